@@ -1,0 +1,125 @@
+"""The scene: everything that a simulation needs, and nothing that changes while it runs."""
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.materials import Material
+from moma.errors import SceneError
+
+__all__ = ["Block", "ContactSettings", "Fidelity", "Scene", "SolverSettings", "TimeSettings"]
+
+
+class Fidelity(StrEnum):
+    """How a block is modelled."""
+
+    FIXED = "fixed"
+    RIGID = "rigid"
+    DEFORMABLE = "deformable"
+
+
+@dataclass(frozen=True)
+class Block:
+    """One convex stone.
+
+    Attributes
+    ----------
+    code : the stone's name, unique in a scene
+    vertices : (nv, 3) corners [m]
+    faces : vertex indices of each planar face, counter-clockwise seen from outside
+    material : density and elasticity
+    fidelity : fixed, rigid or deformable
+    mesh_size : target edge length of the finite elements [m]; only for deformable blocks
+    velocity : (6,) initial translation [m/s] and rotation [rad/s] velocity; not for fixed blocks
+    """
+
+    code: str
+    vertices: NDArray[np.float64]
+    faces: tuple[tuple[int, ...], ...]
+    material: Material
+    fidelity: Fidelity = Fidelity.RIGID
+    mesh_size: float | None = None
+    velocity: tuple[float, ...] = (0.0,) * 6
+
+
+@dataclass(frozen=True)
+class ContactSettings:
+    """Signorini contact with Coulomb friction between every pair of blocks.
+
+    Attributes
+    ----------
+    friction : Coulomb's coefficient μ [-]
+    alert_distance : gap below which a contact is watched, relative to the smaller block's size [-]
+    """
+
+    friction: float = 0.6
+    alert_distance: float = 0.05
+
+
+@dataclass(frozen=True)
+class TimeSettings:
+    """Time integration.
+
+    Attributes
+    ----------
+    step : time step h [s]
+    theta : integration parameter θ, 1/2 ≤ θ ≤ 1; 1 damps most and finds a static equilibrium
+    duration : longest simulated time [s]
+    stop_at_equilibrium : stop as soon as every block is at rest and in balance
+    balance_tolerance : unbalanced force of a block over its weight below which it is in balance [-]
+    collapse_displacement : a block that moved by more than this fraction of its smallest dimension
+        while still moving counts as collapsed [-]
+    """
+
+    step: float = 1e-3
+    theta: float = 1.0
+    duration: float = 1.0
+    stop_at_equilibrium: bool = True
+    balance_tolerance: float = 1e-4
+    collapse_displacement: float = 0.5
+
+
+@dataclass(frozen=True)
+class SolverSettings:
+    """Non-smooth Gauss–Seidel.
+
+    Attributes
+    ----------
+    tolerance : natural map η (unit-free) at which a step counts as solved [-]
+    max_sweeps : sweeps after which a step is given up and reported as not converged
+    """
+
+    tolerance: float = 1e-6
+    max_sweeps: int = 2000
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Bodies, laws, loads and settings of one simulation.
+
+    Attributes
+    ----------
+    name : shown in reports
+    blocks : the stones; contacts are found between all pairs that are not both fixed
+    gravity : (3,) acceleration [m/s²]
+    contact, time, solver : settings
+    frame_every : keep a frame of the motion every so many steps; 0 keeps the first and last only
+    """
+
+    name: str
+    blocks: tuple[Block, ...]
+    gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
+    contact: ContactSettings = field(default_factory=ContactSettings)
+    time: TimeSettings = field(default_factory=TimeSettings)
+    solver: SolverSettings = field(default_factory=SolverSettings)
+    frame_every: int = 0
+
+    def __post_init__(self) -> None:
+        codes = [block.code for block in self.blocks]
+        if not codes:
+            raise SceneError("the scene has no blocks", where=self.name, remedy="select at least one stone")
+        repeated = sorted({code for code in codes if codes.count(code) > 1})
+        if repeated:
+            raise SceneError(f"block codes used twice: {', '.join(repeated)}", where=self.name)
