@@ -1,0 +1,1 @@
+"""Pillar 1: ASCII surveys → planes → faces → extruded blocks → stones that touch."""

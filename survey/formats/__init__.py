@@ -1,0 +1,1 @@
+"""Readers of survey files, each with line-numbered errors."""

@@ -1,0 +1,249 @@
+"""Least-squares planes through surveyed face points, robust to blunders.
+
+The plane n·x = d minimises Σ w (n·x - d)², w = 1/σ². With the weighted centroid c taken out, n is the right
+singular vector of the smallest singular value (FORMULATION.md, §7). In the axes e₁, e₂ of the other two
+singular
+vectors the normal equations are diagonal, so the Gauss–Markov covariance is closed form: the tilts θᵢ
+(δn = -Σ θᵢ eᵢ) have variance σ²/sᵢ², the centroid's height σ²/Σw, and δd = δ(n·c) carries both to the origin
+of
+coordinates.
+
+Blunders: one that is as far out as a stone is wide turns a least-squares plane so much that its own residual
+looks harmless, so residuals of the first fit cannot be trusted. The start is therefore the least median of
+squares (Rousseeuw 1984) over triples of points, which tolerates almost half of the points being wrong; then
+observations are tested one by one with their standardised residuals (Baarda 1968, α₀ = 0.1 %), the worst
+leaving
+first, and those that agree with the final plane return.
+"""
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from moma.errors import GeometryError
+
+__all__ = ["FaceFit", "fit_plane"]
+
+Array = NDArray[np.float64]
+
+_CRITICAL = 3.29  # two-sided normal quantile of Baarda's α₀ = 0.1 %
+_MAX_TRIPLES = 3000  # up to 26 points all triples are tried; beyond, a seeded draw of so many
+_COLLINEAR = 1e-9  # second singular value over the first below which there is no plane
+
+
+@dataclass(frozen=True)
+class FaceFit:
+    """Plane n·x = d fitted to one stone face.
+
+    Attributes
+    ----------
+    normal : (3,) unit vector towards the observer [-]
+    offset : signed distance of the plane from the origin [m]
+    centroid : (3,) weighted mean of the accepted points; it lies on the plane [m]
+    axes : (2, 3) unit directions in the plane, of largest and of smaller spread [-]
+    singular_values : (3,) of the accepted, centred points, unweighted if all weigh the same [m]
+    covariance : (3, 3) of two tilt angles [rad] and the offset [m]; tilt i turns the normal towards -axes[i]
+    rms : root mean square of the accepted residuals [m]
+    sigma0 : sqrt(Σ w r² / redundancy), 1 if the points are as precise as was said; in metres if no precision
+        was
+        given; nan without redundancy, because three points fit any plane
+    redundancy : number of accepted points minus 3
+    rejected : indices of the points left out as blunders
+    residuals : (n,) signed distance of every given point from the plane, towards the observer [m]
+    """
+
+    normal: Array
+    offset: float
+    centroid: Array
+    axes: Array
+    singular_values: Array
+    covariance: Array
+    rms: float
+    sigma0: float
+    redundancy: int
+    rejected: tuple[int, ...]
+    residuals: Array
+
+
+def fit_plane(points: ArrayLike, sigma: ArrayLike | None, observer: ArrayLike | None = None) -> FaceFit:
+    """Fit a plane to the points of a face and leave blunders out.
+
+    Parameters
+    ----------
+    points : (n, 3) surveyed points, n ≥ 3 [m]
+    sigma : standard deviation of a coordinate, one for all or (n,) [m]; None if unknown: then all points
+        weigh
+        the same and the covariance is scaled by what the residuals say
+    observer : (3,) the normal looks towards this point [m]; without it, its largest component is positive
+
+    Returns
+    -------
+    FaceFit
+
+    Raises
+    ------
+    GeometryError
+        if there are fewer than three distinct points, or all lie on a line
+    """
+    xyz, weights = _checked(points, sigma)
+    plain = _weighted_plane(xyz, weights, np.ones(len(xyz), dtype=bool))
+    if _is_clean(plain, xyz, weights, sigma is not None):
+        accepted = np.ones(len(xyz), dtype=bool)
+    else:
+        accepted = _without_blunders(xyz, weights, sigma is not None)
+    return _result(
+        _weighted_plane(xyz, weights, accepted), xyz, weights, accepted, sigma is not None, observer
+    )
+
+
+@dataclass(frozen=True)
+class _Plane:
+    """Weighted least-squares plane of a subset; rows of `vectors` are its singular vectors."""
+
+    centroid: Array
+    vectors: Array
+    singular: Array
+    total_weight: float
+
+    def distances(self, xyz: Array) -> Array:
+        out: Array = (xyz - self.centroid) @ self.vectors[2]
+        return out
+
+    def leverages(self, xyz: Array, weights: Array) -> Array:
+        """Diagonal of the hat matrix: the share of each observation in its own fit."""
+        lateral = (xyz - self.centroid) @ self.vectors[:2].T / self.singular[:2]
+        out: Array = weights * (1.0 / self.total_weight + (lateral**2).sum(axis=1))
+        return out
+
+
+def _checked(points: ArrayLike, sigma: ArrayLike | None) -> tuple[Array, Array]:
+    xyz = np.asarray(points, dtype=np.float64)
+    if xyz.ndim != 2 or xyz.shape[1] != 3 or len(xyz) < 3:
+        raise GeometryError(
+            f"a plane needs (n ≥ 3, 3) points, found {xyz.shape}", remedy="measure more points"
+        )
+    deviations = np.broadcast_to(1.0 if sigma is None else np.asarray(sigma, dtype=np.float64), len(xyz))
+    if not (np.isfinite(xyz).all() and np.isfinite(deviations).all() and (deviations > 0.0).all()):
+        raise GeometryError("coordinates must be finite and sigma positive", remedy="correct the measurement")
+    return xyz, 1.0 / deviations**2
+
+
+def _weighted_plane(xyz: Array, weights: Array, accepted: NDArray[np.bool_]) -> _Plane:
+    some, w = xyz[accepted], weights[accepted]
+    total = float(w.sum())
+    centroid = (
+        some[0] + (w @ (some - some[0])) / total
+    )  # about a point of the face: exact at 10⁶ m from the origin
+    _, singular, vectors = np.linalg.svd((some - centroid) * np.sqrt(w)[:, None], full_matrices=len(some) < 3)
+    if not singular[1] > _COLLINEAR * singular[0]:
+        raise GeometryError("the points lie on one line or coincide", remedy="measure points across the face")
+    return _Plane(centroid, vectors, singular, total)
+
+
+def _is_clean(plane: _Plane, xyz: Array, weights: Array, known: bool) -> bool:
+    """Whether the plain fit passes every test, so that there is nothing to search for.
+
+    The sum of squares catches blunders that hide each other from the single tests, given a precision.
+    """
+    redundancy = len(xyz) - 3
+    if redundancy == 0:
+        return True
+    if not known:
+        return False
+    squares = weights * plane.distances(xyz) ** 2
+    # Wilson–Hilferty approximation of the chi-square quantile at the same α₀, one-sided
+    limit = redundancy * (1.0 - 2.0 / (9.0 * redundancy) + 3.09 * math.sqrt(2.0 / (9.0 * redundancy))) ** 3
+    share = np.maximum(1.0 - plane.leverages(xyz, weights), 1e-6)
+    return bool(squares.sum() <= limit and (squares <= _CRITICAL**2 * share).all())
+
+
+def _without_blunders(xyz: Array, weights: Array, known: bool) -> NDArray[np.bool_]:
+    """Accepted points: robust start, then the worst standardised residual leaves, then good ones return."""
+    start, scale = _least_median(xyz, weights)
+    if known:
+        scale = max(scale, 1.0)  # in units of sigma: never believe points to be better than the survey says
+    accepted = np.sqrt(weights) * np.abs(start) <= _CRITICAL * scale
+    for _ in range(2 * len(xyz)):
+        plane = _weighted_plane(xyz, weights, accepted)
+        lever = plane.leverages(xyz, weights)
+        # a point in the fit pulls the plane towards itself, one outside does not: variances 1 - h and 1 + h
+        share = np.where(accepted, np.maximum(1.0 - lever, 1e-6), 1.0 + lever)
+        tests = np.sqrt(weights) * np.abs(plane.distances(xyz)) / (scale * np.sqrt(share))
+        worst = int(np.argmax(np.where(accepted, tests, 0.0)))
+        best = int(np.argmin(np.where(accepted, np.inf, tests)))
+        if tests[worst] > _CRITICAL and accepted.sum() > 3:
+            accepted[worst] = False
+        elif (
+            not accepted[best] and tests[best] <= 0.9 * _CRITICAL
+        ):  # a margin, so that no point comes and goes
+            accepted[best] = True
+        else:
+            break
+    return accepted
+
+
+def _least_median(xyz: Array, weights: Array) -> tuple[Array, float]:
+    """Distances from the plane with the least median, and the scale of the good points in units of sigma."""
+    count = len(xyz)
+    triples = _triples(count)
+    a, b, c = (xyz[triples[:, k]] - xyz[0] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    areas = np.linalg.norm(normals, axis=1)
+    usable = areas > 1e-3 * areas.max()
+    normals, a = normals[usable] / areas[usable, None], a[usable]
+    distances = normals @ (xyz - xyz[0]).T - (normals * a).sum(axis=1)[:, None]
+    rank = min(count // 2 + 2, count) - 1  # of p = 3 parameters: the median that tolerates most blunders
+    medians = np.partition(np.sqrt(weights) * np.abs(distances), rank, axis=1)[:, rank]
+    best = int(np.argmin(medians))
+    scale = 1.4826 * (1.0 + 5.0 / max(count - 3, 1)) * float(medians[best])
+    return distances[best], max(scale, 1e-12 * float(np.sqrt(weights).max() * np.ptp(xyz, axis=0).max()))
+
+
+def _triples(count: int) -> NDArray[np.intp]:
+    if math.comb(count, 3) <= _MAX_TRIPLES:
+        return np.array(list(combinations(range(count), 3)), dtype=np.intp)
+    draw = np.random.default_rng(count).random((_MAX_TRIPLES, count))
+    return np.argpartition(draw, 3, axis=1)[:, :3]
+
+
+def _result(
+    plane: _Plane,
+    xyz: Array,
+    weights: Array,
+    accepted: NDArray[np.bool_],
+    known: bool,
+    observer: ArrayLike | None,
+) -> FaceFit:
+    """Orient the plane and give its precision."""
+    towards = None if observer is None else np.asarray(observer, dtype=np.float64) - plane.centroid
+    normal = plane.vectors[2] * _sign(plane.vectors[2], towards)
+    residuals = (xyz - plane.centroid) @ normal
+    redundancy = int(accepted.sum()) - 3
+    squares = float((weights * residuals**2)[accepted].sum())
+    sigma0 = math.sqrt(squares / redundancy) if redundancy else math.nan
+    levers = plane.vectors[:2] @ plane.centroid
+    tilts = 1.0 / plane.singular[:2] ** 2
+    covariance = np.diag([*tilts, 1.0 / plane.total_weight + float(tilts @ levers**2)])
+    covariance[:2, 2] = covariance[2, :2] = -tilts * levers
+    mean_weight = plane.total_weight / float(accepted.sum())
+    return FaceFit(
+        normal=normal,
+        offset=float(normal @ plane.centroid),
+        centroid=plane.centroid,
+        axes=plane.vectors[:2],
+        singular_values=plane.singular / math.sqrt(mean_weight),
+        covariance=covariance if known else covariance * sigma0**2,
+        rms=math.sqrt(float((residuals[accepted] ** 2).mean())),
+        sigma0=sigma0,
+        redundancy=redundancy,
+        rejected=tuple(int(i) for i in np.flatnonzero(~accepted)),
+        residuals=residuals,
+    )
+
+
+def _sign(normal: Array, towards: Array | None) -> float:
+    if towards is None:
+        return float(np.sign(normal[np.argmax(np.abs(normal))]))
+    return 1.0 if normal @ towards >= 0.0 else -1.0

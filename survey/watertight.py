@@ -1,0 +1,86 @@
+"""Are the solids closed? Checked with trimesh, nothing repaired."""
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from moma.errors import GeometryError
+from survey.solids import Solid
+
+__all__ = ["check_watertight", "triangulate"]
+
+_CONVEX_TOLERANCE = 1e-9  # metres that a corner may stand in front of a face plane
+
+
+def check_watertight(solid: Solid, *, convex: bool = False) -> None:
+    """Check that a solid is closed, consistently wound and of positive volume.
+
+    Parameters
+    ----------
+    solid : what to check
+    convex : check also that it is convex, within 1e-9 m
+
+    Raises
+    ------
+    GeometryError
+        naming the stone and what is wrong with it
+    """
+    where, remedy = f"stone {solid.code}", "look at its corners in the survey"
+    if not np.isfinite(solid.vertices).all():
+        raise GeometryError("a corner is not finite", where=where, remedy=remedy)
+    mesh = trimesh.Trimesh(solid.vertices, triangulate(solid), process=False)
+    if not mesh.is_watertight:
+        raise GeometryError("the solid is not closed", where=where, remedy=remedy)
+    if not mesh.is_winding_consistent:
+        raise GeometryError("its faces are not all seen from outside", where=where, remedy=remedy)
+    if not mesh.volume > 0.0:
+        raise GeometryError(
+            f"its volume is {mesh.volume:.3g} m³: inside out or flat", where=where, remedy=remedy
+        )
+    if convex and (height := _highest_corner(solid)) > _CONVEX_TOLERANCE:
+        raise GeometryError(f"it is not convex: a corner is {height:.3g} m out", where=where, remedy=remedy)
+
+
+def triangulate(solid: Solid) -> NDArray[np.intp]:
+    """Split the faces into triangles, wound like them, by cutting ears.
+
+    Returns
+    -------
+    (nt, 3) vertex indices
+    """
+    triangles = [triangle for face in solid.faces for triangle in _ears(solid.vertices, face)]
+    return np.array(triangles, dtype=np.intp)
+
+
+def _ears(vertices: NDArray[np.float64], face: tuple[int, ...]) -> list[tuple[int, int, int]]:
+    rest, triangles = list(face), []
+    polygon = vertices[rest]
+    normal = np.cross(polygon - polygon[0], np.roll(polygon, -1, axis=0) - polygon[0]).sum(axis=0)
+    while len(rest) > 3:
+        ear = next((k for k in range(len(rest)) if _is_ear(vertices, rest, k, normal)), 0)
+        triangles.append((rest[ear - 1], rest[ear], rest[(ear + 1) % len(rest)]))
+        del rest[ear]
+    triangles.append((rest[0], rest[1], rest[2]))
+    return triangles
+
+
+def _is_ear(vertices: NDArray[np.float64], rest: list[int], k: int, normal: NDArray[np.float64]) -> bool:
+    ids = (rest[k - 1], rest[k], rest[(k + 1) % len(rest)])
+    corners = vertices[list(ids)]
+    inward = np.cross(normal, np.roll(corners, -1, axis=0) - corners)
+    if inward[0] @ (corners[2] - corners[0]) <= 0.0:
+        return False
+    others = vertices[[i for i in rest if i not in ids]]
+    inside = ((others[:, None, :] - corners) * inward).sum(axis=2) >= 0.0
+    return not inside.all(axis=1).any()
+
+
+def _highest_corner(solid: Solid) -> float:
+    """Largest height of any corner above any face plane [m]."""
+    highest = 0.0
+    for face in solid.faces:
+        polygon = solid.vertices[list(face)]
+        normal = np.cross(polygon - polygon[0], np.roll(polygon, -1, axis=0) - polygon[0]).sum(axis=0)
+        heights = (solid.vertices - polygon.mean(axis=0)) @ (normal / np.linalg.norm(normal))
+        highest = max(highest, float(heights.max()))
+    return highest
