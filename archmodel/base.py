@@ -1,0 +1,61 @@
+"""The declarative base, and the column types that SQL does not have: arrays and instants."""
+
+from datetime import UTC, datetime
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import DateTime, LargeBinary
+from sqlalchemy.engine import Dialect
+from sqlalchemy.orm import DeclarativeBase
+from sqlalchemy.types import TypeDecorator
+
+__all__ = ["ArrayType", "Base", "UtcDateTime"]
+
+
+class Base(DeclarativeBase):
+    """Base of every table of the entity database."""
+
+
+class ArrayType(TypeDecorator[NDArray[np.float64]]):
+    """A float64 array of known shape, stored bit for bit as little-endian bytes.
+
+    Arrays come out read-only, since a change in place would never reach the database.
+
+    Parameters
+    ----------
+    shape : as for ``numpy.reshape``; one axis may be -1
+    """
+
+    impl = LargeBinary
+    cache_ok = True
+
+    def __init__(self, *shape: int) -> None:
+        super().__init__()
+        self.shape = shape
+
+    def process_bind_param(self, value: NDArray[np.float64] | None, dialect: Dialect) -> bytes | None:
+        """Array to bytes."""
+        if value is None:
+            return None
+        return np.asarray(value, dtype="<f8").reshape(self.shape).tobytes()
+
+    def process_result_value(self, value: bytes | None, dialect: Dialect) -> NDArray[np.float64] | None:
+        """Bytes to a read-only array."""
+        if value is None:
+            return None
+        return np.frombuffer(value, dtype="<f8").astype(np.float64, copy=False).reshape(self.shape)
+
+
+class UtcDateTime(TypeDecorator[datetime]):
+    """An instant: stored as UTC without a zone, given back with the zone UTC."""
+
+    impl = DateTime
+    cache_ok = True
+
+    def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
+        """Zoned instant to UTC without a zone."""
+        return None if value is None else value.astimezone(UTC).replace(tzinfo=None)
+
+    def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:
+        """Stored instant to one in UTC."""
+        return None if value is None else value.replace(tzinfo=UTC)

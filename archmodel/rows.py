@@ -1,0 +1,183 @@
+"""From plain records to rows of the tables and back, with every value checked on the way in."""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import Row
+
+from archmodel.entities import Entity, kind_named, kind_of
+from archmodel.measures import face_area, face_extent, solid_volume
+from archmodel.records import RunRecord, StoneRecord, StoneResult
+from archmodel.tables import FIDELITIES, Measurement
+from moma.errors import DatabaseError, GeometryError, MomaError, SurveyError, UsageError
+
+__all__ = ["entity_row", "measurement_row", "result_row", "stone_record", "summary_of"]
+
+Array = NDArray[np.float64]
+
+
+def entity_row(stone: StoneRecord, place: str) -> dict[str, object]:
+    """Row of the `entity` table, without its keys.
+
+    Parameters
+    ----------
+    stone : the record
+    place : ``file:line stone CODE``, for errors
+    """
+    vertices = _array(stone.solid_vertices, (-1, 3), "solid_vertices", place)
+    volume, centroid = _solid(vertices, stone.solid_faces, place)
+    outline = _array(stone.outline, (-1, 3), "outline", place)
+    length, height = face_extent(outline, _array(stone.normal, (3,), "normal", place))
+    if stone.depth_sigma is not None:
+        _number(stone.depth_sigma, "depth_sigma", place)
+    return {
+        "kind": _kind(stone.kind, place),
+        "code": _text(stone.code, "code", place),
+        "course": stone.course,
+        "depth": _number(stone.depth, "depth", place),
+        "depth_sigma": stone.depth_sigma,
+        "depth_source": stone.depth_source,
+        "length": length,
+        "height": height,
+        "area": face_area(outline),
+        "volume": volume,
+        "x": float(centroid[0]),
+        "y": float(centroid[1]),
+        "z": float(centroid[2]),
+    }
+
+
+def measurement_row(stone: StoneRecord, place: str) -> dict[str, object]:
+    """Row of the `measurement` table, without its key."""
+    rejected = [int(index) for index in stone.rejected]
+    points = _array(stone.points, (-1, 3), "points", place)
+    if any(not 0 <= index < len(points) for index in rejected):
+        raise SurveyError(f"rejected point {max(rejected)} of {len(points)} points", where=place)
+    return {
+        "line": stone.line,
+        "sigma": _number(stone.sigma, "sigma", place),
+        "offset": _number(stone.offset, "offset", place),
+        "rms": _number(stone.rms, "rms", place),
+        "redundancy": int(stone.redundancy),
+        "point_count": len(points),
+        "rejected_count": len(rejected),
+        "rejected": rejected,
+        "normal": _array(stone.normal, (3,), "normal", place),
+        "covariance": _array(stone.covariance, (3, 3), "covariance", place),
+        "vertices": _array(stone.vertices, (-1, 3), "vertices", place),
+        "points": points,
+        "outline": _array(stone.outline, (-1, 3), "outline", place),
+        "solid_vertices": _array(stone.solid_vertices, (-1, 3), "solid_vertices", place),
+        "solid_faces": [[int(index) for index in face] for face in stone.solid_faces],
+        "notes": {str(key): str(value) for key, value in stone.notes.items()},
+    }
+
+
+def stone_record(row: Row[tuple[Entity, Measurement]]) -> StoneRecord:
+    """The record that was stored, with arrays of its own."""
+    entity, measured = row
+    return StoneRecord(
+        code=entity.code,
+        kind=entity.kind,
+        course=entity.course,
+        line=measured.line,
+        vertices=measured.vertices.copy(),
+        points=measured.points.copy(),
+        sigma=measured.sigma,
+        normal=measured.normal.copy(),
+        offset=measured.offset,
+        covariance=measured.covariance.copy(),
+        rms=measured.rms,
+        redundancy=measured.redundancy,
+        rejected=tuple(measured.rejected),
+        outline=measured.outline.copy(),
+        depth=entity.depth,
+        depth_sigma=entity.depth_sigma,
+        depth_source=entity.depth_source,
+        solid_vertices=measured.solid_vertices.copy(),
+        solid_faces=tuple(tuple(face) for face in measured.solid_faces),
+        notes=dict(measured.notes),
+    )
+
+
+def result_row(result: StoneResult, place: str) -> dict[str, object]:
+    """Row of the `entity_result` table, without its keys."""
+    if result.fidelity not in FIDELITIES:
+        what = f"fidelity {result.fidelity!r} is none of {', '.join(FIDELITIES)}"
+        raise DatabaseError(what, where=place)
+    numbers = {
+        "von_mises_max": result.von_mises_max,
+        "von_mises_mean": result.von_mises_mean,
+        "displacement_max": result.displacement_max,
+        "contact_force_max": result.contact_force_max,
+    }
+    for name, value in [*numbers.items(), *result.values.items()]:
+        if value is not None and not math.isfinite(value):
+            raise DatabaseError(f"{name} is {value}, not a finite number", where=place)
+    values = {str(name): float(value) for name, value in result.values.items()}
+    finite = {name: None if value is None else float(value) for name, value in numbers.items()}
+    return {"fidelity": str(result.fidelity), "values": values, **finite}
+
+
+def summary_of(run: RunRecord) -> Mapping[str, object]:
+    """The run's summary as JSON will give it back.
+
+    Raises
+    ------
+    DatabaseError
+        if JSON cannot say it
+    """
+    try:
+        plain: Mapping[str, object] = json.loads(json.dumps(dict(run.summary), allow_nan=False))
+    except (TypeError, ValueError) as error:
+        raise DatabaseError(f"the summary cannot be stored: {error}", where=f"run of {run.scene}") from error
+    return plain
+
+
+def _kind(name: str, place: str) -> str:
+    """The kind's own spelling; a kind of the hierarchy or an error at its place in the survey."""
+    try:
+        return kind_of(kind_named(name))
+    except UsageError as error:
+        raise SurveyError(error.what, where=place, remedy=error.remedy) from None
+
+
+def _text(value: str, name: str, place: str) -> str:
+    if not value or not value.isprintable() or value != value.strip():
+        what = f"{name} {value[:40]!r} has no visible character, or some that cannot be typed"
+        raise SurveyError(what, where=place)
+    return value
+
+
+def _number(value: float, name: str, place: str) -> float:
+    if not (math.isfinite(value) and (value >= 0.0 or name == "offset")):
+        raise SurveyError(f"{name} is {value}", where=place, remedy="a finite number, not negative")
+    return float(value)
+
+
+def _array(value: Array, shape: tuple[int, ...], name: str, place: str) -> Array:
+    """`value` as floats; an error unless it has the shape (-1: any length) and only finite numbers."""
+    array = np.asarray(value, dtype=np.float64)
+    fits = array.ndim == len(shape) and all(
+        want in (-1, got) for want, got in zip(shape, array.shape, strict=True)
+    )
+    if not fits:
+        raise SurveyError(f"{name} has shape {array.shape}, expected {shape}", where=place)
+    if not np.isfinite(array).all():
+        raise SurveyError(f"{name} has a coordinate that is not a finite number", where=place)
+    return array
+
+
+def _solid(vertices: Array, faces: Sequence[Sequence[int]], place: str) -> tuple[float, Array]:
+    """Volume and centroid of the stone's solid, which must be the right way out."""
+    if any(len(face) < 3 or not all(0 <= index < len(vertices) for index in face) for face in faces):
+        what = f"a face of the solid is not a polygon on its {len(vertices)} vertices"
+        raise GeometryError(what, where=place)
+    volume, centroid = solid_volume(vertices, faces) if faces else (0.0, vertices.sum(axis=0))
+    if not volume > 0.0:
+        remedy = "its faces must be counter-clockwise seen from outside, and its depth above zero"
+        raise GeometryError(f"the volume of the solid is {volume:g} m³", where=place, remedy=remedy)
+    return volume, centroid

@@ -1,0 +1,204 @@
+"""Into the database and out again: surveyed stones, simulation runs."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from datetime import UTC, datetime
+from itertools import islice
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import insert, select
+from sqlalchemy.orm import Session
+
+from archmodel.entities import Entity
+from archmodel.records import RunRecord, StoneRecord
+from archmodel.rows import entity_row, measurement_row, result_row, stone_record, summary_of
+from archmodel.tables import EntityResult, Measurement, Run, Survey
+from moma.errors import DatabaseError
+
+__all__ = ["load_stones", "store_run", "store_survey", "survey_with_hash"]
+
+BATCH = 500
+"""Rows per statement: fewer than SQLite's limit of parameters, and memory does not grow with the file."""
+
+T = TypeVar("T")
+
+
+def store_survey(
+    session: Session,
+    name: str,
+    source_path: str,
+    sha256: str,
+    stones: Iterable[StoneRecord],
+    *,
+    observer: NDArray[np.float64] | None = None,
+) -> int:
+    """Take in one survey file: all of it, or, if anything is wrong, nothing.
+
+    Parameters
+    ----------
+    session : a writing session; it stays usable after an error
+    name : the survey's name
+    source_path : the file, as the user wrote it
+    sha256 : of the file's bytes, in hexadecimal
+    stones : its stones, at least one; read once, never all in memory
+    observer : (3,) where the instrument stood [m]
+
+    Returns
+    -------
+    int
+        number of the survey in the database
+
+    Raises
+    ------
+    DatabaseError
+        if the file was taken in before, or a code is there already
+    SurveyError, GeometryError
+        if a stone cannot be stored, at its ``file:line``
+    """
+    with session.begin_nested():
+        _refuse_again(session, source_path, sha256)
+        survey = Survey(
+            name=name, path=source_path, sha256=sha256, stored_at=datetime.now(UTC), observer=observer
+        )
+        session.add(survey)
+        session.flush()
+        lines: dict[str, int] = {}
+        for batch in _batches(stones):
+            _refuse_known_codes(session, batch, lines, source_path)
+            _insert_stones(session, batch, survey.id, source_path)
+        if not lines:
+            remedy = "give it at least one stone record"
+            raise DatabaseError("the survey has no stones", where=source_path, remedy=remedy)
+        return survey.id
+
+
+def survey_with_hash(session: Session, sha256: str) -> Survey | None:
+    """The survey that was taken in from a file with these bytes, if any."""
+    return session.scalar(select(Survey).where(Survey.sha256 == sha256))
+
+
+def load_stones(session: Session, entities: Iterable[Entity]) -> list[StoneRecord]:
+    """The survey's records of these entities, in the same order, exactly as they were stored."""
+    wanted = [entity.id for entity in entities]
+    found: dict[int, StoneRecord] = {}
+    for batch in _batches(dict.fromkeys(wanted)):
+        rows = session.execute(
+            select(Entity, Measurement).join(Entity.measurement).where(Entity.id.in_(batch))
+        )
+        found.update((row[0].id, stone_record(row)) for row in rows)
+    missing = [number for number in wanted if number not in found]
+    if missing:
+        raise DatabaseError(
+            f"{len(missing)} entities are no longer in the database", where=f"entity {missing[0]}"
+        )
+    return [found[number] for number in wanted]
+
+
+def store_run(session: Session, run: RunRecord) -> int:
+    """Keep a run and its result for each stone: all of it or nothing.
+
+    Returns
+    -------
+    int
+        number of the run, larger than that of every earlier one
+
+    Raises
+    ------
+    DatabaseError
+        if a stone of the run is not in the database or comes twice, or a number is not finite
+    """
+    place = f"run of {run.scene}"
+    codes = [result.code for result in run.results]
+    if len(set(codes)) < len(codes):
+        twice = next(code for code in codes if codes.count(code) > 1)
+        raise DatabaseError(f"two results for stone {twice}", where=place)
+    with session.begin_nested():
+        stored = Run(
+            scene=run.scene,
+            scene_text=run.scene_text,
+            outcome=str(run.outcome),
+            summary=dict(summary_of(run)),
+            version=run.version,
+            stored_at=datetime.now(UTC),
+        )
+        session.add(stored)
+        session.flush()
+        for batch in _batches(run.results):
+            numbers = _entity_numbers(session, [result.code for result in batch], place)
+            rows = [
+                {
+                    "run_id": stored.id,
+                    "entity_id": numbers[result.code],
+                    **result_row(result, f"{place}, stone {result.code}"),
+                }
+                for result in batch
+            ]
+            session.execute(insert(EntityResult), rows)
+        return stored.id
+
+
+def _refuse_again(session: Session, source_path: str, sha256: str) -> None:
+    """A file is taken in once."""
+    if (known := survey_with_hash(session, sha256)) is not None:
+        what = f"this file is in the database already, as survey {known.name!r} from {known.path}"
+        raise DatabaseError(
+            what, where=source_path, remedy="there is nothing to do, or use another database (--db)"
+        )
+
+
+def _refuse_known_codes(
+    session: Session, batch: Sequence[StoneRecord], lines: dict[str, int], path: str
+) -> None:
+    """A code names one stone of the database. `lines` holds this file's codes so far, and is added to."""
+    known = session.execute(
+        select(Entity.code, Survey.path, Measurement.line)
+        .join(Entity.survey)
+        .join(Entity.measurement)
+        .where(Entity.code.in_([stone.code for stone in batch]))
+    )
+    elsewhere = {code: f"{other}:{line}" for code, other, line in known}
+    for stone in batch:
+        if stone.code in lines:
+            first = f"{path}:{lines[stone.code]}"
+        elif stone.code in elsewhere:
+            first = elsewhere[stone.code]
+        else:
+            lines[stone.code] = stone.line
+            continue
+        remedy = "give each stone a code of its own, or take this file into another database (--db)"
+        what = f"the code {stone.code} is taken by the stone at {first}"
+        raise DatabaseError(what, where=f"{path}:{stone.line}", remedy=remedy)
+
+
+def _insert_stones(session: Session, batch: Sequence[StoneRecord], survey_id: int, path: str) -> None:
+    """The rows of one batch of stones, checked."""
+    places = [f"{path}:{stone.line} stone {stone.code}" for stone in batch]
+    entities = [
+        entity_row(stone, place) | {"survey_id": survey_id}
+        for stone, place in zip(batch, places, strict=True)
+    ]
+    measurements = [measurement_row(stone, place) for stone, place in zip(batch, places, strict=True)]
+    # The table, not the class: rows of many kinds go into one statement.
+    table = Entity.metadata.tables[Entity.__tablename__]
+    numbers = session.scalars(insert(table).returning(table.c.id, sort_by_parameter_order=True), entities)
+    rows = [{"entity_id": number, **row} for number, row in zip(numbers, measurements, strict=True)]
+    session.execute(insert(Measurement), rows)
+
+
+def _entity_numbers(session: Session, codes: Sequence[str], place: str) -> dict[str, int]:
+    """Primary keys by code; every code must be there."""
+    rows = session.execute(select(Entity.code, Entity.id).where(Entity.code.in_(codes)))
+    numbers = {code: number for code, number in rows}
+    for code in codes:
+        if code not in numbers:
+            remedy = "keep the run in the database that its stones were taken from (--db)"
+            raise DatabaseError(f"stone {code} is not in the database", where=place, remedy=remedy)
+    return numbers
+
+
+def _batches(items: Iterable[T]) -> Iterator[list[T]]:
+    """The items in lists of `BATCH`."""
+    source = iter(items)
+    while batch := list(islice(source, BATCH)):
+        yield batch
