@@ -51,6 +51,5 @@ def depth_for(record: BlockRecord, rules: Sequence[DepthRule]) -> Depth:
     raise SurveyError(
         f"no depth is known for a {record.kind}",
         where=f"stone {record.code} (line {record.line})",
-        remedy=f"give the stone a depth, or add 'depth {record.kind} D source TEXT' to the head of the
-        survey",
+        remedy=f"measure the stone, or put 'depth {record.kind} D source TEXT' before the stones",
     )

@@ -16,6 +16,7 @@ leaving
 first, and those that agree with the final plane return.
 """
 
+import math
 from dataclasses import dataclass
 from itertools import combinations
 
