@@ -1,0 +1,1 @@
+"""Bodies: rigid and fixed ones in arrays, deformable ones with their finite elements."""

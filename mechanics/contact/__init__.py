@@ -1,0 +1,1 @@
+"""Contact detection: from the predicted configuration to contact points."""

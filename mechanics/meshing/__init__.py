@@ -1,0 +1,1 @@
+"""Tetrahedral meshes of single stones."""

@@ -1,0 +1,145 @@
+"""A scene made ready to compute: meshes, masses, surfaces; what does not change while it runs."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.bodies.deformable import Deformable, deformable
+from mechanics.bodies.rigid import RigidInertia
+from mechanics.contact.surfaces import FaceMesh, Surfaces, surfaces
+from mechanics.meshing.mesh import TetMesh
+from mechanics.meshing.mesher import mesh_block
+from mechanics.polyhedra import MassProperties, mass_properties
+from mechanics.scene import Block, Fidelity, Scene
+from mechanics.state import State
+from moma.errors import SceneError
+
+__all__ = ["Model", "build_model"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Model:
+    """What does not change while a scene runs.
+
+    Attributes
+    ----------
+    scene : as given
+    fixed, elastic : (nb,) which bodies never move, which are deformable
+    inertia : of the rigid bodies
+    mass : (nb,) [kg]
+    volume : (nb,) [m³]
+    surfaces : for contact detection
+    stones : per body its finite elements; None if it has none
+    node_ptr : (nb+1,) nodes of each body in State.node
+    """
+
+    scene: Scene
+    fixed: NDArray[np.bool_]
+    elastic: NDArray[np.bool_]
+    inertia: RigidInertia
+    mass: Array
+    volume: Array
+    surfaces: Surfaces
+    stones: tuple[Deformable | None, ...]
+    node_ptr: Ints
+
+    @property
+    def gravity(self) -> Array:
+        """(3,) acceleration [m/s²]."""
+        return np.array(self.scene.gravity)
+
+    def nodes_of(self, body: int) -> slice:
+        """Where the nodes of a body lie in State.node."""
+        return slice(int(self.node_ptr[body]), int(self.node_ptr[body + 1]))
+
+
+def build_model(scene: Scene, progress: Callable[[int, int], None] | None = None) -> tuple[Model, State]:
+    """Mesh the deformable stones and pack all bodies; also the state at rest where the scene begins.
+
+    Raises
+    ------
+    SceneError : if a deformable block has no mesh size, or a fixed one a velocity
+    MeshError, GeometryError : if a stone cannot be meshed or its faces do not close
+    """
+    blocks = scene.blocks
+    properties = [mass_properties(block.vertices, block.faces, f"stone {block.code}") for block in blocks]
+    stones: list[Deformable | None] = []
+    centres = np.array([p.centroid for p in properties])
+    for index, block in enumerate(blocks):
+        _check(block)
+        if block.fidelity is Fidelity.DEFORMABLE:
+            stone, centres[index] = deformable(mesh_block(block), block.material)
+            stones.append(stone)
+        else:
+            stones.append(None)
+        if progress is not None:
+            progress(index + 1, len(blocks))
+    node_ptr = np.concatenate([[0], np.cumsum([0 if s is None else len(s.mesh.nodes) for s in stones])]).astype(np.int64)
+    density = np.array([block.material.density for block in blocks])
+    model = Model(
+        scene=scene,
+        fixed=np.array([block.fidelity is Fidelity.FIXED for block in blocks]),
+        elastic=np.array([stone is not None for stone in stones]),
+        inertia=_inertia(blocks, properties, density),
+        mass=density * np.array([p.volume for p in properties]),
+        volume=np.array([p.volume for p in properties]),
+        surfaces=surfaces(
+            [block.vertices - centre for block, centre in zip(blocks, centres, strict=True)],
+            [block.faces for block in blocks],
+            [
+                mesh
+                for block, stone, start in zip(blocks, stones, node_ptr, strict=False)
+                for mesh in _face_meshes(block, None if stone is None else stone.mesh, int(start))
+            ],
+        ),
+        stones=tuple(stones),
+        node_ptr=node_ptr,
+    )
+    return model, _start(model, centres)
+
+
+def _check(block: Block) -> None:
+    if block.fidelity is Fidelity.DEFORMABLE and not (block.mesh_size is not None and block.mesh_size > 0):
+        raise SceneError(
+            f"mesh_size = {block.mesh_size!r} for a deformable stone", where=f"stone {block.code}", remedy="give metres greater than 0"
+        )
+    if block.fidelity is Fidelity.FIXED and any(block.velocity):
+        raise SceneError("a fixed stone has a velocity", where=f"stone {block.code}", remedy="make it rigid")
+
+
+def _inertia(blocks: tuple[Block, ...], properties: list[MassProperties], density: Array) -> RigidInertia:
+    rigid = np.array([block.fidelity is Fidelity.RIGID for block in blocks])
+    mass = density * np.array([p.volume for p in properties])
+    inertia = density[:, None, None] * np.array([p.inertia for p in properties])
+    return RigidInertia(
+        mass, np.where(rigid, 1.0 / mass, 0.0), inertia, np.where(rigid[:, None, None], np.linalg.inv(inertia), 0.0)
+    )
+
+
+def _face_meshes(block: Block, mesh: TetMesh | None, start: int) -> list[FaceMesh | None]:
+    if mesh is None:
+        return [None] * len(block.faces)
+    result: list[FaceMesh | None] = []
+    for face in range(len(block.faces)):
+        node, triangle = np.unique(mesh.triangles[mesh.triangle_face == face], return_inverse=True)
+        result.append(FaceMesh(start + node, mesh.nodes[node], triangle.reshape(-1, 3).astype(np.int64)))
+    return result
+
+
+def _start(model: Model, centres: Array) -> State:
+    velocity = np.array([block.velocity for block in model.scene.blocks], dtype=float)
+    node = np.zeros((int(model.node_ptr[-1]), 3))
+    node_velocity = np.zeros_like(node)
+    for body, stone in enumerate(model.stones):
+        if stone is not None:
+            rows = model.nodes_of(body)
+            node[rows] = centres[body] + stone.mesh.nodes
+            node_velocity[rows] = velocity[body, :3] + np.cross(velocity[body, 3:], stone.mesh.nodes)
+            velocity[body] = 0.0
+    rotation = np.tile(np.eye(3), (len(centres), 1, 1))
+    return State(0.0, centres.copy(), rotation, velocity, node, node_velocity)

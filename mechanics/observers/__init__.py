@@ -1,0 +1,1 @@
+"""Observers: what is measured while a scene runs."""

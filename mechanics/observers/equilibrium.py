@@ -1,0 +1,91 @@
+"""Is every stone in balance, does it rest, has it fallen?"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.contact.contacts import Contacts, material_points
+from mechanics.model import Model
+from mechanics.state import State
+
+__all__ = ["Support", "displacement", "imbalance", "speed", "support_reaction"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Support:
+    """Global equilibrium.
+
+    Attributes
+    ----------
+    reaction : contact force of all fixed bodies against gravity [N]
+    weight : of all bodies that are not fixed [N]
+    """
+
+    reaction: float
+    weight: float
+
+    @property
+    def error(self) -> float:
+        """|reaction - weight| / weight [-]; zero without weight."""
+        return abs(self.reaction - self.weight) / self.weight if self.weight > 0 else 0.0
+
+
+def imbalance(model: Model, state: State, contacts: Contacts, force: Array) -> Array:
+    """Unbalanced force and moment of each body over its weight (nb,) [-]; zero for fixed bodies.
+
+    The sum of the weight and of the contact forces (nc, 3) [N], inertia left out: it is zero only for a body in
+    static equilibrium. The moment, about the centre of mass, counts with the smallest width as its arm. Without
+    gravity the largest contact force replaces the weight.
+    """
+    resultant = np.zeros((len(model.mass), 6))
+    points = material_points(contacts, state)
+    np.add.at(resultant, contacts.bodies[:, 0], _wrench(state, contacts.bodies[:, 0], points[:, 0], force))
+    np.add.at(resultant, contacts.bodies[:, 1], _wrench(state, contacts.bodies[:, 1], points[:, 1], -force))
+    resultant[:, :3] += model.mass[:, None] * model.gravity
+    scale = model.mass * float(np.linalg.norm(model.gravity))
+    if not scale.any():
+        scale = np.full(len(scale), np.linalg.norm(force, axis=1).max(initial=0.0) or 1.0)
+    size = model.surfaces.size
+    parts = np.linalg.norm(resultant[:, :3], axis=1), np.linalg.norm(resultant[:, 3:], axis=1) / size
+    result: Array = np.where(model.fixed, 0.0, np.maximum(*parts) / scale)
+    return result
+
+
+def _wrench(state: State, body: NDArray[np.int64], point: Array, force: Array) -> Array:
+    return np.column_stack([force, np.cross(point - state.centre[body], force)])
+
+
+def support_reaction(model: Model, contacts: Contacts, force: Array) -> Support:
+    """Sum of the contact forces (nc, 3) [N] from fixed bodies, along -gravity (along z without gravity)."""
+    g = float(np.linalg.norm(model.gravity))
+    up = -model.gravity / g if g > 0 else np.array([0.0, 0.0, 1.0])
+    sign = model.fixed[contacts.bodies[:, 1]].astype(float) - model.fixed[contacts.bodies[:, 0]]
+    return Support(float(sign @ (force @ up)), float(model.mass[~model.fixed].sum() * g))
+
+
+def displacement(model: Model, start: State, state: State) -> Array:
+    """Largest displacement of a corner or node of each body since `start` (nb,) [m]."""
+    corner = model.surfaces.body_of_vertex
+    moved = np.einsum("vij,vj->vi", (state.rotation - start.rotation)[corner], model.surfaces.vertex)
+    moved += (state.centre - start.centre)[corner]
+    largest = np.maximum.reduceat(np.linalg.norm(moved, axis=1), model.surfaces.vptr[:-1])
+    return _with_nodes(model, largest, np.linalg.norm(state.node - start.node, axis=1))
+
+
+def speed(model: Model, state: State) -> Array:
+    """Largest speed of a corner or node of each body (nb,) [m/s]."""
+    corner = model.surfaces.body_of_vertex
+    arm = np.einsum("vij,vj->vi", state.rotation[corner], model.surfaces.vertex)
+    v = state.velocity[corner, :3] + np.cross(state.velocity[corner, 3:], arm)
+    largest = np.maximum.reduceat(np.linalg.norm(v, axis=1), model.surfaces.vptr[:-1])
+    return _with_nodes(model, largest, np.linalg.norm(state.node_velocity, axis=1))
+
+
+def _with_nodes(model: Model, largest: Array, of_nodes: Array) -> Array:
+    for b, stone in enumerate(model.stones):
+        if stone is not None:
+            largest[b] = of_nodes[model.nodes_of(b)].max()
+    return largest

@@ -1,0 +1,45 @@
+"""When does a run end, and how: at rest, still moving, or collapsed."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.model import Model
+from mechanics.observers.equilibrium import displacement, speed
+from mechanics.result import Outcome
+from mechanics.state import State
+
+__all__ = ["Watch"]
+
+Array = NDArray[np.float64]
+
+# so many steps in a row must be in balance
+_LASTING = 5
+# a body rests below this part of the speed √(g · size) of a fall over its own size
+_REST_SPEED = 1e-4
+# and is falling above this part
+_FALL_SPEED = 0.05
+
+
+class Watch:
+    """Tells the outcome after each step.
+
+    *Equilibrium*: for five steps in a row every body that is not fixed is in balance (unbalanced force and moment below the
+    scene's tolerance) and slower than 10⁻⁴ √(g · its smallest width). *Collapsed*: a body has moved by more than the
+    scene's fraction of its smallest width and is faster than 0.05 √(g · width). Without gravity g counts as 1 m/s².
+    """
+
+    def __init__(self, model: Model, start: State) -> None:
+        self._model, self._start = model, start
+        self._quiet = 0
+
+    def __call__(self, state: State, balance: Array, converged: bool) -> Outcome:
+        """The outcome so far, given the imbalance of each body (nb,)."""
+        model, settings = self._model, self._model.scene.time
+        fall = np.sqrt((float(np.linalg.norm(model.gravity)) or 1.0) * model.surfaces.size)
+        pace = speed(model, state) / fall
+        quiet = converged and balance.max() <= settings.balance_tolerance and pace.max() <= _REST_SPEED
+        self._quiet = self._quiet + 1 if quiet else 0
+        if self._quiet >= _LASTING:
+            return Outcome.EQUILIBRIUM
+        far = displacement(model, self._start, state) > settings.collapse_displacement * model.surfaces.size
+        return Outcome.COLLAPSED if bool((far & (pace > _FALL_SPEED)).any()) else Outcome.MOVING

@@ -1,0 +1,83 @@
+"""Mass, extent and planes of polyhedra with planar faces."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from moma.errors import GeometryError
+
+__all__ = ["MassProperties", "face_plane", "fan", "mass_properties", "smallest_width"]
+
+Array = NDArray[np.float64]
+Faces = Sequence[Sequence[int]]
+
+
+@dataclass(frozen=True)
+class MassProperties:
+    """Mass properties at unit density.
+
+    Attributes
+    ----------
+    volume : [m³]
+    centroid : (3,) [m]
+    inertia : (3, 3) second-moment tensor of inertia about the centroid, world axes [m⁵]
+    """
+
+    volume: float
+    centroid: Array
+    inertia: Array
+
+
+def fan(faces: Faces) -> NDArray[np.int64]:
+    """Triangles (nt, 3) of all faces, each face cut from its first corner."""
+    return np.array([(f[0], f[i], f[i + 1]) for f in faces for i in range(1, len(f) - 1)], dtype=np.int64)
+
+
+def mass_properties(vertices: Array, faces: Faces, where: str | None = None) -> MassProperties:
+    """Volume, centroid and inertia by the divergence theorem.
+
+    Each boundary triangle and the mean of the corners span a tetrahedron; for a tetrahedron with corners
+    0, a, b, c the moments are ∫x = V (a+b+c)/4 and ∫x xᵀ = V/20 (Σ a aᵀ + s sᵀ), with s = a+b+c (Tonon 2004).
+
+    Raises
+    ------
+    GeometryError : if the faces are not closed, or their orientation gives no positive volume
+    """
+    edges = {(f[i - 1], f[i]) for f in faces for i in range(len(f))}
+    if any((b, a) not in edges for a, b in edges):
+        raise GeometryError(
+            "the faces do not close", where=where, remedy="give each edge to exactly two faces, in opposite directions"
+        )
+    origin = vertices.mean(axis=0)
+    corners = (vertices - origin)[fan(faces)]
+    volumes = np.linalg.det(corners) / 6.0
+    volume = float(volumes.sum())
+    if not volume > 0:
+        raise GeometryError(
+            f"the faces enclose {volume:.3g} m³",
+            where=where,
+            remedy="order the corners of each face counter-clockwise seen from outside",
+        )
+    total = corners.sum(axis=1)
+    mean = np.einsum("t,ti->i", volumes, total) / (4.0 * volume)
+    second = np.einsum("t,tki,tkj->ij", volumes, corners, corners) + np.einsum("t,ti,tj->ij", volumes, total, total)
+    second = second / 20.0 - volume * np.outer(mean, mean)
+    inertia = np.trace(second) * np.eye(3) - second
+    return MassProperties(volume, origin + mean, inertia)
+
+
+def face_plane(points: Array) -> tuple[Array, Array]:
+    """Unit normal by Newell's method and mean point of one polygon (n, 3), ordered counter-clockwise."""
+    centre = points.mean(axis=0)
+    local = points - centre  # far from the origin the cross products would lose the small differences
+    normal = np.cross(local, np.roll(local, -1, axis=0)).sum(axis=0)
+    return normal / np.linalg.norm(normal), centre
+
+
+def smallest_width(vertices: Array, faces: Faces) -> float:
+    """Smallest extent of a convex polyhedron along a face normal [m]."""
+    normals = np.array([face_plane(vertices[list(f)])[0] for f in faces])
+    heights = vertices @ normals.T
+    return float((heights.max(axis=0) - heights.min(axis=0)).min())

@@ -1,0 +1,67 @@
+"""From the last state to what is asked of it: stresses, positions, contact forces."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.contact.contacts import Contacts, gaps, material_points
+from mechanics.elasticity import von_mises
+from mechanics.model import Model
+from mechanics.result import BodyResult, ContactResult
+from mechanics.state import State
+
+__all__ = ["body_results", "contact_results", "positions"]
+
+Array = NDArray[np.float64]
+
+
+def positions(model: Model, state: State) -> tuple[Array, ...]:
+    """Points of each body now: the corners of a rigid one, the nodes of a deformable one [m]."""
+    vptr = model.surfaces.vptr
+    return tuple(
+        state.node[model.nodes_of(b)]
+        if stone is not None
+        else state.centre[b] + model.surfaces.vertex[vptr[b] : vptr[b + 1]] @ state.rotation[b].T
+        for b, stone in enumerate(model.stones)
+    )
+
+
+def body_results(model: Model, start: State, state: State) -> tuple[BodyResult, ...]:
+    """What became of each body."""
+    results = []
+    before, now = positions(model, start), positions(model, state)
+    for b, (block, stone) in enumerate(zip(model.scene.blocks, model.stones, strict=True)):
+        stress = None if stone is None else stone.stress(now[b], state.centre[b], state.rotation[b])
+        results.append(
+            BodyResult(
+                code=block.code,
+                fidelity=block.fidelity,
+                reference=before[b],
+                position=now[b],
+                faces=block.faces if stone is None else tuple(map(tuple, stone.mesh.triangles.tolist())),
+                tetrahedra=np.zeros((0, 4), dtype=np.int64) if stone is None else stone.mesh.tetrahedra,
+                stress=stress,
+                von_mises=None if stress is None else von_mises(stress),
+                volume=float(model.volume[b]),
+                mass=float(model.mass[b]),
+            )
+        )
+    return tuple(results)
+
+
+def contact_results(contacts: Contacts, state: State, impulse: Array, force: Array, friction: float) -> ContactResult:
+    """The contact points with their mean force over the last step.
+
+    A contact slips when its impulse lies on Coulomb's cone, to a relative 10⁻⁶.
+    """
+    pressed = impulse[:, 0] > 0
+    tangential = np.linalg.norm(impulse[:, 1:], axis=1)
+    slip = pressed & (tangential >= (1 - 1e-6) * friction * impulse[:, 0])
+    return ContactResult(
+        bodies=contacts.bodies,
+        point=material_points(contacts, state).mean(axis=1),
+        normal=contacts.frame[:, 0],
+        force=force,
+        gap=gaps(contacts, state),
+        area=contacts.area,
+        status=np.where(~pressed, "open", np.where(slip, "slip", "stick")),
+    )

@@ -1,0 +1,88 @@
+"""One step's frictional contact problem: pure algebra between physics and algorithm.
+
+    find (u, r):  u = W r + u_free,   0 ≤ u_N + bias ⊥ r_N ≥ 0,   ‖r_T‖ ≤ μ r_N,  r_T = -μ r_N u_T/‖u_T‖ if u_T ≠ 0
+
+W = Hᵀ ŵ H is never formed. A rigid body answers through its six velocities; a deformable one through the dense
+compliance between the contact sides that lie on it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["NONE", "ContactProblem", "ContactSolution", "Delassus", "ELASTIC", "RIGID"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+NONE, RIGID, ELASTIC = 0, 1, 2
+
+
+@dataclass(frozen=True)
+class Delassus:
+    """W = Hᵀ ŵ H in factored form; side 0 (candidate) counts positive, side 1 (antagonist) negative.
+
+    Attributes
+    ----------
+    body : (nc, 2) bodies of the two sides
+    kind : (nc, 2) NONE (fixed), RIGID or ELASTIC
+    jacobian : (nc, 2, 3, 6) local velocity of a rigid side from its body's velocity
+    response : (nc, 2, 6, 3) body velocity from the local impulse, ŵ times the transpose of `jacobian`
+    slot : (nc, 2) place of an elastic side among those of its body
+    yptr : (nb+1,) where each body's elastic velocities begin (three for each side)
+    bptr : (nb+1,) where each body's compliance block begins
+    block : flat symmetric compliance blocks of the elastic bodies, between their contact sides [1/kg]
+    diagonal : (nc, 3, 3) W_αα [1/kg]
+    """
+
+    body: Ints
+    kind: Ints
+    jacobian: Array
+    response: Array
+    slot: Ints
+    yptr: Ints
+    bptr: Ints
+    block: Array
+    diagonal: Array
+
+    @property
+    def arrays(self) -> tuple[NDArray[np.generic], ...]:
+        """What the kernels take, in their order."""
+        return self.body, self.kind, self.jacobian, self.response, self.slot, self.yptr, self.bptr, self.block
+
+
+@dataclass(frozen=True)
+class ContactProblem:
+    """What a solver sees.
+
+    Attributes
+    ----------
+    delassus : W
+    u_free : (nc, 3) relative velocity without contact impulses, local frame (n, t1, t2) [m/s]
+    bias : (nc,) shift of u_N in Signorini's condition [m/s]
+    friction : (nc,) Coulomb's μ [-]
+    """
+
+    delassus: Delassus
+    u_free: Array
+    bias: Array
+    friction: Array
+
+
+@dataclass(frozen=True)
+class ContactSolution:
+    """What a solver gives back.
+
+    Attributes
+    ----------
+    impulse : (nc, 3) r, on the candidate, local frame [N s]
+    sweeps : passes over the contacts
+    natural_map : η of `impulse`, as mechanics.residual computes it
+    converged : η is within the tolerance
+    """
+
+    impulse: Array
+    sweeps: int
+    natural_map: float
+    converged: bool

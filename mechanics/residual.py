@@ -1,0 +1,46 @@
+"""How well a contact problem is solved: the natural map, computed outside the solvers."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.problem import ContactProblem
+from mechanics.solvers._kernels import apply_delassus
+
+__all__ = ["natural_map", "project_on_cone", "relative_velocity"]
+
+Array = NDArray[np.float64]
+
+
+def relative_velocity(problem: ContactProblem, impulse: Array) -> Array:
+    """u = W r + u_free (nc, 3), local frame [m/s]."""
+    u, _, _ = apply_delassus(impulse, *problem.delassus.arrays)
+    velocity: Array = u + problem.u_free
+    return velocity
+
+
+def natural_map(problem: ContactProblem, impulse: Array) -> float:
+    """η = ‖r - P_K(r - ρ û)‖ / ‖r‖ with û = u + (bias + μ‖u_T‖) n and ρ = 1 / (mean diagonal of W).
+
+    The de Saxcé form of Signorini–Coulomb (de Saxcé & Feng 1991; FORMULATION.md §5); independent of units. Zero
+    without contacts; where no impulse is given but one is needed, the size of P_K(-ρ û) replaces ‖r‖, so η is 1.
+    """
+    if len(impulse) == 0:
+        return 0.0
+    u = relative_velocity(problem, impulse)
+    u[:, 0] += problem.bias + problem.friction * np.linalg.norm(u[:, 1:], axis=1)
+    rho = 1.0 / float(np.mean(np.trace(problem.delassus.diagonal, axis1=1, axis2=2) / 3.0))
+    projected = project_on_cone(impulse - rho * u, problem.friction)
+    scale = max(float(np.linalg.norm(impulse)), float(np.linalg.norm(projected)))
+    return float(np.linalg.norm(impulse - projected)) / scale if scale > 0 else 0.0
+
+
+def project_on_cone(point: Array, friction: Array) -> Array:
+    """Nearest points (nc, 3) of Coulomb's cones ‖r_T‖ ≤ μ r_N."""
+    n, size = point[:, 0], np.linalg.norm(point[:, 1:], axis=1)
+    inside = size <= friction * n
+    below = friction * size <= -n
+    height = (n + friction * size) / (1.0 + friction**2)
+    shrink = np.where(size > 0, friction * height / np.where(size > 0, size, 1.0), 0.0)
+    on_cone = np.column_stack([height, point[:, 1] * shrink, point[:, 2] * shrink])
+    result: Array = np.where(inside[:, None], point, np.where(below[:, None], 0.0, on_cone))
+    return result

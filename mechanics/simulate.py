@@ -1,0 +1,135 @@
+"""Run a scene from its start to its outcome, with its history and error measures."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.model import Model, build_model
+from mechanics.observers.energy import EnergyBalance, kinetic_energy
+from mechanics.observers.equilibrium import imbalance, speed, support_reaction
+from mechanics.outcome import Watch
+from mechanics.postprocess import body_results, contact_results, positions
+from mechanics.result import Errors, Frame, History, Outcome, Result
+from mechanics.scene import Scene
+from mechanics.simulation import Clock, Simulation, Step
+from mechanics.state import State
+from mechanics.stepping import follow_nodes
+
+__all__ = ["Progress", "simulate"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a run stands: `done` of `total` in a stage, with a short text; total is None if not known."""
+
+    stage: str
+    done: int
+    total: int | None
+    text: str = ""
+
+
+def simulate(scene: Scene, progress: Callable[[Progress], None] | None = None) -> Result:
+    """Run a scene until it rests, has collapsed, or its duration is over.
+
+    Raises
+    ------
+    SceneError, GeometryError, MeshError : if the scene cannot be built
+    SolverError : if the motion is no longer finite
+    """
+    report = progress or (lambda _: None)
+    clock = Clock()
+    with clock("mesh"):
+        model, start = build_model(scene, lambda done, total: report(Progress("mesh", done, total)))
+    simulation = Simulation(model, start, clock)
+    log = _Log(model, start)
+    watch = Watch(model, start)
+    settings = scene.time
+    frames = [Frame(start.time, positions(model, start))]
+    outcome, step = Outcome.MOVING, None
+    total = max(1, round(settings.duration / settings.step))
+    for count in range(1, total + 1):
+        step = simulation.step()
+        with clock("observe"):
+            balance = log(step)
+            outcome = watch(step.after, balance, step.solution.converged)
+        report(Progress("step", count, total, f"balance {balance.max():.1e}, η {step.solution.natural_map:.1e}"))
+        done = settings.stop_at_equilibrium and outcome is not Outcome.MOVING
+        if done or count == total or (scene.frame_every and count % scene.frame_every == 0):
+            frames.append(Frame(step.after.time, positions(model, step.after)))
+        if done:
+            break
+    assert step is not None
+    return _result(model, start, step, outcome, log, frames, clock)
+
+
+class _Log:
+    """Collects what the observers say of each step."""
+
+    def __init__(self, model: Model, start: State) -> None:
+        self._model = model
+        self.energy = EnergyBalance(model, start)
+        self.penetration = 0.0
+        self.unconverged = 0
+        self.rows: list[tuple[float, ...]] = []
+
+    def __call__(self, step: Step) -> Array:
+        """Account for one step, and return the imbalance of each body (nb,)."""
+        model, solution = self._model, step.solution
+        self.energy(step.before, step.after, step.work, model.scene.time.theta)
+        self.penetration = max(self.penetration, float(np.max(-step.gap, initial=0.0)))
+        self.unconverged += not solution.converged
+        balance = imbalance(model, step.after, step.contacts, step.force)
+        self.rows.append(
+            (
+                step.after.time,
+                kinetic_energy(model, step.after),
+                float(speed(model, step.after).max()),
+                float(balance.max()),
+                solution.natural_map,
+                solution.sweeps,
+                len(step.contacts),
+            )
+        )
+        return balance
+
+    def history(self) -> History:
+        """One array for each quantity."""
+        time, kinetic, fastest, balance, eta, sweeps, contacts = np.array(self.rows).T
+        return History(time, kinetic, fastest, balance, eta, sweeps.astype(np.int64), contacts.astype(np.int64))
+
+
+def _result(
+    model: Model, start: State, last: Step, outcome: Outcome, log: _Log, frames: list[Frame], clock: Clock
+) -> Result:
+    history, scene = log.history(), model.scene
+    support = support_reaction(model, last.contacts, last.force)
+    with clock("stress"):
+        bodies = body_results(model, start, follow_nodes(model, last.after))
+    errors = Errors(
+        natural_map=float(history.natural_map[-10:].max()),
+        penetration=log.penetration / float(model.surfaces.size.min()),
+        balance=float(history.balance[-1]),
+        reaction=support.error,
+        energy=log.energy.error,
+        unconverged_steps=log.unconverged,
+    )
+    return Result(
+        scene=scene,
+        outcome=outcome,
+        steps=len(history.time),
+        time=last.after.time,
+        bodies=bodies,
+        contacts=contact_results(
+            last.contacts, last.after, last.solution.impulse, last.force, scene.contact.friction
+        ),
+        errors=errors,
+        reaction=support.reaction,
+        weight=support.weight,
+        frames=tuple(frames),
+        history=history,
+        wall_time=dict(clock.seconds),
+    )

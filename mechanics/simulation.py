@@ -1,0 +1,165 @@
+"""The loop of FORMULATION.md: predict, detect, state the problem, solve, advance."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.bodies.deformable import DynamicCompliance
+from mechanics.contact.assembly import ElasticSides, delassus, elastic_sides, local_velocity, world_impulse
+from mechanics.contact.contacts import Contacts, gaps
+from mechanics.contact.detection import Detector
+from mechanics.memory import Memory
+from mechanics.model import Model
+from mechanics.observers.equilibrium import displacement, speed
+from mechanics.problem import ContactSolution
+from mechanics.solvers.nsgs import NSGS
+from mechanics.state import State
+from mechanics.stepping import advance, compliances, contact_problem, follow_nodes, free_motion, predict
+from moma.errors import SolverError
+
+__all__ = ["Clock", "Simulation", "Step"]
+
+Array = NDArray[np.float64]
+
+# contacts are found anew when a body has moved by more than this part of its smallest width since last time
+_STALE = 1e-3
+
+
+class Clock:
+    """Wall seconds by stage."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def __call__(self, stage: str) -> Iterator[None]:
+        """Add the time of a with-block to a stage."""
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - start
+
+
+@dataclass(frozen=True)
+class Step:
+    """What one step found.
+
+    Attributes
+    ----------
+    before, after : the states between which it lies
+    contacts : the contact points
+    solution : their impulses
+    force : (nc, 3) mean forces r/h on the candidates, world axes [N]
+    gap : (nc,) at the end of the step [m]
+    work : r·u_θ, the work of the contacts [J]
+    """
+
+    before: State
+    after: State
+    contacts: Contacts
+    solution: ContactSolution
+    force: Array
+    gap: Array
+    work: float
+
+
+@dataclass(frozen=True)
+class _Touching:
+    """The contacts in force, what they condense of the deformable bodies, and where they were found."""
+
+    contacts: Contacts
+    elastic: ElasticSides
+    configuration: State
+
+
+class Simulation:
+    """A scene in motion; `step` takes it one time step on."""
+
+    def __init__(self, model: Model, start: State, clock: Clock) -> None:
+        settings = model.scene
+        self.model, self.state, self.clock = model, start, clock
+        self._step, self._theta = settings.time.step, settings.time.theta
+        with clock("assemble"):
+            self._compliance: dict[int, DynamicCompliance] = compliances(model, self._step, self._theta)
+        self._detector = Detector(model.surfaces, model.fixed, settings.contact.alert_distance)
+        self._solve = NSGS(settings.solver.tolerance, settings.solver.max_sweeps)
+        self._memory = Memory()
+        self._touching: _Touching | None = None
+
+    def step(self) -> Step:
+        """Predict, detect, solve, advance.
+
+        Raises
+        ------
+        SolverError : if the motion is no longer finite
+        """
+        h, theta, model = self._step, self._theta, self.model
+        predicted = predict(self.state, h * (1 - theta))
+        predicted, touching = self._detect(predicted)
+        contacts = touching.contacts
+        # one frame for the whole step: the linear problem of a deformable body is stated in it
+        elastic = model.elastic
+        before = replace(
+            self.state,
+            centre=np.where(elastic[:, None], predicted.centre, self.state.centre),
+            rotation=np.where(elastic[:, None, None], predicted.rotation, self.state.rotation),
+        )
+        with self.clock("assemble"):
+            free = free_motion(model, before, self._compliance, h, theta)
+            operator = delassus(model, predicted, contacts, touching.elastic)
+            problem = contact_problem(model, predicted, contacts, operator, free, h, theta)
+        with self.clock("solve"):
+            solution = self._solve(problem, start=self._memory.recall(contacts))
+        with self.clock("advance"):
+            after = advance(model, before, predicted, contacts, solution.impulse, free, self._compliance, h, theta)
+        if not (np.isfinite(after.velocity).all() and np.isfinite(after.node_velocity).all()):
+            raise SolverError(
+                f"the velocities are not finite at t = {after.time:.6g} s",
+                where=model.scene.name,
+                remedy="use a smaller time step",
+            )
+        self._memory.store(contacts, solution.impulse)
+        self.state = after
+        return self._describe(before, predicted, after, contacts, solution)
+
+    def _detect(self, predicted: State) -> tuple[State, _Touching]:
+        """The contacts at the predicted configuration; found anew only when something has moved."""
+        known = self._touching
+        if known is not None:
+            moved = displacement(self.model, known.configuration, predicted)
+            if (moved <= _STALE * self.model.surfaces.size).all():
+                frame = known.configuration
+                elastic = self.model.elastic
+                return replace(
+                    predicted,
+                    centre=np.where(elastic[:, None], frame.centre, predicted.centre),
+                    rotation=np.where(elastic[:, None, None], frame.rotation, predicted.rotation),
+                ), known
+        with self.clock("detect"):
+            predicted = follow_nodes(self.model, predicted)
+            contacts = self._detector(predicted, self._step * speed(self.model, predicted))
+            elastic_part = elastic_sides(self.model, predicted, contacts, self._compliance)
+        self._touching = _Touching(contacts, elastic_part, predicted)
+        return predicted, self._touching
+
+    def _describe(
+        self, before: State, predicted: State, after: State, contacts: Contacts, solution: ContactSolution
+    ) -> Step:
+        theta = self._theta
+        velocity = theta * after.velocity + (1 - theta) * before.velocity
+        node_velocity = theta * after.node_velocity + (1 - theta) * before.node_velocity
+        u_theta = local_velocity(contacts, predicted, velocity, node_velocity)
+        return Step(
+            before,
+            after,
+            contacts,
+            solution,
+            world_impulse(contacts, solution.impulse) / self._step,
+            gaps(contacts, after),
+            float(np.sum(solution.impulse * u_theta)),
+        )

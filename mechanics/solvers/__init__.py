@@ -1,0 +1,1 @@
+"""Solvers of one step's frictional contact problem, and the residual that judges them all."""

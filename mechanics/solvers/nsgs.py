@@ -1,0 +1,46 @@
+"""Non-smooth Gauss–Seidel (Jean 1999; Jourdan, Alart & Jean 1998)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.problem import ContactProblem, ContactSolution
+from mechanics.residual import natural_map
+from mechanics.solvers._kernels import apply_delassus, local_factors, sweep
+
+__all__ = ["NSGS"]
+
+
+@dataclass(frozen=True)
+class NSGS:
+    """Sweeps the contacts, solving each exactly with its neighbours frozen, until η ≤ tolerance.
+
+    Attributes
+    ----------
+    tolerance : natural map η at which the problem counts as solved [-]
+    max_sweeps : sweeps after which it is given up
+    check_every : sweeps between two looks at η
+    """
+
+    tolerance: float = 1e-6
+    max_sweeps: int = 2000
+    check_every: int = 20
+
+    def __call__(self, problem: ContactProblem, start: NDArray[np.float64]) -> ContactSolution:
+        """Solve from the impulses `start` (nc, 3)."""
+        impulse = np.array(start, dtype=float)
+        eta = natural_map(problem, impulse)
+        shift = problem.u_free.copy()
+        shift[:, 0] += problem.bias
+        arrays, diagonal = problem.delassus.arrays, problem.delassus.diagonal
+        factors = local_factors(diagonal)
+        sweeps = 0
+        while eta > self.tolerance and sweeps < self.max_sweeps:
+            # the running velocities are made anew each time, so that rounding cannot pile up
+            _, v, y = apply_delassus(impulse, *arrays)
+            count = min(self.check_every, self.max_sweeps - sweeps)
+            sweep(count, True, impulse, v, y, shift, problem.friction, factors, diagonal, *arrays)
+            sweeps += count
+            eta = natural_map(problem, impulse)
+        return ContactSolution(impulse, sweeps, eta, eta <= self.tolerance)

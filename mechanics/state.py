@@ -1,0 +1,34 @@
+"""The state of a simulation: what changes from step to step, and nothing else."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["State"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class State:
+    """Configuration and velocity at one instant; replaced as a whole each step.
+
+    A deformable body has its nodes, and a frame that follows their mean motion; a rigid body has its frame alone.
+
+    Attributes
+    ----------
+    time : [s]
+    centre : (nb, 3) centre of mass of each body [m]
+    rotation : (nb, 3, 3) from body axes (those of the start) to world axes [-]
+    velocity : (nb, 6) of rigid bodies: translation [m/s] and rotation [rad/s], world axes; zero for others
+    node : (nn, 3) nodes of all deformable bodies, one body after the other [m]
+    node_velocity : (nn, 3) [m/s]
+    """
+
+    time: float
+    centre: Array
+    rotation: Array
+    velocity: Array
+    node: Array
+    node_velocity: Array
