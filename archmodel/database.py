@@ -56,7 +56,7 @@ class Database:
             with Session(engine, expire_on_commit=False) as session, session.begin():
                 yield session
         except DBAPIError as error:
-            raise _refusal(error, self.url) from error
+            raise _refusal(error, self.engine.url.database or "memory") from error
 
     def close(self) -> None:
         """Give the connections back; the database can be opened again."""

@@ -6,15 +6,14 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import Row
 
 from archmodel.entities import Entity, kind_named, kind_of
 from archmodel.measures import face_area, face_extent, solid_volume
 from archmodel.records import RunRecord, StoneRecord, StoneResult
 from archmodel.tables import FIDELITIES, Measurement
-from moma.errors import DatabaseError, GeometryError, MomaError, SurveyError, UsageError
+from moma.errors import DatabaseError, GeometryError, SurveyError, UsageError
 
-__all__ = ["entity_row", "measurement_row", "result_row", "stone_record", "summary_of"]
+__all__ = ["entity_row", "measurement_row", "result_row", "stone_record", "storable", "summary_of"]
 
 Array = NDArray[np.float64]
 
@@ -31,15 +30,14 @@ def entity_row(stone: StoneRecord, place: str) -> dict[str, object]:
     volume, centroid = _solid(vertices, stone.solid_faces, place)
     outline = _array(stone.outline, (-1, 3), "outline", place)
     length, height = face_extent(outline, _array(stone.normal, (3,), "normal", place))
-    if stone.depth_sigma is not None:
-        _number(stone.depth_sigma, "depth_sigma", place)
+    depth_sigma = None if stone.depth_sigma is None else _number(stone.depth_sigma, "depth_sigma", place)
     return {
         "kind": _kind(stone.kind, place),
         "code": _text(stone.code, "code", place),
-        "course": stone.course,
+        "course": None if stone.course is None else int(stone.course),
         "depth": _number(stone.depth, "depth", place),
-        "depth_sigma": stone.depth_sigma,
-        "depth_source": stone.depth_source,
+        "depth_sigma": depth_sigma,
+        "depth_source": storable(stone.depth_source),
         "length": length,
         "height": height,
         "area": face_area(outline),
@@ -57,7 +55,7 @@ def measurement_row(stone: StoneRecord, place: str) -> dict[str, object]:
     if any(not 0 <= index < len(points) for index in rejected):
         raise SurveyError(f"rejected point {max(rejected)} of {len(points)} points", where=place)
     return {
-        "line": stone.line,
+        "line": int(stone.line),
         "sigma": _number(stone.sigma, "sigma", place),
         "offset": _number(stone.offset, "offset", place),
         "rms": _number(stone.rms, "rms", place),
@@ -76,9 +74,8 @@ def measurement_row(stone: StoneRecord, place: str) -> dict[str, object]:
     }
 
 
-def stone_record(row: Row[tuple[Entity, Measurement]]) -> StoneRecord:
+def stone_record(entity: Entity, measured: Measurement) -> StoneRecord:
     """The record that was stored, with arrays of its own."""
-    entity, measured = row
     return StoneRecord(
         code=entity.code,
         kind=entity.kind,
@@ -135,6 +132,11 @@ def summary_of(run: RunRecord) -> Mapping[str, object]:
     except (TypeError, ValueError) as error:
         raise DatabaseError(f"the summary cannot be stored: {error}", where=f"run of {run.scene}") from error
     return plain
+
+
+def storable(text: str) -> str:
+    """The text with undecodable bytes (of a file's name, say) spelled out, since no database takes them."""
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def _kind(name: str, place: str) -> str:

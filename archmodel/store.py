@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session
 
 from archmodel.entities import Entity
 from archmodel.records import RunRecord, StoneRecord
-from archmodel.rows import entity_row, measurement_row, result_row, stone_record, summary_of
+from archmodel.rows import entity_row, measurement_row, result_row, stone_record, storable, summary_of
 from archmodel.tables import EntityResult, Measurement, Run, Survey
 from moma.errors import DatabaseError
 
@@ -59,7 +59,11 @@ def store_survey(
     with session.begin_nested():
         _refuse_again(session, source_path, sha256)
         survey = Survey(
-            name=name, path=source_path, sha256=sha256, stored_at=datetime.now(UTC), observer=observer
+            name=storable(name),
+            path=storable(source_path),
+            sha256=sha256,
+            stored_at=datetime.now(UTC),
+            observer=observer,
         )
         session.add(survey)
         session.flush()
@@ -86,7 +90,7 @@ def load_stones(session: Session, entities: Iterable[Entity]) -> list[StoneRecor
         rows = session.execute(
             select(Entity, Measurement).join(Entity.measurement).where(Entity.id.in_(batch))
         )
-        found.update((row[0].id, stone_record(row)) for row in rows)
+        found.update((entity.id, stone_record(entity, measured)) for entity, measured in rows)
     missing = [number for number in wanted if number not in found]
     if missing:
         raise DatabaseError(
@@ -115,8 +119,8 @@ def store_run(session: Session, run: RunRecord) -> int:
         raise DatabaseError(f"two results for stone {twice}", where=place)
     with session.begin_nested():
         stored = Run(
-            scene=run.scene,
-            scene_text=run.scene_text,
+            scene=storable(run.scene),
+            scene_text=storable(run.scene_text),
             outcome=str(run.outcome),
             summary=dict(summary_of(run)),
             version=run.version,
@@ -189,7 +193,7 @@ def _insert_stones(session: Session, batch: Sequence[StoneRecord], survey_id: in
 def _entity_numbers(session: Session, codes: Sequence[str], place: str) -> dict[str, int]:
     """Primary keys by code; every code must be there."""
     rows = session.execute(select(Entity.code, Entity.id).where(Entity.code.in_(codes)))
-    numbers = {code: number for code, number in rows}
+    numbers = {row.code: row.id for row in rows}
     for code in codes:
         if code not in numbers:
             remedy = "keep the run in the database that its stones were taken from (--db)"
