@@ -6,7 +6,7 @@ import math
 from sqlalchemy import select
 from sqlalchemy.orm import Session, joinedload, selectinload
 
-from archmodel.entities import Entity, definition_of, kind_chain, kind_of
+from archmodel.entities import Entity, definition_of, kind_chain, kind_of, refuse_unknown_kinds
 from archmodel.tables import EntityResult, Measurement
 from moma.errors import UsageError
 
@@ -30,6 +30,7 @@ def describe(session: Session, code: str) -> dict[str, object]:
     UsageError
         if there is no such stone; names the nearest codes
     """
+    refuse_unknown_kinds(session)
     entity = session.scalar(
         select(Entity)
         .where(Entity.code == _plain(code))

@@ -23,12 +23,12 @@ too.
 import difflib
 from collections.abc import Iterator, Mapping
 
-from sqlalchemy import ForeignKey, Index, String
-from sqlalchemy.orm import Mapped, declared_attr, mapped_column, relationship
+from sqlalchemy import ForeignKey, Index, String, select
+from sqlalchemy.orm import Mapped, Session, declared_attr, mapped_column, relationship
 
 from archmodel.base import Base
 from archmodel.tables import EntityResult, Measurement, Survey
-from moma.errors import UsageError
+from moma.errors import DatabaseError, UsageError
 
 __all__ = [
     "Ashlar",
@@ -48,6 +48,7 @@ __all__ = [
     "kind_named",
     "kind_of",
     "kinds",
+    "refuse_unknown_kinds",
 ]
 
 
@@ -183,3 +184,17 @@ def kind_chain(cls: type[Entity]) -> tuple[type[Entity], ...]:
 def definition_of(cls: type[Entity]) -> str:
     """The one sentence that defines a kind."""
     return (cls.__doc__ or "").strip().split("\n", 1)[0]
+
+
+def refuse_unknown_kinds(session: Session) -> None:
+    """Check that every kind in the database is declared, as it is not if another program added its own.
+
+    Raises
+    ------
+    DatabaseError
+        naming such a kind
+    """
+    unknown = session.scalar(select(Entity.kind).where(Entity.kind.not_in(list(kinds()))).limit(1))
+    if unknown is not None:
+        remedy = "import the module that declares it, or use the version of MOMA that stored it"
+        raise DatabaseError(f"the database holds a kind {unknown!r} that is not declared", remedy=remedy)

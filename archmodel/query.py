@@ -8,14 +8,14 @@ from sqlalchemy.orm import Session, object_session
 
 from archmodel.attributes import ATTRIBUTES, Attribute, with_attributes
 from archmodel.description import describe
-from archmodel.entities import Entity, kind_named, kinds
+from archmodel.entities import Entity, kind_named, kinds, refuse_unknown_kinds
 from archmodel.expressions import condition
 from moma.errors import DatabaseError, QueryError
 
 __all__ = ["attributes", "describe", "find", "find_rows", "row_of", "rows_of"]
 
-MAX_EXPRESSIONS = 50
-"""Most expressions in one query."""
+MAX_EXPRESSIONS = 20
+"""Most expressions in one query: together they stay below the number of parameters that SQLite takes."""
 
 BATCH = 500
 """Entities per statement in `rows_of`, below SQLite's limit of parameters."""
@@ -85,8 +85,5 @@ def _restricted(session: Session, statement: S, where: Sequence[str]) -> S:
             f"{len(expressions)} expressions, at most {MAX_EXPRESSIONS}", where="--where", remedy=remedy
         )
     conditions = [condition(expression) for expression in expressions]
-    unknown = session.scalar(select(Entity.kind).where(Entity.kind.not_in(list(kinds()))).limit(1))
-    if unknown is not None:
-        remedy = "import the module that declares it, or use the version of MOMA that stored it"
-        raise DatabaseError(f"the database holds a kind {unknown!r} that is not declared", remedy=remedy)
+    refuse_unknown_kinds(session)
     return statement.where(*conditions).order_by(Entity.id)

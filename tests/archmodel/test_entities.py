@@ -1,0 +1,78 @@
+import subprocess
+import sys
+
+import pytest
+
+from archmodel.entities import (
+    Ashlar,
+    Entity,
+    Keystone,
+    Rubble,
+    Springer,
+    Voussoir,
+    definition_of,
+    kind_chain,
+    kind_named,
+    kind_of,
+    kinds,
+)
+from moma.errors import UsageError
+
+
+def test_a_keystone_is_a_voussoir_is_an_ashlar_is_an_entity() -> None:
+    assert kind_chain(Keystone) == (Entity, Ashlar, Voussoir, Keystone)
+
+
+def test_rubble_is_no_ashlar() -> None:
+    assert kind_chain(Rubble) == (Entity, Rubble)
+
+
+def test_every_kind_is_found_by_its_name_and_has_a_definition_of_its_own() -> None:
+    definitions = [definition_of(cls) for cls in kinds().values()]
+    assert all(text.startswith(("A", "The")) and text.endswith(".") for text in definitions)
+    assert len(set(definitions)) == len(definitions)
+    assert all(kind_named(name) is cls and kind_of(cls) == name for name, cls in kinds().items())
+
+
+def test_kinds_of_the_sample_are_there() -> None:
+    sample = {"header", "stretcher", "jamb", "sill", "voussoir", "keystone", "springer"}
+    assert sample <= set(kinds())
+
+
+def test_upper_case_is_understood() -> None:
+    assert kind_named(" Springer ") is Springer
+
+
+@pytest.mark.parametrize(
+    ("typed", "meant"), [("headers", "header"), ("vousoir", "voussoir"), ("Kestone", "keystone")]
+)
+def test_an_unknown_kind_names_the_nearest(typed: str, meant: str) -> None:
+    with pytest.raises(UsageError, match=f"did you mean .*{meant}"):
+        kind_named(typed)
+
+
+def test_a_kind_like_no_other_lists_them_all() -> None:
+    with pytest.raises(UsageError, match="the kinds are entity, ashlar, header"):
+        kind_named("☃")
+
+
+def test_a_new_kind_is_one_small_class() -> None:
+    # In a process of its own, since a kind cannot be taken back.
+    program = '''
+from archmodel.entities import Voussoir, kinds
+from archmodel.database import open_database
+from archmodel.store import store_survey
+from archmodel.query import find
+from tests.archmodel.stones import SHA, box_stone
+
+class Counterkey(Voussoir):
+    """A voussoir beside the keystone."""
+
+database = open_database("sqlite://")
+with database.session() as session:
+    stones = [box_stone("V2", "counterkey"), box_stone("V3", "keystone")]
+    store_survey(session, "arch", "arch.moma", SHA, stones)
+    assert [type(e) for e in find(session, "counterkey")] == [Counterkey]
+    assert [e.code for e in find(session, "voussoir")] == ["V2", "V3"]
+'''
+    subprocess.run([sys.executable, "-W", "error", "-c", program], check=True)

@@ -1,0 +1,224 @@
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from archmodel.database import Database
+from archmodel.query import find
+from archmodel.records import RunRecord, StoneRecord
+from archmodel.store import load_stones, store_run, store_survey, survey_with_hash
+from archmodel.tables import EntityResult, Run
+from moma.errors import DatabaseError, GeometryError, MomaError, SurveyError
+from tests.archmodel.stones import SHA, box_stone, contents, run_record
+
+OTHER = "cd" * 32
+
+
+def assert_same(got: StoneRecord, want: StoneRecord) -> None:
+    """Equal field by field, arrays to the last bit."""
+    for name, value in vars(want).items():
+        if isinstance(value, np.ndarray):
+            assert getattr(got, name).tobytes() == value.astype(float).tobytes(), name
+            assert getattr(got, name).shape == value.shape, name
+        else:
+            assert getattr(got, name) == value, name
+
+
+def test_stones_come_back_bit_for_bit(filled: Database, wall: tuple[StoneRecord, ...]) -> None:
+    with filled.session(read_only=True) as session:
+        for got, want in zip(load_stones(session, find(session, "entity")), wall, strict=True):
+            assert_same(got, want)
+
+
+def test_stones_come_back_in_the_order_asked_for(filled: Database) -> None:
+    with filled.session(read_only=True) as session:
+        stones = find(session, "entity")[::-1]
+        assert [r.code for r in load_stones(session, [*stones, stones[0]])] == [
+            *[s.code for s in stones],
+            stones[0].code,
+        ]
+
+
+def test_loaded_arrays_belong_to_the_caller(filled: Database) -> None:
+    with filled.session(read_only=True) as session:
+        (stone,) = load_stones(session, find(session, "keystone"))
+        stone.points[0] = 7.0
+        (again,) = load_stones(session, find(session, "keystone"))
+        assert again.points[0, 0] != 7.0
+
+
+def test_entities_can_be_loaded_in_a_later_session(filled: Database) -> None:
+    with filled.session(read_only=True) as session:
+        stones = find(session, "voussoir")
+    with filled.session(read_only=True) as session:
+        assert [r.code for r in load_stones(session, stones)] == ["V1", "V2", "V3"]
+
+
+def test_more_stones_than_one_statement_holds(empty: Database) -> None:
+    stones = [box_stone(f"S{i}") for i in range(1201)]
+    with empty.session() as session:
+        store_survey(session, "big", "big.moma", SHA, iter(stones))
+    with empty.session(read_only=True) as session:
+        loaded = load_stones(session, find(session, "entity"))
+    assert [r.code for r in loaded] == [f"S{i}" for i in range(1201)]
+    assert_same(loaded[1100], stones[1100])
+
+
+def test_a_survey_is_found_by_the_hash_of_its_file(filled: Database) -> None:
+    with filled.session(read_only=True) as session:
+        survey = survey_with_hash(session, SHA)
+        assert survey is not None
+        assert (survey.name, survey.path) == ("window", "window.moma")
+        assert survey_with_hash(session, OTHER) is None
+
+
+def test_the_observer_is_kept(empty: Database) -> None:
+    with empty.session() as session:
+        store_survey(session, "a", "a.moma", SHA, [box_stone("A")], observer=np.array([1.0, 2.0, 3.0]))
+    with empty.session(read_only=True) as session:
+        survey = survey_with_hash(session, SHA)
+        assert survey is not None
+        assert survey.observer is not None
+        assert survey.observer.tolist() == [1.0, 2.0, 3.0]
+
+
+NAN = float("nan")
+BAD = box_stone("BAD", line=42)
+REFUSED = [
+    (
+        replace(BAD, code="A1", line=9),
+        DatabaseError,
+        r"new\.moma:9: the code A1 is taken by the stone at new\.moma:7",
+    ),
+    (
+        replace(BAD, code="V1"),
+        DatabaseError,
+        r"new\.moma:42: the code V1 is taken by the stone at window\.moma:7",
+    ),
+    (
+        replace(BAD, kind="hedaer"),
+        SurveyError,
+        r"new\.moma:42 stone BAD: unknown kind 'hedaer'; did you mean header",
+    ),
+    (replace(BAD, code=""), SurveyError, "no visible character"),
+    (replace(BAD, code="A\n"), SurveyError, "no visible character"),
+    (replace(BAD, depth=NAN), SurveyError, "depth is nan"),
+    (replace(BAD, depth_sigma=-0.1), SurveyError, r"depth_sigma is -0\.1"),
+    (replace(BAD, rms=float("inf")), SurveyError, "rms is inf"),
+    (
+        replace(BAD, points=np.full((4, 3), NAN)),
+        SurveyError,
+        "points has a coordinate that is not a finite number",
+    ),
+    (replace(BAD, points=np.zeros((4, 2))), SurveyError, r"points has shape \(4, 2\), expected \(-1, 3\)"),
+    (replace(BAD, covariance=np.zeros((2, 2))), SurveyError, "covariance has shape"),
+    (replace(BAD, rejected=(99,)), SurveyError, "rejected point 99 of 9 points"),
+    (replace(BAD, solid_faces=((0, 1, 99),)), GeometryError, "not a polygon on its 8 vertices"),
+    (replace(BAD, solid_faces=()), GeometryError, "volume of the solid is 0"),
+    (
+        replace(BAD, solid_faces=tuple(f[::-1] for f in BAD.solid_faces)),
+        GeometryError,
+        "volume of the solid is -",
+    ),
+]
+
+
+@pytest.mark.parametrize(("bad", "error", "message"), REFUSED)
+def test_one_bad_stone_refuses_the_whole_file(
+    filled: Database, bad: StoneRecord, error: type[MomaError], message: str
+) -> None:
+    before = contents(filled)
+    good = [box_stone(f"A{i}") for i in range(700)]  # more than one batch, so that rows were written already
+    with pytest.raises(error, match=message), filled.session() as session:
+        store_survey(session, "new", "new.moma", OTHER, [*good, bad])
+    assert contents(filled) == before
+
+
+def test_a_caught_failure_leaves_nothing_of_the_file_in_the_session(filled: Database) -> None:
+    before = contents(filled)
+    with filled.session() as session:
+        with pytest.raises(DatabaseError):
+            store_survey(session, "new", "new.moma", OTHER, [box_stone(f"A{i % 600}") for i in range(601)])
+        assert len(find(session, "entity")) == 7
+    assert contents(filled) == before
+
+
+def test_a_reader_that_fails_half_way_leaves_nothing(filled: Database) -> None:
+    def broken() -> Iterator[StoneRecord]:
+        yield from (box_stone(f"A{i}") for i in range(700))
+        raise SurveyError("point without z", where="new.moma:8000")
+
+    before = contents(filled)
+    with pytest.raises(SurveyError, match="8000"), filled.session() as session:
+        store_survey(session, "new", "new.moma", OTHER, broken())
+    assert contents(filled) == before
+
+
+def test_a_file_is_taken_in_once(filled: Database) -> None:
+    before = contents(filled)
+    with pytest.raises(DatabaseError, match=r"copy\.moma: this file is in the database already"):  # noqa: SIM117
+        with filled.session() as session:
+            store_survey(session, "copy", "copy.moma", SHA, [box_stone("A1")])
+    assert contents(filled) == before
+
+
+def test_a_survey_without_stones_is_refused(empty: Database) -> None:
+    before = contents(empty)
+    with pytest.raises(DatabaseError, match="no stones"), empty.session() as session:
+        store_survey(session, "none", "none.moma", SHA, [])
+    assert contents(empty) == before
+
+
+def test_undecodable_file_names_are_spelled_out(empty: Database) -> None:
+    with empty.session() as session:
+        store_survey(
+            session, "a\udcff", "a\udcff.moma", SHA, [replace(box_stone("A"), depth_source="\udc80")]
+        )
+    with empty.session(read_only=True) as session:
+        survey = survey_with_hash(session, SHA)
+        assert survey is not None
+        assert survey.path == "a\\udcff.moma"
+
+
+def test_a_run_is_kept_with_its_results(filled: Database) -> None:
+    with filled.session() as session:
+        first = store_run(session, run_record({"V1": 3e5, "V2": None}))
+        second = store_run(session, run_record({"V1": 1e5}, scene="again"))
+    assert second > first
+    with filled.session(read_only=True) as session:
+        run = session.get_one(Run, first)
+        assert (run.scene, run.outcome, run.summary["contacts"]) == ("window", "equilibrium", 12)
+        assert {r.entity.code: r.von_mises_max for r in run.results} == {"V1": 3e5, "V2": None}
+        assert run.results[0].values == {"weight": 900.5}
+
+
+@pytest.mark.parametrize(
+    ("run", "message"),
+    [
+        (run_record({"V1": 1e5, "V9": 1e5}), "run of window: stone V9 is not in the database"),
+        (run_record({"V1": float("nan")}), "run of window, stone V1: von_mises_max is nan"),
+        (replace(run_record({}), results=run_record({"V1": 1.0}).results * 2), "two results for stone V1"),
+        (replace(run_record({}), summary={"weight": float("inf")}), "the summary cannot be stored"),
+        (replace(run_record({}), summary={"weight": object()}), "the summary cannot be stored"),
+        (
+            replace(run_record({}), results=(replace(run_record({"V1": 1.0}).results[0], fidelity="soft"),)),
+            "fidelity 'soft' is none of fixed, rigid, deformable",
+        ),
+    ],
+)
+def test_a_run_is_kept_whole_or_not_at_all(filled: Database, run: RunRecord, message: str) -> None:
+    before = contents(filled)
+    with filled.session() as session, pytest.raises(DatabaseError, match=message):
+        store_run(session, run)
+    assert contents(filled) == before
+
+
+def test_results_of_another_stone_are_not_mixed_up(filled: Database) -> None:
+    with filled.session() as session:
+        store_run(session, run_record({"V3": 3.0, "W01-01": 1.0}))
+    with filled.session(read_only=True) as session:
+        assert {r.entity.code: r.von_mises_max for r in session.query(EntityResult)} == {
+            "V3": 3.0,
+            "W01-01": 1.0,
+        }
