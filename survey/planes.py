@@ -2,23 +2,22 @@
 
 The plane n·x = d minimises Σ w (n·x - d)², w = 1/σ². With the weighted centroid c taken out, n is the right
 singular vector of the smallest singular value (FORMULATION.md, §7). In the axes e₁, e₂ of the other two
-singular
-vectors the normal equations are diagonal, so the Gauss–Markov covariance is closed form: the tilts θᵢ
+singular vectors the normal equations are diagonal, so the Gauss–Markov covariance is closed form: the tilts
+θᵢ
 (δn = -Σ θᵢ eᵢ) have variance σ²/sᵢ², the centroid's height σ²/Σw, and δd = δ(n·c) carries both to the origin
-of
-coordinates.
+of coordinates.
 
 Blunders: one that is as far out as a stone is wide turns a least-squares plane so much that its own residual
 looks harmless, so residuals of the first fit cannot be trusted. The start is therefore the least median of
-squares (Rousseeuw 1984) over triples of points, which tolerates almost half of the points being wrong; then
-observations are tested one by one with their standardised residuals (Baarda 1968, α₀ = 0.1 %), the worst
-leaving
-first, and those that agree with the final plane return.
+squares (Rousseeuw 1984) over triples of points, which tolerates almost half of the points being wrong. From
+that majority the fit grows one point at a time: a point enters, or leaves again, by the test of its
+standardised residual (Baarda 1968, α₀ = 0.1 %).
 """
 
 import math
 from dataclasses import dataclass
 from itertools import combinations
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -161,45 +160,70 @@ def _is_clean(plane: _Plane, xyz: Array, weights: Array, known: bool) -> bool:
 
 
 def _without_blunders(xyz: Array, weights: Array, known: bool) -> NDArray[np.bool_]:
-    """Accepted points: robust start, then the worst standardised residual leaves, then good ones return."""
-    start, scale = _least_median(xyz, weights)
-    if known:
-        scale = max(scale, 1.0)  # in units of sigma: never believe points to be better than the survey says
-    accepted = np.sqrt(weights) * np.abs(start) <= _CRITICAL * scale
-    for _ in range(2 * len(xyz)):
+    """Accepted points: from the best majority forward, one at a time, until the next one is a blunder."""
+    accepted = _best_majority(xyz, weights)
+    majority = int(accepted.sum())
+    for _ in range(4 * len(xyz)):
         plane = _weighted_plane(xyz, weights, accepted)
-        lever = plane.leverages(xyz, weights)
+        distances, lever = np.sqrt(weights) * np.abs(plane.distances(xyz)), plane.leverages(xyz, weights)
+        scale = _scale(distances[accepted], len(xyz), known)
         # a point in the fit pulls the plane towards itself, one outside does not: variances 1 - h and 1 + h
         share = np.where(accepted, np.maximum(1.0 - lever, 1e-6), 1.0 + lever)
-        tests = np.sqrt(weights) * np.abs(plane.distances(xyz)) / (scale * np.sqrt(share))
+        tests = distances / (scale * np.sqrt(share))
         worst = int(np.argmax(np.where(accepted, tests, 0.0)))
         best = int(np.argmin(np.where(accepted, np.inf, tests)))
-        if tests[worst] > _CRITICAL and accepted.sum() > 3:
+        if tests[worst] > _CRITICAL and accepted.sum() > majority:
             accepted[worst] = False
-        elif (
-            not accepted[best] and tests[best] <= 0.9 * _CRITICAL
-        ):  # a margin, so that no point comes and goes
+        elif not accepted[best] and tests[best] <= _CRITICAL:
             accepted[best] = True
         else:
             break
     return accepted
 
 
-def _least_median(xyz: Array, weights: Array) -> tuple[Array, float]:
-    """Distances from the plane with the least median, and the scale of the good points in units of sigma."""
-    count = len(xyz)
-    triples = _triples(count)
+def _scale(distances: Array, count: int, known: bool) -> float:
+    """Standard deviation of the accepted points in units of sigma.
+
+    With a known precision it is 1, or more where the face itself is rough. Without, the best part of all
+    points
+    looks too good by a factor known for normal errors (the consistency factor of least trimmed squares).
+    """
+    part = len(distances) / count
+    raw = math.sqrt(float(distances @ distances) / max(len(distances) - 3, 1))
+    if known:
+        return max(raw, 1.0)
+    z = NormalDist().inv_cdf(0.5 + 0.5 * min(part, 1.0 - 1e-9))
+    return max(raw / math.sqrt(1.0 - 2.0 * z * NormalDist().pdf(z) / part), 1e-300)
+
+
+def _best_majority(xyz: Array, weights: Array) -> NDArray[np.bool_]:
+    """The (n + 4)/2 points nearest to the plane with the least median, refined until they stay the same."""
+    size = min(len(xyz) // 2 + 2, len(xyz))
+    distances = np.abs(_least_median(xyz, weights, size - 1))
+    accepted = np.zeros(len(xyz), dtype=bool)
+    for _ in range(20):
+        nearest = np.argsort(distances, kind="stable")[:size]
+        if accepted[nearest].all():
+            break
+        accepted[:] = False
+        accepted[nearest] = True
+        distances = np.sqrt(weights) * np.abs(_weighted_plane(xyz, weights, accepted).distances(xyz))
+    return accepted
+
+
+def _least_median(xyz: Array, weights: Array, rank: int) -> Array:
+    """Weighted distances of all points from that plane through three of them whose median distance is
+    least."""
+    triples = _triples(len(xyz))
     a, b, c = (xyz[triples[:, k]] - xyz[0] for k in range(3))
     normals = np.cross(b - a, c - a)
     areas = np.linalg.norm(normals, axis=1)
     usable = areas > 1e-3 * areas.max()
     normals, a = normals[usable] / areas[usable, None], a[usable]
     distances = normals @ (xyz - xyz[0]).T - (normals * a).sum(axis=1)[:, None]
-    rank = min(count // 2 + 2, count) - 1  # of p = 3 parameters: the median that tolerates most blunders
-    medians = np.partition(np.sqrt(weights) * np.abs(distances), rank, axis=1)[:, rank]
-    best = int(np.argmin(medians))
-    scale = 1.4826 * (1.0 + 5.0 / max(count - 3, 1)) * float(medians[best])
-    return distances[best], max(scale, 1e-12 * float(np.sqrt(weights).max() * np.ptp(xyz, axis=0).max()))
+    distances = np.sqrt(weights) * np.abs(distances)
+    out: Array = distances[np.argmin(np.partition(distances, rank, axis=1)[:, rank])]
+    return out
 
 
 def _triples(count: int) -> NDArray[np.intp]:

@@ -1,0 +1,140 @@
+"""From the measured outline, bevels and worn corners included, to a stone of six faces.
+
+A dressed face has four sides; further corners come from a bevel, a break or a point measured half-way along a
+side. They are taken out one by one, each time by the smaller change of area: either a short side is dropped
+and
+its neighbours are prolonged until they meet (which restores a bevelled corner), or a corner is dropped. What
+remains is the stone's own quadrilateral, not a rectangle around it: the wedge of a voussoir and the sloped
+end of
+a springer stay as they were measured.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
+
+from moma.errors import GeometryError
+from survey.depth import Depth
+from survey.extrusion import SurveyedBlock, prism
+from survey.faces import Face
+from survey.solids import Solid
+
+__all__ = ["BlockyStone", "simplify"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class BlockyStone:
+    """A stone with six faces.
+
+    Attributes
+    ----------
+    code, kind, course : as in the survey
+    face : the measured face it comes from
+    depth : its depth, with the evidence
+    corners : (4, 3) of the face, on its plane, counter-clockwise seen from outside [m]
+    sound : (4,) whether each corner is known from measurement on the face; False for a worn corner
+    solid : hexahedron; the four visible corners first, then the four hidden ones in the same order
+    displacement : (nv,) distance of each corner of the measured outline from the new outline [m]
+    volume_change : new volume over measured volume, minus 1 [-]
+    """
+
+    code: str
+    kind: str
+    course: int | None
+    face: Face
+    depth: Depth
+    corners: Array
+    sound: tuple[bool, ...]
+    solid: Solid
+    displacement: Array
+    volume_change: float
+
+
+def simplify(block: SurveyedBlock) -> BlockyStone:
+    """Make a hexahedron of a surveyed block.
+
+    Parameters
+    ----------
+    block : a stone with its measured face of three or more corners
+
+    Returns
+    -------
+    BlockyStone, with what was changed
+
+    Raises
+    ------
+    GeometryError
+        for a triangular face, which has no quadrilateral of its own
+    """
+    fit = block.face.fit
+    across = np.cross(fit.normal, fit.axes[0])
+    flat = np.column_stack([(block.face.outline - fit.centroid) @ axis for axis in (fit.axes[0], across)])
+    quad = _quadrilateral(flat, block.code)
+    corners = fit.centroid + quad @ np.array([fit.axes[0], across])
+    solid = prism(block.code, corners, corners - block.depth.value * fit.normal)
+    worn = flat[list(block.face.rejected_vertices)]
+    return BlockyStone(
+        code=block.code,
+        kind=block.kind,
+        course=block.course,
+        face=block.face,
+        depth=block.depth,
+        corners=corners,
+        sound=tuple(not bool((np.linalg.norm(worn - corner, axis=1) < 1e-9).any()) for corner in quad),
+        solid=solid,
+        displacement=np.array([_distance_to_outline(corner, quad) for corner in flat]),
+        volume_change=_area(quad) / _area(flat) - 1.0,
+    )
+
+
+def _quadrilateral(flat: Array, code: str) -> Array:
+    polygon = flat[ConvexHull(flat).vertices]  # counter-clockwise
+    if len(polygon) < 4:
+        raise GeometryError(
+            f"its face has {len(polygon)} corners that stand out",
+            where=f"stone {code}",
+            remedy="measure a fourth corner, or leave the stone out of the selection",
+        )
+    while len(polygon) > 4:
+        polygon = min(_shorter(polygon), key=lambda change: change[0])[1]
+    start = int(np.argmin(np.linalg.norm(polygon - flat[0], axis=1)))  # keep the surveyor's first corner
+    return np.roll(polygon, -start, axis=0)
+
+
+def _shorter(polygon: Array) -> list[tuple[float, Array]]:
+    """All polygons with one corner less, each with the area it gains or loses."""
+    count, changes = len(polygon), []
+    for k in range(count):
+        before, here, after = polygon[k - 1], polygon[k], polygon[(k + 1) % count]
+        lost = 0.5 * abs(_cross(here - before, after - here))
+        changes.append((lost, np.delete(polygon, k, axis=0)))
+        beyond = polygon[(k + 2) % count]
+        u, v = here - before, after - beyond  # the sides before and after side k, towards it
+        turn = _cross(u, v)
+        if turn < -1e-12:  # they meet beyond side k
+            peak = before + _cross(after - before, v) / turn * u
+            gained = 0.5 * abs(_cross(peak - here, after - peak))
+            replaced = polygon.copy()
+            replaced[k] = peak
+            changes.append((gained, np.delete(replaced, (k + 1) % count, axis=0)))
+    return changes
+
+
+def _cross(u: Array, v: Array) -> float:
+    return float(u[0] * v[1] - u[1] * v[0])
+
+
+def _area(polygon: Array) -> float:
+    x, y = (polygon - polygon[0]).T
+    return 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1)))
+
+
+def _distance_to_outline(point: Array, polygon: Array) -> float:
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    along = np.clip(((point - polygon) * edges).sum(axis=1) / (edges**2).sum(axis=1), 0.0, 1.0)
+    nearest: Array = polygon + along[:, None] * edges
+    return float(np.linalg.norm(nearest - point, axis=1).min())

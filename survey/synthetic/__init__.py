@@ -1,0 +1,2 @@
+"""A synthetic survey: a wall with a window that never stood, measured as a surveyor would, its truth
+known."""

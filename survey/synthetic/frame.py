@@ -1,0 +1,90 @@
+"""Where the wall stands in the site, and the true stones in space."""
+
+import math
+from dataclasses import dataclass
+from random import Random
+
+import numpy as np
+from numpy.typing import NDArray
+
+from survey.extrusion import prism
+from survey.solids import Solid
+from survey.synthetic.bond import PlannedStone
+
+__all__ = ["TrueStone", "WallFrame", "build_stone", "wall_frame"]
+
+Array = NDArray[np.float64]
+
+ORIGIN = (12.4, 38.25, 6.83)  # foot of the window's axis in the local site frame [m]
+AZIMUTH = math.radians(7.0)  # of the wall against the x axis
+BATTER = math.radians(0.3)  # the wall leans back from the observer
+RELIEF = 0.002  # standard deviation of a face's distance from the wall plane [m]
+FACE_TILT = math.radians(0.15)  # standard deviation of each tilt of a face against the wall plane
+
+
+@dataclass(frozen=True)
+class WallFrame:
+    """Right-handed frame of the wall plane in the site: x = origin + s axes[0] + t axes[1] + depth axes[2].
+
+    Attributes
+    ----------
+    origin : (3,) [m]
+    axes : (3, 3) rows: along the wall to the right, up the wall, outward normal [-]
+    """
+
+    origin: Array
+    axes: Array
+
+    def place(self, flat: Array, out: float = 0.0) -> Array:
+        """Points (n, 2) of the wall plane, moved out by `out` [m], in the site (n, 3)."""
+        placed: Array = self.origin + flat @ self.axes[:2] + out * self.axes[2]
+        return placed
+
+
+@dataclass(frozen=True)
+class TrueStone:
+    """A stone as it truly is, joints closed.
+
+    Attributes
+    ----------
+    plan : its outline in the wall plane
+    normal, offset : true plane n·x = d of its face
+    depth : [m]
+    solid : hexahedron: side planes perpendicular to the wall, its own face, that face moved by -depth n
+    """
+
+    plan: PlannedStone
+    normal: Array
+    offset: float
+    depth: float
+    solid: Solid
+
+    def on_face(self, frame: WallFrame, flat: Array) -> Array:
+        """Points (n, 2) of the wall plane moved square to the wall onto the true face."""
+        placed = frame.place(flat)
+        lift = (self.offset - placed @ self.normal) / (frame.axes[2] @ self.normal)
+        out: Array = placed + np.outer(lift, frame.axes[2])
+        return out
+
+
+def wall_frame() -> WallFrame:
+    """Lay the wall's frame: turned about the vertical, then leaning back."""
+    along = np.array([math.cos(AZIMUTH), math.sin(AZIMUTH), 0.0])
+    facing, vertical = np.array([along[1], -along[0], 0.0]), np.array([0.0, 0.0, 1.0])
+    up = math.cos(BATTER) * vertical - math.sin(BATTER) * facing
+    out = math.cos(BATTER) * facing + math.sin(BATTER) * vertical
+    return WallFrame(np.array(ORIGIN), np.array([along, up, out]))
+
+
+def build_stone(plan: PlannedStone, depth: float, frame: WallFrame, rng: Random) -> TrueStone:
+    """Give a planned stone its own face plane, near the wall's, and its depth."""
+    tilt_s, tilt_t = rng.gauss(0.0, FACE_TILT), rng.gauss(0.0, FACE_TILT)
+    normal = frame.axes[2] + math.tan(tilt_s) * frame.axes[0] + math.tan(tilt_t) * frame.axes[1]
+    normal /= math.sqrt(float(normal @ normal))
+    centre = frame.place(plan.corners.mean(axis=0), rng.gauss(0.0, RELIEF))
+    offset = float(normal @ centre)
+    corners = frame.place(plan.corners)
+    square = float(frame.axes[2] @ normal)
+    front = corners + np.outer((offset - corners @ normal) / square, frame.axes[2])
+    back = corners + np.outer((offset - depth - corners @ normal) / square, frame.axes[2])
+    return TrueStone(plan, normal, offset, depth, prism(plan.code, front, back))

@@ -1,0 +1,111 @@
+"""The whole sample: plan, stones, measurement, and the two files that say it."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from random import Random
+
+import numpy as np
+
+from survey.formats.moma_ascii import write_moma
+from survey.records import DepthRule, Survey
+from survey.synthetic.frame import TrueStone, WallFrame, build_stone, wall_frame
+from survey.synthetic.measure import SIGMA, Measured, add_blunders, measure_stone
+from survey.synthetic.window import plan_window
+
+__all__ = ["SEED", "Sample", "make_sample", "truth_of", "write_sample"]
+
+SEED = 2000
+BLUNDERS = 12
+SOURCE = "synthetic value, chosen for this sample"
+DEPTHS = {
+    "header": (0.50, 0.03),
+    "jamb": (0.45, 0.03),
+    "keystone": (0.42, 0.02),
+    "sill": (0.45, 0.02),
+    "springer": (0.45, 0.03),
+    "stretcher": (0.38, 0.03),
+    "voussoir": (0.42, 0.02),
+}  # depth and its standard deviation [m]
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A survey, with everything that is true of it.
+
+    Attributes
+    ----------
+    survey : what the file says
+    frame : the wall's frame in the site
+    stones, measured : the true stones, and how each was measured, in the same order
+    """
+
+    survey: Survey
+    frame: WallFrame
+    stones: tuple[TrueStone, ...]
+    measured: tuple[Measured, ...]
+
+
+def make_sample(seed: int = SEED) -> Sample:
+    """Build the wall and measure it; the same seed gives the same sample.
+
+    Parameters
+    ----------
+    seed : of Python's own generator, whose stream is the same everywhere
+    """
+    rng = Random(seed)
+    frame = wall_frame()
+    stones = [build_stone(plan, DEPTHS[plan.kind][0], frame, rng) for plan in plan_window(rng)]
+    measured = [measure_stone(stone, frame, rng) for stone in stones]
+    measured = add_blunders(measured, [stone.normal for stone in stones], BLUNDERS, rng)
+    rules = tuple(DepthRule(kind, depth, sigma, SOURCE) for kind, (depth, sigma) in DEPTHS.items())
+    observer = np.round(frame.origin + 9.0 * frame.axes[2] + 0.8 * frame.axes[0] + [0.0, 0.0, 1.2], 4)
+    records = tuple(one.record for one in measured)
+    survey = Survey("window bay (synthetic)", "window.moma", observer, rules, records)
+    return Sample(survey, frame, tuple(stones), tuple(measured))
+
+
+def truth_of(sample: Sample) -> dict[str, object]:
+    """Say the truth in plain lists, rounded far below any tolerance so that the file is the same
+    everywhere."""
+    return {
+        "about": "true geometry of window.moma; indices count from 0 in the order of the file",
+        "seed": SEED,
+        "sigma": SIGMA,
+        "frame": {"origin": _rounded(sample.frame.origin), "axes": _rounded(sample.frame.axes)},
+        "stones": [_stone_truth(*pair) for pair in zip(sample.stones, sample.measured, strict=True)],
+    }
+
+
+def write_sample(directory: Path) -> tuple[Path, Path]:
+    """Write window.moma and truth.json into a folder, which is created if need be; return their paths."""
+    directory.mkdir(parents=True, exist_ok=True)
+    sample = make_sample()
+    survey, truth = directory / "window.moma", directory / "truth.json"
+    write_moma(sample.survey, survey)
+    truth.write_text(json.dumps(truth_of(sample), indent=1) + "\n", encoding="utf-8", newline="\n")
+    return survey, truth
+
+
+def _stone_truth(stone: TrueStone, measured: Measured) -> dict[str, object]:
+    return {
+        "code": stone.plan.code,
+        "kind": stone.plan.kind,
+        "course": stone.plan.course,
+        "normal": _rounded(stone.normal),
+        "offset": round(stone.offset, 10),
+        "depth": stone.depth,
+        "vertices": _rounded(stone.solid.vertices),
+        "faces": [list(face) for face in stone.solid.faces],
+        "joint_sides": list(stone.plan.joint),
+        "half_joints": [round(half, 6) for half in measured.half_joints],
+        "worn": measured.worn,
+        "worn_corner": measured.worn_corner,
+        "worn_points": list(measured.worn_points),
+        "worn_vertices": list(measured.worn_vertices),
+        "blunders": list(measured.blunders),
+    }
+
+
+def _rounded(values: np.ndarray) -> object:
+    return (np.round(values, 10) + 0.0).tolist()

@@ -1,0 +1,155 @@
+"""The window bay: twelve courses, a sill, jambs and a segmental arch with a level back.
+
+Courses 1–2 carry the sill (3), the jambs (4–7) frame the opening, the arch spans courses 8–9 between the
+skewbacks of the springers, courses 10–12 load it. The arch's joints are radial, its intrados is a chord
+polygon,
+its extrados is the bed line of course 10, so that every stone is a quadrilateral.
+"""
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+from random import Random
+
+import numpy as np
+
+from survey.synthetic.bond import Line, PlannedStone, crossing, fill, level, upright
+
+__all__ = ["plan_window"]
+
+LEFT, RIGHT = -2.35, 2.45  # ends of the panel [m]; s = 0 is the axis of the window
+HEIGHT = 3.90
+COURSES = 12
+SILL_COURSE, JAMB_COURSES, ARCH_COURSES = 3, (4, 5, 6, 7), (8, 9)
+HALF_OPENING = 0.60
+SILL_BEARING = 0.20
+RISE = 0.20  # of the intrados above its springing
+VOUSSOIRS = 7
+JAMB_LENGTHS = (0.42, 0.62)  # short and long in turn, so that the jambs bond with the wall
+CLEARANCE, CLEARANCE_OVER_ARCH = 0.09, 0.05  # between head joints of neighbouring courses [m]
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """One stone of a course: what it is, and where it ends on the right."""
+
+    kind: str
+    end: Line
+
+
+def plan_window(rng: Random) -> tuple[PlannedStone, ...]:
+    """Lay out all stones, course by course from the ground, left to right, then the arch."""
+    beds = _bed_heights(rng)
+    radials = _radials(beds[ARCH_COURSES[0] - 1])
+    stones: list[PlannedStone] = []
+    below: list[float] = []
+    for course in range(1, COURSES + 1):
+        low, high = beds[course - 1], beds[course]
+        runs = _runs(rng, course, low, high, radials, below)
+        stones += _course_stones(course, low, high, runs)
+        below = [line.at(high) for start, pieces in runs for line in (start, *(p.end for p in pieces))]
+        if course == ARCH_COURSES[1]:
+            below += [line.at(high) for line in radials]
+    return (*stones, *_arch(radials, beds[ARCH_COURSES[0] - 1], beds[ARCH_COURSES[1]]))
+
+
+def _bed_heights(rng: Random) -> list[float]:
+    heights = [rng.uniform(0.31, 0.34) for _ in range(COURSES)]
+    scale = HEIGHT / sum(heights)
+    return [sum(heights[:k]) * scale for k in range(COURSES + 1)]
+
+
+def _radials(springing: float) -> list[Line]:
+    """Radial joints of the arch from left to right, the two springings included."""
+    radius = (HALF_OPENING**2 + RISE**2) / (2.0 * RISE)
+    half_angle = math.asin(HALF_OPENING / radius)
+    centre = (0.0, springing + RISE - radius)
+    angles = [half_angle * (2.0 * k / VOUSSOIRS - 1.0) for k in range(VOUSSOIRS + 1)]
+    out = []
+    for angle in angles:
+        direction = (math.sin(angle), math.cos(angle))
+        out.append(Line((centre[0] + radius * direction[0], centre[1] + radius * direction[1]), direction))
+    return out
+
+
+def _runs(
+    rng: Random, course: int, low: float, high: float, radials: list[Line], below: list[float]
+) -> list[tuple[Line, list[_Piece]]]:
+    """Unbroken runs of stones of one course: the line each begins at, and its stones."""
+    middle = 0.5 * (low + high)
+    left, right = upright(LEFT, middle), upright(RIGHT, middle)
+    if course in JAMB_COURSES:
+        lengths = JAMB_LENGTHS if course % 2 else JAMB_LENGTHS[::-1]
+        reveals = upright(-HALF_OPENING, middle), upright(HALF_OPENING, middle)
+        ends = [
+            upright(-HALF_OPENING - lengths[0], middle, rng),
+            upright(HALF_OPENING + lengths[1], middle, rng),
+        ]
+        kind = "jamb"
+    elif course in ARCH_COURSES:
+        reveals = radials[0], radials[-1]
+        long = 0.72 if course == ARCH_COURSES[0] else 0.88
+        ends = [
+            upright(-HALF_OPENING - long - 0.06, middle, rng),
+            upright(HALF_OPENING + long, middle, rng),
+        ]
+        kind = "springer"
+    elif course == SILL_COURSE:
+        half = HALF_OPENING + SILL_BEARING
+        ends = [upright(-half, middle, rng), upright(half, middle, rng)]
+        before = _plain(rng, left, ends[0], low, middle, below)
+        after = _plain(rng, ends[1], right, low, middle, below)
+        return [(left, [*before, _Piece("sill", ends[1]), *after])]
+    else:
+        return [(left, _plain(rng, left, right, low, middle, below))]
+    before = _plain(rng, left, ends[0], low, middle, below)
+    after = _plain(rng, ends[1], right, low, middle, below)
+    return [(left, [*before, _Piece(kind, reveals[0])]), (reveals[1], [_Piece(kind, ends[1]), *after])]
+
+
+def _plain(
+    rng: Random, start: Line, stop: Line, low: float, middle: float, below: list[float]
+) -> list[_Piece]:
+    over_arch = len(below) > VOUSSOIRS + 12
+    clearance = CLEARANCE_OVER_ARCH if over_arch else CLEARANCE
+    filled = fill(rng, start.at(middle), stop.at(middle), below, clearance)
+    return [_Piece(kind, upright(end, middle, rng)) for kind, end in filled[:-1]] + [
+        _Piece(filled[-1][0], stop)
+    ]
+
+
+def _course_stones(
+    course: int, low: float, high: float, runs: list[tuple[Line, list[_Piece]]]
+) -> list[PlannedStone]:
+    bottom, top = level(low), level(high)
+    stones: list[PlannedStone] = []
+    for start, pieces in runs:
+        for line, piece in zip((start, *(p.end for p in pieces)), pieces, strict=False):
+            sides = (bottom, piece.end, top, line)
+            corners = [crossing(sides[k - 1], sides[k]) for k in range(4)]
+            free_ends = (LEFT, RIGHT, -HALF_OPENING, HALF_OPENING)
+            joint = (
+                course > 1,
+                not _is_free(piece.end, free_ends),
+                course < COURSES,
+                not _is_free(line, free_ends),
+            )
+            code = f"W{course:02d}-{len(stones) + 1:02d}"
+            stones.append(PlannedStone(code, piece.kind, course, np.array(corners), joint))
+    return stones
+
+
+def _is_free(line: Line, ends: tuple[float, ...]) -> bool:
+    """Whether a line is an end of the panel or a reveal of the opening: only those are exactly upright."""
+    return line.direction == (0.0, 1.0) and line.point[0] in ends
+
+
+def _arch(radials: list[Line], springing: float, back: float) -> list[PlannedStone]:
+    stones = []
+    for rank, (left, right) in enumerate(pairwise(radials), start=1):
+        corners = np.array(
+            [left.point, right.point, crossing(right, level(back)), crossing(left, level(back))]
+        )
+        kind = "keystone" if rank == (VOUSSOIRS + 1) // 2 else "voussoir"
+        stones.append(PlannedStone(f"V{rank}", kind, None, corners, (False, True, True, True)))
+    return stones
