@@ -1,0 +1,3 @@
+"""The beam: each step from a survey file to a report; the only code that knows all three pillars."""
+
+__all__: list[str] = []

@@ -1,0 +1,97 @@
+"""What the command line shows beside its results, on stderr: progress, warnings, errors."""
+
+import sys
+import traceback
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import wraps
+from typing import TYPE_CHECKING, Any, ParamSpec, TextIO
+
+import typer
+
+from moma.errors import MomaError
+
+if TYPE_CHECKING:
+    from rich.progress import TaskID
+
+    from pipelines.progress import Listener, Report
+
+__all__ = ["progress_bars", "reporting", "say"]
+
+P = ParamSpec("P")
+
+
+def say(message: str) -> None:
+    """One line for the person at the terminal, beside the results."""
+    print(f"moma: {message}", file=sys.stderr)
+
+
+def reporting(command: Callable[P, None]) -> Callable[P, None]:
+    """Make a command end in one line and an exit code when it fails; with ``-v``, in the traceback too."""
+
+    @wraps(command)
+    def run(*arguments: P.args, **options: P.kwargs) -> None:
+        verbose = bool(options.get("verbose"))
+        try:
+            with _short_warnings():
+                command(*arguments, **options)
+        except MomaError as error:
+            if verbose:
+                traceback.print_exc()
+            say(f"error: {' '.join(str(error).split())}")
+            raise typer.Exit(error.exit_code) from None
+        except Exception as error:
+            # typer ends a command by exceptions of its own; those, and broken pipes, are its business
+            if verbose or isinstance(error, typer.Exit | typer.Abort | BrokenPipeError):
+                raise
+            say(f"error: unexpected {type(error).__name__}: {error}; please report it with the output of -v")
+            raise typer.Exit(1) from None
+
+    return run
+
+
+@contextmanager
+def _short_warnings() -> Iterator[None]:
+    """Warnings of the libraries in one line each, without the place in the source."""
+
+    def show(
+        message: Warning | str,
+        category: type[Warning],
+        filename: str,
+        lineno: int,
+        file: TextIO | None = None,
+        line: str | None = None,
+    ) -> None:
+        say(f"warning: {' '.join(str(message).split())}")
+
+    with warnings.catch_warnings():
+        warnings.showwarning = show
+        yield
+
+
+@contextmanager
+def progress_bars() -> "Iterator[Listener]":
+    """A listener that draws one bar per stage on a terminal, and nothing elsewhere."""
+    if not sys.stderr.isatty():
+        yield lambda report: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns: list[Any] = [
+        TextColumn("{task.description:>12}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[text]}"),
+    ]
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
+        tasks: dict[str, TaskID] = {}
+
+        def show(report: "Report") -> None:
+            if report.stage not in tasks:
+                tasks[report.stage] = bars.add_task(report.stage, total=report.total, text="")
+            bars.update(tasks[report.stage], completed=report.done, total=report.total, text=report.text)
+
+        yield show

@@ -1,0 +1,117 @@
+"""Rows and entities as text: tables for people, CSV and JSON for programs."""
+
+import csv
+import io
+import json
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+__all__ = ["as_csv", "as_json", "as_lines", "as_table", "shown_columns"]
+
+# what a table shows, and what --where asks for; CSV and JSON give every attribute
+_USUAL = (
+    "code",
+    "kind",
+    "course",
+    "depth",
+    "length",
+    "height",
+    "volume",
+    "rms",
+    "rejected",
+    "fidelity",
+    "von_mises_max",
+    "displacement_max",
+)
+
+_UNITS = {
+    "length": "m",
+    "height": "m",
+    "area": "m²",
+    "volume": "m³",
+    "centroid": "m",
+    "value": "m",
+    "sigma": "m",
+    "offset": "m",
+    "offset_sigma": "m",
+    "tilt_sigma": "rad",
+    "rms": "m",
+    "von_mises_max": "Pa",
+    "von_mises_mean": "Pa",
+    "displacement_max": "m",
+    "contact_force_max": "N",
+    "mass": "kg",
+}
+
+
+def shown_columns(
+    names: Iterable[str], rows: Sequence[Mapping[str, object]], where: Sequence[str]
+) -> list[str]:
+    """Columns of a table: the usual ones and those named in an expression, if any row has a value there."""
+    asked = set(re.findall(r"\w+", " ".join(where)))
+    return [
+        name
+        for name in names
+        if (name in _USUAL or name in asked)
+        and (name == "code" or any(row[name] is not None for row in rows))
+    ]
+
+
+def as_table(columns: Mapping[str, str | None], rows: Sequence[Mapping[str, object]]) -> str:
+    """Aligned text; `columns` gives the unit of each column, None or "-" for none."""
+    heads = [name if unit in (None, "-") else f"{name} [{unit}]" for name, unit in columns.items()]
+    cells = [[_cell(row[name]) for name in columns] for row in rows]
+    numeric = [
+        all(isinstance(row[name], int | float | None) for row in rows) and bool(rows) for name in columns
+    ]
+    widths = [max(map(len, column)) for column in zip(heads, *cells, strict=True)]
+
+    def line(texts: Sequence[str]) -> str:
+        padded = (
+            text.rjust(width) if right else text.ljust(width)
+            for text, width, right in zip(texts, widths, numeric, strict=True)
+        )
+        return "  ".join(padded).rstrip()
+
+    return "\n".join(map(line, [heads, ["─" * width for width in widths], *cells]))
+
+
+def as_csv(columns: Iterable[str], rows: Iterable[Mapping[str, object]]) -> str:
+    """CSV with a header line; nothing where a value is not known."""
+    out = io.StringIO()
+    writer = csv.DictWriter(out, list(columns), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return out.getvalue().rstrip("\n")
+
+
+def as_json(value: object) -> str:
+    """JSON, indented."""
+    return json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def as_lines(value: Mapping[str, Any], indent: int = 0) -> str:
+    """A nested mapping as indented lines; what is empty or not known is left out."""
+    lines = []
+    margin = "  " * indent
+    for name, content in value.items():
+        if content is None or content == [] or content == {}:
+            continue
+        label, unit = name.replace("_", " "), f" {_UNITS[name]}" if name in _UNITS else ""
+        if isinstance(content, Mapping):
+            lines += [f"{margin}{label}", as_lines(content, indent + 1)]
+        elif isinstance(content, list) and isinstance(content[0], Mapping):
+            lines.append(f"{margin}{label}")
+            lines += [f"{margin}  - {as_lines(one, indent + 2).lstrip()}" for one in content]
+        elif isinstance(content, list):
+            lines.append(f"{margin}{label:<18} {'  '.join(_cell(one) for one in content)}{unit}")
+        else:
+            lines.append(f"{margin}{label:<18} {_cell(content)}{unit}")
+    return "\n".join(lines)
+
+
+def _cell(value: object) -> str:
+    if value is None:
+        return ""
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

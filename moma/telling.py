@@ -1,0 +1,91 @@
+"""What a command has done, in a few lines for a person."""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pipelines.check import CheckReport
+    from pipelines.ingest import IngestReport
+    from pipelines.run import RunReport
+
+__all__ = ["check_lines", "ingest_lines", "run_lines"]
+
+
+def ingest_lines(report: "IngestReport", verbose: bool) -> list[str]:
+    """What each survey file held, and what was left out of it."""
+    lines = []
+    for file in report.files:
+        kinds = ", ".join(f"{count} {kind}" for kind, count in file.stones.items())
+        lines += [
+            f"{file.path}: {sum(file.stones.values())} stones of survey {file.survey!r} ({kinds})",
+            f"  {sum(file.rejected.values())} points left out as blunders on {len(file.rejected)} stones; "
+            f"worst plane: {file.worst}, rms {file.rms * 1e3:.1f} mm",
+        ]
+        if verbose:
+            lines += [f"  {code}: {count} left out" for code, count in file.rejected.items()]
+    return lines
+
+
+def check_lines(report: "CheckReport", verbose: bool) -> list[str]:
+    """The plan of a scene and its problems."""
+    lines = [
+        f"{report.scene}: {sum(report.kinds.values())} stones "
+        f"({', '.join(f'{count} {kind}' for kind, count in report.kinds.items())})",
+        f"  models: {', '.join(f'{count} {name}' for name, count in report.bodies.items())}",
+        *(
+            f"  material {one.name}: {one.stones} stones, ρ {one.density:g} kg/m³, "
+            f"E {one.young / 1e9:g} GPa, ν {one.poisson:g}"
+            for one in report.materials
+        ),
+    ]
+    if report.joints is not None:
+        joints = report.joints
+        lines.append(
+            f"  {joints.count} joints closed, {joints.mean_width * 1e3:.1f} mm wide on average; corners moved "
+            f"by {joints.max_displacement * 1e3:.1f} mm at most (stone {joints.worst_stone}), "
+            f"volumes changed by {100 * joints.max_volume_change:.1f} % at most"
+        )
+    if report.cost is not None:
+        cost = report.cost
+        lines += [
+            f"  {cost.pairs} touching pairs, about {cost.contacts} contact points",
+            f"  about {cost.unknowns} unknowns, {cost.memory / 2**20:.0f} MiB",
+            f"  at most {cost.steps} steps of {cost.step:g} s",
+        ]
+    if verbose and report.joints is not None:
+        lines += [f"  {code}: {moved * 1e3:.1f} mm" for code, moved in report.joints.displacement.items()]
+    lines += [f"problem: {problem}" for problem in report.problems]
+    if not report.problems:
+        lines.append("sound: it can be run")
+    return lines
+
+
+def run_lines(report: "RunReport", verbose: bool) -> list[str]:
+    """How a run ended, and where its results lie."""
+    summary = report.summary
+    bodies, reaction, stress = summary["bodies"], summary["reaction"], summary["von_mises"]
+    lines = [
+        f"{summary['scene']}: {summary['outcome']} after {summary['time']['simulated']:.4g} s "
+        f"({summary['steps']} steps, {summary['time']['wall']:.1f} s of work)",
+        f"  {', '.join(f'{count} {name}' for name, count in bodies.items())} stones, "
+        f"{summary['contacts']} contact points",
+        f"  weight {reaction['weight'] / 1e3:.2f} kN, reaction {reaction['total_vertical'] / 1e3:.2f} kN, "
+        f"largest displacement {summary['displacement']['max'] * 1e3:.4g} mm",
+    ]
+    if stress is not None:
+        mean, p99, largest = (stress[name] / 1e6 for name in ("mean", "p99", "max"))
+        lines.append(
+            f"  Von Mises stress: mean {mean:.4f} MPa, 1 % of the volume above {p99:.4f} MPa, "
+            f"largest {largest:.4f} MPa"
+        )
+    errors = {name: value for name, value in summary["errors"].items() if value is not None}
+    lines.append("  errors: " + ", ".join(f"{name} {_short(value)}" for name, value in errors.items()))
+    if verbose:
+        stages = summary["time"]["by_stage"].items()
+        lines.append("  time: " + ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in stages))
+    pictures = [name for name in summary["files"] if name.endswith(".png")]
+    shown = (*pictures, "report.html", "results.pvd", "summary.json")
+    return [*lines, *(f"  {report.folder / name}" for name in shown)]
+
+
+def _short(value: float | int) -> str:
+    return str(value) if isinstance(value, int) else f"{value:.1e}"

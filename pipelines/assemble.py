@@ -1,0 +1,123 @@
+"""From the database to a scene: selected stones → hexahedra → closed joints → blocks."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy.orm import Session
+
+from archmodel.records import StoneRecord
+from mechanics.scene import Block, Fidelity, Scene
+from pipelines.scenefile import SceneFile
+from pipelines.selection import StoneModel, select_stones
+from survey.blocky import BlockyStone, simplify
+from survey.depth import Depth
+from survey.extrusion import SurveyedBlock, extrude
+from survey.faces import outline_face
+from survey.joints import ClosingReport, close_joints
+from survey.records import BlockRecord
+from survey.solids import Solid
+
+__all__ = ["Assembly", "assemble", "assemble_stones", "surveyed_block"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """A scene that can be simulated, and how it came about.
+
+    Attributes
+    ----------
+    scene : for `mechanics.simulate`
+    models : the stones as surveyed, in the order of the scene's blocks
+    simplified : the same as hexahedra, before the joints were closed
+    closing : what closing the joints has changed; None if they stay open
+    towards : (3,) mean normal of the faces, from the wall to the observer [-]
+    """
+
+    scene: Scene
+    models: tuple[StoneModel, ...]
+    simplified: tuple[BlockyStone, ...]
+    closing: ClosingReport | None
+    towards: Array
+
+
+def assemble(scene: SceneFile, session: Session) -> Assembly:
+    """Build the scene of a scene file from the stones in the database.
+
+    Raises
+    ------
+    SceneError : a key names no stone, or a stone has no material
+    GeometryError : a stone cannot be made a hexahedron, or its joints cannot be closed
+    """
+    return assemble_stones(scene, select_stones(scene, session))
+
+
+def assemble_stones(scene: SceneFile, models: tuple[StoneModel, ...]) -> Assembly:
+    """As `assemble`, of stones that have been selected; the database is not needed."""
+    simplified = tuple(simplify(surveyed_block(model.record)) for model in models)
+    solids: Sequence[Solid] = [stone.solid for stone in simplified]
+    closing = None
+    if scene.joints is not None:
+        closed = close_joints(simplified, scene.joints)
+        solids, closing = closed.solids, closed.report
+    return Assembly(
+        scene=Scene(
+            name=scene.name,
+            blocks=tuple(_block(model, solid, scene) for model, solid in zip(models, solids, strict=True)),
+            gravity=scene.gravity,
+            contact=scene.contact,
+            time=scene.time,
+            solver=scene.solver,
+            frame_every=scene.output.frame_every,
+        ),
+        models=models,
+        simplified=simplified,
+        closing=closing,
+        towards=_facing(simplified),
+    )
+
+
+def surveyed_block(record: StoneRecord) -> SurveyedBlock:
+    """The stone as the survey pillar knows it, from what the database keeps of it.
+
+    The face is fitted anew: from the same measurements it is the same face, and the database need not keep
+    what follows from others of its columns.
+    """
+    measured = BlockRecord(
+        code=record.code,
+        kind=record.kind,
+        course=record.course,
+        vertices=record.vertices,
+        points=record.points,
+        sigma=record.sigma,
+        line=record.line,
+        notes=record.notes,
+    )
+    # any point on the stored side of the plane tells the fit which side is outside
+    face = outline_face(measured, record.outline.mean(axis=0) + 100.0 * record.normal)
+    depth = Depth(record.depth, record.depth_sigma, record.depth_source, "database", record.line)
+    return extrude(face, depth)
+
+
+def _block(model: StoneModel, solid: Solid, scene: SceneFile) -> Block:
+    return Block(
+        code=solid.code,
+        vertices=solid.vertices,
+        faces=solid.faces,
+        material=model.material,
+        fidelity=model.fidelity,
+        mesh_size=scene.mesh_size if model.fidelity is Fidelity.DEFORMABLE else None,
+    )
+
+
+def _facing(stones: Sequence[BlockyStone]) -> Array:
+    """(3,) mean normal of the faces, weighted by area."""
+    total = np.zeros(3)
+    for stone in stones:
+        a, b, c, d = stone.corners
+        total += np.cross(c - a, d - b)
+    length = float(np.linalg.norm(total))
+    return total / length if length > 0.0 else stones[0].face.fit.normal

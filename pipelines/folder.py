@@ -1,0 +1,74 @@
+"""A folder of results appears whole or not at all, and takes the place of earlier results only."""
+
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from moma.errors import UsageError
+
+__all__ = ["check_replaceable", "replacing"]
+
+_INDEX = "summary.json"  # its "files" are those that a run wrote
+
+
+def check_replaceable(folder: Path) -> None:
+    """Refuse a place that results must not take: a file, or a folder that holds anything but earlier results.
+
+    Raises
+    ------
+    UsageError : naming what is there
+    """
+    place, remedy = str(folder), "name another folder with --out"
+    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+        raise UsageError("is not a folder", where=place, remedy=remedy)
+    if not folder.exists():
+        return
+    foreign = sorted({entry.name for entry in folder.iterdir()} - _own_files(folder))
+    if foreign:
+        shown = ", ".join(foreign[:3]) + (", …" if len(foreign) > 3 else "")
+        raise UsageError(f"holds what no run of MOMA wrote ({shown})", where=place, remedy=remedy)
+
+
+@contextmanager
+def replacing(folder: Path) -> Iterator[Path]:
+    """A fresh folder to write into; it takes the place of `folder` when the block ends without an error.
+
+    If the block fails or is interrupted, `folder` stays as it was.
+    """
+    check_replaceable(folder)
+    parent = folder.absolute().parent
+    try:
+        parent.mkdir(parents=True, exist_ok=True)
+        fresh = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=parent))
+    except OSError as error:
+        raise UsageError(
+            f"cannot be written: {error.strerror}", where=str(parent), remedy="name another folder with --out"
+        ) from error
+    try:
+        yield fresh
+        fresh.chmod(0o777 & ~_umask())  # mkdtemp makes it private
+        check_replaceable(folder)
+        if folder.exists():
+            shutil.rmtree(folder)
+        fresh.rename(folder.absolute())
+    finally:
+        shutil.rmtree(fresh, ignore_errors=True)
+
+
+def _own_files(folder: Path) -> set[str]:
+    """Names of the files that the run whose summary lies there wrote."""
+    try:
+        files = json.loads((folder / _INDEX).read_text(encoding="utf-8"))["files"]
+    except (OSError, ValueError, LookupError, TypeError):
+        return set()
+    return {_INDEX, *map(str, files)} if isinstance(files, list) else set()
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

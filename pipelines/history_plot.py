@@ -1,0 +1,42 @@
+"""The history of a run as a small plot."""
+
+import io
+import logging
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.result import History
+
+__all__ = ["history_svg"]
+
+_CURVES = (
+    ("speed", "speed [m/s]", "#8a3b12"),
+    ("balance", "unbalanced force / weight", "#1f5f8b"),
+    ("natural_map", "residual η of the contact law", "#6b7a2a"),
+)
+
+
+def history_svg(history: History) -> str:
+    """Speed, balance and residual against time, as an SVG element."""
+    # matplotlib tells on stderr that it builds its font cache, once per machine
+    logging.getLogger("matplotlib.font_manager").setLevel(logging.ERROR)
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8.5, 3.6), layout="constrained")
+    axes = figure.subplots()
+    for name, label, colour in _CURVES:
+        values = _positive(getattr(history, name))
+        axes.semilogy(history.time, values, label=label, color=colour, marker="." if len(values) < 30 else "")
+    axes.set_xlabel("simulated time [s]")
+    axes.grid(alpha=0.3)
+    axes.legend(frameon=False, loc="upper right")
+    out = io.StringIO()
+    figure.savefig(out, format="svg")
+    text = out.getvalue()
+    return text[text.index("<svg") :]
+
+
+def _positive(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Zeros cannot be drawn on a logarithmic axis: leave gaps there."""
+    return np.where(values > 0.0, values, np.nan)

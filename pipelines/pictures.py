@@ -1,0 +1,123 @@
+"""Pictures of a result: what to draw, in a process of its own, and what to say when it cannot be drawn."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.result import Outcome, Result
+from moma.errors import MissingLibraryError
+from pipelines.stone_values import stress_statistics
+from pipelines.surfaces import save_surface, wall_surface
+
+__all__ = ["draw_pictures", "package_of"]
+
+_TIMEOUT = 300.0  # seconds; software rendering of 10⁵ triangles takes a few
+_PACKAGES = {
+    "libGL": "libgl1",
+    "libGLX": "libglx0",
+    "libOpenGL": "libopengl0",
+    "libEGL": "libegl1",
+    "libOSMesa": "libosmesa6",
+    "libX11": "libx11-6",
+    "libXrender": "libxrender1",
+    "libXcursor": "libxcursor1",
+    "libXext": "libxext6",
+    "libXt": "libxt6",
+    "libSM": "libsm6",
+    "libICE": "libice6",
+}
+_ENDINGS = {
+    Outcome.EQUILIBRIUM: "at equilibrium",
+    Outcome.MOVING: "still moving",
+    Outcome.COLLAPSED: "collapsed",
+}
+
+
+def package_of(message: str) -> str | None:
+    """Debian package of the shared library that a loader's message names; None if it names none."""
+    found = re.search(r"(lib[A-Za-z0-9_+-]+?)(?:-\d[\d.]*)?\.so", message)
+    return _PACKAGES.get(found.group(1)) if found else None
+
+
+def draw_pictures(
+    result: Result, folder: Path, names: Sequence[str], towards: NDArray[np.float64]
+) -> tuple[str, ...]:
+    """Draw the named pictures (von_mises, displacement) into a folder, seen from the side `towards`.
+
+    Returns the file names. `von_mises` is left out when no stone deforms.
+
+    Raises
+    ------
+    MissingLibraryError : VTK cannot be loaded or cannot draw on this machine
+    """
+    statistics = stress_statistics(result)
+    wanted = [name for name in names if name != "von_mises" or statistics is not None]
+    if not wanted:
+        return ()
+    up = -np.array(result.scene.gravity)
+    jobs = [
+        {
+            "quantity": name,
+            "path": str((folder / f"{name}.png").absolute()),
+            "top": statistics.p99 if name == "von_mises" and statistics is not None else None,
+            "title": _title(result, name),
+            "towards": towards.tolist(),
+            "up": up.tolist() if up.any() else [0.0, 0.0, 1.0],
+        }
+        for name in wanted
+    ]
+    with tempfile.TemporaryDirectory() as scratch:
+        surface = Path(scratch) / "surface.npz"
+        save_surface(surface, wall_surface(result))
+        job_file = Path(scratch) / "job.json"
+        job_file.write_text(json.dumps({"surface": str(surface), "pictures": jobs}), encoding="utf-8")
+        _draw_apart(job_file)
+    return tuple(f"{name}.png" for name in wanted)
+
+
+def _title(result: Result, quantity: str) -> str:
+    what = {"von_mises": "Von Mises stress", "displacement": "displacement"}[quantity]
+    return f"{result.scene.name}: {what}, {_ENDINGS[result.outcome]} after {result.time:.3g} s"
+
+
+def _draw_apart(job_file: Path) -> None:
+    """Run pipelines.drawing on a job; its noise about displays is kept back unless it fails."""
+    root = str(Path(__file__).resolve().parent.parent)
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([root, os.environ.get("PYTHONPATH", "")])}
+    try:
+        done: Any = subprocess.run(
+            [sys.executable, "-m", "pipelines.drawing", str(job_file)],
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=_TIMEOUT,
+            env=environment,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        raise MissingLibraryError(f"no picture after {_TIMEOUT:.0f} s", where="pictures") from None
+    if done.returncode == 3:
+        message = done.stdout.strip()
+        package = package_of(message)
+        raise MissingLibraryError(
+            f"VTK cannot be loaded: {message}",
+            where="pictures",
+            remedy=f"install it: apt-get install {package or 'libgl1 libxrender1 libegl1'}",
+        )
+    if done.returncode != 0:
+        lines = [line.strip() for line in done.stderr.splitlines() if line.strip()]
+        reason = lines[-1] if lines else f"it ended with code {done.returncode}"
+        raise MissingLibraryError(
+            f"VTK cannot draw off screen: {reason}",
+            where="pictures",
+            remedy="install software rendering: apt-get install libegl1 libgl1 libgl1-mesa-dri",
+        )

@@ -1,0 +1,135 @@
+"""A scene from file to results: assemble, simulate, write, and keep the results in the database."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from archmodel.database import open_database
+from archmodel.records import RunRecord, StoneResult
+from archmodel.store import store_run
+from mechanics.result import Result
+from mechanics.simulate import simulate
+from moma.errors import DatabaseError, MissingLibraryError
+from pipelines.assemble import Assembly, assemble
+from pipelines.folder import check_replaceable, replacing
+from pipelines.pictures import draw_pictures
+from pipelines.progress import Listener, Progress, silent
+from pipelines.report import write_report
+from pipelines.scenefile import SceneFile, read_scene
+from pipelines.stone_values import stone_results
+from pipelines.summary import as_json, summarise
+from pipelines.vtk_output import write_frames
+
+__all__ = ["RunReport", "run_scene", "write_results"]
+
+
+@dataclass(frozen=True)
+class RunReport:
+    """What a run left behind.
+
+    Attributes
+    ----------
+    folder : where the results lie
+    summary : the contents of summary.json
+    warnings : what went less well than asked
+    run : number of the run in the database
+    """
+
+    folder: Path
+    summary: dict[str, Any]
+    warnings: tuple[str, ...]
+    run: int
+
+
+def run_scene(path: str | Path, url: str, folder: str | Path, progress: Listener = silent) -> RunReport:
+    """Run a scene file on the stones of a database, and write the results into a folder.
+
+    Parameters
+    ----------
+    path : scene file
+    url : of the database
+    folder : of the results; earlier results there are replaced when the new ones are complete
+    progress : told of every stage
+
+    Raises
+    ------
+    UsageError : the folder holds other things
+    SceneError, GeometryError, MeshError, SolverError : see `assemble` and `mechanics.simulate`
+    DatabaseError : the database cannot be read, or not written at the end; the folder is complete then
+    """
+    seconds: dict[str, float] = {}
+    folder, scene = Path(folder), read_scene(path)
+    check_replaceable(folder)
+    with open_database(url, create=False) as database:
+        with _timed(seconds, "blocks"), database.session(read_only=True) as session:
+            assembly = assemble(scene, session)
+        result = simulate(assembly.scene, progress)
+        seconds |= result.wall_time
+        stones = stone_results(result)
+        with replacing(folder) as fresh:
+            summary, warnings = write_results(result, stones, scene, assembly, fresh, seconds, progress)
+        record = RunRecord(
+            scene=scene.name,
+            scene_text=scene.text,
+            outcome=str(result.outcome),
+            summary=summary,
+            version=summary["version"],
+            results=stones,
+        )
+        try:
+            with database.session() as session:
+                run = store_run(session, record)
+        except DatabaseError as error:
+            what = f"the results are in {folder}, but could not be stored: {error.what}"
+            raise DatabaseError(what, where=error.where, remedy=error.remedy) from error
+    return RunReport(folder, summary, warnings, run)
+
+
+def write_results(
+    result: Result,
+    stones: tuple[StoneResult, ...],
+    scene: SceneFile,
+    assembly: Assembly,
+    folder: Path,
+    seconds: dict[str, float],
+    progress: Listener = silent,
+) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Write all files of a run into an empty folder; the summary, and what could not be done.
+
+    Pictures that cannot be drawn on this machine are a warning; everything else is written.
+    """
+    warnings = []
+    if result.errors.unconverged_steps:
+        warnings.append(
+            f"{result.errors.unconverged_steps} of {result.steps} steps were left above the solver's "
+            "tolerance; allow more max_sweeps in [solver], or a smaller step in [time]"
+        )
+    with _timed(seconds, "files"):
+        progress(Progress("write", 0, 3, "results.pvd"))
+        write_frames(result, folder)
+    with _timed(seconds, "pictures"):
+        progress(Progress("write", 1, 3, "pictures"))
+        try:
+            draw_pictures(result, folder, scene.output.pictures, assembly.towards)
+        except MissingLibraryError as error:
+            warnings.append(f"no pictures: {error}")
+    progress(Progress("write", 2, 3, "report.html"))
+    summary = summarise(result, version=version("moma-masonry"), seconds=seconds)
+    write_report(folder / "report.html", result, summary, stones, warnings)
+    (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
+    summary["warnings"] = warnings
+    summary["files"] = sorted(["summary.json", *(entry.name for entry in folder.iterdir())])
+    (folder / "summary.json").write_text(as_json(summary), encoding="utf-8")
+    progress(Progress("write", 3, 3))
+    return summary, tuple(warnings)
+
+
+@contextmanager
+def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
+    start = time.perf_counter()
+    yield
+    seconds[stage] = time.perf_counter() - start

@@ -1,0 +1,198 @@
+"""Every key of a scene file: type, unit, bounds, default. docs/scene.md is held to this list by a test."""
+
+from collections.abc import Mapping
+
+from mechanics.scene import ContactSettings, Fidelity, SolverSettings, TimeSettings
+from pipelines.schema import Key, Kind
+from survey.joint_lines import JointSettings
+
+__all__ = ["MATERIAL_KEYS", "PICTURES", "TABLES"]
+
+PICTURES = ("von_mises", "displacement")
+
+MATERIAL_KEYS = (
+    Key("density", Kind.NUMBER, "Density ρ.", "kg/m³", above=0),
+    Key("young", Kind.NUMBER, "Young's modulus E; only deformable stones use it.", "Pa", above=0),
+    Key("poisson", Kind.NUMBER, "Poisson's ratio ν.", "-", at_least=0, below=0.5),
+    Key(
+        "stones",
+        Kind.TEXTS,
+        "Expressions; stones that satisfy any of them are of this material. "
+        "One material may leave this out: it is that of all other stones.",
+        default=(),
+    ),
+)
+
+_SCENE = (Key("name", Kind.TEXT, "Title of reports and pictures; else the file's name.", default=None),)
+
+_SELECT = (
+    Key("kind", Kind.TEXT, "Kind of the stones; its subkinds belong to it.", default="entity"),
+    Key("where", Kind.TEXTS, "Expressions that every stone must satisfy.", default=()),
+    Key("exclude", Kind.TEXTS, "Codes or expressions; stones named by any of them are left out.", default=()),
+)
+
+_BODIES = (
+    Key(
+        "default",
+        Kind.TEXT,
+        "Model of stones that no list below names.",
+        default=Fidelity.DEFORMABLE.value,
+        choices=(Fidelity.RIGID.value, Fidelity.DEFORMABLE.value),
+    ),
+    Key("rigid", Kind.TEXTS, "Codes or expressions of stones that move but do not deform.", default=()),
+    Key("deformable", Kind.TEXTS, "Codes or expressions of stones with finite elements.", default=()),
+    Key("fixed", Kind.TEXTS, "Codes or expressions of stones that never move: the supports.", default=()),
+)
+
+_JOINTS = (
+    Key(
+        "mode",
+        Kind.TEXT,
+        "close: neighbouring stones share contact planes; open: stones keep their measured sides.",
+        default="close",
+        choices=("close", "open"),
+    ),
+    Key(
+        "max_width",
+        Kind.NUMBER,
+        "Sides farther apart do not make a joint.",
+        "m",
+        JointSettings.max_width,
+        above=0,
+    ),
+    Key(
+        "max_angle",
+        Kind.NUMBER,
+        "Sides that open wider do not make a joint.",
+        "°",
+        JointSettings.max_angle,
+        above=0,
+        below=45,
+    ),
+    Key(
+        "min_overlap",
+        Kind.NUMBER,
+        "Length over which two sides must face each other.",
+        "m",
+        JointSettings.min_overlap,
+        at_least=0,
+    ),
+    Key(
+        "straightness",
+        Kind.NUMBER,
+        "Largest distance of a corner from its joint that still counts as straight.",
+        "m",
+        JointSettings.straightness,
+        above=0,
+    ),
+    Key(
+        "max_displacement",
+        Kind.NUMBER,
+        "Largest distance by which closing may move a corner.",
+        "m",
+        JointSettings.max_displacement,
+        above=0,
+    ),
+)
+
+_CONTACT = (
+    Key("friction", Kind.NUMBER, "Coulomb's coefficient μ.", "-", ContactSettings.friction, at_least=0),
+    Key(
+        "alert_distance",
+        Kind.NUMBER,
+        "Gap below which a contact is watched, relative to the smaller stone's size.",
+        "-",
+        ContactSettings.alert_distance,
+        above=0,
+        at_most=1,
+    ),
+)
+
+_GRAVITY = (
+    Key("magnitude", Kind.NUMBER, "Acceleration of gravity.", "m/s²", 9.81, at_least=0),
+    Key("direction", Kind.VECTOR, "Where things fall to; its length does not matter.", "-", (0.0, 0.0, -1.0)),
+)
+
+_MESH = (Key("size", Kind.NUMBER, "Target edge length of the finite elements.", "m", 0.2, above=0),)
+
+_TIME = (
+    Key("step", Kind.NUMBER, "Time step h.", "s", TimeSettings.step, above=0),
+    Key(
+        "theta",
+        Kind.NUMBER,
+        "θ of the scheme; 1 damps most.",
+        "-",
+        TimeSettings.theta,
+        at_least=0.5,
+        at_most=1,
+    ),
+    Key("duration", Kind.NUMBER, "Longest simulated time.", "s", TimeSettings.duration, above=0),
+    Key(
+        "stop_at_equilibrium",
+        Kind.BOOLEAN,
+        "Stop once every stone is at rest and in balance.",
+        "",
+        TimeSettings.stop_at_equilibrium,
+    ),
+    Key(
+        "balance_tolerance",
+        Kind.NUMBER,
+        "Unbalanced force of a stone over its weight below which it is in balance.",
+        "-",
+        TimeSettings.balance_tolerance,
+        above=0,
+    ),
+    Key(
+        "collapse_displacement",
+        Kind.NUMBER,
+        "A stone that moved by more than this fraction of its smallest side and still moves has collapsed.",
+        "-",
+        TimeSettings.collapse_displacement,
+        above=0,
+    ),
+)
+
+_SOLVER = (
+    Key(
+        "tolerance",
+        Kind.NUMBER,
+        "Natural map η at which a step is solved.",
+        "-",
+        SolverSettings.tolerance,
+        above=0,
+        below=1,
+    ),
+    Key(
+        "max_sweeps",
+        Kind.INTEGER,
+        "Gauss–Seidel sweeps after which a step is given up, and reported as not converged.",
+        "",
+        SolverSettings.max_sweeps,
+        at_least=1,
+    ),
+)
+
+_OUTPUT = (
+    Key(
+        "frame_every",
+        Kind.INTEGER,
+        "Keep the motion every so many steps; 0: first and last.",
+        "",
+        0,
+        at_least=0,
+    ),
+    Key("pictures", Kind.TEXTS, "Pictures to draw: von_mises, displacement.", "", PICTURES),
+)
+
+TABLES: Mapping[str, tuple[Key, ...]] = {
+    "scene": _SCENE,
+    "select": _SELECT,
+    "bodies": _BODIES,
+    "joints": _JOINTS,
+    "contact": _CONTACT,
+    "gravity": _GRAVITY,
+    "mesh": _MESH,
+    "time": _TIME,
+    "solver": _SOLVER,
+    "output": _OUTPUT,
+}

@@ -1,0 +1,209 @@
+"""Scene files: TOML text → a SceneFile in which every key has been checked.
+
+Nothing runs and no database is read here; stones are still expressions. docs/scene.md lists the keys.
+"""
+
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mechanics.materials import Material
+from mechanics.scene import ContactSettings, Fidelity, SolverSettings, TimeSettings
+from moma.errors import SceneError
+from pipelines.scene_keys import MATERIAL_KEYS, PICTURES, TABLES
+from pipelines.schema import Document, check_table, nearest
+from pipelines.toml_lines import key_lines
+from survey.joint_lines import JointSettings
+
+__all__ = ["Fidelities", "MaterialRule", "Output", "SceneFile", "Selection", "parse_scene", "read_scene"]
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Which stones take part: of this kind, satisfying all of `where`, named by none of `exclude`."""
+
+    kind: str
+    where: tuple[str, ...]
+    exclude: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class MaterialRule:
+    """A material and the expressions of its stones; no expressions: all stones that no other rule names."""
+
+    material: Material
+    stones: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Fidelities:
+    """How stones are modelled: `fixed` goes before the other lists, `default` is for those in no list."""
+
+    default: Fidelity
+    rigid: tuple[str, ...]
+    deformable: tuple[str, ...]
+    fixed: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Output:
+    """What to keep: a frame every so many steps (0: first and last), and the names of the pictures."""
+
+    frame_every: int
+    pictures: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class SceneFile:
+    """A scene as its author wrote it, checked, with all defaults filled in.
+
+    Attributes
+    ----------
+    document : file and lines, for error messages
+    text : the file, as it is kept with the run
+    name : title
+    joints : how joints are closed; None: they stay open
+    gravity : (3,) acceleration [m/s²]
+    mesh_size : target edge length of the finite elements [m]
+    """
+
+    document: Document
+    text: str
+    name: str
+    selection: Selection
+    materials: tuple[MaterialRule, ...]
+    bodies: Fidelities
+    joints: JointSettings | None
+    contact: ContactSettings
+    gravity: tuple[float, float, float]
+    mesh_size: float
+    time: TimeSettings
+    solver: SolverSettings
+    output: Output
+
+
+def read_scene(path: str | Path) -> SceneFile:
+    """Read and check a scene file.
+
+    Raises
+    ------
+    SceneError : with file and line, at the first thing that is wrong
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise SceneError("no such scene file", where=str(path), remedy="check the path") from None
+    except UnicodeDecodeError as error:
+        raise SceneError(
+            f"byte {error.start} is not UTF-8", where=str(path), remedy="save the file as UTF-8"
+        ) from None
+    except OSError as error:
+        raise SceneError(f"cannot be read: {error.strerror}", where=str(path)) from None
+    return parse_scene(text, str(path))
+
+
+def parse_scene(text: str, path: str) -> SceneFile:
+    """Check the text of a scene file; `path` is for the messages."""
+    try:
+        given = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise _syntax_error(error, text, path) from None
+    document = Document(path, key_lines(text))
+    tables = _checked_tables(document, given)
+    return SceneFile(
+        document=document,
+        text=text,
+        name=tables["scene"]["name"] or Path(path).stem,
+        selection=Selection(**tables["select"]),
+        materials=_materials(document, given),
+        bodies=Fidelities(**tables["bodies"] | {"default": Fidelity(tables["bodies"]["default"])}),
+        joints=_joints(**tables["joints"]),
+        contact=ContactSettings(**tables["contact"]),
+        gravity=_gravity(document, **tables["gravity"]),
+        mesh_size=tables["mesh"]["size"],
+        time=_time(document, tables["time"]),
+        solver=SolverSettings(**tables["solver"]),
+        output=_output(document, **tables["output"]),
+    )
+
+
+def _syntax_error(error: tomllib.TOMLDecodeError, text: str, path: str) -> SceneError:
+    message = str(error)
+    place = re.search(r"\(at line (\d+), column \d+\)", message)
+    line = int(place.group(1)) if place else max(1, len(text.rstrip().splitlines()))
+    what = re.sub(r" \(at .*\)$", "", message)
+    return SceneError(
+        f"not TOML: {what}", where=f"{path}:{line}", remedy="see docs/scene.md for a scene to start from"
+    )
+
+
+def _checked_tables(document: Document, given: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    known = [*TABLES, "materials"]
+    for name, content in given.items():
+        if name not in known:
+            what = f"unknown table [{name}]" if isinstance(content, dict | list) else f"unknown key {name!r}"
+            document.fail(what, name, remedy=nearest(name, known))
+        if not isinstance(content, dict):
+            document.fail(f"{name!r} is not a table", name, remedy=f"write [{name}] on a line of its own")
+    return {name: check_table(document, (name,), given.get(name, {}), keys) for name, keys in TABLES.items()}
+
+
+def _materials(document: Document, given: Mapping[str, Any]) -> tuple[MaterialRule, ...]:
+    tables = given.get("materials", {})
+    if not tables:
+        document.fail("no material", "materials", remedy="add a table such as [materials.limestone]")
+    rules = []
+    for name, content in tables.items():
+        if not isinstance(content, dict):
+            document.fail(
+                f"{name!r} stands in no material", "materials", name, remedy="write it under [materials.NAME]"
+            )
+        values: dict[str, Any] = check_table(document, ("materials", name), content, MATERIAL_KEYS)
+        stones = values.pop("stones")
+        rules.append(MaterialRule(Material(name, **values), stones))
+    general = [rule.material.name for rule in rules if not rule.stones]
+    if len(general) > 1:
+        document.fail(
+            f"materials {' and '.join(map(repr, general))} both lack 'stones'",
+            "materials",
+            general[1],
+            remedy="only one material can be that of all other stones",
+        )
+    return tuple(rules)
+
+
+def _joints(mode: str, **settings: float) -> JointSettings | None:
+    return JointSettings(**settings) if mode == "close" else None
+
+
+def _gravity(
+    document: Document, magnitude: float, direction: tuple[float, float, float]
+) -> tuple[float, float, float]:
+    length = float(np.linalg.norm(direction))
+    if length == 0.0:
+        document.fail("direction has no length", "gravity", "direction", remedy="give for example [0, 0, -1]")
+    x, y, z = (magnitude * one / length for one in direction)
+    return x, y, z
+
+
+def _time(document: Document, values: dict[str, Any]) -> TimeSettings:
+    if values["duration"] < values["step"]:
+        document.fail(
+            f"duration = {values['duration']:g} s is shorter than step = {values['step']:g} s",
+            "time",
+            "duration",
+            remedy="give at least one step",
+        )
+    return TimeSettings(**values)
+
+
+def _output(document: Document, frame_every: int, pictures: tuple[str, ...]) -> Output:
+    for name in pictures:
+        if name not in PICTURES:
+            document.fail(f"unknown picture {name!r}", "output", "pictures", remedy=nearest(name, PICTURES))
+    return Output(frame_every, pictures)

@@ -1,0 +1,145 @@
+"""Which stones a scene means, and how each is modelled: its expressions, asked of the database."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from sqlalchemy.orm import Session
+
+from archmodel.query import find
+from archmodel.records import StoneRecord
+from archmodel.store import load_stones
+from mechanics.materials import Material
+from mechanics.scene import Fidelity
+from moma.errors import QueryError, UsageError
+from pipelines.scenefile import SceneFile
+from pipelines.schema import nearest
+from pipelines.toml_lines import Path
+
+__all__ = ["StoneModel", "select_stones"]
+
+_CODE = re.compile(r"[\w.:/+-]+")  # a text without blanks or comparison is meant as a code
+
+
+@dataclass(frozen=True)
+class StoneModel:
+    """One stone of a scene: as surveyed, of what, and how it is modelled."""
+
+    record: StoneRecord
+    material: Material
+    fidelity: Fidelity
+
+
+def select_stones(scene: SceneFile, session: Session) -> tuple[StoneModel, ...]:
+    """The stones of a scene, in the order of the survey.
+
+    Raises
+    ------
+    SceneError
+        at the key whose expression cannot be understood or names no stone, or where a stone would have no
+        material, or two
+    """
+    records = _selected(scene, session)
+    materials = _materials(scene, session, records)
+    fidelities = _fidelities(scene, session, records)
+    return tuple(
+        StoneModel(record, materials[code], fidelities.get(code, scene.bodies.default))
+        for code, record in records.items()
+    )
+
+
+def _selected(scene: SceneFile, session: Session) -> dict[str, StoneRecord]:
+    """Stones by code: of the kind, satisfying all of `where`, less those excluded."""
+    selection, document = scene.selection, scene.document
+    try:
+        entities = find(session, selection.kind, selection.where)
+    except UsageError as error:
+        key = "where" if isinstance(error, QueryError) else "kind"
+        document.fail(error.what, "select", key, remedy=error.remedy)
+    if not entities:
+        document.fail(
+            f"no stone is selected ({', '.join([f'kind {selection.kind}', *selection.where])})",
+            "select",
+            remedy="try the selection with: moma query",
+        )
+    records = {record.code: record for record in load_stones(session, entities)}
+    out = _named(scene, session, records, ("select", "exclude"), selection.exclude)
+    left = {code: record for code, record in records.items() if code not in out}
+    if not left:
+        document.fail("all selected stones are excluded", "select", "exclude", remedy="exclude fewer")
+    return left
+
+
+def _materials(scene: SceneFile, session: Session, records: Mapping[str, StoneRecord]) -> dict[str, Material]:
+    """Material of every stone: that of the one rule that names it, else the general one."""
+    general: Material | None = None
+    found: dict[str, Material] = {}
+    for rule in scene.materials:
+        if not rule.stones:
+            general = rule.material
+            continue
+        path = ("materials", rule.material.name, "stones")
+        for code in _named(scene, session, records, path, rule.stones):
+            if code in found:
+                both = f"{found[code].name!r} and {rule.material.name!r}"
+                scene.document.fail(f"stone {code} is of two materials, {both}", *path, remedy="name it once")
+            found[code] = rule.material
+    if general is not None:
+        return {code: found.get(code, general) for code in records}
+    without = [code for code in records if code not in found]
+    if without:
+        scene.document.fail(
+            f"{len(without)} stones have no material, e.g. {without[0]}",
+            "materials",
+            remedy="leave 'stones' out of one material: it is that of all others",
+        )
+    return found
+
+
+def _fidelities(
+    scene: SceneFile, session: Session, records: Mapping[str, StoneRecord]
+) -> dict[str, Fidelity]:
+    """Fidelity of the stones that a list names."""
+    lists = {
+        Fidelity.RIGID: scene.bodies.rigid,
+        Fidelity.DEFORMABLE: scene.bodies.deformable,
+        Fidelity.FIXED: scene.bodies.fixed,
+    }
+    named = {
+        fidelity: _named(scene, session, records, ("bodies", str(fidelity)), items)
+        for fidelity, items in lists.items()
+    }
+    both = named[Fidelity.RIGID] & named[Fidelity.DEFORMABLE] - named[Fidelity.FIXED]
+    if both:
+        scene.document.fail(
+            f"stone {min(both)} is both rigid and deformable", "bodies", "deformable", remedy="name it in one"
+        )
+    # FIXED comes last: it goes before the others
+    return {code: fidelity for fidelity, codes in named.items() for code in codes}
+
+
+def _named(
+    scene: SceneFile, session: Session, records: Mapping[str, StoneRecord], key: Path, items: Sequence[str]
+) -> set[str]:
+    """Codes of the selected stones that any of the items, codes or expressions, names."""
+    codes: set[str] = set()
+    for item in items:
+        if item in records:
+            codes.add(item)
+            continue
+        if _CODE.fullmatch(item):
+            scene.document.fail(
+                f"{key[-1]}: {item!r} is not the code of a selected stone",
+                *key,
+                remedy=nearest(item, records),
+            )
+        try:
+            matching = {entity.code for entity in find(session, "entity", [item])} & records.keys()
+        except UsageError as error:
+            scene.document.fail(f"{key[-1]}: {error.what}", *key, remedy=error.remedy)
+        if not matching:
+            scene.document.fail(
+                f"{key[-1]}: no selected stone satisfies {item!r}", *key, remedy="try it with: moma query"
+            )
+        codes |= matching
+    return codes

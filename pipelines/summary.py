@@ -1,0 +1,66 @@
+"""summary.json: the run in a few numbers, for people and for programs."""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from mechanics.result import Result
+from mechanics.scene import Fidelity
+from pipelines.stone_values import stress_statistics
+
+__all__ = ["as_json", "summarise"]
+
+
+def summarise(result: Result, *, version: str, seconds: Mapping[str, float]) -> dict[str, Any]:
+    """The contents of summary.json, in SI units.
+
+    Parameters
+    ----------
+    result : of the simulation
+    version : of MOMA
+    seconds : wall time by stage, of the simulation and of what went before and after it [s]
+
+    Numbers that are not finite become None: JSON has no word for them.
+    """
+    stress = stress_statistics(result)
+    displacement = max(float(np.linalg.norm(body.displacement, axis=1).max()) for body in result.bodies)
+    fidelities = [body.fidelity for body in result.bodies]
+    summary: dict[str, Any] = {
+        "scene": result.scene.name,
+        "outcome": str(result.outcome),
+        "bodies": {
+            str(one): fidelities.count(one) for one in (Fidelity.RIGID, Fidelity.DEFORMABLE, Fidelity.FIXED)
+        },
+        "contacts": len(result.contacts.gap),
+        "steps": result.steps,
+        "time": {
+            "simulated": result.time,
+            "wall": sum(seconds.values()),
+            "by_stage": dict(seconds),
+        },
+        "errors": asdict(result.errors),
+        "von_mises": None if stress is None else asdict(stress),
+        "displacement": {"max": displacement},
+        "reaction": {"total_vertical": result.reaction, "weight": result.weight},
+        "version": version,
+    }
+    return {key: _finite(value) for key, value in summary.items()}
+
+
+def as_json(value: Mapping[str, Any] | list[Any]) -> str:
+    """JSON text with a final newline; refuses numbers that JSON cannot say."""
+    return json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(one) for key, one in value.items()}
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,77 @@
+"""On which line of a TOML text each key stands; the standard reader does not tell."""
+
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+
+__all__ = ["Path", "key_lines", "line_of"]
+
+Path = tuple[str, ...]
+
+_TOKEN = re.compile(
+    r'"""(?:\\.|[^\\])*?"""'
+    r"|'''.*?'''"
+    r'|"(?:\\.|[^"\\\n])*"'
+    r"|'[^'\n]*'"
+    r"|\#[^\n]*"
+    r"|\n"
+    r"|[\[\]{}=]"
+    r"|[^\s\[\]{}=\"'#]+"
+    r"|.",
+    re.DOTALL,
+)
+
+
+def key_lines(text: str) -> dict[Path, int]:
+    """Line numbers, from 1, of the tables and keys of a valid TOML text.
+
+    A key inside an inline table stands on the line of that table's key, so `line_of` falls back on it.
+    """
+    lines: dict[Path, int] = {}
+    table: Path = ()
+    for line, statement in _statements(text):
+        if statement[0] == "[":
+            table = _dotted("".join(statement).strip("[]"))
+            path = table
+        else:
+            path = table + _dotted("".join(statement[: statement.index("=")]))
+        for length in range(1, len(path) + 1):
+            lines.setdefault(path[:length], line)
+    return lines
+
+
+def line_of(lines: Mapping[Path, int], path: Path) -> int:
+    """Line of a key, or of the nearest table or key that holds it; 1 if there is none."""
+    while path:
+        if path in lines:
+            return lines[path]
+        path = path[:-1]
+    return 1
+
+
+def _statements(text: str) -> Iterator[tuple[int, list[str]]]:
+    """(first line, tokens) of each header or assignment, comments and outer space left out."""
+    line, first, depth = 1, 1, 0
+    tokens: list[str] = []
+    for match in _TOKEN.finditer(text + "\n"):
+        token = match.group()
+        if token == "\n" and depth == 0:
+            if tokens:
+                yield first, tokens
+            tokens = []
+        elif not token.isspace() and not token.startswith("#"):
+            if not tokens:
+                first = line
+            tokens.append(token)
+            depth += (token in ("[", "{")) - (token in ("]", "}"))
+        line += token.count("\n")
+
+
+def _dotted(key: str) -> Path:
+    """Path of a dotted, perhaps quoted, key: ``a."b.c"`` is (a, b.c)."""
+    value: object = tomllib.loads(f"{key} = 0")
+    path: list[str] = []
+    while isinstance(value, dict):
+        (name, value), *_ = value.items()
+        path.append(name)
+    return tuple(path)

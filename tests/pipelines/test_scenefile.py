@@ -1,0 +1,175 @@
+"""Scene files: every mistake is named with its line, its value and a remedy, before anything runs."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mechanics.scene import Fidelity
+from moma.errors import MomaError, SceneError
+from pipelines.scene_keys import MATERIAL_KEYS, TABLES
+from pipelines.scenefile import parse_scene, read_scene
+from pipelines.schema import REQUIRED
+from pipelines.toml_lines import key_lines
+
+ROOT = Path(__file__).resolve().parents[2]
+SAMPLE = ROOT / "data/samples/window/window.toml"
+STONE = "[materials.stone]\ndensity = 2000\nyoung = 1e10\npoisson = 0.2\n"
+
+
+def message_of(text):
+    with pytest.raises(SceneError) as caught:
+        parse_scene(text, "scene.toml")
+    assert caught.value.exit_code == 2
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def test_the_smallest_scene_has_a_material_and_defaults_for_the_rest():
+    scene = parse_scene(STONE, "dir/tower.toml")
+    assert scene.name == "tower"
+    assert scene.gravity == (0.0, 0.0, -9.81)
+    assert scene.bodies.default is Fidelity.DEFORMABLE
+    assert scene.materials[0].material.density == 2000.0
+    assert scene.contact.friction == 0.6
+
+
+def test_the_sample_scene_is_valid():
+    scene = read_scene(SAMPLE)
+    assert scene.bodies.fixed == ("course = 1",)
+    assert scene.text == SAMPLE.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "said"),
+    [
+        ("[contact]\nfrictoin = 0.6\n", 2, "unknown key 'frictoin' in [contact]; did you mean 'friction'?"),
+        ("[contcat]\n", 1, "unknown table [contcat]; did you mean 'contact'?"),
+        ("\nname = 'x'\n", 2, "unknown key 'name'"),
+        (
+            "[contact]\nfriction = 'high'\n",
+            2,
+            "friction = 'high' is not a number; give a number [-], at least 0",
+        ),
+        ("[contact]\nfriction = true\n", 2, "friction = true is not a number"),
+        ("[contact]\nfriction = -0.1\n", 2, "friction = -0.1 is out of range"),
+        ("[contact]\nfriction = nan\n", 2, "friction = nan is out of range"),
+        ("[time]\nstep = 0.0\n", 2, "give a number [s], greater than 0"),
+        ("[time]\n# slower\ntheta = 0.4\n", 3, "at least 0.5 and at most 1"),
+        ("[time]\nstep = 0.1\nduration = 0.01\n", 3, "shorter than step"),
+        ("[solver]\nmax_sweeps = 1.5\n", 2, "not a whole number"),
+        ("[bodies]\ndefault = 'elastic'\n", 2, "known here: deformable, rigid"),
+        ("[bodies]\nfixed = 'course = 1'\n", 2, "not a list of texts"),
+        ("[gravity]\ndirection = [0, 0]\n", 2, "not a list of three numbers"),
+        ("[gravity]\ndirection = [0, 0, 0]\n", 2, "direction has no length"),
+        ("[output]\npictures = ['von_mise']\n", 2, "did you mean 'von_mises'?"),
+        ("[joints]\nmode = 'shut'\n", 2, "mode = 'shut' is unknown"),
+        ("[time]\nstep = \n", 2, "not TOML"),
+        ("[time\n", 1, "not TOML"),
+        ("time = 3\n", 1, "'time' is not a table"),
+    ],
+)
+def test_a_mistake_is_named_with_its_line(text, line, said):
+    message = message_of(text + STONE) if "not TOML" not in said else message_of(text)
+    assert message.startswith(f"scene.toml:{line}: ")
+    assert said in message
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "said"),
+    [
+        ("[scene]\nname = 'x'\n", 1, "no material"),
+        ("[materials]\ndensity = 2000\n", 2, "'density' stands in no material"),
+        ("[materials.a]\ndensity = 2000\nyoung = 1e10\n", 1, "[materials.a] has no 'poisson'"),
+        (STONE.replace("0.2", "0.5"), 4, "poisson = 0.5 is out of range"),
+        (STONE + STONE.replace("stone", "brick"), 5, "'stone' and 'brick' both lack 'stones'"),
+    ],
+)
+def test_a_mistake_in_the_materials_is_named_with_its_line(text, line, said):
+    message = message_of(text)
+    assert message.startswith(f"scene.toml:{line}: ")
+    assert said in message
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(SceneError, match="no such scene file"):
+        read_scene(tmp_path / "none.toml")
+    (tmp_path / "latin.toml").write_bytes(b"[scene]\nname = '\xe9glise'\n")
+    with pytest.raises(SceneError, match="not UTF-8"):
+        read_scene(tmp_path / "latin.toml")
+    with pytest.raises(SceneError, match="cannot be read"):
+        read_scene(tmp_path)
+
+
+@given(st.text(max_size=200) | st.text(alphabet="[]{}=\"'#\n.a1 -,", max_size=60))
+def test_no_text_makes_the_reader_fail_in_another_way(text):
+    try:
+        parse_scene(text, "scene.toml")
+    except MomaError as error:
+        message = str(error)
+    else:
+        return
+    assert re.match(r"scene\.toml:\d+: ", message)
+
+
+@given(
+    st.dictionaries(
+        st.sampled_from(["a", "b-1", "c_2", '"d.e"', "'f'", "g.h"]),
+        st.sampled_from(
+            ["1", '"# no comment"', "[1,\n 2, # two\n 3]", '"""\n[x]\ny = 1\n"""', "{ p = 1 }", "'='"]
+        ),
+        max_size=6,
+    ),
+    st.integers(0, 3),
+)
+def test_key_lines_agree_with_where_the_keys_were_written(keys, blank):
+    lines = ["# head", *[""] * blank, "[table]"]
+    written = {}
+    for key, value in keys.items():
+        written[key] = len("\n".join(lines).split("\n")) + 1
+        lines.append(f"{key} = {value} # end")
+    text = "\n".join(lines)
+    found = key_lines(text)
+    assert set(_paths(tomllib.loads(text))) == set(found)
+    for key, line in written.items():
+        path = tuple(part.strip("\"'") for part in ([key] if key[0] in "\"'" else key.split(".")))
+        assert found[("table", *path)] == line
+
+
+def _paths(tables, above=()):
+    """Paths of all keys, but of those inside inline tables, which stand on their table's line."""
+    for name, value in tables.items():
+        path = (*above, name)
+        yield path
+        if isinstance(value, dict) and "p" not in value:
+            yield from _paths(value, path)
+
+
+def test_every_key_of_a_scene_is_documented_with_its_unit_and_default():
+    documented = (ROOT / "docs/scene.md").read_text(encoding="utf-8")
+    for table, keys in {**TABLES, "materials.NAME": MATERIAL_KEYS}.items():
+        section = documented.split(f"## `[{table}]`")[1].split("\n## ")[0]
+        rows = [line for line in section.splitlines() if line.startswith("| `")]
+        assert [row.split("`")[1] for row in rows] == [key.name for key in keys]
+        for row, key in zip(rows, keys, strict=True):
+            _, _, unit, default, doc, _ = (cell.strip() for cell in row.split("|"))
+            assert unit == (key.unit or ""), key.name
+            assert default == default_text(key), key.name
+            assert key.doc in doc, key.name
+
+
+def default_text(key):
+    """A default as the documentation writes it."""
+    if key.default is REQUIRED:
+        return "required"
+    if key.default is None:
+        return ""
+    if isinstance(key.default, bool):
+        return f"`{str(key.default).lower()}`"
+    if isinstance(key.default, tuple):
+        quoted = (f'"{one}"' if isinstance(one, str) else f"{one:g}" for one in key.default)
+        return f"`[{', '.join(quoted)}]`"
+    return f'`"{key.default}"`' if isinstance(key.default, str) else f"`{key.default:g}`"
