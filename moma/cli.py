@@ -10,7 +10,7 @@ import typer
 from moma.console import progress_bars, reporting, say
 from moma.errors import UsageError
 
-__all__ = ["app", "main"]
+__all__ = ["ListFormat", "SurveyFormat", "app", "check", "ingest", "main", "query", "run", "show"]
 
 
 class SurveyFormat(StrEnum):

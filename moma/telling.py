@@ -52,7 +52,8 @@ def check_lines(report: "CheckReport", verbose: bool) -> list[str]:
             f"  at most {cost.steps} steps of {cost.step:g} s",
         ]
     if verbose and report.joints is not None:
-        lines += [f"  {code}: {moved * 1e3:.1f} mm" for code, moved in report.joints.displacement.items()]
+        moved = report.joints.displacement
+        lines += [f"  {code}: {distance * 1e3:.1f} mm" for code, distance in moved.items()]
     lines += [f"problem: {problem}" for problem in report.problems]
     if not report.problems:
         lines.append("sound: it can be run")

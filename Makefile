@@ -1,0 +1,54 @@
+# make demo   from a survey file to a picture of the stresses, in out/window
+# make test   the tests
+# make clean  remove .venv and out
+#
+# Another interpreter: make demo PYTHON=python3.12
+
+PYTHON ?= python3
+VENV := .venv
+MOMA := $(VENV)/bin/moma
+SAMPLE := data/samples/window
+OUT := out
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test clean
+
+help:
+	@sed -n 's/^# \{0,1\}//p' Makefile | head -5
+
+demo: $(VENV)/.installed
+	@mkdir -p $(OUT)
+	@rm -f $(OUT)/window.db $(OUT)/window.db-wal $(OUT)/window.db-shm
+	$(MOMA) ingest $(SAMPLE)/window.moma --db sqlite:///$(OUT)/window.db
+	$(MOMA) run $(SAMPLE)/window.toml --db sqlite:///$(OUT)/window.db --out $(OUT)/window
+	@echo
+	@if test -f $(OUT)/window/von_mises.png; then echo "The picture: $(OUT)/window/von_mises.png"; \
+	  else echo "No picture could be drawn on this machine; the warning above says what to install."; fi
+	@echo "The report:  $(OUT)/window/report.html"
+
+test: $(VENV)/.tests
+	$(VENV)/bin/python -m pytest
+
+# A mark is newer than pyproject.toml as long as what it stands for is installed.
+$(VENV)/.installed: pyproject.toml | $(VENV)/bin/python
+	@echo "Installing into $(VENV); the first time this takes some minutes."
+	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --editable .
+	@touch $@
+
+$(VENV)/.tests: pyproject.toml | $(VENV)/bin/python
+	@echo "Installing into $(VENV) with what the tests need; the first time this takes some minutes."
+	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
+	@touch $@ $(VENV)/.installed
+
+$(VENV)/bin/python:
+	@command -v $(PYTHON) >/dev/null || { echo "make: there is no $(PYTHON):" \
+	  "install Python 3.11 or later, or name yours, e.g. make demo PYTHON=python3.12" >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	  echo "make: $$($(PYTHON) --version) is too old:" \
+	  "MOMA needs 3.11 or later, e.g. make demo PYTHON=python3.12" >&2; exit 1; }
+	@rm -rf $(VENV)
+	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); echo "make: no virtual environment could be made:" \
+	  "on Debian and Ubuntu, apt-get install python3-venv" >&2; exit 1; }
+
+clean:
+	rm -rf $(VENV) $(OUT)

@@ -1,0 +1,266 @@
+"""Summary, ParaView files, pictures and report of a result whose numbers are known."""
+
+import base64
+import json
+import struct
+import xml.etree.ElementTree as ElementTree
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from mechanics.result import Outcome
+from mechanics.scene import Fidelity
+from moma.errors import MissingLibraryError
+from pipelines import pictures
+from pipelines.drawing import colouring, nice_ceiling
+from pipelines.pictures import draw_pictures, package_of
+from pipelines.report import write_report
+from pipelines.stone_values import node_volumes, stone_results, stress_statistics
+from pipelines.summary import as_json, summarise
+from pipelines.surfaces import load_surface, save_surface, wall_surface
+from pipelines.vtk_output import write_frames
+from tests.pipelines.handmade import deformable_body, result_of, rigid_body
+
+TOWARDS = np.array([0.0, -1.0, 0.0])
+
+
+def height(points):
+    """A stress that is linear in height, from 0 at z = 1 to 2 MPa at z = 3."""
+    return 1e6 * (points[:, 2] - 1.0)
+
+
+@pytest.fixture(scope="module")
+def mixed():
+    """A fixed, a deformable and a rigid block on each other."""
+    return result_of(
+        [
+            rigid_body("base", (0, 0, 0), (1, 1, 1), Fidelity.FIXED),
+            deformable_body("D1", (0, 0, 1), (1, 1, 3), height, size=0.5, shift=(0, 0, -0.002)),
+            rigid_body("top", (0, 0, 3), (1, 1, 4), shift=(0, 0.003, -0.004)),
+        ],
+        pairs=((1, 0), (2, 1)),
+        forces=((0.0, 0.0, 3000.0), (0.0, 600.0, 800.0)),
+    )
+
+
+@pytest.fixture(scope="module")
+def rigid():
+    return result_of(
+        [rigid_body("a", (0, 0, 0), (1, 1, 1), Fidelity.FIXED), rigid_body("b", (0, 0, 1), (1, 1, 2))],
+        outcome=Outcome.COLLAPSED,
+    )
+
+
+def test_the_volume_of_the_nodes_is_the_volume_of_the_stone(mixed):
+    assert node_volumes(mixed.bodies[1]).sum() == pytest.approx(2.0)
+
+
+def test_stress_statistics_are_weighted_by_volume(mixed):
+    statistics = stress_statistics(mixed)
+    assert statistics.max == pytest.approx(2e6)
+    assert statistics.mean == pytest.approx(1e6)  # a linear field's volume mean is its middle value
+    assert statistics.mean < statistics.p99 <= statistics.max
+
+
+def test_every_stone_has_its_result(mixed):
+    base, elastic, top = stone_results(mixed)
+    assert (base.code, base.fidelity, base.von_mises_max) == ("base", "fixed", None)
+    assert elastic.von_mises_max == pytest.approx(2e6)
+    assert elastic.von_mises_mean == pytest.approx(1e6)
+    assert elastic.contact_force_max == pytest.approx(3000.0)
+    assert top.displacement_max == pytest.approx(0.005)
+    assert top.contact_force_max == pytest.approx(1000.0)
+
+
+def test_a_stone_without_contact_has_no_contact_force():
+    alone = result_of([rigid_body("a", (0, 0, 0), (1, 1, 1))], pairs=(), forces=())
+    assert stone_results(alone)[0].contact_force_max is None
+
+
+def test_the_summary_has_its_keys_and_says_nothing_that_json_cannot(mixed):
+    summary = json.loads(as_json(summarise(mixed, version="1.2", seconds={"mesh": 0.5, "solve": 1.5})))
+    assert summary["scene"] == "by hand"
+    assert summary["outcome"] == "equilibrium"
+    assert summary["bodies"] == {"rigid": 1, "deformable": 1, "fixed": 1}
+    assert summary["contacts"] == 2
+    assert summary["steps"] == 10
+    assert summary["time"] == {"simulated": 0.1, "wall": 2.0, "by_stage": {"mesh": 0.5, "solve": 1.5}}
+    assert set(summary["errors"]) >= {"natural_map", "penetration", "balance", "reaction", "energy"}
+    assert summary["errors"]["energy"] is None  # not a number
+    assert summary["von_mises"]["max"] == pytest.approx(2e6)
+    assert summary["displacement"]["max"] == pytest.approx(0.005)
+    assert summary["reaction"] == {"total_vertical": 20010.0, "weight": 20000.0}
+
+
+def test_without_deformable_stones_there_is_no_stress(rigid):
+    assert summarise(rigid, version="1", seconds={})["von_mises"] is None
+
+
+def read_array(node):
+    """Values of a binary DataArray, decoded from the format's description."""
+    content = base64.b64decode(node.text)
+    (length,) = struct.unpack("<Q", content[:8])
+    assert length == len(content) - 8
+    kind = {"Float64": "<f8", "Int64": "<i8", "UInt8": "<u1"}[node.get("type")]
+    return np.frombuffer(content[8:], kind).reshape(-1, int(node.get("NumberOfComponents", 1))).squeeze()
+
+
+def test_paraview_files_hold_every_stone_and_the_last_frame_its_stress(mixed, tmp_path):
+    write_frames(mixed, tmp_path)
+    datasets = ElementTree.parse(tmp_path / "results.pvd").getroot().findall(".//DataSet")
+    assert [float(one.get("timestep")) for one in datasets] == [0.0, 0.1]
+    first, last = (
+        {
+            node.get("Name"): read_array(node)
+            for node in ElementTree.parse(tmp_path / one.get("file")).iter("DataArray")
+        }
+        for one in datasets
+    )
+    elastic = mixed.bodies[1]
+    assert last["Points"].shape == (8 + len(elastic.reference) + 8, 3)
+    assert list(np.unique(last["types"])) == [10, 42]
+    assert np.count_nonzero(last["types"] == 10) == len(elastic.tetrahedra)
+    assert last["stone"].max() == 2
+    assert np.isnan(first["von_mises"]).all()
+    assert last["von_mises"][8:-8] == pytest.approx(elastic.von_mises)
+    assert np.isnan(last["von_mises"][:8]).all()
+    assert last["displacement"][-1] == pytest.approx([0.0, 0.003, -0.004])
+
+
+def test_vtk_reads_the_files_as_closed_stones(mixed, tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    write_frames(mixed, tmp_path)
+    grid = pyvista.read(tmp_path / "results_0001.vtu")
+    sizes = grid.compute_cell_sizes()["Volume"]
+    for index, body in enumerate(mixed.bodies):
+        assert abs(sizes[grid["stone"] == index]).sum() == pytest.approx(body.volume)
+    contacts = pyvista.read(tmp_path / "contacts.vtu")
+    assert contacts["force"][1] == pytest.approx([0.0, 600.0, 800.0])
+
+
+def test_the_edges_drawn_are_those_of_the_stones_not_of_the_mesh(mixed):
+    surface = wall_surface(mixed)
+    segments = surface.points[surface.edges]
+    assert np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1).sum() == pytest.approx(12 + 16 + 12)
+    corners = surface.points[surface.triangles]
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    assert areas.sum() == pytest.approx(6 + 10 + 6)
+    assert areas[surface.deformable].sum() == pytest.approx(10)
+    assert areas[surface.fixed].sum() == pytest.approx(6)
+
+
+def test_a_surface_survives_its_file(mixed, tmp_path):
+    surface = wall_surface(mixed)
+    save_surface(tmp_path / "s.npz", surface)
+    again = load_surface(tmp_path / "s.npz")
+    assert np.array_equal(again.von_mises, surface.von_mises, equal_nan=True)
+    assert np.array_equal(again.edges, surface.edges)
+
+
+@pytest.mark.parametrize(
+    ("value", "end"), [(1.0, 1.0), (1.01, 1.2), (0.083, 0.1), (7.9e5, 8e5), (8.1e5, 1e6), (2.2e-6, 2.5e-6)]
+)
+def test_the_scale_ends_at_a_round_number(value, end):
+    top, intervals = nice_ceiling(value)
+    assert top == pytest.approx(end)
+    step = top / intervals
+    assert float(f"{step:.1e}") == pytest.approx(step)  # two digits at most
+
+
+def test_colours_are_in_the_unit_that_the_scale_names(mixed):
+    surface = wall_surface(mixed)
+    stress = colouring(surface, "von_mises", 1.4e6)
+    assert stress.title == "Von Mises stress [MPa]"
+    assert (stress.top, stress.saturated) == (pytest.approx(1.5), True)
+    assert np.nanmax(stress.values) == pytest.approx(2.0)
+    moved = colouring(surface, "displacement", None)
+    assert moved.title == "Displacement [mm]"
+    assert (moved.top, moved.saturated) == (pytest.approx(5.0), False)
+
+
+def test_pictures_show_the_wall_in_colour_on_white(mixed, tmp_path):
+    from PIL import Image
+
+    names = draw_pictures(mixed, tmp_path, ("von_mises", "displacement"), TOWARDS)
+    assert names == ("von_mises.png", "displacement.png")
+    for name in names:
+        pixels = np.asarray(Image.open(tmp_path / name).convert("RGB")).astype(int)
+        assert (pixels[[0, -1], :, :][:, [0, -1]] == 255).all()  # corners: background
+        spread = np.ptp(pixels, axis=2)
+        assert (spread > 60).mean() > 0.02  # coloured
+        assert ((spread < 12) & (pixels.mean(axis=2) < 220)).mean() > 0.02  # grey stones
+
+
+def test_without_deformable_stones_no_stress_is_drawn(rigid, tmp_path):
+    assert draw_pictures(rigid, tmp_path, ("von_mises",), TOWARDS) == ()
+
+
+@pytest.mark.parametrize(
+    ("message", "package"),
+    [
+        ("libGL.so.1: cannot open shared object file: No such file or directory", "libgl1"),
+        ("libXrender.so.1: cannot open shared object file", "libxrender1"),
+        ("libEGL.so.1: cannot open", "libegl1"),
+        ("No module named 'vtkmodules'", None),
+    ],
+)
+def test_a_missing_library_is_named_by_its_package(message, package):
+    assert package_of(message) == package
+
+
+@pytest.mark.parametrize(
+    ("program", "said"),
+    [
+        ("import sys; print('libGL.so.1: cannot open'); sys.exit(3)", "apt-get install libgl1"),
+        ("import os; os.abort()", "cannot draw off screen"),
+        ("import sys; sys.exit('no GLX')", "no GLX"),
+    ],
+)
+def test_a_drawing_process_that_fails_is_reported_not_followed(mixed, tmp_path, monkeypatch, program, said):
+    broken = tmp_path / "python"
+    broken.write_text(f"#!/bin/sh\nexec '{pictures.sys.executable}' -c \"{program}\"\n", encoding="utf-8")
+    broken.chmod(0o755)
+    monkeypatch.setattr(pictures.sys, "executable", str(broken))
+    with pytest.raises(MissingLibraryError, match=said):
+        draw_pictures(mixed, tmp_path, ("von_mises",), TOWARDS)
+
+
+class Words(HTMLParser):
+    """Text of a page, and the addresses that it loads from."""
+
+    def __init__(self):
+        super().__init__()
+        self.text, self.sources = [], []
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+    def handle_starttag(self, tag, attrs):
+        self.sources += [
+            value for name, value in attrs if name in ("src", "href") and not value.startswith("#")
+        ]
+
+
+def test_the_report_explains_the_run_and_needs_no_other_file(mixed, tmp_path):
+    pixel = base64.b64decode(
+        "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
+    )
+    (tmp_path / "von_mises.png").write_bytes(pixel)
+    summary = summarise(mixed, version="1.2", seconds={"solve": 1.0})
+    write_report(tmp_path / "report.html", mixed, summary, stone_results(mixed), ["a <warning>"])
+    page = Words()
+    page.feed((tmp_path / "report.html").read_text(encoding="utf-8"))
+    text = " ".join(page.text)
+    for words in ("It stands", "D1", "2.0000 MPa", "20.01 kN", "a <warning>", "not known", "4.0e-04"):
+        assert words in text
+    assert page.sources
+    assert all(source.startswith("data:image/png;base64,") for source in page.sources)
+
+
+def test_the_report_of_a_rigid_collapse_says_so(rigid, tmp_path):
+    summary = summarise(rigid, version="1.2", seconds={})
+    write_report(tmp_path / "report.html", rigid, summary, stone_results(rigid), [])
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "It falls" in text
+    assert "Most stressed" not in text

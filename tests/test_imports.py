@@ -1,0 +1,79 @@
+"""Who may import whom, and what a module says that it offers."""
+
+import ast
+import importlib
+import pkgutil
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGES = ("moma", "survey", "archmodel", "mechanics", "pipelines")
+MODULES = sorted(
+    name
+    for package in PACKAGES
+    for name in [package, *(one.name for one in pkgutil.walk_packages([str(ROOT / package)], f"{package}."))]
+    if not name.split(".")[-1].startswith("__")
+)
+
+
+def test_the_import_rule_holds():
+    """moma.cli → pipelines → survey | archmodel | mechanics → moma.errors, as pyproject.toml has it."""
+    done = subprocess.run(
+        [Path(sys.executable).with_name("lint-imports"), "--no-cache"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "1 kept, 0 broken" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("module", "loaded_late"),
+    [
+        ("moma", ("numpy", "sqlalchemy", "numba", "vtkmodules", "typer")),
+        (
+            "moma.cli",
+            ("numpy", "sqlalchemy", "numba", "gmsh", "pyvista", "vtkmodules", "scipy", "matplotlib"),
+        ),
+        ("mechanics.simulate", ("sqlalchemy", "typer", "vtkmodules")),
+        ("archmodel.query", ("numba", "typer", "vtkmodules", "scipy")),
+        ("survey.joints", ("sqlalchemy", "numba", "typer", "vtkmodules")),
+        ("pipelines.run", ("typer", "vtkmodules", "matplotlib")),
+    ],
+)
+def test_a_module_loads_only_what_it_needs(module, loaded_late):
+    program = f"import sys, {module}; print([one for one in {loaded_late} if one in sys.modules])"
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "[]"
+
+
+def order(name):
+    """Constants, then classes, then the rest, each sorted; as ruff's RUF022 has it."""
+    natural = [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", name)]
+    group = 0 if name.isupper() and len(name) > 1 else 1 if name[:1].isupper() else 2
+    return group, natural
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_all_is_complete_and_sorted(name):
+    module = importlib.import_module(name)
+    offered = list(getattr(module, "__all__", []))  # a package that only explains itself offers nothing
+    assert offered == sorted(offered, key=order)
+    assert len(set(offered)) == len(offered)
+    missing = [one for one in offered if not hasattr(module, one)]
+    assert not missing
+    tree = ast.parse(Path(module.__file__).read_text(encoding="utf-8"))
+    defined = [
+        node.name
+        for node in tree.body
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_")
+    ]
+    assert set(defined) <= set(offered)
