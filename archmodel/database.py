@@ -1,6 +1,7 @@
 """Opening the entity database, and working in it one transaction at a time."""
 
 import sqlite3
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -97,7 +98,7 @@ def open_database(url: str, create: bool = True, *, lock_timeout: float = 10.0) 
         with engine.connect() as connection:
             _prepare(connection, place, create)
         if file is not None:
-            _use_write_ahead_log(engine)
+            _use_write_ahead_log(engine, lock_timeout)
     except (DBAPIError, sqlite3.Error) as error:
         engine.dispose()
         raise _refusal(error, place) from error
@@ -186,17 +187,24 @@ def _is_ours(connection: Connection, tables: set[str], place: str) -> bool:
     return True
 
 
-def _use_write_ahead_log(engine: Engine) -> None:
+def _use_write_ahead_log(engine: Engine, lock_timeout: float) -> None:
     """Let readers and one writer work at once. The file remembers it, so mostly there is nothing to do.
 
-    This cannot be done within a transaction, hence on the bare connection.
+    This cannot be done within a transaction, hence on the bare connection; and SQLite does not wait for
+    another program's write lock here, hence the loop.
     """
     connection = engine.raw_connection()
+    deadline = time.monotonic() + lock_timeout
     try:
         cursor = connection.cursor()
-        cursor.execute("PRAGMA journal_mode")
-        if cursor.fetchone() != ("wal",):
-            cursor.execute("PRAGMA journal_mode = WAL")
+        while True:
+            try:
+                cursor.execute("PRAGMA journal_mode = WAL")
+                break
+            except sqlite3.OperationalError as error:
+                if "locked" not in str(error) or time.monotonic() > deadline:
+                    raise
+            time.sleep(0.01)
         cursor.close()
     finally:
         connection.close()

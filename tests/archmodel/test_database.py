@@ -188,6 +188,32 @@ def test_many_processes_can_open_one_new_database_at_once(tmp_path: Path) -> Non
         assert session.scalar(select(func.count(Entity.id))) == 200
 
 
+def rollback_mode(database: Database) -> sqlite3.Connection:
+    """A writer in a database that is just being made: laid out, not yet with its write-ahead log."""
+    database.close()
+    writer = sqlite3.connect(str(database.engine.url.database), isolation_level=None, check_same_thread=False)
+    writer.execute("PRAGMA journal_mode = DELETE")
+    writer.execute("BEGIN IMMEDIATE")
+    return writer
+
+
+def test_opening_waits_for_the_writer_of_a_database_that_is_just_being_made(empty: Database) -> None:
+    writer = rollback_mode(empty)
+    timer = threading.Timer(0.3, writer.execute, ["COMMIT"])
+    timer.start()
+    with open_database(empty.url) as database, database.session() as session:
+        assert session.connection().exec_driver_sql("PRAGMA journal_mode").scalar() == "wal"
+    timer.join()
+    writer.close()
+
+
+def test_opening_waits_no_longer_than_asked(empty: Database) -> None:
+    writer = rollback_mode(empty)
+    with pytest.raises(DatabaseError, match="locked by another program"):
+        open_database(empty.url, lock_timeout=0.05)
+    writer.close()
+
+
 def test_threads_can_share_a_database(empty: Database) -> None:
     errors: list[BaseException] = []
 
