@@ -132,12 +132,8 @@ def _fit_line(sides: Sides, members: list[tuple[int, int]], usual_width: float |
     """Fit two parallel lines, one to the sides on either hand; the joint is the line half-way between them.
 
     Unknowns a, b, w of a + b x ± w/2 = y: without the width w, the hand with more corners would draw the line
-    to
-    itself. The usual width of the wall's joints counts as an observation of w, half as precise as a corner:
-    it
-    decides where too few sound corners are left. Worn corners stay out if the others determine the line;
-    large
-    residuals lose weight (Huber).
+    to itself. Worn corners stay out. Where fewer than four sound ones are left, the usual width of the wall's
+    joints counts as an observation of w, half as precise as a corner. Large residuals lose weight (Huber).
     """
     first = members[0]
     longest = max(members, key=lambda m: float(np.linalg.norm(sides.stop[m] - sides.start[m])))
@@ -152,7 +148,8 @@ def _fit_line(sides: Sides, members: list[tuple[int, int]], usual_width: float |
     centre = corners.mean(axis=0)
     x, y = (corners - centre) @ run, (corners - centre) @ up
     design = np.column_stack([np.ones_like(x), x, 0.5 * hands])
-    usual = np.empty((0, 3)) if usual_width is None else np.array([[0.0, 0.0, 0.5]])
+    needed = usual_width is not None and sound.sum() < 4
+    usual = np.array([[0.0, 0.0, 0.5]]) if needed else np.empty((0, 3))
     used = sound if _determined(np.vstack([design[sound], usual])) else np.ones_like(sound)
     observed = np.append(y[used], usual[:, 2] * (usual_width or 0.0))
     solution = _huber(np.vstack([design[used], usual]), observed)

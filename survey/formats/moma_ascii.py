@@ -29,11 +29,11 @@ from numpy.typing import NDArray
 
 from moma.errors import SurveyError
 from survey.formats.fields import CODE, KIND, parse_length, parse_number, read_lines
+from survey.formats.moma_writer import MAGIC, write_moma
 from survey.records import BlockRecord, DepthRule, Survey
 
 __all__ = ["read_moma", "write_moma"]
 
-_MAGIC = "moma-survey 1"
 _HEADER_WORDS = "name, observer, sigma, depth, stone"
 _STONE_WORDS = "vertex, point, sigma, depth, note, end"
 
@@ -100,8 +100,8 @@ class _Reader:
     def take(self, line: str) -> None:
         """Read one line that is neither blank nor a comment."""
         if not self.begun:
-            if line.split("#", 1)[0].split() != _MAGIC.split():
-                raise self.fail("this is not a MOMA survey", f"the first line must be '{_MAGIC}'")
+            if line.split("#", 1)[0].split() != MAGIC.split():
+                raise self.fail("this is not a MOMA survey", f"the first line must be '{MAGIC}'")
             self.begun = True
             return
         word, rest = _head(line)
@@ -113,7 +113,7 @@ class _Reader:
 
     def finish(self, stem: str) -> Survey:
         if not self.begun:
-            raise self.fail("the file is empty", f"the first line must be '{_MAGIC}'")
+            raise self.fail("the file is empty", f"the first line must be '{MAGIC}'")
         if self.stone is not None:
             raise self.fail(
                 f"stone {self.stone.code} (line {self.stone.line}) has no 'end'", "the file may be cut short"
@@ -236,7 +236,7 @@ class _Reader:
             raise self.fail(f"a second {word!r}", f"keep one {word!r} line")
 
     def _text(self, rest: str, what: str) -> str:
-        text = rest.strip()
+        text = rest.strip().replace("\t", " ")
         if not text or not text.isprintable():
             raise self.fail(f"{what} has no readable text", "write printable words after it")
         return text
@@ -293,54 +293,3 @@ def _uncommented(rest: str) -> list[str]:
         if word.startswith("#"):
             return words[:index]
     return words
-
-
-def write_moma(survey: Survey, path: Path) -> None:
-    """Write a survey in the native format; what is read back is equal to the last bit.
-
-    Parameters
-    ----------
-    survey : what to write
-    path : the file; it is replaced
-    """
-    lines = [_MAGIC, f"name {survey.name}"]
-    if survey.observer is not None:
-        lines.append(f"observer {_row(survey.observer)}")
-    lines += [
-        f"depth {rule.kind} {_depth_text(rule.depth, rule.sigma, rule.source)}" for rule in survey.depth_rules
-    ]
-    sigmas = [block.sigma for block in survey.blocks]
-    common = max(sorted(set(sigmas)), key=sigmas.count)
-    lines.append(f"sigma {_number(common)}")
-    for block in survey.blocks:
-        lines += ["", *_stone_lines(block, common)]
-    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
-
-
-def _stone_lines(block: BlockRecord, common_sigma: float) -> list[str]:
-    course = "" if block.course is None else f" course {block.course}"
-    lines = [f"stone {block.code} {block.kind}{course}"]
-    if block.sigma != common_sigma:
-        lines.append(f"  sigma {_number(block.sigma)}")
-    if block.depth is not None:
-        source = block.depth_source or "not stated"
-        lines.append(f"  depth {_depth_text(block.depth, block.depth_sigma, source)}")
-    lines += [f"  note {key} {text}" for key, text in block.notes.items()]
-    lines += [f"  vertex {_row(vertex)}" for vertex in block.vertices]
-    lines += [f"  point {_row(point)}" for point in block.points]
-    return [*lines, "end"]
-
-
-def _depth_text(depth: float, sigma: float | None, source: str) -> str:
-    precision = "" if sigma is None else f" sigma {_number(sigma)}"
-    return f"{_number(depth)}{precision} source {source}"
-
-
-def _row(values: NDArray[np.float64]) -> str:
-    return " ".join(_number(value) for value in values)
-
-
-def _number(value: float) -> str:
-    """Shortest of: four decimals when they say it all, else every digit."""
-    fixed = f"{value:.4f}"
-    return fixed if float(fixed) == value else repr(float(value))

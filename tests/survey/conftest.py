@@ -1,0 +1,38 @@
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from survey.depth import depth_for
+from survey.extrusion import SurveyedBlock, extrude
+from survey.faces import outline_face
+from survey.formats.moma_ascii import read_moma
+from survey.joints import ClosedStones, close_joints
+from survey.records import Survey
+
+SAMPLE = Path(__file__).parents[2] / "data" / "samples" / "window"
+
+
+@pytest.fixture(scope="session")
+def survey() -> Survey:
+    return read_moma(SAMPLE / "window.moma")
+
+
+@pytest.fixture(scope="session")
+def truth() -> dict[str, dict[str, Any]]:
+    stones = json.loads((SAMPLE / "truth.json").read_text(encoding="utf-8"))["stones"]
+    return {stone["code"]: stone for stone in stones}
+
+
+@pytest.fixture(scope="session")
+def blocks(survey: Survey) -> list[SurveyedBlock]:
+    return [
+        extrude(outline_face(record, survey.observer), depth_for(record, survey.depth_rules))
+        for record in survey.blocks
+    ]
+
+
+@pytest.fixture(scope="session")
+def closed(blocks: list[SurveyedBlock]) -> ClosedStones:
+    return close_joints(blocks)
