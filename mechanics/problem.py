@@ -8,10 +8,14 @@ compliance between the contact sides that lie on it.
 
 from dataclasses import dataclass
 
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import splu
 
-__all__ = ["NONE", "ContactProblem", "ContactSolution", "Delassus", "ELASTIC", "RIGID"]
+__all__ = ["ELASTIC", "NONE", "RIGID", "ContactProblem", "ContactSolution", "Delassus", "SparseForm"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -52,6 +56,36 @@ class Delassus:
         return self.body, self.kind, self.jacobian, self.response, self.slot, self.yptr, self.bptr, self.block
 
 
+class _Factor(Protocol):
+    def solve(self, rhs: Array) -> Array:
+        """Solve for one right-hand side."""
+
+
+class SparseForm:
+    """W as Hᵀ Â⁻¹ H with sparse matrices, for methods that factorise.
+
+    Attributes
+    ----------
+    inertia : Â = ŵ⁻¹, (nd, nd) over the velocities of all bodies that move [kg]
+    lift : H, (nd, 3 nc), local impulses → generalized impulses
+    softness : typical compliance of a contact beyond what rigid bodies have [1/kg]
+    """
+
+    def __init__(self, inertia: "csc_array[np.float64]", lift: "csc_array[np.float64]", softness: float) -> None:
+        self.inertia, self.lift, self.softness = inertia, lift, softness
+        self._factors: dict[float, _Factor] = {}
+
+    def factor(self, sigma: float) -> _Factor:
+        """Sparse factors of Â + H Hᵀ/σ, kept for the next call."""
+        if sigma not in self._factors:
+            matrix = (self.inertia + self.lift @ self.lift.T / sigma).tocsc()
+            # symmetric positive definite: order A + Aᵀ and do not pivot
+            self._factors[sigma] = splu(
+                matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}, relax=30
+            )
+        return self._factors[sigma]
+
+
 @dataclass(frozen=True)
 class ContactProblem:
     """What a solver sees.
@@ -62,12 +96,14 @@ class ContactProblem:
     u_free : (nc, 3) relative velocity without contact impulses, local frame (n, t1, t2) [m/s]
     bias : (nc,) shift of u_N in Signorini's condition [m/s]
     friction : (nc,) Coulomb's μ [-]
+    sparse : W once more, for methods that factorise; None where none was asked for
     """
 
     delassus: Delassus
     u_free: Array
     bias: Array
     friction: Array
+    sparse: SparseForm | None = None
 
 
 @dataclass(frozen=True)
@@ -77,12 +113,12 @@ class ContactSolution:
     Attributes
     ----------
     impulse : (nc, 3) r, on the candidate, local frame [N s]
-    sweeps : passes over the contacts
+    iterations : Gauss–Seidel sweeps, or the iterations of another method
     natural_map : η of `impulse`, as mechanics.residual computes it
     converged : η is within the tolerance
     """
 
     impulse: Array
-    sweeps: int
+    iterations: int
     natural_map: float
     converged: bool

@@ -121,7 +121,7 @@ class History:
     speed : largest speed of a block's points [m/s]
     balance : largest unbalanced force over weight [-]
     natural_map : η after the solve [-]
-    sweeps : Gauss–Seidel sweeps
+    iterations : of the contact solver
     contacts : contact points
     """
 
@@ -130,7 +130,7 @@ class History:
     speed: Array
     balance: Array
     natural_map: Array
-    sweeps: Ints
+    iterations: Ints
     contacts: Ints
 
 

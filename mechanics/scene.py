@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from mechanics.materials import Material
 from moma.errors import SceneError
 
-__all__ = ["Block", "ContactSettings", "Fidelity", "Scene", "SolverSettings", "TimeSettings"]
+__all__ = ["Block", "ContactSettings", "Fidelity", "Method", "Scene", "SolverSettings", "TimeSettings"]
 
 
 class Fidelity(StrEnum):
@@ -81,18 +81,28 @@ class TimeSettings:
     collapse_displacement: float = 0.5
 
 
+class Method(StrEnum):
+    """How the contact problem of a step is solved."""
+
+    AUTO = "auto"
+    NSGS = "nsgs"
+    ADMM = "admm"
+
+
 @dataclass(frozen=True)
 class SolverSettings:
-    """Non-smooth Gauss–Seidel.
+    """Solver of the contact problem of each step.
 
     Attributes
     ----------
+    method : nsgs (Gauss–Seidel), admm (needs a deformable block), or auto: admm as soon as a block is deformable
     tolerance : natural map η (unit-free) at which a step counts as solved [-]
-    max_sweeps : sweeps after which a step is given up and reported as not converged
+    max_iterations : sweeps or iterations after which a step is left as it is and reported as not converged
     """
 
+    method: Method = Method.AUTO
     tolerance: float = 1e-6
-    max_sweeps: int = 2000
+    max_iterations: int = 2000
 
 
 @dataclass(frozen=True)

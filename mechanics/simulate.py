@@ -90,7 +90,7 @@ class _Log:
                 float(speed(model, step.after).max()),
                 float(balance.max()),
                 solution.natural_map,
-                solution.sweeps,
+                solution.iterations,
                 len(step.contacts),
             )
         )
@@ -98,8 +98,8 @@ class _Log:
 
     def history(self) -> History:
         """One array for each quantity."""
-        time, kinetic, fastest, balance, eta, sweeps, contacts = np.array(self.rows).T
-        return History(time, kinetic, fastest, balance, eta, sweeps.astype(np.int64), contacts.astype(np.int64))
+        time, kinetic, fastest, balance, eta, iterations, contacts = np.array(self.rows).T
+        return History(time, kinetic, fastest, balance, eta, iterations.astype(np.int64), contacts.astype(np.int64))
 
 
 def _result(

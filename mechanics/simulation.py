@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechanics.bodies.deformable import DynamicCompliance
-from mechanics.contact.assembly import ElasticSides, delassus, elastic_sides, local_velocity, world_impulse
+from mechanics.contact.assembly import delassus, local_velocity, sparse_form, world_impulse
 from mechanics.contact.contacts import Contacts, gaps
 from mechanics.contact.detection import Detector
 from mechanics.memory import Memory
 from mechanics.model import Model
 from mechanics.observers.equilibrium import displacement, speed
-from mechanics.problem import ContactSolution
-from mechanics.solvers.nsgs import NSGS
+from mechanics.problem import ContactSolution, Delassus, SparseForm
+from mechanics.solvers.admm import ADMM
+from mechanics.solvers.choice import choose_solver
 from mechanics.state import State
 from mechanics.stepping import advance, compliances, contact_problem, follow_nodes, free_motion, predict
 from moma.errors import SolverError
@@ -25,8 +26,10 @@ __all__ = ["Clock", "Simulation", "Step"]
 
 Array = NDArray[np.float64]
 
-# contacts are found anew when a body has moved by more than this part of its smallest width since last time
+# contacts are found anew when a body has moved by more than this part of its smallest width since last time,
 _STALE = 1e-3
+# or by more than this part, once it moves a hundred times less per step: where stones come to rest, no lag stays
+_SETTLED, _SLOWED = 1e-6, 1e-2
 
 
 class Clock:
@@ -70,10 +73,11 @@ class Step:
 
 @dataclass(frozen=True)
 class _Touching:
-    """The contacts in force, what they condense of the deformable bodies, and where they were found."""
+    """The contacts in force, their Delassus operator, and the configuration in which they were found."""
 
     contacts: Contacts
-    elastic: ElasticSides
+    operator: Delassus
+    sparse: SparseForm | None
     configuration: State
 
 
@@ -87,7 +91,7 @@ class Simulation:
         with clock("assemble"):
             self._compliance: dict[int, DynamicCompliance] = compliances(model, self._step, self._theta)
         self._detector = Detector(model.surfaces, model.fixed, settings.contact.alert_distance)
-        self._solve = NSGS(settings.solver.tolerance, settings.solver.max_sweeps)
+        self._solve = choose_solver(settings.solver, bool(model.elastic.any()))
         self._memory = Memory()
         self._touching: _Touching | None = None
 
@@ -111,12 +115,15 @@ class Simulation:
         )
         with self.clock("assemble"):
             free = free_motion(model, before, self._compliance, h, theta)
-            operator = delassus(model, predicted, contacts, touching.elastic)
-            problem = contact_problem(model, predicted, contacts, operator, free, h, theta)
+            problem = contact_problem(
+                model, predicted, contacts, touching.operator, touching.sparse, free, h, theta
+            )
         with self.clock("solve"):
             solution = self._solve(problem, start=self._memory.recall(contacts))
         with self.clock("advance"):
-            after = advance(model, before, predicted, contacts, solution.impulse, free, self._compliance, h, theta)
+            after = advance(
+                model, before, contacts, touching.operator, solution.impulse, free, self._compliance, h, theta
+            )
         if not (np.isfinite(after.velocity).all() and np.isfinite(after.node_velocity).all()):
             raise SolverError(
                 f"the velocities are not finite at t = {after.time:.6g} s",
@@ -125,14 +132,16 @@ class Simulation:
             )
         self._memory.store(contacts, solution.impulse)
         self.state = after
-        return self._describe(before, predicted, after, contacts, solution)
+        return self._describe(before, after, touching, solution)
 
     def _detect(self, predicted: State) -> tuple[State, _Touching]:
         """The contacts at the predicted configuration; found anew only when something has moved."""
         known = self._touching
         if known is not None:
-            moved = displacement(self.model, known.configuration, predicted)
-            if (moved <= _STALE * self.model.surfaces.size).all():
+            moved = displacement(self.model, known.configuration, predicted) / self.model.surfaces.size
+            pace = self._step * speed(self.model, predicted) / self.model.surfaces.size
+            settled = moved.max() > _SETTLED and pace.max() < _SLOWED * moved.max()
+            if moved.max() <= _STALE and not settled:
                 frame = known.configuration
                 elastic = self.model.elastic
                 return replace(
@@ -143,17 +152,19 @@ class Simulation:
         with self.clock("detect"):
             predicted = follow_nodes(self.model, predicted)
             contacts = self._detector(predicted, self._step * speed(self.model, predicted))
-            elastic_part = elastic_sides(self.model, predicted, contacts, self._compliance)
-        self._touching = _Touching(contacts, elastic_part, predicted)
+        with self.clock("assemble"):
+            operator = delassus(self.model, predicted, contacts, self._compliance)
+            sparse = None
+            if isinstance(self._solve, ADMM):
+                sparse = sparse_form(self.model, predicted, contacts, operator, self._compliance)
+        self._touching = _Touching(contacts, operator, sparse, predicted)
         return predicted, self._touching
 
-    def _describe(
-        self, before: State, predicted: State, after: State, contacts: Contacts, solution: ContactSolution
-    ) -> Step:
-        theta = self._theta
+    def _describe(self, before: State, after: State, touching: _Touching, solution: ContactSolution) -> Step:
+        theta, contacts = self._theta, touching.contacts
         velocity = theta * after.velocity + (1 - theta) * before.velocity
         node_velocity = theta * after.node_velocity + (1 - theta) * before.node_velocity
-        u_theta = local_velocity(contacts, predicted, velocity, node_velocity)
+        u_theta = local_velocity(contacts, touching.operator, velocity, node_velocity)
         return Step(
             before,
             after,

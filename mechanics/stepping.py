@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechanics.bodies.deformable import DynamicCompliance, body_frame, dynamic_compliance
-from mechanics.bodies.rigid import inverse_inertia_world, rigid_free_velocity, rotation_exp
-from mechanics.contact.assembly import delassus, local_velocity, world_impulse
+from mechanics.bodies.rigid import rigid_free_velocity, rotation_exp
+from mechanics.contact.assembly import local_velocity, world_impulse
 from mechanics.contact.contacts import Contacts, gaps
 from mechanics.model import Model
-from mechanics.problem import ContactProblem, Delassus
+from mechanics.problem import ContactProblem, Delassus, SparseForm
 from mechanics.state import State
 
 __all__ = ["FreeMotion", "advance", "compliances", "contact_problem", "follow_nodes", "free_motion", "predict"]
@@ -80,6 +80,7 @@ def contact_problem(
     configuration: State,
     contacts: Contacts,
     operator: Delassus,
+    sparse: SparseForm | None,
     free: FreeMotion,
     step: float,
     theta: float,
@@ -89,17 +90,17 @@ def contact_problem(
     Detected at q + h(1-θ)v, the gap at the end of the step is g + hθ u_N; so the shift g/(hθ) lets a closing
     contact land exactly. An overlap is not pushed out (max(g, 0)), which would create energy.
     """
-    u_free = local_velocity(contacts, configuration, free.velocity, free.node_velocity)
+    u_free = local_velocity(contacts, operator, free.velocity, free.node_velocity)
     bias = np.maximum(gaps(contacts, configuration), 0.0) / (step * theta)
     friction = np.full(len(contacts), model.scene.contact.friction)
-    return ContactProblem(operator, u_free, bias, friction)
+    return ContactProblem(operator, u_free, bias, friction, sparse)
 
 
 def advance(
     model: Model,
     state: State,
-    configuration: State,
     contacts: Contacts,
+    operator: Delassus,
     impulse: Array,
     free: FreeMotion,
     compliance: dict[int, DynamicCompliance],
@@ -107,13 +108,15 @@ def advance(
     theta: float,
 ) -> State:
     """v_{i+1} = v_free + ŵ H r, q_{i+1} = q_i + h [θ v_{i+1} + (1-θ) v_i]; rotations by the exponential map."""
-    world = world_impulse(contacts, impulse)
-    velocity = free.velocity + _rigid_answer(model, configuration, contacts, world)
+    velocity = free.velocity.copy()
+    answer = np.einsum("csij,cj->csi", operator.response, impulse)
+    np.add.at(velocity, contacts.bodies[:, 0], answer[:, 0])
+    np.subtract.at(velocity, contacts.bodies[:, 1], answer[:, 1])
     node_velocity = free.node_velocity.copy()
-    signed = np.stack([world, -world], axis=1).reshape(-1, 3)
-    nodal = contacts.weights.T @ signed
+    world = world_impulse(contacts, impulse)
+    nodal = contacts.weights.T @ np.stack([world, -world], axis=1).reshape(-1, 3)
     for b, own in compliance.items():
-        rows, turn = model.nodes_of(b), configuration.rotation[b]
+        rows, turn = model.nodes_of(b), state.rotation[b]
         if nodal[rows].any():
             node_velocity[rows] += own.respond(nodal[rows] @ turn) @ turn.T
     mean = theta * velocity + (1 - theta) * state.velocity
@@ -125,14 +128,3 @@ def advance(
         state.node + step * (theta * node_velocity + (1 - theta) * state.node_velocity),
         node_velocity,
     )
-
-
-def _rigid_answer(model: Model, configuration: State, contacts: Contacts, world: Array) -> Array:
-    """Velocity change (nb, 6) of the rigid bodies."""
-    total = np.zeros((len(model.mass), 6))
-    for side, sign in ((0, 1.0), (1, -1.0)):
-        body = contacts.bodies[:, side]
-        arm = np.einsum("cij,cj->ci", configuration.rotation[body], contacts.arm[:, side])
-        np.add.at(total, body, sign * np.column_stack([world, np.cross(arm, world)]))
-    spin = inverse_inertia_world(model.inertia, configuration.rotation) @ total[:, 3:, None]
-    return np.column_stack([model.inertia.inverse_mass[:, None] * total[:, :3], spin[..., 0]])

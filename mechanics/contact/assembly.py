@@ -1,47 +1,26 @@
 """From contact points to the Delassus operator: the Jacobians of rigid sides, the compliance between elastic ones."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array, kron
+from scipy.sparse import block_diag, csc_array, csr_array, eye_array, hstack, kron
 
 from mechanics.bodies.deformable import DynamicCompliance
 from mechanics.bodies.rigid import inverse_inertia_world
 from mechanics.contact.contacts import Contacts
 from mechanics.model import Model
-from mechanics.problem import ELASTIC, NONE, RIGID, Delassus
+from mechanics.problem import ELASTIC, NONE, RIGID, Delassus, SparseForm
 from mechanics.state import State
 
-__all__ = ["ElasticSides", "delassus", "elastic_sides", "local_velocity", "world_impulse"]
+__all__ = ["delassus", "local_velocity", "sparse_form", "world_impulse"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-@dataclass(frozen=True)
-class ElasticSides:
-    """The part of W that lives on deformable bodies; it changes only when the contacts do.
-
-    Attributes
-    ----------
-    kind, slot, yptr, bptr, block : as in mechanics.problem.Delassus
-    diagonal : (nc, 2, 3, 3) share of each elastic side in W_αα [1/kg]
-    """
-
-    kind: Ints
-    slot: Ints
-    yptr: Ints
-    bptr: Ints
-    block: Array
-    diagonal: Array
-
-
-def elastic_sides(
-    model: Model, state: State, contacts: Contacts, compliance: Mapping[int, DynamicCompliance]
-) -> ElasticSides:
-    """Condense the compliance of each deformable body on its contact sides."""
+def delassus(model: Model, state: State, contacts: Contacts, compliance: Mapping[int, DynamicCompliance]) -> Delassus:
+    """W of the contacts at the configuration of `state`: condense each deformable body on its contact sides."""
     body = contacts.bodies
     kind = np.where(model.fixed[body], NONE, np.where(model.elastic[body], ELASTIC, RIGID)).astype(np.int64)
     count, slot = _slots(body, kind, len(model.mass))
@@ -54,24 +33,9 @@ def elastic_sides(
         block[bptr[b] : bptr[b + 1]] = square.ravel()
         n = np.arange(len(sides))
         diagonal[sides] = square.reshape(len(sides), 3, len(sides), 3)[n, :, n]
-    return ElasticSides(kind, slot, yptr, bptr, block, diagonal.reshape(-1, 2, 3, 3))
-
-
-def delassus(model: Model, state: State, contacts: Contacts, elastic: ElasticSides) -> Delassus:
-    """W of the contacts at the configuration of `state`."""
     jacobian, response = _rigid_sides(model, state, contacts)
-    diagonal = (elastic.diagonal + jacobian @ response).sum(axis=1)
-    return Delassus(
-        contacts.bodies,
-        elastic.kind,
-        jacobian,
-        response,
-        elastic.slot,
-        elastic.yptr,
-        elastic.bptr,
-        elastic.block,
-        diagonal,
-    )
+    total = (diagonal.reshape(-1, 2, 3, 3) + jacobian @ response).sum(axis=1)
+    return Delassus(body, kind, jacobian, response, slot, yptr, bptr, block, total)
 
 
 def _rigid_sides(model: Model, state: State, contacts: Contacts) -> tuple[Array, Array]:
@@ -114,15 +78,46 @@ def _compliance_block(
     return symmetric
 
 
-def local_velocity(contacts: Contacts, state: State, velocity: Array, node_velocity: Array) -> Array:
+def sparse_form(
+    model: Model, state: State, contacts: Contacts, operator: Delassus, compliance: Mapping[int, DynamicCompliance]
+) -> SparseForm:
+    """The same W in sparse matrices: six velocities for each rigid body, then those of all nodes, world axes."""
+    rigid = np.flatnonzero(model.inertia.inverse_mass > 0)
+    turn = state.rotation[rigid]
+    spin = turn @ model.inertia.inertia[rigid] @ turn.transpose(0, 2, 1)
+    blocks: list[object] = [
+        block for b, moment in zip(rigid, spin, strict=True) for block in (model.mass[b] * np.eye(3), moment)
+    ]
+    for b, own in compliance.items():
+        axes = kron(eye_array(own.matrix.shape[0] // 3), csr_array(state.rotation[b]), format="csr")
+        blocks.append(axes @ own.matrix @ axes.T)
+    signed = contacts.weights[0::2] - contacts.weights[1::2]
+    frames = block_diag(list(contacts.frame), format="csr")
+    lift = hstack([_rigid_lift(rigid, operator), frames @ kron(signed, eye_array(3), format="csr")]).T
+    soft = np.array([compliance[b].softness if b in compliance else 0.0 for b in range(len(model.mass))])
+    return SparseForm(
+        block_diag(blocks, format="csc"), csc_array(lift), float(np.median(soft[contacts.bodies].sum(axis=1)))
+    )
+
+
+def _rigid_lift(rigid: Ints, operator: Delassus) -> "csr_array[np.float64]":
+    """Hᵀ of the rigid sides, (3 nc, 6 nr)."""
+    place = np.full(operator.body.max(initial=0) + 1, -1)
+    place[rigid[rigid < len(place)]] = np.flatnonzero(rigid < len(place))
+    c, s = np.nonzero(operator.kind == RIGID)
+    rows = 3 * c[:, None, None] + np.arange(3)[:, None] + np.zeros(6, dtype=np.int64)
+    columns = 6 * place[operator.body[c, s]][:, None, None] + np.zeros((3, 1), dtype=np.int64) + np.arange(6)
+    values = operator.jacobian[c, s] * np.where(s == 0, 1.0, -1.0)[:, None, None]
+    shape = (3 * len(operator.body), 6 * len(rigid))
+    return csr_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
+
+
+def local_velocity(contacts: Contacts, operator: Delassus, velocity: Array, node_velocity: Array) -> Array:
     """Relative velocity u = Hᵀ v (nc, 3) of the contacts, local frame [m/s]."""
-    body = contacts.bodies
-    arm = np.einsum("csij,csj->csi", state.rotation[body], contacts.arm)
-    rigid = velocity[body][..., :3] + np.cross(velocity[body][..., 3:], arm)
-    elastic = (contacts.weights @ node_velocity).reshape(-1, 2, 3)
-    on_nodes = (np.diff(contacts.weights.indptr) > 0).reshape(-1, 2, 1)
-    sides = np.where(on_nodes, elastic, rigid)
-    relative: Array = np.einsum("cij,cj->ci", contacts.frame, sides[:, 0] - sides[:, 1])
+    rigid = np.einsum("csij,csj->csi", operator.jacobian, velocity[contacts.bodies])
+    elastic = np.einsum("cij,csj->csi", contacts.frame, (contacts.weights @ node_velocity).reshape(-1, 2, 3))
+    sides = np.where((operator.kind == ELASTIC)[..., None], elastic, rigid)
+    relative: Array = sides[:, 0] - sides[:, 1]
     return relative
 
 

@@ -19,12 +19,12 @@ class NSGS:
     Attributes
     ----------
     tolerance : natural map η at which the problem counts as solved [-]
-    max_sweeps : sweeps after which it is given up
+    max_iterations : sweeps after which it is given up
     check_every : sweeps between two looks at η
     """
 
     tolerance: float = 1e-6
-    max_sweeps: int = 2000
+    max_iterations: int = 2000
     check_every: int = 20
 
     def __call__(self, problem: ContactProblem, start: NDArray[np.float64]) -> ContactSolution:
@@ -36,10 +36,10 @@ class NSGS:
         arrays, diagonal = problem.delassus.arrays, problem.delassus.diagonal
         factors = local_factors(diagonal)
         sweeps = 0
-        while eta > self.tolerance and sweeps < self.max_sweeps:
+        while eta > self.tolerance and sweeps < self.max_iterations:
             # the running velocities are made anew each time, so that rounding cannot pile up
             _, v, y = apply_delassus(impulse, *arrays)
-            count = min(self.check_every, self.max_sweeps - sweeps)
+            count = min(self.check_every, self.max_iterations - sweeps)
             sweep(count, True, impulse, v, y, shift, problem.friction, factors, diagonal, *arrays)
             sweeps += count
             eta = natural_map(problem, impulse)
