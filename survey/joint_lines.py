@@ -28,7 +28,7 @@ class JointSettings:
     """
 
     max_width: float = 0.05
-    max_angle: float = 12.0
+    max_angle: float = 20.0
     min_overlap: float = 0.03
     straightness: float = 0.02
     max_displacement: float = 0.08
@@ -132,8 +132,9 @@ def _fit_line(sides: Sides, members: list[tuple[int, int]], usual_width: float |
     """Fit two parallel lines, one to the sides on either hand; the joint is the line half-way between them.
 
     Unknowns a, b, w of a + b x ± w/2 = y: without the width w, the hand with more corners would draw the line
-    to itself. Worn corners stay out. Where fewer than four sound ones are left, the usual width of the wall's
-    joints counts as an observation of w, half as precise as a corner. Large residuals lose weight (Huber).
+    to itself. Worn corners stay out if the sound ones reach along the joint. Where fewer than four sound ones
+    are left, the usual width of the wall's joints counts as an observation of w, half as precise as a corner.
+    Large residuals lose weight (Huber).
     """
     first = members[0]
     longest = max(members, key=lambda m: float(np.linalg.norm(sides.stop[m] - sides.start[m])))
@@ -150,11 +151,11 @@ def _fit_line(sides: Sides, members: list[tuple[int, int]], usual_width: float |
     design = np.column_stack([np.ones_like(x), x, 0.5 * hands])
     needed = usual_width is not None and sound.sum() < 4
     usual = np.array([[0.0, 0.0, 0.5]]) if needed else np.empty((0, 3))
-    used = sound if _determined(np.vstack([design[sound], usual])) else np.ones_like(sound)
+    used = sound if _determined(design, sound, len(usual)) else np.ones_like(sound)
     observed = np.append(y[used], usual[:, 2] * (usual_width or 0.0))
     solution = _huber(np.vstack([design[used], usual]), observed)
     residuals = y - design @ solution
-    worst = int(np.argmax(np.where(used, np.abs(residuals), -1.0)))
+    worst = int(np.argmax(np.where(sound, np.abs(residuals), 0.0)))
     direction = run + solution[1] * up
     return JointLine(
         members=tuple(members),
@@ -162,13 +163,16 @@ def _fit_line(sides: Sides, members: list[tuple[int, int]], usual_width: float |
         direction=direction / np.linalg.norm(direction),
         width=float(solution[2]),
         rms=float(np.sqrt((residuals[used] ** 2).mean())),
-        largest=float(np.abs(residuals[worst])),
+        largest=float(np.abs(residuals[worst])) if sound[worst] else 0.0,
         worst=int(owner[worst]),
     )
 
 
-def _determined(design: Array) -> bool:
-    return len(design) >= 3 and bool(np.linalg.cond(design) < 1e3)
+def _determined(design: Array, sound: NDArray[np.bool_], further: int) -> bool:
+    """Whether the sound corners and further observations of the width tell the line from end to end."""
+    if sound.sum() + further < 3 or (further == 0 and np.ptp(design[sound, 2]) == 0.0):
+        return False
+    return bool(np.ptp(design[sound, 1]) >= 0.5 * np.ptp(design[:, 1]))
 
 
 def _huber(design: Array, values: Array) -> Array:

@@ -8,10 +8,11 @@ singular vectors the normal equations are diagonal, so the Gauss–Markov covari
 of coordinates.
 
 Blunders: one that is as far out as a stone is wide turns a least-squares plane so much that its own residual
-looks harmless, so residuals of the first fit cannot be trusted. The start is therefore the least median of
-squares (Rousseeuw 1984) over triples of points, which tolerates almost half of the points being wrong. From
-that majority the fit grows one point at a time: a point enters, or leaves again, by the test of its
-standardised residual (Baarda 1968, α₀ = 0.1 %).
+looks harmless, so residuals of the first fit cannot be trusted. The search starts from planes through triples
+of points: the one of least median distance (Rousseeuw 1984), which tolerates almost half of the points being
+wrong, and, where the precision is known, the one of least truncated squares. From there the fit grows one
+point at a time: a point enters, or leaves again, by the test of its standardised residual (Baarda 1968,
+α₀ = 0.1 %).
 """
 
 import math
@@ -153,16 +154,40 @@ def _is_clean(plane: _Plane, xyz: Array, weights: Array, known: bool) -> bool:
     if not known:
         return False
     squares = weights * plane.distances(xyz) ** 2
-    # Wilson–Hilferty approximation of the chi-square quantile at the same α₀, one-sided
-    limit = redundancy * (1.0 - 2.0 / (9.0 * redundancy) + 3.09 * math.sqrt(2.0 / (9.0 * redundancy))) ** 3
     share = np.maximum(1.0 - plane.leverages(xyz, weights), 1e-6)
-    return bool(squares.sum() <= limit and (squares <= _CRITICAL**2 * share).all())
+    return bool(squares.sum() <= _largest_sum(redundancy) and (squares <= _CRITICAL**2 * share).all())
+
+
+def _largest_sum(redundancy: int) -> float:
+    """Sum of squares that chance exceeds once in a thousand: chi-square after Wilson and Hilferty."""
+    spread = 2.0 / (9.0 * redundancy)
+    return redundancy * (1.0 - spread + 3.09 * math.sqrt(spread)) ** 3
 
 
 def _without_blunders(xyz: Array, weights: Array, known: bool) -> NDArray[np.bool_]:
-    """Accepted points: from the best majority forward, one at a time, until the next one is a blunder."""
-    accepted = _best_majority(xyz, weights)
-    majority = int(accepted.sum())
+    """Accepted points, from the better of the starts."""
+    distances = _distances_from_triples(xyz, weights)
+    size = min(len(xyz) // 2 + 2, len(xyz))  # of p = 3 parameters: the majority that tolerates most blunders
+    medians = np.partition(distances, size - 1, axis=1)[:, size - 1]
+    grown = [_grow(_nearest(distances[np.argmin(medians)], size, xyz, weights), xyz, weights, known)]
+    if not known:
+        return grown[0]
+    # the least median sees half of the points only; with a known precision all of them can be judged
+    within = distances[np.argmin(np.minimum(distances**2, _CRITICAL**2).sum(axis=1))] <= _CRITICAL
+    if within.sum() >= size:
+        grown.append(_grow(within, xyz, weights, known))
+    return min(grown, key=lambda accepted: _truncated(accepted, xyz, weights))
+
+
+def _truncated(accepted: NDArray[np.bool_], xyz: Array, weights: Array) -> float:
+    """Sum of squares of all points in units of sigma, in which no blunder counts more than the limit."""
+    squares = weights * _weighted_plane(xyz, weights, accepted).distances(xyz) ** 2
+    return float(np.minimum(squares, _CRITICAL**2).sum())
+
+
+def _grow(start: NDArray[np.bool_], xyz: Array, weights: Array, known: bool) -> NDArray[np.bool_]:
+    """Add the best point, or drop the worst, one at a time, until the next one is a blunder."""
+    accepted, majority = start.copy(), min(len(xyz) // 2 + 2, len(xyz))
     for _ in range(4 * len(xyz)):
         plane = _weighted_plane(xyz, weights, accepted)
         distances, lever = np.sqrt(weights) * np.abs(plane.distances(xyz)), plane.leverages(xyz, weights)
@@ -184,22 +209,22 @@ def _without_blunders(xyz: Array, weights: Array, known: bool) -> NDArray[np.boo
 def _scale(distances: Array, count: int, known: bool) -> float:
     """Standard deviation of the accepted points in units of sigma.
 
-    With a known precision it is 1, or more where the face itself is rough. Without, the best part of all
-    points
-    looks too good by a factor known for normal errors (the consistency factor of least trimmed squares).
+    With a known precision it is 1, or more where the face itself is clearly rough. Without, the best part of
+    all points looks too good by a factor known for normal errors (the consistency factor of least trimmed
+    squares).
     """
     part = len(distances) / count
-    raw = math.sqrt(float(distances @ distances) / max(len(distances) - 3, 1))
+    redundancy = max(len(distances) - 3, 1)
+    squares = float(distances @ distances)
+    raw = math.sqrt(squares / redundancy)
     if known:
-        return max(raw, 1.0)
+        return raw if squares > _largest_sum(redundancy) else 1.0
     z = NormalDist().inv_cdf(0.5 + 0.5 * min(part, 1.0 - 1e-9))
     return max(raw / math.sqrt(1.0 - 2.0 * z * NormalDist().pdf(z) / part), 1e-300)
 
 
-def _best_majority(xyz: Array, weights: Array) -> NDArray[np.bool_]:
-    """The (n + 4)/2 points nearest to the plane with the least median, refined until they stay the same."""
-    size = min(len(xyz) // 2 + 2, len(xyz))
-    distances = np.abs(_least_median(xyz, weights, size - 1))
+def _nearest(distances: Array, size: int, xyz: Array, weights: Array) -> NDArray[np.bool_]:
+    """The `size` points nearest to a plane, and then to the plane through them, until they stay the same."""
     accepted = np.zeros(len(xyz), dtype=bool)
     for _ in range(20):
         nearest = np.argsort(distances, kind="stable")[:size]
@@ -211,9 +236,8 @@ def _best_majority(xyz: Array, weights: Array) -> NDArray[np.bool_]:
     return accepted
 
 
-def _least_median(xyz: Array, weights: Array, rank: int) -> Array:
-    """Weighted distances of all points from that plane through three of them whose median distance is
-    least."""
+def _distances_from_triples(xyz: Array, weights: Array) -> Array:
+    """Distances of all points, in units of sigma, from planes through three of them, (triples, n)."""
     triples = _triples(len(xyz))
     a, b, c = (xyz[triples[:, k]] - xyz[0] for k in range(3))
     normals = np.cross(b - a, c - a)
@@ -221,8 +245,7 @@ def _least_median(xyz: Array, weights: Array, rank: int) -> Array:
     usable = areas > 1e-3 * areas.max()
     normals, a = normals[usable] / areas[usable, None], a[usable]
     distances = normals @ (xyz - xyz[0]).T - (normals * a).sum(axis=1)[:, None]
-    distances = np.sqrt(weights) * np.abs(distances)
-    out: Array = distances[np.argmin(np.partition(distances, rank, axis=1)[:, rank])]
+    out: Array = np.sqrt(weights) * np.abs(distances)
     return out
 
 

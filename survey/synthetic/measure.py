@@ -54,7 +54,7 @@ class Measured:
 def measure_stone(stone: TrueStone, frame: WallFrame, rng: Random) -> Measured:
     """Measure one face: its corners and 17 to 20 points along its margin."""
     halves = tuple(rng.uniform(*HALF_JOINT) if joint else 0.0 for joint in stone.plan.joint)
-    visible = inset(stone.plan.corners, halves)
+    visible = _inset(stone.plan.corners, halves)
     chance = rng.random()
     worn = "eroded" if chance < ERODED else "bevelled" if chance < ERODED + BEVELLED else None
     corner = rng.randrange(4) if worn else None
@@ -106,7 +106,7 @@ def add_blunders(measured: list[Measured], normals: list[Array], count: int, rng
     return out
 
 
-def inset(corners: Array, distances: tuple[float, ...]) -> Array:
+def _inset(corners: Array, distances: tuple[float, ...]) -> Array:
     """Move each side of a counter-clockwise polygon inwards, and cross neighbouring sides again."""
     lines = []
     for k, distance in enumerate(distances):
@@ -141,7 +141,7 @@ def _towards(start: Array, stop: Array) -> Array:
 
 def _margin_points(visible: Array, count: int, rng: Random) -> Array:
     """Points along the dressed margin, closest near its corners, two of them further in."""
-    ring = inset(visible, (rng.uniform(*MARGIN),) * 4)
+    ring = _inset(visible, (rng.uniform(*MARGIN),) * 4)
     edges = np.roll(ring, -1, axis=0) - ring
     reach = np.cumsum(np.hypot(edges[:, 0], edges[:, 1]))
     points = []

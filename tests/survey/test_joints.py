@@ -143,3 +143,20 @@ def test_other_samples_close_as_well() -> None:
         ]
         assert np.median(np.max(moved, axis=1)) < 0.006
         assert closed.report.alone == ()
+
+
+def test_a_head_joint_whose_corners_are_worn_on_both_hands_stays_upright() -> None:
+    # two sound corners at the foot of the joint do not tell its direction; the worn ones, alike, do
+    grid = [(x, 0.0, z) for x in (0.1, 0.25, 0.4) for z in (0.05, 0.15, 0.25)]
+    left = np.array([(0, 0, 0), (0.495, 0, 0), (0.465, 0.02, 0.27), (0, 0, 0.3)])
+    right = (left * np.array([-1, 1, 1]) + np.array([1, 0, 0]))[[1, 0, 3, 2]]
+    blocks = []
+    for code, corners, shift in (("A", left, 0.0), ("B", right, 0.5)):
+        points = np.array(grid) + np.array([shift, 0, 0])
+        record = BlockRecord(code, "header", 1, corners.astype(float), points, 0.002)
+        block = extrude(outline_face(record, np.array([0.5, -9.0, 0.5])), DEPTH)
+        assert len(block.face.rejected_vertices) == 1
+        blocks.append(block)
+    a, b = close_joints(blocks).solids
+    np.testing.assert_allclose(a.vertices[[1, 2], 0], 0.5, atol=1e-3)
+    np.testing.assert_allclose(sorted(b.vertices[:4, 0])[:2], 0.5, atol=1e-3)
