@@ -1,2 +1,1 @@
-"""A synthetic survey: a wall with a window that never stood, measured as a surveyor would, its truth
-known."""
+"""A synthetic survey: a wall with a window that never stood, measured as a surveyor would, and its truth."""
