@@ -17,6 +17,7 @@ class SurveyFormat(StrEnum):
     """Formats of survey files."""
 
     MOMA = "moma"
+    CSV = "csv"
 
 
 class ListFormat(StrEnum):

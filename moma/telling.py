@@ -40,8 +40,8 @@ def check_lines(report: "CheckReport", verbose: bool) -> list[str]:
     if report.joints is not None:
         joints = report.joints
         lines.append(
-            f"  {joints.count} joints closed, {joints.mean_width * 1e3:.1f} mm wide on average; corners moved "
-            f"by {joints.max_displacement * 1e3:.1f} mm at most (stone {joints.worst_stone}), "
+            f"  {joints.count} joints closed, {joints.mean_width * 1e3:.1f} mm wide on average; "
+            f"corners moved by {joints.max_displacement * 1e3:.1f} mm at most (stone {joints.worst_stone}), "
             f"volumes changed by {100 * joints.max_volume_change:.1f} % at most"
         )
     if report.cost is not None:

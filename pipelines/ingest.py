@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-
 from archmodel.database import open_database
 from archmodel.entities import kind_named
 from archmodel.records import StoneRecord
@@ -15,13 +14,14 @@ from pipelines.progress import Listener, Progress, silent
 from survey.depth import depth_for
 from survey.extrusion import SurveyedBlock, extrude
 from survey.faces import outline_face
+from survey.formats.csv_points import read_csv
 from survey.formats.moma_ascii import read_moma
 from survey.records import BlockRecord, Survey
 from survey.watertight import check_watertight
 
 __all__ = ["FORMATS", "FileReport", "IngestReport", "ingest"]
 
-FORMATS: Mapping[str, Callable[[Path], Survey]] = {"moma": read_moma}
+FORMATS: Mapping[str, Callable[[Path], Survey]] = {"moma": read_moma, "csv": read_csv}
 """Readers of survey files by the name of their format."""
 
 

@@ -8,7 +8,6 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,11 +89,36 @@ def _title(result: Result, quantity: str) -> str:
 
 
 def _draw_apart(job_file: Path) -> None:
-    """Run pipelines.drawing on a job; its noise about displays is kept back unless it fails."""
+    """Run pipelines.drawing on a job; its noise about displays is kept back unless it fails.
+
+    EGL comes first: it needs no X server, and no X libraries either.
+    """
+    reason = ""
+    for window in ("vtkEGLRenderWindow", None):
+        done = _attempt(job_file, window)
+        if done.returncode == 0:
+            return
+        if done.returncode == 3:
+            reason = done.stdout.strip()
+            package = package_of(reason) or "libgl1 libxrender1 libegl1"
+            raise MissingLibraryError(
+                f"VTK cannot be loaded: {reason}", remedy=f"install what it needs: apt-get install {package}"
+            )
+        reason = reason or _last_words(done.stderr) or f"it ended with code {done.returncode}"
+    raise MissingLibraryError(
+        f"VTK cannot draw off screen: {reason}",
+        remedy="install software rendering: apt-get install libegl1 libgl1-mesa-dri",
+    )
+
+
+def _attempt(job_file: Path, window: str | None) -> "subprocess.CompletedProcess[str]":
+    """One process that draws, with the given kind of VTK window; None: the one that VTK would take."""
     root = str(Path(__file__).resolve().parent.parent)
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([root, os.environ.get("PYTHONPATH", "")])}
+    if window is not None:
+        environment.setdefault("VTK_DEFAULT_OPENGL_WINDOW", window)
     try:
-        done: Any = subprocess.run(
+        return subprocess.run(
             [sys.executable, "-m", "pipelines.drawing", str(job_file)],
             capture_output=True,
             text=True,
@@ -104,20 +128,11 @@ def _draw_apart(job_file: Path) -> None:
             check=False,
         )
     except subprocess.TimeoutExpired:
-        raise MissingLibraryError(f"no picture after {_TIMEOUT:.0f} s", where="pictures") from None
-    if done.returncode == 3:
-        message = done.stdout.strip()
-        package = package_of(message)
-        raise MissingLibraryError(
-            f"VTK cannot be loaded: {message}",
-            where="pictures",
-            remedy=f"install it: apt-get install {package or 'libgl1 libxrender1 libegl1'}",
-        )
-    if done.returncode != 0:
-        lines = [line.strip() for line in done.stderr.splitlines() if line.strip()]
-        reason = lines[-1] if lines else f"it ended with code {done.returncode}"
-        raise MissingLibraryError(
-            f"VTK cannot draw off screen: {reason}",
-            where="pictures",
-            remedy="install software rendering: apt-get install libegl1 libgl1 libgl1-mesa-dri",
-        )
+        raise MissingLibraryError(f"no picture after {_TIMEOUT:.0f} s") from None
+
+
+def _last_words(stderr: str) -> str:
+    """The last line that a process said, without VTK's time stamps and colours."""
+    lines = [re.sub(r"\x1b\[[0-9;]*m", "", line).strip() for line in stderr.splitlines()]
+    last = next((line for line in reversed(lines) if line), "")
+    return re.split(r"(?:WARN|ERR)\| ", last)[-1][:200].rstrip(".")

@@ -106,7 +106,7 @@ def write_results(
     if result.errors.unconverged_steps:
         warnings.append(
             f"{result.errors.unconverged_steps} of {result.steps} steps were left above the solver's "
-            "tolerance; allow more max_sweeps in [solver], or a smaller step in [time]"
+            "tolerance; allow more max_iterations in [solver], or a smaller step in [time]"
         )
     with _timed(seconds, "files"):
         progress(Progress("write", 0, 3, "results.pvd"))

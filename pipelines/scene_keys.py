@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from mechanics.scene import ContactSettings, Fidelity, SolverSettings, TimeSettings
+from mechanics.scene import ContactSettings, Fidelity, Method, SolverSettings, TimeSettings
 from pipelines.schema import Key, Kind
 from survey.joint_lines import JointSettings
 
@@ -154,6 +154,13 @@ _TIME = (
 
 _SOLVER = (
     Key(
+        "method",
+        Kind.TEXT,
+        "nsgs: Gauss–Seidel; admm: needs a deformable stone; auto: admm as soon as a stone is deformable.",
+        default=SolverSettings.method.value,
+        choices=tuple(one.value for one in Method),
+    ),
+    Key(
         "tolerance",
         Kind.NUMBER,
         "Natural map η at which a step is solved.",
@@ -163,11 +170,11 @@ _SOLVER = (
         below=1,
     ),
     Key(
-        "max_sweeps",
+        "max_iterations",
         Kind.INTEGER,
-        "Gauss–Seidel sweeps after which a step is given up, and reported as not converged.",
+        "Iterations after which a step is left as it is, and reported as not converged.",
         "",
-        SolverSettings.max_sweeps,
+        SolverSettings.max_iterations,
         at_least=1,
     ),
 )

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from mechanics.materials import Material
-from mechanics.scene import ContactSettings, Fidelity, SolverSettings, TimeSettings
+from mechanics.scene import ContactSettings, Fidelity, Method, SolverSettings, TimeSettings
 from moma.errors import SceneError
 from pipelines.scene_keys import MATERIAL_KEYS, PICTURES, TABLES
 from pipelines.schema import Document, check_table, nearest
@@ -127,7 +127,7 @@ def parse_scene(text: str, path: str) -> SceneFile:
         gravity=_gravity(document, **tables["gravity"]),
         mesh_size=tables["mesh"]["size"],
         time=_time(document, tables["time"]),
-        solver=SolverSettings(**tables["solver"]),
+        solver=SolverSettings(**tables["solver"] | {"method": Method(tables["solver"]["method"])}),
         output=_output(document, **tables["output"]),
     )
 

@@ -120,7 +120,7 @@ def result_of(
             speed=10.0**-steps,
             balance=10.0 ** (-steps / 2),
             natural_map=np.full(10, 1e-7),
-            sweeps=np.full(10, 100),
+            iterations=np.full(10, 100),
             contacts=np.full(10, count),
         ),
         wall_time={"mesh": 0.5, "solve": 1.5},

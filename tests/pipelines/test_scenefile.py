@@ -60,7 +60,7 @@ def test_the_sample_scene_is_valid():
         ("[time]\nstep = 0.0\n", 2, "give a number [s], greater than 0"),
         ("[time]\n# slower\ntheta = 0.4\n", 3, "at least 0.5 and at most 1"),
         ("[time]\nstep = 0.1\nduration = 0.01\n", 3, "shorter than step"),
-        ("[solver]\nmax_sweeps = 1.5\n", 2, "not a whole number"),
+        ("[solver]\nmax_iterations = 1.5\n", 2, "not a whole number"),
         ("[bodies]\ndefault = 'elastic'\n", 2, "known here: deformable, rigid"),
         ("[bodies]\nfixed = 'course = 1'\n", 2, "not a list of texts"),
         ("[gravity]\ndirection = [0, 0]\n", 2, "not a list of three numbers"),

@@ -1,0 +1,83 @@
+"""The commands of the documentation run as they are written; the main job runs on rigid stones here."""
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = ("README.md", "docs/howto/first-run.md", "docs/query.md")
+SCENE = "data/samples/window/window.toml"
+
+
+def blocks(page, language):
+    text = (ROOT / page).read_text(encoding="utf-8")
+    return re.findall(rf"^```{language}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+
+
+def commands(page):
+    """The moma commands of a page, in order."""
+    lines = [line.strip() for block in blocks(page, "bash") for line in block.splitlines()]
+    return [shlex.split(line, comments=True) for line in lines if line.startswith("moma ")]
+
+
+@pytest.fixture
+def place(tmp_path):
+    """A folder in which the documentation's paths exist, with a scene that is quick to run."""
+    sample = tmp_path / "data/samples/window"
+    sample.mkdir(parents=True)
+    (sample / "window.moma").symlink_to(ROOT / "data/samples/window/window.moma")
+    text = (ROOT / SCENE).read_text(encoding="utf-8")
+    assert 'default = "deformable"' in text
+    quick = text.replace('default = "deformable"', 'default = "rigid"').replace(
+        "[materials", 'where = ["course <= 3"]\n\n[materials', 1
+    )
+    (sample / "window.toml").write_text(quick, encoding="utf-8")
+    return tmp_path
+
+
+def execute(arguments, folder):
+    environment = {name: value for name, value in os.environ.items() if name != "MOMA_DB"}
+    environment["PYTHONPATH"] = str(ROOT)
+    return subprocess.run(arguments, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_the_commands_run_in_their_order(page, place):
+    found = commands(page)
+    assert found
+    if page == "docs/query.md":  # it asks a database that is there
+        found.insert(0, ["moma", "ingest", "data/samples/window/window.moma"])
+    for command in found:
+        done = execute([sys.executable, "-m", *command], place)
+        assert done.returncode == 0, (command, done.stderr)
+        assert "error" not in done.stderr, (command, done.stderr)
+
+
+def test_the_python_of_the_readme_runs(place):
+    (script,) = blocks("README.md", "python")
+    done = execute([sys.executable, "-W", "error", "-c", script], place)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("W03-")
+
+
+def test_the_links_of_the_pages_lead_somewhere():
+    for page in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]:
+        for link in re.findall(r"\]\(([^)#]+)", page.read_text(encoding="utf-8")):
+            if "://" not in link:
+                assert (page.parent / link).exists(), (page.name, link)
+
+
+def test_the_makefile_makes_what_the_readme_says():
+    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+    asked = {
+        line.split()[1]
+        for block in blocks("README.md", "bash")
+        for line in block.splitlines()
+        if "make " in line
+    }
+    assert asked <= targets
