@@ -47,8 +47,8 @@ def check_lines(report: "CheckReport", verbose: bool) -> list[str]:
     if report.cost is not None:
         cost = report.cost
         lines += [
-            f"  {cost.pairs} touching pairs, about {cost.contacts} contact points",
-            f"  about {cost.unknowns} unknowns, {cost.memory / 2**20:.0f} MiB",
+            f"  {cost.pairs} touching pairs, {cost.contacts} contact points at the start",
+            f"  {cost.unknowns} unknowns, about {max(1, round(cost.memory / 2**20))} MiB of arrays",
             f"  at most {cost.steps} steps of {cost.step:g} s",
         ]
     if verbose and report.joints is not None:

@@ -128,9 +128,15 @@ _TIME = (
     ),
     Key("duration", Kind.NUMBER, "Longest simulated time.", "s", TimeSettings.duration, above=0),
     Key(
+        "relaxation",
+        Kind.BOOLEAN,
+        "Kinetic damping: all velocities become zero when the kinetic energy has passed a peak.",
+        default=TimeSettings.relaxation,
+    ),
+    Key(
         "stop_at_equilibrium",
         Kind.BOOLEAN,
-        "Stop once every stone is at rest and in balance.",
+        "Stop once every stone is at rest and in balance, or one has collapsed.",
         "",
         TimeSettings.stop_at_equilibrium,
     ),

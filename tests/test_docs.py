@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = ("README.md", "docs/howto/first-run.md", "docs/query.md")
+PAGES = ("README.md", "docs/howto/first-run.md")
 SCENE = "data/samples/window/window.toml"
 
 
@@ -50,8 +50,6 @@ def execute(arguments, folder):
 def test_the_commands_run_in_their_order(page, place):
     found = commands(page)
     assert found
-    if page == "docs/query.md":  # it asks a database that is there
-        found.insert(0, ["moma", "ingest", "data/samples/window/window.moma"])
     for command in found:
         done = execute([sys.executable, "-m", *command], place)
         assert done.returncode == 0, (command, done.stderr)

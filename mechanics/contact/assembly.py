@@ -95,9 +95,10 @@ def sparse_form(
     frames = block_diag(list(contacts.frame), format="csr")
     lift = hstack([_rigid_lift(rigid, operator), frames @ kron(signed, eye_array(3), format="csr")]).T
     soft = np.array([compliance[b].softness if b in compliance else 0.0 for b in range(len(model.mass))])
-    return SparseForm(
-        block_diag(blocks, format="csc"), csc_array(lift), float(np.median(soft[contacts.bodies].sum(axis=1)))
-    )
+    between = soft[contacts.bodies].sum(axis=1)
+    # contacts of two rigid sides have no softness of their own: they take that of the others
+    elastic = between[between > 0] if (between > 0).any() else soft[soft > 0]
+    return SparseForm(block_diag(blocks, format="csc"), csc_array(lift), float(np.median(elastic)))
 
 
 def _rigid_lift(rigid: Ints, operator: Delassus) -> "csr_array[np.float64]":

@@ -180,6 +180,84 @@ def test_show_tells_what_it_is_and_what_was_measured(database):
         assert words in text
 
 
+RIGID = """
+[scene]
+name = "Low"
+[select]
+where = ["course <= 2"]
+[materials.limestone]
+density = 2350.0
+young = 12e9
+poisson = 0.2
+[bodies]
+default = "rigid"
+fixed = ["course = 1"]
+"""
+
+
+@pytest.fixture
+def scene(tmp_path):
+    """A scene that takes a second."""
+    path = tmp_path / "low.toml"
+    path.write_text(RIGID, encoding="utf-8")
+    return path
+
+
+def test_check_tells_the_plan(scene, database):
+    text = invoke("check", scene, "--db", database)
+    assert text.exit_code == 0
+    assert "sound" in text.stdout
+    plan = json.loads(invoke("check", scene, "--db", database, "--json").stdout)
+    assert plan["bodies"]["rigid"] + plan["bodies"]["fixed"] == sum(plan["kinds"].values())
+    assert plan["cost"]["unknowns"] == 6 * plan["bodies"]["rigid"]
+    assert plan["cost"]["contacts"] >= 3 * plan["bodies"]["rigid"]
+    assert plan["joints"]["max_displacement"] < 0.1
+    assert plan["problems"] == []
+
+
+@pytest.mark.parametrize(
+    ("written", "instead", "said"),
+    [
+        ('fixed = ["course = 1"]', "", "no stone is fixed"),
+        (
+            '"course <= 2"',
+            '"course in (1, 4)"',
+            "no chain of touching stones ties these to a fixed one: W04-01",
+        ),
+        ("[scene]", "[joints]\nmax_displacement = 0.001\n[scene]", "max_displacement"),
+    ],
+)
+def test_an_unsound_scene_ends_in_1_with_its_problem(scene, database, written, instead, said):
+    scene.write_text(RIGID.replace(written, instead), encoding="utf-8")
+    done = invoke("check", scene, "--db", database)
+    assert done.exit_code == 1
+    assert any(said in line for line in done.stdout.splitlines() if line.startswith("problem: "))
+    assert json.loads(invoke("check", scene, "--db", database, "--json").stdout)["problems"]
+
+
+@pytest.mark.parametrize("command", ["check", "run"])
+def test_a_wrong_scene_is_wrong_use(command, scene, database):
+    scene.write_text(RIGID.replace("density", "densty"), encoding="utf-8")
+    assert "low.toml:7: unknown key 'densty'" in fails(2, command, scene, "--db", database)
+    assert "no such scene file" in fails(2, command, scene.with_name("none.toml"), "--db", database)
+    scene.write_text(RIGID.replace("course <= 2", "course > 99"), encoding="utf-8")
+    assert "no stone is selected" in fails(2, command, scene, "--db", database)
+
+
+def test_run_tells_how_it_ended_and_query_knows_it(scene, tmp_path):
+    url = f"sqlite:///{tmp_path / 'own.db'}"
+    assert invoke("ingest", SAMPLE / "window.moma", "--db", url).exit_code == 0
+    done = invoke("run", scene, "--db", url, "--out", tmp_path / "out", "-v")
+    assert done.exit_code == 0, done.output
+    assert done.stdout.startswith("Low: equilibrium after ")
+    assert str(tmp_path / "out/report.html") in done.stdout
+    rows = json.loads(invoke("query", "entity", "--where", "fidelity = rigid", "--db", url, "--json").stdout)
+    assert rows
+    assert all(row["course"] == 2 for row in rows)
+    summary = json.loads(invoke("run", scene, "--db", url, "--out", tmp_path / "out", "--json").stdout)
+    assert summary["bodies"]["rigid"] == len(rows)
+
+
 def test_an_unexpected_error_is_one_line_and_whole_with_v(database, monkeypatch):
     def broken(*_):
         raise ZeroDivisionError("by hand")

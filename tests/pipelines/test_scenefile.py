@@ -2,18 +2,20 @@
 
 import re
 import tomllib
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mechanics.scene import Fidelity
+from mechanics.scene import ContactSettings, Fidelity, SolverSettings, TimeSettings
 from moma.errors import MomaError, SceneError
 from pipelines.scene_keys import MATERIAL_KEYS, TABLES
 from pipelines.scenefile import parse_scene, read_scene
 from pipelines.schema import REQUIRED
 from pipelines.toml_lines import key_lines
+from survey.joint_lines import JointSettings
 
 ROOT = Path(__file__).resolve().parents[2]
 SAMPLE = ROOT / "data/samples/window/window.toml"
@@ -146,6 +148,20 @@ def _paths(tables, above=()):
         yield path
         if isinstance(value, dict) and "p" not in value:
             yield from _paths(value, path)
+
+
+@pytest.mark.parametrize(
+    ("table", "settings"),
+    [
+        ("time", TimeSettings),
+        ("solver", SolverSettings),
+        ("contact", ContactSettings),
+        ("joints", JointSettings),
+    ],
+)
+def test_every_setting_has_a_key_with_its_default(table, settings):
+    keys = {key.name: key.default for key in TABLES[table] if (table, key.name) != ("joints", "mode")}
+    assert keys == {one.name: one.default for one in fields(settings)}
 
 
 def test_every_key_of_a_scene_is_documented_with_its_unit_and_default():
