@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import skfem
 from numpy.typing import NDArray
-from scipy.sparse import csc_array
+from scipy.sparse import csc_array, csr_array
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 from mechanics.materials import Material
@@ -16,12 +16,15 @@ __all__ = [
     "elastic_operators",
     "element_stress",
     "from_voigt",
-    "recover_at_nodes",
+    "recovery",
     "to_voigt",
     "von_mises",
 ]
 
 Array = NDArray[np.float64]
+
+# a linear fit has four unknowns; so many values make it a mean, not an interpolation
+_PATCH = 10
 
 
 @dataclass(frozen=True)
@@ -51,7 +54,9 @@ def elastic_operators(mesh: TetMesh, material: Material) -> ElasticOperators:
 
 def _basis(mesh: TetMesh) -> "skfem.Basis":
     return skfem.Basis(
-        skfem.MeshTet(np.ascontiguousarray(mesh.nodes.T), np.ascontiguousarray(mesh.tetrahedra.T)), skfem.ElementVector(skfem.ElementTetP1()), intorder=2
+        skfem.MeshTet(np.ascontiguousarray(mesh.nodes.T), np.ascontiguousarray(mesh.tetrahedra.T)),
+        skfem.ElementVector(skfem.ElementTetP1()),
+        intorder=2,
     )
 
 
@@ -67,16 +72,29 @@ def element_stress(mesh: TetMesh, material: Material, displacement: Array) -> Ar
     return to_voigt(stress)
 
 
-def recover_at_nodes(mesh: TetMesh, stress: Array) -> Array:
-    """Nodal stress (n, 6): the mean of the adjacent tetrahedra (nt, 6), weighted by volume (a lumped L2 projection)."""
-    corners = mesh.nodes[mesh.tetrahedra]
-    volume = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1]))
-    total, weight = np.zeros((len(mesh.nodes), 6)), np.zeros(len(mesh.nodes))
-    for k in range(4):
-        np.add.at(total, mesh.tetrahedra[:, k], volume[:, None] * stress)
-        np.add.at(weight, mesh.tetrahedra[:, k], volume)
-    recovered: Array = total / weight[:, None]
-    return recovered
+def recovery(mesh: TetMesh) -> "csr_array[np.float64]":
+    """Weights (n, nt) that give nodal values from those of the tetrahedra (superconvergent patch recovery).
+
+    Around each node a linear polynomial is fitted by least squares to the values at the tetrahedra's centroids
+    (Zienkiewicz & Zhu 1992). A patch that cannot carry the fit, as at a corner, is widened by its neighbours.
+    """
+    nodes, count = len(mesh.nodes), len(mesh.tetrahedra)
+    centroid = mesh.nodes[mesh.tetrahedra].mean(axis=1)
+    touches = csr_array(
+        (np.ones(4 * count), (mesh.tetrahedra.ravel(), np.repeat(np.arange(count), 4))), shape=(nodes, count)
+    )
+    wider = (touches @ touches.T) @ touches
+    columns, weights = [], []
+    for node in range(nodes):
+        patch = touches.indices[touches.indptr[node] : touches.indptr[node + 1]]
+        if len(patch) < _PATCH:
+            patch = wider.indices[wider.indptr[node] : wider.indptr[node + 1]]
+        offset = centroid[patch] - mesh.nodes[node]
+        basis = np.column_stack([np.ones(len(patch)), offset / np.abs(offset).max()])
+        columns.append(patch)
+        weights.append(np.linalg.pinv(basis)[0])
+    pointer = np.concatenate([[0], np.cumsum([len(c) for c in columns])])
+    return csr_array((np.concatenate(weights), np.concatenate(columns), pointer), shape=(nodes, count))
 
 
 def von_mises(stress: Array) -> Array:

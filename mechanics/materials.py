@@ -32,5 +32,7 @@ class Material:
         ):
             if not ok:
                 raise SceneError(
-                    f"{quantity} = {getattr(self, quantity)!r}", where=f"material {self.name!r}", remedy=remedy
+                    f"{quantity} = {getattr(self, quantity)!r}",
+                    where=f"material {self.name!r}",
+                    remedy=remedy,
                 )

@@ -79,7 +79,9 @@ def build_model(scene: Scene, progress: Callable[[int, int], None] | None = None
             stones.append(None)
         if progress is not None:
             progress(index + 1, len(blocks))
-    node_ptr = np.concatenate([[0], np.cumsum([0 if s is None else len(s.mesh.nodes) for s in stones])]).astype(np.int64)
+    node_ptr = np.concatenate(
+        [[0], np.cumsum([0 if s is None else len(s.mesh.nodes) for s in stones])]
+    ).astype(np.int64)
     density = np.array([block.material.density for block in blocks])
     model = Model(
         scene=scene,
@@ -106,7 +108,9 @@ def build_model(scene: Scene, progress: Callable[[int, int], None] | None = None
 def _check(block: Block) -> None:
     if block.fidelity is Fidelity.DEFORMABLE and not (block.mesh_size is not None and block.mesh_size > 0):
         raise SceneError(
-            f"mesh_size = {block.mesh_size!r} for a deformable stone", where=f"stone {block.code}", remedy="give metres greater than 0"
+            f"mesh_size = {block.mesh_size!r} for a deformable stone",
+            where=f"stone {block.code}",
+            remedy="give metres greater than 0",
         )
     if block.fidelity is Fidelity.FIXED and any(block.velocity):
         raise SceneError("a fixed stone has a velocity", where=f"stone {block.code}", remedy="make it rigid")
@@ -117,7 +121,10 @@ def _inertia(blocks: tuple[Block, ...], properties: list[MassProperties], densit
     mass = density * np.array([p.volume for p in properties])
     inertia = density[:, None, None] * np.array([p.inertia for p in properties])
     return RigidInertia(
-        mass, np.where(rigid, 1.0 / mass, 0.0), inertia, np.where(rigid[:, None, None], np.linalg.inv(inertia), 0.0)
+        mass,
+        np.where(rigid, 1.0 / mass, 0.0),
+        inertia,
+        np.where(rigid[:, None, None], np.linalg.inv(inertia), 0.0),
     )
 
 

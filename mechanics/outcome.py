@@ -23,9 +23,10 @@ _FALL_SPEED = 0.05
 class Watch:
     """Tells the outcome after each step.
 
-    *Equilibrium*: for five steps in a row every body that is not fixed is in balance (unbalanced force and moment below the
-    scene's tolerance) and slower than 10⁻⁴ √(g · its smallest width). *Collapsed*: a body has moved by more than the
-    scene's fraction of its smallest width and is faster than 0.05 √(g · width). Without gravity g counts as 1 m/s².
+    *Equilibrium*: for five steps in a row every body that is not fixed is in balance (unbalanced force and moment
+    below the scene's tolerance) and slower than 10⁻⁴ √(g · its smallest width). *Collapsed*: a body has moved by more
+    than the scene's fraction of its smallest width and is faster than 0.05 √(g · width). Without gravity g counts as
+    1 m/s².
     """
 
     def __init__(self, model: Model, start: State) -> None:

@@ -48,7 +48,9 @@ def mass_properties(vertices: Array, faces: Faces, where: str | None = None) -> 
     edges = {(f[i - 1], f[i]) for f in faces for i in range(len(f))}
     if any((b, a) not in edges for a, b in edges):
         raise GeometryError(
-            "the faces do not close", where=where, remedy="give each edge to exactly two faces, in opposite directions"
+            "the faces do not close",
+            where=where,
+            remedy="give each edge to exactly two faces, in opposite directions",
         )
     origin = vertices.mean(axis=0)
     corners = (vertices - origin)[fan(faces)]
@@ -62,7 +64,9 @@ def mass_properties(vertices: Array, faces: Faces, where: str | None = None) -> 
         )
     total = corners.sum(axis=1)
     mean = np.einsum("t,ti->i", volumes, total) / (4.0 * volume)
-    second = np.einsum("t,tki,tkj->ij", volumes, corners, corners) + np.einsum("t,ti,tj->ij", volumes, total, total)
+    second = np.einsum("t,tki,tkj->ij", volumes, corners, corners) + np.einsum(
+        "t,ti,tj->ij", volumes, total, total
+    )
     second = second / 20.0 - volume * np.outer(mean, mean)
     inertia = np.trace(second) * np.eye(3) - second
     return MassProperties(volume, origin + mean, inertia)

@@ -48,7 +48,9 @@ def body_results(model: Model, start: State, state: State) -> tuple[BodyResult, 
     return tuple(results)
 
 
-def contact_results(contacts: Contacts, state: State, impulse: Array, force: Array, friction: float) -> ContactResult:
+def contact_results(
+    contacts: Contacts, state: State, impulse: Array, force: Array, friction: float
+) -> ContactResult:
     """The contact points with their mean force over the last step.
 
     A contact slips when its impulse lies on Coulomb's cone, to a relative 10⁻⁶.

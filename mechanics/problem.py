@@ -7,7 +7,6 @@ compliance between the contact sides that lie on it.
 """
 
 from dataclasses import dataclass
-
 from typing import Protocol
 
 import numpy as np
@@ -71,7 +70,9 @@ class SparseForm:
     softness : typical compliance of a contact beyond what rigid bodies have [1/kg]
     """
 
-    def __init__(self, inertia: "csc_array[np.float64]", lift: "csc_array[np.float64]", softness: float) -> None:
+    def __init__(
+        self, inertia: "csc_array[np.float64]", lift: "csc_array[np.float64]", softness: float
+    ) -> None:
         self.inertia, self.lift, self.softness = inertia, lift, softness
         self._factors: dict[float, _Factor] = {}
 
@@ -81,7 +82,7 @@ class SparseForm:
             matrix = (self.inertia + self.lift @ self.lift.T / sigma).tocsc()
             # symmetric positive definite: order A + Aᵀ and do not pivot
             self._factors[sigma] = splu(
-                matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}, relax=30
+                matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
             )
         return self._factors[sigma]
 

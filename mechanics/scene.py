@@ -67,7 +67,9 @@ class TimeSettings:
     step : time step h [s]
     theta : integration parameter θ, 1/2 ≤ θ ≤ 1; 1 damps most and finds a static equilibrium
     duration : longest simulated time [s]
-    stop_at_equilibrium : stop as soon as every block is at rest and in balance
+    relaxation : kinetic damping: all velocities are set to zero each time the kinetic energy has passed a peak;
+        leads to a static equilibrium soonest, but the way there is no longer the true motion
+    stop_at_equilibrium : stop as soon as every block is at rest and in balance, or the scene has collapsed
     balance_tolerance : unbalanced force of a block over its weight below which it is in balance [-]
     collapse_displacement : a block that moved by more than this fraction of its smallest dimension
         while still moving counts as collapsed [-]
@@ -76,6 +78,7 @@ class TimeSettings:
     step: float = 1e-3
     theta: float = 1.0
     duration: float = 1.0
+    relaxation: bool = False
     stop_at_equilibrium: bool = True
     balance_tolerance: float = 1e-4
     collapse_displacement: float = 0.5

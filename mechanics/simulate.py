@@ -56,7 +56,9 @@ def simulate(scene: Scene, progress: Callable[[Progress], None] | None = None) -
         with clock("observe"):
             balance = log(step)
             outcome = watch(step.after, balance, step.solution.converged)
-        report(Progress("step", count, total, f"balance {balance.max():.1e}, η {step.solution.natural_map:.1e}"))
+        report(
+            Progress("step", count, total, f"balance {balance.max():.1e}, η {step.solution.natural_map:.1e}")
+        )
         done = settings.stop_at_equilibrium and outcome is not Outcome.MOVING
         if done or count == total or (scene.frame_every and count % scene.frame_every == 0):
             frames.append(Frame(step.after.time, positions(model, step.after)))
@@ -79,7 +81,7 @@ class _Log:
     def __call__(self, step: Step) -> Array:
         """Account for one step, and return the imbalance of each body (nb,)."""
         model, solution = self._model, step.solution
-        self.energy(step.before, step.after, step.work, model.scene.time.theta)
+        self.energy(step.before, step.after, step.work, step.relaxed, model.scene.time.theta)
         self.penetration = max(self.penetration, float(np.max(-step.gap, initial=0.0)))
         self.unconverged += not solution.converged
         balance = imbalance(model, step.after, step.contacts, step.force)
@@ -99,7 +101,9 @@ class _Log:
     def history(self) -> History:
         """One array for each quantity."""
         time, kinetic, fastest, balance, eta, iterations, contacts = np.array(self.rows).T
-        return History(time, kinetic, fastest, balance, eta, iterations.astype(np.int64), contacts.astype(np.int64))
+        return History(
+            time, kinetic, fastest, balance, eta, iterations.astype(np.int64), contacts.astype(np.int64)
+        )
 
 
 def _result(

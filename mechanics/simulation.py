@@ -14,6 +14,7 @@ from mechanics.contact.contacts import Contacts, gaps
 from mechanics.contact.detection import Detector
 from mechanics.memory import Memory
 from mechanics.model import Model
+from mechanics.observers.energy import kinetic_energy
 from mechanics.observers.equilibrium import displacement, speed
 from mechanics.problem import ContactSolution, Delassus, SparseForm
 from mechanics.solvers.admm import ADMM
@@ -54,12 +55,13 @@ class Step:
 
     Attributes
     ----------
-    before, after : the states between which it lies
+    before, after : the states between which it lies; relaxation comes after them
     contacts : the contact points
     solution : their impulses
     force : (nc, 3) mean forces r/h on the candidates, world axes [N]
     gap : (nc,) at the end of the step [m]
     work : r·u_θ, the work of the contacts [J]
+    relaxed : kinetic energy that relaxation took out at the end of the step [J]
     """
 
     before: State
@@ -69,6 +71,7 @@ class Step:
     force: Array
     gap: Array
     work: float
+    relaxed: float
 
 
 @dataclass(frozen=True)
@@ -94,6 +97,7 @@ class Simulation:
         self._solve = choose_solver(settings.solver, bool(model.elastic.any()))
         self._memory = Memory()
         self._touching: _Touching | None = None
+        self._kinetic = 0.0
 
     def step(self) -> Step:
         """Predict, detect, solve, advance.
@@ -131,8 +135,22 @@ class Simulation:
                 remedy="use a smaller time step",
             )
         self._memory.store(contacts, solution.impulse)
-        self.state = after
-        return self._describe(before, after, touching, solution)
+        work = self._contact_work(before, after, touching, solution)
+        self.state, relaxed = self._relax(after)
+        force = world_impulse(contacts, solution.impulse) / h
+        return Step(before, after, contacts, solution, force, gaps(contacts, after), work, relaxed)
+
+    def _relax(self, after: State) -> tuple[State, float]:
+        """Kinetic damping: bring all bodies to a halt once their kinetic energy has passed a peak (Cundall 1976)."""
+        kinetic, last = kinetic_energy(self.model, after), self._kinetic
+        if not self.model.scene.time.relaxation or kinetic >= last:
+            self._kinetic = kinetic
+            return after, 0.0
+        self._kinetic = 0.0
+        halted = replace(
+            after, velocity=np.zeros_like(after.velocity), node_velocity=np.zeros_like(after.node_velocity)
+        )
+        return halted, kinetic
 
     def _detect(self, predicted: State) -> tuple[State, _Touching]:
         """The contacts at the predicted configuration; found anew only when something has moved."""
@@ -160,17 +178,12 @@ class Simulation:
         self._touching = _Touching(contacts, operator, sparse, predicted)
         return predicted, self._touching
 
-    def _describe(self, before: State, after: State, touching: _Touching, solution: ContactSolution) -> Step:
-        theta, contacts = self._theta, touching.contacts
+    def _contact_work(
+        self, before: State, after: State, touching: _Touching, solution: ContactSolution
+    ) -> float:
+        """r·u_θ [J]."""
+        theta = self._theta
         velocity = theta * after.velocity + (1 - theta) * before.velocity
         node_velocity = theta * after.node_velocity + (1 - theta) * before.node_velocity
-        u_theta = local_velocity(contacts, touching.operator, velocity, node_velocity)
-        return Step(
-            before,
-            after,
-            contacts,
-            solution,
-            world_impulse(contacts, solution.impulse) / self._step,
-            gaps(contacts, after),
-            float(np.sum(solution.impulse * u_theta)),
-        )
+        u_theta = local_velocity(touching.contacts, touching.operator, velocity, node_velocity)
+        return float(np.sum(solution.impulse * u_theta))

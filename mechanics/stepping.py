@@ -13,7 +13,15 @@ from mechanics.model import Model
 from mechanics.problem import ContactProblem, Delassus, SparseForm
 from mechanics.state import State
 
-__all__ = ["FreeMotion", "advance", "compliances", "contact_problem", "follow_nodes", "free_motion", "predict"]
+__all__ = [
+    "FreeMotion",
+    "advance",
+    "compliances",
+    "contact_problem",
+    "follow_nodes",
+    "free_motion",
+    "predict",
+]
 
 Array = NDArray[np.float64]
 

@@ -15,7 +15,14 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
-from mechanics.elasticity import ElasticOperators, elastic_operators, element_stress, from_voigt, recover_at_nodes, to_voigt
+from mechanics.elasticity import (
+    ElasticOperators,
+    elastic_operators,
+    element_stress,
+    from_voigt,
+    recovery,
+    to_voigt,
+)
 from mechanics.materials import Material
 from mechanics.meshing.mesh import TetMesh
 
@@ -44,7 +51,8 @@ class Deformable:
 
     def stress(self, node: Array, centre: Array, rotation: Array) -> Array:
         """Recovered nodal stress (n, 6) in world axes [Pa]."""
-        local = recover_at_nodes(self.mesh, element_stress(self.mesh, self.material, self.displacement(node, centre, rotation)))
+        strained = element_stress(self.mesh, self.material, self.displacement(node, centre, rotation))
+        local = recovery(self.mesh) @ strained
         return to_voigt(rotation @ from_voigt(local) @ rotation.T)
 
     def displacement(self, node: Array, centre: Array, rotation: Array) -> Array:

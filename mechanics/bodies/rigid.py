@@ -55,4 +55,6 @@ def rotation_exp(vector: Array) -> Array:
     zero = np.zeros_like(x)
     skew = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(-1, 3, 3)
     # sinc(t/π) = sin t / t, and (1 - cos t)/t² = ½ (sin(t/2)/(t/2))²
-    return np.eye(3) + np.sinc(angle / np.pi) * skew + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * (skew @ skew)
+    turned: Array = np.eye(3) + np.sinc(angle / np.pi) * skew
+    turned += 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * (skew @ skew)
+    return turned

@@ -101,9 +101,7 @@ def _deepest_edges(i, j, floor, eptr, edge_a, edge_b, vptr, vertices, centres):
         p = vertices[edge_b[e]] - vertices[edge_a[e]]
         for f in range(eptr[j], eptr[j + 1]):
             q = vertices[edge_b[f]] - vertices[edge_a[f]]
-            n = np.array(
-                [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]]
-            )
+            n = np.array([p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]])
             length = np.sqrt(n[0] ** 2 + n[1] ** 2 + n[2] ** 2)
             if length < 1e-3 * np.sqrt((p @ p) * (q @ q)):
                 continue
@@ -223,7 +221,9 @@ def _point_areas(polygon, count):
 
 
 @njit(cache=True)
-def face_points(reference, incident, n, cptr, corner, vertices, alert, parallel, thin):  # pragma: no cover - compiled
+def face_points(
+    reference, incident, n, cptr, corner, vertices, alert, parallel, thin
+):  # pragma: no cover - compiled
     """Clip the incident face by the sides of the reference face, and keep the points nearer than `alert`.
 
     Returns

@@ -19,7 +19,9 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-def delassus(model: Model, state: State, contacts: Contacts, compliance: Mapping[int, DynamicCompliance]) -> Delassus:
+def delassus(
+    model: Model, state: State, contacts: Contacts, compliance: Mapping[int, DynamicCompliance]
+) -> Delassus:
     """W of the contacts at the configuration of `state`: condense each deformable body on its contact sides."""
     body = contacts.bodies
     kind = np.where(model.fixed[body], NONE, np.where(model.elastic[body], ELASTIC, RIGID)).astype(np.int64)
@@ -45,7 +47,9 @@ def _rigid_sides(model: Model, state: State, contacts: Contacts) -> tuple[Array,
     frame = np.broadcast_to(contacts.frame[:, None], (len(contacts), 2, 3, 3))
     # row · (ω × arm) = (arm × row) · ω
     jacobian = np.concatenate([frame, np.cross(arm[:, :, None, :], frame)], axis=-1)
-    spin = inverse_inertia_world(model.inertia, state.rotation)[body] @ jacobian[..., 3:].transpose(0, 1, 3, 2)
+    spin = inverse_inertia_world(model.inertia, state.rotation)[body] @ jacobian[..., 3:].transpose(
+        0, 1, 3, 2
+    )
     push = model.inertia.inverse_mass[body][..., None, None] * jacobian[..., :3].transpose(0, 1, 3, 2)
     return np.ascontiguousarray(jacobian), np.ascontiguousarray(np.concatenate([push, spin], axis=2))
 
@@ -79,7 +83,11 @@ def _compliance_block(
 
 
 def sparse_form(
-    model: Model, state: State, contacts: Contacts, operator: Delassus, compliance: Mapping[int, DynamicCompliance]
+    model: Model,
+    state: State,
+    contacts: Contacts,
+    operator: Delassus,
+    compliance: Mapping[int, DynamicCompliance],
 ) -> SparseForm:
     """The same W in sparse matrices: six velocities for each rigid body, then those of all nodes, world axes."""
     rigid = np.flatnonzero(model.inertia.inverse_mass > 0)

@@ -50,10 +50,12 @@ def material_points(contacts: Contacts, state: State) -> Array:
     rigid = state.centre[body] + np.einsum("csij,csj->csi", state.rotation[body], contacts.arm)
     elastic = (contacts.weights @ state.node).reshape(-1, 2, 3)
     on_nodes = (np.diff(contacts.weights.indptr) > 0).reshape(-1, 2, 1)
-    return np.where(on_nodes, elastic, rigid)
+    points: Array = np.where(on_nodes, elastic, rigid)
+    return points
 
 
 def gaps(contacts: Contacts, state: State) -> Array:
     """Signed distance g = n·(x_candidate - x_antagonist) of each contact (nc,) [m], negative when overlapping."""
     points = material_points(contacts, state)
-    return np.einsum("ci,ci->c", contacts.frame[:, 0], points[:, 0] - points[:, 1])
+    gap: Array = np.einsum("ci,ci->c", contacts.frame[:, 0], points[:, 0] - points[:, 1])
+    return gap

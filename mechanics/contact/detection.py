@@ -158,14 +158,21 @@ class _Collector:
             thin,
         )
         frame = self._frame(n, reference)
-        local = (reference - self.surfaces.fptr[bodies[0]]) % 64 * 64 + (incident - self.surfaces.fptr[bodies[1]]) % 64
+        local = (reference - self.surfaces.fptr[bodies[0]]) % 64 * 64 + (
+            incident - self.surfaces.fptr[bodies[1]]
+        ) % 64
         for k in range(count):
             sides = [
                 self._side(bodies[1], incident, polygon[k]),
                 self._side(bodies[0], reference, polygon[k] - gap[k] * n),
             ]
             self._append(
-                (bodies[1], bodies[0]), key + (int(local) << 9) + int(label[k]), frame, float(area[k]), alert, sides
+                (bodies[1], bodies[0]),
+                key + (int(local) << 9) + int(label[k]),
+                frame,
+                float(area[k]),
+                alert,
+                sides,
             )
 
     def _edges(self, first: int, second: int, feature: Ints, axis: Array, alert: float, key: int) -> None:
@@ -179,7 +186,9 @@ class _Collector:
         frame = np.array([-axis, along, np.cross(-axis, along)])
         faces = [self._face_at(body, direction) for body, direction in ((first, axis), (second, -axis))]
         sides = [self._side(first, faces[0], p + s * u), self._side(second, faces[1], q + t * v)]
-        local = (int(feature[0] - surfaces.eptr[first]) % 512 << 9) + int(feature[1] - surfaces.eptr[second]) % 512
+        local = (int(feature[0] - surfaces.eptr[first]) % 512 << 9) + int(
+            feature[1] - surfaces.eptr[second]
+        ) % 512
         self._append((first, second), key + (kernel.EDGES << 21) + local, frame, 0.0, alert, sides)
 
     def _face_at(self, body: int, direction: Array) -> int:
@@ -217,7 +226,12 @@ class _Collector:
             )
             sides = [_Side(np.zeros(3), mesh_c.node, own[i] / area[i]), side_a]
             self._append(
-                (candidate, antagonist), key + (1 << 23) + int(mesh_c.node[i]), frame, float(area[i]), alert, sides
+                (candidate, antagonist),
+                key + (1 << 23) + int(mesh_c.node[i]),
+                frame,
+                float(area[i]),
+                alert,
+                sides,
             )
 
     def _frame(self, n: Array, face: int) -> Array:

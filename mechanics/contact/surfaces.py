@@ -72,7 +72,9 @@ class Surfaces:
 
 
 def surfaces(
-    vertices: Sequence[Array], faces: Sequence[tuple[tuple[int, ...], ...]], face_mesh: Sequence[FaceMesh | None]
+    vertices: Sequence[Array],
+    faces: Sequence[tuple[tuple[int, ...], ...]],
+    face_mesh: Sequence[FaceMesh | None],
 ) -> Surfaces:
     """Pack bodies given by their corners (body axes) and faces."""
     vptr = _pointer([len(v) for v in vertices])

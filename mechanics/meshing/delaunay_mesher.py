@@ -29,15 +29,14 @@ def mesh_with_delaunay(vertices: Array, faces: Faces, size: float, code: str) ->
     centre = vertices.mean(axis=0)
     reach = float(np.linalg.norm(vertices - centre, axis=1).max())
     layers = max(1, round(reach / size))
-    points = [_lattice(vertices, faces, size)]
-    for shell in np.arange(layers - 1, 0, -1) / layers:
-        points.append(centre + shell * (_lattice(vertices, faces, size / shell) - centre))
+    shells = np.arange(layers, 0, -1) / layers
+    points = [centre + shell * (_lattice(vertices, faces, size / shell) - centre) for shell in shells]
     cloud = np.vstack([*points, centre[None]])
     normals, origins = map(np.array, zip(*(face_plane(vertices[list(face)]) for face in faces), strict=True))
     on_face = np.abs(np.einsum("pfk,fk->pf", cloud[:, None] - origins, normals)) < 1e-9 * reach
-    cloud = cloud + _tangential(np.random.default_rng(0).uniform(-1.0, 1.0, cloud.shape), normals, on_face) * (
-        _JITTER * size
-    )
+    cloud = cloud + _tangential(
+        np.random.default_rng(0).uniform(-1.0, 1.0, cloud.shape), normals, on_face
+    ) * (_JITTER * size)
     tetrahedra = Delaunay((cloud - centre) / reach).simplices.astype(np.int64)
     flat = on_face[tetrahedra].all(axis=1).any(axis=1)
     return tet_mesh(cloud, tetrahedra[~flat], vertices, faces, code)

@@ -1,6 +1,5 @@
 """Tetrahedra by gmsh. The only module that imports it."""
 
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,7 +12,9 @@ __all__ = ["mesh_with_gmsh"]
 _SYSTEM_PACKAGES = "libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1"
 
 
-def mesh_with_gmsh(vertices: NDArray[np.float64], faces: tuple[tuple[int, ...], ...], size: float, code: str) -> TetMesh:
+def mesh_with_gmsh(
+    vertices: NDArray[np.float64], faces: tuple[tuple[int, ...], ...], size: float, code: str
+) -> TetMesh:
     """Mesh one polyhedron with linear tetrahedra of edge length about `size` [m].
 
     The model is built at unit size, so that gmsh's absolute tolerances mean the same for every stone, and in
@@ -40,7 +41,9 @@ def mesh_with_gmsh(vertices: NDArray[np.float64], faces: tuple[tuple[int, ...], 
         nodes, tetrahedra = _generate(gmsh, (vertices - origin) / scale, faces, size / scale)
     except Exception as error:  # gmsh raises bare exceptions
         raise MeshError(
-            f"gmsh failed: {error}", where=f"stone {code}", remedy="check that the stone's faces are planar and closed"
+            f"gmsh failed: {error}",
+            where=f"stone {code}",
+            remedy="check that the stone's faces are planar and closed",
         ) from error
     finally:
         gmsh.model.remove()

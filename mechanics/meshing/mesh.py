@@ -40,7 +40,9 @@ def boundary_triangles(tetrahedra: Ints) -> Ints:
     return boundary
 
 
-def tet_mesh(nodes: Array, tetrahedra: Ints, vertices: Array, faces: tuple[tuple[int, ...], ...], code: str) -> TetMesh:
+def tet_mesh(
+    nodes: Array, tetrahedra: Ints, vertices: Array, faces: tuple[tuple[int, ...], ...], code: str
+) -> TetMesh:
     """Orient the tetrahedra, drop unused nodes, and tell which stone face each boundary triangle lies on.
 
     Raises

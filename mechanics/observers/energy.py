@@ -59,7 +59,7 @@ class EnergyBalance:
 
     Attributes
     ----------
-    external, contact, scheme : work of the loads and of the contacts, dissipation of the scheme, so far [J]
+    external, contact, scheme : work of the loads and of the contacts, dissipation of scheme and relaxation, so far [J]
     unexplained : ΔE - external - contact + scheme, so far [J]
     reference : the largest energy that was in play so far, at least 10⁻⁹ of weight times smallest width [J]
     """
@@ -71,23 +71,25 @@ class EnergyBalance:
         weight = float(model.mass[~model.fixed].sum() * np.linalg.norm(model.gravity))
         self.reference = max(self._energy, 1e-9 * weight * float(model.surfaces.size.min()))
 
-    def __call__(self, before: State, after: State, contact_work: float, theta: float) -> None:
-        """Account for one step; `contact_work` is r·u_θ [J]."""
+    def __call__(
+        self, before: State, after: State, contact_work: float, relaxed: float, theta: float
+    ) -> None:
+        """Account for one step: `contact_work` is r·u_θ, `relaxed` the kinetic energy taken out at its end [J]."""
         model = self._model
         external = self._load_work(before, after)
-        change = State(
-            0.0, before.centre, before.rotation, after.velocity - before.velocity, before.node, after.node_velocity - before.node_velocity
+        jump = _mass_norm(
+            model,
+            before.rotation,
+            after.velocity - before.velocity,
+            after.node_velocity - before.node_velocity,
         )
-        scheme = (theta - 0.5) * (
-            _mass_norm(model, before.rotation, change.velocity, change.node_velocity)
-            + _stiffness_norm(model, before, after)
-        )
+        scheme = (theta - 0.5) * (jump + _stiffness_norm(model, before, after))
         energy = kinetic_energy(model, after) + elastic_energy(model, after)
         self.unexplained += energy - self._energy - external - contact_work + scheme
         self.external += external
         self.contact += contact_work
-        self.scheme += scheme
-        self._energy = energy
+        self.scheme += scheme + relaxed
+        self._energy = energy - relaxed
         self.reference = max(self.reference, energy, abs(self.external), abs(self.contact), self.scheme)
 
     def _load_work(self, before: State, after: State) -> float:

@@ -88,8 +88,8 @@ def solve_contact(f, b, mu, r):  # pragma: no cover - compiled
     """Solve u = W r + b with Signorini's and Coulomb's laws at one contact, exactly; r (3,) is written.
 
     Open if b_N ≥ 0. Stick if r = -W⁻¹ b lies in the cone. Else slip: u_T = -λ r_T with λ > 0 gives
-    r_T(λ) = -(A + λ)⁻¹ c and r_N(λ) = -(b_N + W_NT r_T)/W_NN, and ‖r_T‖ - μ r_N changes its sign on (0, ∞), so the root is
-    bracketed and Newton's method, kept inside the bracket, finds it.
+    r_T(λ) = -(A + λ)⁻¹ c and r_N(λ) = -(b_N + W_NT r_T)/W_NN, and ‖r_T‖ - μ r_N changes its sign on (0, ∞), so the
+    root is bracketed and Newton's method, kept inside the bracket, finds it.
     """
     if b[0] >= 0.0:
         r[:] = 0.0
@@ -139,7 +139,23 @@ def solve_contact(f, b, mu, r):  # pragma: no cover - compiled
 
 @njit(cache=True)
 def sweep(
-    count, backward, r, v, y, shift, mu, factors, diagonal, body, kind, jacobian, response, slot, yptr, bptr, block
+    count,
+    backward,
+    r,
+    v,
+    y,
+    shift,
+    mu,
+    factors,
+    diagonal,
+    body,
+    kind,
+    jacobian,
+    response,
+    slot,
+    yptr,
+    bptr,
+    block,
 ):  # pragma: no cover - compiled
     """`count` passes of non-smooth Gauss–Seidel; r, v and y are kept up to date in place.
 
@@ -165,7 +181,9 @@ def sweep(
                 a = body[c, s]
                 if kind[c, s] == RIGID:
                     for i in range(6):
-                        v[a, i] += response[c, s, i, 0] * d0 + response[c, s, i, 1] * d1 + response[c, s, i, 2] * d2
+                        v[a, i] += (
+                            response[c, s, i, 0] * d0 + response[c, s, i, 1] * d1 + response[c, s, i, 2] * d2
+                        )
                 elif kind[c, s] == ELASTIC:
                     start, size = yptr[a], yptr[a + 1] - yptr[a]
                     # the block is symmetric: rows, which lie together in memory, serve as columns

@@ -19,7 +19,9 @@ def choose_solver(settings: SolverSettings, deformable: bool) -> NSGS | ADMM:
     SceneError : if ADMM is asked for and nothing is deformable
     """
     if settings.method == Method.ADMM and not deformable:
-        raise SceneError("admm needs a deformable block", where="solver.method", remedy='use "nsgs" or "auto"')
+        raise SceneError(
+            "admm needs a deformable block", where="solver.method", remedy='use "nsgs" or "auto"'
+        )
     if settings.method == Method.ADMM or (settings.method == Method.AUTO and deformable):
         return ADMM(settings.tolerance, settings.max_iterations)
     return NSGS(settings.tolerance, settings.max_iterations)
