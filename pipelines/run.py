@@ -11,7 +11,7 @@ from typing import Any
 from archmodel.database import open_database
 from archmodel.records import RunRecord, StoneResult
 from archmodel.store import store_run
-from mechanics.result import Result
+from mechanics.result import Outcome, Result
 from mechanics.simulate import simulate
 from moma.errors import DatabaseError, MissingLibraryError
 from pipelines.assemble import Assembly, assemble
@@ -103,7 +103,9 @@ def write_results(
     Pictures that cannot be drawn on this machine are a warning; everything else is written.
     """
     warnings = []
-    if result.errors.unconverged_steps:
+    # a relaxed equilibrium counts by its end alone, whose steps are all solved
+    relaxed = result.outcome is Outcome.EQUILIBRIUM and result.scene.time.relaxation
+    if result.errors.unconverged_steps and not relaxed:
         warnings.append(
             f"{result.errors.unconverged_steps} of {result.steps} steps were left above the solver's "
             "tolerance; allow more max_iterations in [solver], or a smaller step in [time]"

@@ -1,6 +1,7 @@
 """From survey file to results in folder and database, on the two lowest courses of the sample."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,14 +9,17 @@ import pytest
 
 from archmodel.database import open_database
 from archmodel.query import describe, find_rows
+from mechanics.result import Outcome
 from mechanics.scene import Fidelity
 from moma.errors import MissingLibraryError, SceneError, UsageError
 from pipelines import run as run_module
 from pipelines.assemble import assemble, surveyed_block
 from pipelines.ingest import ingest
-from pipelines.run import run_scene
+from pipelines.run import run_scene, write_results
 from pipelines.scenefile import parse_scene
 from pipelines.selection import select_stones
+from pipelines.stone_values import stone_results
+from tests.pipelines.handmade import result_of, rigid_body
 
 SURVEY = Path(__file__).resolve().parents[2] / "data/samples/window/window.moma"
 
@@ -185,3 +189,22 @@ def test_a_place_that_is_taken_is_refused_before_anything_runs(tmp_path, url, mo
     (tmp_path / "low.toml").write_text(LOW, encoding="utf-8")
     with pytest.raises(UsageError, match=r"low\.toml"):
         run_scene(tmp_path / "low.toml", url, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("relaxation", "outcome", "warned"),
+    [(False, "equilibrium", True), (True, "equilibrium", False), (True, "moving", True)],
+)
+def test_unsolved_steps_are_a_warning_unless_only_the_end_counts(
+    tmp_path, session, relaxation, outcome, warned
+):
+    scene = parse_scene(
+        LOW + f"relaxation = {str(relaxation).lower()}\n[output]\npictures = []\n", "scene.toml"
+    )
+    assembly = assemble(scene, session)
+    by_hand = result_of(
+        [rigid_body("a", (0, 0, 0), (1, 1, 1))], outcome=Outcome(outcome), pairs=(), forces=()
+    )
+    result = replace(by_hand, scene=assembly.scene)
+    _, warnings = write_results(result, stone_results(result), scene, assembly, tmp_path, {})
+    assert any("1 of 10 steps" in one for one in warnings) == warned
