@@ -45,8 +45,9 @@ def mass_properties(vertices: Array, faces: Faces, where: str | None = None) -> 
     ------
     GeometryError : if the faces are not closed, or their orientation gives no positive volume
     """
-    edges = {(f[i - 1], f[i]) for f in faces for i in range(len(f))}
-    if any((b, a) not in edges for a, b in edges):
+    edges = [(f[i - 1], f[i]) for f in faces for i in range(len(f))]
+    distinct = set(edges)
+    if len(distinct) < len(edges) or any((b, a) not in distinct for a, b in edges):
         raise GeometryError(
             "the faces do not close",
             where=where,
