@@ -33,10 +33,12 @@ def mesh_with_delaunay(vertices: Array, faces: Faces, size: float, code: str) ->
     points = [centre + shell * (_lattice(vertices, faces, size / shell) - centre) for shell in shells]
     cloud = np.vstack([*points, centre[None]])
     normals, origins = map(np.array, zip(*(face_plane(vertices[list(face)]) for face in faces), strict=True))
-    on_face = np.abs(np.einsum("pfk,fk->pf", cloud[:, None] - origins, normals)) < 1e-9 * reach
-    cloud = cloud + _tangential(
-        np.random.default_rng(0).uniform(-1.0, 1.0, cloud.shape), normals, on_face
-    ) * (_JITTER * size)
+    depth = np.abs(np.einsum("pfk,fk->pf", cloud[:, None] - origins, normals))
+    on_face = depth < 1e-9 * reach
+    # no point may reach a face that it does not lie on, or a slender stone would lose its shape
+    room = np.minimum(size, np.where(on_face, np.inf, depth).min(axis=1))
+    moves = np.random.default_rng(0).uniform(-1.0, 1.0, cloud.shape) * (_JITTER * room)[:, None]
+    cloud = cloud + _tangential(moves, normals, on_face)
     tetrahedra = Delaunay((cloud - centre) / reach).simplices.astype(np.int64)
     flat = on_face[tetrahedra].all(axis=1).any(axis=1)
     return tet_mesh(cloud, tetrahedra[~flat], vertices, faces, code)
