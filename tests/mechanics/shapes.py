@@ -1,0 +1,102 @@
+"""Stones, scenes and reference operators that the tests of the mechanics share."""
+
+import itertools
+
+import numpy as np
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from mechanics.contact.detection import Detector
+from mechanics.materials import Material
+from mechanics.model import build_model
+from mechanics.scene import Block, ContactSettings, Fidelity, Scene, TimeSettings
+from tests.pipelines.handmade import BOX_FACES, box
+
+LIMESTONE = Material("limestone", density=2000.0, young=1e9, poisson=0.2)
+TURN = Rotation.from_rotvec([0.4, -0.7, 1.1]).as_matrix()
+TETRAHEDRON_FACES = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
+
+
+def brick(code, low, high, fidelity=Fidelity.RIGID, **more):
+    """An axis-aligned block."""
+    if fidelity is Fidelity.DEFORMABLE:
+        more.setdefault("mesh_size", 0.5)
+    material = more.pop("material", LIMESTONE)
+    return Block(code, box(low, high), BOX_FACES, material, fidelity, **more)
+
+
+def ground(low=(-2.0, -2.0, -1.0), high=(3.0, 3.0, 0.0), code="ground"):
+    return brick(code, low, high, Fidelity.FIXED)
+
+
+def moved(block, turn=None, shift=(0.0, 0.0, 0.0), scale=1.0):
+    """The same stone, scaled, then turned about the origin, then moved."""
+    turn = np.eye(3) if turn is None else turn
+    vertices = scale * block.vertices @ turn.T + np.array(shift)
+    size = None if block.mesh_size is None else scale * block.mesh_size
+    return Block(block.code, vertices, block.faces, block.material, block.fidelity, size, block.velocity)
+
+
+def scene(*blocks, gravity=(0.0, 0.0, -9.81), friction=0.6, alert=0.05, **time):
+    return Scene(
+        "test",
+        blocks,
+        gravity=gravity,
+        contact=ContactSettings(friction, alert),
+        time=TimeSettings(**time),
+    )
+
+
+def detected(one):
+    """Model, state at the start and the contacts in it."""
+    model, state = build_model(one)
+    find = Detector(model.surfaces, model.fixed, one.contact.alert_distance)
+    return model, state, find(state, np.zeros(len(one.blocks)))
+
+
+@st.composite
+def hexahedra(draw):
+    """Corners of a convex hexahedron with planar faces: a box seen through a projective map, turned and moved.
+
+    Lengths range over a factor of 3, faces lean by up to some 20°.
+    """
+    number = st.floats(-1.0, 1.0, allow_subnormal=False)
+    extent = np.array([draw(st.floats(0.4, 1.2)) for _ in range(3)])
+    lean = 0.15 * np.array([draw(number) for _ in range(3)])
+    corners = box(-extent / 2, extent / 2)
+    corners = corners / (1.0 + corners @ lean)[:, None]
+    turn = Rotation.from_rotvec([3.0 * draw(number) for _ in range(3)]).as_matrix()
+    return corners @ turn.T + 10.0 * np.array([draw(number) for _ in range(3)])
+
+
+def dense_operator(model, state, contacts, compliance):
+    """ŵ and Hᵀ as dense matrices over six velocities for each rigid body and three for each node, world axes.
+
+    Written from the definitions alone: the velocity of a material point, and the inverse of M + h²θ²K.
+    """
+    bodies, nodes = len(model.mass), len(state.node)
+    w_hat = np.zeros((6 * bodies + 3 * nodes,) * 2)
+    transpose = np.zeros((3 * len(contacts), len(w_hat)))
+    for b in range(bodies):
+        turn = state.rotation[b]
+        if b in compliance:
+            rows = slice(6 * bodies + 3 * model.node_ptr[b], 6 * bodies + 3 * model.node_ptr[b + 1])
+            axes = np.kron(np.eye(len(model.stones[b].mesh.nodes)), turn)
+            w_hat[rows, rows] = axes @ np.linalg.inv(compliance[b].matrix.toarray()) @ axes.T
+        elif not model.fixed[b]:
+            w_hat[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = np.eye(3) / model.mass[b]
+            moment = turn @ model.inertia.inertia[b] @ turn.T
+            w_hat[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = np.linalg.inv(moment)
+    weights = contacts.weights.toarray()
+    for c, side in itertools.product(range(len(contacts)), range(2)):
+        b, sign = contacts.bodies[c, side], 1.0 - 2.0 * side
+        rows = slice(3 * c, 3 * c + 3)
+        if b in compliance:
+            for n in np.flatnonzero(weights[2 * c + side]):
+                columns = slice(6 * bodies + 3 * n, 6 * bodies + 3 * n + 3)
+                transpose[rows, columns] += sign * weights[2 * c + side, n] * contacts.frame[c]
+        else:
+            x, y, z = state.rotation[b] @ contacts.arm[c, side]
+            lever = np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]])  # ω × arm = lever ω
+            transpose[rows, 6 * b : 6 * b + 6] += sign * contacts.frame[c] @ np.hstack([np.eye(3), lever])
+    return w_hat, transpose
