@@ -89,10 +89,11 @@ def recovery(mesh: TetMesh) -> "csr_array[np.float64]":
         patch = touches.indices[touches.indptr[node] : touches.indptr[node + 1]]
         if len(patch) < _PATCH:
             patch = wider.indices[wider.indptr[node] : wider.indptr[node + 1]]
-        offset = centroid[patch] - mesh.nodes[node]
-        basis = np.column_stack([np.ones(len(patch)), offset / np.abs(offset).max()])
+        # fitted about the patch's mean point: where the centroids lie on one plane, a constant stays exact
+        mean = centroid[patch].mean(axis=0)
+        slope = np.linalg.pinv(centroid[patch] - mean)
         columns.append(patch)
-        weights.append(np.linalg.pinv(basis)[0])
+        weights.append(1.0 / len(patch) + (mesh.nodes[node] - mean) @ slope)
     pointer = np.concatenate([[0], np.cumsum([len(c) for c in columns])])
     return csr_array((np.concatenate(weights), np.concatenate(columns), pointer), shape=(nodes, count))
 
