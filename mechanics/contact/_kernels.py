@@ -174,7 +174,8 @@ def separating_axes(
 def clip_polygon(polygon, label, count, origin, normal, side):  # pragma: no cover - compiled
     """Keep the part of a polygon (MAX_POINTS, 3) where normal·(x - origin) ≤ 0 (Sutherland & Hodgman 1974), in place.
 
-    `label` names each point: what it was at the start, or, for a new point, the edge and the side that made it.
+    `label` names each point after the edge that begins in it: the polygon's own edge, or 16 + the side cut along.
+    A convex polygon has no two corners where the same edge begins.
     """
     kept = np.empty_like(polygon)
     kept_label = np.empty_like(label)
@@ -198,7 +199,7 @@ def clip_polygon(polygon, label, count, origin, normal, side):  # pragma: no cov
         if (da < 0.0 < db or db < 0.0 < da) and k < MAX_POINTS:
             t = da / (da - db)
             kept[k] = polygon[a] + t * (polygon[b] - polygon[a])
-            kept_label[k] = 16 + 16 * side + (label[a] % 16)
+            kept_label[k] = 16 + side if da < 0.0 else label[a]
             k += 1
     polygon[:k] = kept[:k]
     label[:k] = kept_label[:k]
@@ -232,7 +233,7 @@ def face_points(
     polygon : (MAX_POINTS, 3) points on the incident face
     gap : (MAX_POINTS,) distance to the reference plane along n, the reference face's outward normal
     area : (MAX_POINTS,) tributary areas
-    label : (MAX_POINTS,) which corner, or which edge and side, made the point
+    label : (MAX_POINTS,) which edge of the overlap begins in the point, as in `clip_polygon`
     """
     polygon, label = np.empty((MAX_POINTS, 3)), np.empty(MAX_POINTS, dtype=np.int64)
     gap, area = np.empty(MAX_POINTS), np.zeros(MAX_POINTS)
