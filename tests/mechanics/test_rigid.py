@@ -47,7 +47,7 @@ def test_gravity_moves_only_what_is_free():
 
 
 def test_inverse_inertia_turns_with_the_body():
-    model, state = build_model(scene(brick("a", (0, 0, 0), (0.3, 0.7, 1.1))))
+    model, _ = build_model(scene(brick("a", (0, 0, 0), (0.3, 0.7, 1.1))))
     found = inverse_inertia_world(model.inertia, TURN[None])[0]
     turned, _ = build_model(scene(moved(brick("a", (0, 0, 0), (0.3, 0.7, 1.1)), TURN)))
     np.testing.assert_allclose(found, turned.inertia.inverse_inertia[0], rtol=1e-10)
