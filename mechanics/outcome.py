@@ -8,12 +8,12 @@ from mechanics.observers.equilibrium import displacement, speed
 from mechanics.result import Outcome
 from mechanics.state import State
 
-__all__ = ["Watch"]
+__all__ = ["LASTING", "Watch"]
 
 Array = NDArray[np.float64]
 
 # so many steps in a row must be in balance
-_LASTING = 5
+LASTING = 5
 # a body rests below this part of the speed √(g · size) of a fall over its own size
 _REST_SPEED = 1e-4
 # and is falling above this part
@@ -40,7 +40,7 @@ class Watch:
         pace = speed(model, state) / fall
         quiet = converged and balance.max() <= settings.balance_tolerance and pace.max() <= _REST_SPEED
         self._quiet = self._quiet + 1 if quiet else 0
-        if self._quiet >= _LASTING:
+        if self._quiet >= LASTING:
             return Outcome.EQUILIBRIUM
         far = displacement(model, self._start, state) > settings.collapse_displacement * model.surfaces.size
         return Outcome.COLLAPSED if bool((far & (pace > _FALL_SPEED)).any()) else Outcome.MOVING

@@ -14,7 +14,16 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
-__all__ = ["ELASTIC", "NONE", "RIGID", "ContactProblem", "ContactSolution", "Delassus", "SparseForm"]
+__all__ = [
+    "ELASTIC",
+    "NONE",
+    "RIGID",
+    "ContactProblem",
+    "ContactSolution",
+    "ContactStart",
+    "Delassus",
+    "SparseForm",
+]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -108,18 +117,34 @@ class ContactProblem:
 
 
 @dataclass(frozen=True)
+class ContactStart:
+    """Where a solver begins: what is remembered of the same contacts, zero for new ones.
+
+    Attributes
+    ----------
+    impulse : (nc, 3) r [N s]
+    velocity : (nc, 3) û = u + (bias + μ‖u_T‖) n, the velocity that is dual to r [m/s]
+    """
+
+    impulse: Array
+    velocity: Array
+
+
+@dataclass(frozen=True)
 class ContactSolution:
     """What a solver gives back.
 
     Attributes
     ----------
     impulse : (nc, 3) r, on the candidate, local frame [N s]
+    velocity : (nc, 3) û, dual to r, as the solver knows it [m/s]
     iterations : Gauss–Seidel sweeps, or the iterations of another method
     natural_map : η of `impulse`, as mechanics.residual computes it
     converged : η is within the tolerance
     """
 
     impulse: Array
+    velocity: Array
     iterations: int
     natural_map: float
     converged: bool

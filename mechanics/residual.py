@@ -6,15 +6,16 @@ from numpy.typing import NDArray
 from mechanics.problem import ContactProblem
 from mechanics.solvers._kernels import apply_delassus
 
-__all__ = ["natural_map", "project_on_cone", "relative_velocity"]
+__all__ = ["dual_velocity", "natural_map", "project_on_cone"]
 
 Array = NDArray[np.float64]
 
 
-def relative_velocity(problem: ContactProblem, impulse: Array) -> Array:
-    """u = W r + u_free (nc, 3), local frame [m/s]."""
+def dual_velocity(problem: ContactProblem, impulse: Array) -> Array:
+    """û = W r + u_free + (bias + μ‖u_T‖) n (nc, 3), local frame [m/s]."""
     u, _, _ = apply_delassus(impulse, *problem.delassus.arrays)
     velocity: Array = u + problem.u_free
+    velocity[:, 0] += problem.bias + problem.friction * np.linalg.norm(velocity[:, 1:], axis=1)
     return velocity
 
 
@@ -26,10 +27,8 @@ def natural_map(problem: ContactProblem, impulse: Array) -> float:
     """
     if len(impulse) == 0:
         return 0.0
-    u = relative_velocity(problem, impulse)
-    u[:, 0] += problem.bias + problem.friction * np.linalg.norm(u[:, 1:], axis=1)
     rho = 1.0 / float(np.mean(np.trace(problem.delassus.diagonal, axis1=1, axis2=2) / 3.0))
-    projected = project_on_cone(impulse - rho * u, problem.friction)
+    projected = project_on_cone(impulse - rho * dual_velocity(problem, impulse), problem.friction)
     scale = max(float(np.linalg.norm(impulse)), float(np.linalg.norm(projected)))
     return float(np.linalg.norm(impulse - projected)) / scale if scale > 0 else 0.0
 

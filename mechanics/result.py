@@ -28,7 +28,7 @@ class Errors:
 
     Attributes
     ----------
-    natural_map : η, largest over the last ten steps [-]
+    natural_map : η, largest over the last five steps, those in which an equilibrium must last [-]
     penetration : deepest overlap over the smallest block's size, largest of the run [-]
     balance : unbalanced force of a block over its weight, largest over the blocks [-]
     reaction : |vertical support reaction - weight| over weight [-]

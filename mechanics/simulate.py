@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from mechanics.model import Model, build_model
 from mechanics.observers.energy import EnergyBalance, kinetic_energy
 from mechanics.observers.equilibrium import imbalance, speed, support_reaction
-from mechanics.outcome import Watch
+from mechanics.outcome import LASTING, Watch
 from mechanics.postprocess import body_results, contact_results, positions
 from mechanics.result import Errors, Frame, History, Outcome, Result
 from mechanics.scene import Scene
@@ -114,7 +114,7 @@ def _result(
     with clock("stress"):
         bodies = body_results(model, start, follow_nodes(model, last.after))
     errors = Errors(
-        natural_map=float(history.natural_map[-10:].max()),
+        natural_map=float(history.natural_map[-LASTING:].max()),
         penetration=log.penetration / float(model.surfaces.size.min()),
         balance=float(history.balance[-1]),
         reaction=support.error,

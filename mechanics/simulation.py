@@ -134,7 +134,7 @@ class Simulation:
                 where=model.scene.name,
                 remedy="use a smaller time step",
             )
-        self._memory.store(contacts, solution.impulse)
+        self._memory.store(contacts, solution)
         work = self._contact_work(before, after, touching, solution)
         self.state, relaxed = self._relax(after)
         force = world_impulse(contacts, solution.impulse) / h

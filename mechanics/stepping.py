@@ -96,10 +96,12 @@ def contact_problem(
     """Signorini with gap and Coulomb friction, as a shift of u_N and a cone.
 
     Detected at q + h(1-θ)v, the gap at the end of the step is g + hθ u_N; so the shift g/(hθ) lets a closing
-    contact land exactly. An overlap is not pushed out (max(g, 0)), which would create energy.
+    contact land exactly. An overlap is not pushed out (max(g, 0)), which would create energy; only relaxation, which
+    asks for the place of rest and not for the motion, pushes it out, so that no early error stays as self-stress.
     """
     u_free = local_velocity(contacts, operator, free.velocity, free.node_velocity)
-    bias = np.maximum(gaps(contacts, configuration), 0.0) / (step * theta)
+    gap = gaps(contacts, configuration)
+    bias = (gap if model.scene.time.relaxation else np.maximum(gap, 0.0)) / (step * theta)
     friction = np.full(len(contacts), model.scene.contact.friction)
     return ContactProblem(operator, u_free, bias, friction, sparse)
 

@@ -4,28 +4,25 @@ Splits r = z: r minimises the quadratic part, z lies in the Coulomb cone. With t
 
     r ← (W + σ)⁻¹ [σ (z - y) - u_free - bias - s n],   z ← P_K(r + y),   y ← y + r - z,   s = μ‖u_T‖
 
-where r is over-relaxed, and the de Saxcé shift s, taken from u = -σ (r - z + y) - s n each time, makes the friction
-Coulomb's own and not the convex, associated one. By the Woodbury identity W + σ is solved through the sparse,
-positive definite ŵ⁻¹ + H Hᵀ/σ, factorised once as long as the contacts persist. So the motion of whole stones, which
-holds Gauss–Seidel back, is solved for exactly; only the elastic compliance decides how fast the iteration converges.
+where r is over-relaxed, and the de Saxcé shift s, taken from û = -σ y each time, makes the friction Coulomb's own and
+not the convex, associated one. By the Woodbury identity W + σ is solved through the sparse, positive definite
+ŵ⁻¹ + H Hᵀ/σ, factorised once as long as the contacts persist. So the motion of whole stones, which holds Gauss–Seidel
+back, is solved for exactly; only the elastic compliance decides how fast the iteration converges.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mechanics.problem import ContactProblem, ContactSolution
-from mechanics.residual import natural_map, project_on_cone, relative_velocity
+from mechanics.problem import ContactProblem, ContactSolution, ContactStart
+from mechanics.residual import natural_map, project_on_cone
 from moma.errors import SolverError
 
 __all__ = ["ADMM"]
 
-Array = NDArray[np.float64]
-
 _OVER_RELAXATION = 1.6
-# σ over the elastic compliance of a contact; 1 to 10 were within 30 % of the best on an arch and a wall
-_PENALTY = 3.0
+# σ over the elastic compliance of a contact: larger values leave gaps, smaller ones lose the friction for long
+_PENALTY = 1.0
 
 
 @dataclass(frozen=True)
@@ -43,8 +40,8 @@ class ADMM:
     max_iterations: int = 2000
     check_every: int = 10
 
-    def __call__(self, problem: ContactProblem, start: Array) -> ContactSolution:
-        """Solve from the impulses `start` (nc, 3).
+    def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
+        """Solve from `start`; its velocity, û = -σ y, lets the iteration go on where it stopped.
 
         Raises
         ------
@@ -52,31 +49,21 @@ class ADMM:
         """
         if problem.sparse is None:
             raise SolverError("the problem has no sparse form", where="ADMM", remedy='use the method "nsgs"')
-        lift, sigma = problem.sparse.lift, _PENALTY * problem.sparse.softness
-        factor = problem.sparse.factor(sigma)
-        mu, shifted = problem.friction, problem.u_free.copy()
+        lift, sigma, mu = problem.sparse.lift, _PENALTY * problem.sparse.softness, problem.friction
+        factor, across = problem.sparse.factor(sigma), lift.T.tocsr()
+        shifted = problem.u_free.copy()
         shifted[:, 0] += problem.bias
-        z, y, slip = self._start(problem, start, sigma)
+        z, y = project_on_cone(start.impulse, mu), -start.velocity / sigma
         eta, iterations = natural_map(problem, z), 0
         while eta > self.tolerance and iterations < self.max_iterations:
             for _ in range(min(self.check_every, self.max_iterations - iterations)):
                 right = sigma * (z - y) - shifted
-                right[:, 0] -= slip
+                right[:, 0] -= mu * sigma * np.linalg.norm(y[:, 1:], axis=1)
                 inner = factor.solve(lift @ (right.ravel() / sigma))
-                r = ((right.ravel() - lift.T @ inner) / sigma).reshape(-1, 3)
-                slip = mu * sigma * np.linalg.norm((r - z + y)[:, 1:], axis=1)
-                r = _OVER_RELAXATION * r + (1 - _OVER_RELAXATION) * z
-                z = project_on_cone(r + y, mu)
-                y = y + r - z
+                r = ((right.ravel() - across @ inner) / sigma).reshape(-1, 3)
+                relaxed = _OVER_RELAXATION * r + (1 - _OVER_RELAXATION) * z
+                z = project_on_cone(relaxed + y, mu)
+                y = y + relaxed - z
                 iterations += 1
             eta = natural_map(problem, z)
-        return ContactSolution(z, iterations, eta, eta <= self.tolerance)
-
-    @staticmethod
-    def _start(problem: ContactProblem, start: Array, sigma: float) -> tuple[Array, Array, Array]:
-        """z in the cone, and y = -û/σ with û the nearest admissible velocity of `start`."""
-        z = project_on_cone(start, problem.friction)
-        u = relative_velocity(problem, z)
-        slip = problem.friction * np.linalg.norm(u[:, 1:], axis=1)
-        u[:, 0] += problem.bias + slip
-        return z, (-u - project_on_cone(-u, problem.friction)) / sigma if z.any() else np.zeros_like(z), slip
+        return ContactSolution(z, -sigma * y, iterations, eta, eta <= self.tolerance)

@@ -2,11 +2,8 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-from mechanics.problem import ContactProblem, ContactSolution
-from mechanics.residual import natural_map
+from mechanics.problem import ContactProblem, ContactSolution, ContactStart
+from mechanics.residual import dual_velocity, natural_map
 from mechanics.solvers._kernels import apply_delassus, local_factors, sweep
 
 __all__ = ["NSGS"]
@@ -27,9 +24,9 @@ class NSGS:
     max_iterations: int = 2000
     check_every: int = 20
 
-    def __call__(self, problem: ContactProblem, start: NDArray[np.float64]) -> ContactSolution:
-        """Solve from the impulses `start` (nc, 3)."""
-        impulse = np.array(start, dtype=float)
+    def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
+        """Solve from the impulses of `start`."""
+        impulse = start.impulse.copy()
         eta = natural_map(problem, impulse)
         shift = problem.u_free.copy()
         shift[:, 0] += problem.bias
@@ -43,4 +40,4 @@ class NSGS:
             sweep(count, True, impulse, v, y, shift, problem.friction, factors, diagonal, *arrays)
             sweeps += count
             eta = natural_map(problem, impulse)
-        return ContactSolution(impulse, sweeps, eta, eta <= self.tolerance)
+        return ContactSolution(impulse, dual_velocity(problem, impulse), sweeps, eta, eta <= self.tolerance)
