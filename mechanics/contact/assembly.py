@@ -100,7 +100,8 @@ def sparse_form(
         axes = kron(eye_array(own.matrix.shape[0] // 3), csr_array(state.rotation[b]), format="csr")
         blocks.append(axes @ own.matrix @ axes.T)
     signed = contacts.weights[0::2] - contacts.weights[1::2]
-    frames = block_diag(list(contacts.frame), format="csr")
+    # scipy makes no block diagonal of nothing
+    frames = block_diag(list(contacts.frame), format="csr") if len(contacts) else csr_array((0, 0))
     lift = hstack([_rigid_lift(rigid, operator), frames @ kron(signed, eye_array(3), format="csr")]).T
     soft = np.array([compliance[b].softness if b in compliance else 0.0 for b in range(len(model.mass))])
     between = soft[contacts.bodies].sum(axis=1)
