@@ -22,7 +22,7 @@ def dual_velocity(problem: ContactProblem, impulse: Array) -> Array:
 def natural_map(problem: ContactProblem, impulse: Array) -> float:
     """η = ‖r - P_K(r - ρ û)‖ / ‖r‖ with û = u + (bias + μ‖u_T‖) n and ρ = 1 / (mean diagonal of W).
 
-    The de Saxcé form of Signorini–Coulomb (de Saxcé & Feng 1991; FORMULATION.md §5); independent of units. Zero
+    The de Saxcé form of Signorini–Coulomb (de Saxcé & Feng 1991; docs/theory.md §4); independent of units. Zero
     without contacts; where no impulse is given but one is needed, the size of P_K(-ρ û) replaces ‖r‖, so η is 1.
     """
     if len(impulse) == 0:

@@ -24,7 +24,7 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True)
 class Errors:
-    """The error measures of FORMULATION.md §5, at the last step unless it says otherwise.
+    """The error measures of docs/theory.md §4, at the last step unless it says otherwise.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""The loop of FORMULATION.md: predict, detect, state the problem, solve, advance."""
+"""The loop of docs/theory.md: predict, detect, state the problem, solve, advance."""
 
 import time
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""One time step of the Moreau–Jean θ-scheme, in the order of FORMULATION.md §2."""
+"""One time step of the Moreau–Jean θ-scheme, in the order of docs/theory.md §2."""
 
 from dataclasses import dataclass, replace
 

@@ -99,11 +99,6 @@ def _cells(grid: Grid) -> list[str]:
     return arrays
 
 
-def _stream(faces: Sequence[Sequence[int]]) -> list[int]:
-    """A polyhedron as VTK wants it: how many faces, then the size and nodes of each; else nothing."""
-    return [len(faces), *(n for face in faces for n in (len(face), *face))] if faces else []
-
-
 def _flat(rows: Sequence[Sequence[int]]) -> NDArray[np.int64]:
     return np.fromiter((n for row in rows for n in row), dtype=np.int64)
 

@@ -1,11 +1,9 @@
 """Least-squares planes through surveyed face points, robust to blunders.
 
 The plane n·x = d minimises Σ w (n·x - d)², w = 1/σ². With the weighted centroid c taken out, n is the right
-singular vector of the smallest singular value (FORMULATION.md, §7). In the axes e₁, e₂ of the other two
-singular vectors the normal equations are diagonal, so the Gauss–Markov covariance is closed form: the tilts
-θᵢ
-(δn = -Σ θᵢ eᵢ) have variance σ²/sᵢ², the centroid's height σ²/Σw, and δd = δ(n·c) carries both to the origin
-of coordinates.
+singular vector of the smallest singular value. In the axes e₁, e₂ of the other two singular vectors the normal
+equations are diagonal, so the Gauss–Markov covariance is closed form: the tilts θᵢ (δn = -Σ θᵢ eᵢ) have variance
+σ²/sᵢ², the centroid's height σ²/Σw, and δd = δ(n·c) carries both to the origin of coordinates.
 
 Blunders: one that is as far out as a stone is wide turns a least-squares plane so much that its own residual
 looks harmless, so residuals of the first fit cannot be trusted. The search starts from planes through triples

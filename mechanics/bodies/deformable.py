@@ -4,7 +4,7 @@ In body axes, with d the displacement of the nodes from the undeformed stone, th
 
     v_free = v + ŵ [ -h K (d + h θ v) + h P ],     ŵ = (M + h² θ² K)⁻¹
 
-(FORMULATION.md §2 with V = 0). Only M and K of the undeformed stone are needed, so ŵ is factorised once, and a
+(docs/theory.md §2). Only M and K of the undeformed stone are needed, so ŵ is factorised once, and a
 turning stone keeps its strain small. Contacts touch the surface nodes alone: C = S ŵ Sᵀ is their compliance.
 """
 

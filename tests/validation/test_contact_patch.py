@@ -1,4 +1,4 @@
-"""Contact patch test: a uniform pressure passes through non-matching meshes (case F16; Taylor & Papadopoulos 1991)."""
+"""Contact patch test: a uniform pressure passes through non-matching meshes (Taylor & Papadopoulos 1991)."""
 
 import numpy as np
 import pytest

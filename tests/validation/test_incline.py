@@ -1,4 +1,4 @@
-"""A block on a tilted plane: when it slides, how fast, and when it topples. Closed forms (cases R01, R02, R04)."""
+"""A block on a tilted plane: when it slides, how fast, and when it topples. Closed forms."""
 
 import numpy as np
 import pytest

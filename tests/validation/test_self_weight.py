@@ -1,4 +1,4 @@
-"""An elastic block under its own weight on a rigid support. Closed form with ν = 0 (case F01)."""
+"""An elastic block under its own weight on a rigid support. Closed form with ν = 0."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The window bay of the sample: it stands; without what carries its arch it falls (VALIDATION: arches, reactions)."""
+"""The window bay of the sample: it stands; without what carries its arch it falls."""
 
 from dataclasses import replace
 from pathlib import Path
