@@ -105,6 +105,16 @@ def test_a_falling_stone_lands_on_the_ground_not_in_it(theta, fidelity):
         assert speed(model, last.after)[1] < 2e-2
 
 
+@pytest.mark.parametrize("theta", [0.5, 0.75, 1.0])
+def test_a_gap_that_closes_within_a_step_ends_closed_to_the_last_digits(theta):
+    # at 1 m/s, 1 mm a step; open by 0.3 mm still where contacts are looked for, q + h(1-θ)v
+    gap = 1e-3 * (1 - theta) + 3e-4
+    block = brick("a", (0, 0, gap), (1, 1, 1 + gap), velocity=(0, 0, -1.0, 0, 0, 0))
+    one = scene(ground(), block, gravity=(0, 0, 0), step=1e-3, theta=theta)
+    _, _, (step,) = run(replace(one, solver=SolverSettings(tolerance=1e-13)), 1)
+    np.testing.assert_allclose(step.gap, 0.0, atol=1e-14)
+
+
 @pytest.mark.parametrize(("theta", "order"), [(0.5, 1e-2), (1.0, 1e-2)])
 def test_a_sliding_stone_stops_after_v2_over_2_mu_g_and_the_energy_adds_up(theta, order):
     mu, v0, h = 0.3, 1.0, 1e-3
