@@ -8,18 +8,22 @@ from numpy.typing import NDArray
 
 from mechanics.bodies.deformable import Deformable, deformable
 from mechanics.bodies.rigid import RigidInertia
+from mechanics.contact._kernels import MAX_CORNERS
 from mechanics.contact.surfaces import FaceMesh, Surfaces, surfaces
 from mechanics.meshing.mesh import TetMesh
 from mechanics.meshing.mesher import mesh_block
 from mechanics.polyhedra import MassProperties, mass_properties
 from mechanics.scene import Block, Fidelity, Scene
 from mechanics.state import State
-from moma.errors import SceneError
+from moma.errors import GeometryError, SceneError
 
 __all__ = ["Model", "build_model"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+# contact keys number the faces of a stone in six bits
+_MAX_FACES = 64
 
 
 @dataclass(frozen=True)
@@ -114,6 +118,13 @@ def _check(block: Block) -> None:
         )
     if block.fidelity is Fidelity.FIXED and any(block.velocity):
         raise SceneError("a fixed stone has a velocity", where=f"stone {block.code}", remedy="make it rigid")
+    corners = max(len(face) for face in block.faces)
+    if len(block.faces) > _MAX_FACES or corners > MAX_CORNERS:
+        raise GeometryError(
+            f"{len(block.faces)} faces with up to {corners} corners",
+            where=f"stone {block.code}",
+            remedy=f"simplify it to at most {_MAX_FACES} faces with at most {MAX_CORNERS} corners each",
+        )
 
 
 def _inertia(blocks: tuple[Block, ...], properties: list[MassProperties], density: Array) -> RigidInertia:

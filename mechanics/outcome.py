@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from mechanics.model import Model
 from mechanics.observers.equilibrium import displacement, speed
+from mechanics.problem import ContactSolution
 from mechanics.result import Outcome
 from mechanics.state import State
 
@@ -18,6 +19,8 @@ LASTING = 5
 _REST_SPEED = 1e-4
 # and is falling above this part
 _FALL_SPEED = 0.05
+# a step that is solved worse than this natural map proves no fall
+_TRUSTED = 1e-2
 
 
 class Watch:
@@ -25,22 +28,25 @@ class Watch:
 
     *Equilibrium*: for five steps in a row every body that is not fixed is in balance (unbalanced force and moment
     below the scene's tolerance) and slower than 10⁻⁴ √(g · its smallest width). *Collapsed*: a body has moved by more
-    than the scene's fraction of its smallest width and is faster than 0.05 √(g · width). Without gravity g counts as
-    1 m/s².
+    than the scene's fraction of its smallest width and is faster than 0.05 √(g · width), in a step solved to η < 0.01.
+    Without gravity g counts as 1 m/s².
     """
 
     def __init__(self, model: Model, start: State) -> None:
         self._model, self._start = model, start
         self._quiet = 0
 
-    def __call__(self, state: State, balance: Array, converged: bool) -> Outcome:
-        """The outcome so far, given the imbalance of each body (nb,)."""
+    def __call__(self, state: State, balance: Array, solution: ContactSolution) -> Outcome:
+        """The outcome so far, given the imbalance of each body (nb,) and how well the step was solved."""
         model, settings = self._model, self._model.scene.time
         fall = np.sqrt((float(np.linalg.norm(model.gravity)) or 1.0) * model.surfaces.size)
         pace = speed(model, state) / fall
-        quiet = converged and balance.max() <= settings.balance_tolerance and pace.max() <= _REST_SPEED
+        quiet = (
+            solution.converged and balance.max() <= settings.balance_tolerance and pace.max() <= _REST_SPEED
+        )
         self._quiet = self._quiet + 1 if quiet else 0
         if self._quiet >= LASTING:
             return Outcome.EQUILIBRIUM
         far = displacement(model, self._start, state) > settings.collapse_displacement * model.surfaces.size
-        return Outcome.COLLAPSED if bool((far & (pace > _FALL_SPEED)).any()) else Outcome.MOVING
+        fallen = solution.natural_map < _TRUSTED and bool((far & (pace > _FALL_SPEED)).any())
+        return Outcome.COLLAPSED if fallen else Outcome.MOVING

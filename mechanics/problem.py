@@ -59,6 +59,11 @@ class Delassus:
     diagonal: Array
 
     @property
+    def scale(self) -> float:
+        """Mean diagonal of W [1/kg]; what r and u are measured against."""
+        return float(np.mean(np.trace(self.diagonal, axis1=1, axis2=2) / 3.0))
+
+    @property
     def arrays(self) -> tuple[NDArray[np.generic], ...]:
         """What the kernels take, in their order."""
         return self.body, self.kind, self.jacobian, self.response, self.slot, self.yptr, self.bptr, self.block
@@ -76,13 +81,10 @@ class SparseForm:
     ----------
     inertia : Â = ŵ⁻¹, (nd, nd) over the velocities of all bodies that move [kg]
     lift : H, (nd, 3 nc), local impulses → generalized impulses
-    softness : typical compliance of a contact beyond what rigid bodies have [1/kg]
     """
 
-    def __init__(
-        self, inertia: "csc_array[np.float64]", lift: "csc_array[np.float64]", softness: float
-    ) -> None:
-        self.inertia, self.lift, self.softness = inertia, lift, softness
+    def __init__(self, inertia: "csc_array[np.float64]", lift: "csc_array[np.float64]") -> None:
+        self.inertia, self.lift = inertia, lift
         self._factors: dict[float, _Factor] = {}
 
     def factor(self, sigma: float) -> _Factor:

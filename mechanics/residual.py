@@ -27,7 +27,7 @@ def natural_map(problem: ContactProblem, impulse: Array) -> float:
     """
     if len(impulse) == 0:
         return 0.0
-    rho = 1.0 / float(np.mean(np.trace(problem.delassus.diagonal, axis1=1, axis2=2) / 3.0))
+    rho = 1.0 / problem.delassus.scale
     projected = project_on_cone(impulse - rho * dual_velocity(problem, impulse), problem.friction)
     scale = max(float(np.linalg.norm(impulse)), float(np.linalg.norm(projected)))
     return float(np.linalg.norm(impulse - projected)) / scale if scale > 0 else 0.0

@@ -55,7 +55,7 @@ def simulate(scene: Scene, progress: Callable[[Progress], None] | None = None) -
         step = simulation.step()
         with clock("observe"):
             balance = log(step)
-            outcome = watch(step.after, balance, step.solution.converged)
+            outcome = watch(step.after, balance, step.solution)
         report(
             Progress("step", count, total, f"balance {balance.max():.1e}, η {step.solution.natural_map:.1e}")
         )

@@ -27,7 +27,7 @@ __all__ = ["Clock", "Simulation", "Step"]
 
 Array = NDArray[np.float64]
 
-# contacts are found anew when a body has moved by more than this part of its smallest width since last time,
+# contacts are found anew when a body has moved by more than this part of the scene's smallest width since last time,
 _STALE = 1e-3
 # or by more than this part, once it moves a hundred times less per step: where stones come to rest, no lag stays
 _SETTLED, _SLOWED = 1e-6, 1e-2
@@ -156,10 +156,11 @@ class Simulation:
         """The contacts at the predicted configuration; found anew only when something has moved."""
         known = self._touching
         if known is not None:
-            moved = displacement(self.model, known.configuration, predicted) / self.model.surfaces.size
-            pace = self._step * speed(self.model, predicted) / self.model.surfaces.size
-            settled = moved.max() > _SETTLED and pace.max() < _SLOWED * moved.max()
-            if moved.max() <= _STALE and not settled:
+            width = self.model.surfaces.size.min()
+            moved = displacement(self.model, known.configuration, predicted).max() / width
+            pace = self._step * speed(self.model, predicted).max() / width
+            settled = moved > _SETTLED and pace < _SLOWED * moved
+            if moved <= _STALE and not settled:
                 frame = known.configuration
                 elastic = self.model.elastic
                 return replace(

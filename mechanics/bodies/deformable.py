@@ -91,13 +91,11 @@ class DynamicCompliance:
     matrix : M + h² θ² K, (3n, 3n), body axes [kg]
     factor : its sparse LU factors
     surface : C = S ŵ Sᵀ, (3 ns, 3 ns), the compliance of the surface nodes [1/kg]
-    softness : mean diagonal of C less what the stone would have if it were rigid [1/kg]
     """
 
     matrix: "csc_array[np.float64]"
     factor: object
     surface: Array
-    softness: float
 
     def respond(self, impulse: Array) -> Array:
         """Velocity ŵ p (n, 3) that the nodal impulses p (n, 3) [N s] give, body axes [m/s]."""
@@ -113,15 +111,4 @@ def dynamic_compliance(body: Deformable, step: float, theta: float) -> DynamicCo
     unit = np.zeros((matrix.shape[0], len(dofs)))
     unit[dofs, np.arange(len(dofs))] = 1.0
     surface = factor.solve(unit)[dofs]
-    softness = float(np.mean(np.diag(surface) - _rigid_compliance(body)))
-    return DynamicCompliance(matrix, factor, 0.5 * (surface + surface.T), softness)
-
-
-def _rigid_compliance(body: Deformable) -> Array:
-    """Diagonal (3 ns,) of the compliance that the surface nodes would have if the stone were rigid [1/kg]."""
-    x, weight = body.mesh.nodes, body.operators.nodal_mass
-    second = np.einsum("n,ni,nj->ij", weight, x, x)
-    inverse_inertia = np.linalg.inv(np.trace(second) * np.eye(3) - second)
-    turn = np.cross(x[body.surface][:, None, :], np.eye(3))  # x × eₖ
-    diagonal: Array = (1.0 / weight.sum() + np.einsum("nki,ij,nkj->nk", turn, inverse_inertia, turn)).ravel()
-    return diagonal
+    return DynamicCompliance(matrix, factor, 0.5 * (surface + surface.T))

@@ -9,7 +9,9 @@ from numba import njit
 
 __all__ = ["clip_polygon", "close_pairs", "face_points", "mortar_integrals", "separating_axes"]
 
-MAX_POINTS = 16
+# a face has at most MAX_CORNERS corners; clipping one convex polygon by another gives at most the sum of both
+MAX_CORNERS = 16
+MAX_POINTS = 2 * MAX_CORNERS
 SEPARATED, FACE_FIRST, FACE_SECOND, EDGES = 0, 1, 2, 3
 
 
@@ -174,7 +176,8 @@ def separating_axes(
 def clip_polygon(polygon, label, count, origin, normal, side):  # pragma: no cover - compiled
     """Keep the part of a polygon (MAX_POINTS, 3) where normal·(x - origin) ≤ 0 (Sutherland & Hodgman 1974), in place.
 
-    `label` names each point after the edge that begins in it: the polygon's own edge, or 16 + the side cut along.
+    `label` names each point after the edge that begins in it: the polygon's own edge, or MAX_CORNERS + the side that
+    was cut along.
     A convex polygon has no two corners where the same edge begins.
     """
     kept = np.empty_like(polygon)
@@ -199,7 +202,7 @@ def clip_polygon(polygon, label, count, origin, normal, side):  # pragma: no cov
         if (da < 0.0 < db or db < 0.0 < da) and k < MAX_POINTS:
             t = da / (da - db)
             kept[k] = polygon[a] + t * (polygon[b] - polygon[a])
-            kept_label[k] = 16 + side if da < 0.0 else label[a]
+            kept_label[k] = MAX_CORNERS + side if da < 0.0 else label[a]
             k += 1
     polygon[:k] = kept[:k]
     label[:k] = kept_label[:k]

@@ -103,11 +103,7 @@ def sparse_form(
     # scipy makes no block diagonal of nothing
     frames = block_diag(list(contacts.frame), format="csr") if len(contacts) else csr_array((0, 0))
     lift = hstack([_rigid_lift(rigid, operator), frames @ kron(signed, eye_array(3), format="csr")]).T
-    soft = np.array([compliance[b].softness if b in compliance else 0.0 for b in range(len(model.mass))])
-    between = soft[contacts.bodies].sum(axis=1)
-    # contacts of two rigid sides have no softness of their own: they take that of the others
-    elastic = between[between > 0] if (between > 0).any() else soft[soft > 0]
-    return SparseForm(block_diag(blocks, format="csc"), csc_array(lift), float(np.median(elastic)))
+    return SparseForm(block_diag(blocks, format="csc"), csc_array(lift))
 
 
 def _rigid_lift(rigid: Ints, operator: Delassus) -> "csr_array[np.float64]":

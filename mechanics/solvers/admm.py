@@ -21,8 +21,8 @@ from moma.errors import SolverError
 __all__ = ["ADMM"]
 
 _OVER_RELAXATION = 1.6
-# σ over the elastic compliance of a contact: larger values leave gaps, smaller ones lose the friction for long
-_PENALTY = 1.0
+# σ over the mean diagonal of W: larger values leave gaps for long, smaller ones lose friction in the first steps
+_PENALTY = 0.1
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,9 @@ class ADMM:
         """
         if problem.sparse is None:
             raise SolverError("the problem has no sparse form", where="ADMM", remedy='use the method "nsgs"')
-        lift, sigma, mu = problem.sparse.lift, _PENALTY * problem.sparse.softness, problem.friction
+        if len(start.impulse) == 0:
+            return ContactSolution(start.impulse, start.velocity, 0, 0.0, True)
+        lift, sigma, mu = problem.sparse.lift, _PENALTY * problem.delassus.scale, problem.friction
         factor, across = problem.sparse.factor(sigma), lift.T.tocsr()
         shifted = problem.u_free.copy()
         shifted[:, 0] += problem.bias

@@ -80,3 +80,13 @@ def test_the_model_knows_the_stones_and_where_they_begin():
     corners = model.surfaces.vertex[model.surfaces.vptr[1] : model.surfaces.vptr[2]]
     np.testing.assert_allclose(state.centre[1] + corners, stones[1].vertices, atol=1e-13)
     assert model.inertia.inverse_mass.tolist() == [0.0, 1 / model.mass[1], 0.0]
+
+
+def test_a_stone_with_more_corners_than_contacts_can_name_is_refused():
+    angle = np.linspace(0, 2 * np.pi, 17, endpoint=False)
+    ring = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(17)])
+    sides = tuple((i, (i + 1) % 17, 17 + (i + 1) % 17, 17 + i) for i in range(17))
+    faces = (tuple(range(16, -1, -1)), tuple(range(17, 34)), *sides)
+    drum = Block("D1", np.vstack([ring, ring + np.array([0, 0, 1])]), faces, LIMESTONE)
+    with pytest.raises(GeometryError, match="stone D1: 19 faces with up to 17 corners; simplify"):
+        build_model(scene(drum))
