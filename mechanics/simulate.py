@@ -1,7 +1,6 @@
 """Run a scene from its start to its outcome, with its history and error measures."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,25 +10,16 @@ from mechanics.observers.energy import EnergyBalance, kinetic_energy
 from mechanics.observers.equilibrium import imbalance, speed, support_reaction
 from mechanics.outcome import LASTING, Watch
 from mechanics.postprocess import body_results, contact_results, positions
+from mechanics.progress import Progress
 from mechanics.result import Errors, Frame, History, Outcome, Result
 from mechanics.scene import Scene
 from mechanics.simulation import Clock, Simulation, Step
 from mechanics.state import State
 from mechanics.stepping import follow_nodes
 
-__all__ = ["Progress", "simulate"]
+__all__ = ["simulate"]
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Progress:
-    """Where a run stands: `done` of `total` in a stage, with a short text; total is None if not known."""
-
-    stage: str
-    done: int
-    total: int | None
-    text: str = ""
 
 
 def simulate(scene: Scene, progress: Callable[[Progress], None] | None = None) -> Result:

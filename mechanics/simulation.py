@@ -111,12 +111,7 @@ class Simulation:
         predicted, touching = self._detect(predicted)
         contacts = touching.contacts
         # one frame for the whole step: the linear problem of a deformable body is stated in it
-        elastic = model.elastic
-        before = replace(
-            self.state,
-            centre=np.where(elastic[:, None], predicted.centre, self.state.centre),
-            rotation=np.where(elastic[:, None, None], predicted.rotation, self.state.rotation),
-        )
+        before = self._with_frames_of(predicted, self.state)
         with self.clock("assemble"):
             free = free_motion(model, before, self._compliance, h, theta)
             problem = contact_problem(
@@ -161,13 +156,7 @@ class Simulation:
             pace = self._step * speed(self.model, predicted).max() / width
             settled = moved > _SETTLED and pace < _SLOWED * moved
             if moved <= _STALE and not settled:
-                frame = known.configuration
-                elastic = self.model.elastic
-                return replace(
-                    predicted,
-                    centre=np.where(elastic[:, None], frame.centre, predicted.centre),
-                    rotation=np.where(elastic[:, None, None], frame.rotation, predicted.rotation),
-                ), known
+                return self._with_frames_of(known.configuration, predicted), known
         with self.clock("detect"):
             predicted = follow_nodes(self.model, predicted)
             contacts = self._detector(predicted, self._step * speed(self.model, predicted))
@@ -178,6 +167,15 @@ class Simulation:
                 sparse = sparse_form(self.model, predicted, contacts, operator, self._compliance)
         self._touching = _Touching(contacts, operator, sparse, predicted)
         return predicted, self._touching
+
+    def _with_frames_of(self, source: State, state: State) -> State:
+        """`state` with the frames of the deformable bodies taken from `source`."""
+        elastic = self.model.elastic
+        return replace(
+            state,
+            centre=np.where(elastic[:, None], source.centre, state.centre),
+            rotation=np.where(elastic[:, None, None], source.rotation, state.rotation),
+        )
 
     def _contact_work(
         self, before: State, after: State, touching: _Touching, solution: ContactSolution

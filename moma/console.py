@@ -15,7 +15,8 @@ from moma.errors import MomaError
 if TYPE_CHECKING:
     from rich.progress import TaskID
 
-    from pipelines.progress import Listener, Report
+    from mechanics.progress import Progress as Told
+    from pipelines.progress import Listener
 
 __all__ = ["progress_bars", "reporting", "say"]
 
@@ -89,7 +90,7 @@ def progress_bars() -> "Iterator[Listener]":
     with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
         tasks: dict[str, TaskID] = {}
 
-        def show(report: "Report") -> None:
+        def show(report: "Told") -> None:
             if report.stage not in tasks:
                 tasks[report.stage] = bars.add_task(report.stage, total=report.total, text="")
             bars.update(tasks[report.stage], completed=report.done, total=report.total, text=report.text)

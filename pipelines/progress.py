@@ -1,44 +1,13 @@
-"""How long work tells where it stands, without knowing who listens."""
+"""Who listens to long work; `mechanics.progress.Progress` is what is told."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Protocol
 
-__all__ = ["Listener", "Progress", "Report", "silent"]
+from mechanics.progress import Progress
 
+__all__ = ["Listener", "Progress", "silent"]
 
-class Report(Protocol):
-    """What is reported; `mechanics.simulate.Progress` has the same shape."""
-
-    @property
-    def stage(self) -> str:
-        """Name of the work."""
-
-    @property
-    def done(self) -> int:
-        """How much of it is done."""
-
-    @property
-    def total(self) -> int | None:
-        """How much there is; None if nobody knows."""
-
-    @property
-    def text(self) -> str:
-        """A few words on how it goes."""
+Listener = Callable[[Progress], None]
 
 
-@dataclass(frozen=True)
-class Progress:
-    """Where a pipeline stands: `done` of `total` in a stage, with a short text."""
-
-    stage: str
-    done: int
-    total: int | None
-    text: str = ""
-
-
-Listener = Callable[[Report], None]
-
-
-def silent(report: Report) -> None:
+def silent(progress: Progress) -> None:
     """Listen to nothing."""
