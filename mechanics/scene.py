@@ -6,10 +6,24 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from mechanics.laws.dry_joint import DryJoint
+from mechanics.laws.law import Law
+from mechanics.loads.load import Loads
 from mechanics.materials import Material
 from moma.errors import SceneError
 
-__all__ = ["Block", "ContactSettings", "Fidelity", "Method", "Scene", "SolverSettings", "TimeSettings"]
+__all__ = [
+    "Block",
+    "ContactSettings",
+    "Fidelity",
+    "LawRule",
+    "Method",
+    "Part",
+    "Placement",
+    "Scene",
+    "SolverSettings",
+    "TimeSettings",
+]
 
 
 class Fidelity(StrEnum):
@@ -21,8 +35,16 @@ class Fidelity(StrEnum):
 
 
 @dataclass(frozen=True)
+class Part:
+    """A convex part of a stone: corners (nv, 3) [m], and faces counter-clockwise seen from outside."""
+
+    vertices: NDArray[np.float64]
+    faces: tuple[tuple[int, ...], ...]
+
+
+@dataclass(frozen=True)
 class Block:
-    """One convex stone.
+    """One stone; convex, or a union of convex parts.
 
     Attributes
     ----------
@@ -33,6 +55,7 @@ class Block:
     fidelity : fixed, rigid or deformable
     mesh_size : target edge length of the finite elements [m]; only for deformable blocks
     velocity : (6,) initial translation [m/s] and rotation [rad/s] velocity; not for fixed blocks
+    parts : convex parts that fill a non-convex stone without overlap; empty if it is convex. Not for deformable blocks
     """
 
     code: str
@@ -42,20 +65,44 @@ class Block:
     fidelity: Fidelity = Fidelity.RIGID
     mesh_size: float | None = None
     velocity: tuple[float, ...] = (0.0,) * 6
+    parts: tuple[Part, ...] = ()
+
+
+class Placement(StrEnum):
+    """Where the contact points of two flat faces lie."""
+
+    CORNERS = "corners"
+    INERTIA = "inertia"
+
+
+@dataclass(frozen=True)
+class LawRule:
+    """The law between two groups of stones, given by their codes; it goes before the scene's general law."""
+
+    first: frozenset[str]
+    second: frozenset[str]
+    law: Law
 
 
 @dataclass(frozen=True)
 class ContactSettings:
-    """Signorini contact with Coulomb friction between every pair of blocks.
+    """Contact between every pair of blocks.
 
     Attributes
     ----------
-    friction : Coulomb's coefficient μ [-]
+    law : where no rule says otherwise
+    rules : laws of particular joints; of two that name the same pair, the later holds
     alert_distance : gap below which a contact is watched, relative to the smaller block's size [-]
+    points : contact points of two rigid faces: 1, 3, 4 or 8, at most
+    placement : *corners*: at the true edge of the common face, so that a stone rocks about its very edge; *inertia*:
+        inside it, where they carry its area and its second moments exactly, as a uniform pressure does
     """
 
-    friction: float = 0.6
+    law: Law = field(default_factory=DryJoint)
+    rules: tuple[LawRule, ...] = ()
     alert_distance: float = 0.05
+    points: int = 4
+    placement: Placement = Placement.CORNERS
 
 
 @dataclass(frozen=True)
@@ -118,6 +165,7 @@ class Scene:
     blocks : the stones; contacts are found between all pairs that are not both fixed
     gravity : (3,) acceleration [m/s²]
     contact, time, solver : settings
+    loads : what acts besides gravity
     frame_every : keep a frame of the motion every so many steps; 0 keeps the first and last only
     """
 
@@ -127,6 +175,7 @@ class Scene:
     contact: ContactSettings = field(default_factory=ContactSettings)
     time: TimeSettings = field(default_factory=TimeSettings)
     solver: SolverSettings = field(default_factory=SolverSettings)
+    loads: Loads = field(default_factory=Loads)
     frame_every: int = 0
 
     def __post_init__(self) -> None:

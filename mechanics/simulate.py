@@ -118,7 +118,7 @@ def _result(
         time=last.after.time,
         bodies=bodies,
         contacts=contact_results(
-            last.contacts, last.after, last.solution.impulse, last.force, scene.contact.friction
+            last.contacts, last.after, last.solution.impulse, last.force, scene.contact.law.friction
         ),
         errors=errors,
         reaction=support.reaction,

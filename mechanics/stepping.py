@@ -102,7 +102,7 @@ def contact_problem(
     u_free = local_velocity(contacts, operator, free.velocity, free.node_velocity)
     gap = gaps(contacts, configuration)
     bias = (gap if model.scene.time.relaxation else np.maximum(gap, 0.0)) / (step * theta)
-    friction = np.full(len(contacts), model.scene.contact.friction)
+    friction = np.full(len(contacts), model.scene.contact.law.friction)
     return ContactProblem(operator, u_free, bias, friction, sparse)
 
 

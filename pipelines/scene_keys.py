@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+from mechanics.laws.dry_joint import DryJoint
 from mechanics.scene import ContactSettings, Fidelity, Method, SolverSettings, TimeSettings
 from pipelines.schema import Key, Kind
 from survey.joint_lines import JointSettings
@@ -96,7 +97,7 @@ _JOINTS = (
 )
 
 _CONTACT = (
-    Key("friction", Kind.NUMBER, "Coulomb's coefficient μ.", "-", ContactSettings.friction, at_least=0),
+    Key("friction", Kind.NUMBER, "Coulomb's coefficient μ.", "-", DryJoint.friction, at_least=0),
     Key(
         "alert_distance",
         Kind.NUMBER,

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from mechanics.laws.dry_joint import DryJoint
 from mechanics.materials import Material
 from mechanics.scene import ContactSettings, Fidelity, Method, SolverSettings, TimeSettings
 from moma.errors import SceneError
@@ -123,7 +124,9 @@ def parse_scene(text: str, path: str) -> SceneFile:
         materials=_materials(document, given),
         bodies=Fidelities(**tables["bodies"] | {"default": Fidelity(tables["bodies"]["default"])}),
         joints=_joints(**tables["joints"]),
-        contact=ContactSettings(**tables["contact"]),
+        contact=ContactSettings(
+            DryJoint(tables["contact"]["friction"]), alert_distance=tables["contact"]["alert_distance"]
+        ),
         gravity=_gravity(document, **tables["gravity"]),
         mesh_size=tables["mesh"]["size"],
         time=_time(document, tables["time"]),

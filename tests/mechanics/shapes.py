@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from mechanics.contact.detection import Detector
+from mechanics.laws.dry_joint import DryJoint
 from mechanics.materials import Material
 from mechanics.model import build_model
 from mechanics.scene import Block, ContactSettings, Fidelity, Scene, TimeSettings
@@ -42,7 +43,7 @@ def scene(*blocks, gravity=(0.0, 0.0, -9.81), friction=0.6, alert=0.05, **time):
         "test",
         blocks,
         gravity=gravity,
-        contact=ContactSettings(friction, alert),
+        contact=ContactSettings(DryJoint(friction), alert_distance=alert),
         time=TimeSettings(**time),
     )
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scenes import G, box, ground
 
+from mechanics.laws.dry_joint import DryJoint
 from mechanics.materials import Material
 from mechanics.result import Outcome
 from mechanics.scene import ContactSettings, Fidelity, Method, Scene, SolverSettings, TimeSettings
@@ -27,7 +28,7 @@ def test_a_uniform_pressure_passes_through_non_matching_meshes(lower, upper):
         Scene(
             "patch",
             blocks,
-            contact=ContactSettings(friction=0.5),
+            contact=ContactSettings(DryJoint(0.5)),
             time=TimeSettings(step=2e-3, duration=0.4, relaxation=True, balance_tolerance=1e-2),
             solver=SolverSettings(Method.ADMM, tolerance=1e-7),
         )

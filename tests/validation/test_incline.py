@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scenes import G, box, ground, tilted_gravity
 
+from mechanics.laws.dry_joint import DryJoint
 from mechanics.result import Outcome
 from mechanics.scene import ContactSettings, Method, Scene, SolverSettings, TimeSettings
 from mechanics.simulate import simulate
@@ -15,7 +16,7 @@ def incline(block, degrees, friction, *, theta=0.5, duration=1.0, step=2e-3):
             "incline",
             (ground(), block),
             gravity=tilted_gravity(degrees),
-            contact=ContactSettings(friction),
+            contact=ContactSettings(DryJoint(friction)),
             time=TimeSettings(step, theta, duration, stop_at_equilibrium=False),
             solver=SolverSettings(Method.NSGS, tolerance=1e-9, max_iterations=5000),
         )

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scenes import G, box, ground
 
+from mechanics.laws.dry_joint import DryJoint
 from mechanics.materials import Material
 from mechanics.result import Outcome
 from mechanics.scene import ContactSettings, Fidelity, Method, Scene, SolverSettings, TimeSettings
@@ -20,7 +21,7 @@ def column():
         Scene(
             "column",
             (ground(half=1.0), block),
-            contact=ContactSettings(0.5),
+            contact=ContactSettings(DryJoint(0.5)),
             time=TimeSettings(step=1e-2, theta=1.0, duration=1.0, relaxation=True),
             solver=SolverSettings(Method.ADMM, tolerance=1e-7),
         )

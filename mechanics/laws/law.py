@@ -1,0 +1,84 @@
+"""What every contact law is asked, and what it answers: a shift of (u, r) and a friction cone.
+
+Once per step each law states, for all its contacts at once, the one form that every solver sees: with r̃ = r + s n
+
+    0 ≤ u_N + bias ⊥ r̃_N ≥ 0,   ‖r_T‖ ≤ μ r̃_N + k,   and r_T opposes u_T, at the limit, while sliding
+
+To add a law, write one class with the two methods of `Law`; nothing else changes.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["BOND", "OPENING", "REST", "SLIDING", "SLIP", "STATE", "Approach", "Law", "Terms"]
+
+Array = NDArray[np.float64]
+
+# columns of the internal variables that a contact carries from step to step
+BOND, SLIDING, OPENING, SLIP, REST = range(5)
+STATE = 5
+
+
+@dataclass(frozen=True)
+class Approach:
+    """The contacts of one law at the predicted configuration, before the step is solved.
+
+    Attributes
+    ----------
+    gap : (n,) signed distance, negative when overlapping [m]
+    speed : (n,) u_N before the step, positive when opening [m/s]
+    area : (n,) tributary area; zero at an edge or a corner [m²]
+    size : (n,) smallest width of the smaller body; tolerances scale with it [m]
+    yielding : (n,) W_NN, what one unit of normal impulse does to u_N [1/kg]
+    step, theta : h [s] and θ; the gap at the end of the step is gap + h θ u_N
+    push_out : overlaps are pushed out (relaxation) instead of only kept from growing
+    first : this is the first step of the run: bonds that the scene asks for are made here
+    state : (n, STATE) internal variables, as the law left them in the last step; zeros for new contacts.
+        BOND intact fraction (1 whole, between: damaged, 0 never bonded, -1 broken), SLIDING 1 if it slid in the last
+        step, OPENING largest opening so far [m], SLIP path of sliding so far [m], REST gap that counts as closed [m]
+    """
+
+    gap: Array
+    speed: Array
+    area: Array
+    size: Array
+    yielding: Array
+    step: float
+    theta: float
+    push_out: bool
+    first: bool
+    state: Array
+
+
+@dataclass(frozen=True)
+class Terms:
+    """A law as shift and cone.
+
+    Attributes
+    ----------
+    bias : (n,) shift of u_N [m/s]; infinite where the contact must not act in this step
+    friction : (n,) μ [-]
+    cohesion : (n,) k, tangential impulse that is carried at r̃_N = 0 [N s]
+    adhesion : (n,) s, largest tensile impulse; r̃_N = r_N + s [N s]
+    """
+
+    bias: Array
+    friction: Array
+    cohesion: Array
+    adhesion: Array
+
+
+class Law(Protocol):
+    """A contact law; a frozen dataclass of its parameters, checked when made (SceneError)."""
+
+    def terms(self, contacts: Approach) -> Terms:
+        """State the law for one step."""
+
+    def after(self, contacts: Approach, impulse: Array, velocity: Array) -> Array:
+        """New internal variables (n, STATE), from the shifted impulses r̃ (n, d) [N s] and u (n, d) [m/s].
+
+        A solver's last touch of a contact is exact: r̃_N is 0 where it opened, and ‖r_T‖ lies on the cone where it slid.
+        """
