@@ -63,6 +63,11 @@ class DryJoint:
             if not ok:
                 raise SceneError(f"{quantity} = {value!r}", where="dry joint", remedy=remedy)
 
+    @property
+    def reach(self) -> float:
+        """Nothing acts across a gap [m]."""
+        return 0.0
+
     def terms(self, contacts: Approach) -> Terms:
         """Signorini as a shift, friction by what the contact did last."""
         none = np.zeros(len(contacts.gap))

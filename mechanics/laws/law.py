@@ -4,7 +4,7 @@ Once per step each law states, for all its contacts at once, the one form that e
 
     0 ≤ u_N + bias ⊥ r̃_N ≥ 0,   ‖r_T‖ ≤ μ r̃_N + k,   and r_T opposes u_T, at the limit, while sliding
 
-To add a law, write one class with the two methods of `Law`; nothing else changes.
+To add a law, write one class with the members of `Law`; nothing else changes.
 """
 
 from dataclasses import dataclass
@@ -73,6 +73,10 @@ class Terms:
 
 class Law(Protocol):
     """A contact law; a frozen dataclass of its parameters, checked when made (SceneError)."""
+
+    @property
+    def reach(self) -> float:
+        """How far beyond the alert distance contacts must be watched, as open ones still pull [m]; mostly 0."""
 
     def terms(self, contacts: Approach) -> Terms:
         """State the law for one step."""
