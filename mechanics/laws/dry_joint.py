@@ -5,32 +5,41 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.laws.law import SLIDING, Approach, Terms
-from moma.errors import SceneError
+from mechanics.laws.law import REST, SLIDING, Approach, Terms
+from mechanics.laws.parameters import require_at_least_zero, require_between
 
-__all__ = ["DryJoint", "gap_bias", "sliding"]
+__all__ = ["DryJoint", "at_limit", "gap_bias", "slid"]
 
 Array = NDArray[np.float64]
 
-# a contact slides when its impulse lies on the cone, to rounding
+# an impulse lies on its cone, to rounding
 _ON_CONE = 1.0 - 1e-9
 # of a body's size: a contact no farther open than this is closed for Newton's law
 _CLOSED = 1e-9
+# of a body's size: the least path in a step that counts as sliding; a contact may rest at the limit of its cone
+_SLIDES = 1e-9
 
 
 def gap_bias(contacts: Approach) -> Array:
     """Shift of u_N (n,) with which a closing contact lands exactly: g/(hθ), docs/theory.md §3 [m/s]."""
-    gap = contacts.gap if contacts.push_out else np.maximum(contacts.gap, 0.0)
-    bias: Array = gap / (contacts.step * contacts.theta)
+    gap = contacts.gap - contacts.state[:, REST]
+    bias: Array = (gap if contacts.push_out else np.maximum(gap, 0.0)) / (contacts.step * contacts.theta)
     return bias
 
 
-def sliding(terms: Terms, impulse: Array) -> NDArray[np.bool_]:
-    """Which contacts (n,) are at the limit of their cone."""
+def at_limit(terms: Terms, impulse: Array) -> NDArray[np.bool_]:
+    """Which contacts (n,) are pressed, or held by cohesion, and at the limit of their cone."""
     tangential = np.linalg.norm(impulse[:, 1:], axis=1)
     limit = terms.friction * impulse[:, 0] + terms.cohesion
-    at_limit: NDArray[np.bool_] = (tangential >= _ON_CONE * limit) & (tangential > 0)
-    return at_limit
+    on_cone: NDArray[np.bool_] = (tangential >= _ON_CONE * limit) & ((tangential > 0) | (impulse[:, 0] > 0))
+    return on_cone
+
+
+def slid(contacts: Approach, terms: Terms, impulse: Array, velocity: Array) -> NDArray[np.bool_]:
+    """Which contacts (n,) have slid in the step that gave r̃ (n, d) [N s] and u (n, d) [m/s]."""
+    path = contacts.step * np.linalg.norm(velocity[:, 1:], axis=1)
+    moved: NDArray[np.bool_] = at_limit(terms, impulse) & (path > _SLIDES * contacts.size)
+    return moved
 
 
 @dataclass(frozen=True)
@@ -49,19 +58,11 @@ class DryJoint:
     restitution: float = 0.0
 
     def __post_init__(self) -> None:
-        dynamic = self.friction if self.dynamic_friction is None else self.dynamic_friction
-        for quantity, value, ok, remedy in (
-            ("friction", self.friction, self.friction >= 0, "give a coefficient of 0 or more"),
-            (
-                "dynamic_friction",
-                dynamic,
-                0 <= dynamic <= self.friction,
-                "give from 0 up to the static friction",
-            ),
-            ("restitution", self.restitution, 0 <= self.restitution <= 1, "give a ratio from 0 to 1"),
-        ):
-            if not ok:
-                raise SceneError(f"{quantity} = {value!r}", where="dry joint", remedy=remedy)
+        require_at_least_zero("dry joint", friction=self.friction)
+        if self.dynamic_friction is not None:
+            remedy = f"give from 0 up to the static friction, {self.friction:g}"
+            require_between("dry joint", 0, self.friction, remedy, dynamic_friction=self.dynamic_friction)
+        require_between("dry joint", 0, 1, "give a ratio from 0 to 1", restitution=self.restitution)
 
     @property
     def reach(self) -> float:
@@ -84,5 +85,5 @@ class DryJoint:
     def after(self, contacts: Approach, impulse: Array, velocity: Array) -> Array:
         """Remember which contacts slide."""
         state = contacts.state.copy()
-        state[:, SLIDING] = sliding(self.terms(contacts), impulse)
+        state[:, SLIDING] = slid(contacts, self.terms(contacts), impulse, velocity)
         return state
