@@ -1,0 +1,146 @@
+"""Accelerograms from files; every record written here is synthetic."""
+
+import numpy as np
+import pytest
+
+from mechanics.loads.record_files import read_accelerogram, read_at2, read_csv
+from moma.errors import SceneError
+
+ACCELERATION = 0.1 * np.sin(np.arange(12) / 2.0)  # [g]
+TITLE = "PEER NGA STRONG MOTION DATABASE RECORD"
+EVENT = "Synthetic test record, 1/1/2000, Nowhere, 090"
+UNIT = "ACCELERATION TIME SERIES IN UNITS OF G"
+
+
+def at2(path, steps="NPTS=     12, DT=   .0050 SEC", unit=UNIT, values=ACCELERATION, per_line=5):
+    rows = [values[i : i + per_line] for i in range(0, len(values), per_line)]
+    # Fortran's E15.7 without the leading zero, as the database writes it
+    texts = ["".join(f"{value:15.7E}".replace("0.", " .").rjust(15) for value in row) for row in rows]
+    path.write_text("\n".join([TITLE, EVENT, unit, steps, *texts]) + "\n")
+    return path
+
+
+def message_of(function, *arguments):
+    with pytest.raises(SceneError) as caught:
+        function(*arguments)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "steps",
+    [
+        "NPTS=     12, DT=   .0050 SEC",
+        "NPTS=  12, DT= .00500 SEC,",
+        "NPTS=12,DT=0.005SEC",
+        "NPTS =   12 , DT =  5.0E-03 SEC",
+        "npts= 12, dt= 0.005 sec",
+        "     12    0.0050    NPTS, DT",
+        "12 .005 NPTS, DT",
+    ],
+)
+def test_every_variant_of_the_header_is_understood(tmp_path, steps):
+    found = read_at2(at2(tmp_path / "a.AT2", steps))
+    assert found.dt == 0.005
+    np.testing.assert_allclose(found.acceleration, 9.80665 * ACCELERATION, atol=1e-7)
+    assert found.name == EVENT
+    assert found.source.endswith("a.AT2")
+
+
+@pytest.mark.parametrize("unit", ["ACCELERATION TIME HISTORY IN UNITS OF G", "Acceleration time series in g"])
+def test_older_records_say_the_unit_in_other_words(tmp_path, unit):
+    assert len(read_at2(at2(tmp_path / "a.at2", unit=unit))) == 12
+
+
+def test_any_number_of_values_in_a_line_is_read(tmp_path):
+    for per_line in (1, 8, 12):
+        found = read_accelerogram(at2(tmp_path / "a.at2", per_line=per_line))
+        np.testing.assert_allclose(found.acceleration, 9.80665 * ACCELERATION, atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("changed", "line", "said"),
+    [
+        ({"steps": "12 values"}, 4, "no number of samples and step of time: '12 values'; write for example"),
+        ({"steps": "NPTS= 12, DT= 0.0 SEC"}, 4, "no number of samples"),
+        (
+            {"unit": "VELOCITY TIME SERIES IN UNITS OF CM/S"},
+            3,
+            "not an acceleration in units of g: 'VELOCITY",
+        ),
+        ({"unit": "ACCELERATION IN CM/S/S"}, 3, "not an acceleration in units of g"),
+        ({"values": ACCELERATION[:8]}, 6, "8 values, but NPTS = 12; the file is cut off"),
+        ({"values": np.append(ACCELERATION, 0.5)}, 7, "more values than NPTS = 12"),
+    ],
+)
+def test_a_malformed_record_is_refused_with_its_line(tmp_path, changed, line, said):
+    path = at2(tmp_path / "bad.AT2", **changed)
+    message = message_of(read_at2, path)
+    assert message.startswith(f"{path}:{line}: ")
+    assert said in message
+
+
+@pytest.mark.parametrize("text", ["******", "0.1.2", "nan"])
+def test_what_is_not_a_number_is_shown_with_its_line(tmp_path, text):
+    path = at2(tmp_path / "bad.AT2")
+    lines = path.read_text().splitlines()
+    lines[5] = lines[5].replace(lines[5].split()[2], text)
+    path.write_text("\n".join(lines))
+    assert message_of(read_at2, path).startswith(f"{path}:6: {text!r} is not a number")
+
+
+def test_a_file_that_is_too_short_is_refused(tmp_path):
+    path = tmp_path / "short.AT2"
+    path.write_text(f"{TITLE}\n{EVENT}\n")
+    assert f"{path}:2: less than four lines" in message_of(read_at2, path)
+    path.write_text("")
+    assert f"{path}:1: less than four lines" in message_of(read_at2, path)
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("g", 9.80665), ("m/s2", 1.0), ("cm/s2", 0.01)])
+@pytest.mark.parametrize("separator", [",", ";", "\t", " ", ", "])
+def test_a_table_is_read_in_its_unit(tmp_path, unit, factor, separator):
+    rows = [f"{2.0 + 0.02 * i:.2f}{separator}{a:.9f}" for i, a in enumerate(ACCELERATION)]
+    path = tmp_path / "record.csv"
+    path.write_text("# synthetic\ntime" + separator + "acceleration\n\n" + "\n".join(rows) + "\n")
+    found = read_accelerogram(path, unit)
+    assert found.dt == pytest.approx(0.02)
+    np.testing.assert_allclose(found.acceleration, factor * ACCELERATION, atol=1e-8)
+    assert found.name == "record"
+
+
+def test_a_table_needs_no_header_and_may_round_its_times(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(f"{i / 30:.3f},{a}" for i, a in enumerate(ACCELERATION)))
+    assert read_csv(path, "g").dt == pytest.approx(1 / 30, rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "said"),
+    [
+        ("time,a\n0.0,1.0\n0.1,x\n", 3, "'x' is not a number"),
+        ("0.0,1.0\nagain,1\n", 2, "'again' is not a number"),
+        ("0.0,1.0,2.0\n", 1, "3 columns; give time and acceleration"),
+        ("0.0,1.0\n0.1\n", 2, "1 columns"),
+        ("0.0,1\n0.1,1\n0.3,1\n0.4,1\n", 2, "time 0.1 s is not at equal steps of 0.133333 s; resample"),
+        ("0.1,1\n0.1,1\n0.1,1\n", 1, "time 0.1 s is not at equal steps of 0 s"),
+        ("0.0,1\n0.1,inf\n", 2, "'inf' is not a number"),
+    ],
+)
+def test_a_malformed_table_is_refused_with_its_line(tmp_path, text, line, said):
+    path = tmp_path / "bad.csv"
+    path.write_text(text)
+    message = message_of(read_csv, path, "g")
+    assert message.startswith(f"{path}:{line}: ")
+    assert said in message
+
+
+def test_a_table_without_rows_unit_or_file_is_refused(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("time,a\n0.0,1.0\n")
+    assert "1 rows of numbers" in message_of(read_csv, path, "g")
+    assert "the unit of the acceleration is not known; give g, m/s2, cm/s2" in message_of(
+        read_accelerogram, path
+    )
+    assert "unknown unit 'gal'" in message_of(read_csv, path, "gal")
+    assert "no such file; check the path" in message_of(read_at2, tmp_path / "none.AT2")
+    assert "cannot be read" in message_of(read_csv, tmp_path, "g")
