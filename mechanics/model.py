@@ -8,12 +8,14 @@ from numpy.typing import NDArray
 
 from mechanics.bodies.deformable import Deformable, deformable
 from mechanics.bodies.rigid import RigidInertia
-from mechanics.contact._kernels import MAX_CORNERS
+from mechanics.contact._kernels_narrow import MAX_CORNERS
 from mechanics.contact.surfaces import FaceMesh, Surfaces, surfaces
+from mechanics.laws.table import LawTable, law_table
+from mechanics.loads.load import Force, Motion
 from mechanics.meshing.mesh import TetMesh
 from mechanics.meshing.mesher import mesh_block
-from mechanics.polyhedra import MassProperties, mass_properties
-from mechanics.scene import Block, Fidelity, Scene
+from mechanics.polyhedra import MassProperties, mass_properties, united
+from mechanics.scene import Block, Fidelity, Part, Scene
 from mechanics.state import State
 from moma.errors import GeometryError, SceneError
 
@@ -33,7 +35,10 @@ class Model:
     Attributes
     ----------
     scene : as given
-    fixed, elastic : (nb,) which bodies never move, which are deformable
+    fixed, elastic : (nb,) which bodies no force moves, which are deformable
+    motions : imposed motions, each with the bodies that it drives
+    forces : forces, each with the bodies on which it acts
+    laws : contact laws, and between which bodies they hold
     inertia : of the rigid bodies
     mass : (nb,) [kg]
     volume : (nb,) [m³]
@@ -45,6 +50,9 @@ class Model:
     scene: Scene
     fixed: NDArray[np.bool_]
     elastic: NDArray[np.bool_]
+    motions: tuple[tuple[Motion, Ints], ...]
+    forces: tuple[tuple[Force, Ints], ...]
+    laws: LawTable
     inertia: RigidInertia
     mass: Array
     volume: Array
@@ -53,9 +61,16 @@ class Model:
     node_ptr: Ints
 
     @property
-    def gravity(self) -> Array:
-        """(3,) acceleration [m/s²]."""
-        return np.array(self.scene.gravity)
+    def rigid_only(self) -> bool:
+        """Nothing is deformable."""
+        return not bool(self.elastic.any())
+
+    def gravity(self, time: float) -> Array:
+        """(3,) acceleration at a time [m/s²]."""
+        gravity = np.array(self.scene.gravity, dtype=float)
+        for change in self.scene.loads.gravity:
+            gravity = change(time, gravity)
+        return gravity
 
     def nodes_of(self, body: int) -> slice:
         """Where the nodes of a body lie in State.node."""
@@ -71,7 +86,7 @@ def build_model(scene: Scene, progress: Callable[[int, int], None] | None = None
     MeshError, GeometryError : if a stone cannot be meshed or its faces do not close
     """
     blocks = scene.blocks
-    properties = [mass_properties(block.vertices, block.faces, f"stone {block.code}") for block in blocks]
+    properties = [_mass_properties(block) for block in blocks]
     stones: list[Deformable | None] = []
     centres = np.array([p.centroid for p in properties])
     for index, block in enumerate(blocks):
@@ -91,22 +106,91 @@ def build_model(scene: Scene, progress: Callable[[int, int], None] | None = None
         scene=scene,
         fixed=np.array([block.fidelity is Fidelity.FIXED for block in blocks]),
         elastic=np.array([stone is not None for stone in stones]),
+        motions=tuple((motion, _indices(scene, motion.stones)) for motion in scene.loads.motions),
+        forces=tuple((force, _indices(scene, force.stones)) for force in scene.loads.forces),
+        laws=law_table(
+            scene.contact.law,
+            [(_mask(scene, rule.first), _mask(scene, rule.second), rule.law) for rule in scene.contact.rules],
+            len(blocks),
+        ),
         inertia=_inertia(blocks, properties, density),
         mass=density * np.array([p.volume for p in properties]),
         volume=np.array([p.volume for p in properties]),
-        surfaces=surfaces(
-            [block.vertices - centre for block, centre in zip(blocks, centres, strict=True)],
-            [block.faces for block in blocks],
-            [
-                mesh
-                for block, stone, start in zip(blocks, stones, node_ptr, strict=False)
-                for mesh in _face_meshes(block, None if stone is None else stone.mesh, int(start))
-            ],
-        ),
+        surfaces=_surfaces(blocks, centres, stones, node_ptr),
         stones=tuple(stones),
         node_ptr=node_ptr,
     )
+    _check_loads(model)
     return model, _start(model, centres)
+
+
+def _parts(block: Block) -> tuple[Part, ...]:
+    return block.parts or (Part(block.vertices, block.faces),)
+
+
+def _mass_properties(block: Block) -> MassProperties:
+    return united(
+        [mass_properties(part.vertices, part.faces, f"stone {block.code}") for part in _parts(block)]
+    )
+
+
+def _surfaces(
+    blocks: tuple[Block, ...], centres: Array, stones: list[Deformable | None], node_ptr: Ints
+) -> Surfaces:
+    shapes = [(b, part) for b, block in enumerate(blocks) for part in _parts(block)]
+    return surfaces(
+        [part.vertices - centres[b] for b, part in shapes],
+        [part.faces for _, part in shapes],
+        [mesh for b, part in shapes for mesh in _face_meshes(part, _mesh_of(stones[b]), int(node_ptr[b]))],
+        [b for b, _ in shapes],
+    )
+
+
+def _mesh_of(stone: Deformable | None) -> TetMesh | None:
+    return None if stone is None else stone.mesh
+
+
+def _indices(scene: Scene, codes: frozenset[str]) -> Ints:
+    known = [block.code for block in scene.blocks]
+    missing = sorted(codes.difference(known))
+    if missing:
+        raise SceneError(
+            f"a load names {', '.join(missing[:5])}",
+            where=scene.name,
+            remedy="give codes of blocks of the scene",
+        )
+    return np.array([b for b, code in enumerate(known) if code in codes], dtype=np.int64)
+
+
+def _mask(scene: Scene, codes: frozenset[str]) -> NDArray[np.bool_]:
+    return np.array([block.code in codes for block in scene.blocks], dtype=bool)
+
+
+def _check_loads(model: Model) -> None:
+    codes = [block.code for block in model.scene.blocks]
+    driven: set[int] = set()
+    for _, bodies in model.motions:
+        loose = [codes[b] for b in bodies if not model.fixed[b]]
+        if loose:
+            raise SceneError(
+                f"a motion is imposed on {loose[0]}, which is not fixed",
+                where=model.scene.name,
+                remedy="make it fixed: an imposed motion leaves a stone no freedom of its own",
+            )
+        twice = driven.intersection(bodies.tolist())
+        if twice:
+            raise SceneError(
+                f"two motions are imposed on {codes[min(twice)]}", where=model.scene.name, remedy="give one"
+            )
+        driven.update(bodies.tolist())
+    for _, bodies in model.forces:
+        held = [codes[b] for b in bodies if model.fixed[b] or model.elastic[b]]
+        if held:
+            raise SceneError(
+                f"a force acts on {held[0]}, which is not rigid",
+                where=model.scene.name,
+                remedy="forces act on rigid stones",
+            )
 
 
 def _check(block: Block) -> None:
@@ -118,10 +202,17 @@ def _check(block: Block) -> None:
         )
     if block.fidelity is Fidelity.FIXED and any(block.velocity):
         raise SceneError("a fixed stone has a velocity", where=f"stone {block.code}", remedy="make it rigid")
-    corners = max(len(face) for face in block.faces)
-    if len(block.faces) > _MAX_FACES or corners > MAX_CORNERS:
+    if block.parts and block.fidelity is Fidelity.DEFORMABLE:
+        raise SceneError(
+            "a deformable stone has several parts",
+            where=f"stone {block.code}",
+            remedy="make it rigid, or make each part a stone of its own",
+        )
+    faces = max(len(part.faces) for part in _parts(block))
+    corners = max(len(face) for part in _parts(block) for face in part.faces)
+    if faces > _MAX_FACES or corners > MAX_CORNERS:
         raise GeometryError(
-            f"{len(block.faces)} faces with up to {corners} corners",
+            f"{faces} faces with up to {corners} corners",
             where=f"stone {block.code}",
             remedy=f"simplify it to at most {_MAX_FACES} faces with at most {MAX_CORNERS} corners each",
         )
@@ -139,11 +230,11 @@ def _inertia(blocks: tuple[Block, ...], properties: list[MassProperties], densit
     )
 
 
-def _face_meshes(block: Block, mesh: TetMesh | None, start: int) -> list[FaceMesh | None]:
+def _face_meshes(part: Part, mesh: TetMesh | None, start: int) -> list[FaceMesh | None]:
     if mesh is None:
-        return [None] * len(block.faces)
+        return [None] * len(part.faces)
     result: list[FaceMesh | None] = []
-    for face in range(len(block.faces)):
+    for face in range(len(part.faces)):
         node, triangle = np.unique(mesh.triangles[mesh.triangle_face == face], return_inverse=True)
         result.append(FaceMesh(start + node, mesh.nodes[node], triangle.reshape(-1, 3).astype(np.int64)))
     return result

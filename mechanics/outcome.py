@@ -39,7 +39,7 @@ class Watch:
     def __call__(self, state: State, balance: Array, solution: ContactSolution) -> Outcome:
         """The outcome so far, given the imbalance of each body (nb,) and how well the step was solved."""
         model, settings = self._model, self._model.scene.time
-        fall = np.sqrt((float(np.linalg.norm(model.gravity)) or 1.0) * model.surfaces.size)
+        fall = np.sqrt((float(np.linalg.norm(model.gravity(state.time))) or 1.0) * model.surfaces.size)
         pace = speed(model, state) / fall
         quiet = (
             solution.converged and balance.max() <= settings.balance_tolerance and pace.max() <= _REST_SPEED

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from mechanics.contact.detection import Detector
 from mechanics.model import Model, build_model
 from mechanics.scene import Fidelity, Scene
+from mechanics.simulation import detector
 
 __all__ = ["Plan", "plan"]
 
@@ -52,7 +52,7 @@ def plan(scene: Scene) -> Plan:
     SceneError, GeometryError, MeshError : if the scene cannot be built
     """
     model, start = build_model(scene)
-    detect = Detector(model.surfaces, model.fixed, scene.contact.alert_distance)
+    detect = detector(model)
     contacts = detect(start, np.zeros(len(scene.blocks)))
     pairs = np.unique(np.sort(contacts.bodies, axis=1), axis=0)
     codes = [block.code for block in scene.blocks]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from moma.errors import GeometryError
 
-__all__ = ["MassProperties", "face_plane", "fan", "mass_properties", "smallest_width"]
+__all__ = ["MassProperties", "face_plane", "fan", "mass_properties", "smallest_width", "united"]
 
 Array = NDArray[np.float64]
 Faces = Sequence[Sequence[int]]
@@ -71,6 +71,19 @@ def mass_properties(vertices: Array, faces: Faces, where: str | None = None) -> 
     second = second / 20.0 - volume * np.outer(mean, mean)
     inertia = np.trace(second) * np.eye(3) - second
     return MassProperties(volume, origin + mean, inertia)
+
+
+def united(parts: Sequence[MassProperties]) -> MassProperties:
+    """Mass properties of parts that do not overlap, taken together (Steiner's theorem)."""
+    if len(parts) == 1:
+        return parts[0]
+    volume = sum(part.volume for part in parts)
+    centroid = sum((part.volume * part.centroid for part in parts), np.zeros(3)) / volume
+    inertia = np.zeros((3, 3))
+    for part in parts:
+        arm = part.centroid - centroid
+        inertia += part.inertia + part.volume * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    return MassProperties(volume, centroid, inertia)
 
 
 def face_plane(points: Array) -> tuple[Array, Array]:

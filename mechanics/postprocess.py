@@ -3,10 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.contact.contacts import Contacts, gaps, material_points
+from mechanics.contact.contacts import material_points
 from mechanics.elasticity import von_mises
+from mechanics.laws.status import contact_status
 from mechanics.model import Model
 from mechanics.result import BodyResult, ContactResult
+from mechanics.simulation import Step
 from mechanics.state import State
 
 __all__ = ["body_results", "contact_results", "positions"]
@@ -16,7 +18,7 @@ Array = NDArray[np.float64]
 
 def positions(model: Model, state: State) -> tuple[Array, ...]:
     """Points of each body now: the corners of a rigid one, the nodes of a deformable one [m]."""
-    vptr = model.surfaces.vptr
+    vptr = model.surfaces.body_vptr
     return tuple(
         state.node[model.nodes_of(b)]
         if stone is not None
@@ -48,22 +50,15 @@ def body_results(model: Model, start: State, state: State) -> tuple[BodyResult, 
     return tuple(results)
 
 
-def contact_results(
-    contacts: Contacts, state: State, impulse: Array, force: Array, friction: float
-) -> ContactResult:
-    """The contact points with their mean force over the last step.
-
-    A contact slips when its impulse lies on Coulomb's cone, to a relative 10⁻⁶.
-    """
-    pressed = impulse[:, 0] > 0
-    tangential = np.linalg.norm(impulse[:, 1:], axis=1)
-    slip = pressed & (tangential >= (1 - 1e-6) * friction * impulse[:, 0])
+def contact_results(step: Step) -> ContactResult:
+    """The contact points of a step, with their mean force."""
+    contacts = step.contacts
     return ContactResult(
         bodies=contacts.bodies,
-        point=material_points(contacts, state).mean(axis=1),
+        point=material_points(contacts, step.after).mean(axis=1),
         normal=contacts.frame[:, 0],
-        force=force,
-        gap=gaps(contacts, state),
+        force=step.force,
+        gap=step.gap,
         area=contacts.area,
-        status=np.where(~pressed, "open", np.where(slip, "slip", "stick")),
+        status=contact_status(step.internal, step.terms, step.solution.impulse),
     )

@@ -1,9 +1,9 @@
 """One step's frictional contact problem: pure algebra between physics and algorithm.
 
-    find (u, r):  u = W r + u_free,   0 ≤ u_N + bias ⊥ r_N ≥ 0,   ‖r_T‖ ≤ μ r_N,  r_T = -μ r_N u_T/‖u_T‖ if u_T ≠ 0
+    find (u, r):  u = W r + u_free,   0 ≤ u_N + bias ⊥ r_N ≥ 0,   ‖r_T‖ ≤ μ r_N + k,  r_T opposes u_T at the limit
 
-W = Hᵀ ŵ H is never formed. A rigid body answers through its six velocities; a deformable one through the dense
-compliance between the contact sides that lie on it.
+W = Hᵀ ŵ H is behind the protocol `Delassus`; mechanics/operators holds its forms. Laws with adhesion state r shifted
+by the largest tension, so that r_N ≥ 0 (mechanics/laws/law.py).
 """
 
 from dataclasses import dataclass
@@ -15,58 +15,54 @@ from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
 __all__ = [
-    "ELASTIC",
-    "NONE",
-    "RIGID",
     "ContactProblem",
     "ContactSolution",
     "ContactStart",
     "Delassus",
+    "GaussSeidel",
     "SparseForm",
+    "scale_of",
 ]
 
 Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
-NONE, RIGID, ELASTIC = 0, 1, 2
 
 
-@dataclass(frozen=True)
-class Delassus:
-    """W = Hᵀ ŵ H in factored form; side 0 (candidate) counts positive, side 1 (antagonist) negative.
+class GaussSeidel(Protocol):
+    """Passes of non-smooth Gauss–Seidel on one problem."""
+
+    def __call__(self, impulse: Array, count: int, /) -> None:
+        """Sweep `impulse` (nc, d) in place, `count` times."""
+
+
+class Delassus(Protocol):
+    """W = Hᵀ ŵ H, the relative velocities that impulses cause; d is 3, or 2 in the plane.
 
     Attributes
     ----------
-    body : (nc, 2) bodies of the two sides
-    kind : (nc, 2) NONE (fixed), RIGID or ELASTIC
-    jacobian : (nc, 2, 3, 6) local velocity of a rigid side from its body's velocity
-    response : (nc, 2, 6, 3) body velocity from the local impulse, ŵ times the transpose of `jacobian`
-    slot : (nc, 2) place of an elastic side among those of its body
-    yptr : (nb+1,) where each body's elastic velocities begin (three for each side)
-    bptr : (nb+1,) where each body's compliance block begins
-    block : flat symmetric compliance blocks of the elastic bodies, between their contact sides [1/kg]
-    diagonal : (nc, 3, 3) W_αα [1/kg]
+    diagonal : (nc, d, d) W_αα [1/kg]
     """
 
-    body: Ints
-    kind: Ints
-    jacobian: Array
-    response: Array
-    slot: Ints
-    yptr: Ints
-    bptr: Ints
-    block: Array
-    diagonal: Array
-
     @property
-    def scale(self) -> float:
-        """Mean diagonal of W [1/kg]; what r and u are measured against."""
-        return float(np.mean(np.trace(self.diagonal, axis1=1, axis2=2) / 3.0))
+    def diagonal(self) -> Array:
+        """W_αα (nc, d, d) [1/kg]."""
 
-    @property
-    def arrays(self) -> tuple[NDArray[np.generic], ...]:
-        """What the kernels take, in their order."""
-        return self.body, self.kind, self.jacobian, self.response, self.slot, self.yptr, self.bptr, self.block
+    def apply(self, impulse: Array) -> Array:
+        """W r (nc, d) [m/s]."""
+
+    def gauss_seidel(self, shift: Array, friction: Array, cohesion: Array) -> GaussSeidel:
+        """Sweeps that solve each contact exactly with its neighbours frozen.
+
+        Parameters
+        ----------
+        shift : (nc, d) u_free, with the bias added to its normal part [m/s]
+        friction, cohesion : (nc,) μ [-] and k [N s]
+        """
+
+
+def scale_of(delassus: Delassus) -> float:
+    """Mean diagonal of W [1/kg]; what r and u are measured against."""
+    diagonal = delassus.diagonal
+    return float(np.einsum("cii->", diagonal) / (len(diagonal) * diagonal.shape[1]))
 
 
 class _Factor(Protocol):
@@ -105,9 +101,10 @@ class ContactProblem:
     Attributes
     ----------
     delassus : W
-    u_free : (nc, 3) relative velocity without contact impulses, local frame (n, t1, t2) [m/s]
+    u_free : (nc, d) relative velocity without contact impulses, local frame (n, t1, t2), or (n, t) [m/s]
     bias : (nc,) shift of u_N in Signorini's condition [m/s]
     friction : (nc,) Coulomb's μ [-]
+    cohesion : (nc,) k, the tangential impulse carried at r_N = 0 [N s]
     sparse : W once more, for methods that factorise; None where none was asked for
     """
 
@@ -115,6 +112,7 @@ class ContactProblem:
     u_free: Array
     bias: Array
     friction: Array
+    cohesion: Array
     sparse: SparseForm | None = None
 
 
@@ -124,8 +122,8 @@ class ContactStart:
 
     Attributes
     ----------
-    impulse : (nc, 3) r [N s]
-    velocity : (nc, 3) û = u + (bias + μ‖u_T‖) n, the velocity that is dual to r [m/s]
+    impulse : (nc, d) r [N s]
+    velocity : (nc, d) û = u + (bias + μ‖u_T‖) n, the velocity that is dual to r [m/s]
     """
 
     impulse: Array
@@ -138,11 +136,11 @@ class ContactSolution:
 
     Attributes
     ----------
-    impulse : (nc, 3) r, on the candidate, local frame [N s]
-    velocity : (nc, 3) û, dual to r, as the solver knows it [m/s]
+    impulse : (nc, d) r, on the candidate, local frame [N s]
+    velocity : (nc, d) û, dual to r, as the solver knows it [m/s]
     iterations : Gauss–Seidel sweeps, or the iterations of another method
     natural_map : η of `impulse`, as mechanics.residual computes it
-    converged : η is within the tolerance
+    converged : η, and the error of the velocities where a solver looks at it, are within their tolerances
     """
 
     impulse: Array

@@ -1,45 +1,73 @@
 """How well a contact problem is solved: the natural map, computed outside the solvers."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.problem import ContactProblem
-from mechanics.solvers._kernels import apply_delassus
+from mechanics.problem import ContactProblem, scale_of
+from mechanics.solvers._kernels import natural_errors
 
-__all__ = ["dual_velocity", "natural_map", "project_on_cone"]
+__all__ = ["Residual", "dual_velocity", "natural_map", "project_on_cone", "residual"]
 
 Array = NDArray[np.float64]
 
 
+@dataclass(frozen=True)
+class Residual:
+    """What is left of a contact problem.
+
+    Attributes
+    ----------
+    natural_map : η [-]
+    velocity : largest velocity by which a contact breaks its law, over the largest of u_free [-]
+    error : (nc,) ‖e_α‖ of each contact [N s]
+    """
+
+    natural_map: float
+    velocity: float
+    error: Array
+
+
 def dual_velocity(problem: ContactProblem, impulse: Array) -> Array:
-    """û = W r + u_free + (bias + μ‖u_T‖) n (nc, 3), local frame [m/s]."""
-    u, _, _ = apply_delassus(impulse, *problem.delassus.arrays)
-    velocity: Array = u + problem.u_free
+    """û = W r + u_free + (bias + μ‖u_T‖) n (nc, d), local frame [m/s]."""
+    velocity: Array = problem.delassus.apply(impulse) + problem.u_free
     velocity[:, 0] += problem.bias + problem.friction * np.linalg.norm(velocity[:, 1:], axis=1)
     return velocity
 
 
-def natural_map(problem: ContactProblem, impulse: Array) -> float:
-    """η = ‖r - P_K(r - ρ û)‖ / ‖r‖ with û = u + (bias + μ‖u_T‖) n and ρ = 1 / (mean diagonal of W).
+def residual(problem: ContactProblem, impulse: Array) -> Residual:
+    """η = ‖e‖ / ‖r‖, e = r - P_K(r - ρ û), û = u + (bias + μ‖u_T‖) n and ρ = 1 / (mean diagonal of W).
 
     The de Saxcé form of Signorini–Coulomb (de Saxcé & Feng 1991; docs/theory.md §4); independent of units. Zero
     without contacts; where no impulse is given but one is needed, the size of P_K(-ρ û) replaces ‖r‖, so η is 1.
     """
     if len(impulse) == 0:
-        return 0.0
-    rho = 1.0 / problem.delassus.scale
-    projected = project_on_cone(impulse - rho * dual_velocity(problem, impulse), problem.friction)
-    scale = max(float(np.linalg.norm(impulse)), float(np.linalg.norm(projected)))
-    return float(np.linalg.norm(impulse - projected)) / scale if scale > 0 else 0.0
+        return Residual(0.0, 0.0, np.zeros(0))
+    rho = 1.0 / scale_of(problem.delassus)
+    u = problem.delassus.apply(impulse)
+    u += problem.u_free
+    error, size, projected = natural_errors(impulse, u, problem.bias, problem.friction, problem.cohesion, rho)
+    scale, pace = max(size, projected), float(np.abs(problem.u_free).max())
+    return Residual(
+        float(np.linalg.norm(error)) / scale if scale > 0 else 0.0,
+        float(error.max()) / rho / pace if pace > 0 else 0.0,
+        error,
+    )
 
 
-def project_on_cone(point: Array, friction: Array) -> Array:
-    """Nearest points (nc, 3) of Coulomb's cones ‖r_T‖ ≤ μ r_N."""
+def natural_map(problem: ContactProblem, impulse: Array) -> float:
+    """η of `residual`."""
+    return residual(problem, impulse).natural_map
+
+
+def project_on_cone(point: Array, friction: Array, cohesion: Array) -> Array:
+    """Nearest points (nc, d) of {r_N ≥ 0, ‖r_T‖ ≤ μ r_N + k}."""
     n, size = point[:, 0], np.linalg.norm(point[:, 1:], axis=1)
-    inside = size <= friction * n
-    below = friction * size <= -n
-    height = (n + friction * size) / (1.0 + friction**2)
-    shrink = np.where(size > 0, friction * height / np.where(size > 0, size, 1.0), 0.0)
-    on_cone = np.column_stack([height, point[:, 1] * shrink, point[:, 2] * shrink])
-    result: Array = np.where(inside[:, None], point, np.where(below[:, None], 0.0, on_cone))
+    foot = np.maximum((n + friction * (size - cohesion)) / (1.0 + friction**2), 0.0)
+    inside = size <= friction * np.maximum(n, 0.0) + cohesion
+    height = np.where(inside, np.maximum(n, 0.0), foot)
+    radius = np.where(inside, size, friction * foot + cohesion)
+    shrink = np.where(size > 0, radius / np.where(size > 0, size, 1.0), 0.0)
+    result: Array = np.column_stack([height, point[:, 1:] * shrink[:, None]])
     return result

@@ -90,7 +90,7 @@ class ContactResult:
     force : (nc, 3) mean force over the last step, on the candidate, world axes [N]
     gap : (nc,) [m]
     area : (nc,) tributary area [m²]
-    status : (nc,) "open", "stick" or "slip"
+    status : (nc,) "open", "stick", "slip", "bonded" or "broken"
     """
 
     bodies: Ints

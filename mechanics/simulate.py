@@ -71,10 +71,10 @@ class _Log:
     def __call__(self, step: Step) -> Array:
         """Account for one step, and return the imbalance of each body (nb,)."""
         model, solution = self._model, step.solution
-        self.energy(step.before, step.after, step.work, step.relaxed, model.scene.time.theta)
+        self.energy(step)
         self.penetration = max(self.penetration, float(np.max(-step.gap, initial=0.0)))
         self.unconverged += not solution.converged
-        balance = imbalance(model, step.after, step.contacts, step.force)
+        balance = imbalance(model, step.after, step.contacts, step.force, step.kick.load)
         self.rows.append(
             (
                 step.after.time,
@@ -100,7 +100,7 @@ def _result(
     model: Model, start: State, last: Step, outcome: Outcome, log: _Log, frames: list[Frame], clock: Clock
 ) -> Result:
     history, scene = log.history(), model.scene
-    support = support_reaction(model, last.contacts, last.force)
+    support = support_reaction(model, last.contacts, last.force, last.after.time)
     with clock("stress"):
         bodies = body_results(model, start, follow_nodes(model, last.after))
     errors = Errors(
@@ -117,9 +117,7 @@ def _result(
         steps=len(history.time),
         time=last.after.time,
         bodies=bodies,
-        contacts=contact_results(
-            last.contacts, last.after, last.solution.impulse, last.force, scene.contact.law.friction
-        ),
+        contacts=contact_results(last),
         errors=errors,
         reaction=support.reaction,
         weight=support.weight,

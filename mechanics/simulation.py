@@ -9,25 +9,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechanics.bodies.deformable import DynamicCompliance
-from mechanics.contact.assembly import delassus, local_velocity, sparse_form, world_impulse
-from mechanics.contact.contacts import Contacts, gaps
+from mechanics.contact.assembly import (
+    local_velocity,
+    mixed_delassus,
+    rigid_delassus,
+    sparse_form,
+    world_impulse,
+)
+from mechanics.contact.contacts import Contacts, gaps, take
 from mechanics.contact.detection import Detector
+from mechanics.laws.law import Terms
 from mechanics.memory import Memory
 from mechanics.model import Model
 from mechanics.observers.energy import kinetic_energy
 from mechanics.observers.equilibrium import displacement, speed
-from mechanics.problem import ContactSolution, Delassus, SparseForm
+from mechanics.operators.mixed import MixedDelassus
+from mechanics.operators.rigid import RigidDelassus, schedule
+from mechanics.problem import ContactSolution, SparseForm
 from mechanics.solvers.admm import ADMM
 from mechanics.solvers.choice import choose_solver
 from mechanics.state import State
-from mechanics.stepping import advance, compliances, contact_problem, follow_nodes, free_motion, predict
+from mechanics.statement import Statement, state_laws
+from mechanics.stepping import Kick, advance, compliances, follow_nodes, free_kick, kicked, predict
 from moma.errors import SolverError
 
-__all__ = ["Clock", "Simulation", "Step"]
+__all__ = ["Clock", "Simulation", "Step", "detector"]
 
 Array = NDArray[np.float64]
 
-# contacts are found anew when a body has moved by more than this part of the scene's smallest width since last time,
+# contacts of rigid stones are found anew when one has moved by more than this part of the smallest width since last
+# time: where stones rest, nothing is to be found; where they move, W is that of the very instant
+_STALE_RIGID = 1e-6
+# with deformable stones, whose W is dear, when one has moved by this,
 _STALE = 1e-3
 # or by more than this part, once it moves a hundred times less per step: where stones come to rest, no lag stays
 _SETTLED, _SLOWED = 1e-6, 1e-2
@@ -56,30 +69,43 @@ class Step:
     Attributes
     ----------
     before, after : the states between which it lies; relaxation comes after them
+    predicted : at the instant of the kick, with the velocities just before it
+    kick : velocities just after it
     contacts : the contact points
-    solution : their impulses
+    solution : their impulses r̃, shifted where a law has adhesion
+    impulse : (nc, 3) r, local frame [N s]
     force : (nc, 3) mean forces r/h on the candidates, world axes [N]
     gap : (nc,) at the end of the step [m]
+    terms : the laws of the step, as shift and cone
+    internal : (nc, STATE) what the laws remember of each contact
     work : r·u_θ, the work of the contacts [J]
+    driven : work that driven bodies put in through the contacts [J]
     relaxed : kinetic energy that relaxation took out at the end of the step [J]
     """
 
     before: State
     after: State
+    predicted: State
+    kick: Kick
     contacts: Contacts
     solution: ContactSolution
+    impulse: Array
     force: Array
     gap: Array
+    terms: Terms
+    internal: Array
     work: float
+    driven: float
     relaxed: float
 
 
 @dataclass(frozen=True)
 class _Touching:
-    """The contacts in force, their Delassus operator, and the configuration in which they were found."""
+    """The contacts in force, their laws and W, and the configuration in which they were found."""
 
     contacts: Contacts
-    operator: Delassus
+    law: NDArray[np.int64]
+    operator: RigidDelassus | MixedDelassus
     sparse: SparseForm | None
     configuration: State
 
@@ -89,51 +115,91 @@ class Simulation:
 
     def __init__(self, model: Model, start: State, clock: Clock) -> None:
         settings = model.scene
-        self.model, self.state, self.clock = model, start, clock
+        self.model, self.start, self.state, self.clock = model, start, start, clock
         self._step, self._theta = settings.time.step, settings.time.theta
         with clock("assemble"):
             self._compliance: dict[int, DynamicCompliance] = compliances(model, self._step, self._theta)
-        self._detector = Detector(model.surfaces, model.fixed, settings.contact.alert_distance)
-        self._solve = choose_solver(settings.solver, bool(model.elastic.any()))
+        self._detector = detector(model)
+        self._solve = choose_solver(settings.solver, not model.rigid_only)
         self._memory = Memory()
         self._touching: _Touching | None = None
         self._kinetic = 0.0
+        self._first = True
 
     def step(self) -> Step:
-        """Predict, detect, solve, advance.
+        """Predict, detect, state the problem, solve, advance.
 
         Raises
         ------
         SolverError : if the motion is no longer finite
         """
         h, theta, model = self._step, self._theta, self.model
-        predicted = predict(self.state, h * (1 - theta))
+        with self.clock("advance"):
+            predicted = predict(model, self.start, self.state, h * (1 - theta))
         predicted, touching = self._detect(predicted)
-        contacts = touching.contacts
+        contacts, operator = touching.contacts, touching.operator
         # one frame for the whole step: the linear problem of a deformable body is stated in it
         before = self._with_frames_of(predicted, self.state)
+        remembered, internal = self._memory.recall(contacts.key)
         with self.clock("assemble"):
-            free = free_motion(model, before, self._compliance, h, theta)
-            problem = contact_problem(
-                model, predicted, contacts, touching.operator, touching.sparse, free, h, theta
-            )
+            free = free_kick(model, self.start, before, predicted, self._compliance, h, theta)
+            statement = state_laws(
+                model, predicted, contacts, gaps(contacts, predicted), touching.law,
+                operator, touching.sparse, free, internal, self._first,
+            )  # fmt: skip
         with self.clock("solve"):
-            solution = self._solve(problem, start=self._memory.recall(contacts))
+            solution = self._solve(statement.problem, start=statement.started(remembered))
+        impulse = statement.real(solution.impulse)
         with self.clock("advance"):
-            after = advance(
-                model, before, contacts, touching.operator, solution.impulse, free, self._compliance, h, theta
-            )
+            kick = kicked(model, free, before, contacts, operator, impulse, self._compliance)
+            after = advance(model, self.start, predicted, kick, h * theta)
         if not (np.isfinite(after.velocity).all() and np.isfinite(after.node_velocity).all()):
             raise SolverError(
                 f"the velocities are not finite at t = {after.time:.6g} s",
                 where=model.scene.name,
                 remedy="use a smaller time step",
             )
-        self._memory.store(contacts, solution)
-        work = self._contact_work(before, after, touching, solution)
+        with self.clock("advance"):
+            return self._finish(before, predicted, kick, after, touching, statement, solution, impulse)
+
+    def _finish(
+        self,
+        before: State,
+        predicted: State,
+        kick: Kick,
+        after: State,
+        touching: _Touching,
+        statement: Statement,
+        solution: ContactSolution,
+        impulse: Array,
+    ) -> Step:
+        """Let the laws see what came of them, remember, and account."""
+        contacts, operator, model = touching.contacts, touching.operator, self.model
+        u = local_velocity(contacts, operator, kick.velocity, kick.node_velocity)
+        internal = model.laws.after(statement.law, statement.approach, solution.impulse, u)
+        self._memory.store(contacts.key, replace(solution, impulse=impulse), internal)
+        self._first = False
+        u_before = local_velocity(contacts, operator, predicted.velocity, predicted.node_velocity)
+        fixed = np.where(model.fixed[:, None], kick.velocity, 0.0)
+        driving = local_velocity(contacts, operator, fixed, np.zeros_like(after.node))
+        theta = self._theta
         self.state, relaxed = self._relax(after)
-        force = world_impulse(contacts, solution.impulse) / h
-        return Step(before, after, contacts, solution, force, gaps(contacts, after), work, relaxed)
+        return Step(
+            before=before,
+            after=after,
+            predicted=predicted,
+            kick=kick,
+            contacts=contacts,
+            solution=solution,
+            impulse=impulse,
+            force=world_impulse(contacts, impulse) / self._step,
+            gap=gaps(contacts, after),
+            terms=statement.terms,
+            internal=internal,
+            work=float(np.sum(impulse * (theta * u + (1 - theta) * u_before))),
+            driven=-float(np.sum(impulse * driving)),
+            relaxed=relaxed,
+        )
 
     def _relax(self, after: State) -> tuple[State, float]:
         """Kinetic damping: bring all bodies to a halt once their kinetic energy has passed a peak (Cundall 1976)."""
@@ -149,24 +215,34 @@ class Simulation:
 
     def _detect(self, predicted: State) -> tuple[State, _Touching]:
         """The contacts at the predicted configuration; found anew only when something has moved."""
-        known = self._touching
-        if known is not None:
-            width = self.model.surfaces.size.min()
-            moved = displacement(self.model, known.configuration, predicted).max() / width
-            pace = self._step * speed(self.model, predicted).max() / width
-            settled = moved > _SETTLED and pace < _SLOWED * moved
-            if moved <= _STALE and not settled:
-                return self._with_frames_of(known.configuration, predicted), known
+        model, known = self.model, self._touching
+        if known is not None and not self._stale(known, predicted):
+            return self._with_frames_of(known.configuration, predicted), known
         with self.clock("detect"):
-            predicted = follow_nodes(self.model, predicted)
-            contacts = self._detector(predicted, self._step * speed(self.model, predicted))
+            predicted = follow_nodes(model, predicted)
+            contacts = self._detector(predicted, self._step * speed(model, predicted))
         with self.clock("assemble"):
-            operator = delassus(self.model, predicted, contacts, self._compliance)
             sparse = None
-            if isinstance(self._solve, ADMM):
-                sparse = sparse_form(self.model, predicted, contacts, operator, self._compliance)
-        self._touching = _Touching(contacts, operator, sparse, predicted)
+            operator: RigidDelassus | MixedDelassus
+            if model.rigid_only:
+                plan = schedule(contacts.bodies, model.inertia.moving)
+                contacts = take(contacts, plan.order)
+                operator = rigid_delassus(model, predicted, contacts, plan)
+            else:
+                operator = mixed_delassus(model, predicted, contacts, self._compliance)
+                if isinstance(self._solve, ADMM):
+                    sparse = sparse_form(model, predicted, contacts, operator, self._compliance)
+        self._touching = _Touching(contacts, model.laws.of(contacts.bodies), operator, sparse, predicted)
         return predicted, self._touching
+
+    def _stale(self, known: _Touching, predicted: State) -> bool:
+        """Whether the known contacts no longer serve."""
+        width = float(self.model.surfaces.size.min())
+        moved = float(displacement(self.model, known.configuration, predicted).max()) / width
+        if self.model.rigid_only:
+            return moved > _STALE_RIGID
+        pace = self._step * float(speed(self.model, predicted).max()) / width
+        return moved > _STALE or (moved > _SETTLED and pace < _SLOWED * moved)
 
     def _with_frames_of(self, source: State, state: State) -> State:
         """`state` with the frames of the deformable bodies taken from `source`."""
@@ -177,12 +253,15 @@ class Simulation:
             rotation=np.where(elastic[:, None, None], source.rotation, state.rotation),
         )
 
-    def _contact_work(
-        self, before: State, after: State, touching: _Touching, solution: ContactSolution
-    ) -> float:
-        """r·u_θ [J]."""
-        theta = self._theta
-        velocity = theta * after.velocity + (1 - theta) * before.velocity
-        node_velocity = theta * after.node_velocity + (1 - theta) * before.node_velocity
-        u_theta = local_velocity(touching.contacts, touching.operator, velocity, node_velocity)
-        return float(np.sum(solution.impulse * u_theta))
+
+def detector(model: Model) -> Detector:
+    """The contact detector of a scene."""
+    settings = model.scene.contact
+    return Detector(
+        model.surfaces,
+        model.fixed,
+        settings.alert_distance,
+        settings.points,
+        settings.placement,
+        max(law.reach for law in model.laws.laws),
+    )

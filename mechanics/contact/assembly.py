@@ -8,20 +8,39 @@ from scipy.sparse import block_diag, csc_array, csr_array, eye_array, hstack, kr
 
 from mechanics.bodies.deformable import DynamicCompliance
 from mechanics.bodies.rigid import inverse_inertia_world
-from mechanics.contact.contacts import Contacts
+from mechanics.contact.contacts import Contacts, material_points
 from mechanics.model import Model
-from mechanics.problem import ELASTIC, NONE, RIGID, Delassus, SparseForm
+from mechanics.operators.mixed import ELASTIC, NONE, RIGID, MixedDelassus
+from mechanics.operators.rigid import RigidDelassus, Schedule
+from mechanics.problem import SparseForm
 from mechanics.state import State
 
-__all__ = ["delassus", "local_velocity", "sparse_form", "world_impulse"]
+__all__ = ["local_velocity", "mixed_delassus", "rigid_delassus", "sparse_form", "world_impulse"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-def delassus(
+def rigid_delassus(model: Model, state: State, contacts: Contacts, schedule: Schedule) -> RigidDelassus:
+    """W of contacts between rigid bodies, already in the order of the schedule.
+
+    Both bodies meet in one common point, half-way between their material points, so that equal and opposite
+    impulses leave the angular momentum of the scene as it is, whatever the gap.
+    """
+    point = material_points(contacts, state).mean(axis=1)
+    arm = point[:, None] - state.centre[contacts.bodies]
+    turned = inverse_inertia_world(model.inertia, state.rotation).reshape(-1, 9)
+    return RigidDelassus(
+        contacts.bodies,
+        np.hstack([contacts.frame.reshape(-1, 9), arm.reshape(-1, 6)]),
+        np.hstack([model.inertia.inverse_mass[:, None], turned[:, [0, 1, 2, 4, 5, 8]]]),
+        schedule,
+    )
+
+
+def mixed_delassus(
     model: Model, state: State, contacts: Contacts, compliance: Mapping[int, DynamicCompliance]
-) -> Delassus:
+) -> MixedDelassus:
     """W of the contacts at the configuration of `state`: condense each deformable body on its contact sides."""
     body = contacts.bodies
     kind = np.where(model.fixed[body], NONE, np.where(model.elastic[body], ELASTIC, RIGID)).astype(np.int64)
@@ -37,7 +56,7 @@ def delassus(
         diagonal[sides] = square.reshape(len(sides), 3, len(sides), 3)[n, :, n]
     jacobian, response = _rigid_sides(model, state, contacts)
     total = (diagonal.reshape(-1, 2, 3, 3) + jacobian @ response).sum(axis=1)
-    return Delassus(body, kind, jacobian, response, slot, yptr, bptr, block, total)
+    return MixedDelassus(body, kind, jacobian, response, slot, yptr, bptr, block, total)
 
 
 def _rigid_sides(model: Model, state: State, contacts: Contacts) -> tuple[Array, Array]:
@@ -86,7 +105,7 @@ def sparse_form(
     model: Model,
     state: State,
     contacts: Contacts,
-    operator: Delassus,
+    operator: MixedDelassus,
     compliance: Mapping[int, DynamicCompliance],
 ) -> SparseForm:
     """The same W in sparse matrices: six velocities for each rigid body, then those of all nodes, world axes."""
@@ -106,7 +125,7 @@ def sparse_form(
     return SparseForm(block_diag(blocks, format="csc"), csc_array(lift))
 
 
-def _rigid_lift(rigid: Ints, operator: Delassus) -> "csr_array[np.float64]":
+def _rigid_lift(rigid: Ints, operator: MixedDelassus) -> "csr_array[np.float64]":
     """Hᵀ of the rigid sides, (3 nc, 6 nr)."""
     place = np.full(operator.body.max(initial=0) + 1, -1)
     place[rigid[rigid < len(place)]] = np.flatnonzero(rigid < len(place))
@@ -118,8 +137,12 @@ def _rigid_lift(rigid: Ints, operator: Delassus) -> "csr_array[np.float64]":
     return csr_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
 
 
-def local_velocity(contacts: Contacts, operator: Delassus, velocity: Array, node_velocity: Array) -> Array:
+def local_velocity(
+    contacts: Contacts, operator: RigidDelassus | MixedDelassus, velocity: Array, node_velocity: Array
+) -> Array:
     """Relative velocity u = Hᵀ v (nc, 3) of the contacts, local frame [m/s]."""
+    if isinstance(operator, RigidDelassus):
+        return operator.relative_velocity(velocity)
     rigid = np.einsum("csij,csj->csi", operator.jacobian, velocity[contacts.bodies])
     elastic = np.einsum("cij,csj->csi", contacts.frame, (contacts.weights @ node_velocity).reshape(-1, 2, 3))
     sides = np.where((operator.kind == ELASTIC)[..., None], elastic, rigid)

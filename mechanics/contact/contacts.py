@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from mechanics.contact._kernels_broad import points_of
 from mechanics.state import State
 
-__all__ = ["Contacts", "gaps", "material_points"]
+__all__ = ["Contacts", "gaps", "material_points", "take"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -28,7 +29,7 @@ class Contacts:
     bodies : (nc, 2) candidate and antagonist
     key : (nc,) names the contact from step to step
     frame : (nc, 3, 3) rows n, t1, t2; n points from antagonist to candidate
-    area : (nc,) tributary area; zero at an edge or a corner [m²]
+    area : (nc,) tributary area; the areas of an interface add up to its own; zero between edges [m²]
     arm : (nc, 2, 3) place of a rigid body's material point, body axes [m]
     weights : (2 nc, nn) of the nodes of deformable bodies; row 2α + side, empty for rigid sides
     """
@@ -44,13 +45,30 @@ class Contacts:
         return len(self.key)
 
 
+def take(contacts: Contacts, rows: Ints) -> Contacts:
+    """Some contacts, in the order of `rows` (n,)."""
+    weights = contacts.weights
+    if weights.nnz:
+        weights = weights[(2 * rows[:, None] + np.arange(2)).ravel()]
+    elif len(rows) != len(contacts):
+        weights = csr_array((2 * len(rows), weights.shape[1]))
+    return Contacts(
+        contacts.bodies[rows],
+        contacts.key[rows],
+        contacts.frame[rows],
+        contacts.area[rows],
+        contacts.arm[rows],
+        weights,
+    )
+
+
 def material_points(contacts: Contacts, state: State) -> Array:
     """Where the two material points of each contact are now, (nc, 2, 3) [m]."""
-    body = contacts.bodies
-    rigid = state.centre[body] + np.einsum("csij,csj->csi", state.rotation[body], contacts.arm)
-    elastic = (contacts.weights @ state.node).reshape(-1, 2, 3)
-    on_nodes = (np.diff(contacts.weights.indptr) > 0).reshape(-1, 2, 1)
-    points: Array = np.where(on_nodes, elastic, rigid)
+    points: Array = points_of(contacts.bodies, contacts.arm, state.centre, state.rotation)
+    if contacts.weights.nnz:
+        elastic = (contacts.weights @ state.node).reshape(-1, 2, 3)
+        on_nodes = (np.diff(contacts.weights.indptr) > 0).reshape(-1, 2, 1)
+        points = np.where(on_nodes, elastic, points)
     return points
 
 

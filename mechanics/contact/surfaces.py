@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from mechanics.polyhedra import face_plane, smallest_width
 
-__all__ = ["FaceMesh", "Surfaces", "surfaces"]
+__all__ = ["FaceMesh", "Placed", "Surfaces", "surfaces"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -32,21 +32,29 @@ class FaceMesh:
 
 @dataclass(frozen=True)
 class Surfaces:
-    """Convex polyhedra of all bodies, in body axes, as in mechanics.contact._kernels.
+    """The convex polyhedra of all bodies, in body axes, as in mechanics.contact._kernels_narrow.
+
+    A body has one shape, or one for each of its convex parts; the shapes of a body follow one another.
 
     Attributes
     ----------
-    vptr : (nb+1,) vertices of each body
-    vertex : (nv, 3) relative to the centre of mass, body axes [m]
-    fptr : (nb+1,) faces of each body
+    body : (ns,) the body of each shape
+    sptr : (nb+1,) shapes of each body
+    vptr : (ns+1,) vertices of each shape
+    vertex : (nv, 3) relative to the body's centre of mass, body axes [m]
+    fptr : (ns+1,) faces of each shape
     cptr, corner : corners of each face
     normal : (nf, 3) outward, body axes
-    eptr, edge_a, edge_b : edges of each body, as vertex indices
+    eptr, edge_a, edge_b : edges of each shape, as vertex indices
+    edge_face : (ne, 2) the faces that meet in each edge
+    shape_size : (ns,) smallest width of each shape [m]
     size : (nb,) smallest width of each body [m]
     face_area : (nf,) [m²]
     face_mesh : per face, its finite elements; None for rigid bodies
     """
 
+    body: Ints
+    sptr: Ints
     vptr: Ints
     vertex: Array
     fptr: Ints
@@ -56,44 +64,75 @@ class Surfaces:
     eptr: Ints
     edge_a: Ints
     edge_b: Ints
+    edge_face: Ints
+    shape_size: Array
     size: Array
     face_area: Array
     face_mesh: tuple[FaceMesh | None, ...]
 
     @property
-    def body_of_vertex(self) -> Ints:
-        """(nv,) the body of each vertex."""
-        return np.repeat(np.arange(len(self.vptr) - 1), np.diff(self.vptr))
+    def body_vptr(self) -> Ints:
+        """(nb+1,) vertices of each body."""
+        return self.vptr[self.sptr]
 
     @property
-    def body_of_face(self) -> Ints:
-        """(nf,) the body of each face."""
-        return np.repeat(np.arange(len(self.fptr) - 1), np.diff(self.fptr))
+    def body_of_vertex(self) -> Ints:
+        """(nv,) the body of each vertex."""
+        return np.repeat(self.body, np.diff(self.vptr))
+
+
+@dataclass(frozen=True)
+class Placed:
+    """The shapes in world axes, and the frames of their bodies.
+
+    Attributes
+    ----------
+    vertex, normal : of all shapes, as in `Surfaces`, world axes
+    centre, rotation : of the bodies
+    shape_centre : (ns, 3) of the body of each shape [m]
+    """
+
+    vertex: Array
+    normal: Array
+    centre: Array
+    rotation: Array
+    shape_centre: Array
 
 
 def surfaces(
     vertices: Sequence[Array],
     faces: Sequence[tuple[tuple[int, ...], ...]],
     face_mesh: Sequence[FaceMesh | None],
+    body: Sequence[int],
 ) -> Surfaces:
-    """Pack bodies given by their corners (body axes) and faces."""
-    vptr = _pointer([len(v) for v in vertices])
+    """Pack shapes given by their corners (body axes), their faces and the body that each belongs to, in order."""
+    vptr, fptr = _pointer([len(v) for v in vertices]), _pointer([len(group) for group in faces])
     corners = [start + np.asarray(face) for start, group in zip(vptr, faces, strict=False) for face in group]
     vertex = np.vstack(list(vertices))
-    edges = [_edges(group) + start for group, start in zip(faces, vptr, strict=False)]
-    packed = np.vstack(edges)
     polygons = [vertex[c] for c in corners]
+    normal = np.array([face_plane(p)[0] for p in polygons])
+    edges = [
+        _edges(group, vertex, normal, int(v), int(f)) for group, v, f in zip(faces, vptr, fptr, strict=False)
+    ]
+    packed = np.vstack(edges)
+    owner = np.asarray(body, dtype=np.int64)
+    sptr = _pointer(np.bincount(owner).tolist())
+    shape_size = np.array([smallest_width(v, group) for v, group in zip(vertices, faces, strict=True)])
     return Surfaces(
+        body=owner,
+        sptr=sptr,
         vptr=vptr,
         vertex=vertex,
-        fptr=_pointer([len(group) for group in faces]),
+        fptr=fptr,
         cptr=_pointer([len(c) for c in corners]),
         corner=np.concatenate(corners).astype(np.int64),
-        normal=np.array([face_plane(p)[0] for p in polygons]),
+        normal=normal,
         eptr=_pointer([len(e) for e in edges]),
         edge_a=np.ascontiguousarray(packed[:, 0]),
         edge_b=np.ascontiguousarray(packed[:, 1]),
-        size=np.array([smallest_width(v, group) for v, group in zip(vertices, faces, strict=True)]),
+        edge_face=np.ascontiguousarray(packed[:, 2:]),
+        shape_size=shape_size,
+        size=np.minimum.reduceat(shape_size, sptr[:-1]),
         face_area=np.array([_area(p) for p in polygons]),
         face_mesh=tuple(face_mesh),
     )
@@ -108,7 +147,20 @@ def _area(polygon: Array) -> float:
     return float(0.5 * np.linalg.norm(np.cross(local, np.roll(local, -1, axis=0)).sum(axis=0)))
 
 
-def _edges(faces: tuple[tuple[int, ...], ...]) -> Ints:
-    """All edges (ne, 2), each once."""
-    pairs = {(min(a, b), max(a, b)) for f in faces for a, b in zip(f, (*f[1:], f[0]), strict=True)}
-    return np.array(sorted(pairs), dtype=np.int64)
+def _edges(
+    faces: tuple[tuple[int, ...], ...], vertex: Array, normal: Array, first_vertex: int, first_face: int
+) -> Ints:
+    """Edges (ne, 4): two vertices and two faces, each once, directed along second normal × first normal."""
+    face_of = {
+        (a, b): n for n, face in enumerate(faces) for a, b in zip(face, (*face[1:], face[0]), strict=True)
+    }
+    rows = []
+    for (a, b), one in sorted(face_of.items()):
+        if a > b:
+            continue
+        other = face_of[(b, a)]
+        along = vertex[first_vertex + b] - vertex[first_vertex + a]
+        turned = np.cross(normal[first_face + other], normal[first_face + one])
+        start, end = (a, b) if along @ turned >= 0 else (b, a)
+        rows.append((first_vertex + start, first_vertex + end, first_face + one, first_face + other))
+    return np.array(rows, dtype=np.int64)

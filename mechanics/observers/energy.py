@@ -4,14 +4,20 @@ With v_θ = θ v_{i+1} + (1-θ) v_i, the scheme gives exactly
 
     ΔE = W_ext + W_contact - D_scheme,   W_contact = r·u_θ,   D_scheme = (θ - ½) (‖Δv‖²_M + ‖Δq‖²_K)
 
-for linear motion; turning bodies leave a remainder that shrinks with the step.
+where Δv is the jump at the kick; the flights before and after it keep the energy of a rigid body as it is. Deformable
+bodies that turn leave a remainder that shrinks with the step. W_ext holds the loads and what driven bodies put in.
 """
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechanics.model import Model
 from mechanics.state import State
+
+if TYPE_CHECKING:
+    from mechanics.simulation import Step
 
 __all__ = ["EnergyBalance", "elastic_energy", "kinetic_energy"]
 
@@ -59,7 +65,8 @@ class EnergyBalance:
 
     Attributes
     ----------
-    external, contact, scheme : work of the loads and of the contacts, dissipation of scheme and relaxation, so far [J]
+    external, contact, scheme : work of loads and driven bodies, work of the contacts, dissipation of scheme and
+        relaxation, so far [J]
     unexplained : ΔE - external - contact + scheme, so far [J]
     reference : the largest energy that was in play so far, at least 10⁻⁹ of weight times smallest width [J]
     """
@@ -68,38 +75,41 @@ class EnergyBalance:
         self._model = model
         self._energy = kinetic_energy(model, state) + elastic_energy(model, state)
         self.external = self.contact = self.scheme = self.unexplained = 0.0
-        weight = float(model.mass[~model.fixed].sum() * np.linalg.norm(model.gravity))
+        weight = float(model.mass[~model.fixed].sum() * np.linalg.norm(model.gravity(state.time)))
         self.reference = max(self._energy, 1e-9 * weight * float(model.surfaces.size.min()))
 
-    def __call__(
-        self, before: State, after: State, contact_work: float, relaxed: float, theta: float
-    ) -> None:
-        """Account for one step: `contact_work` is r·u_θ, `relaxed` the kinetic energy taken out at its end [J]."""
-        model = self._model
-        external = self._load_work(before, after)
+    def __call__(self, step: "Step") -> None:
+        """Account for one step."""
+        model, theta = self._model, self._model.scene.time.theta
+        before, kick = step.predicted, step.kick
+        external = self._load_work(step, theta) + step.driven
         jump = _mass_norm(
             model,
             before.rotation,
-            after.velocity - before.velocity,
-            after.node_velocity - before.node_velocity,
+            kick.velocity - before.velocity,
+            kick.node_velocity - before.node_velocity,
         )
-        scheme = (theta - 0.5) * (jump + _stiffness_norm(model, before, after))
-        energy = kinetic_energy(model, after) + elastic_energy(model, after)
-        self.unexplained += energy - self._energy - external - contact_work + scheme
+        scheme = (theta - 0.5) * (jump + _stiffness_norm(model, step.before, step.after))
+        energy = kinetic_energy(model, step.after) + elastic_energy(model, step.after)
+        self.unexplained += energy - self._energy - external - step.work + scheme
         self.external += external
-        self.contact += contact_work
-        self.scheme += scheme + relaxed
-        self._energy = energy - relaxed
+        self.contact += step.work
+        self.scheme += scheme + step.relaxed
+        self._energy = energy - step.relaxed
         self.reference = max(self.reference, energy, abs(self.external), abs(self.contact), self.scheme)
 
-    def _load_work(self, before: State, after: State) -> float:
+    def _load_work(self, step: "Step", theta: float) -> float:
+        """h P·v_θ: loads at the kick, on velocities before and after it."""
         model = self._model
-        rigid = model.inertia.inverse_mass > 0
-        work = float(model.mass[rigid] @ ((after.centre - before.centre)[rigid] @ model.gravity))
+        moving, h = model.inertia.moving, model.scene.time.step
+        mean = theta * step.kick.velocity + (1 - theta) * step.predicted.velocity
+        work = h * float(np.sum(step.kick.load[moving] * mean[moving]))
+        gravity = model.gravity(step.predicted.time)
         for b, stone in enumerate(model.stones):
             if stone is not None:
                 rows = model.nodes_of(b)
-                work += float(stone.operators.nodal_mass @ ((after.node - before.node)[rows] @ model.gravity))
+                move = (step.after.node - step.before.node)[rows]
+                work += float(stone.operators.nodal_mass @ (move @ gravity))
         return work
 
     @property

@@ -33,19 +33,21 @@ class Support:
         return abs(self.reaction - self.weight) / self.weight if self.weight > 0 else 0.0
 
 
-def imbalance(model: Model, state: State, contacts: Contacts, force: Array) -> Array:
+def imbalance(model: Model, state: State, contacts: Contacts, force: Array, load: Array) -> Array:
     """Unbalanced force and moment of each body over its weight (nb,) [-]; zero for fixed bodies.
 
-    The sum of the weight and of the contact forces (nc, 3) [N], inertia left out: it is zero only for a body in
-    static equilibrium. The moment, about the centre of mass, counts with the smallest width as its arm. Without
-    gravity the largest contact force replaces the weight.
+    The sum of the loads (nb, 6) on rigid bodies, weight included, and of the contact forces (nc, 3) [N], inertia left
+    out: it is zero only for a body in static equilibrium. The moment, about the centre of mass, counts with the
+    smallest width as its arm. Without gravity the largest contact force replaces the weight.
     """
-    resultant = np.zeros((len(model.mass), 6))
     points = material_points(contacts, state)
-    np.add.at(resultant, contacts.bodies[:, 0], _wrench(state, contacts.bodies[:, 0], points[:, 0], force))
-    np.add.at(resultant, contacts.bodies[:, 1], _wrench(state, contacts.bodies[:, 1], points[:, 1], -force))
-    resultant[:, :3] += model.mass[:, None] * model.gravity
-    scale = model.mass * float(np.linalg.norm(model.gravity))
+    count = len(model.mass)
+    resultant = _wrenches(state, contacts.bodies[:, 0], points[:, 0], force, count)
+    resultant -= _wrenches(state, contacts.bodies[:, 1], points[:, 1], force, count)
+    weight = model.mass[:, None] * model.gravity(state.time)
+    # the load on rigid bodies holds their weight
+    resultant += np.where(model.elastic[:, None], np.hstack([weight, np.zeros_like(weight)]), load)
+    scale = np.linalg.norm(weight, axis=1)
     if not scale.any():
         scale = np.full(len(scale), np.linalg.norm(force, axis=1).max(initial=0.0) or 1.0)
     size = model.surfaces.size
@@ -54,14 +56,17 @@ def imbalance(model: Model, state: State, contacts: Contacts, force: Array) -> A
     return result
 
 
-def _wrench(state: State, body: NDArray[np.int64], point: Array, force: Array) -> Array:
-    return np.column_stack([force, np.cross(point - state.centre[body], force)])
+def _wrenches(state: State, body: NDArray[np.int64], point: Array, force: Array, count: int) -> Array:
+    """Sums (count, 6) of forces and of their moments about the centres of the bodies."""
+    wrench = np.column_stack([force, np.cross(point - state.centre[body], force)])
+    return np.column_stack([np.bincount(body, column, count) for column in wrench.T])
 
 
-def support_reaction(model: Model, contacts: Contacts, force: Array) -> Support:
+def support_reaction(model: Model, contacts: Contacts, force: Array, time: float) -> Support:
     """Sum of the contact forces (nc, 3) [N] from fixed bodies, along -gravity (along z without gravity)."""
-    g = float(np.linalg.norm(model.gravity))
-    up = -model.gravity / g if g > 0 else np.array([0.0, 0.0, 1.0])
+    gravity = model.gravity(time)
+    g = float(np.linalg.norm(gravity))
+    up = -gravity / g if g > 0 else np.array([0.0, 0.0, 1.0])
     sign = model.fixed[contacts.bodies[:, 1]].astype(float) - model.fixed[contacts.bodies[:, 0]]
     return Support(float(sign @ (force @ up)), float(model.mass[~model.fixed].sum() * g))
 
@@ -71,7 +76,7 @@ def displacement(model: Model, start: State, state: State) -> Array:
     corner = model.surfaces.body_of_vertex
     moved = np.einsum("vij,vj->vi", (state.rotation - start.rotation)[corner], model.surfaces.vertex)
     moved += (state.centre - start.centre)[corner]
-    largest = np.maximum.reduceat(np.linalg.norm(moved, axis=1), model.surfaces.vptr[:-1])
+    largest = np.maximum.reduceat(np.linalg.norm(moved, axis=1), model.surfaces.body_vptr[:-1])
     return _with_nodes(model, largest, np.linalg.norm(state.node - start.node, axis=1))
 
 
@@ -80,7 +85,7 @@ def speed(model: Model, state: State) -> Array:
     corner = model.surfaces.body_of_vertex
     arm = np.einsum("vij,vj->vi", state.rotation[corner], model.surfaces.vertex)
     v = state.velocity[corner, :3] + np.cross(state.velocity[corner, 3:], arm)
-    largest = np.maximum.reduceat(np.linalg.norm(v, axis=1), model.surfaces.vptr[:-1])
+    largest = np.maximum.reduceat(np.linalg.norm(v, axis=1), model.surfaces.body_vptr[:-1])
     return _with_nodes(model, largest, np.linalg.norm(state.node_velocity, axis=1))
 
 

@@ -1,63 +1,9 @@
-"""Numba kernels of the contact problem: products with W, exact local solves, Gauss–Seidel sweeps."""
+"""Numba kernels that every solver uses: the exact solution of one contact, and the natural map of all."""
 
 import numpy as np
 from numba import njit
 
-__all__ = ["apply_delassus", "local_factors", "solve_contact", "sweep"]
-
-NONE, RIGID, ELASTIC = 0, 1, 2
-
-
-@njit(cache=True)
-def apply_delassus(r, body, kind, jacobian, response, slot, yptr, bptr, block):  # pragma: no cover - compiled
-    """What the impulses r (nc, 3) do: u = W r (nc, 3), rigid velocities (nb, 6), elastic side velocities."""
-    nc, nb = r.shape[0], yptr.shape[0] - 1
-    v = np.zeros((nb, 6))
-    p, y = np.zeros(yptr[nb]), np.zeros(yptr[nb])
-    for c in range(nc):
-        sign = 1.0
-        for s in range(2):
-            b = body[c, s]
-            if kind[c, s] == RIGID:
-                for i in range(6):
-                    for k in range(3):
-                        v[b, i] += sign * response[c, s, i, k] * r[c, k]
-            elif kind[c, s] == ELASTIC:
-                start = yptr[b] + 3 * slot[c, s]
-                for k in range(3):
-                    p[start + k] += sign * r[c, k]
-            sign = -1.0
-    for b in range(nb):
-        n = yptr[b + 1] - yptr[b]
-        for row in range(n):
-            start = bptr[b] + row * n
-            total = 0.0
-            for col in range(n):
-                total += block[start + col] * p[yptr[b] + col]
-            y[yptr[b] + row] = total
-    u = np.zeros((nc, 3))
-    for c in range(nc):
-        _relative_velocity(c, u[c], v, y, body, kind, jacobian, slot, yptr)
-    return u, v, y
-
-
-@njit(cache=True, inline="always")
-def _relative_velocity(c, u, v, y, body, kind, jacobian, slot, yptr):
-    """Add to u (3,) the local relative velocity at contact c."""
-    sign = 1.0
-    for s in range(2):
-        b = body[c, s]
-        if kind[c, s] == RIGID:
-            for k in range(3):
-                total = 0.0
-                for i in range(6):
-                    total += jacobian[c, s, k, i] * v[b, i]
-                u[k] += sign * total
-        elif kind[c, s] == ELASTIC:
-            start = yptr[b] + 3 * slot[c, s]
-            for k in range(3):
-                u[k] += sign * y[start + k]
-        sign = -1.0
+__all__ = ["local_factors", "natural_errors", "slip", "solve_contact"]
 
 
 @njit(cache=True)
@@ -74,52 +20,60 @@ def local_factors(diagonal):  # pragma: no cover - compiled
         a = w[1, 1] - w[1, 0] * w[0, 1] / nn
         b = w[1, 2] - w[1, 0] * w[0, 2] / nn
         d = w[2, 2] - w[2, 0] * w[0, 2] / nn
-        angle = 0.5 * np.arctan2(2.0 * b, a - d)
-        co, si = np.cos(angle), np.sin(angle)
         factors[c, 9], factors[c, 10], factors[c, 11] = nn, w[0, 1], w[0, 2]
-        factors[c, 12], factors[c, 13] = co, si
-        factors[c, 14] = co * co * a + 2.0 * co * si * b + si * si * d
-        factors[c, 15] = si * si * a - 2.0 * co * si * b + co * co * d
+        factors[c, 12:] = plane_axes(a, b, d)
     return factors
 
 
 @njit(cache=True)
-def solve_contact(f, b, mu, r):  # pragma: no cover - compiled
-    """Solve u = W r + b with Signorini's and Coulomb's laws at one contact, exactly; r (3,) is written.
+def plane_axes(a, b, d):  # pragma: no cover - compiled
+    """Rotation (cos, sin) to the axes of [[a, b], [b, d]], and its eigenvalues."""
+    angle = 0.5 * np.arctan2(2.0 * b, a - d)
+    co, si = np.cos(angle), np.sin(angle)
+    return (
+        co,
+        si,
+        co * co * a + 2.0 * co * si * b + si * si * d,
+        si * si * a - 2.0 * co * si * b + co * co * d,
+    )
 
-    Open if b_N ≥ 0. Stick if r = -W⁻¹ b lies in the cone. Else slip: u_T = -λ r_T with λ > 0 gives
-    r_T(λ) = -(A + λ)⁻¹ c and r_N(λ) = -(b_N + W_NT r_T)/W_NN, and ‖r_T‖ - μ r_N changes its sign on (0, ∞), so the
-    root is bracketed and Newton's method, kept inside the bracket, finds it.
+
+@njit(cache=True)
+def slip(nn, n1, n2, co, si, l1, l2, b0, b1, b2, mu, k):  # pragma: no cover - compiled
+    """The impulse of one contact that neither sticks nor is without any load: r_N ≥ 0 and ‖r_T‖ = μ r_N + k.
+
+    Slip means u_T = -λ r_T with λ > 0, so r_T(λ) = -(A + λ)⁻¹ c and r_N(λ) = -(b_N + W_NT r_T)/W_NN. The value
+    ‖r_T‖ - μ r_N - k changes its sign on (0, ∞), so the root is bracketed and Newton's method, kept inside the
+    bracket, finds it. Cohesion can also be spent without pressure: then r_N = 0 and ‖r_T‖ ≤ k.
     """
-    if b[0] >= 0.0:
-        r[:] = 0.0
-        return
-    for k in range(3):
-        r[k] = -(f[3 * k] * b[0] + f[3 * k + 1] * b[1] + f[3 * k + 2] * b[2])
-    if r[0] > 0.0 and r[1] * r[1] + r[2] * r[2] <= mu * mu * r[0] * r[0]:
-        return
-    nn, n1, n2 = f[9], f[10], f[11]
-    if mu == 0.0:
-        r[0], r[1], r[2] = -b[0] / nn, 0.0, 0.0
-        return
-    co, si, l1, l2 = f[12], f[13], f[14], f[15]
-    c1, c2 = b[1] - n1 * b[0] / nn, b[2] - n2 * b[0] / nn
+    if b0 < 0.0:
+        r0, r1, r2 = _slip_pressed(nn, n1, n2, co, si, l1, l2, b0, b1, b2, mu, k)
+        if r0 > 0.0 or k == 0.0:
+            return r0, r1, r2
+    return _slip_unpressed(nn, n1, n2, co, si, l1, l2, b1, b2, k)
+
+
+@njit(cache=True)
+def _slip_pressed(nn, n1, n2, co, si, l1, l2, b0, b1, b2, mu, k):
+    if mu == 0.0 and k == 0.0:
+        return -b0 / nn, 0.0, 0.0
+    c1, c2 = b1 - n1 * b0 / nn, b2 - n2 * b0 / nn
     # in the axes of A
     x1, x2 = co * c1 + si * c2, -si * c1 + co * c2
     m1, m2 = co * n1 + si * n2, -si * n1 + co * n2
     low, high = 0.0, -1.0
-    lam = np.sqrt(x1 * x1 + x2 * x2) * nn / (mu * -b[0]) * 0.5
+    lam = np.sqrt(x1 * x1 + x2 * x2) * nn / (mu * -b0 + k * nn) * 0.5
     t1 = t2 = n = 0.0
     for _ in range(100):
         t1, t2 = -x1 / (l1 + lam), -x2 / (l2 + lam)
-        n = -(b[0] + m1 * t1 + m2 * t2) / nn
+        n = -(b0 + m1 * t1 + m2 * t2) / nn
         size = np.sqrt(t1 * t1 + t2 * t2)
-        value = size - mu * n
+        value = size - mu * n - k
         if value > 0.0:
             low = lam
         else:
             high = lam
-        if abs(value) <= 1e-14 * (size + mu * abs(n)):
+        if abs(value) <= 1e-14 * (size + mu * abs(n) + k):
             break
         d1, d2 = -t1 / (l1 + lam), -t2 / (l2 + lam)
         slope = (t1 * d1 + t2 * d2) / size + mu * (m1 * d1 + m2 * d2) / nn
@@ -130,66 +84,99 @@ def solve_contact(f, b, mu, r):  # pragma: no cover - compiled
             if high - low <= 1e-15 * high:
                 break
             lam = trial if low < trial < high else 0.5 * (low + high)
+    if n < 0.0:
+        return 0.0, 0.0, 0.0
     size = np.sqrt(t1 * t1 + t2 * t2)
-    n = max(n, 0.0)
-    scale = mu * n / size if size > 0.0 else 0.0
-    r[0] = n
-    r[1], r[2] = scale * (co * t1 - si * t2), scale * (si * t1 + co * t2)
+    scale = (mu * n + k) / size if size > 0.0 else 0.0
+    return n, scale * (co * t1 - si * t2), scale * (si * t1 + co * t2)
 
 
 @njit(cache=True)
-def sweep(
-    count,
-    backward,
-    r,
-    v,
-    y,
-    shift,
-    mu,
-    factors,
-    diagonal,
-    body,
-    kind,
-    jacobian,
-    response,
-    slot,
-    yptr,
-    bptr,
-    block,
-):  # pragma: no cover - compiled
-    """`count` passes of non-smooth Gauss–Seidel; r, v and y are kept up to date in place.
+def _slip_unpressed(nn, n1, n2, co, si, l1, l2, b1, b2, k):
+    """r_N = 0: stick tangentially, or slide against ‖r_T‖ = k."""
+    a = co * co * l1 + si * si * l2 + n1 * n1 / nn
+    b = co * si * (l1 - l2) + n1 * n2 / nn
+    d = si * si * l1 + co * co * l2 + n2 * n2 / nn
+    low, high, lam = 0.0, np.sqrt(b1 * b1 + b2 * b2) / k, 0.0
+    t1 = t2 = 0.0
+    for _ in range(200):
+        det = (a + lam) * (d + lam) - b * b
+        t1, t2 = -((d + lam) * b1 - b * b2) / det, -((a + lam) * b2 - b * b1) / det
+        size = np.sqrt(t1 * t1 + t2 * t2)
+        if lam == 0.0 and size <= k:
+            return 0.0, t1, t2
+        if size > k:
+            low = lam
+        else:
+            high = lam
+        if abs(size - k) <= 1e-14 * k or high - low <= 1e-15 * high:
+            break
+        lam = 0.5 * (low + high)
+    size = np.sqrt(t1 * t1 + t2 * t2)
+    return 0.0, t1 * k / size, t2 * k / size
 
-    `shift` is u_free with the bias added to its normal part. With `backward`, every second pass runs the
-    other way round.
+
+@njit(cache=True)
+def solve_contact(f, b, mu, k, r):  # pragma: no cover - compiled
+    """Solve u = W r + b with Signorini's and Coulomb's laws at one contact, exactly; r (3,) is written.
+
+    `f` is a row of `local_factors`. Open if b_N ≥ 0 and nothing holds it; stick if r = -W⁻¹ b is admissible; else slip.
     """
-    nc = r.shape[0]
-    u, b, new = np.empty(3), np.empty(3), np.empty(3)
-    for n in range(count):
-        for position in range(nc):
-            c = nc - 1 - position if backward and n % 2 == 1 else position
-            u[:] = shift[c]
-            _relative_velocity(c, u, v, y, body, kind, jacobian, slot, yptr)
-            w = diagonal[c]
-            for k in range(3):
-                b[k] = u[k] - w[k, 0] * r[c, 0] - w[k, 1] * r[c, 1] - w[k, 2] * r[c, 2]
-            solve_contact(factors[c], b, mu[c], new)
-            d0, d1, d2 = new[0] - r[c, 0], new[1] - r[c, 1], new[2] - r[c, 2]
-            if d0 == 0.0 and d1 == 0.0 and d2 == 0.0:
-                continue
-            r[c] = new
-            for s in range(2):
-                a = body[c, s]
-                if kind[c, s] == RIGID:
-                    for i in range(6):
-                        v[a, i] += (
-                            response[c, s, i, 0] * d0 + response[c, s, i, 1] * d1 + response[c, s, i, 2] * d2
-                        )
-                elif kind[c, s] == ELASTIC:
-                    start, size = yptr[a], yptr[a + 1] - yptr[a]
-                    # the block is symmetric: rows, which lie together in memory, serve as columns
-                    row = bptr[a] + 3 * slot[c, s] * size
-                    for k in range(size):
-                        y[start + k] += (
-                            block[row + k] * d0 + block[row + size + k] * d1 + block[row + 2 * size + k] * d2
-                        )
-                d0, d1, d2 = -d0, -d1, -d2
+    if b[0] >= 0.0 and k == 0.0:
+        r[:] = 0.0
+        return
+    for i in range(3):
+        r[i] = -(f[3 * i] * b[0] + f[3 * i + 1] * b[1] + f[3 * i + 2] * b[2])
+    limit = mu * r[0] + k
+    if r[0] >= 0.0 and r[1] * r[1] + r[2] * r[2] <= limit * limit:
+        return
+    r[0], r[1], r[2] = slip(f[9], f[10], f[11], f[12], f[13], f[14], f[15], b[0], b[1], b[2], mu, k)
+
+
+@njit(cache=True)
+def natural_errors(r, u, bias, mu, k, rho):  # pragma: no cover - compiled
+    """e = r - P_K(r - ρ û) with û = u + (bias + μ‖u_T‖) n of every contact.
+
+    K is the part r_N ≥ 0 of the cone ‖r_T‖ ≤ μ r_N + k.
+
+    Returns
+    -------
+    error : (nc,) ‖e‖
+    size : ‖r‖ over all contacts
+    projected : ‖P_K(r - ρ û)‖ over all contacts
+    """
+    nc, d = r.shape
+    error = np.empty(nc)
+    total = projected = 0.0
+    for c in range(nc):
+        slide = 0.0
+        for i in range(1, d):
+            slide += u[c, i] * u[c, i]
+        n = r[c, 0] - rho * (u[c, 0] + bias[c] + mu[c] * np.sqrt(slide))
+        tangential = 0.0
+        for i in range(1, d):
+            t = r[c, i] - rho * u[c, i]
+            tangential += t * t
+        tangential = np.sqrt(tangential)
+        height, radius = onto_cone(n, tangential, mu[c], k[c])
+        shrink = radius / tangential if tangential > 0.0 else 0.0
+        e = (r[c, 0] - height) ** 2
+        total += r[c, 0] ** 2
+        for i in range(1, d):
+            e += (r[c, i] - shrink * (r[c, i] - rho * u[c, i])) ** 2
+            total += r[c, i] ** 2
+        error[c] = np.sqrt(e)
+        projected += height * height + radius * radius
+    return error, np.sqrt(total), np.sqrt(projected)
+
+
+@njit(cache=True)
+def onto_cone(n, t, mu, k):  # pragma: no cover - compiled
+    """The point of {n ≥ 0, t ≤ μ n + k} that is nearest to (n, t), t ≥ 0."""
+    if n >= 0.0 and t <= mu * n + k:
+        return n, t
+    if n < 0.0 and t <= k:
+        return 0.0, t
+    # foot on the line t = μ n + k
+    foot = (n + mu * (t - k)) / (1.0 + mu * mu)
+    return (foot, mu * foot + k) if foot > 0.0 else (0.0, k)

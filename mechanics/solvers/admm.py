@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.problem import ContactProblem, ContactSolution, ContactStart
+from mechanics.problem import ContactProblem, ContactSolution, ContactStart, scale_of
 from mechanics.residual import natural_map, project_on_cone
 from moma.errors import SolverError
 
@@ -51,11 +51,12 @@ class ADMM:
             raise SolverError("the problem has no sparse form", where="ADMM", remedy='use the method "nsgs"')
         if len(start.impulse) == 0:
             return ContactSolution(start.impulse, start.velocity, 0, 0.0, True)
-        lift, sigma, mu = problem.sparse.lift, _PENALTY * problem.delassus.scale, problem.friction
+        lift, sigma = problem.sparse.lift, _PENALTY * scale_of(problem.delassus)
+        mu, cohesion = problem.friction, problem.cohesion
         factor, across = problem.sparse.factor(sigma), lift.T.tocsr()
         shifted = problem.u_free.copy()
         shifted[:, 0] += problem.bias
-        z, y = project_on_cone(start.impulse, mu), -start.velocity / sigma
+        z, y = project_on_cone(start.impulse, mu, cohesion), -start.velocity / sigma
         eta, iterations = natural_map(problem, z), 0
         while eta > self.tolerance and iterations < self.max_iterations:
             for _ in range(min(self.check_every, self.max_iterations - iterations)):
@@ -64,7 +65,7 @@ class ADMM:
                 inner = factor.solve(lift @ (right.ravel() / sigma))
                 r = ((right.ravel() - across @ inner) / sigma).reshape(-1, 3)
                 relaxed = _OVER_RELAXATION * r + (1 - _OVER_RELAXATION) * z
-                z = project_on_cone(relaxed + y, mu)
+                z = project_on_cone(relaxed + y, mu, cohesion)
                 y = y + relaxed - z
                 iterations += 1
             eta = natural_map(problem, z)

@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 
 from mechanics.problem import ContactProblem, ContactSolution, ContactStart
-from mechanics.residual import dual_velocity, natural_map
-from mechanics.solvers._kernels import apply_delassus, local_factors, sweep
+from mechanics.residual import dual_velocity, residual
 
 __all__ = ["NSGS"]
 
@@ -27,17 +26,14 @@ class NSGS:
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from the impulses of `start`."""
         impulse = start.impulse.copy()
-        eta = natural_map(problem, impulse)
+        eta = residual(problem, impulse).natural_map
         shift = problem.u_free.copy()
         shift[:, 0] += problem.bias
-        arrays, diagonal = problem.delassus.arrays, problem.delassus.diagonal
-        factors = local_factors(diagonal)
+        sweep = problem.delassus.gauss_seidel(shift, problem.friction, problem.cohesion)
         sweeps = 0
         while eta > self.tolerance and sweeps < self.max_iterations:
-            # the running velocities are made anew each time, so that rounding cannot pile up
-            _, v, y = apply_delassus(impulse, *arrays)
             count = min(self.check_every, self.max_iterations - sweeps)
-            sweep(count, True, impulse, v, y, shift, problem.friction, factors, diagonal, *arrays)
+            sweep(impulse, count)
             sweeps += count
-            eta = natural_map(problem, impulse)
+            eta = residual(problem, impulse).natural_map
         return ContactSolution(impulse, dual_velocity(problem, impulse), sweeps, eta, eta <= self.tolerance)

@@ -1,0 +1,191 @@
+"""Numba kernels of the broad phase: bodies put in place, their boxes, and the pairs of boxes that overlap."""
+
+import numpy as np
+from numba import njit
+
+__all__ = ["boxes", "close_pairs", "place", "points_of"]
+
+# a box that spans more cells than this is compared with all others instead
+_MANY_CELLS = 64
+
+
+@njit(cache=True)
+def place(pointer, local, centre, rotation):  # pragma: no cover - compiled
+    """centre + rotation · local for the rows pointer[b]:pointer[b+1] of each body; pass zero centres for directions."""
+    out = np.empty_like(local)
+    for b in range(pointer.shape[0] - 1):
+        c, r = centre[b], rotation[b]
+        for k in range(pointer[b], pointer[b + 1]):
+            x, y, z = local[k, 0], local[k, 1], local[k, 2]
+            out[k, 0] = c[0] + r[0, 0] * x + r[0, 1] * y + r[0, 2] * z
+            out[k, 1] = c[1] + r[1, 0] * x + r[1, 1] * y + r[1, 2] * z
+            out[k, 2] = c[2] + r[2, 0] * x + r[2, 1] * y + r[2, 2] * z
+    return out
+
+
+@njit(cache=True)
+def boxes(pointer, vertex, margin):  # pragma: no cover - compiled
+    """Axis-parallel boxes (nb, 3), (nb, 3) around bodies, widened by a margin (nb,)."""
+    nb = pointer.shape[0] - 1
+    low, high = np.full((nb, 3), np.inf), np.full((nb, 3), -np.inf)
+    for b in range(nb):
+        for k in range(pointer[b], pointer[b + 1]):
+            for d in range(3):
+                low[b, d] = min(low[b, d], vertex[k, d])
+                high[b, d] = max(high[b, d], vertex[k, d])
+        for d in range(3):
+            low[b, d] -= margin[b]
+            high[b, d] += margin[b]
+    return low, high
+
+
+@njit(cache=True)
+def _overlap(i, j, low, high):
+    apart = False
+    for d in range(low.shape[1]):
+        apart = apart or low[j, d] > high[i, d] or low[i, d] > high[j, d]
+    return not apart
+
+
+@njit(cache=True)
+def _push(pairs, count, i, j):
+    if count == pairs.shape[0]:
+        grown = np.empty((2 * count, 2), dtype=np.int64)
+        grown[:count] = pairs
+        pairs = grown
+    pairs[count, 0], pairs[count, 1] = min(i, j), max(i, j)
+    return pairs
+
+
+@njit(cache=True)
+def _cell_size(low, high):
+    """Median of the boxes' largest extents: most boxes span at most two cells in each direction."""
+    nb, d = low.shape
+    extent = np.empty(nb)
+    for b in range(nb):
+        e = 0.0
+        for k in range(d):
+            e = max(e, high[b, k] - low[b, k])
+        extent[b] = e
+    return max(np.median(extent), 1e-300)
+
+
+@njit(cache=True)
+def _cells_of(low, high, origin, cell):
+    """First cell and number of cells of each box along each axis, and which boxes are too large for the grid."""
+    nb, d = low.shape
+    first, span = np.empty((nb, d), dtype=np.int64), np.empty((nb, d), dtype=np.int64)
+    large = np.zeros(nb, dtype=np.bool_)
+    for b in range(nb):
+        total = 1.0
+        for k in range(d):
+            total *= (high[b, k] - low[b, k]) / cell + 1.0
+        if total > _MANY_CELLS:
+            large[b] = True
+            span[b] = 0
+            first[b] = 0
+            continue
+        for k in range(d):
+            first[b, k] = np.int64(np.floor((low[b, k] - origin[k]) / cell))
+            span[b, k] = np.int64(np.floor((high[b, k] - origin[k]) / cell)) - first[b, k] + 1
+    return first, span, large
+
+
+@njit(cache=True)
+def _slot_of(x, y, z, mask):
+    return (x * 73856093 ^ y * 19349663 ^ z * 83492791) & mask
+
+
+@njit(cache=True)
+def _fill(first, span, mask):
+    """Boxes sorted by the slot of each cell that they touch: slot pointers, box and cell of each entry."""
+    nb, d = first.shape
+    start = np.zeros(mask + 2, dtype=np.int64)
+    total = 0
+    for pass_ in range(2):
+        if pass_ == 1:
+            for s in range(mask + 1):
+                start[s + 1] += start[s]
+            total = start[mask + 1]
+            box, cell = np.empty(total, dtype=np.int64), np.empty((total, 3), dtype=np.int64)
+            cursor = start[: mask + 1].copy()
+        for b in range(nb):
+            deep = span[b, 2] if d == 3 else min(1, span[b, 0])
+            base = first[b, 2] if d == 3 else 0
+            for x in range(first[b, 0], first[b, 0] + span[b, 0]):
+                for y in range(first[b, 1], first[b, 1] + span[b, 1]):
+                    for z in range(base, base + deep):
+                        s = _slot_of(x, y, z, mask)
+                        if pass_ == 0:
+                            start[s + 1] += 1
+                        else:
+                            n = cursor[s]
+                            box[n] = b
+                            cell[n, 0], cell[n, 1], cell[n, 2] = x, y, z
+                            cursor[s] += 1
+    return start, box, cell
+
+
+@njit(cache=True)
+def close_pairs(low, high, owner, fixed):  # pragma: no cover - compiled
+    """Pairs (np, 2), smaller index first, of boxes (n, d) that overlap, d = 2 or 3.
+
+    Boxes of one `owner` (n,), and of two `fixed` owners (n,), make no pair. A uniform grid, hashed, so that the cost
+    grows linearly with the number of boxes and neither with the space between them; boxes much larger than most
+    are compared with all others.
+    """
+    nb, d = low.shape
+    pairs, count = np.empty((8 * nb + 8, 2), dtype=np.int64), 0
+    if nb < 2:
+        return pairs[:0]
+    origin = low[0].copy()
+    cell = _cell_size(low, high)
+    first, span, large = _cells_of(low, high, origin, cell)
+    entries = 0
+    for b in range(nb):
+        e = 1
+        for k in range(d):
+            e *= span[b, k]
+        entries += e
+    mask = 1
+    while mask < 2 * entries:
+        mask *= 2
+    mask -= 1
+    start, box, place_of = _fill(first, span, mask)
+    for s in range(mask + 1):
+        for a in range(start[s], start[s + 1]):
+            i = box[a]
+            for b in range(a + 1, start[s + 1]):
+                j = box[b]
+                # in the lowest cell that both touch, and nowhere else
+                here = place_of[a, 0] == place_of[b, 0] and place_of[a, 1] == place_of[b, 1]
+                here = here and place_of[a, 2] == place_of[b, 2]
+                for k in range(d):
+                    here = here and place_of[a, k] == max(first[i, k], first[j, k])
+                if not here or owner[i] == owner[j] or (fixed[i] and fixed[j]):
+                    continue
+                if _overlap(i, j, low, high):
+                    pairs = _push(pairs, count, i, j)
+                    count += 1
+    for i in range(nb):
+        if large[i]:
+            for j in range(nb):
+                if i == j or (large[j] and j < i) or owner[i] == owner[j] or (fixed[i] and fixed[j]):
+                    continue
+                if _overlap(i, j, low, high):
+                    pairs = _push(pairs, count, i, j)
+                    count += 1
+    return pairs[:count]
+
+
+@njit(cache=True)
+def points_of(body, arm, centre, rotation):  # pragma: no cover - compiled
+    """Places (nc, 2, 3) of points given by arms (nc, 2, 3) in the axes of bodies (nc, 2)."""
+    out = np.empty_like(arm)
+    for c in range(arm.shape[0]):
+        for s in range(2):
+            b = body[c, s]
+            r, x, y, z = rotation[b], arm[c, s, 0], arm[c, s, 1], arm[c, s, 2]
+            for d in range(3):
+                out[c, s, d] = centre[b, d] + r[d, 0] * x + r[d, 1] * y + r[d, 2] * z
+    return out

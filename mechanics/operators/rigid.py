@@ -1,0 +1,124 @@
+"""W between rigid bodies, matrix-free: 15 numbers for each contact, 7 for each body."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.operators import _kernels_rigid as kernel
+from mechanics.problem import GaussSeidel
+from mechanics.solvers.colouring import greedy_colours
+
+__all__ = ["RigidDelassus", "Schedule", "schedule"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# fewer contacts than this are swept in their own order by one thread: there is nothing to win from more
+_WORTH_COLOURS = 2000
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """In which order contacts are swept; it depends on the contacts alone, never on the number of threads.
+
+    Attributes
+    ----------
+    order : (nc,) contacts in sweep order: those between the same two bodies follow one another
+    group : (ng+1,) where, in that order, each such group begins
+    colour : (k+1,) where each colour begins among the groups; groups of one colour share no moving body. One
+        colour for few contacts, which are swept by one thread
+    """
+
+    order: Ints
+    group: Ints
+    colour: Ints
+
+
+def schedule(bodies: Ints, moving: NDArray[np.bool_]) -> Schedule:
+    """Group the contacts (nc, 2) by pairs of bodies, and colour the groups if they are many."""
+    count = len(bodies)
+    if count == 0:
+        empty = np.zeros(0, dtype=np.int64)
+        return Schedule(empty, np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64))
+    pair = bodies.min(axis=1) * len(moving) + bodies.max(axis=1)
+    order = np.argsort(pair, kind="stable")
+    starts = np.flatnonzero(np.diff(pair[order], prepend=-1))
+    sizes = np.diff(starts, append=count)
+    if count < _WORTH_COLOURS:
+        return Schedule(order, np.append(starts, count), np.array([0, len(starts)]))
+    colours = greedy_colours(bodies[order[starts]], moving)
+    by_colour = np.argsort(colours, kind="stable")
+    sizes, starts = sizes[by_colour], starts[by_colour]
+    group = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+    inside = np.arange(count) - np.repeat(group[:-1], sizes)
+    return Schedule(
+        order[np.repeat(starts, sizes) + inside],
+        group,
+        np.searchsorted(colours[by_colour], np.arange(colours.max() + 2)).astype(np.int64),
+    )
+
+
+@dataclass(frozen=True)
+class RigidDelassus:
+    """W = Hᵀ ŵ H of contacts in the order of a schedule.
+
+    Attributes
+    ----------
+    body : (nc, 2) candidate and antagonist
+    geometry : (nc, 15) rows n, t1, t2 of the frame, then the lever arms from the two centres of mass [m], world axes
+    inertia : (nb, 7) inverse mass [1/kg], upper triangle of the inverse inertia [1/(kg m²)], world axes; zero for
+        bodies that no impulse moves
+    schedule : order of the sweeps
+    """
+
+    body: Ints
+    geometry: Array
+    inertia: Array
+    schedule: Schedule
+
+    @cached_property
+    def diagonal(self) -> Array:
+        """W_αα (nc, 3, 3) [1/kg]."""
+        blocks: Array = kernel.diagonals(self.body, self.geometry, self.inertia)
+        return blocks
+
+    @cached_property
+    def _factors(self) -> Array:
+        factors: Array = kernel.factors_of(self.diagonal)
+        return factors
+
+    def apply(self, impulse: Array) -> Array:
+        """W r (nc, 3) [m/s]."""
+        velocity: Array = kernel.apply(impulse, self.body, self.geometry, self.inertia)
+        return velocity
+
+    def rigid_change(self, impulse: Array) -> Array:
+        """Velocities (nb, 6) that the impulses give to the bodies [m/s, rad/s]."""
+        change: Array = kernel.velocity_change(impulse, self.body, self.geometry, self.inertia)
+        return change
+
+    def relative_velocity(self, velocity: Array) -> Array:
+        """u (nc, 3) of the bodies' velocities (nb, 6) [m/s]."""
+        relative: Array = kernel.relative_velocity(velocity, self.body, self.geometry)
+        return relative
+
+    def gauss_seidel(self, shift: Array, friction: Array, cohesion: Array) -> GaussSeidel:
+        """Sweeps forth and back; the same bits for any number of threads.
+
+        The running velocities are made anew on each call, so that rounding cannot pile up.
+        """
+        parallel = len(self.schedule.colour) > 2 and numba.get_num_threads() > 1
+
+        def sweeps(impulse: Array, count: int) -> None:
+            change = self.rigid_change(impulse)
+            data = (count, impulse, change, shift, friction, cohesion, self._factors, self.body)
+            more = (self.geometry, self.inertia, self.schedule.group)
+            if parallel:
+                kernel.sweep_parallel(*data, *more, self.schedule.colour)
+            else:
+                kernel.sweep(*data, *more)
+
+        return sweeps
