@@ -59,7 +59,8 @@ def imbalance(model: Model, state: State, contacts: Contacts, force: Array, load
 def _wrenches(state: State, body: NDArray[np.int64], point: Array, force: Array, count: int) -> Array:
     """Sums (count, 6) of forces and of their moments about the centres of the bodies."""
     wrench = np.column_stack([force, np.cross(point - state.centre[body], force)])
-    return np.column_stack([np.bincount(body, column, count) for column in wrench.T])
+    # without contacts bincount forgets that forces are no integers
+    return np.column_stack([np.bincount(body, column, count) for column in wrench.T]).astype(np.float64)
 
 
 def support_reaction(model: Model, contacts: Contacts, force: Array, time: float) -> Support:
