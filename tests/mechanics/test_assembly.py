@@ -4,14 +4,16 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mechanics.contact.assembly import delassus, local_velocity, sparse_form, world_impulse
+from mechanics.contact.assembly import local_velocity, mixed_delassus, sparse_form, world_impulse
 from mechanics.contact.contacts import gaps
 from mechanics.contact.detection import Detector
 from mechanics.model import build_model
-from mechanics.problem import ELASTIC, NONE, RIGID
+from mechanics.laws.law import STATE
+from mechanics.operators.mixed import ELASTIC, NONE, RIGID
+from mechanics.problem import scale_of
 from mechanics.scene import Fidelity
-from mechanics.solvers._kernels import apply_delassus
-from mechanics.stepping import advance, compliances, contact_problem, follow_nodes, free_motion, predict
+from mechanics.statement import state_laws
+from mechanics.stepping import advance, compliances, follow_nodes, free_kick, kicked, predict
 from tests.mechanics.shapes import TURN, brick, dense_operator, ground, moved, scene
 
 STEP, THETA = 2e-3, 0.75
@@ -49,10 +51,17 @@ class Assembled:
         self.compliance = compliances(self.model, STEP, THETA)
         find = Detector(self.model.surfaces, self.model.fixed, 0.05)
         self.contacts = find(self.state, np.zeros(len(one.blocks)))
-        self.operator = delassus(self.model, self.state, self.contacts, self.compliance)
+        self.operator = mixed_delassus(self.model, self.state, self.contacts, self.compliance)
         self.sparse = sparse_form(self.model, self.state, self.contacts, self.operator, self.compliance)
         self.w_hat, self.transpose = dense_operator(self.model, self.state, self.contacts, self.compliance)
         self.dense = self.transpose @ self.w_hat @ self.transpose.T
+
+    def free(self, predicted):
+        """Velocities without contact impulses."""
+        return free_kick(self.model, self.state, self.state, predicted, self.compliance, STEP, THETA)
+
+    def kick(self, free, impulse):
+        return kicked(self.model, free, self.state, self.contacts, self.operator, impulse, self.compliance)
 
 
 @pytest.fixture(scope="module")
@@ -63,9 +72,7 @@ def step():
 def columns(step):
     """W, column by column."""
     size = 3 * len(step.contacts)
-    return np.column_stack(
-        [apply_delassus(e.reshape(-1, 3), *step.operator.arrays)[0].ravel() for e in np.eye(size)]
-    )
+    return np.column_stack([step.operator.apply(e.reshape(-1, 3)).ravel() for e in np.eye(size)])
 
 
 def test_all_kinds_of_sides_meet_in_the_scene(step):
@@ -96,7 +103,7 @@ def test_sparse_form_is_the_same_w(step):
 
 def test_factor_solves_with_the_inertia_and_the_penalty(step):
     inertia, lift = step.sparse.inertia.toarray(), step.sparse.lift.toarray()
-    sigma = 0.1 * step.operator.scale
+    sigma = 0.1 * scale_of(step.operator)
     right = np.random.default_rng(0).normal(size=len(inertia))
     expected = np.linalg.solve(inertia + lift @ lift.T / sigma, right)
     found = step.sparse.factor(sigma).solve(right)
@@ -114,12 +121,15 @@ def test_local_velocity_is_the_transpose_of_the_lift(step):
 
 
 def test_velocity_after_a_step_is_w_r_plus_u_free(step):
-    model, state = step.model, step.state
-    free = free_motion(model, state, step.compliance, STEP, THETA)
-    problem = contact_problem(model, state, step.contacts, step.operator, step.sparse, free, STEP, THETA)
-    r = np.random.default_rng(2).normal(size=(len(step.contacts), 3))
-    after = advance(model, state, step.contacts, step.operator, r, free, step.compliance, STEP, THETA)
-    found = local_velocity(step.contacts, step.operator, after.velocity, after.node_velocity)
+    contacts, state = step.contacts, step.state
+    free = step.free(state)
+    problem = state_laws(
+        step.model, state, contacts, gaps(contacts, state), step.model.laws.of(contacts.bodies),
+        step.operator, step.sparse, free, np.zeros((len(contacts), STATE)), True,
+    ).problem  # fmt: skip
+    r = np.random.default_rng(2).normal(size=(len(contacts), 3))
+    kick = step.kick(free, r)
+    found = local_velocity(contacts, step.operator, kick.velocity, kick.node_velocity)
     expected = step.dense @ r.ravel() + problem.u_free.ravel()
     np.testing.assert_allclose(found.ravel(), expected, atol=1e-11 * np.abs(expected).max())
 
@@ -127,11 +137,10 @@ def test_velocity_after_a_step_is_w_r_plus_u_free(step):
 def test_gap_at_the_end_of_a_step_is_g_plus_h_theta_u(step):
     """Detected at q + h(1-θ)v; to first order in the turn of the stones over the step."""
     model, state = step.model, step.state
-    predicted = predict(state, STEP * (1 - THETA))
-    free = free_motion(model, state, step.compliance, STEP, THETA)
-    none = np.zeros((len(step.contacts), 3))
-    after = advance(model, state, step.contacts, step.operator, none, free, step.compliance, STEP, THETA)
-    u = local_velocity(step.contacts, step.operator, free.velocity, free.node_velocity)
+    predicted = predict(model, state, state, STEP * (1 - THETA))
+    kick = step.kick(step.free(predicted), np.zeros((len(step.contacts), 3)))
+    after = advance(model, state, predicted, kick, STEP * THETA)
+    u = local_velocity(step.contacts, step.operator, kick.velocity, kick.node_velocity)
     expected = gaps(step.contacts, predicted) + STEP * THETA * u[:, 0]
     turned = STEP * np.abs(state.velocity[:, 3:]).max()
     np.testing.assert_allclose(gaps(step.contacts, after), expected, atol=2 * turned**2)
@@ -140,14 +149,14 @@ def test_gap_at_the_end_of_a_step_is_g_plus_h_theta_u(step):
 def test_free_motion_of_an_elastic_stone_solves_the_theta_scheme(step):
     # (M + h²θ²K) (v_free - v) = h P - h K (d + hθ v), here in world axes
     model, state, b = step.model, step.state, 1
-    free = free_motion(model, state, step.compliance, STEP, THETA)
+    free = step.free(state)
     stone, rows = model.stones[b], model.nodes_of(b)
     axes = np.kron(np.eye(len(stone.mesh.nodes)), state.rotation[b])
     stiffness = axes @ stone.operators.stiffness.toarray() @ axes.T
     mass = stone.operators.mass.toarray()
     d = (state.node[rows] - state.centre[b] - stone.mesh.nodes @ state.rotation[b].T).ravel()
     v = state.node_velocity[rows].ravel()
-    load = np.outer(stone.operators.nodal_mass, model.gravity).ravel()
+    load = np.outer(stone.operators.nodal_mass, model.gravity(0.0)).ravel()
     right = STEP * (load - stiffness @ (d + STEP * THETA * v))
     jump = np.linalg.solve(mass + (STEP * THETA) ** 2 * stiffness, right)
     found = (free.node_velocity[rows] - state.node_velocity[rows]).ravel()

@@ -241,8 +241,12 @@ def test_wherever_a_box_lies_on_another_the_keys_are_unique_and_the_area_is_the_
     stones = (upper, lower) if swap else (lower, upper)
     _, state, contacts = detected(scene(*stones))
     assert len(set(contacts.key.tolist())) == len(contacts)
-    if len(contacts):
+    if len(contacts) == 0:
+        return
+    assert_frames(contacts, state)
+    if np.abs(contacts.frame[:, 0, 2]).min() > 1 - 1e-12:
         np.testing.assert_allclose(gaps(contacts, state), gap, atol=1e-12)
-        assert_frames(contacts, state)
         other = detected(scene(*stones[::-1]))[2]
         assert contacts.area.sum() == pytest.approx(other.area.sum(), rel=1e-9)
+    else:  # beside one another: some upright face parts them by more than the lying ones do
+        assert gaps(contacts, state).max() > gap - 1e-3 * 0.6
