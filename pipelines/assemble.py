@@ -1,7 +1,7 @@
 """From the database to a scene: selected stones → hexahedra → closed joints → blocks."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,8 +9,10 @@ from sqlalchemy.orm import Session
 
 from archmodel.records import StoneRecord
 from mechanics.scene import Block, Fidelity, Scene
+from pipelines.joint_laws import law_rules
+from pipelines.scene_loads import build_loads, thrown
 from pipelines.scenefile import SceneFile
-from pipelines.selection import StoneModel, select_stones
+from pipelines.selection import Groups, StoneModel, select_groups, select_stones
 from survey.blocky import BlockyStone, simplify
 from survey.depth import Depth
 from survey.extrusion import SurveyedBlock, extrude
@@ -49,13 +51,14 @@ def assemble(scene: SceneFile, session: Session) -> Assembly:
 
     Raises
     ------
-    SceneError : a key names no stone, or a stone has no material
+    SceneError : a key names no stone, a stone has no material, or a load does not suit its stones
     GeometryError : a stone cannot be made a hexahedron, or its joints cannot be closed
     """
-    return assemble_stones(scene, select_stones(scene, session))
+    models = select_stones(scene, session)
+    return assemble_stones(scene, models, select_groups(scene, session, models))
 
 
-def assemble_stones(scene: SceneFile, models: tuple[StoneModel, ...]) -> Assembly:
+def assemble_stones(scene: SceneFile, models: tuple[StoneModel, ...], groups: Groups) -> Assembly:
     """As `assemble`, of stones that have been selected; the database is not needed."""
     simplified = tuple(simplify(surveyed_block(model.record)) for model in models)
     solids: Sequence[Solid] = [stone.solid for stone in simplified]
@@ -63,16 +66,9 @@ def assemble_stones(scene: SceneFile, models: tuple[StoneModel, ...]) -> Assembl
     if scene.joints is not None:
         closed = close_joints(simplified, scene.joints)
         solids, closing = closed.solids, closed.report
+    blocks = tuple(_block(model, solid, scene) for model, solid in zip(models, solids, strict=True))
     return Assembly(
-        scene=Scene(
-            name=scene.name,
-            blocks=tuple(_block(model, solid, scene) for model, solid in zip(models, solids, strict=True)),
-            gravity=scene.gravity,
-            contact=scene.contact,
-            time=scene.time,
-            solver=scene.solver,
-            frame_every=scene.output.frame_every,
-        ),
+        scene=_scene(scene, blocks, groups),
         models=models,
         simplified=simplified,
         closing=closing,
@@ -100,6 +96,26 @@ def surveyed_block(record: StoneRecord) -> SurveyedBlock:
     face = outline_face(measured, record.outline.mean(axis=0) + 100.0 * record.normal)
     depth = Depth(record.depth, record.depth_sigma, record.depth_source, "database", record.line)
     return extrude(face, depth)
+
+
+def _scene(scene: SceneFile, blocks: Sequence[Block], groups: Groups) -> Scene:
+    """The scene of the blocks, with the laws and loads that the file gives them."""
+    document, by_code = scene.document, {block.code: block for block in blocks}
+    materials = {block.code: block.material.name for block in blocks}
+    velocity = thrown(document, scene.throws, groups, by_code)
+    return Scene(
+        name=scene.name,
+        blocks=tuple(
+            replace(block, velocity=velocity[block.code]) if block.code in velocity else block
+            for block in blocks
+        ),
+        gravity=scene.gravity,
+        contact=replace(scene.contact, rules=law_rules(document, scene.laws, groups, materials)),
+        time=scene.time,
+        solver=scene.solver,
+        loads=build_loads(document, scene.loads, groups, by_code),
+        frame_every=scene.output.frame_every,
+    )
 
 
 def _block(model: StoneModel, solid: Solid, scene: SceneFile) -> Block:

@@ -12,8 +12,9 @@ from mechanics.plan import Plan, plan
 from mechanics.scene import Fidelity, Scene
 from moma.errors import GeometryError, MeshError
 from pipelines.assemble import assemble_stones
+from pipelines.entries import describe
 from pipelines.scenefile import read_scene
-from pipelines.selection import select_stones
+from pipelines.selection import select_groups, select_stones
 from survey.joints import ClosingReport
 from survey.solids import Solid
 from survey.watertight import check_watertight
@@ -77,7 +78,7 @@ class Cost:
 
 @dataclass(frozen=True)
 class CheckReport:
-    """The plan of a scene; it is sound if there are no problems."""
+    """The plan of a scene; it is sound if there are no problems. Laws and loads are told in words."""
 
     scene: str
     kinds: Mapping[str, int]
@@ -85,6 +86,8 @@ class CheckReport:
     materials: tuple[MaterialUse, ...]
     joints: JointsReport | None
     cost: Cost | None
+    laws: tuple[str, ...]
+    loads: tuple[str, ...]
     problems: tuple[str, ...]
 
 
@@ -101,13 +104,14 @@ def check_scene(path: str | Path, url: str) -> CheckReport:
     scene = read_scene(path)
     with open_database(url, create=False) as database, database.session(read_only=True) as session:
         models = select_stones(scene, session)
+        groups = select_groups(scene, session, models)
     kinds = Counter(model.record.kind for model in models)
     bodies = Counter(str(model.fidelity) for model in models)
     uses = Counter(model.material for model in models)
     problems: list[str] = []
     joints, cost = None, None
     try:
-        assembly = assemble_stones(scene, models)
+        assembly = assemble_stones(scene, models, groups)
         joints = _joints(assembly.closing) if assembly.closing is not None else None
         problems += _unsound_solids(assembly.scene)
         needs = plan(assembly.scene)
@@ -124,6 +128,8 @@ def check_scene(path: str | Path, url: str) -> CheckReport:
         ),
         joints=joints,
         cost=cost,
+        laws=tuple(describe(one.entry, groups) for one in scene.laws),
+        loads=tuple(describe(entry, groups) for entry in (*scene.loads, *scene.throws)),
         problems=tuple(problems),
     )
 

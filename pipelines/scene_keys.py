@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from mechanics.laws.dry_joint import DryJoint
-from mechanics.scene import ContactSettings, Fidelity, Method, SolverSettings, TimeSettings
+from mechanics.scene import ContactSettings, Fidelity, Method, Placement, SolverSettings, TimeSettings
 from pipelines.schema import Key, Kind
 from survey.joint_lines import JointSettings
 
@@ -99,6 +99,23 @@ _JOINTS = (
 _CONTACT = (
     Key("friction", Kind.NUMBER, "Coulomb's coefficient μ.", "-", DryJoint.friction, at_least=0),
     Key(
+        "dynamic_friction",
+        Kind.NUMBER,
+        "μ of a contact that slid in the last step; else the same.",
+        "-",
+        DryJoint.dynamic_friction,
+        at_least=0,
+    ),
+    Key(
+        "restitution",
+        Kind.NUMBER,
+        "Newton's ratio e of the velocities after and before an impact.",
+        "-",
+        DryJoint.restitution,
+        at_least=0,
+        at_most=1,
+    ),
+    Key(
         "alert_distance",
         Kind.NUMBER,
         "Gap below which a contact is watched, relative to the smaller stone's size.",
@@ -106,6 +123,20 @@ _CONTACT = (
         ContactSettings.alert_distance,
         above=0,
         at_most=1,
+    ),
+    Key(
+        "points",
+        Kind.INTEGER,
+        "Contact points of two flat faces, at most.",
+        default=ContactSettings.points,
+        choices=(1, 3, 4, 8),
+    ),
+    Key(
+        "placement",
+        Kind.TEXT,
+        "corners: at the true edge of the common face; inertia: inside it, where they carry its second moments.",
+        default=ContactSettings.placement.value,
+        choices=tuple(one.value for one in Placement),
     ),
 )
 

@@ -14,9 +14,13 @@ import numpy as np
 
 from mechanics.laws.dry_joint import DryJoint
 from mechanics.materials import Material
-from mechanics.scene import ContactSettings, Fidelity, Method, SolverSettings, TimeSettings
+from mechanics.scene import ContactSettings, Fidelity, Method, Placement, SolverSettings, TimeSettings
 from moma.errors import SceneError
+from pipelines.entries import Entry
+from pipelines.entry_keys import ARRAYS
+from pipelines.joint_laws import JointLaw, read_laws
 from pipelines.scene_keys import MATERIAL_KEYS, PICTURES, TABLES
+from pipelines.scene_loads import read_loads, read_throws
 from pipelines.schema import Document, check_table, nearest
 from pipelines.toml_lines import key_lines
 from survey.joint_lines import JointSettings
@@ -71,6 +75,8 @@ class SceneFile:
     joints : how joints are closed; None: they stay open
     gravity : (3,) acceleration [m/s²]
     mesh_size : target edge length of the finite elements [m]
+    laws : of particular joints; the general law is in `contact`
+    loads, throws : what acts besides gravity, and what begins in motion
     """
 
     document: Document
@@ -86,6 +92,9 @@ class SceneFile:
     time: TimeSettings
     solver: SolverSettings
     output: Output
+    laws: tuple[JointLaw, ...]
+    loads: tuple[Entry, ...]
+    throws: tuple[Entry, ...]
 
 
 def read_scene(path: str | Path) -> SceneFile:
@@ -124,14 +133,15 @@ def parse_scene(text: str, path: str) -> SceneFile:
         materials=_materials(document, given),
         bodies=Fidelities(**tables["bodies"] | {"default": Fidelity(tables["bodies"]["default"])}),
         joints=_joints(**tables["joints"]),
-        contact=ContactSettings(
-            DryJoint(tables["contact"]["friction"]), alert_distance=tables["contact"]["alert_distance"]
-        ),
+        contact=_contact(document, **tables["contact"]),
         gravity=_gravity(document, **tables["gravity"]),
         mesh_size=tables["mesh"]["size"],
         time=_time(document, tables["time"]),
         solver=SolverSettings(**tables["solver"] | {"method": Method(tables["solver"]["method"])}),
         output=_output(document, **tables["output"]),
+        laws=read_laws(document, given),
+        loads=read_loads(document, given),
+        throws=read_throws(document, given),
     )
 
 
@@ -146,8 +156,10 @@ def _syntax_error(error: tomllib.TOMLDecodeError, text: str, path: str) -> Scene
 
 
 def _checked_tables(document: Document, given: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    known = [*TABLES, "materials"]
+    known = [*TABLES, "materials", *ARRAYS]
     for name, content in given.items():
+        if name in ARRAYS:
+            continue
         if name not in known:
             what = f"unknown table [{name}]" if isinstance(content, dict | list) else f"unknown key {name!r}"
             document.fail(what, name, remedy=nearest(name, known))
@@ -182,6 +194,19 @@ def _materials(document: Document, given: Mapping[str, Any]) -> tuple[MaterialRu
 
 def _joints(mode: str, **settings: float) -> JointSettings | None:
     return JointSettings(**settings) if mode == "close" else None
+
+
+def _contact(
+    document: Document,
+    friction: float,
+    dynamic_friction: float | None,
+    restitution: float,
+    placement: str,
+    **settings: Any,
+) -> ContactSettings:
+    with document.at("contact", "dynamic_friction"):
+        law = DryJoint(friction, dynamic_friction, restitution)
+    return ContactSettings(law, placement=Placement(placement), **settings)
 
 
 def _gravity(

@@ -1,6 +1,7 @@
 """What a TOML table may hold, and its check: what is unknown, missing or wrong, by name and line."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from enum import Enum
@@ -19,6 +20,9 @@ class _Required(Enum):
 
 REQUIRED = _Required.REQUIRED
 
+# TOML's whole numbers have no end, floating-point numbers have
+_HUGE = 10**300
+
 
 class Kind(Enum):
     """What the value of a key is; the value says it in the words of an error message."""
@@ -28,7 +32,13 @@ class Kind(Enum):
     BOOLEAN = "true or false"
     TEXT = "a text in quotes"
     TEXTS = "a list of texts in quotes"
+    STONES = "a list of codes or expressions in quotes"
+    GROUPS = "two lists of codes or expressions in quotes"
     VECTOR = "a list of three numbers"
+    NUMBERS = "a list of numbers"
+    ROWS = "a list of lists of three numbers"
+    HISTORY = "a number or a table { time = […], value = […] }"
+    VECTOR_HISTORY = "a list of three numbers or a table { time = […], value = [[…], …] }"
 
 
 @dataclass(frozen=True)
@@ -43,7 +53,7 @@ class Key:
     unit : of the value; "-" for a ratio
     default : used when the key is absent; REQUIRED if it must be given; None if absence has its own meaning
     above, at_least, below, at_most : bounds of a number
-    choices : the texts allowed; any if empty
+    choices : the texts or numbers allowed; any if empty
     """
 
     name: str
@@ -55,7 +65,7 @@ class Key:
     at_least: float | None = None
     below: float | None = None
     at_most: float | None = None
-    choices: tuple[str, ...] = ()
+    choices: tuple[str | int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -79,13 +89,26 @@ class Document:
         """Raise a SceneError at a key."""
         raise SceneError(what, where=self.where(*path), remedy=remedy)
 
+    @contextmanager
+    def at(self, *path: str) -> Iterator[None]:
+        """Let a SceneError of what is made in a with-block name the key that it was made from, if it names none."""
+        try:
+            yield
+        except SceneError as error:
+            if (error.where or "").startswith(f"{self.path}:"):
+                raise
+            self.fail(error.what, *path, remedy=error.remedy)
+
 
 def check_table(
-    document: Document, table: Path, given: Mapping[str, object], keys: Iterable[Key]
+    document: Document, table: Path, given: Mapping[str, object], keys: Iterable[Key], title: str = ""
 ) -> dict[str, object]:
-    """Values of all keys of one table, defaults filled in; raises SceneError at the first that is wrong."""
+    """Values of all keys of one table, defaults filled in; raises SceneError at the first that is wrong.
+
+    `title` is what messages call the table; else its header.
+    """
     known = {key.name: key for key in keys}
-    title = f"[{'.'.join(table)}]"
+    title = title or f"[{'.'.join(table)}]"
     for name in given:
         if name not in known:
             document.fail(f"unknown key {name!r} in {title}", *table, name, remedy=nearest(name, known))
@@ -115,15 +138,16 @@ def _checked(document: Document, path: Path, value: object, key: Key) -> object:
         document.fail(
             f"{path[-1]} = {_shown(value)} is not {key.kind.value}", *path, remedy=f"give {_expected(key)}"
         )
-    numbers = typed if isinstance(typed, tuple) else (typed,)
-    for number in numbers:
-        if isinstance(number, (int, float)) and not isinstance(number, bool) and not _within(number, key):
+    for number in _numbers(typed):
+        if not _within(number, key):
             document.fail(
                 f"{path[-1]} = {_shown(value)} is out of range", *path, remedy=f"give {_expected(key)}"
             )
     if key.choices and typed not in key.choices:
         document.fail(
-            f"{path[-1]} = {_shown(value)} is unknown", *path, remedy=nearest(str(value), key.choices)
+            f"{path[-1]} = {_shown(value)} is unknown",
+            *path,
+            remedy=nearest(str(value), map(str, key.choices)),
         )
     return typed
 
@@ -140,15 +164,43 @@ def _typed(value: object, kind: Kind) -> object | None:
         case Kind.TEXT:
             return value if isinstance(value, str) and value.strip() else None
         case Kind.TEXTS:
-            fits = isinstance(value, list) and all(isinstance(one, str) and one.strip() for one in value)
-            return tuple(value) if fits else None  # type: ignore[arg-type]
+            return _list_of(value, lambda one: one if isinstance(one, str) and one.strip() else None)
+        case Kind.STONES:
+            return _typed(value, Kind.TEXTS) or None
+        case Kind.GROUPS:
+            groups = _list_of(value, lambda one: _typed([one] if isinstance(one, str) else one, Kind.STONES))
+            return groups if groups is not None and len(groups) == 2 else None
+        case Kind.NUMBERS:
+            return _list_of(value, lambda one: _typed(one, Kind.NUMBER))
         case Kind.VECTOR:
-            fits = isinstance(value, list) and len(value) == 3 and all(_is_number(one) for one in value)
-            return tuple(float(one) for one in value) if fits else None  # type: ignore[attr-defined]
+            vector = _typed(value, Kind.NUMBERS)
+            return vector if isinstance(vector, tuple) and len(vector) == 3 else None
+        case Kind.ROWS:
+            return _list_of(value, lambda one: _typed(one, Kind.VECTOR))
+        case Kind.HISTORY | Kind.VECTOR_HISTORY:
+            constant = Kind.NUMBER if kind is Kind.HISTORY else Kind.VECTOR
+            return value if isinstance(value, dict) else _typed(value, constant)
+
+
+def _list_of(value: object, typed: Callable[[object], object | None]) -> tuple[object, ...] | None:
+    """All entries of a list as `typed` gives them, or None if it gives None for any."""
+    entries = [typed(one) for one in value] if isinstance(value, list) else [None]
+    return None if any(one is None for one in entries) else tuple(entries)
+
+
+def _numbers(typed: object) -> Iterator[int | float]:
+    """All numbers in a value, its bounds being those of each."""
+    if isinstance(typed, tuple):
+        for one in typed:
+            yield from _numbers(one)
+    elif isinstance(typed, (int, float)) and not isinstance(typed, bool):
+        yield typed
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
+    if isinstance(value, bool):
+        return False
+    return isinstance(value, float) or (isinstance(value, int) and abs(value) < _HUGE)
 
 
 def _within(number: float, key: Key) -> bool:
@@ -164,7 +216,7 @@ def _within(number: float, key: Key) -> bool:
 def _expected(key: Key) -> str:
     """What to write, in words: type, unit and bounds."""
     if key.choices:
-        return " or ".join(f'"{choice}"' for choice in key.choices)
+        return " or ".join(f'"{one}"' if isinstance(one, str) else str(one) for one in key.choices)
     bounds = [
         f"{words} {bound:g}"
         for words, bound in (

@@ -16,9 +16,13 @@ from pipelines.scenefile import SceneFile
 from pipelines.schema import nearest
 from pipelines.toml_lines import Path
 
-__all__ = ["StoneModel", "select_stones"]
+__all__ = ["Groups", "StoneModel", "select_groups", "select_stones"]
 
 _CODE = re.compile(r"[\w.:/+-]+")  # a text without blanks or comparison is meant as a code
+
+
+# the codes of each group of stones that a table of an array names, by the table's path
+Groups = Mapping[Path, tuple[frozenset[str], ...]]
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,24 @@ def select_stones(scene: SceneFile, session: Session) -> tuple[StoneModel, ...]:
         StoneModel(record, materials[code], fidelities.get(code, scene.bodies.default))
         for code, record in records.items()
     )
+
+
+def select_groups(scene: SceneFile, session: Session, models: Sequence[StoneModel]) -> Groups:
+    """Which of the selected stones the laws, loads and throws of a scene name.
+
+    Raises
+    ------
+    SceneError : at the key whose expression cannot be understood or names no stone
+    """
+    records = {model.record.code: model.record for model in models}
+    entries = (*(one.entry for one in scene.laws), *scene.loads, *scene.throws)
+    return {
+        entry.path: tuple(
+            frozenset(_named(scene, session, records, (*entry.path, key), items))
+            for key, items in entry.groups
+        )
+        for entry in entries
+    }
 
 
 def _selected(scene: SceneFile, session: Session) -> dict[str, StoneRecord]:

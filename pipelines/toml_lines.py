@@ -25,19 +25,35 @@ _TOKEN = re.compile(
 def key_lines(text: str) -> dict[Path, int]:
     """Line numbers, from 1, of the tables and keys of a valid TOML text.
 
-    A key inside an inline table stands on the line of that table's key, so `line_of` falls back on it.
+    Tables of an array are numbered: the keys under the second ``[[loads]]`` begin with ("loads", "1"). A key inside
+    an inline table stands on the line of that table's key, so `line_of` falls back on it.
     """
     lines: dict[Path, int] = {}
     table: Path = ()
+    counts: dict[Path, int] = {}
     for line, statement in _statements(text):
         if statement[0] == "[":
-            table = _dotted("".join(statement).strip("[]"))
+            header = _dotted("".join(statement).strip("[]"))
+            table = _numbered(header, counts)
+            if statement[:2] == ["[", "["]:
+                counts[table] = counts.get(table, 0) + 1
+                table = (*table, str(counts[table] - 1))
             path = table
         else:
             path = table + _dotted("".join(statement[: statement.index("=")]))
         for length in range(1, len(path) + 1):
             lines.setdefault(path[:length], line)
     return lines
+
+
+def _numbered(header: Path, counts: Mapping[Path, int]) -> Path:
+    """The path of a header, with the number of the last table after each array above it."""
+    path: Path = ()
+    for name in header[:-1]:
+        path = (*path, name)
+        if path in counts:
+            path = (*path, str(counts[path] - 1))
+    return (*path, header[-1])
 
 
 def line_of(lines: Mapping[Path, int], path: Path) -> int:

@@ -1,13 +1,12 @@
 """Accelerograms from files: two columns of text, and the format of the PEER ground motion database."""
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
-from typing import NoReturn
 
 import numpy as np
 
 from mechanics.loads.accelerogram import Accelerogram
+from mechanics.loads.tables import fail_at, number_at, numbered_lines, read_columns
 from moma.errors import SceneError
 
 __all__ = ["UNITS", "read_accelerogram", "read_at2", "read_csv"]
@@ -43,9 +42,7 @@ def read_accelerogram(path: str | Path, unit: str | None = None) -> Accelerogram
 
 
 def read_csv(path: str | Path, unit: str) -> Accelerogram:
-    """Read a table of times [s] and accelerations in `unit`; one header line, comments (#) and blank lines are skipped.
-
-    Columns are parted by commas, semicolons, tabs or blanks. Times must come at equal steps.
+    """Read a table of times [s], at equal steps, and accelerations in `unit`; see `read_columns` for the format.
 
     Raises
     ------
@@ -53,29 +50,15 @@ def read_csv(path: str | Path, unit: str) -> Accelerogram:
     """
     if unit not in UNITS:
         raise SceneError(f"unknown unit {unit!r}", where=str(path), remedy=f"give {', '.join(UNITS)}")
-    rows: list[tuple[int, float, float]] = []
-    headed = False
-    for number, line in _lines(path):
-        text = line.split("#")[0].strip()
-        if not text:
-            continue
-        cells = re.split(r"\s*[,;]\s*|\s+", text)
-        if not rows and not headed and not _is_number(cells[0]):
-            headed = True
-            continue
-        if len(cells) != 2:
-            _fail(path, number, f"{len(cells)} columns", "give time and acceleration")
-        rows.append((number, _value(path, number, cells[0]), _value(path, number, cells[1])))
-    if len(rows) < 2:
-        raise SceneError(f"{len(rows)} rows of numbers", where=str(path), remedy="give time and acceleration")
-    numbers, time, acceleration = (np.array(column) for column in zip(*rows, strict=True))
+    lines, rows = read_columns(path, "time, acceleration")
+    time, acceleration = rows.T
     dt = (time[-1] - time[0]) / (len(time) - 1)
     uneven = np.flatnonzero(~(np.abs(time - time[0] - dt * np.arange(len(time))) < _UNEVEN * dt))
     if len(uneven):
         at = int(uneven[0])
-        _fail(
+        fail_at(
             path,
-            int(numbers[at]),
+            int(lines[at]),
             f"time {time[at]:g} s is not at equal steps of {dt:g} s",
             "resample the record",
         )
@@ -89,17 +72,19 @@ def read_at2(path: str | Path) -> Accelerogram:
     ------
     SceneError : with file and line
     """
-    lines = list(_lines(path))
+    lines = list(numbered_lines(path))
     count, dt = _steps(path, lines)
     values: list[float] = []
     for number, line in lines[_HEADER:]:
         for text in line.split():
             if len(values) == count:
-                _fail(path, number, f"more values than NPTS = {count}", "correct NPTS, or take the rest away")
-            values.append(_value(path, number, text))
+                fail_at(
+                    path, number, f"more values than NPTS = {count}", "correct NPTS, or take the rest away"
+                )
+            values.append(number_at(path, number, text))
     if len(values) < count:
         what = f"{len(values)} values, but NPTS = {count}"
-        _fail(path, lines[-1][0], what, "the file is cut off: get it again, or correct NPTS")
+        fail_at(path, lines[-1][0], what, "the file is cut off: get it again, or correct NPTS")
     name = lines[1][1].strip()
     return Accelerogram(dt, UNITS["g"] * np.array(values), name or Path(path).stem, str(path))
 
@@ -108,9 +93,9 @@ def _steps(path: str | Path, lines: list[tuple[int, str]]) -> tuple[int, float]:
     """NPTS and DT from the four lines of the header, whose third must say that the unit is g."""
     header = [line for _, line in lines[:_HEADER]]
     if len(header) < _HEADER:
-        _fail(path, len(header) or 1, "less than four lines", "give a file of PEER's AT2 format")
+        fail_at(path, len(header) or 1, "less than four lines", "give a file of PEER's AT2 format")
     if not re.search(r"ACCELERATION.*\bG\b", header[2], re.IGNORECASE):
-        _fail(path, 3, f"not an acceleration in units of g: {header[2].strip()!r}", "give the .AT2 file")
+        fail_at(path, 3, f"not an acceleration in units of g: {header[2].strip()!r}", "give the .AT2 file")
     for pattern in _STEPS:
         found = pattern.search(header[3])
         if found and int(found[1]) > 1 and float(found[2]) > 0:
@@ -120,31 +105,3 @@ def _steps(path: str | Path, lines: list[tuple[int, str]]) -> tuple[int, float]:
         where=f"{path}:4",
         remedy="write for example: NPTS=  4000, DT=   .0050 SEC",
     )
-
-
-def _lines(path: str | Path) -> Iterator[tuple[int, str]]:
-    """Numbered lines of a text file."""
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig", errors="replace")
-    except OSError as error:
-        what = "no such file" if isinstance(error, FileNotFoundError) else f"cannot be read: {error.strerror}"
-        raise SceneError(what, where=str(path), remedy="check the path") from None
-    return enumerate(text.splitlines(), start=1)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
-def _value(path: str | Path, number: int, text: str) -> float:
-    if not _is_number(text) or not np.isfinite(float(text)):
-        _fail(path, number, f"{text[:40]!r} is not a number", "correct it, or take the line away")
-    return float(text)
-
-
-def _fail(path: str | Path, number: int, what: str, remedy: str) -> NoReturn:
-    raise SceneError(what, where=f"{path}:{number}", remedy=remedy)

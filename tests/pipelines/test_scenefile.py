@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mechanics.laws.dry_joint import DryJoint
 from mechanics.scene import ContactSettings, Fidelity, SolverSettings, TimeSettings
 from moma.errors import MomaError, SceneError
 from pipelines.scene_keys import MATERIAL_KEYS, TABLES
@@ -36,7 +37,7 @@ def test_the_smallest_scene_has_a_material_and_defaults_for_the_rest():
     assert scene.gravity == (0.0, 0.0, -9.81)
     assert scene.bodies.default is Fidelity.DEFORMABLE
     assert scene.materials[0].material.density == 2000.0
-    assert scene.contact.friction == 0.6
+    assert scene.contact.law.friction == 0.6
 
 
 def test_the_sample_scene_is_valid():
@@ -155,13 +156,18 @@ def _paths(tables, above=()):
     [
         ("time", TimeSettings),
         ("solver", SolverSettings),
-        ("contact", ContactSettings),
         ("joints", JointSettings),
     ],
 )
 def test_every_setting_has_a_key_with_its_default(table, settings):
     keys = {key.name: key.default for key in TABLES[table] if (table, key.name) != ("joints", "mode")}
     assert keys == {one.name: one.default for one in fields(settings)}
+
+
+def test_every_setting_of_the_contact_has_a_key_with_its_default():
+    keys = {key.name: key.default for key in TABLES["contact"]}
+    settings = {one.name: one.default for one in (*fields(DryJoint), *fields(ContactSettings))}
+    assert keys == {name: value for name, value in settings.items() if name not in ("law", "rules")}
 
 
 def test_every_key_of_a_scene_is_documented_with_its_unit_and_default():
