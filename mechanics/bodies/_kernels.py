@@ -10,22 +10,47 @@ _SUBSTEP = 0.1
 
 
 @njit(cache=True)
-def _turn(rotation, x, y, z):
-    """rotation · exp(vector) in place (Rodrigues); the vector is given in body axes [rad]."""
+def _series(x, y, z):
+    """sin(a)/a and (1 - cos(a))/a² of a rotation vector of length a (Rodrigues)."""
     angle = np.sqrt(x * x + y * y + z * z)
     if angle < 1e-8:
-        s, c = 1.0 - angle * angle / 6.0, 0.5 - angle * angle / 24.0
-    else:
-        half = np.sin(0.5 * angle) / (0.5 * angle)
-        s, c = np.sin(angle) / angle, 0.5 * half * half
+        return 1.0 - angle * angle / 6.0, 0.5 - angle * angle / 24.0
+    half = np.sin(0.5 * angle) / (0.5 * angle)
+    return np.sin(angle) / angle, 0.5 * half * half
+
+
+@njit(cache=True)
+def _row_turned(a, b, c, x, y, z, s, v):
+    """The row (a, b, c) times the exponential of a rotation vector, given its series."""
+    p, q, r = b * z - c * y, c * x - a * z, a * y - b * x
+    return a + s * p + v * (q * z - r * y), b + s * q + v * (r * x - p * z), c + s * r + v * (p * y - q * x)
+
+
+@njit(cache=True)
+def _turn(rotation, x, y, z):
+    """rotation · exp(vector) in place; the vector is given in body axes [rad]."""
+    s, v = _series(x, y, z)
     for i in range(3):
-        a, b, d = rotation[i, 0], rotation[i, 1], rotation[i, 2]
-        # row × vector, and once more
-        p, q, r = b * z - d * y, d * x - a * z, a * y - b * x
-        pp, qq, rr = q * z - r * y, r * x - p * z, p * y - q * x
-        rotation[i, 0] = a + s * p + c * pp
-        rotation[i, 1] = b + s * q + c * qq
-        rotation[i, 2] = d + s * r + c * rr
+        rotation[i, 0], rotation[i, 1], rotation[i, 2] = _row_turned(
+            rotation[i, 0], rotation[i, 1], rotation[i, 2], x, y, z, s, v
+        )
+
+
+@njit(cache=True)
+def _straighten(rotation):
+    """Take rounding out of a rotation, in place: one step of Newton's towards the nearest, R (3 - Rᵀ R)/2."""
+    a, b, c = rotation[:, 0], rotation[:, 1], rotation[:, 2]
+    aa = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
+    ab = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    ac = a[0] * c[0] + a[1] * c[1] + a[2] * c[2]
+    bb = b[0] * b[0] + b[1] * b[1] + b[2] * b[2]
+    bc = b[0] * c[0] + b[1] * c[1] + b[2] * c[2]
+    cc = c[0] * c[0] + c[1] * c[1] + c[2] * c[2]
+    for i in range(3):
+        x, y, z = a[i], b[i], c[i]
+        a[i] += 0.5 * (x - x * aa - y * ab - z * ac)
+        b[i] += 0.5 * (y - x * ab - y * bb - z * bc)
+        c[i] += 0.5 * (z - x * ac - y * bc - z * cc)
 
 
 @njit(cache=True)
@@ -66,22 +91,30 @@ def fly(rotation, omega, inertia, inverse, moving, duration):  # pragma: no cove
         steps = min(int(angle / _SUBSTEP) + 1, 1000)
         tau = duration / steps
         o0, o1, o2 = _transposed(r, w0, w1, w2)
+        # R is a rotation but for rounding: what R Rᵀ ω lacks of ω would add up over the steps
+        d0, d1, d2 = _product(r, o0, o1, o2)
+        d0, d1, d2 = _transposed(r, w0 - d0, w1 - d1, w2 - d2)
+        o0, o1, o2 = o0 + d0, o1 + d1, o2 + d2
         p0, p1, p2 = _product(i, o0, o1, o2)
         for _ in range(steps):
             e0, e1, e2 = o0, o1, o2
             n0, n1, n2 = p0, p1, p2
             size = np.sqrt(p0 * p0 + p1 * p1 + p2 * p2)
             for _ in range(60):
-                t = np.eye(3)
-                _turn(t, tau * e0, tau * e1, tau * e2)
-                c0, c1, c2 = _transposed(t, p0, p1, p2)
+                x, y, z = tau * e0, tau * e1, tau * e2
+                s, c = _series(x, y, z)
+                c0, c1, c2 = _row_turned(p0, p1, p2, x, y, z, s, c)
                 change = abs(c0 - n0) + abs(c1 - n1) + abs(c2 - n2)
                 n0, n1, n2 = c0, c1, c2
                 if change <= 1e-16 * size:
                     break
-                e0, e1, e2 = _product(v, 0.5 * (p0 + n0), 0.5 * (p1 + n1), 0.5 * (p2 + n2))
+                # by the change of Π: I⁻¹ I is not quite 1, and would scale the spin a little more each time
+                d0, d1, d2 = _product(v, n0 - p0, n1 - p1, n2 - p2)
+                e0, e1, e2 = o0 + 0.5 * d0, o1 + 0.5 * d1, o2 + 0.5 * d2
             _turn(r, tau * e0, tau * e1, tau * e2)
+            d0, d1, d2 = _product(v, n0 - p0, n1 - p1, n2 - p2)
+            o0, o1, o2 = o0 + d0, o1 + d1, o2 + d2
             p0, p1, p2 = n0, n1, n2
-            o0, o1, o2 = _product(v, p0, p1, p2)
+        _straighten(r)
         spin[b, 0], spin[b, 1], spin[b, 2] = _product(r, o0, o1, o2)
     return new, spin
