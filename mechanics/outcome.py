@@ -26,10 +26,10 @@ _TRUSTED = 1e-2
 class Watch:
     """Tells the outcome after each step.
 
-    *Equilibrium*: for five steps in a row every body that is not fixed is in balance (unbalanced force and moment
-    below the scene's tolerance) and slower than 10⁻⁴ √(g · its smallest width). *Collapsed*: a body has moved by more
-    than the scene's fraction of its smallest width and is faster than 0.05 √(g · width), in a step solved to η < 0.01.
-    Without gravity g counts as 1 m/s².
+    *Equilibrium*: for five steps in a row, and after all loads have ceased to change, every body that is not fixed is
+    in balance (unbalanced force and moment below the scene's tolerance) and slower than 10⁻⁴ √(g · its smallest width).
+    *Collapsed*: a body has moved by more than the scene's fraction of its smallest width and is faster than
+    0.05 √(g · width), in a step solved to η < 0.01. Without gravity g counts as 1 m/s².
     """
 
     def __init__(self, model: Model, start: State) -> None:
@@ -42,7 +42,10 @@ class Watch:
         fall = np.sqrt((float(np.linalg.norm(model.gravity(state.time))) or 1.0) * model.surfaces.size)
         pace = speed(model, state) / fall
         quiet = (
-            solution.converged and balance.max() <= settings.balance_tolerance and pace.max() <= _REST_SPEED
+            state.time >= model.scene.loads.until
+            and solution.converged
+            and balance.max() <= settings.balance_tolerance
+            and pace.max() <= _REST_SPEED
         )
         self._quiet = self._quiet + 1 if quiet else 0
         if self._quiet >= LASTING:

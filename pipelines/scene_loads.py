@@ -120,10 +120,10 @@ def _tilt(values: Mapping[str, Any]) -> TiltingTable:
 
 def _force(document: Document, entry: Entry, codes: Codes, blocks: Blocks) -> StoneForce:
     values, point = entry.values, entry.values["point"]
-    still = sorted(code for code in codes if blocks[code].fidelity is Fidelity.FIXED)
-    if still:
-        what = f"a force on stone {still[0]}, which is fixed"
-        document.fail(what, *entry.path, "stones", remedy="leave it out: a support takes any force")
+    for code in sorted(codes):
+        if blocks[code].fidelity is not Fidelity.RIGID:
+            what = f"a force on stone {code}, which is {blocks[code].fidelity}"
+            document.fail(what, *entry.path, "stones", remedy="forces act on rigid stones; leave it out")
     if point is None:
         return StoneForce(codes, values["force"], follows=values["follows"])
     if len(codes) > 1:

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from mechanics.laws.status import STATUSES
 from mechanics.result import BodyResult, Result
 from mechanics.scene import Fidelity
 from pipelines.vtu import POLYHEDRON, TETRAHEDRON, VERTEX, Grid, write_pvd, write_vtu
@@ -14,7 +15,6 @@ __all__ = ["body_grid", "contact_grid", "write_frames"]
 Array = NDArray[np.float64]
 
 _FIDELITIES = (Fidelity.FIXED, Fidelity.RIGID, Fidelity.DEFORMABLE)
-_STATUSES = ("open", "stick", "slip")
 
 
 def write_frames(result: Result, folder: Path) -> None:
@@ -72,10 +72,10 @@ def body_grid(result: Result, positions: tuple[Array, ...], *, stressed: bool) -
 
 
 def contact_grid(result: Result) -> Grid:
-    """The contact points at the end, with their force [N], normal, gap [m], area [m²] and status."""
+    """The contact points at the end, with their force [N], normal, gap [m], area [m²] and status (in STATUSES)."""
     contacts = result.contacts
     count = len(contacts.gap)
-    status = np.array([_STATUSES.index(str(one)) for one in contacts.status], dtype=np.int64)
+    status = np.array([STATUSES.index(str(one)) for one in contacts.status], dtype=np.int64)
     return Grid(
         points=contacts.point,
         cells=[[index] for index in range(count)],

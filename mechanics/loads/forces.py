@@ -36,6 +36,11 @@ class StoneForce:
                 f"a force of {self.force.components} components", where="force", remedy="give x, y and z"
             )
 
+    @property
+    def until(self) -> float:
+        """When the force ceases to change [s]."""
+        return self.force.until
+
     def __call__(self, time: float, centre: Array, rotation: Array) -> tuple[Array, Array]:
         """Force (n, 3) [N] and moment (n, 3) [N m] about the centre of mass, world axes."""
         force = np.broadcast_to(self.force(time), centre.shape)

@@ -31,6 +31,11 @@ class GravityRamp:
                 f"duration = {self.duration!r}", where="gravity ramp", remedy="give seconds greater than 0"
             )
 
+    @property
+    def until(self) -> float:
+        """T [s]."""
+        return self.duration
+
     def __call__(self, time: float, gravity: Array) -> Array:
         """g t/T up to the duration T, then g (3,) [m/s²]."""
         return gravity * min(max(time / self.duration, 0.0), 1.0)
@@ -72,6 +77,11 @@ class TiltingTable:
                 remedy="give a rate and a limit greater than 0, from a time of 0 or later",
             )
         return cls(axis, History(np.array([start, start + limit / rate]), np.radians([0.0, limit])))
+
+    @property
+    def until(self) -> float:
+        """When the angle ceases to change [s]."""
+        return self.angle.until
 
     def __call__(self, time: float, gravity: Array) -> Array:
         """Gravity (3,) turned by minus the angle [m/s²]."""

@@ -66,6 +66,11 @@ class GroundMotion:
                 remedy="give a number, and a time of 0 or later",
             )
 
+    @property
+    def until(self) -> float:
+        """When the ground comes to rest [s]."""
+        return max(one.until for one in self._velocity)
+
     def pose(self, time: float) -> Pose:
         """Where the ground is at `time` [s]."""
         return Pose(sum((one.integral(time) for one in self._velocity), np.zeros(3)), np.eye(3), np.zeros(3))

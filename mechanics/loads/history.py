@@ -85,6 +85,11 @@ class History:
         """How many numbers a value has: k, or 1 for a scalar."""
         return 1 if self.value.ndim == 1 else self.value.shape[1]
 
+    @property
+    def until(self) -> float:
+        """When it ceases to change [s]; 0 for a constant."""
+        return float(self.time[-1]) if len(self.time) > 1 else 0.0
+
     def __call__(self, time: float) -> Array:
         """Value () or (k,) at `time` [s].
 

@@ -1,6 +1,7 @@
 """What a load can be: a change of gravity, a force on stones, an imposed motion of supports.
 
-Each is a small frozen class behind one of three protocols; to add one, write one file.
+Each is a small frozen class behind one of three protocols; to add one, write one file. Each says `until` when it
+changes [s], infinity if it never ceases to: before that no scene has come to its equilibrium.
 """
 
 from dataclasses import dataclass
@@ -17,6 +18,10 @@ Array = NDArray[np.float64]
 class GravityChange(Protocol):
     """Changes gravity with time: a ramp, a tilting table."""
 
+    @property
+    def until(self) -> float:
+        """When it ceases to change [s]."""
+
     def __call__(self, time: float, gravity: Array) -> Array:
         """Gravity (3,) at `time`, given that of the scene or of the change before this one [m/s²]."""
 
@@ -32,6 +37,10 @@ class Force(Protocol):
     @property
     def stones(self) -> frozenset[str]:
         """Codes."""
+
+    @property
+    def until(self) -> float:
+        """When it ceases to change [s]."""
 
     def __call__(self, time: float, centre: Array, rotation: Array) -> tuple[Array, Array]:
         """Force (n, 3) [N] and its moment about the centre of mass (n, 3) [N m] at `time`, world axes.
@@ -68,6 +77,10 @@ class Motion(Protocol):
     def stones(self) -> frozenset[str]:
         """Codes."""
 
+    @property
+    def until(self) -> float:
+        """When it comes to rest [s]."""
+
     def pose(self, time: float) -> Pose:
         """Where the stones are at `time` [s]; continuous, and the identity at time 0."""
 
@@ -79,3 +92,9 @@ class Loads:
     gravity: tuple[GravityChange, ...] = ()
     forces: tuple[Force, ...] = ()
     motions: tuple[Motion, ...] = ()
+
+    @property
+    def until(self) -> float:
+        """When all of them have ceased to change [s]; 0 without loads."""
+        gravity, forces = (one.until for one in self.gravity), (one.until for one in self.forces)
+        return max([0.0, *gravity, *forces, *(one.until for one in self.motions)])

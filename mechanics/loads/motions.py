@@ -56,6 +56,12 @@ class ImposedMotion:
             if not ok:
                 raise SceneError(what, where="motion", remedy=remedy)
 
+    @property
+    def until(self) -> float:
+        """When the stones come to rest [s]; infinity if they do not."""
+        moving = self.velocity.value[-1].any() or self.spin.value[-1].any()
+        return float(np.inf) if moving else max(self.velocity.until, self.spin.until)
+
     def pose(self, time: float) -> Pose:
         """Where the stones are at `time` [s]."""
         axis = np.array(self.axis) / np.linalg.norm(self.axis)

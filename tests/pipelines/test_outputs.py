@@ -4,6 +4,7 @@ import base64
 import json
 import struct
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -19,7 +20,7 @@ from pipelines.report import write_report
 from pipelines.stone_values import node_volumes, stone_results, stress_statistics
 from pipelines.summary import as_json, summarise
 from pipelines.surfaces import load_surface, save_surface, wall_surface
-from pipelines.vtk_output import write_frames
+from pipelines.vtk_output import contact_grid, write_frames
 from tests.pipelines.handmade import deformable_body, result_of, rigid_body
 
 TOWARDS = np.array([0.0, -1.0, 0.0])
@@ -264,3 +265,14 @@ def test_the_report_of_a_rigid_collapse_says_so(rigid, tmp_path):
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "It falls" in text
     assert "Most stressed" not in text
+
+
+def test_every_status_of_a_contact_has_its_number(mixed):
+    many = np.array(["open", "stick", "slip", "bonded", "broken"])
+    contacts = replace(
+        result_of(
+            [rigid_body("a", (0, 0, 0), (1, 1, 1))], pairs=((0, 0),) * 5, forces=((0, 0, 0),) * 5
+        ).contacts,
+        status=many,
+    )
+    assert contact_grid(replace(mixed, contacts=contacts)).point_data["status"].tolist() == [0, 1, 2, 3, 4]

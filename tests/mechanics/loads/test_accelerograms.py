@@ -127,6 +127,7 @@ def test_after_a_record_the_ground_stays_where_it_is():
     last = motion.pose(1.0 + DT).displacement[0]
     assert last == pytest.approx(1.0 + DT * 2.0 / 2, rel=1e-12)
     assert motion.pose(50.0).displacement[0] == last
+    assert motion.until == pytest.approx(1.0 + DT)
 
 
 @pytest.mark.parametrize(

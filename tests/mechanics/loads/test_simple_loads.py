@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 from mechanics.loads.forces import StoneForce
 from mechanics.loads.gravity import GravityRamp, TiltingTable
 from mechanics.loads.history import History
+from mechanics.loads.load import Loads
 from mechanics.loads.motions import ImposedMotion, settlement, spreading
 from moma.errors import SceneError
 
@@ -106,3 +107,16 @@ def test_impossible_motions_are_refused(changed, said):
     with pytest.raises(SceneError, match="motion: ") as caught:
         ImposedMotion(NORTH, **changed)
     assert said in str(caught.value)
+
+
+def test_loads_say_until_when_they_change():
+    """No scene is at its equilibrium before."""
+    ramp, table = GravityRamp(2.0), TiltingTable.at_rate_degrees((0, 1, 0), rate=2.0, limit=6.0, start=1.0)
+    push = StoneForce(NORTH, History([0.0, 7.0], np.zeros((2, 3))))
+    settled = settlement(NORTH, (0.0, 0.0, -1.0), duration=5.0, start=1.0)
+    assert [one.until for one in (ramp, table, push, settled)] == [2.0, 4.0, 7.0, 6.0]
+    assert Loads((ramp, table), (push,), (settled,)).until == 7.0
+    assert Loads().until == 0.0
+    assert StoneForce(NORTH, History.constant([1.0, 0.0, 0.0])).until == 0.0
+    assert ImposedMotion(NORTH, History.constant([1.0, 0.0, 0.0])).until == np.inf
+    assert ImposedMotion(NORTH, spin=History([0.0, 1.0], [0.0, 1.0])).until == np.inf
