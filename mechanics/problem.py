@@ -6,6 +6,7 @@ W = Hᵀ ŵ H is behind the protocol `Delassus`; mechanics/operators holds its f
 by the largest tension, so that r_N ≥ 0 (mechanics/laws/law.py).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -76,17 +77,17 @@ class SparseForm:
     Attributes
     ----------
     inertia : Â = ŵ⁻¹, (nd, nd) over the velocities of all bodies that move [kg]
-    lift : H, (nd, 3 nc), local impulses → generalized impulses
+    lift, across : H, (nd, 3 nc), local impulses → generalized impulses, and Hᵀ
     """
 
     def __init__(self, inertia: "csc_array[np.float64]", lift: "csc_array[np.float64]") -> None:
-        self.inertia, self.lift = inertia, lift
+        self.inertia, self.lift, self.across = inertia, lift, lift.T.tocsr()
         self._factors: dict[float, _Factor] = {}
 
     def factor(self, sigma: float) -> _Factor:
         """Sparse factors of Â + H Hᵀ/σ, kept for the next call."""
         if sigma not in self._factors:
-            matrix = (self.inertia + self.lift @ self.lift.T / sigma).tocsc()
+            matrix = (self.inertia + self.lift @ self.across / sigma).tocsc()
             # symmetric positive definite: order A + Aᵀ and do not pivot
             self._factors[sigma] = splu(
                 matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
@@ -105,7 +106,7 @@ class ContactProblem:
     bias : (nc,) shift of u_N in Signorini's condition [m/s]
     friction : (nc,) Coulomb's μ [-]
     cohesion : (nc,) k, the tangential impulse carried at r_N = 0 [N s]
-    sparse : W once more, for methods that factorise; None where none was asked for
+    sparse : gives W once more, for methods that factorise; None where it has no such form
     """
 
     delassus: Delassus
@@ -113,7 +114,7 @@ class ContactProblem:
     bias: Array
     friction: Array
     cohesion: Array
-    sparse: SparseForm | None = None
+    sparse: Callable[[], SparseForm] | None = None
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from mechanics.problem import ContactProblem, scale_of
 from mechanics.solvers._kernels import natural_errors
 
-__all__ = ["Residual", "dual_velocity", "natural_map", "project_on_cone", "residual"]
+__all__ = ["Residual", "natural_map", "project_on_cone", "residual"]
 
 Array = NDArray[np.float64]
 
@@ -22,18 +22,17 @@ class Residual:
     natural_map : η [-]
     velocity : largest velocity by which a contact breaks its law, over the largest of u_free [-]
     error : (nc,) ‖e_α‖ of each contact [N s]
+    dual : (nc, d) û, the velocity that is dual to r [m/s]
     """
 
     natural_map: float
     velocity: float
     error: Array
+    dual: Array
 
-
-def dual_velocity(problem: ContactProblem, impulse: Array) -> Array:
-    """û = W r + u_free + (bias + μ‖u_T‖) n (nc, d), local frame [m/s]."""
-    velocity: Array = problem.delassus.apply(impulse) + problem.u_free
-    velocity[:, 0] += problem.bias + problem.friction * np.linalg.norm(velocity[:, 1:], axis=1)
-    return velocity
+    def within(self, tolerance: float, velocity_tolerance: float) -> bool:
+        """Whether both measures are."""
+        return self.natural_map <= tolerance and self.velocity <= velocity_tolerance
 
 
 def residual(problem: ContactProblem, impulse: Array) -> Residual:
@@ -43,16 +42,18 @@ def residual(problem: ContactProblem, impulse: Array) -> Residual:
     without contacts; where no impulse is given but one is needed, the size of P_K(-ρ û) replaces ‖r‖, so η is 1.
     """
     if len(impulse) == 0:
-        return Residual(0.0, 0.0, np.zeros(0))
+        return Residual(0.0, 0.0, np.zeros(0), np.zeros_like(impulse))
     rho = 1.0 / scale_of(problem.delassus)
     u = problem.delassus.apply(impulse)
     u += problem.u_free
+    # writes û into u
     error, size, projected = natural_errors(impulse, u, problem.bias, problem.friction, problem.cohesion, rho)
     scale, pace = max(size, projected), float(np.abs(problem.u_free).max())
     return Residual(
         float(np.linalg.norm(error)) / scale if scale > 0 else 0.0,
         float(error.max()) / rho / pace if pace > 0 else 0.0,
         error,
+        u,
     )
 
 

@@ -145,13 +145,16 @@ class SolverSettings:
 
     Attributes
     ----------
-    method : nsgs (Gauss–Seidel), admm (needs a deformable block), or auto: admm as soon as a block is deformable
+    method : nsgs (Gauss–Seidel), admm, or auto: admm as soon as a block is deformable, else both in turn
     tolerance : natural map η (unit-free) at which a step counts as solved [-]
+    velocity_tolerance : largest velocity by which a contact may still break its law, over the largest velocity that
+        the contacts have to stop [-]
     max_iterations : sweeps or iterations after which a step is left as it is and reported as not converged
     """
 
     method: Method = Method.AUTO
     tolerance: float = 1e-6
+    velocity_tolerance: float = 1e-4
     max_iterations: int = 2000
 
 

@@ -1,9 +1,10 @@
 """The loop of docs/theory.md: predict, detect, state the problem, solve, advance."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,6 @@ from mechanics.observers.equilibrium import displacement, speed
 from mechanics.operators.mixed import MixedDelassus
 from mechanics.operators.rigid import RigidDelassus, schedule
 from mechanics.problem import ContactSolution, SparseForm
-from mechanics.solvers.admm import ADMM
 from mechanics.solvers.choice import choose_solver
 from mechanics.state import State
 from mechanics.statement import Statement, state_laws
@@ -106,7 +106,7 @@ class _Touching:
     contacts: Contacts
     law: NDArray[np.int64]
     operator: RigidDelassus | MixedDelassus
-    sparse: SparseForm | None
+    sparse: Callable[[], SparseForm]
     configuration: State
 
 
@@ -222,16 +222,17 @@ class Simulation:
             predicted = follow_nodes(model, predicted)
             contacts = self._detector(predicted, self._step * speed(model, predicted))
         with self.clock("assemble"):
-            sparse = None
             operator: RigidDelassus | MixedDelassus
+            sparse: Callable[[], SparseForm]
             if model.rigid_only:
                 plan = schedule(contacts.bodies, model.inertia.moving)
                 contacts = take(contacts, plan.order)
-                operator = rigid_delassus(model, predicted, contacts, plan)
+                rigid = rigid_delassus(model, predicted, contacts, plan)
+                operator, sparse = rigid, lambda: rigid.sparse
             else:
-                operator = mixed_delassus(model, predicted, contacts, self._compliance)
-                if isinstance(self._solve, ADMM):
-                    sparse = sparse_form(model, predicted, contacts, operator, self._compliance)
+                mixed = mixed_delassus(model, predicted, contacts, self._compliance)
+                operator = mixed
+                sparse = cache(lambda: sparse_form(model, predicted, contacts, mixed, self._compliance))
         self._touching = _Touching(contacts, model.laws.of(contacts.bodies), operator, sparse, predicted)
         return predicted, self._touching
 

@@ -1,5 +1,6 @@
 """From contacts and their laws to the contact problem of one step: a shift, a cone, and W."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -63,7 +64,7 @@ def state_laws(
     gap: Array,
     law: Ints,
     operator: RigidDelassus | MixedDelassus,
-    sparse: SparseForm | None,
+    sparse: Callable[[], SparseForm] | None,
     free: Kick,
     memory: Array,
     first: bool,

@@ -135,7 +135,7 @@ def solve_contact(f, b, mu, k, r):  # pragma: no cover - compiled
 
 @njit(cache=True)
 def natural_errors(r, u, bias, mu, k, rho):  # pragma: no cover - compiled
-    """e = r - P_K(r - ρ û) with û = u + (bias + μ‖u_T‖) n of every contact.
+    """e = r - P_K(r - ρ û) with û = u + (bias + μ‖u_T‖) n of every contact; u becomes û.
 
     K is the part r_N ≥ 0 of the cone ‖r_T‖ ≤ μ r_N + k.
 
@@ -152,7 +152,8 @@ def natural_errors(r, u, bias, mu, k, rho):  # pragma: no cover - compiled
         slide = 0.0
         for i in range(1, d):
             slide += u[c, i] * u[c, i]
-        n = r[c, 0] - rho * (u[c, 0] + bias[c] + mu[c] * np.sqrt(slide))
+        u[c, 0] += bias[c] + mu[c] * np.sqrt(slide)
+        n = r[c, 0] - rho * u[c, 0]
         tangential = 0.0
         for i in range(1, d):
             t = r[c, i] - rho * u[c, i]

@@ -15,30 +15,35 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.problem import ContactProblem, ContactSolution, ContactStart, scale_of
-from mechanics.residual import natural_map, project_on_cone
+from mechanics.residual import project_on_cone, residual
 from moma.errors import SolverError
 
 __all__ = ["ADMM"]
 
 _OVER_RELAXATION = 1.6
-# σ over the mean diagonal of W: larger values leave gaps for long, smaller ones lose friction in the first steps
-_PENALTY = 0.1
 
 
 @dataclass(frozen=True)
 class ADMM:
-    """Iterates until η ≤ tolerance; for scenes with deformable bodies.
+    """Iterates until η ≤ tolerance.
 
     Attributes
     ----------
     tolerance : natural map η at which the problem counts as solved [-]
+    velocity_tolerance : and the largest velocity by which a contact may break its law, over that of u_free [-]
     max_iterations : iterations after which it is given up
+    penalty : σ over the mean diagonal of W; where all that touches stays in touch, the smaller the faster; larger
+        values bear with contacts that open and slide [-]
     check_every : iterations between two looks at η
+    patience : give up after a look that finds η less than this many times smaller than two looks before; 0: never
     """
 
     tolerance: float = 1e-6
+    velocity_tolerance: float = 1e-4
     max_iterations: int = 2000
+    penalty: float = 0.1
     check_every: int = 10
+    patience: float = 0.0
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from `start`; its velocity, û = -σ y, lets the iteration go on where it stopped.
@@ -51,14 +56,19 @@ class ADMM:
             raise SolverError("the problem has no sparse form", where="ADMM", remedy='use the method "nsgs"')
         if len(start.impulse) == 0:
             return ContactSolution(start.impulse, start.velocity, 0, 0.0, True)
-        lift, sigma = problem.sparse.lift, _PENALTY * scale_of(problem.delassus)
+        form, sigma = problem.sparse(), self.penalty * scale_of(problem.delassus)
+        lift, across, factor = form.lift, form.across, form.factor(sigma)
         mu, cohesion = problem.friction, problem.cohesion
-        factor, across = problem.sparse.factor(sigma), lift.T.tocsr()
         shifted = problem.u_free.copy()
         shifted[:, 0] += problem.bias
         z, y = project_on_cone(start.impulse, mu, cohesion), -start.velocity / sigma
-        eta, iterations = natural_map(problem, z), 0
-        while eta > self.tolerance and iterations < self.max_iterations:
+        left, iterations = residual(problem, z), 0
+        looks = [np.inf, np.inf]
+        limits = self.tolerance, self.velocity_tolerance
+        while not left.within(*limits) and iterations < self.max_iterations:
+            if looks[-2] < self.patience * left.natural_map:
+                break
+            looks.append(left.natural_map)
             for _ in range(min(self.check_every, self.max_iterations - iterations)):
                 right = sigma * (z - y) - shifted
                 right[:, 0] -= mu * sigma * np.linalg.norm(y[:, 1:], axis=1)
@@ -68,5 +78,5 @@ class ADMM:
                 z = project_on_cone(relaxed + y, mu, cohesion)
                 y = y + relaxed - z
                 iterations += 1
-            eta = natural_map(problem, z)
-        return ContactSolution(z, -sigma * y, iterations, eta, eta <= self.tolerance)
+            left = residual(problem, z)
+        return ContactSolution(z, -sigma * y, iterations, left.natural_map, left.within(*limits))

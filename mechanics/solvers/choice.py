@@ -2,26 +2,19 @@
 
 from mechanics.scene import Method, SolverSettings
 from mechanics.solvers.admm import ADMM
+from mechanics.solvers.alternating import Alternating
 from mechanics.solvers.nsgs import NSGS
-from moma.errors import SceneError
 
 __all__ = ["choose_solver"]
 
 
-def choose_solver(settings: SolverSettings, deformable: bool) -> NSGS | ADMM:
-    """The solver that the settings ask for; *auto* is ADMM as soon as a body is deformable.
+def choose_solver(settings: SolverSettings, deformable: bool) -> NSGS | ADMM | Alternating:
+    """The solver that the settings ask for; *auto*: ADMM as soon as a body is deformable, else both in turn.
 
     Deformable bodies make Gauss–Seidel slow: their contacts are many, and each is far stiffer than the stone is
-    heavy. Rigid bodies leave ADMM without the elastic compliance that sets its penalty.
-
-    Raises
-    ------
-    SceneError : if ADMM is asked for and nothing is deformable
+    heavy.
     """
-    if settings.method == Method.ADMM and not deformable:
-        raise SceneError(
-            "admm needs a deformable block", where="solver.method", remedy='use "nsgs" or "auto"'
-        )
+    limits = settings.tolerance, settings.velocity_tolerance, settings.max_iterations
     if settings.method == Method.ADMM or (settings.method == Method.AUTO and deformable):
-        return ADMM(settings.tolerance, settings.max_iterations)
-    return NSGS(settings.tolerance, settings.max_iterations)
+        return ADMM(*limits)
+    return NSGS(*limits) if settings.method == Method.NSGS else Alternating(*limits)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from mechanics.problem import ContactProblem, ContactSolution, ContactStart
-from mechanics.residual import dual_velocity, residual
+from mechanics.residual import residual
 
 __all__ = ["NSGS"]
 
@@ -15,25 +15,29 @@ class NSGS:
     Attributes
     ----------
     tolerance : natural map η at which the problem counts as solved [-]
+    velocity_tolerance : and the largest velocity by which a contact may break its law, over that of u_free [-]
     max_iterations : sweeps after which it is given up
     check_every : sweeps between two looks at η
     """
 
     tolerance: float = 1e-6
+    velocity_tolerance: float = 1e-4
     max_iterations: int = 2000
     check_every: int = 20
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from the impulses of `start`."""
         impulse = start.impulse.copy()
-        eta = residual(problem, impulse).natural_map
-        shift = problem.u_free.copy()
-        shift[:, 0] += problem.bias
-        sweep = problem.delassus.gauss_seidel(shift, problem.friction, problem.cohesion)
+        left = residual(problem, impulse)
+        limits = self.tolerance, self.velocity_tolerance
         sweeps = 0
-        while eta > self.tolerance and sweeps < self.max_iterations:
-            count = min(self.check_every, self.max_iterations - sweeps)
-            sweep(impulse, count)
-            sweeps += count
-            eta = residual(problem, impulse).natural_map
-        return ContactSolution(impulse, dual_velocity(problem, impulse), sweeps, eta, eta <= self.tolerance)
+        if not left.within(*limits):
+            shift = problem.u_free.copy()
+            shift[:, 0] += problem.bias
+            sweep = problem.delassus.gauss_seidel(shift, problem.friction, problem.cohesion)
+            while not left.within(*limits) and sweeps < self.max_iterations:
+                count = min(self.check_every, self.max_iterations - sweeps)
+                sweep(impulse, count)
+                sweeps += count
+                left = residual(problem, impulse)
+        return ContactSolution(impulse, left.dual, sweeps, left.natural_map, left.within(*limits))
