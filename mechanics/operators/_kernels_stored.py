@@ -34,16 +34,15 @@ def apply(r, block, indices, indptr):  # pragma: no cover - compiled
 def sweep(
     count, r, shift, mu, cohesion, factors, local, block, indices, indptr
 ):  # pragma: no cover - compiled
-    """`count` passes of non-smooth Gauss–Seidel, every second one backwards; r (nc, 3) is kept up to date in place.
+    """`count` passes of non-smooth Gauss–Seidel; r (nc, 3) is kept up to date in place.
 
     `shift` is u_free with the bias added to its normal part; `local` (nc, 3, 3) the symmetric blocks that each
     contact is solved with, and `factors` theirs. What the row of W has besides stays frozen in b.
     """
     nc = r.shape[0]
     u, b, new = np.empty(3), np.empty(3), np.empty(3)
-    for n in range(count):
-        for position in range(nc):
-            c = nc - 1 - position if n % 2 == 1 else position
+    for _ in range(count):
+        for c in range(nc):
             u[:] = shift[c]
             _row(c, r, block, indices, indptr, u)
             w = local[c]

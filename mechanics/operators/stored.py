@@ -78,7 +78,7 @@ class StoredDelassus:
         return velocity
 
     def gauss_seidel(self, shift: Array, friction: Array, cohesion: Array) -> GaussSeidel:
-        """Sweeps forth and back."""
+        """Sweeps in the order of the contacts: on most problems forth and back takes twice as many."""
         local = self._local()
         factors = local_factors(local)
 
