@@ -1,0 +1,144 @@
+"""Numba kernels of the grids in which disks are found.
+
+Disks are sorted into grids of square cells, one for each class of sizes: a cell is at least as wide as the reach of
+each disk in it, and at most about twice. A disk looks for partners in its own grid and in the coarser ones, each time
+in nine cells, so the cost is linear whatever the sizes.
+
+A grid is a tuple: origin (2,), width (nl,), low (nl, 2) and count (nl, 2) of the cells in use, base (nl,), buckets
+(nl,), start (nbuckets+1,), order (nd,), level (nd,), cell (nd, 2). A class with few empty cells has one bucket for each
+cell; one with many shares buckets by a hash, and the cell of each disk tells who is meant.
+"""
+
+import numpy as np
+from numba import njit
+
+__all__ = ["bucket", "build_grid", "cells_along"]
+
+
+@njit(cache=True)
+def bucket(cell_x, cell_y, level, low, count, base, buckets):
+    """Where the disks of a cell are kept; -1 outside."""
+    x, y = cell_x - low[level, 0], cell_y - low[level, 1]
+    if x < 0 or y < 0 or x >= count[level, 0] or y >= count[level, 1]:
+        return -1
+    if count[level, 0] * count[level, 1] == buckets[level]:
+        return base[level] + y * count[level, 0] + x
+    mixed = np.uint64(x) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(y) * np.uint64(0xC2B2AE3D27D4EB4F)
+    mixed ^= mixed >> np.uint64(29)
+    return base[level] + np.int64(mixed % np.uint64(buckets[level]))
+
+
+@njit(cache=True)
+def _size_classes(extent):
+    """Class (nd,) of each disk by its half width, and the width of the cells of each class that is in use (nl,)."""
+    nd = extent.shape[0]
+    smallest, largest = np.inf, 0.0
+    for i in range(nd):
+        smallest, largest = min(smallest, extent[i]), max(largest, extent[i])
+    # a little wider than needed, so that rounding cannot put two disks in reach two cells apart
+    finest = 2.0 * smallest * (1.0 + 1e-9)
+    classes = 1
+    while finest * 2.0 ** (classes - 1) < 2.0 * largest:
+        classes += 1
+    occupied = np.zeros(classes, dtype=np.int64)
+    level = np.zeros(nd, dtype=np.int64)
+    for i in range(nd):
+        while finest * 2.0 ** level[i] < 2.0 * extent[i]:
+            level[i] += 1
+        occupied[level[i]] = 1
+    width = np.empty(occupied.sum())
+    nl = 0
+    for k in range(classes):
+        if occupied[k]:
+            width[nl] = finest * 2.0**k
+            occupied[k] = nl
+            nl += 1
+    for i in range(nd):
+        level[i] = occupied[level[i]]
+    return level, width
+
+
+@njit(cache=True)
+def _cells_in_use(centre, level, width):
+    """Origin, cell of each disk (nd, 2), and lowest (nl, 2) and number (nl, 2) of the cells of each class."""
+    nd, nl = centre.shape[0], width.shape[0]
+    origin = np.array([centre[:, 0].min(), centre[:, 1].min()])
+    cell = np.empty((nd, 2), dtype=np.int64)
+    low = np.full((nl, 2), np.iinfo(np.int64).max)
+    high = np.full((nl, 2), np.iinfo(np.int64).min)
+    for i in range(nd):
+        k = level[i]
+        for axis in range(2):
+            at = np.int64(np.floor((centre[i, axis] - origin[axis]) / width[k]))
+            cell[i, axis] = at
+            low[k, axis], high[k, axis] = min(low[k, axis], at), max(high[k, axis], at)
+    return origin, cell, low, high - low + 1
+
+
+@njit(cache=True)
+def build_grid(centre, extent):  # pragma: no cover - compiled
+    """Sort disks (nd,), one at least, of half widths `extent` into grids."""
+    level, width = _size_classes(extent)
+    origin, cell, low, count = _cells_in_use(centre, level, width)
+    nd, nl = centre.shape[0], width.shape[0]
+    members = np.zeros(nl, dtype=np.int64)
+    for i in range(nd):
+        members[level[i]] += 1
+    base, buckets = np.zeros(nl, dtype=np.int64), np.zeros(nl, dtype=np.int64)
+    total = 0
+    for k in range(nl):
+        base[k] = total
+        # compared as floats: the product may not fit an integer
+        dense = float(count[k, 0]) * float(count[k, 1]) <= 4.0 * members[k] + 64.0
+        buckets[k] = count[k, 0] * count[k, 1] if dense else 2 * members[k] + 1
+        total += buckets[k]
+    start = np.zeros(total + 1, dtype=np.int64)
+    where = np.empty(nd, dtype=np.int64)
+    for i in range(nd):
+        where[i] = bucket(cell[i, 0], cell[i, 1], level[i], low, count, base, buckets)
+        start[where[i] + 1] += 1
+    for b in range(total):
+        start[b + 1] += start[b]
+    order, filled = np.empty(nd, dtype=np.int64), start[:-1].copy()
+    for i in range(nd):
+        order[filled[where[i]]] = i
+        filled[where[i]] += 1
+    return origin, width, low, count, base, buckets, start, order, level, cell
+
+
+@njit(cache=True)
+def cells_along(ends, far, k, origin, width, low, count, base, buckets, start, order, cell, near):
+    """Write the disks of class k in the cells within `far` of a wall to `near`; how many, or -1: too many cells."""
+    nd = order.shape[0]
+    ax, ay = ends[0, 0] - origin[0], ends[0, 1] - origin[1]
+    bx, by = ends[1, 0] - origin[0], ends[1, 1] - origin[1]
+    if ax > bx:
+        ax, ay, bx, by = bx, by, ax, ay
+    first = max(np.floor((ax - far) / width), float(low[k, 0]))
+    last = min(np.floor((bx + far) / width), float(low[k, 0] + count[k, 0] - 1))
+    bottom, top = float(low[k, 1]), float(low[k, 1] + count[k, 1] - 1)
+    seen, found = 0.0, 0
+    if last - first > nd:
+        return -1
+    column = first
+    while column <= last:
+        # the part of the wall whose neighbourhood meets this column of cells
+        left, right = max(column * width - far, ax), min((column + 1.0) * width + far, bx)
+        y0, y1 = ay, by
+        if bx > ax:
+            y0, y1 = ay + (by - ay) * (left - ax) / (bx - ax), ay + (by - ay) * (right - ax) / (bx - ax)
+        row = max(np.floor((min(y0, y1) - far) / width), bottom)
+        end = min(np.floor((max(y0, y1) + far) / width), top)
+        seen += max(end - row + 1.0, 0.0)
+        if seen > nd:
+            return -1
+        while row <= end:
+            b = bucket(np.int64(column), np.int64(row), k, low, count, base, buckets)
+            for e in range(start[b], start[b + 1]):
+                j = order[e]
+                if cell[j, 0] == column and cell[j, 1] == row:
+                    near[found] = j
+                    found += 1
+            row += 1.0
+        column += 1.0
+    return found

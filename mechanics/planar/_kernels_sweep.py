@@ -1,0 +1,225 @@
+"""Numba kernels of W in the plane: products, exact local solves, Gauss–Seidel sweeps, matrix-free.
+
+With t = n turned by +90°, and the lever ℓ_n = a × n, ℓ_t = a × t of the contact point on each side,
+
+    u_N = n·(v_i - v_j) + ℓ_n,i ω_i - ℓ_n,j ω_j,   u_T likewise,   Δv_i = (n Δr_N + t Δr_T)/m_i,   Δω_i = ℓ·Δr/J_i
+
+`inertia` (nb, 2) holds 1/m and 1/J, zero for a body that impulses do not move. A sweep works on `record` (nc, 16), two
+cache lines of a contact, and on `v` (nb, 8), one cache line of a body: vx, vy, ω, 1/m, 1/J.
+"""
+
+import numpy as np
+from numba import njit, prange
+
+__all__ = [
+    "apply",
+    "diagonals",
+    "records",
+    "relative_velocity",
+    "solve_local",
+    "sweep",
+    "sweep_parallel",
+    "velocity_change",
+]
+
+# columns of a record: n (2), ℓ_n and ℓ_t of both sides (4), shift (2), μ, k, r (2), 1/W_NN, 1/W_TT, W_NT
+_LN_I, _LT_I, _LN_J, _LT_J, _SHIFT, _MU, _K, _R, _INV_NN, _INV_TT, _NT = 2, 3, 4, 5, 6, 8, 9, 10, 12, 13, 14
+
+
+@njit(cache=True)
+def velocity_change(r, body, normal, lever, inertia):  # pragma: no cover - compiled
+    """ŵ H r: what the impulses (nc, 2) do to the bodies (nb, 3)."""
+    v = np.zeros((inertia.shape[0], 3))
+    for c in range(r.shape[0]):
+        nx, ny, r0, r1 = normal[c, 0], normal[c, 1], r[c, 0], r[c, 1]
+        x, y = nx * r0 - ny * r1, ny * r0 + nx * r1
+        i, j = body[c, 0], body[c, 1]
+        v[i, 0] += x
+        v[i, 1] += y
+        v[i, 2] += lever[c, 0] * r0 + lever[c, 1] * r1
+        v[j, 0] -= x
+        v[j, 1] -= y
+        v[j, 2] -= lever[c, 2] * r0 + lever[c, 3] * r1
+    for b in range(v.shape[0]):
+        v[b, 0] *= inertia[b, 0]
+        v[b, 1] *= inertia[b, 0]
+        v[b, 2] *= inertia[b, 1]
+    return v
+
+
+@njit(cache=True)
+def relative_velocity(v, body, normal, lever):  # pragma: no cover - compiled
+    """Hᵀ v: local relative velocities (nc, 2) of the bodies' velocities (nb, 3)."""
+    nc = body.shape[0]
+    u = np.empty((nc, 2))
+    for c in range(nc):
+        i, j = body[c, 0], body[c, 1]
+        nx, ny = normal[c, 0], normal[c, 1]
+        x, y = v[i, 0] - v[j, 0], v[i, 1] - v[j, 1]
+        u[c, 0] = nx * x + ny * y + lever[c, 0] * v[i, 2] - lever[c, 2] * v[j, 2]
+        u[c, 1] = nx * y - ny * x + lever[c, 1] * v[i, 2] - lever[c, 3] * v[j, 2]
+    return u
+
+
+@njit(cache=True)
+def apply(r, body, normal, lever, inertia):  # pragma: no cover - compiled
+    """W r (nc, 2)."""
+    return relative_velocity(velocity_change(r, body, normal, lever, inertia), body, normal, lever)
+
+
+@njit(cache=True)
+def diagonals(body, lever, inertia):  # pragma: no cover - compiled
+    """W_αα (nc, 2, 2)."""
+    nc = body.shape[0]
+    w = np.empty((nc, 2, 2))
+    for c in range(nc):
+        i, j = body[c, 0], body[c, 1]
+        m, p, q = inertia[i, 0] + inertia[j, 0], inertia[i, 1], inertia[j, 1]
+        a, b, d, e = lever[c, 0], lever[c, 1], lever[c, 2], lever[c, 3]
+        w[c, 0, 0] = m + p * a * a + q * d * d
+        w[c, 1, 1] = m + p * b * b + q * e * e
+        w[c, 0, 1] = w[c, 1, 0] = p * a * b + q * d * e
+    return w
+
+
+@njit(cache=True)
+def records(order, shift, friction, cohesion, normal, lever, diagonal):  # pragma: no cover - compiled
+    """What a sweep needs of each contact, in the order of the sweep (nc, 16)."""
+    record = np.zeros((len(order), 16))
+    for p in range(len(order)):
+        c, one = order[p], record[p]
+        one[0], one[1] = normal[c, 0], normal[c, 1]
+        for k in range(4):
+            one[_LN_I + k] = lever[c, k]
+        one[_SHIFT], one[_SHIFT + 1] = shift[c, 0], shift[c, 1]
+        one[_MU], one[_K] = friction[c], cohesion[c]
+        one[_INV_NN], one[_INV_TT] = 1.0 / diagonal[c, 0, 0], 1.0 / diagonal[c, 1, 1]
+        one[_NT] = diagonal[c, 0, 1]
+    return record
+
+
+@njit(cache=True)
+def solve_local(nn, nt, tt, bn, bt, mu, k):  # pragma: no cover - compiled
+    """The impulse (r_N, r_T) of one contact, exactly: u = W r + b, 0 ≤ u_N ⊥ r_N ≥ 0, |r_T| ≤ μ r_N + k.
+
+    Open, stick and both slips are tried in this order. With μ |W_NT| ≥ W_NN (Painlevé) a contact that departs may stay
+    open or jam: one that can stay open stays open, one that can stick sticks, and of two slips the smaller one holds.
+    """
+    t = min(max(-bt / tt, -k), k)
+    if bn + nt * t >= 0.0:
+        return 0.0, t
+    det = nn * tt - nt * nt
+    if det > 0.0:
+        n, t = (nt * bt - tt * bn) / det, (nt * bn - nn * bt) / det
+        if n >= 0.0 and abs(t) <= mu * n + k:
+            return n, t
+    # closed and not sticking: r_T = s (μ r_N + k) against u_T; what breaks s u_T ≤ 0 least, beyond rounding, holds
+    best_n, best_t, best = 0.0, 0.0, np.inf
+    for s in (1.0, -1.0):
+        slope = nn + s * mu * nt
+        n = -(bn + s * k * nt) / slope if slope != 0.0 else -1.0
+        if n < 0.0:
+            continue
+        t = s * (mu * n + k)
+        wrong = max(s * (bt + nt * n + tt * t), 0.0)
+        wrong = 0.0 if wrong <= 1e-14 * (abs(bt) + abs(nt) * n + tt * abs(t)) else wrong
+        if wrong < best or (wrong == best and n < best_n):
+            best_n, best_t, best = n, t, wrong
+    return best_n, best_t
+
+
+@njit(cache=True, inline="always")
+def _solve_contact(c, record, body, v):
+    """Solve one contact with its neighbours frozen, and pass what has changed on to its bodies."""
+    i, j = body[c, 0], body[c, 1]
+    nx, ny = record[c, 0], record[c, 1]
+    ln_i, lt_i, ln_j, lt_j = record[c, _LN_I], record[c, _LT_I], record[c, _LN_J], record[c, _LT_J]
+    x, y = v[i, 0] - v[j, 0], v[i, 1] - v[j, 1]
+    un = record[c, _SHIFT] + nx * x + ny * y + ln_i * v[i, 2] - ln_j * v[j, 2]
+    ut = record[c, _SHIFT + 1] + nx * y - ny * x + lt_i * v[i, 2] - lt_j * v[j, 2]
+    old_n, old_t = record[c, _R], record[c, _R + 1]
+    mu, k, nt = record[c, _MU], record[c, _K], record[c, _NT]
+    if nt == 0.0:
+        # W_αα is diagonal, as between disks: the normal does not feel the tangent
+        n = max(old_n - un * record[c, _INV_NN], 0.0)
+        limit = mu * n + k
+        t = min(max(old_t - ut * record[c, _INV_TT], -limit), limit)
+    else:
+        nn, tt = 1.0 / record[c, _INV_NN], 1.0 / record[c, _INV_TT]
+        n, t = solve_local(nn, nt, tt, un - nn * old_n - nt * old_t, ut - nt * old_n - tt * old_t, mu, k)
+    record[c, _R], record[c, _R + 1] = n, t
+    dn, dt = n - old_n, t - old_t
+    fx, fy = nx * dn - ny * dt, ny * dn + nx * dt
+    # a body that does not move is not written: contacts of one colour may share it
+    if v[i, 3] > 0.0:
+        v[i, 0] += v[i, 3] * fx
+        v[i, 1] += v[i, 3] * fy
+        v[i, 2] += v[i, 4] * (ln_i * dn + lt_i * dt)
+    if v[j, 3] > 0.0:
+        v[j, 0] -= v[j, 3] * fx
+        v[j, 1] -= v[j, 3] * fy
+        v[j, 2] -= v[j, 4] * (ln_j * dn + lt_j * dt)
+
+
+@njit(cache=True)
+def _begin(impulse, order, record, body, inertia):
+    """Put the impulses (nc, 2) into the records, and make the bodies' velocities (nb, 8) that they cause."""
+    v = np.zeros((inertia.shape[0], 8))
+    for p in range(record.shape[0]):
+        one, i, j = record[p], body[p, 0], body[p, 1]
+        n, t = impulse[order[p], 0], impulse[order[p], 1]
+        one[_R], one[_R + 1] = n, t
+        x, y = one[0] * n - one[1] * t, one[1] * n + one[0] * t
+        v[i, 0] += x
+        v[i, 1] += y
+        v[i, 2] += one[_LN_I] * n + one[_LT_I] * t
+        v[j, 0] -= x
+        v[j, 1] -= y
+        v[j, 2] -= one[_LN_J] * n + one[_LT_J] * t
+    for b in range(v.shape[0]):
+        v[b, 3], v[b, 4] = inertia[b, 0], inertia[b, 1]
+        v[b, 0] *= v[b, 3]
+        v[b, 1] *= v[b, 3]
+        v[b, 2] *= v[b, 4]
+    return v
+
+
+@njit(cache=True)
+def _end(impulse, order, record):
+    for p in range(record.shape[0]):
+        impulse[order[p], 0], impulse[order[p], 1] = record[p, _R], record[p, _R + 1]
+
+
+@njit(cache=True)
+def sweep(count, impulse, order, record, body, inertia):  # pragma: no cover - compiled
+    """`count` passes over the records, every second one backwards; `impulse` is changed in place."""
+    nc = record.shape[0]
+    v = _begin(impulse, order, record, body, inertia)
+    for n in range(count):
+        if n % 2 == 0:
+            for c in range(nc):
+                _solve_contact(c, record, body, v)
+        else:
+            for c in range(nc - 1, -1, -1):
+                _solve_contact(c, record, body, v)
+    _end(impulse, order, record)
+
+
+@njit(cache=True, parallel=True)
+def sweep_parallel(count, impulse, order, record, body, inertia, start, grain):  # pragma: no cover - compiled
+    """The same passes in parallel, with the same bits: records start[k] to start[k+1] share no moving body.
+
+    Colours of fewer than `grain` contacts are not worth waking the other threads.
+    """
+    v = _begin(impulse, order, record, body, inertia)
+    colours = start.shape[0] - 1
+    for n in range(count):
+        for position in range(colours):
+            k = position if n % 2 == 0 else colours - 1 - position
+            if start[k + 1] - start[k] < grain:
+                for c in range(start[k], start[k + 1]):
+                    _solve_contact(c, record, body, v)
+            else:
+                for c in prange(start[k], start[k + 1]):
+                    _solve_contact(c, record, body, v)
+    _end(impulse, order, record)

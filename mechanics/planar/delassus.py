@@ -1,0 +1,110 @@
+"""W between rigid bodies of the plane, and its Gauss–Seidel sweeps."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.planar._kernels_sweep import (
+    apply,
+    diagonals,
+    records,
+    relative_velocity,
+    sweep,
+    sweep_parallel,
+    velocity_change,
+)
+from mechanics.solvers.colouring import greedy_colours
+
+__all__ = ["PlanarDelassus", "PlanarGaussSeidel"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# contacts from which several threads pay, in all and in one colour
+_PARALLEL, _GRAIN = 8000, 1000
+
+
+@dataclass(frozen=True)
+class PlanarDelassus:
+    """W = Hᵀ M⁻¹ H, matrix-free.
+
+    Attributes
+    ----------
+    bodies : (nc, 2) candidate and antagonist
+    normal : (nc, 2) n, from antagonist to candidate; t is n turned by +90°
+    lever : (nc, 4) a × n and a × t of the candidate, then of the antagonist, with a from the body's centre to the
+        contact point [m]
+    inertia : (nb, 2) inverse mass and inverse moment of inertia; zero for fixed and driven bodies [1/kg, 1/(kg m²)]
+    """
+
+    bodies: Ints
+    normal: Array
+    lever: Array
+    inertia: Array
+
+    @cached_property
+    def diagonal(self) -> Array:
+        """W_αα (nc, 2, 2) [1/kg]."""
+        result: Array = diagonals(self.bodies, self.lever, self.inertia)
+        return result
+
+    def apply(self, impulse: Array) -> Array:
+        """W r (nc, 2) [m/s]."""
+        result: Array = apply(impulse, self.bodies, self.normal, self.lever, self.inertia)
+        return result
+
+    def velocity_change(self, impulse: Array) -> Array:
+        """M⁻¹ H r (nb, 3): what impulses do to vx, vy [m/s] and ω [rad/s]."""
+        result: Array = velocity_change(impulse, self.bodies, self.normal, self.lever, self.inertia)
+        return result
+
+    def relative_velocity(self, velocity: Array) -> Array:
+        """Hᵀ v: u (nc, 2) [m/s] of the bodies' velocities (nb, 3)."""
+        result: Array = relative_velocity(velocity, self.bodies, self.normal, self.lever)
+        return result
+
+    @cached_property
+    def colouring(self) -> tuple[Ints, Ints]:
+        """Contacts sorted by colour (nc,), and where each colour begins there."""
+        colour = greedy_colours(self.bodies, self.inertia[:, 0] > 0)
+        start = np.concatenate([[0], np.cumsum(np.bincount(colour))]).astype(np.int64)
+        return np.argsort(colour, kind="stable"), start
+
+    def gauss_seidel(self, shift: Array, friction: Array, cohesion: Array) -> "PlanarGaussSeidel":
+        """Sweeps on u = W r + shift with Coulomb's μ and the cohesion k, each (nc,)."""
+        order, start = self.colouring
+        record = records(order, shift, friction, cohesion, self.normal, self.lever, self.diagonal)
+        return PlanarGaussSeidel(order, start, record, self.bodies[order].astype(np.uint32), self.inertia)
+
+
+@dataclass(frozen=True)
+class PlanarGaussSeidel:
+    """Passes over the contacts, colour by colour, every second one backwards.
+
+    Two contacts of a colour share no body that moves, so a colour may be swept by several threads; the result is the
+    same, bit by bit, for any number of them.
+
+    Attributes
+    ----------
+    order : (nc,) contacts by colour
+    start : where each colour begins
+    record : (nc, 16) what the kernel needs of each contact, in that order
+    bodies : (nc, 2) in that order
+    inertia : (nb, 2) inverse masses and moments of inertia
+    """
+
+    order: Ints
+    start: Ints
+    record: Array
+    bodies: NDArray[np.uint32]
+    inertia: Array
+
+    def __call__(self, impulse: Array, sweeps: int) -> None:
+        """Sweep `impulse` (nc, 2) in place."""
+        arrays = impulse, self.order, self.record, self.bodies, self.inertia
+        if len(self.order) >= _PARALLEL:
+            sweep_parallel(sweeps, *arrays, self.start, _GRAIN)
+        else:
+            sweep(sweeps, *arrays)

@@ -1,0 +1,104 @@
+"""Arrays of a scene of the plane: what does not change while it runs, and what does."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.laws.table import LawTable, law_table
+from mechanics.planar.scene import PlanarScene
+
+__all__ = ["PlanarModel", "PlanarState", "build_planar_model"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PlanarState:
+    """Where the bodies are, and how they move; disks first, then walls.
+
+    Attributes
+    ----------
+    time : [s]
+    centre : (nb, 2) of a wall, the middle of its ends [m]
+    angle : (nb,) [rad]
+    velocity : (nb, 3) vx, vy [m/s] and ω [rad/s]
+    """
+
+    time: float
+    centre: Array
+    angle: Array
+    velocity: Array
+
+
+@dataclass(frozen=True)
+class PlanarModel:
+    """What does not change while a scene runs.
+
+    Attributes
+    ----------
+    scene : it
+    radius : (nd,) [m]
+    mass, moment : (nb,) mass and moment of inertia ½ m R² of a disk, in the slice; zero of a wall [kg, kg m²]
+    fixed : (nb,) bodies that impulses do not move
+    inertia : (nb, 2) 1/mass and 1/moment, zero for fixed bodies
+    half : (nw, 2) from the middle of a wall to its second end, at angle 0 [m]
+    laws : contact laws, and between which bodies they hold
+    """
+
+    scene: PlanarScene
+    radius: Array
+    mass: Array
+    moment: Array
+    fixed: NDArray[np.bool_]
+    inertia: Array
+    half: Array
+    laws: LawTable
+
+    def ends(self, state: PlanarState) -> Array:
+        """Ends of the walls (nw, 2, 2) [m]."""
+        nd = len(self.radius)
+        turn, middle = state.angle[nd:], state.centre[nd:]
+        half = np.column_stack(
+            [
+                np.cos(turn) * self.half[:, 0] - np.sin(turn) * self.half[:, 1],
+                np.sin(turn) * self.half[:, 0] + np.cos(turn) * self.half[:, 1],
+            ]
+        )
+        return np.stack([middle - half, middle + half], axis=1)
+
+
+def build_planar_model(scene: PlanarScene) -> tuple[PlanarModel, PlanarState]:
+    """The arrays of a scene, and its start."""
+    disks, nw = scene.disks, len(scene.walls)
+    radius = np.array([disk.radius for disk in disks], dtype=float)
+    density = np.array([disk.density for disk in disks], dtype=float)
+    walls = np.array([(wall.start, wall.end) for wall in scene.walls], dtype=float).reshape(-1, 2, 2)
+    none = np.zeros(nw)
+    mass = np.append(density * scene.thickness * np.pi * radius**2, none)
+    moment = 0.5 * mass * np.append(radius, none) ** 2
+    fixed = np.array([disk.fixed for disk in disks] + [True] * nw)
+    inertia = np.zeros((len(fixed), 2))
+    inertia[~fixed] = np.column_stack([1.0 / mass[~fixed], 1.0 / moment[~fixed]])
+    half = 0.5 * (walls[:, 1] - walls[:, 0])
+    model = PlanarModel(scene, radius, mass, moment, fixed, inertia, half, _laws(scene))
+    start = PlanarState(
+        0.0,
+        np.vstack([np.array([disk.centre for disk in disks], dtype=float), walls.mean(axis=1)]),
+        np.append([float(disk.angle) for disk in disks], none),
+        np.vstack([np.array([disk.velocity for disk in disks], dtype=float), np.zeros((nw, 3))]),
+    )
+    return model, start
+
+
+def _laws(scene: PlanarScene) -> LawTable:
+    codes = scene.codes
+    rules = [
+        (
+            np.array([code in rule.first for code in codes]),
+            np.array([code in rule.second for code in codes]),
+            rule.law,
+        )
+        for rule in scene.rules
+    ]
+    return law_table(scene.law, rules, len(codes))

@@ -1,0 +1,131 @@
+"""What is measured while a scene of the plane runs: energy, balance, rest, reactions."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.outcome import LASTING
+from mechanics.planar.contacts import PlanarContacts
+from mechanics.planar.model import PlanarModel, PlanarState
+from mechanics.planar.simulation import PlanarStep
+from mechanics.result import Outcome
+
+__all__ = ["PlanarEnergy", "PlanarWatch", "disk_speed", "imbalance", "kinetic_energy", "world_force"]
+
+Array = NDArray[np.float64]
+
+# every disk rests below this part of the speed √(g · width) of a fall over its own width
+_REST_SPEED = 1e-4
+# loads that change by less than this part in a step are steady
+_STEADY = 1e-9
+
+
+def world_force(contacts: PlanarContacts, impulse: Array, step: float) -> Array:
+    """Mean forces r/h (nc, 2) on the candidates, in x and y [N]."""
+    n, r = contacts.normal, impulse / step
+    return np.column_stack([n[:, 0] * r[:, 0] - n[:, 1] * r[:, 1], n[:, 1] * r[:, 0] + n[:, 0] * r[:, 1]])
+
+
+def kinetic_energy(model: PlanarModel, velocity: Array) -> float:
+    """½ vᵀ M v of the disks that can move [J]."""
+    free = ~model.fixed
+    v = velocity[free]
+    # sums of numpy's, not products of BLAS: those may depend on the number of threads
+    twice = model.mass[free] * (v[:, 0] ** 2 + v[:, 1] ** 2) + model.moment[free] * v[:, 2] ** 2
+    return 0.5 * float(twice.sum())
+
+
+def disk_speed(model: PlanarModel, velocity: Array) -> Array:
+    """Largest speed of a point of each disk that can move [m/s]; zero for the others (nd,)."""
+    nd = len(model.radius)
+    v = velocity[:nd]
+    speed: Array = np.hypot(v[:, 0], v[:, 1]) + np.abs(v[:, 2]) * model.radius
+    return np.where(model.fixed[:nd], 0.0, speed)
+
+
+def imbalance(model: PlanarModel, step: PlanarStep) -> Array:
+    """Unbalanced force of each disk over its weight, or unbalanced moment over weight × radius (nd,) [-].
+
+    What is not in balance changes the velocity, so M Δv/h is the unbalanced force. Without gravity the largest contact
+    force replaces the weight. Zero for fixed disks.
+    """
+    nd, h = len(model.radius), model.scene.time.step
+    change = (step.after.velocity - step.kick.velocity)[:nd]
+    force = model.mass[:nd] * np.hypot(change[:, 0], change[:, 1]) / h
+    moment = model.moment[:nd] * np.abs(change[:, 2]) / h / model.radius
+    pull = model.mass[:nd] * np.hypot(*model.scene.gravity)
+    if not pull.any():
+        pull = np.full(nd, np.abs(step.impulse).max(initial=0.0) / h or 1.0)
+    return np.where(model.fixed[:nd], 0.0, np.maximum(force, moment) / pull)
+
+
+class PlanarEnergy:
+    """Energy balance; what no term explains was made by the program.
+
+    ΔE = W_ext + W_contact - D_scheme with W_contact = r·u_θ and D_scheme = (θ - ½) ‖Δv‖²_M holds exactly in the plane.
+
+    Attributes
+    ----------
+    external, contact, scheme : work of loads and driven bodies, work of the contacts, dissipation of the scheme [J]
+    unexplained : ΔE - external - contact + scheme, so far [J]
+    reference : the largest energy that was in play so far, at least 10⁻⁹ of weight times smallest radius [J]
+    """
+
+    def __init__(self, model: PlanarModel, start: PlanarState) -> None:
+        self._model = model
+        self._kinetic = kinetic_energy(model, start.velocity)
+        self.external = self.contact = self.scheme = self.unexplained = 0.0
+        weight = float(model.mass[~model.fixed].sum() * np.hypot(*model.scene.gravity))
+        self.reference = max(self._kinetic, 1e-9 * weight * float(model.radius.min()))
+
+    def __call__(self, step: PlanarStep) -> None:
+        """Account for one step."""
+        model, theta = self._model, self._model.scene.time.theta
+        before, after = step.kick.velocity, step.after.velocity
+        mean, free = theta * after + (1 - theta) * before, ~model.fixed
+        pushed = step.loads[free] * mean[free]
+        power = model.mass[free] * (pushed[:, 0] + pushed[:, 1]) + model.moment[free] * pushed[:, 2]
+        external = float(power.sum()) + step.driven
+        scheme = (theta - 0.5) * 2.0 * kinetic_energy(model, after - before)
+        energy = kinetic_energy(model, after)
+        self.unexplained += energy - self._kinetic - external - step.work + scheme
+        self.external += external
+        self.contact += step.work
+        self.scheme += scheme
+        self._kinetic = energy
+        self.reference = max(self.reference, energy, abs(self.external), abs(self.contact), self.scheme)
+
+    @property
+    def error(self) -> float:
+        """|unexplained| / reference [-]."""
+        return abs(self.unexplained) / self.reference if self.reference > 0 else 0.0
+
+
+class PlanarWatch:
+    """Tells the outcome after each step.
+
+    *Equilibrium*: for five steps in a row, each solved to its tolerance, every disk that is not fixed is in balance
+    (unbalanced force and moment below the scene's tolerance) and slower than 10⁻⁴ √(g · its width). Without gravity g
+    counts as 1 m/s². Nothing rests while walls move, or loads change.
+    """
+
+    def __init__(self, model: PlanarModel) -> None:
+        self._model = model
+        g = float(np.hypot(*model.scene.gravity)) or 1.0
+        self._slow = _REST_SPEED * np.sqrt(g * 2.0 * model.radius)
+        self._quiet = 0
+        self._loads: Array | None = None
+
+    def __call__(self, step: PlanarStep, balance: Array) -> Outcome:
+        """The outcome so far, given the imbalance of each disk (nd,)."""
+        model, velocity = self._model, step.after.velocity
+        last, self._loads = self._loads, step.loads
+        change = np.inf if last is None else np.abs(step.loads - last).max()
+        quiet = (
+            step.solution.converged
+            and change <= _STEADY * np.abs(step.loads).max()
+            and balance.max() <= model.scene.time.balance_tolerance
+            and bool((disk_speed(model, velocity) <= self._slow).all())
+            and not velocity[model.fixed].any()
+        )
+        self._quiet = self._quiet + 1 if quiet else 0
+        return Outcome.EQUILIBRIUM if self._quiet >= LASTING else Outcome.MOVING

@@ -1,0 +1,106 @@
+"""What a simulation of the plane gives back."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.planar.scene import PlanarScene
+from mechanics.result import Errors, Outcome
+
+__all__ = ["PlanarContactResult", "PlanarFrame", "PlanarHistory", "PlanarResult"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class PlanarContactResult:
+    """The contact points at the end of the run.
+
+    Attributes
+    ----------
+    bodies : (nc, 2) candidate and antagonist: disks, then walls, in the scene's order
+    point, normal : (nc, 2) [m], and from antagonist to candidate [-]
+    force : (nc, 2) mean force over the last step, on the candidate, in x and y [N]
+    gap : (nc,) [m]
+    area : (nc,) [m²]
+    status : (nc,) "open", "stick", "slip", "bonded" or "broken"
+    """
+
+    bodies: Ints
+    point: Array
+    normal: Array
+    force: Array
+    gap: Array
+    area: Array
+    status: NDArray[np.str_]
+
+
+@dataclass(frozen=True)
+class PlanarFrame:
+    """The motion at one instant: `position` (nb, 3) is x, y [m] and the angle [rad] of each body."""
+
+    time: float
+    position: Array
+
+
+@dataclass(frozen=True)
+class PlanarHistory:
+    """One value per step.
+
+    Attributes
+    ----------
+    time : at the end of the step [s]
+    kinetic : kinetic energy [J]
+    speed : largest speed of a point of a disk [m/s]
+    balance : largest unbalanced force over weight [-]
+    natural_map : η after the solve [-]
+    iterations : sweeps
+    contacts : contact points that are watched
+    penetration : deepest overlap at the end of the step over the width of the smaller disk [-]
+    """
+
+    time: Array
+    kinetic: Array
+    speed: Array
+    balance: Array
+    natural_map: Array
+    iterations: Ints
+    contacts: Ints
+    penetration: Array
+
+
+@dataclass(frozen=True)
+class PlanarResult:
+    """The end of a run, with its history.
+
+    Attributes
+    ----------
+    scene : what was simulated
+    outcome : equilibrium or moving
+    steps, time : time steps done, and simulated time [s]
+    position : (nb, 3) x, y [m] and angle [rad] of disks, then walls
+    velocity : (nb, 3) vx, vy [m/s] and ω [rad/s]
+    contacts : the contact points at the end
+    errors : how far the result can be trusted
+    reaction : force of fixed and driven bodies against gravity [N]
+    weight : of the disks that are not fixed [N]
+    frames : the motion, at least its first and last instant
+    history : one value per step
+    wall_time : wall seconds by stage: detect, assemble, solve, advance, observe
+    """
+
+    scene: PlanarScene
+    outcome: Outcome
+    steps: int
+    time: float
+    position: Array
+    velocity: Array
+    contacts: PlanarContactResult
+    errors: Errors
+    reaction: float
+    weight: float
+    frames: tuple[PlanarFrame, ...]
+    history: PlanarHistory
+    wall_time: dict[str, float]

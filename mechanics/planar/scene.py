@@ -1,0 +1,194 @@
+"""The scene of the plane: disks and walls, laws, loads and settings; SI units, y up, angles counter-clockwise."""
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mechanics.laws.dry_joint import DryJoint
+from mechanics.laws.law import Law
+from mechanics.loads.load import Loads
+from mechanics.scene import LawRule, Method, SolverSettings
+from moma.errors import SceneError
+
+__all__ = ["Disk", "PlanarScene", "PlanarTime", "Wall"]
+
+
+@dataclass(frozen=True)
+class Disk:
+    """A homogeneous disk.
+
+    Attributes
+    ----------
+    code : its name, unique in a scene
+    centre : (x, y) [m]
+    radius : [m]
+    density : [kg/m³]
+    angle : [rad]
+    velocity : vx, vy [m/s] and ω [rad/s]; zero if fixed
+    fixed : impulses do not move it; a load may (`Loads.motions`)
+    """
+
+    code: str
+    centre: tuple[float, float]
+    radius: float
+    density: float = 2400.0
+    angle: float = 0.0
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    fixed: bool = False
+
+    def __post_init__(self) -> None:
+        where = f"disk {self.code!r}"
+        for quantity, value, ok, remedy in (
+            ("centre", self.centre, np.shape(self.centre) == (2,), "give x and y"),
+            ("velocity", self.velocity, np.shape(self.velocity) == (3,), "give vx, vy and ω"),
+            ("radius", self.radius, self.radius > 0, "give metres greater than 0"),
+            ("density", self.density, self.density > 0, "give kg/m³ greater than 0"),
+        ):
+            if not ok:
+                raise SceneError(f"{quantity} = {value!r}", where=where, remedy=remedy)
+        _check_finite(where, *self.centre, *self.velocity, self.radius, self.density, self.angle)
+        if self.fixed and any(self.velocity):
+            raise SceneError(
+                "fixed, and has a velocity", where=where, remedy="move it by a motion in the scene's loads"
+            )
+
+
+@dataclass(frozen=True)
+class Wall:
+    """A straight segment, met from both sides; fixed unless a load moves it (`Loads.motions`).
+
+    A polyline is several walls that share end points. What rolls along it meets no end between two of them.
+
+    Attributes
+    ----------
+    code : its name, unique in a scene
+    start, end : (x, y) of its ends [m]
+    """
+
+    code: str
+    start: tuple[float, float]
+    end: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        where = f"wall {self.code!r}"
+        if np.shape(self.start) != (2,) or np.shape(self.end) != (2,):
+            raise SceneError(
+                f"ends {self.start!r} and {self.end!r}", where=where, remedy="give x and y of each"
+            )
+        _check_finite(where, *self.start, *self.end)
+        if tuple(self.start) == tuple(self.end):
+            raise SceneError("has no length", where=where, remedy="give two different ends")
+
+
+def _check_finite(where: str, *values: float) -> None:
+    if not np.isfinite(values).all():
+        raise SceneError("has a value that is not finite", where=where, remedy="give numbers")
+
+
+@dataclass(frozen=True)
+class PlanarTime:
+    """Time integration.
+
+    Attributes
+    ----------
+    step : time step h [s]
+    theta : integration parameter θ, 1/2 ≤ θ ≤ 1; 1/2 flies exactly, 1 lands without overlap and damps most
+    duration : longest simulated time [s]
+    stop_at_equilibrium : stop as soon as every disk is at rest and in balance
+    balance_tolerance : unbalanced force of a disk over its weight below which it is in balance [-]
+    """
+
+    step: float = 1e-3
+    theta: float = 1.0
+    duration: float = 1.0
+    stop_at_equilibrium: bool = True
+    balance_tolerance: float = 1e-4
+
+    def __post_init__(self) -> None:
+        for quantity, value, ok, remedy in (
+            ("step", self.step, 0 < self.step < np.inf, "give seconds greater than 0"),
+            ("theta", self.theta, 0.5 <= self.theta <= 1, "give from 0.5 to 1"),
+            ("duration", self.duration, 0 < self.duration < np.inf, "give seconds greater than 0"),
+            ("balance_tolerance", self.balance_tolerance, self.balance_tolerance > 0, "give more than 0"),
+        ):
+            if not ok:
+                raise SceneError(f"{quantity} = {value!r}", where="time", remedy=remedy)
+
+
+@dataclass(frozen=True)
+class PlanarScene:
+    """Disks, walls, laws, loads and settings of one simulation.
+
+    Attributes
+    ----------
+    name : shown in reports
+    disks, walls : the bodies; contacts are found between disks, and between disks and walls
+    gravity : (gx, gy) [m/s²]
+    law : contact law where no rule says otherwise
+    rules : laws between two groups of bodies, by their codes; of two that name the same pair, the later holds
+    alert_distance : gap below which a contact is watched, relative to the smaller radius [-]
+    thickness : of the slice; masses and areas are for it [m]
+    time, solver : settings; the solver is Gauss–Seidel
+    loads : what acts besides gravity; the plane is z = 0 of their space, moments and turns are about z
+    frame_every : keep a frame of the motion every so many steps; 0 keeps the first and last only
+    """
+
+    name: str
+    disks: tuple[Disk, ...]
+    walls: tuple[Wall, ...] = ()
+    gravity: tuple[float, float] = (0.0, -9.81)
+    law: Law = field(default_factory=DryJoint)
+    rules: tuple[LawRule, ...] = ()
+    alert_distance: float = 0.05
+    thickness: float = 1.0
+    time: PlanarTime = field(default_factory=PlanarTime)
+    solver: SolverSettings = field(default_factory=SolverSettings)
+    loads: Loads = field(default_factory=Loads)
+    frame_every: int = 0
+
+    def __post_init__(self) -> None:
+        if not self.disks:
+            raise SceneError("the scene has no disks", where=self.name, remedy="give at least one")
+        codes = self.codes
+        known = set(codes)
+        if len(known) < len(codes):
+            repeated = sorted(code for code, times in Counter(codes).items() if times > 1)
+            raise SceneError(f"codes used twice: {', '.join(repeated)}", where=self.name)
+        for quantity, value, ok, remedy in (
+            ("gravity", self.gravity, np.isfinite(self.gravity).all(), "give two numbers"),
+            ("alert_distance", self.alert_distance, 0 <= self.alert_distance < np.inf, "give 0 or more"),
+            ("thickness", self.thickness, 0 < self.thickness < np.inf, "give metres greater than 0"),
+            ("frame_every", self.frame_every, self.frame_every >= 0, "give 0 or a number of steps"),
+        ):
+            if not ok:
+                raise SceneError(f"{quantity} = {value!r}", where=self.name, remedy=remedy)
+        if self.solver.method is Method.ADMM:
+            raise SceneError("admm in the plane", where=self.name, remedy="use nsgs")
+        self._check_named(known)
+
+    def _check_named(self, known: set[str]) -> None:
+        """Rules and loads name bodies that there are, and motions only bodies that are fixed."""
+        named = [(rule.first | rule.second, "a contact rule") for rule in self.rules]
+        named += [(force.stones, "a force") for force in self.loads.forces]
+        named += [(motion.stones, "a motion") for motion in self.loads.motions]
+        for codes, what in named:
+            missing = sorted(codes - known)
+            if missing:
+                raise SceneError(f"{what} names {missing[0]!r}, which is not there", where=self.name)
+        free = {disk.code for disk in self.disks if not disk.fixed}
+        driven: set[str] = set()
+        for motion in self.loads.motions:
+            for code in sorted(motion.stones):
+                if code in free:
+                    raise SceneError(
+                        "has an imposed motion, but is not fixed", where=f"disk {code!r}", remedy="fix it"
+                    )
+                if code in driven:
+                    raise SceneError(f"{code!r} has two imposed motions", where=self.name)
+                driven.add(code)
+
+    @property
+    def codes(self) -> list[str]:
+        """Codes of all bodies: disks, then walls; bodies are numbered in this order."""
+        return [disk.code for disk in self.disks] + [wall.code for wall in self.walls]

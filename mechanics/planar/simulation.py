@@ -1,0 +1,222 @@
+"""One step after another in the plane: fly, detect, state the problem, solve, fly on."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.laws.law import Approach, Terms
+from mechanics.memory import Memory
+from mechanics.planar.contacts import PlanarContacts, PlanarDetector
+from mechanics.planar.delassus import PlanarDelassus
+from mechanics.planar.model import PlanarModel, PlanarState
+from mechanics.planar.stepping import Drive, fly, load_velocity
+from mechanics.problem import ContactProblem, ContactSolution, ContactStart
+from mechanics.simulation import Clock
+from mechanics.solvers.nsgs import NSGS
+from moma.errors import SolverError
+
+__all__ = ["PlanarSimulation", "PlanarStep"]
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class PlanarStep:
+    """What one step found.
+
+    Attributes
+    ----------
+    before, after : the states between which it lies
+    kick : at the instant of the kick, with the velocities just before it
+    contacts : the contact points
+    terms : their laws, as shift and cone
+    solution : of the contact problem; its impulses are r̃, shifted where a law has adhesion
+    impulse : (nc, 2) r on the candidates, local frame [N s]
+    internal : (nc, STATE) what the laws remember
+    gap : (nc,) at the end of the step [m]
+    loads : (nb, 3) what the loads did to the velocities
+    work : r·u_θ, the work of the contacts [J]
+    driven : work that driven bodies put in through the contacts [J]
+    """
+
+    before: PlanarState
+    after: PlanarState
+    kick: PlanarState
+    contacts: PlanarContacts
+    terms: Terms
+    solution: ContactSolution
+    impulse: Array
+    internal: Array
+    gap: Array
+    loads: Array
+    work: float
+    driven: float
+
+
+@dataclass(frozen=True)
+class _Stated:
+    """The contact problem of a step; `acting` (nc,) are the contacts that are in it."""
+
+    problem: ContactProblem
+    acting: Bools
+    approach: Approach
+    terms: Terms
+    law: NDArray[np.int64]
+
+
+class PlanarSimulation:
+    """A scene of the plane in motion; `step` takes it one time step on.
+
+    Attributes
+    ----------
+    model : what does not change
+    start, state : where it began, and where it is
+    """
+
+    def __init__(self, model: PlanarModel, start: PlanarState, clock: Clock) -> None:
+        solver = model.scene.solver
+        self.model, self.start, self.state, self.clock = model, start, start, clock
+        self._drive = Drive(model, start)
+        self._detector = PlanarDetector(model)
+        self._solve = NSGS(solver.tolerance, solver.velocity_tolerance, solver.max_iterations)
+        self._memory = Memory(2)
+        self._first = True
+
+    def step(self) -> PlanarStep:
+        """Fly, detect, state the problem, solve, fly on.
+
+        Raises
+        ------
+        SolverError : if the motion is no longer finite
+        """
+        h, theta, model = self.model.scene.time.step, self.model.scene.time.theta, self.model
+        with self.clock("advance"):
+            kick = self._kick(h, theta)
+            loads = load_velocity(model, kick, h)
+            free = self._driven(kick, kick.velocity + loads)
+        with self.clock("detect"):
+            contacts = self._detector(kick)
+        with self.clock("assemble"):
+            operator = PlanarDelassus(contacts.bodies, contacts.normal, contacts.lever, model.inertia)
+            start, internal = self._memory.recall(contacts.key)
+            stated = self._state_laws(kick, contacts, operator, free, internal)
+        with self.clock("solve"):
+            solution = self._solved(stated, start)
+        with self.clock("advance"):
+            impulse = solution.impulse.copy()
+            impulse[:, 0] -= stated.terms.adhesion
+            velocity = free + operator.velocity_change(impulse)
+            after = self._drive.place(fly(replace(kick, velocity=velocity), h * theta))
+            if not (np.isfinite(after.velocity).all() and np.isfinite(after.centre).all()):
+                raise SolverError(
+                    f"the motion is not finite at t = {after.time:.6g} s",
+                    where=model.scene.name,
+                    remedy="use a smaller time step",
+                )
+            return self._finish(kick, after, contacts, operator, loads, stated, solution, impulse)
+
+    def _kick(self, h: float, theta: float) -> PlanarState:
+        """The state at the instant of the kick, with the velocities just before it."""
+        kick = self._drive.place(fly(self.state, h * (1 - theta)))
+        if self._first and len(self._drive.bodies):
+            # before the first step the walls have moved as they go on to move
+            kick = replace(kick, velocity=self._driven(kick, kick.velocity))
+        return kick
+
+    def _driven(self, kick: PlanarState, velocity: Array) -> Array:
+        """`velocity` with that of the driven bodies just after the kick."""
+        if not len(self._drive.bodies):
+            return velocity
+        velocity = velocity.copy()
+        velocity[self._drive.bodies] = self._drive.velocity(kick, self.model.scene.time.step)
+        return velocity
+
+    def _state_laws(
+        self,
+        kick: PlanarState,
+        contacts: PlanarContacts,
+        operator: PlanarDelassus,
+        free: Array,
+        internal: Array,
+    ) -> _Stated:
+        """Ask the laws, and state u = W r̃ + (u_free - W s n) for the contacts that act in this step."""
+        time = self.model.scene.time
+        approach = Approach(
+            gap=contacts.gap,
+            speed=operator.relative_velocity(kick.velocity)[:, 0],
+            area=contacts.area,
+            size=contacts.size,
+            yielding=operator.diagonal[:, 0, 0],
+            step=time.step,
+            theta=time.theta,
+            push_out=False,
+            first=self._first,
+            state=internal,
+        )
+        law = self.model.laws.of(contacts.bodies)
+        terms = self.model.laws.terms(law, approach)
+        u_free = operator.relative_velocity(free)
+        if terms.adhesion.any():
+            pull = np.column_stack([terms.adhesion, np.zeros(len(contacts))])
+            u_free -= operator.apply(pull)
+        acting = np.isfinite(terms.bias)
+        problem = ContactProblem(operator, u_free, terms.bias, terms.friction, terms.cohesion)
+        return _Stated(problem, acting, approach, terms, law)
+
+    def _solved(self, stated: _Stated, start: ContactStart) -> ContactSolution:
+        """Solve for the contacts that act; the others have r̃ = 0."""
+        problem, acting = stated.problem, stated.acting
+        shifted = start.impulse.copy()
+        shifted[:, 0] += stated.terms.adhesion
+        if acting.all():
+            return self._solve(problem, start=ContactStart(shifted, start.velocity))
+        whole = problem.delassus
+        assert isinstance(whole, PlanarDelassus)
+        some = ContactProblem(
+            PlanarDelassus(whole.bodies[acting], whole.normal[acting], whole.lever[acting], whole.inertia),
+            problem.u_free[acting],
+            problem.bias[acting],
+            problem.friction[acting],
+            problem.cohesion[acting],
+        )
+        part = self._solve(some, start=ContactStart(shifted[acting], start.velocity[acting]))
+        impulse, velocity = np.zeros_like(shifted), np.zeros_like(shifted)
+        impulse[acting], velocity[acting] = part.impulse, part.velocity
+        return replace(part, impulse=impulse, velocity=velocity)
+
+    def _finish(
+        self,
+        kick: PlanarState,
+        after: PlanarState,
+        contacts: PlanarContacts,
+        operator: PlanarDelassus,
+        loads: Array,
+        stated: _Stated,
+        solution: ContactSolution,
+        impulse: Array,
+    ) -> PlanarStep:
+        """Let the laws see what came of them, remember, and account."""
+        time, model = self.model.scene.time, self.model
+        u_before = operator.relative_velocity(kick.velocity)
+        u = operator.relative_velocity(after.velocity)
+        internal = model.laws.after(stated.law, stated.approach, solution.impulse, u)
+        self._memory.store(contacts.key, replace(solution, impulse=impulse), internal)
+        mean = time.theta * after.velocity + (1 - time.theta) * kick.velocity
+        driving = operator.relative_velocity(np.where(model.fixed[:, None], mean, 0.0))
+        before, self.state, self._first = self.state, after, False
+        return PlanarStep(
+            before=before,
+            after=after,
+            kick=kick,
+            contacts=contacts,
+            terms=stated.terms,
+            solution=solution,
+            impulse=impulse,
+            internal=internal,
+            gap=contacts.gap + time.step * time.theta * u[:, 0],
+            loads=loads,
+            work=float(np.sum(impulse * (time.theta * u + (1 - time.theta) * u_before))),
+            driven=-float(np.sum(impulse * driving)),
+        )
