@@ -47,11 +47,13 @@ def residual(problem: ContactProblem, impulse: Array) -> Residual:
     u = problem.delassus.apply(impulse)
     u += problem.u_free
     # writes û into u
-    error, size, projected = natural_errors(impulse, u, problem.bias, problem.friction, problem.cohesion, rho)
+    error, whole, largest, size, projected = natural_errors(
+        impulse, u, problem.bias, problem.friction, problem.cohesion, rho
+    )
     scale, pace = max(size, projected), float(np.abs(problem.u_free).max())
     return Residual(
-        float(np.linalg.norm(error)) / scale if scale > 0 else 0.0,
-        float(error.max()) / rho / pace if pace > 0 else 0.0,
+        whole / scale if scale > 0 else 0.0,
+        largest / rho / pace if pace > 0 else 0.0,
         error,
         u,
     )

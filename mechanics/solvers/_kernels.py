@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-__all__ = ["local_factors", "natural_errors", "slip", "solve_contact"]
+__all__ = ["admm_right_side", "admm_update", "local_factors", "natural_errors", "slip", "solve_contact"]
 
 
 @njit(cache=True)
@@ -142,12 +142,13 @@ def natural_errors(r, u, bias, mu, k, rho):  # pragma: no cover - compiled
     Returns
     -------
     error : (nc,) ‖e‖
+    whole, largest : ‖e‖ over all contacts, and of the worst
     size : ‖r‖ over all contacts
     projected : ‖P_K(r - ρ û)‖ over all contacts
     """
     nc, d = r.shape
     error = np.empty(nc)
-    total = projected = 0.0
+    total = projected = whole = largest = 0.0
     for c in range(nc):
         slide = 0.0
         for i in range(1, d):
@@ -167,8 +168,41 @@ def natural_errors(r, u, bias, mu, k, rho):  # pragma: no cover - compiled
             e += (r[c, i] - shrink * (r[c, i] - rho * u[c, i])) ** 2
             total += r[c, i] ** 2
         error[c] = np.sqrt(e)
+        whole += e
+        largest = max(largest, e)
         projected += height * height + radius * radius
-    return error, np.sqrt(total), np.sqrt(projected)
+    return error, np.sqrt(whole), np.sqrt(largest), np.sqrt(total), np.sqrt(projected)
+
+
+@njit(cache=True)
+def admm_right_side(z, y, shift, mu, sigma, right):  # pragma: no cover - compiled
+    """z - y - (u_free + bias n + μ‖u_T‖ n)/σ, with u_T = -σ y_T, into `right` (nc, d)."""
+    for c in range(z.shape[0]):
+        slide = 0.0
+        for i in range(z.shape[1]):
+            right[c, i] = z[c, i] - y[c, i] - shift[c, i] / sigma
+            if i > 0:
+                slide += y[c, i] * y[c, i]
+        right[c, 0] -= mu[c] * np.sqrt(slide)
+
+
+@njit(cache=True)
+def admm_update(r, z, y, mu, k, over):  # pragma: no cover - compiled
+    """z ← P_K(r' + y), y ← y + r' - z, with r' = over r + (1 - over) z, in place."""
+    for c in range(z.shape[0]):
+        tangential = 0.0
+        for i in range(z.shape[1]):
+            y[c, i] += over * r[c, i] + (1.0 - over) * z[c, i]
+            if i > 0:
+                tangential += y[c, i] * y[c, i]
+        tangential = np.sqrt(tangential)
+        height, radius = onto_cone(y[c, 0], tangential, mu[c], k[c])
+        shrink = radius / tangential if tangential > 0.0 else 0.0
+        z[c, 0] = height
+        y[c, 0] -= height
+        for i in range(1, z.shape[1]):
+            z[c, i] = shrink * y[c, i]
+            y[c, i] -= z[c, i]
 
 
 @njit(cache=True)

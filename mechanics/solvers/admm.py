@@ -16,6 +16,7 @@ import numpy as np
 
 from mechanics.problem import ContactProblem, ContactSolution, ContactStart, scale_of
 from mechanics.residual import project_on_cone, residual
+from mechanics.solvers._kernels import admm_right_side, admm_update
 from moma.errors import SolverError
 
 __all__ = ["ADMM"]
@@ -62,6 +63,7 @@ class ADMM:
         shifted = problem.u_free.copy()
         shifted[:, 0] += problem.bias
         z, y = project_on_cone(start.impulse, mu, cohesion), -start.velocity / sigma
+        right = np.empty_like(shifted)
         left, iterations = residual(problem, z), 0
         looks = [np.inf, np.inf]
         limits = self.tolerance, self.velocity_tolerance
@@ -70,13 +72,10 @@ class ADMM:
                 break
             looks.append(left.natural_map)
             for _ in range(min(self.check_every, self.max_iterations - iterations)):
-                right = sigma * (z - y) - shifted
-                right[:, 0] -= mu * sigma * np.linalg.norm(y[:, 1:], axis=1)
-                inner = factor.solve(lift @ (right.ravel() / sigma))
-                r = ((right.ravel() - across @ inner) / sigma).reshape(-1, 3)
-                relaxed = _OVER_RELAXATION * r + (1 - _OVER_RELAXATION) * z
-                z = project_on_cone(relaxed + y, mu, cohesion)
-                y = y + relaxed - z
+                admm_right_side(z, y, shifted, mu, sigma, right)
+                inner = factor.solve(lift @ right.ravel())
+                r = right - (across @ inner).reshape(right.shape) / sigma
+                admm_update(r, z, y, mu, cohesion, _OVER_RELAXATION)
                 iterations += 1
             left = residual(problem, z)
         return ContactSolution(z, -sigma * y, iterations, left.natural_map, left.within(*limits))
