@@ -413,6 +413,8 @@ def interface_points(
                     x[kept], y[kept], z[kept], label[kept] = x[q], y[q], z[q], label[q]
                     kept += 1
             k = kept
+            if k == 0:
+                continue
             if k > points:
                 if points == 1:
                     lowest = 0

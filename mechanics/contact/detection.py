@@ -114,7 +114,7 @@ class Detector:
         hint = self._hints.of(key)
         kind, feature, axis = separating_axes(
             shapes, limit, hint, own.vptr, placed.vertex, own.fptr, own.cptr, own.corner, placed.normal,
-            own.eptr, own.edge_a, own.edge_b, own.edge_face, placed.shape_centre, own.shape_size,
+            own.eptr, own.edge_a, own.edge_b, own.edge_face, placed.inside, own.shape_size,
         )  # fmt: skip
         self._hints.key, self._hints.face = key, hint
         return _Pairs(shapes, limit, kind, feature, axis)
@@ -155,10 +155,11 @@ class Detector:
 
 
 def _place(surfaces: Surfaces, state: State) -> Placed:
-    shape_centre, turn = state.centre[surfaces.body], state.rotation[surfaces.body]
-    vertex = place(surfaces.vptr, surfaces.vertex, shape_centre, turn)
-    normal = place(surfaces.fptr, surfaces.normal, np.zeros_like(shape_centre), turn)
-    return Placed(vertex, normal, state.centre, state.rotation, shape_centre)
+    centre, turn = state.centre[surfaces.body], state.rotation[surfaces.body]
+    vertex = place(surfaces.vptr, surfaces.vertex, centre, turn)
+    normal = place(surfaces.fptr, surfaces.normal, np.zeros_like(centre), turn)
+    inside = np.add.reduceat(vertex, surfaces.vptr[:-1]) / np.diff(surfaces.vptr)[:, None]
+    return Placed(vertex, normal, state.centre, state.rotation, inside)
 
 
 def _pair_key(shapes: Ints, count: int) -> Ints:

@@ -89,14 +89,14 @@ class Placed:
     ----------
     vertex, normal : of all shapes, as in `Surfaces`, world axes
     centre, rotation : of the bodies
-    shape_centre : (ns, 3) of the body of each shape [m]
+    inside : (ns, 3) a point inside each shape [m]
     """
 
     vertex: Array
     normal: Array
     centre: Array
     rotation: Array
-    shape_centre: Array
+    inside: Array
 
 
 def surfaces(
