@@ -194,7 +194,7 @@ _SOLVER = (
     Key(
         "method",
         Kind.TEXT,
-        "nsgs: Gauss–Seidel; admm: needs a deformable stone; auto: admm as soon as a stone is deformable.",
+        "nsgs: Gauss–Seidel; admm: alternating directions; auto: admm with a deformable stone, else both in turn.",
         default=SolverSettings.method.value,
         choices=tuple(one.value for one in Method),
     ),
@@ -206,6 +206,14 @@ _SOLVER = (
         SolverSettings.tolerance,
         above=0,
         below=1,
+    ),
+    Key(
+        "velocity_tolerance",
+        Kind.NUMBER,
+        "Largest velocity by which a contact may break its law, over the largest that contacts have to stop.",
+        "-",
+        SolverSettings.velocity_tolerance,
+        above=0,
     ),
     Key(
         "max_iterations",
