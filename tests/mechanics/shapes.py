@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 from hypothesis import strategies as st
+from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from mechanics.contact.detection import Detector
@@ -101,3 +102,39 @@ def dense_operator(model, state, contacts, compliance):
             lever = np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]])  # ω × arm = lever ω
             transpose[rows, 6 * b : 6 * b + 6] += sign * contacts.frame[c] @ np.hstack([np.eye(3), lever])
     return w_hat, transpose
+
+
+def hull(points):
+    """Corners and faces, counter-clockwise seen from outside, of the convex hull of points; all faces triangles."""
+    shape = ConvexHull(points)
+    corners = shape.points[shape.vertices]
+    number = {vertex: n for n, vertex in enumerate(shape.vertices)}
+    faces = []
+    for simplex, equation in zip(shape.simplices, shape.equations, strict=True):
+        a, b, c = shape.points[simplex]
+        ordered = simplex if np.cross(b - a, c - a) @ equation[:3] > 0 else simplex[::-1]
+        faces.append(tuple(number[vertex] for vertex in ordered))
+    return corners, tuple(faces)
+
+
+def random_stone(rng):
+    """A random convex polyhedron about the origin: a leaning box, a tetrahedron, a prism or a hull of points."""
+    kind = rng.integers(4)
+    turn = Rotation.random(random_state=rng).as_matrix()
+    if kind == 0:
+        extent, lean = rng.uniform(0.4, 1.2, 3), rng.uniform(-0.15, 0.15, 3)
+        corners = box(-extent / 2, extent / 2)
+        return corners / (1.0 + corners @ lean)[:, None] @ turn.T, BOX_FACES
+    if kind == 1:
+        return hull(rng.uniform(0.5, 1.2) * np.vstack([np.eye(3), -np.ones(3) / 3]) @ turn.T)
+    if kind == 2:
+        sides = int(rng.integers(3, 9))
+        angle = 2 * np.pi * np.arange(sides) / sides
+        ring = np.column_stack([np.cos(angle), np.sin(angle), np.full(sides, -0.5)]) * rng.uniform(
+            0.3, 0.8, 3
+        )
+        walls = tuple((i, (i + 1) % sides, sides + (i + 1) % sides, sides + i) for i in range(sides))
+        faces = (tuple(range(sides))[::-1], tuple(range(sides, 2 * sides)), *walls)
+        return np.vstack([ring, ring * [1, 1, -1]]) @ turn.T, faces
+    points = rng.normal(size=(int(rng.integers(5, 15)), 3))
+    return hull(rng.uniform(0.3, 0.7) * points / np.linalg.norm(points, axis=1)[:, None])
