@@ -49,6 +49,8 @@ class ADMM:
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from `start`; its velocity, û = -σ y, lets the iteration go on where it stopped.
 
+        The best of all looks is given back.
+
         Raises
         ------
         SolverError : if the problem carries no sparse form
@@ -65,7 +67,7 @@ class ADMM:
         z, y = project_on_cone(start.impulse, mu, cohesion), -start.velocity / sigma
         right = np.empty_like(shifted)
         left, iterations = residual(problem, z), 0
-        looks = [np.inf, np.inf]
+        looks, best = [np.inf, np.inf], (left, z.copy(), y.copy())
         limits = self.tolerance, self.velocity_tolerance
         while not left.within(*limits) and iterations < self.max_iterations:
             if looks[-2] < self.patience * left.natural_map:
@@ -78,4 +80,8 @@ class ADMM:
                 admm_update(r, z, y, mu, cohesion, _OVER_RELAXATION)
                 iterations += 1
             left = residual(problem, z)
+            if left.natural_map <= best[0].natural_map:
+                best = left, z.copy(), y.copy()
+        if not left.within(*limits):
+            left, z, y = best
         return ContactSolution(z, -sigma * y, iterations, left.natural_map, left.within(*limits))

@@ -13,24 +13,30 @@ __all__ = ["Alternating"]
 
 # sweeps with which every solution begins: near a solution they suffice
 _FIRST_SWEEPS = 20
-# a small penalty finds the forces in stones that stay in touch within a few dozen iterations, or never
+# sweeps between two extrapolations, and from how many iterates
+_LOOK, _DEPTH = 5, 10
+# a small penalty finds the forces in stones that stay in touch within a few dozen iterations, or never:
+# penalty, iterations, and how much η must fall in two looks; near a collapse it falls late, and then all at once
+_STATIC = ((1e-3, 60, 3.0), (3e-3, 300, 0.0))
 # it is then driven further than asked for, which costs little and spares the next steps any work
 _FURTHER = 0.03
-_STATIC_PENALTY, _STATIC_ITERATIONS, _STATIC_PATIENCE = 1e-3, 60, 3.0
+# a larger one bears with contacts that open and slide
+_MOVING_PENALTY, _MOVING_SHARE = 0.1, 0.5
 
 
 @dataclass(frozen=True)
 class Alternating:
-    """For rigid scenes: a few sweeps; ADMM with a small penalty, as long as it converges fast; then sweeps again.
+    """For rigid scenes: sweeps, ADMM with a small penalty, ADMM with a larger one, sweeps; the best of all counts.
 
     Gauss–Seidel carries news by one stone in a sweep, so the first steps of a tall wall cost it thousands of sweeps;
     ADMM with a small penalty solves the motion of all stones at once, and needs some 30 iterations as long as
-    few contacts open or slide. Where they do, Gauss–Seidel is the better one.
+    few contacts open or slide. Where many do, a larger penalty or accelerated sweeps are better
+    (docs/decisions/006-alternating-solver.md has the measurements).
 
     Attributes
     ----------
     tolerance, velocity_tolerance : as in `NSGS`
-    max_iterations : sweeps, after the attempt with ADMM
+    max_iterations : sweeps and iterations together
     """
 
     tolerance: float = 1e-6
@@ -39,28 +45,34 @@ class Alternating:
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from `start`."""
-        sweep = NSGS(self.tolerance, self.velocity_tolerance, min(_FIRST_SWEEPS, self.max_iterations))
+        limits = self.tolerance, self.velocity_tolerance
+        sweep = NSGS(*limits, min(_FIRST_SWEEPS, self.max_iterations), _LOOK, _DEPTH)
         best = sweep(problem, start)
-        if best.converged or self.max_iterations <= _FIRST_SWEEPS or problem.sparse is None:
-            return best
-        static = ADMM(
-            _FURTHER * self.tolerance,
-            _FURTHER * self.velocity_tolerance,
-            _STATIC_ITERATIONS,
-            penalty=_STATIC_PENALTY,
-            patience=_STATIC_PATIENCE,
-        )
-        # not from the sweeps: they end near a solution, but with velocities that lead ADMM astray
-        found = static(problem, ContactStart(start.impulse, np.zeros_like(start.velocity)))
-        done = best.iterations + found.iterations
-        if found.converged or residual(problem, found.impulse).within(
-            self.tolerance, self.velocity_tolerance
-        ):
-            return replace(found, iterations=done, converged=True)
-        if found.natural_map < best.natural_map:
-            best = found
-        rest = replace(sweep, max_iterations=self.max_iterations - _FIRST_SWEEPS)
-        last = rest(problem, ContactStart(best.impulse, best.velocity))
-        if last.natural_map > best.natural_map:
-            last = replace(best, iterations=last.iterations)
-        return replace(last, iterations=done + last.iterations)
+        if best.converged or problem.sparse is None:
+            return best if best.converged else self._rest(problem, best)
+        # not from the sweeps: they end near a solution, but with velocities that lead a small penalty astray
+        cold = ContactStart(start.impulse, np.zeros_like(start.velocity))
+        for penalty, iterations, patience in _STATIC:
+            static = ADMM(_FURTHER * limits[0], _FURTHER * limits[1], iterations, penalty, patience=patience)
+            best = self._better(best, static(problem, cold), problem)
+            if best.converged:
+                return best
+        if not best.converged and self.max_iterations > best.iterations:
+            count = int(_MOVING_SHARE * (self.max_iterations - best.iterations))
+            moving = ADMM(*limits, count, _MOVING_PENALTY)
+            best = self._better(best, moving(problem, ContactStart(best.impulse, best.velocity)), problem)
+        return best if best.converged else self._rest(problem, best)
+
+    def _rest(self, problem: ContactProblem, best: ContactSolution) -> ContactSolution:
+        """Sweeps for what is left of the iterations."""
+        count = max(self.max_iterations - best.iterations, 0)
+        sweep = NSGS(self.tolerance, self.velocity_tolerance, count, _LOOK, _DEPTH)
+        return self._better(best, sweep(problem, ContactStart(best.impulse, best.velocity)), problem)
+
+    def _better(
+        self, one: ContactSolution, other: ContactSolution, problem: ContactProblem
+    ) -> ContactSolution:
+        """The one with the smaller η, with the iterations of both."""
+        best = other if other.natural_map < one.natural_map else one
+        within = residual(problem, best.impulse).within(self.tolerance, self.velocity_tolerance)
+        return replace(best, iterations=one.iterations + other.iterations, converged=within)

@@ -1,11 +1,22 @@
-"""Non-smooth Gauss–Seidel (Jean 1999; Jourdan, Alart & Jean 1998)."""
+"""Non-smooth Gauss–Seidel (Jean 1999; Jourdan, Alart & Jean 1998), with safeguarded Anderson acceleration."""
 
 from dataclasses import dataclass
 
-from mechanics.problem import ContactProblem, ContactSolution, ContactStart
-from mechanics.residual import residual
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.problem import ContactProblem, ContactSolution, ContactStart, GaussSeidel
+from mechanics.residual import Residual, residual
+from mechanics.solvers.anderson import Anderson
 
 __all__ = ["NSGS"]
+
+Array = NDArray[np.float64]
+
+# an extrapolation this many times worse than the sweeps alone makes the old iterates worthless
+_BAD = 10.0
+# so many extrapolations in a row in vain, and it is no longer tried
+_IN_VAIN = 20
 
 
 @dataclass(frozen=True)
@@ -18,26 +29,62 @@ class NSGS:
     velocity_tolerance : and the largest velocity by which a contact may break its law, over that of u_free [-]
     max_iterations : sweeps after which it is given up
     check_every : sweeps between two looks at η
+    depth : past iterates from which Anderson's method extrapolates at each look; an extrapolation is kept only where
+        its η is the smaller one. 0: plain sweeps
     """
 
     tolerance: float = 1e-6
     velocity_tolerance: float = 1e-4
     max_iterations: int = 2000
     check_every: int = 20
+    depth: int = 0
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
-        """Solve from the impulses of `start`."""
+        """Solve from the impulses of `start`; the best of all looks is given back."""
         impulse = start.impulse.copy()
         left = residual(problem, impulse)
+        best, sweeps = (impulse, left), 0
         limits = self.tolerance, self.velocity_tolerance
-        sweeps = 0
         if not left.within(*limits):
             shift = problem.u_free.copy()
             shift[:, 0] += problem.bias
             sweep = problem.delassus.gauss_seidel(shift, problem.friction, problem.cohesion)
+            look = _Look(problem, sweep, self.depth)
             while not left.within(*limits) and sweeps < self.max_iterations:
                 count = min(self.check_every, self.max_iterations - sweeps)
-                sweep(impulse, count)
+                impulse, left = look(impulse, count)
                 sweeps += count
-                left = residual(problem, impulse)
+                if left.natural_map <= best[1].natural_map:
+                    best = impulse.copy(), left
+        if not left.within(*limits):
+            impulse, left = best
         return ContactSolution(impulse, left.dual, sweeps, left.natural_map, left.within(*limits))
+
+
+class _Look:
+    """Some sweeps, a look at what is left, and maybe an extrapolation."""
+
+    def __init__(self, problem: ContactProblem, sweep: GaussSeidel, depth: int) -> None:
+        self._problem, self._sweep = problem, sweep
+        self._anderson = Anderson(depth) if depth else None
+        self._in_vain = 0
+
+    def __call__(self, impulse: Array, count: int) -> tuple[Array, Residual]:
+        """The next iterate and its residual; `impulse` may be overwritten."""
+        if self._anderson is None or self._in_vain >= _IN_VAIN:
+            self._sweep(impulse, count)
+            return impulse, residual(self._problem, impulse)
+        swept = impulse.copy()
+        self._sweep(swept, count)
+        left = residual(self._problem, swept)
+        candidate = self._anderson(impulse, swept)
+        if candidate is None:
+            return swept, left
+        bold = residual(self._problem, candidate)
+        if np.isfinite(bold.natural_map) and bold.natural_map < left.natural_map:
+            self._in_vain = 0
+            return candidate, bold
+        self._in_vain += 1
+        if not bold.natural_map < _BAD * left.natural_map:
+            self._anderson.forget()
+        return swept, left

@@ -1,0 +1,46 @@
+"""Anderson acceleration of a fixed-point iteration (Anderson 1965; Walker & Ni 2011)."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Anderson"]
+
+Array = NDArray[np.float64]
+
+# of the trace of the Gram matrix: keeps the small least-squares problem solvable
+_REGULAR = 1e-12
+
+
+class Anderson:
+    """Extrapolates from the last iterates of x ← G(x).
+
+    Parameters
+    ----------
+    depth : how many differences of iterates are used
+    """
+
+    def __init__(self, depth: int) -> None:
+        self._depth = depth
+        self._images: list[Array] = []
+        self._steps: list[Array] = []
+
+    def __call__(self, x: Array, image: Array) -> Array | None:
+        """The extrapolated iterate, given x and G(x); None as long as too little is known."""
+        self._images.append(image.ravel().copy())
+        self._steps.append((image - x).ravel())
+        del self._images[: -self._depth - 1], self._steps[: -self._depth - 1]
+        if len(self._steps) < 2:
+            return None
+        steps, images = np.diff(self._steps, axis=0), np.diff(self._images, axis=0)
+        gram = steps @ steps.T
+        size = float(np.trace(gram))
+        if size == 0.0:
+            return None
+        gram += _REGULAR * size * np.eye(len(gram))
+        weights = np.linalg.solve(gram, steps @ self._steps[-1])
+        extrapolated: Array = (self._images[-1] - weights @ images).reshape(x.shape)
+        return extrapolated
+
+    def forget(self) -> None:
+        """Begin anew: after a bad extrapolation the old iterates mislead."""
+        del self._images[:-1], self._steps[:-1]
