@@ -117,6 +117,22 @@ def hull(points):
     return corners, tuple(faces)
 
 
+def prism(ring, bottom, top):
+    """Corners and faces of an upright prism over a convex polygon (n, 2), counter-clockwise."""
+    n = len(ring)
+    walls = tuple((i, (i + 1) % n, n + (i + 1) % n, n + i) for i in range(n))
+    corners = np.vstack([np.column_stack([ring, np.full(n, z)]) for z in (bottom, top)])
+    return corners, (tuple(range(n))[::-1], tuple(range(n, 2 * n)), *walls)
+
+
+def ellipse(sides, axes, turn=0.0, centre=(0.0, 0.0)):
+    """A polygon (sides, 2) on an ellipse, counter-clockwise."""
+    angle = 2 * np.pi * np.arange(sides) / sides
+    ring = np.column_stack([np.cos(angle), np.sin(angle)]) * axes
+    c, s = np.cos(turn), np.sin(turn)
+    return ring @ np.array([[c, s], [-s, c]]) + centre
+
+
 def random_stone(rng):
     """A random convex polyhedron about the origin: a leaning box, a tetrahedron, a prism or a hull of points."""
     kind = rng.integers(4)
@@ -128,13 +144,8 @@ def random_stone(rng):
     if kind == 1:
         return hull(rng.uniform(0.5, 1.2) * np.vstack([np.eye(3), -np.ones(3) / 3]) @ turn.T)
     if kind == 2:
-        sides = int(rng.integers(3, 9))
-        angle = 2 * np.pi * np.arange(sides) / sides
-        ring = np.column_stack([np.cos(angle), np.sin(angle), np.full(sides, -0.5)]) * rng.uniform(
-            0.3, 0.8, 3
-        )
-        walls = tuple((i, (i + 1) % sides, sides + (i + 1) % sides, sides + i) for i in range(sides))
-        faces = (tuple(range(sides))[::-1], tuple(range(sides, 2 * sides)), *walls)
-        return np.vstack([ring, ring * [1, 1, -1]]) @ turn.T, faces
+        half = rng.uniform(0.15, 0.4)
+        corners, faces = prism(ellipse(int(rng.integers(3, 9)), rng.uniform(0.3, 0.8, 2)), -half, half)
+        return corners @ turn.T, faces
     points = rng.normal(size=(int(rng.integers(5, 15)), 3))
     return hull(rng.uniform(0.3, 0.7) * points / np.linalg.norm(points, axis=1)[:, None])

@@ -9,18 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial import Delaunay
 
 from mechanics.contact import _kernels_mortar as kernel
-
-
-def clip(polygon, origin, normal):
-    """Sutherland–Hodgman, one edge after another."""
-    kept = []
-    for a, b in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
-        da, db = normal @ (a - origin), normal @ (b - origin)
-        if da <= 0:
-            kept.append(a)
-        if da * db < 0:
-            kept.append(a + da / (da - db) * (b - a))
-    return np.array(kept).reshape(-1, 3)
+from tests.mechanics.polygons import overlap
 
 
 def barycentric(x, tri):
@@ -28,12 +17,9 @@ def barycentric(x, tri):
 
 
 def clip_flat(polygon, cutter):
-    cutter = np.column_stack([cutter, np.zeros(len(cutter))])
-    result = np.column_stack([polygon, np.zeros(len(polygon))])
-    for a, b in zip(cutter, np.roll(cutter, -1, axis=0), strict=True):
-        if len(result):
-            result = clip(result, a, np.cross(b - a, [0, 0, 1.0]))
-    return result[:, :2]
+    """The part of a plane polygon inside another, counter-clockwise."""
+    flat = [np.column_stack([points, np.zeros(len(points))]) for points in (cutter, polygon)]
+    return overlap(*flat, np.array([0.0, 0.0, 1.0]))[:, :2]
 
 
 def mortar_integrals(xc, tc, xa, ta, outline):
