@@ -1,0 +1,289 @@
+"""Stored frictional contact problems: `python -m benchmarks.fc3d --problems DIR [--tolerance T] [--json]`.
+
+Each .npz holds W in block-sparse rows, q and μ of u = W r + q with Coulomb's law. Beside our figures stand those of
+Siconos: of the file siconos.csv beside the problems, and live where an interpreter that has Siconos is named.
+"""
+
+import argparse
+import csv
+import json
+import subprocess
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
+from mechanics.operators.stored import StoredDelassus
+from mechanics.problem import ContactProblem, ContactSolution, ContactStart
+from mechanics.residual import natural_map, project_on_cone
+from mechanics.solvers.admm import ADMM
+from mechanics.solvers.alternating import Alternating
+from mechanics.solvers.nsgs import NSGS
+from moma.errors import MissingLibraryError, UsageError
+
+__all__ = ["main", "read_problem", "siconos_error"]
+
+Array = NDArray[np.float64]
+
+_SOLVERS = {"auto": Alternating, "nsgs": NSGS, "admm": ADMM}
+# η begins at this, or at the tolerance times that, and is divided by the third, down to rounding
+_LOOSEST, _LOOSER, _TIGHTER, _SMALLEST = 1e-2, 1e5, 10**0.5, 1e-14
+# iterations before Siconos' error is looked at, or a quarter of those done
+_SLICE = 200
+_TABLE: Table = (
+    ("problem", "problem", ""),
+    ("nc", "contacts", "d"),
+    ("solved", "solved", ""),
+    ("error", "error", ".1e"),
+    ("eta", "η", ".1e"),
+    ("iterations", "iterations", "d"),
+    ("cpu_ms", "cpu ms", ".3g"),
+    ("ns", "ns per contact and iteration", ".0f"),
+    ("solved_eta", "η too", ""),
+    ("iterations_eta", "iterations", "d"),
+    ("cpu_eta_ms", "cpu ms", ".3g"),
+    ("siconos_nsgs_iterations", "Siconos' NSGS: iterations", "d"),
+    ("siconos_nsgs_cpu_ms", "cpu ms", ".3g"),
+    ("siconos_best", "best of Siconos", ""),
+    ("siconos_best_cpu_ms", "cpu ms", ".3g"),
+    ("ratio_best", "best of Siconos / ours", ".2g"),
+)
+
+
+def main() -> None:
+    """Solve every problem and print."""
+    options = _options()
+    folder = Path(options.problems)
+    if not folder.is_dir():
+        raise UsageError("no such folder", where=str(folder), remedy="name the folder with the .npz problems")
+    paths = sorted(path for path in folder.glob("*.npz") if not options.only or path.stem in options.only)
+    if not paths:
+        raise UsageError(
+            "no .npz problems", where=str(folder), remedy="see benchmarks/README.md for what one holds"
+        )
+    known = _Siconos(folder / "siconos.csv", options)
+    _warm_up(options.solver)
+    rows = [_row(path, options, known) for path in paths]
+    if options.json:
+        print_json(rows)
+        return
+    for row in rows:
+        keys = ("cpu", "cpu_eta", "siconos_nsgs_cpu", "siconos_best_cpu")
+        row |= {f"{key}_ms": None if row[key] is None else 1e3 * row[key] for key in keys}
+        row |= {key: "yes" if row[key] else "no" for key in ("solved", "solved_eta")}
+    print(f"{machine()}; {rows[0]['versions']}; {options.solver}, tolerance {options.tolerance:g}")
+    print(f"Siconos: {known.source}\n")
+    print_table(rows, _TABLE)
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.fc3d", description=__doc__)
+    parser.add_argument("--problems", required=True, help="folder with .npz problems")
+    parser.add_argument("--only", nargs="+", default=[], metavar="NAME", help="these problems alone")
+    parser.add_argument("--tolerance", type=float, default=1e-8, help="of Siconos' error and of η (1e-8)")
+    parser.add_argument("--solver", choices=sorted(_SOLVERS), default="auto", help="ours (auto)")
+    parser.add_argument("--max-iterations", type=int, default=100_000, help="of each solver (100000)")
+    parser.add_argument(
+        "--siconos-python", metavar="PYTHON", help="interpreter that has Siconos: run it side by side"
+    )
+    parser.add_argument(
+        "--siconos-limit", type=float, default=60.0, help="seconds for a problem in Siconos (60)"
+    )
+    parser.add_argument("--json", action="store_true", help="print an array of objects, one for each problem")
+    return parser.parse_args()
+
+
+def read_problem(path: Path) -> ContactProblem:
+    """Read `data` (nnz, 3, 3), `indices`, `indptr`, `q` (3 nc), `mu` (nc).
+
+    Raises
+    ------
+    UsageError : if one of them is missing
+    """
+    with np.load(path) as data:
+        try:
+            operator = StoredDelassus(
+                np.ascontiguousarray(data["data"], dtype=float),
+                data["indices"].astype(np.int64),
+                data["indptr"].astype(np.int64),
+            )
+            q, mu = data["q"].astype(float).reshape(-1, 3), data["mu"].astype(float)
+        except KeyError as missing:
+            remedy = "see benchmarks/README.md for what a problem holds"
+            raise UsageError(str(missing.args[0]), where=str(path), remedy=remedy) from None
+    none = np.zeros(len(mu))
+    return ContactProblem(operator, q, none, mu, none, operator.sparse)
+
+
+def siconos_error(problem: ContactProblem, impulse: Array) -> float:
+    """The number that Siconos 4.4 prints: the natural map with ρ = 1, over max(‖q‖, ‖r‖, ‖u‖); not free of units."""
+    u = problem.delassus.apply(impulse) + problem.u_free
+    dual = u.copy()
+    dual[:, 0] += problem.friction * np.linalg.norm(u[:, 1:], axis=1)
+    left = impulse - project_on_cone(impulse - dual, problem.friction, problem.cohesion)
+    scale = max(np.linalg.norm(problem.u_free), np.linalg.norm(impulse), np.linalg.norm(u))
+    return float(np.linalg.norm(left) / scale) if scale > 0 else 0.0
+
+
+@dataclass(frozen=True)
+class _Solved:
+    """Where a solver was when a measure was first within the tolerance, or when it gave up."""
+
+    impulse: Array
+    reached: bool
+    iterations: int
+    cpu: float
+
+
+def _solve(problem: ContactProblem, options: argparse.Namespace) -> tuple[_Solved, _Solved]:
+    """Solve to Siconos' error ≤ tolerance, and on to η ≤ tolerance.
+
+    Our solvers stop by η, which for the same number is mostly the stricter measure: so η is tightened by steps, each
+    going on from the last, until Siconos' error is within the tolerance, and then until η itself is.
+    """
+    goal, limit = options.tolerance, options.max_iterations
+    nothing = np.zeros_like(problem.u_free)
+    solution = ContactSolution(nothing, nothing, 0, np.inf, False)
+    eta, iterations, cpu = min(_LOOSEST, _LOOSER * goal), 0, 0.0
+    by_error: _Solved | None = None
+    while True:
+        # the velocity criterion of time steps is no part of these problems
+        slice_ = min(limit - iterations, max(_SLICE, iterations // 4))
+        solver = _SOLVERS[options.solver](eta, velocity_tolerance=np.inf, max_iterations=slice_)
+        start = time.process_time()
+        solution = solver(problem, ContactStart(solution.impulse, solution.velocity))
+        cpu += time.process_time() - start
+        iterations += solution.iterations
+        strict = solution.natural_map <= goal
+        if by_error is None and siconos_error(problem, solution.impulse) <= goal:
+            by_error = _Solved(solution.impulse, True, iterations, cpu)
+        gave_up = iterations >= limit or eta < _SMALLEST
+        if gave_up or (strict and by_error is not None):
+            last = _Solved(solution.impulse, strict, iterations, cpu)
+            return by_error or replace(last, reached=False), last
+        if solution.converged:
+            eta /= _TIGHTER
+
+
+def _warm_up(solver: str) -> None:
+    """Compile, or load, every kernel on two contacts that slide on one body."""
+    block = np.tile(np.array([[2.0, 0.3, -0.2], [0.3, 1.5, 0.1], [-0.2, 0.1, 1.0]]), (4, 1, 1)) * 0.1
+    block[[0, 3]] *= 10.0
+    operator = StoredDelassus(block, np.array([0, 1, 0, 1]), np.array([0, 2, 4]))
+    u_free, none = np.array([[-1.0, 2.0, 3.0], [-1.0, 0.1, 0.0]]), np.zeros(2)
+    problem = ContactProblem(operator, u_free, none, np.array([0.3, 0.3]), none, operator.sparse)
+    options = argparse.Namespace(solver=solver, tolerance=1e-10, max_iterations=200)
+    _solve(problem, options)
+
+
+def _row(path: Path, options: argparse.Namespace, known: "_Siconos") -> Row:
+    progress(path.stem)
+    problem = read_problem(path)
+    found, strict = _solve(problem, options)
+    nc = len(problem.friction)
+    row: Row = {
+        "problem": path.stem,
+        "nc": nc,
+        "solver": options.solver,
+        "tolerance": options.tolerance,
+        "solved": found.reached,
+        "error": siconos_error(problem, found.impulse),
+        "eta": natural_map(problem, found.impulse),
+        "iterations": found.iterations,
+        "cpu": found.cpu,
+        "solved_eta": strict.reached,
+        "error_eta": siconos_error(problem, strict.impulse),
+        "eta_eta": natural_map(problem, strict.impulse),
+        "iterations_eta": strict.iterations,
+        "cpu_eta": strict.cpu,
+        "ns": 1e9 * strict.cpu / (nc * max(strict.iterations, 1)),
+    }
+    row |= known.figures(path)
+    best = row["siconos_best_cpu"]
+    row["ratio_best"] = best / found.cpu if best is not None and row["solved"] else None
+    return row | {
+        "siconos_source": known.source,
+        "machine": machine(),
+        "versions": environment("moma-masonry", "numba", "numpy", "scipy"),
+    }
+
+
+class _Siconos:
+    """What Siconos reached: live, or as the file beside the problems says."""
+
+    def __init__(self, table: Path, options: argparse.Namespace) -> None:
+        self._options = options
+        self._rows: list[dict[str, str]] = []
+        self.source = "not there"
+        if options.siconos_python:
+            self._check()
+            self.source = f"live, {options.siconos_python}"
+        elif table.exists():
+            with table.open(newline="", encoding="utf-8") as file:
+                self._rows = [row for row in csv.DictReader(file) if float(row["tol"]) == options.tolerance]
+            self.source = f"{table.name}, measured on another machine"
+
+    def figures(self, path: Path) -> Row:
+        """The fastest method that solved the problem, and the fastest NSGS."""
+        methods = self._live(path) if self._options.siconos_python else self._stored(path.stem)
+        solved = sorted((one for one in methods if one["solved"]), key=lambda one: one["cpu"])
+        sweeping = [one for one in solved if one["method"].startswith("NSGS")]
+        best, nsgs = next(iter(solved), None), next(iter(sweeping), None)
+        return {
+            "siconos_solved": len(solved),
+            "siconos_tried": len(methods),
+            "siconos_best": best and best["method"],
+            "siconos_best_cpu": best and best["cpu"],
+            "siconos_best_iterations": best and best["iterations"],
+            "siconos_nsgs": nsgs and nsgs["method"],
+            "siconos_nsgs_cpu": nsgs and nsgs["cpu"],
+            "siconos_nsgs_iterations": nsgs and nsgs["iterations"],
+        }
+
+    def _stored(self, name: str) -> list[Row]:
+        return [
+            {
+                "method": row["solver"],
+                "solved": row["solved"] == "1",
+                "iterations": int(row["iterations"] or 0),
+                "cpu": float(row["cpu_s"] or "nan"),
+            }
+            for row in self._rows
+            if row["problem"] == name
+        ]
+
+    def _live(self, path: Path) -> list[Row]:
+        options, child = self._options, Path(__file__).with_name("siconos_child.py")
+        command = [options.siconos_python, "-W", "ignore", str(child), str(path.resolve())]
+        command += [repr(options.tolerance), str(options.max_iterations)]
+        said: bytes
+        try:
+            said = subprocess.run(
+                command,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                check=False,
+                timeout=options.siconos_limit,
+            ).stdout
+        except subprocess.TimeoutExpired as late:  # what had been solved by then counts
+            said = late.stdout or b""
+        lines = said.decode(errors="replace").splitlines()
+        return [json.loads(line.removeprefix("ROW ")) for line in lines if line.startswith("ROW ")]
+
+    def _check(self) -> None:
+        python = self._options.siconos_python
+        asked = [python, "-c", "import scipy.sparse, siconos.numerics"]
+        try:
+            found = subprocess.run(asked, check=False, capture_output=True).returncode == 0
+        except OSError:
+            raise UsageError("no such interpreter", where=f"--siconos-python {python}") from None
+        if not found:
+            remedy = "on Debian and Ubuntu, apt-get install python3-siconos python3-scipy"
+            raise MissingLibraryError("siconos.numerics cannot be imported", where=python, remedy=remedy)
+
+
+if __name__ == "__main__":
+    guarded(main)

@@ -1,0 +1,318 @@
+"""MOMA and LMGC90 side by side: `python -m benchmarks.lmgc90 --scenes DIR [--json]`.
+
+Same blocks, friction, law (gap Signorini and Coulomb, inelastic), time step and θ; every run is a process of its
+own with one thread, the two programs in turns. See benchmarks/README.md for what the columns mean.
+"""
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.judge import Judge, Verdict
+from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
+from benchmarks.scenes import list_scenes, read_scene
+from benchmarks.trace import Trace, read_trace
+from moma.errors import MissingLibraryError, SolverError, UsageError
+
+__all__ = ["main"]
+
+_TABLE: Table = (
+    ("scene", "scene", ""),
+    ("setting", "setting", ""),
+    ("contacts", "contacts", "d"),
+    ("contacts_theirs", "LMGC90's", "d"),
+    ("tolerance", "tolerance", ".0e"),
+    ("ours_step_ms", "step ms", ".3g"),
+    ("theirs_step_ms", "LMGC90", ".3g"),
+    ("ratio_step", "ratio", ".1f"),
+    ("ours_first_ms", "first ms", ".3g"),
+    ("theirs_first_ms", "LMGC90", ".3g"),
+    ("ratio_first", "ratio", ".1f"),
+    ("ratio_total", "ratio of all", ".1f"),
+    ("ours_eta", "η", ".0e"),
+    ("theirs_eta", "LMGC90", ".0e"),
+    ("ours_penetration", "penetration", ".0e"),
+    ("theirs_penetration", "LMGC90", ".0e"),
+    ("ours_drift", "drift m/s", ".0e"),
+    ("theirs_drift", "LMGC90", ".0e"),
+    ("ours_balance", "balance", ".0e"),
+    ("theirs_balance", "LMGC90", ".0e"),
+    ("ours_reaction", "reaction", ".0e"),
+    ("theirs_reaction", "LMGC90", ".0e"),
+    ("ours_sweeps", "sweeps", ".0f"),
+    ("theirs_sweeps", "LMGC90", ".0f"),
+)
+_TIMES = (
+    "ours_step",
+    "theirs_step",
+    "ours_first",
+    "theirs_first",
+    "theirs_step_relaxed",
+    "theirs_first_relaxed",
+)
+_RELAXED: Table = (
+    ("theirs_step_relaxed_ms", "LMGC90 relaxed: step ms", ".3g"),
+    ("theirs_first_relaxed_ms", "first ms", ".3g"),
+)
+# in these the run at the same accuracy must be no worse than LMGC90's
+_MATCHED = ("eta", "penetration", "drift", "balance")
+_TIGHTER = 10**0.5
+_INSTALL = (
+    "pip install compas_lmgc90, or name an interpreter that has it with --lmgc90-python, or use --ours-only"
+)
+
+
+@dataclass(frozen=True)
+class _Run:
+    """One side of a scene.
+
+    Attributes
+    ----------
+    first, step, total : processor time of the first step, median of the settled ones, and of all [s]
+    sweeps_first, sweeps : of the first step, median of the settled ones
+    verdict : how exact it was; None if only times were asked for
+    program : its name and version
+    """
+
+    first: float
+    step: float
+    total: float
+    sweeps_first: int
+    sweeps: float
+    verdict: Verdict | None
+    program: str
+
+
+def main() -> None:
+    """Run the scenes and print."""
+    options = _options()
+    if options.steps < 2:
+        raise UsageError(
+            f"{options.steps} steps", where="--steps", remedy="give 2 or more: the first and a settled one"
+        )
+    rows: list[Row] = []
+    for path in list_scenes(Path(options.scenes), tuple(options.only)):
+        rows += _Pair(path, options).rows()
+    if options.json:
+        print_json(rows)
+        return
+    for row in rows:
+        row |= {f"{key}_ms": None if row[key] is None else 1e3 * row[key] for key in _TIMES}
+    print(
+        f"{machine()}; {rows[0]['versions']}; θ = {options.theta}, h = {options.step} s, {options.steps} steps\n"
+    )
+    print_table(rows, _TABLE if options.relaxation is None else (*_TABLE, *_RELAXED))
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.lmgc90", description=__doc__)
+    parser.add_argument("--scenes", required=True, help="folder with .npz scenes")
+    parser.add_argument("--only", nargs="+", default=[], metavar="NAME", help="these scenes alone")
+    parser.add_argument("--json", action="store_true", help="print an array of objects, one for each row")
+    parser.add_argument("--steps", type=int, default=60, help="time steps of each run (60)")
+    parser.add_argument("--settled", type=int, default=20, help="steps at the end that count as settled (20)")
+    parser.add_argument("--step", type=float, default=1e-3, help="time step in seconds (0.001)")
+    parser.add_argument(
+        "--theta", type=float, default=0.5, help="θ of both programs (0.5, LMGC90's default there)"
+    )
+    parser.add_argument(
+        "--repeats", type=int, default=1, help="runs of each side, in turns; the fastest counts (1)"
+    )
+    parser.add_argument(
+        "--tolerance", type=float, help="η of our steps; without it, as exact as LMGC90's run or more"
+    )
+    parser.add_argument(
+        "--sweeps", type=int, default=20000, help="largest number of our sweeps in a step (20000)"
+    )
+    parser.add_argument(
+        "--accurate", action="store_true", help="one more row for each scene, at --accurate-tolerance"
+    )
+    parser.add_argument(
+        "--accurate-tolerance", type=float, default=1e-9, help="η of the accurate rows (1e-9)"
+    )
+    parser.add_argument(
+        "--lmgc90-python", default=sys.executable, help="interpreter that has compas_lmgc90 (this one)"
+    )
+    parser.add_argument(
+        "--relaxation", type=float, help="also time LMGC90 with this relaxation; the package fixes 0.1"
+    )
+    parser.add_argument("--ours-only", action="store_true", help="leave LMGC90 out")
+    return parser.parse_args()
+
+
+class _Pair:
+    """The two sides of one scene."""
+
+    def __init__(self, path: Path, options: argparse.Namespace) -> None:
+        self._path, self._options = path, options
+        self._scene = read_scene(path)
+        self._judge = Judge(self._scene, options.step, options.theta)
+
+    def rows(self) -> list[Row]:
+        """One row, and one more for the accurate setting."""
+        options = self._options
+        theirs = None if options.ours_only else self._lmgc90()
+        tolerance, ours = self._matched(theirs)
+        for _ in range(options.repeats - 1):
+            theirs = None if theirs is None else _fastest(theirs, self._lmgc90())
+            ours = _fastest(ours, self._moma(tolerance))
+        driven = None
+        if theirs is not None and options.relaxation is not None:
+            driven = self._lmgc90(options.relaxation)
+        rows = [self._row("same accuracy" if theirs else "given", tolerance, ours, theirs, driven)]
+        if options.accurate:
+            exact = options.accurate_tolerance
+            rows.append(self._row("accurate", exact, self._moma(exact), theirs, driven))
+        return rows
+
+    def _matched(self, theirs: _Run | None) -> tuple[float, _Run]:
+        """The loosest tolerance, from LMGC90's own η downwards, at which our run is nowhere less exact than its."""
+        if self._options.tolerance is not None or theirs is None or theirs.verdict is None:
+            tolerance = self._options.tolerance or 1e-4
+            return tolerance, self._moma(tolerance)
+        goal = theirs.verdict
+        tolerance = _rounded(min(goal.eta_first, goal.eta))
+        while True:
+            ours = self._moma(tolerance)
+            assert ours.verdict is not None
+            worse = [key for key in _MATCHED if getattr(ours.verdict, key) > getattr(goal, key)]
+            if not worse or tolerance < self._options.accurate_tolerance:
+                return tolerance, ours
+            progress(f"{self._path.stem}: at η = {tolerance:.1e} less exact in {', '.join(worse)}")
+            tolerance /= _TIGHTER
+
+    def _moma(self, tolerance: float) -> _Run:
+        options = self._options
+        more = ["--tolerance", repr(tolerance), "--sweeps", str(options.sweeps)]
+        trace = self._child([sys.executable, "-m", "benchmarks.moma_child"], more, "MOMA")
+        return self._run(trace, options.theta)
+
+    def _lmgc90(self, relaxation: float | None = None) -> _Run:
+        options, child = self._options, str(Path(__file__).with_name("lmgc90_child.py"))
+        _check_installed(options.lmgc90_python)
+        more = [] if relaxation is None else ["--relaxation", repr(relaxation)]
+        return self._run(self._child([options.lmgc90_python, child], more, "LMGC90"), 1.0)
+
+    def _child(self, program: list[str], more: list[str], name: str) -> Trace:
+        """Run one side in its own process, single-threaded."""
+        options = self._options
+        progress(f"{self._path.stem}: {name} {' '.join(more)}")
+        with tempfile.TemporaryDirectory() as folder:
+            out = Path(folder) / "trace.npz"
+            common = ["--steps", str(options.steps), "--keep", str(min(options.settled, options.steps - 1))]
+            common += ["--step", repr(options.step), "--theta", repr(options.theta)]
+            done = subprocess.run(
+                [*program, str(self._path.resolve()), str(out), *common, *more],
+                cwd=Path(__file__).resolve().parents[1],
+                env=os.environ | _single_threaded(),
+                capture_output=True,
+                text=True,
+                check=False,
+            )
+            if not out.exists():
+                said = (done.stderr or done.stdout).strip().splitlines()
+                raise SolverError(
+                    f"{name} ended with code {done.returncode}: {said[-1] if said else 'no word'}",
+                    where=self._path.stem,
+                )
+            return read_trace(out)
+
+    def _run(self, trace: Trace, landing: float) -> _Run:
+        settled = min(self._options.settled, len(trace.cpu) - 1)
+        return _Run(
+            first=float(trace.cpu[0]),
+            step=float(np.median(trace.cpu[-settled:])),
+            total=float(trace.cpu.sum()),
+            sweeps_first=int(trace.sweeps[0]),
+            sweeps=float(np.median(trace.sweeps[-settled:])),
+            verdict=self._judge(trace, landing) if trace.kept else None,
+            program=trace.program,
+        )
+
+    def _row(
+        self, setting: str, tolerance: float, ours: _Run, theirs: _Run | None, driven: _Run | None
+    ) -> Row:
+        options = self._options
+        assert ours.verdict is not None
+        row: Row = {
+            "scene": self._path.stem,
+            "setting": setting,
+            "blocks": len(self._scene.vertices),
+            "contacts": ours.verdict.contacts,
+            "contacts_theirs": theirs.verdict.contacts if theirs and theirs.verdict else None,
+            "tolerance": tolerance,
+            "size": self._judge.size,
+        }
+        for side, run in (("ours", ours), ("theirs", theirs)):
+            row |= {f"{side}_{key}": value for key, value in _figures(run).items()}
+        for key in ("step", "first", "total"):
+            row[f"ratio_{key}"] = None if theirs is None else getattr(theirs, key) / getattr(ours, key)
+        row |= {
+            "relaxation": options.relaxation,
+            "theirs_first_relaxed": driven.first if driven else None,
+            "theirs_step_relaxed": driven.step if driven else None,
+            "step": options.step,
+            "theta": options.theta,
+            "steps": options.steps,
+            "machine": machine(),
+            "versions": ", ".join(
+                [environment("moma-masonry", "numba", "numpy"), *([theirs.program] if theirs else [])]
+            ),
+        }
+        return row
+
+
+def _figures(run: _Run | None) -> Row:
+    """What a row says of one side; the same keys whether it ran or not."""
+    keys = [key for key in Verdict.__dataclass_fields__ if key != "contacts"]
+    exact = asdict(run.verdict) if run and run.verdict else {}
+    figures: Row = {
+        key: getattr(run, key) if run else None
+        for key in ("step", "first", "total", "sweeps", "sweeps_first")
+    }
+    return figures | {key: exact.get(key) for key in keys}
+
+
+def _fastest(one: _Run, other: _Run) -> _Run:
+    """The same work done twice: the smaller times are less disturbed by the rest of the machine."""
+    return _Run(
+        min(one.first, other.first),
+        min(one.step, other.step),
+        min(one.total, other.total),
+        one.sweeps_first,
+        one.sweeps,
+        one.verdict,
+        one.program,
+    )
+
+
+def _rounded(value: float) -> float:
+    """Down to one significant figure."""
+    unit = 10.0 ** np.floor(np.log10(value))
+    return float(np.floor(value / unit) * unit)
+
+
+def _single_threaded() -> dict[str, str]:
+    names = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+    return dict.fromkeys(names, "1")
+
+
+def _check_installed(python: str) -> None:
+    """Raise MissingLibraryError unless the interpreter has the package."""
+    asked = "import sys, importlib.util as u; sys.exit(0 if u.find_spec('compas_lmgc90') else 1)"
+    try:
+        found = subprocess.run([python, "-c", asked], check=False, capture_output=True).returncode == 0
+    except OSError:
+        raise UsageError("no such interpreter", where=f"--lmgc90-python {python}") from None
+    if not found:
+        raise MissingLibraryError("compas_lmgc90 is not installed", where=python, remedy=_INSTALL)
+
+
+if __name__ == "__main__":
+    guarded(main)

@@ -1,0 +1,192 @@
+"""LMGC90 on one scene: a process of its own, run by benchmarks.lmgc90 with the interpreter that has `compas_lmgc90`.
+
+It needs numpy and that package alone, so that interpreter need not have MOMA. LMGC90 keeps one simulation
+per process and ends the process where it is used wrongly; so each run is one process, and leaves one .npz file behind.
+
+The package drives LMGC90's Fortran routines, which its library also exports: `--relaxation` calls them one by one, in
+the order of the package's own step, with another relaxation of the sweeps than the 0.1 that the package fixes.
+"""
+
+import argparse
+import ctypes
+import time
+from collections.abc import Callable
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+# LMGC90's number for contacts between polyhedra, the norm and the tolerance of its sweeps as the package sets them
+_POLYHEDRA, _NORM, _TOLERANCE = 18, b"QM/16", 1.666e-4
+_CHECK_EVERY, _CHECKS = 50, 500
+
+
+def main() -> None:
+    """Run, and write cpu, sweeps, motion and the contacts of some steps to OUT."""
+    options = _options()
+    solver = _solver(options)
+    from compas_lmgc90 import _lmgc90
+
+    library = ctypes.CDLL(_lmgc90.__file__)
+    step = solver.lmgc90.compute_one_step
+    if options.relaxation is not None:
+        step = _Driven(library, options.relaxation)
+    result = solver.lmgc90.get_initial_state()
+    place = [_place(result.init_bodies, result.init_body_frames)]
+    cpu, sweeps, kept = [], [], {}
+    for n in range(1, options.steps + 1):
+        start = time.process_time()
+        result = step()
+        cpu.append(time.process_time() - start)
+        sweeps.append(_sweeps(library))
+        if result is None:  # routine by routine there is nothing to read back: such a run tells times alone
+            continue
+        place.append(_place(result.bodies, result.body_frames))
+        if n == 1 or n > options.steps - options.keep:
+            kept[n] = _contacts(result)
+    centre, frame = (np.array(one) for one in zip(*place, strict=True))
+    program = f"compas_lmgc90 {version('compas_lmgc90')}"
+    np.savez(
+        options.out,
+        program=program,
+        cpu=cpu,
+        sweeps=sweeps,
+        centre=centre,
+        frame=frame,
+        kept=list(kept),
+        **_flat(kept),
+    )
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("scene")
+    parser.add_argument("out")
+    parser.add_argument("--steps", type=int, required=True)
+    parser.add_argument("--keep", type=int, required=True)
+    parser.add_argument("--step", type=float, required=True)
+    parser.add_argument("--theta", type=float, required=True)
+    parser.add_argument("--relaxation", type=float)
+    return parser.parse_args()
+
+
+def _solver(options: argparse.Namespace) -> Any:
+    """The package's solver with the scene in it, ready to step."""
+    from compas_lmgc90.solver import Solver
+
+    with np.load(options.scene) as data:
+        scene = {key: data[key] for key in data.files}
+    solver = Solver(dt=options.step, theta=options.theta, density=float(scene["density"]))
+    vptr, fptr = scene["vptr"], scene["fptr"]
+    solver.geometry_from_v_f(
+        [
+            {
+                "vertices": scene["verts"][vptr[b] : vptr[b + 1]].tolist(),
+                "faces": scene["faces"][fptr[b] : fptr[b + 1]].tolist(),
+            }
+            for b in range(len(vptr) - 1)
+        ]
+    )
+    for b in np.flatnonzero(scene["support"]):
+        for component in ("Vx", "Vy", "Vz", "Rx", "Ry", "Rz"):
+            solver.apply_velocity(int(b), component, np.zeros((1, 6)))
+    solver.contact_law("IQS_CLB", float(scene["friction"]))
+    solver.preprocess()
+    return solver
+
+
+def _place(centres: Any, frames: Any) -> tuple[Any, Any]:
+    """Points (nb, 3) and principal axes in rows (nb, 3, 3) of the bodies."""
+    return np.array(centres), np.array(frames).reshape(-1, 3, 3)
+
+
+def _contacts(result: Any) -> dict[str, Any]:
+    """The contacts of one step; LMGC90's axes (t, n, s) become (n, t, s), forces are in newtons on the candidate."""
+    axes = np.array(result.interaction_uc).reshape(-1, 3, 3)
+    return {
+        "body": np.array(result.interaction_bodies) - 1,
+        "point": np.array(result.interaction_coords),
+        "frame": axes[:, [1, 0, 2]],
+        "gap": np.array(result.interaction_gap),
+        "force": np.array(result.interaction_rloc)[:, [1, 0, 2]],
+    }
+
+
+def _flat(kept: dict[int, dict[str, Any]]) -> dict[str, Any]:
+    return {f"{key}_{n}": value for n, contacts in kept.items() for key, value in contacts.items()}
+
+
+def _sweeps(library: ctypes.CDLL) -> int:
+    """How many sweeps the last step took; -1 where the library does not say."""
+    try:
+        ask = library["__nlgs_3d_MOD_get_nlgs3d_loop"]
+    except AttributeError:
+        return -1
+    count, contacts = ctypes.c_int(), ctypes.c_int()
+    errors = [ctypes.byref(ctypes.c_double()) for _ in range(3)]
+    ask(ctypes.byref(count), *errors, ctypes.byref(contacts))
+    return count.value
+
+
+class _Driven:
+    """The package's step, routine by routine, with another relaxation."""
+
+    def __init__(self, library: ctypes.CDLL, relaxation: float) -> None:
+        self._library = library
+        self._relaxation = ctypes.c_double(relaxation)
+        self._first = True
+
+    def _call(self, module: str, routine: str, *arguments: Any) -> int:
+        found: Callable[..., int] = self._library[f"__{module}_MOD_{routine}"]
+        return found(*(a if a is None or isinstance(a, bytes) else ctypes.byref(a) for a in arguments))
+
+    def __call__(self) -> None:
+        call, one = self._call, ctypes.c_int(1)
+        for routine in ("clean_writing_flags", "time_increment", "display_time"):
+            call("overall", routine)
+        for routine in ("increment_rbdy3", "comp_fext_rbdy3", "comp_fint_rbdy3", "comp_free_vlocy_rbdy3"):
+            call("rbdy3", routine)
+        call("overall", "init_entitylist")
+        call("overall", "set_run_contactor", one)
+        if call("prprx", "check_prprx"):
+            self._detect()
+        call("inter_meca_handler_3d", "recup_rloc", ctypes.c_int(_POLYHEDRA))
+        self._sweep()
+        call("nlgs_3d", "nullify_entitylist_nlgs")
+        call("nlgs_3d", "update_tact_behav_nlgs")
+        call("inter_meca_handler_3d", "stock_rloc", ctypes.c_int(_POLYHEDRA))
+        call("rbdy3", "comp_dof_rbdy3")
+        call("overall", "updt_time_begin")
+        call("rbdy3", "update_dof_rbdy3")
+
+    def _detect(self) -> None:
+        if self._first:
+            self._call("prprx", "compute_box_prprx")
+            self._first = False
+        self._call("prprx", "coor_prediction_prprx")
+        if self._call("prprx", "run_prprx"):
+            self._call("prprx", "creation_tab_visu_prprx")
+        self._call("prprx", "sto_compute_contact_prprx", None)
+
+    def _sweep(self) -> None:
+        call, left = self._call, ctypes.c_int()
+        iterate, check, finish = (ctypes.c_int(n) for n in (1, 2, 3))
+        # Fortran passes the length of the text behind the other arguments
+        setting = self._library["__nlgs_3d_MOD_set_nlgs_parameter"]
+        tolerance = ctypes.c_double(_TOLERANCE)
+        setting(_NORM, ctypes.byref(tolerance), ctypes.byref(self._relaxation), ctypes.c_size_t(len(_NORM)))
+        call("nlgs_3d", "prep_nlgs", ctypes.c_int(1))
+        for _ in range(_CHECKS):
+            for _ in range(_CHECK_EVERY):
+                call("nlgs_3d", "solve_nlgs", iterate)
+            call("nlgs_3d", "prep_check_nlgs", left)
+            call("nlgs_3d", "solve_nlgs", check)
+            call("nlgs_3d", "comp_check_nlgs", left)
+            if left.value == 0:
+                break
+        call("nlgs_3d", "rnodhrloc_nlgs", None, None)
+        call("nlgs_3d", "solve_nlgs", finish)
+
+
+if __name__ == "__main__":
+    main()

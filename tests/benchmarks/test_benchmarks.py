@@ -1,0 +1,147 @@
+"""Each benchmark runs on a tiny input of its own, and says what it should."""
+
+import importlib.util
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks import fc3d, lmgc90
+from benchmarks.generated import running_bond
+from benchmarks.scenes import write_scene
+from moma.errors import UsageError
+
+ROOT = Path(__file__).resolve().parents[2]
+SIDES = (
+    "step",
+    "first",
+    "total",
+    "sweeps",
+    "eta",
+    "penetration",
+    "drift",
+    "displacement",
+    "balance",
+    "reaction",
+)
+
+
+def run(name, *options):
+    return subprocess.run(
+        [sys.executable, "-m", f"benchmarks.{name}", *map(str, options)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def rows(name, *options):
+    done = run(name, *options, "--json")
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.fixture
+def scenes(tmp_path):
+    """A wall of two courses."""
+    write_scene(running_bond(2, 2), tmp_path / "small.npz")
+    return tmp_path
+
+
+def test_a_scene_is_run_and_judged(scenes):
+    (row,) = rows("lmgc90", "--scenes", scenes, "--ours-only", "--steps", 4, "--tolerance", 1e-8)
+    assert row["scene"] == "small"
+    # two bricks on the slab and their head joint; three on them and their two: 2·4 + 4 + 4·4 + 2·4
+    assert row["contacts"] == 36
+    assert row["ours_eta"] <= 1e-8
+    assert row["ours_momentum"] <= 1e-6
+    assert {f"ours_{key}" for key in SIDES} | {f"theirs_{key}" for key in SIDES} <= set(row)
+    assert all(row[f"theirs_{key}"] is None for key in SIDES)
+    assert row["ratio_step"] is row["ratio_first"] is None
+
+
+def test_lmgc90_stands_beside_it(scenes):
+    if importlib.util.find_spec("compas_lmgc90") is None:
+        pytest.skip("compas_lmgc90 is not installed")
+    (row,) = rows("lmgc90", "--scenes", scenes, "--steps", 4)
+    assert row["contacts_theirs"] == row["contacts"] == 36
+    assert row["ratio_step"] == pytest.approx(row["theirs_step"] / row["ours_step"])
+    assert row["theirs_momentum"] <= 1e-3
+    assert row["ours_eta"] <= row["theirs_eta"]
+
+
+def test_the_table_has_one_line_for_each_scene(scenes):
+    done = run("lmgc90", "--scenes", scenes, "--ours-only", "--steps", 3, "--accurate")
+    assert done.returncode == 0, done.stderr
+    lines = [line.split("|")[1].strip() for line in done.stdout.splitlines() if line.startswith("|")]
+    assert lines == ["scene", "-" * len(lines[1]), "small", "small"]
+
+
+def test_missing_things_are_named(scenes, tmp_path, monkeypatch):
+    for module, options, said in (
+        (lmgc90, ("--scenes", tmp_path / "nowhere"), "nowhere: no such folder"),
+        (lmgc90, ("--scenes", scenes, "--only", "large", "--ours-only"), "no scene large; it has small"),
+        (lmgc90, ("--scenes", scenes, "--lmgc90-python", tmp_path / "python"), "no such interpreter"),
+        (lmgc90, ("--scenes", scenes, "--ours-only", "--steps", 1), "--steps: 1 steps"),
+        (fc3d, ("--problems", tmp_path / "nowhere"), "nowhere: no such folder"),
+        (fc3d, ("--problems", tmp_path, "--only", "large"), "no .npz problems"),
+        (fc3d, ("--problems", tmp_path), "small.npz: data is not a file in the archive"),
+    ):
+        monkeypatch.setattr(sys, "argv", ["benchmark", *map(str, options)])
+        with pytest.raises(UsageError, match=re.escape(said)):
+            module.main()
+
+
+def test_a_failure_is_one_line_and_a_code(tmp_path):
+    done = run("fc3d", "--problems", tmp_path / "nowhere")
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: ")
+    assert len(done.stderr.splitlines()) == 1
+    assert not done.stdout
+
+
+def test_a_missing_package_is_named_with_its_remedy(scenes):
+    if importlib.util.find_spec("compas_lmgc90") is not None:
+        pytest.skip("compas_lmgc90 is installed")
+    done = run("lmgc90", "--scenes", scenes)
+    assert done.returncode == 1
+    assert "pip install compas_lmgc90" in done.stderr
+
+
+def test_problems_are_solved_beside_the_figures_of_siconos(tmp_path):
+    """One contact that slides, in closed form r = (1, -0.06, -0.08); and its row of a table like siconos.csv."""
+    np.savez(
+        tmp_path / "one.npz",
+        data=np.eye(3)[None],
+        indices=np.array([0]),
+        indptr=np.array([0, 1]),
+        q=np.array([-1.0, 0.6, 0.8]),
+        mu=np.array([0.1]),
+    )
+    heading = "problem,nc,rank_W,mu,solver,tol,solved,error,iterations,cpu_s\n"
+    lines = ["one,1,3,0.1,NSGS,1e-08,1,1e-9,3,0.5\n", "one,1,3,0.1,PROX,1e-08,1,1e-9,2,0.25\n"]
+    (tmp_path / "siconos.csv").write_text(heading + "".join(lines))
+    (row,) = rows("fc3d", "--problems", tmp_path)
+    assert row["problem"] == "one"
+    assert row["nc"] == 1
+    assert row["solved"]
+    assert row["error"] <= 1e-8
+    assert row["eta_eta"] <= 1e-8
+    assert row["iterations"] > 0
+    assert row["cpu"] > 0
+    assert (row["siconos_best"], row["siconos_best_cpu"]) == ("PROX", 0.25)
+    assert (row["siconos_nsgs_cpu"], row["siconos_nsgs_iterations"]) == (0.5, 3)
+
+
+def test_cost_is_given_for_each_size():
+    first, *_ = found = rows("scaling", "--largest", 350, "--threads", 2)
+    assert [row["kind"] for row in found] == ["wall", "disks", "disks"]
+    for key in ("contacts", "detection_ms", "sweep_ns", "step_ms", "bytes_kept", "exponent_step_1"):
+        assert key in first
+    assert all(row["same_bits"] for row in found)
+    assert 0 < first["bytes_kept"] < 10_000
