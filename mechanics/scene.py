@@ -26,6 +26,10 @@ __all__ = [
 ]
 
 
+# numbers of contact points that two faces can have
+_POINTS = (1, 3, 4, 8)
+
+
 class Fidelity(StrEnum):
     """How a block is modelled."""
 
@@ -103,6 +107,10 @@ class ContactSettings:
     alert_distance: float = 0.05
     points: int = 4
     placement: Placement = Placement.CORNERS
+
+    def __post_init__(self) -> None:
+        if self.points not in _POINTS:
+            raise SceneError(f"points = {self.points!r}", where="contact", remedy="give 1, 3, 4 or 8")
 
 
 @dataclass(frozen=True)

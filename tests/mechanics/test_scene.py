@@ -5,7 +5,7 @@ import pytest
 
 from mechanics.materials import Material
 from mechanics.model import build_model
-from mechanics.scene import Block, Fidelity, Scene
+from mechanics.scene import Block, ContactSettings, Fidelity, Scene
 from moma.errors import GeometryError, SceneError
 from tests.mechanics.shapes import LIMESTONE, TURN, brick, ground, moved, scene
 from tests.pipelines.handmade import BOX_FACES, box
@@ -31,6 +31,12 @@ def test_a_deformable_stone_needs_a_mesh_size(size):
 def test_a_fixed_stone_has_no_velocity():
     with pytest.raises(SceneError, match=r"stone A1: a fixed stone has a velocity.*make it rigid"):
         build_model(scene(brick("A1", (0, 0, 0), (1, 1, 1), Fidelity.FIXED, velocity=(1, 0, 0, 0, 0, 0))))
+
+
+@pytest.mark.parametrize("points", [0, 2, 5, 16, -4])
+def test_other_numbers_of_contact_points_are_refused(points):
+    with pytest.raises(SceneError, match=f"contact: points = {points}; give 1, 3, 4 or 8"):
+        ContactSettings(points=points)
 
 
 def test_a_stone_inside_out_is_refused_by_name():
