@@ -16,8 +16,9 @@ Array = NDArray[np.float64]
 _ON_CONE = 1.0 - 1e-9
 # of a body's size: a contact no farther open than this is closed for Newton's law
 _CLOSED = 1e-9
-# of a body's size: the least path in a step that counts as sliding; a contact may rest at the limit of its cone
-_SLIDES = 1e-9
+# a contact may rest at the limit of its cone, but for what solvers leave as velocity: slower than this part of the
+# speed √(a size), of a fall over the body's size with a = W r/h, it does not slide
+_DRIFT = 1e-4
 
 
 def gap_bias(contacts: Approach) -> Array:
@@ -37,8 +38,9 @@ def at_limit(terms: Terms, impulse: Array) -> NDArray[np.bool_]:
 
 def slid(contacts: Approach, terms: Terms, impulse: Array, velocity: Array) -> NDArray[np.bool_]:
     """Which contacts (n,) have slid in the step that gave r̃ (n, d) [N s] and u (n, d) [m/s]."""
-    path = contacts.step * np.linalg.norm(velocity[:, 1:], axis=1)
-    moved: NDArray[np.bool_] = at_limit(terms, impulse) & (path > _SLIDES * contacts.size)
+    acceleration = contacts.yielding * np.linalg.norm(impulse, axis=1) / contacts.step
+    drift = _DRIFT * np.sqrt(acceleration * contacts.size)
+    moved: NDArray[np.bool_] = at_limit(terms, impulse) & (np.linalg.norm(velocity[:, 1:], axis=1) > drift)
     return moved
 
 

@@ -6,16 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechanics.laws.bonds import BROKEN, bonded, with_bonds
-from mechanics.laws.dry_joint import DryJoint, slid
-from mechanics.laws.law import BOND, SLIDING, Approach, Terms
+from mechanics.laws.dry_joint import DryJoint, at_limit, slid
+from mechanics.laws.law import BOND, REST, SLIDING, SLIP, Approach, Terms
 from mechanics.laws.parameters import require_at_least_zero
 
 __all__ = ["MortarJoint", "held_tension"]
 
 Array = NDArray[np.float64]
 
-# of a body's size: the least opening in a step with which a bond at its tensile limit breaks
-_OPENS = 1e-9
+# of a body's size: a bond at its tensile limit has broken when it is open by this,
+_OPENED = 1e-6
+# one at its shear limit when it slides faster than solvers let it drift, or has crept by this
+_CREPT = 1e-3
 
 
 def held_tension(friction: float, tension: float, shear: float) -> float:
@@ -28,7 +30,7 @@ class MortarJoint:
     """A bond r_N ≥ -h c_n A, ‖r_T‖ ≤ h c_t A + μ r_N that breaks once and for all, then a dry joint.
 
     With r̃_N = r_N + h c_n A these are r̃_N ≥ 0 and ‖r_T‖ ≤ μ r̃_N + h A (c_t - μ c_n). A is the tributary area of the
-    contact point. The bond breaks in the step in which it opens at its tensile limit or slides at its shear limit.
+    contact point. The bond breaks when it opens at its tensile limit or slides at its shear limit.
 
     Attributes
     ----------
@@ -73,10 +75,12 @@ class MortarJoint:
         """Break the bonds that opened at their tensile limit, or slid."""
         contacts = with_bonds(contacts)
         terms = self.terms(contacts)
-        opening = contacts.step * contacts.theta * (velocity[:, 0] + terms.bias)
-        opened = (impulse[:, 0] <= 0) & (opening > _OPENS * contacts.size)
-        moved = slid(contacts, terms, impulse, velocity)
-        state = contacts.state.copy()
-        state[:, SLIDING] = moved
-        state[bonded(contacts) & (opened | moved), BOND] = BROKEN
+        state, holds = contacts.state.copy(), bonded(contacts)
+        opening = contacts.gap - state[:, REST] + contacts.step * contacts.theta * velocity[:, 0]
+        opened = (impulse[:, 0] <= 0) & (opening > _OPENED * contacts.size)
+        path = contacts.step * np.linalg.norm(velocity[:, 1:], axis=1)
+        state[:, SLIP] += np.where(holds & at_limit(terms, impulse), path, 0.0)
+        state[:, SLIDING] = slid(contacts, terms, impulse, velocity)
+        sheared = (state[:, SLIDING] > 0) | (state[:, SLIP] > _CREPT * contacts.size)
+        state[holds & (opened | sheared), BOND] = BROKEN
         return state
