@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mechanics.laws.law import STATE
+from mechanics.laws.law import BOND, SLIP, STATE
 from mechanics.memory import Memory
 from mechanics.problem import ContactSolution
 
@@ -86,3 +86,34 @@ def test_recall_is_that_of_a_dictionary(stored, fresh, data):
         impulse, variables = book.get(key, (np.zeros(3), np.zeros(STATE)))
         np.testing.assert_array_equal(start.impulse[row], impulse)
         np.testing.assert_array_equal(state[row], variables)
+
+
+def bonded_pairs():
+    """Two contacts of the pair 5, one of the pair 6; the bond of the second is damaged."""
+    state = np.zeros((3, STATE))
+    state[:, BOND], state[:, SLIP] = [1.0, 0.5, 0.0], [1.0, 2.0, 3.0]
+    key = np.array([(5 << 24) + 40, (5 << 24) + 2, (6 << 24) + 1])
+    place = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.1]])
+    return key, state, place
+
+
+def test_a_new_contact_of_a_bonded_joint_takes_the_bond_of_the_nearest():
+    """Pair 5 has lost its contact 2 and got 7 and 8; pair 9 is new, and its contact stays without a bond."""
+    memory, (key, state, place) = Memory(), bonded_pairs()
+    memory.store(key, solution(numbers(3)), state, place)
+    asked = np.array([(9 << 24) + 2, (5 << 24) + 7, (6 << 24) + 3, (5 << 24) + 40, (5 << 24) + 8])
+    where = np.array([[0.0, 0.0, 0.0], [0.9, 0.1, 0.0], [5.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.4, 0.0, 0.3]])
+    start, found = memory.recall(asked, where)
+    np.testing.assert_array_equal(found[:, BOND], [0.0, 0.5, 0.0, 1.0, 1.0])
+    np.testing.assert_array_equal(found[:, SLIP], [0.0, 2.0, 3.0, 1.0, 1.0])
+    # the impulses of others are not theirs
+    np.testing.assert_array_equal(start.impulse, [[0, 0, 0], [0, 0, 0], [0, 0, 0], [1, 2, 3], [0, 0, 0]])
+
+
+def test_without_places_or_bonds_new_contacts_start_from_zero():
+    memory, (key, state, place) = Memory(), bonded_pairs()
+    memory.store(key, solution(numbers(3)), state)
+    assert not memory.recall(key + 1000, place)[1].any()
+    state[:, BOND] = 0.0
+    memory.store(key, solution(numbers(3)), state, place)
+    assert not memory.recall(key + 1000, place)[1].any()
