@@ -22,6 +22,9 @@ _PARALLEL = 0.999999
 # of the smaller shape's size: closer to a side than this is on it, so that faces which end together clip cleanly
 _ON_SIDE = 1e-7
 
+# of an even share of an overlap: the least that a contact point has
+_LEAST_SHARE = 0.1
+
 
 @njit(cache=True)
 def _face_gap(f, o, cptr, corner, vptr, vertices, normals):
@@ -241,7 +244,11 @@ def _moments(x, y, count):
 
 @njit(cache=True)
 def point_areas(x, y, count, area, mx, my, out):  # pragma: no cover - compiled
-    """Shares of an area that add up to it and have its centroid (mx, my): the most even ones, if none is negative."""
+    """Shares of an area that add up to it and have its centroid (mx, my): the most even ones.
+
+    Where one would be less than a tenth of an even share, all are drawn towards even ones until it is that much; so
+    no point is left without area, and the shares do not jump when the overlap changes.
+    """
     sxx = sxy = syy = cx = cy = 0.0
     for p in range(count):
         cx += x[p] / count
@@ -260,9 +267,10 @@ def point_areas(x, y, count, area, mx, my, out):  # pragma: no cover - compiled
     for p in range(count):
         out[p] = even + lx * (x[p] - cx) + ly * (y[p] - cy)
         lowest = min(lowest, out[p])
-    if lowest < 0.0:
+    if lowest < _LEAST_SHARE * even:
+        keep = (1.0 - _LEAST_SHARE) * even / (even - lowest)
         for p in range(count):
-            out[p] = even
+            out[p] = even + keep * (out[p] - even)
 
 
 @njit(cache=True)

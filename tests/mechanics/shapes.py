@@ -1,6 +1,7 @@
 """Stones, scenes and reference operators that the tests of the mechanics share."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 from hypothesis import strategies as st
@@ -11,7 +12,7 @@ from mechanics.contact.detection import Detector
 from mechanics.laws.dry_joint import DryJoint
 from mechanics.materials import Material
 from mechanics.model import build_model
-from mechanics.scene import Block, ContactSettings, Fidelity, Scene, TimeSettings
+from mechanics.scene import Block, ContactSettings, Fidelity, Part, Placement, Scene, TimeSettings
 from tests.pipelines.handmade import BOX_FACES, box
 
 LIMESTONE = Material("limestone", density=2000.0, young=1e9, poisson=0.2)
@@ -34,9 +35,18 @@ def ground(low=(-2.0, -2.0, -1.0), high=(3.0, 3.0, 0.0), code="ground"):
 def moved(block, turn=None, shift=(0.0, 0.0, 0.0), scale=1.0):
     """The same stone, scaled, then turned about the origin, then moved."""
     turn = np.eye(3) if turn is None else turn
-    vertices = scale * block.vertices @ turn.T + np.array(shift)
+
+    def there(vertices):
+        return scale * vertices @ turn.T + np.array(shift)
+
     size = None if block.mesh_size is None else scale * block.mesh_size
-    return Block(block.code, vertices, block.faces, block.material, block.fidelity, size, block.velocity)
+    parts = tuple(Part(there(part.vertices), part.faces) for part in block.parts)
+    return replace(block, vertices=there(block.vertices), mesh_size=size, parts=parts)
+
+
+def transformed(one, turn=None, shift=(0.0, 0.0, 0.0), scale=1.0):
+    """The same scene, scaled, then turned about the origin, then moved."""
+    return replace(one, blocks=tuple(moved(block, turn, shift, scale) for block in one.blocks))
 
 
 def scene(*blocks, gravity=(0.0, 0.0, -9.81), friction=0.6, alert=0.05, **time):
@@ -49,10 +59,10 @@ def scene(*blocks, gravity=(0.0, 0.0, -9.81), friction=0.6, alert=0.05, **time):
     )
 
 
-def detected(one):
+def detected(one, points=4, placement=Placement.CORNERS):
     """Model, state at the start and the contacts in it."""
     model, state = build_model(one)
-    find = Detector(model.surfaces, model.fixed, one.contact.alert_distance)
+    find = Detector(model.surfaces, model.fixed, one.contact.alert_distance, points, placement)
     return model, state, find(state, np.zeros(len(one.blocks)))
 
 
@@ -149,3 +159,16 @@ def random_stone(rng):
         return corners @ turn.T, faces
     points = rng.normal(size=(int(rng.integers(5, 15)), 3))
     return hull(rng.uniform(0.3, 0.7) * points / np.linalg.norm(points, axis=1)[:, None])
+
+
+def pile(seed, stones=8, **more):
+    """A scene of random convex stones, close to one another; the first is fixed."""
+    rng = np.random.default_rng(seed)
+    blocks = []
+    for k in range(stones):
+        corners, faces = random_stone(rng)
+        place = 0.45 * stones ** (1 / 3) * rng.normal(size=3)
+        blocks.append(
+            Block(str(k), corners + place, faces, LIMESTONE, Fidelity.FIXED if k == 0 else Fidelity.RIGID)
+        )
+    return scene(*blocks, **more)

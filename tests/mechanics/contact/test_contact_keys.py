@@ -1,0 +1,165 @@
+"""The names of contacts: unique, and the same wherever the scene is and however large it is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from mechanics.contact.contacts import gaps, material_points
+from mechanics.contact.detection import Detector
+from mechanics.model import build_model
+from mechanics.scene import Fidelity, Placement
+from tests.mechanics.shapes import TURN, brick, detected, ground, pile, scene, transformed
+
+seeds = st.integers(0, 2**32 - 1)
+placements = st.sampled_from(Placement)
+
+
+def facts(one, points=4, placement=Placement.CORNERS):
+    """By key: bodies, gap, area and the two material points."""
+    _, state, contacts = detected(one, points, placement)
+    assert len(set(contacts.key.tolist())) == len(contacts)
+    assert (contacts.key >= 0).all()
+    order = np.argsort(contacts.key)
+    place = material_points(contacts, state)
+    return (
+        contacts.key[order],
+        contacts.bodies[order],
+        gaps(contacts, state)[order],
+        contacts.area[order],
+        place[order],
+    )
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    seeds,
+    st.sampled_from([1e-2, 1.0, 1e3]),
+    st.sampled_from([0.0, 1e4]),
+    st.sampled_from([1, 3, 4, 8]),
+    placements,
+)
+@example(seed=0, scale=1e-2, far=1e4, points=4, placement=Placement.CORNERS)
+def test_no_contact_appears_vanishes_or_changes_its_name_when_the_scene_is_turned_moved_or_scaled(
+    seed, scale, far, points, placement
+):
+    one = pile(seed, stones=6, alert=0.3)
+    key, bodies, gap, area, place = facts(one, points, placement)
+    rng = np.random.default_rng(seed + 1)
+    turn, shift = Rotation.random(random_state=rng).as_matrix(), far * rng.normal(size=3)
+    there = facts(transformed(one, turn, shift, scale), points, placement)
+    np.testing.assert_array_equal(there[0], key)
+    np.testing.assert_array_equal(there[1], bodies)
+    # far away coordinates have fewer digits: 2e-12 m at 1e4 m
+    atol = 1e-10 + 1e-9 * (far > 0) * max(1.0, 1 / scale)
+    np.testing.assert_allclose(there[2] / scale, gap, atol=atol)
+    np.testing.assert_allclose(there[3] / scale**2, area, atol=10 * atol)
+    np.testing.assert_allclose((there[4] - shift) @ turn / scale, place, atol=10 * atol)
+
+
+@settings(max_examples=30, deadline=None)
+@given(seeds)
+def test_names_stay_when_the_state_turns_as_a_whole(seed):
+    model, state, contacts = detected(pile(seed, stones=6, alert=0.3))
+    turn = Rotation.random(random_state=seed).as_matrix()
+    turned = replace(state, centre=state.centre @ turn.T + 7.0, rotation=turn @ state.rotation)
+    found = Detector(model.surfaces, model.fixed, 0.3)(turned, np.zeros(len(model.mass)))
+    np.testing.assert_array_equal(found.key, contacts.key)
+    np.testing.assert_allclose(found.frame, contacts.frame @ turn.T, atol=1e-9)
+    np.testing.assert_allclose(found.arm, contacts.arm, atol=1e-9)  # the same material points
+
+
+@settings(max_examples=30, deadline=None)
+@given(seeds)
+def test_names_stay_when_stones_move_by_a_hair(seed):
+    model, state, contacts = detected(pile(seed, stones=6, alert=0.3))
+    rng = np.random.default_rng(seed)
+    near = replace(
+        state,
+        centre=state.centre + 1e-9 * rng.normal(size=(6, 3)),
+        rotation=Rotation.from_rotvec(1e-9 * rng.normal(size=(6, 3))).as_matrix() @ state.rotation,
+    )
+    found = Detector(model.surfaces, model.fixed, 0.3)(near, np.zeros(len(model.mass)))
+    np.testing.assert_array_equal(found.key, contacts.key)
+    np.testing.assert_allclose(found.arm, contacts.arm, atol=1e-6)
+
+
+def column(count, shift=0.0):
+    """Equal cubes on a cube, each moved a little against the one below."""
+    place = [np.array([shift * k, shift * k, k]) for k in range(count)]
+    kind = [Fidelity.FIXED] + [Fidelity.RIGID] * (count - 1)
+    return scene(*(brick(str(k), place[k], place[k] + 1, kind[k]) for k in range(count)))
+
+
+def names(model, state, noise=None, detector=None):
+    if noise is not None:
+        state = replace(
+            state,
+            centre=state.centre + noise[0],
+            rotation=Rotation.from_rotvec(noise[1]).as_matrix() @ state.rotation,
+        )
+    find = detector or Detector(model.surfaces, model.fixed, 0.05)
+    return find(state, np.zeros(len(model.mass))).key.tolist()
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.01])
+@pytest.mark.parametrize(
+    ("turn", "far", "scale"), [(None, 0.0, 1.0), (TURN, 0.0, 1.0), (TURN, 1e4, 1e-2), (TURN, 1e4, 1e3)]
+)
+def test_faces_that_coincide_keep_their_names_under_rounding(shift, turn, far, scale):
+    model, state = build_model(transformed(column(5, shift), turn, (far, -far, far), scale))
+    expected = names(model, state)
+    assert len(expected) == 16
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        noise = 1e-12 * scale * rng.normal(size=(5, 3)), 1e-12 * rng.normal(size=(5, 3))
+        assert names(model, state, noise) == expected
+
+
+def test_contacts_slide_with_their_names_where_no_edge_is_crossed():
+    """Small on large: its corners. Shifted equal ones: also where edges cross."""
+    for one, count in ((scene(ground(), brick("a", (0, 0, 0), (1, 1, 1))), 4), (column(3, 0.1), 8)):
+        model, state = build_model(one)
+        expected = names(model, state)
+        assert len(expected) == count
+        for step in np.linspace(0, 0.05, 6):
+            noise = np.zeros((2, len(model.mass), 3))
+            noise[0, 1, :2], noise[1, 1, 2] = (step, -step), step
+            assert names(model, state, noise) == expected
+
+
+@settings(max_examples=20, deadline=None)
+@given(seeds)
+def test_what_a_detector_has_seen_before_changes_nothing(seed):
+    """Hints of earlier detections against a detector that knows nothing, along a random motion."""
+    model, state = build_model(pile(seed, stones=8, alert=0.1))
+    rng = np.random.default_rng(seed)
+    used = Detector(model.surfaces, model.fixed, 0.1)
+    for _ in range(6):
+        noise = 0.1 * rng.normal(size=(8, 3)), 0.2 * rng.normal(size=(8, 3))
+        assert names(model, state, noise, used) == names(
+            model, state, noise, Detector(model.surfaces, model.fixed, 0.1)
+        )
+
+
+@pytest.mark.parametrize(("points", "placement", "count"), [
+    (1, Placement.CORNERS, 1), (3, Placement.CORNERS, 3), (4, Placement.CORNERS, 4), (8, Placement.CORNERS, 4),
+    (1, Placement.INERTIA, 1), (3, Placement.INERTIA, 3), (4, Placement.INERTIA, 4), (8, Placement.INERTIA, 8),
+])  # fmt: skip
+def test_a_joint_has_as_many_points_as_asked_for_or_as_it_has_corners(points, placement, count):
+    one = scene(ground(), brick("a", (0, 0, 0), (0.8, 0.5, 0.6)))
+    key, _, gap, area, place = facts(one, points, placement)
+    assert len(key) == count
+    np.testing.assert_allclose(gap, 0.0, atol=1e-14)
+    assert area.sum() == pytest.approx(0.4, rel=1e-12)
+    if (points, placement) != (3, Placement.CORNERS):  # three corners do not hold the middle
+        centroid = np.einsum("c,ci->i", area, place[:, 0, :2]) / 0.4
+        np.testing.assert_allclose(centroid, [0.4, 0.25], atol=1e-13)
+    if placement is Placement.INERTIA and count > 1:
+        # ∫(x - x̄)(x - x̄)ᵀ of a rectangle
+        local = place[:, 0, :2] - [0.4, 0.25]
+        second = np.einsum("c,ci,cj->ij", area, local, local)
+        np.testing.assert_allclose(second, 0.4 / 12 * np.diag([0.64, 0.25]), atol=1e-14)
