@@ -52,7 +52,8 @@ def test_a_block_on_mortar_is_pulled_off_and_sheared_off_at_its_strength(
 ):
     """W = 19620 N on 1 m², c_n = 10 kPa, c_t = 5 kPa, μ = 0.5: W + c_n A and μ (W + c_n A), within 1e-4.
 
-    For half a second the load is 1e-4 below, then 1e-4 above; slowly, the block starts. Broken, μ W = 9810 N brakes the sliding block.
+    For half a second the load is 1e-4 below, then 1e-4 above, and slowly the block starts. Broken, μ W = 9810 N
+    brakes it.
     """
     stone = Material("stone", density=2000.0, young=1e10, poisson=0.2)
     parts = limit * np.array([1 - 1e-4, 1 - 1e-4, 1 + 1e-4, 1 + 1e-4])
