@@ -175,15 +175,12 @@ def natural_errors(r, u, bias, mu, k, rho):  # pragma: no cover - compiled
 
 
 @njit(cache=True)
-def admm_right_side(z, y, shift, mu, sigma, right):  # pragma: no cover - compiled
-    """z - y - (u_free + bias n + μ‖u_T‖ n)/σ, with u_T = -σ y_T, into `right` (nc, d)."""
+def admm_right_side(z, y, shift, lag, sigma, right):  # pragma: no cover - compiled
+    """z - y - (u_free + bias n)/σ - lag n into `right` (nc, d), with lag = μ‖u_T‖/σ of some earlier u_T."""
     for c in range(z.shape[0]):
-        slide = 0.0
         for i in range(z.shape[1]):
             right[c, i] = z[c, i] - y[c, i] - shift[c, i] / sigma
-            if i > 0:
-                slide += y[c, i] * y[c, i]
-        right[c, 0] -= mu[c] * np.sqrt(slide)
+        right[c, 0] -= lag[c]
 
 
 @njit(cache=True)

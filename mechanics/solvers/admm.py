@@ -4,8 +4,8 @@ Splits r = z: r minimises the quadratic part, z lies in the Coulomb cone. With t
 
     r ← (W + σ)⁻¹ [σ (z - y) - u_free - bias - s n],   z ← P_K(r + y),   y ← y + r - z,   s = μ‖u_T‖
 
-where r is over-relaxed, and the de Saxcé shift s, taken from û = -σ y each time, makes the friction Coulomb's own and
-not the convex, associated one. By the Woodbury identity W + σ is solved through the sparse, positive definite
+where r is over-relaxed, and the de Saxcé shift s, taken from û = -σ y now and then, makes the friction Coulomb's own
+and not the convex, associated one. By the Woodbury identity W + σ is solved through the sparse, positive definite
 ŵ⁻¹ + H Hᵀ/σ, factorised once as long as the contacts persist. So the motion of whole stones, which holds Gauss–Seidel
 back, is solved for exactly; only the elastic compliance decides how fast the iteration converges.
 """
@@ -13,6 +13,7 @@ back, is solved for exactly; only the elastic compliance decides how fast the it
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mechanics.problem import ContactProblem, ContactSolution, ContactStart, scale_of
 from mechanics.residual import project_on_cone, residual
@@ -21,7 +22,11 @@ from moma.errors import SolverError
 
 __all__ = ["ADMM"]
 
+Array = NDArray[np.float64]
+
 _OVER_RELAXATION = 1.6
+# looks between two balances of the penalty, by how much it may change at a time, and its bounds over W
+_BALANCE_LOOKS, _LEAST_CHANGE, _MOST_CHANGE, _BOUNDS = 2, 2.0, 5.0, (1e-4, 1.0)
 
 
 @dataclass(frozen=True)
@@ -37,6 +42,8 @@ class ADMM:
         values bear with contacts that open and slide [-]
     check_every : iterations between two looks at η
     patience : give up after a look that finds η less than this many times smaller than two looks before; 0: never
+    hold : iterations for which the de Saxcé shift is held; held longer, it is steadier where much slides
+    balanced : let the penalty follow the ratio of dual and primal residual (He, Yang & Wang 2000)
     """
 
     tolerance: float = 1e-6
@@ -45,6 +52,8 @@ class ADMM:
     penalty: float = 0.1
     check_every: int = 10
     patience: float = 0.0
+    hold: int = 1
+    balanced: bool = False
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from `start`; its velocity, û = -σ y, lets the iteration go on where it stopped.
@@ -59,29 +68,73 @@ class ADMM:
             raise SolverError("the problem has no sparse form", where="ADMM", remedy='use the method "nsgs"')
         if len(start.impulse) == 0:
             return ContactSolution(start.impulse, start.velocity, 0, 0.0, True)
-        form, sigma = problem.sparse(), self.penalty * scale_of(problem.delassus)
-        lift, across, factor = form.lift, form.across, form.factor(sigma)
-        mu, cohesion = problem.friction, problem.cohesion
-        shifted = problem.u_free.copy()
-        shifted[:, 0] += problem.bias
-        z, y = project_on_cone(start.impulse, mu, cohesion), -start.velocity / sigma
-        right = np.empty_like(shifted)
-        left, iterations = residual(problem, z), 0
-        looks, best = [np.inf, np.inf], (left, z.copy(), y.copy())
+        run = _Run(problem, start, self.penalty * scale_of(problem.delassus), self.hold)
+        left, looks = residual(problem, run.z), [np.inf, np.inf]
+        best = left, run.z.copy(), run.velocity
         limits = self.tolerance, self.velocity_tolerance
-        while not left.within(*limits) and iterations < self.max_iterations:
+        while not left.within(*limits) and run.iterations < self.max_iterations:
             if looks[-2] < self.patience * left.natural_map:
                 break
             looks.append(left.natural_map)
-            for _ in range(min(self.check_every, self.max_iterations - iterations)):
-                admm_right_side(z, y, shifted, mu, sigma, right)
-                inner = factor.solve(lift @ right.ravel())
-                r = right - (across @ inner).reshape(right.shape) / sigma
-                admm_update(r, z, y, mu, cohesion, _OVER_RELAXATION)
-                iterations += 1
-            left = residual(problem, z)
+            run.iterate(min(self.check_every, self.max_iterations - run.iterations))
+            left = residual(problem, run.z)
             if left.natural_map <= best[0].natural_map:
-                best = left, z.copy(), y.copy()
-        if not left.within(*limits):
-            left, z, y = best
-        return ContactSolution(z, -sigma * y, iterations, left.natural_map, left.within(*limits))
+                best = left, run.z.copy(), run.velocity
+            if self.balanced and len(looks) % _BALANCE_LOOKS == 0:
+                run.balance()
+        if left.within(*limits):
+            return ContactSolution(run.z, run.velocity, run.iterations, left.natural_map, True)
+        left, impulse, velocity = best
+        return ContactSolution(impulse, velocity, run.iterations, left.natural_map, left.within(*limits))
+
+
+class _Run:
+    """The iterates of one solution."""
+
+    def __init__(self, problem: ContactProblem, start: ContactStart, sigma: float, hold: int) -> None:
+        assert problem.sparse is not None
+        self._problem, self._form, self._hold = problem, problem.sparse(), hold
+        self._scale = scale_of(problem.delassus)
+        self._shift = problem.u_free.copy()
+        self._shift[:, 0] += problem.bias
+        self._sigma, self._factor = sigma, self._form.factor(sigma)
+        self.z = project_on_cone(start.impulse, problem.friction, problem.cohesion)
+        self._y = -start.velocity / sigma
+        self._lag = np.zeros(len(self.z))
+        self._r, self._last, self._right = self.z, self.z, np.empty_like(self.z)
+        self.iterations = 0
+
+    @property
+    def velocity(self) -> Array:
+        """û = -σ y (nc, d) [m/s]."""
+        return -self._sigma * self._y
+
+    def iterate(self, count: int) -> None:
+        """So many times r, z and y."""
+        form, problem, sigma = self._form, self._problem, self._sigma
+        for _ in range(count):
+            if self.iterations % self._hold == 0:
+                self._lag = problem.friction * np.sqrt((self._y[:, 1:] ** 2).sum(axis=1))
+            admm_right_side(self.z, self._y, self._shift, self._lag, sigma, self._right)
+            inner = self._factor.solve(form.lift @ self._right.ravel())
+            self._r = self._right - (form.across @ inner).reshape(self._right.shape) / sigma
+            self._last = self.z.copy()
+            admm_update(self._r, self.z, self._y, problem.friction, problem.cohesion, _OVER_RELAXATION)
+            self.iterations += 1
+
+    def balance(self) -> None:
+        """Let σ follow the ratio of the residuals."""
+        tiny, sigma = 1e-300, self._sigma
+        primal = _norm(self._r - self.z) / max(_norm(self.z), tiny)
+        dual = sigma * _norm(self.z - self._last) / max(sigma * _norm(self._y), _norm(self._shift), tiny)
+        factor = float(np.clip(np.sqrt(dual / max(primal, tiny)), 1.0 / _MOST_CHANGE, _MOST_CHANGE))
+        if 1.0 / _LEAST_CHANGE <= factor <= _LEAST_CHANGE:
+            return
+        new = float(np.clip(sigma / factor, _BOUNDS[0] * self._scale, _BOUNDS[1] * self._scale))
+        self._y *= sigma / new
+        self._lag *= sigma / new
+        self._sigma, self._factor = new, self._form.factor(new)
+
+
+def _norm(values: Array) -> float:
+    return float(np.sqrt((values**2).sum()))

@@ -15,22 +15,21 @@ __all__ = ["Alternating"]
 _FIRST_SWEEPS = 20
 # sweeps between two extrapolations, and from how many iterates
 _LOOK, _DEPTH = 5, 10
-# a small penalty finds the forces in stones that stay in touch within a few dozen iterations, or never:
-# penalty, iterations, and how much η must fall in two looks; near a collapse it falls late, and then all at once
-_STATIC = ((1e-3, 60, 3.0), (3e-3, 300, 0.0))
+# a small penalty finds the forces in stones that stay in touch within a few dozen iterations, or never
+_STATIC_PENALTY, _STATIC_ITERATIONS, _STATIC_PATIENCE = 1e-3, 60, 3.0
 # it is then driven further than asked for, which costs little and spares the next steps any work
 _FURTHER = 0.03
-# a larger one bears with contacts that open and slide
-_MOVING_PENALTY, _MOVING_SHARE = 0.1, 0.5
+# where contacts open and slide: a larger penalty, balanced, and a shift that is held; for this share of the iterations
+_MOVING_PENALTY, _MOVING_HOLD, _MOVING_SHARE = 0.03, 10, 0.8
 
 
 @dataclass(frozen=True)
 class Alternating:
-    """For rigid scenes: sweeps, ADMM with a small penalty, ADMM with a larger one, sweeps; the best of all counts.
+    """For rigid scenes: sweeps, ADMM with a small penalty, ADMM with a balanced one, sweeps; the best of all counts.
 
     Gauss–Seidel carries news by one stone in a sweep, so the first steps of a tall wall cost it thousands of sweeps;
     ADMM with a small penalty solves the motion of all stones at once, and needs some 30 iterations as long as
-    few contacts open or slide. Where many do, a larger penalty or accelerated sweeps are better
+    few contacts open or slide. Where many do, a larger penalty and a steadier shift are better
     (docs/decisions/006-alternating-solver.md has the measurements).
 
     Attributes
@@ -46,21 +45,26 @@ class Alternating:
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from `start`."""
         limits = self.tolerance, self.velocity_tolerance
-        sweep = NSGS(*limits, min(_FIRST_SWEEPS, self.max_iterations), _LOOK, _DEPTH)
-        best = sweep(problem, start)
+        best = ContactSolution(start.impulse, start.velocity, 0, np.inf, False)
+        # from nothing, sweeps would leave much of the friction where they happen to begin
+        if start.impulse.any() or problem.sparse is None:
+            best = NSGS(*limits, min(_FIRST_SWEEPS, self.max_iterations), _LOOK, _DEPTH)(problem, start)
         if best.converged or problem.sparse is None:
             return best if best.converged else self._rest(problem, best)
         # not from the sweeps: they end near a solution, but with velocities that lead a small penalty astray
         cold = ContactStart(start.impulse, np.zeros_like(start.velocity))
-        for penalty, iterations, patience in _STATIC:
-            static = ADMM(_FURTHER * limits[0], _FURTHER * limits[1], iterations, penalty, patience=patience)
-            best = self._better(best, static(problem, cold), problem)
-            if best.converged:
-                return best
+        static = ADMM(
+            _FURTHER * limits[0],
+            _FURTHER * limits[1],
+            min(_STATIC_ITERATIONS, self.max_iterations),
+            _STATIC_PENALTY,
+            patience=_STATIC_PATIENCE,
+        )
+        best = self._better(best, static(problem, cold), problem)
         if not best.converged and self.max_iterations > best.iterations:
             count = int(_MOVING_SHARE * (self.max_iterations - best.iterations))
-            moving = ADMM(*limits, count, _MOVING_PENALTY)
-            best = self._better(best, moving(problem, ContactStart(best.impulse, best.velocity)), problem)
+            moving = ADMM(*limits, count, _MOVING_PENALTY, hold=_MOVING_HOLD, balanced=True)
+            best = self._better(best, moving(problem, start), problem)
         return best if best.converged else self._rest(problem, best)
 
     def _rest(self, problem: ContactProblem, best: ContactSolution) -> ContactSolution:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechanics.problem import ContactProblem, ContactSolution, ContactStart, GaussSeidel
-from mechanics.residual import Residual, residual
+from mechanics.residual import Residual, project_on_cone, residual
 from mechanics.solvers.anderson import Anderson
 
 __all__ = ["NSGS"]
@@ -80,6 +80,7 @@ class _Look:
         candidate = self._anderson(impulse, swept)
         if candidate is None:
             return swept, left
+        candidate = project_on_cone(candidate, self._problem.friction, self._problem.cohesion)
         bold = residual(self._problem, candidate)
         if np.isfinite(bold.natural_map) and bold.natural_map < left.natural_map:
             self._in_vain = 0
