@@ -27,8 +27,8 @@ def positions(model: Model, state: State) -> tuple[Array, ...]:
     )
 
 
-def body_results(model: Model, start: State, state: State) -> tuple[BodyResult, ...]:
-    """What became of each body."""
+def body_results(model: Model, start: State, state: State, balance: Array) -> tuple[BodyResult, ...]:
+    """What became of each body; `balance` (nb,) as `imbalance` gives it."""
     results = []
     before, now = positions(model, start), positions(model, state)
     for b, (block, stone) in enumerate(zip(model.scene.blocks, model.stones, strict=True)):
@@ -45,6 +45,7 @@ def body_results(model: Model, start: State, state: State) -> tuple[BodyResult, 
                 von_mises=None if stress is None else von_mises(stress),
                 volume=float(model.volume[b]),
                 mass=float(model.mass[b]),
+                balance=float(balance[b]),
             )
         )
     return tuple(results)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from mechanics.scene import Fidelity, Scene
 
-__all__ = ["BodyResult", "ContactResult", "Errors", "Frame", "History", "Outcome", "Result"]
+__all__ = ["BodyResult", "ContactResult", "Energies", "Errors", "Frame", "History", "Outcome", "Result"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -59,6 +59,7 @@ class BodyResult:
     von_mises : (n,) Von Mises stress of the recovered nodal stress [Pa]; None if rigid
     volume : [m³]
     mass : [kg]
+    balance : unbalanced force, or moment over its smallest width, over its weight [-]
     """
 
     code: str
@@ -71,6 +72,7 @@ class BodyResult:
     von_mises: Array | None
     volume: float
     mass: float
+    balance: float
 
     @property
     def displacement(self) -> Array:
@@ -123,6 +125,8 @@ class History:
     natural_map : η after the solve [-]
     iterations : of the contact solver
     contacts : contact points
+    penetration : deepest overlap at the end of the step [m]
+    settlement : how far the stone that sank most has sunk along gravity [m]
     """
 
     time: Array
@@ -132,6 +136,24 @@ class History:
     natural_map: Array
     iterations: Ints
     contacts: Ints
+    penetration: Array
+    settlement: Array
+
+
+@dataclass(frozen=True)
+class Energies:
+    """Where the energy of the run came from and went, up to its end [J].
+
+    Attributes
+    ----------
+    external : work of the weight, of the loads and of what drives supports
+    contact : work of the contacts; negative: they dissipate
+    scheme : dissipation of the time integration and of the relaxation
+    """
+
+    external: float
+    contact: float
+    scheme: float
 
 
 @dataclass(frozen=True)
@@ -147,6 +169,8 @@ class Result:
     bodies : one per block, in the scene's order
     contacts : the contact points at the end
     errors : how far the result can be trusted
+    energies : where the energy went
+    rest_time : when the spell of rest began in which the run ended; None if it did not end at rest [s]
     reaction : total vertical support reaction [N]
     weight : total weight of the blocks that are not fixed [N]
     frames : the motion, at least its first and last instant
@@ -161,6 +185,8 @@ class Result:
     bodies: tuple[BodyResult, ...]
     contacts: ContactResult
     errors: Errors
+    energies: Energies
+    rest_time: float | None
     reaction: float
     weight: float
     frames: tuple[Frame, ...]

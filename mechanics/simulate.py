@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from mechanics.model import Model, build_model
 from mechanics.observers.energy import EnergyBalance, kinetic_energy
-from mechanics.observers.equilibrium import imbalance, speed, support_reaction
+from mechanics.observers.equilibrium import imbalance, settlement, speed, support_reaction
 from mechanics.outcome import LASTING, Watch
 from mechanics.postprocess import body_results, contact_results, positions
 from mechanics.progress import Progress
-from mechanics.result import Errors, Frame, History, Outcome, Result
+from mechanics.result import Energies, Errors, Frame, History, Outcome, Result
 from mechanics.scene import Scene
 from mechanics.simulation import Clock, Simulation, Step
 from mechanics.state import State
@@ -55,14 +55,15 @@ def simulate(scene: Scene, progress: Callable[[Progress], None] | None = None) -
         if done:
             break
     assert step is not None
-    return _result(model, start, step, outcome, log, frames, clock)
+    return _result(model, start, step, outcome, watch.rest_time, log, frames, clock)
 
 
 class _Log:
     """Collects what the observers say of each step."""
 
     def __init__(self, model: Model, start: State) -> None:
-        self._model = model
+        self._model, self._start = model, start
+        self.balance = np.zeros(len(model.mass))
         self.energy = EnergyBalance(model, start)
         self.penetration = 0.0
         self.unconverged = 0
@@ -72,9 +73,10 @@ class _Log:
         """Account for one step, and return the imbalance of each body (nb,)."""
         model, solution = self._model, step.solution
         self.energy(step)
-        self.penetration = max(self.penetration, float(np.max(-step.gap, initial=0.0)))
+        overlap = float(np.max(-step.gap, initial=0.0))
+        self.penetration = max(self.penetration, overlap)
         self.unconverged += not solution.converged
-        balance = imbalance(model, step.after, step.contacts, step.force, step.kick.load)
+        self.balance = balance = imbalance(model, step.after, step.contacts, step.force, step.kick.load)
         self.rows.append(
             (
                 step.after.time,
@@ -84,25 +86,42 @@ class _Log:
                 solution.natural_map,
                 solution.iterations,
                 len(step.contacts),
+                overlap,
+                float(settlement(model, self._start, step.after)[~model.fixed].max(initial=0.0)),
             )
         )
         return balance
 
     def history(self) -> History:
         """One array for each quantity."""
-        time, kinetic, fastest, balance, eta, iterations, contacts = np.array(self.rows).T
+        time, kinetic, fastest, balance, eta, iterations, contacts, overlap, sunk = np.array(self.rows).T
         return History(
-            time, kinetic, fastest, balance, eta, iterations.astype(np.int64), contacts.astype(np.int64)
+            time,
+            kinetic,
+            fastest,
+            balance,
+            eta,
+            iterations.astype(np.int64),
+            contacts.astype(np.int64),
+            overlap,
+            sunk,
         )
 
 
 def _result(
-    model: Model, start: State, last: Step, outcome: Outcome, log: _Log, frames: list[Frame], clock: Clock
+    model: Model,
+    start: State,
+    last: Step,
+    outcome: Outcome,
+    rest_time: float,
+    log: _Log,
+    frames: list[Frame],
+    clock: Clock,
 ) -> Result:
     history, scene = log.history(), model.scene
     support = support_reaction(model, last.contacts, last.force, last.after.time)
     with clock("stress"):
-        bodies = body_results(model, start, follow_nodes(model, last.after))
+        bodies = body_results(model, start, follow_nodes(model, last.after), log.balance)
     errors = Errors(
         natural_map=float(history.natural_map[-LASTING:].max()),
         penetration=log.penetration / float(model.surfaces.size.min()),
@@ -119,6 +138,8 @@ def _result(
         bodies=bodies,
         contacts=contact_results(last),
         errors=errors,
+        energies=Energies(log.energy.external, log.energy.contact, log.energy.scheme),
+        rest_time=rest_time if outcome is Outcome.EQUILIBRIUM else None,
         reaction=support.reaction,
         weight=support.weight,
         frames=tuple(frames),

@@ -39,12 +39,15 @@ def summarise(result: Result, *, version: str, seconds: Mapping[str, float]) -> 
         "steps": result.steps,
         "time": {
             "simulated": result.time,
+            "rest": result.rest_time,
             "wall": sum(seconds.values()),
             "by_stage": dict(seconds),
         },
         "errors": asdict(result.errors),
         "von_mises": None if stress is None else asdict(stress),
+        "energies": asdict(result.energies),
         "displacement": {"max": displacement},
+        "settlement": {"max": float(result.history.settlement[-1])},
         "reaction": {"total_vertical": result.reaction, "weight": result.weight},
         "version": version,
     }

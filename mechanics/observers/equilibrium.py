@@ -1,6 +1,6 @@
 """Is every stone in balance, does it rest, has it fallen?"""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +9,15 @@ from mechanics.contact.contacts import Contacts, material_points
 from mechanics.model import Model
 from mechanics.state import State
 
-__all__ = ["Support", "displacement", "imbalance", "speed", "support_reaction"]
+__all__ = [
+    "Support",
+    "displacement",
+    "imbalance",
+    "seen_from_supports",
+    "settlement",
+    "speed",
+    "support_reaction",
+]
 
 Array = NDArray[np.float64]
 
@@ -70,6 +78,35 @@ def support_reaction(model: Model, contacts: Contacts, force: Array, time: float
     up = -gravity / g if g > 0 else np.array([0.0, 0.0, 1.0])
     sign = model.fixed[contacts.bodies[:, 1]].astype(float) - model.fixed[contacts.bodies[:, 0]]
     return Support(float(sign @ (force @ up)), float(model.mass[~model.fixed].sum() * g))
+
+
+def settlement(model: Model, start: State, state: State) -> Array:
+    """How far the centre of each body has sunk along gravity since `start` (nb,) [m]; along -z without gravity."""
+    gravity = model.gravity(state.time)
+    g = float(np.linalg.norm(gravity))
+    down = gravity / g if g > 0 else np.array([0.0, 0.0, -1.0])
+    sunk: Array = (state.centre - start.centre) @ down
+    return sunk
+
+
+def seen_from_supports(model: Model, start: State, state: State) -> State:
+    """The state as an observer sees it who moves along with the supports, by the mean of their translations.
+
+    Where the ground shakes, what counts is how stones move against it.
+    """
+    if not model.motions:
+        return state
+    away = (state.centre - start.centre)[model.fixed].mean(axis=0)
+    pace = state.velocity[model.fixed, :3].mean(axis=0)
+    velocity = state.velocity.copy()
+    velocity[~model.elastic, :3] -= pace
+    return replace(
+        state,
+        centre=state.centre - away,
+        velocity=velocity,
+        node=state.node - away,
+        node_velocity=state.node_velocity - pace,
+    )
 
 
 def displacement(model: Model, start: State, state: State) -> Array:

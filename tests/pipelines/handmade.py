@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 
 from mechanics.materials import Material
-from mechanics.result import BodyResult, ContactResult, Errors, Frame, History, Outcome, Result
+from mechanics.result import BodyResult, ContactResult, Energies, Errors, Frame, History, Outcome, Result
 from mechanics.scene import Block, Fidelity, Scene
 
 LIMESTONE = Material("limestone", density=2000.0, young=1e10, poisson=0.2)
@@ -62,6 +62,7 @@ def rigid_body(code, low, high, fidelity=Fidelity.RIGID, shift=(0.0, 0.0, 0.0)):
         von_mises=None,
         volume=volume,
         mass=volume * LIMESTONE.density,
+        balance=3e-5,
     )
 
 
@@ -82,6 +83,7 @@ def deformable_body(code, low, high, von_mises, size=0.1, shift=(0.0, 0.0, 0.0))
         von_mises=von_mises(nodes),
         volume=volume,
         mass=volume * LIMESTONE.density,
+        balance=3e-5,
     )
 
 
@@ -108,6 +110,8 @@ def result_of(
             status=np.array(["stick"] * count),
         ),
         errors=Errors(1e-7, 2e-6, 3e-5, 4e-4, float("nan"), 1),
+        energies=Energies(5.0, -4.0, 1.0),
+        rest_time=0.06,
         reaction=20010.0,
         weight=20000.0,
         frames=(
@@ -122,6 +126,8 @@ def result_of(
             natural_map=np.full(10, 1e-7),
             iterations=np.full(10, 100),
             contacts=np.full(10, count),
+            penetration=np.full(10, 1e-8),
+            settlement=steps * 1e-6,
         ),
         wall_time={"mesh": 0.5, "solve": 1.5},
     )

@@ -86,7 +86,10 @@ def test_the_summary_has_its_keys_and_says_nothing_that_json_cannot(mixed):
     assert summary["bodies"] == {"rigid": 1, "deformable": 1, "fixed": 1}
     assert summary["contacts"] == 2
     assert summary["steps"] == 10
-    assert summary["time"] == {"simulated": 0.1, "wall": 2.0, "by_stage": {"mesh": 0.5, "solve": 1.5}}
+    stages = {"mesh": 0.5, "solve": 1.5}
+    assert summary["time"] == {"simulated": 0.1, "rest": 0.06, "wall": 2.0, "by_stage": stages}
+    assert summary["energies"] == {"external": 5.0, "contact": -4.0, "scheme": 1.0}
+    assert summary["settlement"]["max"] == pytest.approx(1e-5)
     assert set(summary["errors"]) >= {"natural_map", "penetration", "balance", "reaction", "energy"}
     assert summary["errors"]["energy"] is None  # not a number
     assert summary["von_mises"]["max"] == pytest.approx(2e6)
