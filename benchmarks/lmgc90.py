@@ -31,6 +31,7 @@ _TABLE: Table = (
     ("ours_step_ms", "step ms", ".3g"),
     ("theirs_step_ms", "LMGC90", ".3g"),
     ("ratio_step", "ratio", ".1f"),
+    ("ratio_step_fresh", "with detection", ".1f"),
     ("ours_first_ms", "first ms", ".3g"),
     ("theirs_first_ms", "LMGC90", ".3g"),
     ("ratio_first", "ratio", ".1f"),
@@ -169,6 +170,10 @@ class _Pair:
         if options.accurate:
             exact = options.accurate_tolerance
             rows.append(self._row("accurate", exact, self._moma(exact), theirs, driven))
+        for row in rows:
+            fresh = self._moma(row["tolerance"], fresh=True)
+            row["ours_step_fresh"] = fresh.step
+            row["ratio_step_fresh"] = None if theirs is None else theirs.step / fresh.step
         return rows
 
     def _matched(self, theirs: _Run | None) -> tuple[float, _Run]:
@@ -187,9 +192,15 @@ class _Pair:
             progress(f"{self._path.stem}: at η = {tolerance:.1e} less exact in {', '.join(worse)}")
             tolerance /= _TIGHTER
 
-    def _moma(self, tolerance: float) -> _Run:
+    def _moma(self, tolerance: float, fresh: bool = False) -> _Run:
         options = self._options
-        more = ["--tolerance", repr(tolerance), "--sweeps", str(options.sweeps)]
+        more = [
+            "--tolerance",
+            repr(tolerance),
+            "--sweeps",
+            str(options.sweeps),
+            *(["--fresh"] if fresh else []),
+        ]
         trace = self._child([sys.executable, "-m", "benchmarks.moma_child"], more, "MOMA")
         return self._run(trace, options.theta)
 

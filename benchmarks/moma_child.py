@@ -13,6 +13,7 @@ from mechanics.contact.contacts import gaps, material_points
 from mechanics.model import build_model
 from mechanics.scene import Scene
 from mechanics.simulation import Clock, Simulation, Step
+from mechanics.state import State
 
 __all__ = ["main"]
 
@@ -23,7 +24,7 @@ def main() -> None:
     blocks = read_scene(Path(options.scene))
     scene = engine_scene(blocks, options.step, options.theta, options.tolerance, options.sweeps)
     _warm_up(engine_scene(blocks, options.step, options.theta, 1.0, 2))
-    simulation = _simulation(scene)
+    simulation = _simulation(scene, options.fresh)
     state = simulation.state
     place = [(state.centre, state.rotation.transpose(0, 2, 1))]
     cpu, sweeps, kept = [], [], {}
@@ -60,12 +61,20 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--theta", type=float, required=True)
     parser.add_argument("--tolerance", type=float, required=True)
     parser.add_argument("--sweeps", type=int, required=True)
+    parser.add_argument("--fresh", action="store_true", help="find the contacts anew in every step")
     return parser.parse_args()
 
 
-def _simulation(scene: Scene) -> Simulation:
+class _Fresh(Simulation):
+    """Finds contacts and makes W in every step, as LMGC90 does, though nothing has moved."""
+
+    def _stale(self, known: Any, predicted: State) -> bool:
+        return True
+
+
+def _simulation(scene: Scene, fresh: bool = False) -> Simulation:
     model, state = build_model(scene)
-    return Simulation(model, state, Clock())
+    return (_Fresh if fresh else Simulation)(model, state, Clock())
 
 
 def _warm_up(scene: Scene) -> None:
