@@ -101,9 +101,10 @@ class Step:
 
 @dataclass(frozen=True)
 class _Touching:
-    """The contacts in force, their laws and W, and the configuration in which they were found."""
+    """The contacts in force, their places and laws, W, and the configuration in which they were found."""
 
     contacts: Contacts
+    place: Array
     law: NDArray[np.int64]
     operator: RigidDelassus | MixedDelassus
     sparse: Callable[[], SparseForm]
@@ -140,7 +141,7 @@ class Simulation:
         contacts, operator = touching.contacts, touching.operator
         # one frame for the whole step: the linear problem of a deformable body is stated in it
         before = self._with_frames_of(predicted, self.state)
-        remembered, internal = self._memory.recall(contacts.key)
+        remembered, internal = self._memory.recall(contacts.key, touching.place)
         with self.clock("assemble"):
             free = free_kick(model, self.start, before, predicted, self._compliance, h, theta)
             statement = state_laws(
@@ -177,7 +178,7 @@ class Simulation:
         contacts, operator, model = touching.contacts, touching.operator, self.model
         u = local_velocity(contacts, operator, kick.velocity, kick.node_velocity)
         internal = model.laws.after(statement.law, statement.approach, solution.impulse, u)
-        self._memory.store(contacts.key, replace(solution, impulse=impulse), internal)
+        self._memory.store(contacts.key, replace(solution, impulse=impulse), internal, touching.place)
         self._first = False
         u_before = local_velocity(contacts, operator, predicted.velocity, predicted.node_velocity)
         fixed = np.where(model.fixed[:, None], kick.velocity, 0.0)
@@ -233,7 +234,11 @@ class Simulation:
                 mixed = mixed_delassus(model, predicted, contacts, self._compliance)
                 operator = mixed
                 sparse = cache(lambda: sparse_form(model, predicted, contacts, mixed, self._compliance))
-        self._touching = _Touching(contacts, model.laws.of(contacts.bodies), operator, sparse, predicted)
+        # in the axes of one of the two bodies, the same whichever is the candidate
+        side = contacts.bodies.argmin(axis=1)
+        place = contacts.arm[np.arange(len(side)), side]
+        law = model.laws.of(contacts.bodies)
+        self._touching = _Touching(contacts, place, law, operator, sparse, predicted)
         return predicted, self._touching
 
     def _stale(self, known: _Touching, predicted: State) -> bool:
