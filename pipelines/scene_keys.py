@@ -223,6 +223,14 @@ _SOLVER = (
         SolverSettings.max_iterations,
         at_least=1,
     ),
+    Key(
+        "threads",
+        Kind.INTEGER,
+        "Threads that sweep rigid scenes of many contacts; the results are the same to the last bit.",
+        "",
+        SolverSettings.threads,
+        at_least=1,
+    ),
 )
 
 _OUTPUT = (

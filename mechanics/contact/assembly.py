@@ -35,6 +35,7 @@ def rigid_delassus(model: Model, state: State, contacts: Contacts, schedule: Sch
         np.hstack([contacts.frame.reshape(-1, 9), arm.reshape(-1, 6)]),
         np.hstack([model.inertia.inverse_mass[:, None], turned[:, [0, 1, 2, 4, 5, 8]]]),
         schedule,
+        model.scene.solver.threads,
     )
 
 

@@ -132,7 +132,10 @@ def apply(r, body, geometry, inertia):  # pragma: no cover - compiled
 
 @njit(cache=True)
 def _solve_group(first, last, step, r, v, shift, mu, cohesion, factors, body, geometry, inertia):
-    """Solve the contacts first, first + step, … before last, of one pair of bodies, one after the other."""
+    """Solve the contacts first, first + step, … before last, of one pair of bodies, one after the other.
+
+    Returns how much the velocities of the two bodies, at the first contact, have changed.
+    """
     i, j = body[first, 0], body[first, 1]
     p0, p1, p2, p3, p4, p5 = v[i, 0], v[i, 1], v[i, 2], v[i, 3], v[i, 4], v[i, 5]
     q0, q1, q2, q3, q4, q5 = v[j, 0], v[j, 1], v[j, 2], v[j, 3], v[j, 4], v[j, 5]
@@ -188,53 +191,84 @@ def _solve_group(first, last, step, r, v, shift, mu, cohesion, factors, body, ge
         q3 -= n[1] * t0 + n[2] * t1 + n[3] * t2
         q4 -= n[2] * t0 + n[4] * t1 + n[5] * t2
         q5 -= n[3] * t0 + n[5] * t1 + n[6] * t2
-    if changed:
-        # bodies that do not move are shared between groups of one colour: they are only read
-        if m[0] > 0.0:
-            v[i, 0], v[i, 1], v[i, 2], v[i, 3], v[i, 4], v[i, 5] = p0, p1, p2, p3, p4, p5
-        if n[0] > 0.0:
-            v[j, 0], v[j, 1], v[j, 2], v[j, 3], v[j, 4], v[j, 5] = q0, q1, q2, q3, q4, q5
+    if not changed:
+        return 0.0, 0.0
+    g = geometry[first]
+    moved_i = moved_j = 0.0
+    # bodies that do not move are shared between groups of one colour: they are only read
+    if m[0] > 0.0:
+        moved_i = abs(p0 - v[i, 0]) + abs(p1 - v[i, 1]) + abs(p2 - v[i, 2])
+        size = abs(g[9]) + abs(g[10]) + abs(g[11])
+        moved_i += size * (abs(p3 - v[i, 3]) + abs(p4 - v[i, 4]) + abs(p5 - v[i, 5]))
+        v[i, 0], v[i, 1], v[i, 2], v[i, 3], v[i, 4], v[i, 5] = p0, p1, p2, p3, p4, p5
+    if n[0] > 0.0:
+        moved_j = abs(q0 - v[j, 0]) + abs(q1 - v[j, 1]) + abs(q2 - v[j, 2])
+        size = abs(g[12]) + abs(g[13]) + abs(g[14])
+        moved_j += size * (abs(q3 - v[j, 3]) + abs(q4 - v[j, 4]) + abs(q5 - v[j, 5]))
+        v[j, 0], v[j, 1], v[j, 2], v[j, 3], v[j, 4], v[j, 5] = q0, q1, q2, q3, q4, q5
+    return moved_i, moved_j
+
+
+@njit(cache=True)
+def _visit(g, forth, path, seen, calm, r, v, shift, mu, cohesion, factors, body, geometry, inertia, group):
+    """Solve a group unless it sleeps: its bodies have hardly changed since it was last solved.
+
+    `path` (nb,) adds up the changes of each body, `seen` (ng, 2) is where the paths were after the last solution. Any
+    change of a body beyond `calm` wakes all its groups.
+    """
+    start, stop = group[g], group[g + 1]
+    i, j = body[start, 0], body[start, 1]
+    if path[i] - seen[g, 0] + path[j] - seen[g, 1] <= calm:
+        return
+    first, last, step = (start, stop, 1) if forth else (stop - 1, start - 1, -1)
+    moved_i, moved_j = _solve_group(
+        first, last, step, r, v, shift, mu, cohesion, factors, body, geometry, inertia
+    )
+    # bodies that do not move have no path: groups of one colour may share them
+    if moved_i > 0.0:
+        path[i] += moved_i
+    if moved_j > 0.0:
+        path[j] += moved_j
+    # more than one contact: solved once more, the group would change again
+    seen[g, 0] = path[i] - (moved_i if stop - start > 1 else 0.0)
+    seen[g, 1] = path[j] - (moved_j if stop - start > 1 else 0.0)
 
 
 @njit(cache=True)
 def sweep(
-    count, r, v, shift, mu, cohesion, factors, body, geometry, inertia, group
+    count, calm, r, v, shift, mu, cohesion, factors, body, geometry, inertia, group
 ):  # pragma: no cover - compiled
-    """`count` passes over all groups, every second one backwards; r and v are kept up to date in place."""
+    """`count` passes over all groups, every second one backwards; r and v are kept up to date in place.
+
+    The first pass visits every group; in the others, groups sleep whose bodies changed by no more than `calm` [m/s].
+    """
     groups = group.shape[0] - 1
+    path, seen = np.zeros(inertia.shape[0]), np.full((groups, 2), -np.inf)
     for s in range(count):
-        if s % 2 == 0:
-            for g in range(groups):
-                _solve_group(
-                    group[g], group[g + 1], 1, r, v, shift, mu, cohesion, factors, body, geometry, inertia
-                )
-        else:
-            for g in range(groups - 1, -1, -1):
-                _solve_group(
-                    group[g + 1] - 1, group[g] - 1, -1,
-                    r, v, shift, mu, cohesion, factors, body, geometry, inertia,
-                )  # fmt: skip
+        for k in range(groups):
+            forth = s % 2 == 0
+            g = k if forth else groups - 1 - k
+            _visit(
+                g, forth, path, seen, calm, r, v, shift, mu, cohesion, factors, body, geometry, inertia, group
+            )
 
 
 @njit(cache=True, parallel=True)
 def sweep_parallel(
-    count, r, v, shift, mu, cohesion, factors, body, geometry, inertia, group, colour
+    count, calm, r, v, shift, mu, cohesion, factors, body, geometry, inertia, group, colour
 ):  # pragma: no cover - compiled
     """As `sweep`, with the groups of each colour (`colour` points into the groups) in parallel.
 
     Groups of one colour share no moving body, so the result has the same bits as that of `sweep`.
     """
-    colours = colour.shape[0] - 1
+    groups, colours = group.shape[0] - 1, colour.shape[0] - 1
+    path, seen = np.zeros(inertia.shape[0]), np.full((groups, 2), -np.inf)
     for s in range(count):
+        forth = s % 2 == 0
         for k in range(colours):
-            if s % 2 == 0:
-                for g in prange(colour[k], colour[k + 1]):
-                    _solve_group(
-                        group[g], group[g + 1], 1, r, v, shift, mu, cohesion, factors, body, geometry, inertia
-                    )
-            else:
-                for g in prange(colour[colours - k - 1], colour[colours - k]):
-                    _solve_group(
-                        group[g + 1] - 1, group[g] - 1, -1,
-                        r, v, shift, mu, cohesion, factors, body, geometry, inertia,
-                    )  # fmt: skip
+            c = k if forth else colours - 1 - k
+            for g in prange(colour[c], colour[c + 1]):
+                _visit(
+                    g, forth, path, seen, calm,
+                    r, v, shift, mu, cohesion, factors, body, geometry, inertia, group,
+                )  # fmt: skip

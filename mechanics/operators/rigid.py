@@ -19,6 +19,8 @@ Ints = NDArray[np.int64]
 
 # fewer contacts than this are swept in their own order by one thread: there is nothing to win from more
 _WORTH_COLOURS = 2000
+# of the largest shift: contacts between bodies whose velocities change less than this sleep until they change more
+_CALM = 1e-9
 
 
 @dataclass(frozen=True)
@@ -73,12 +75,14 @@ class RigidDelassus:
     inertia : (nb, 7) inverse mass [1/kg], upper triangle of the inverse inertia [1/(kg m²)], world axes; zero for
         bodies that no impulse moves
     schedule : order of the sweeps
+    threads : that may sweep at once, at most; the result is the same to the last bit
     """
 
     body: Ints
     geometry: Array
     inertia: Array
     schedule: Schedule
+    threads: int = 1
 
     @cached_property
     def diagonal(self) -> Array:
@@ -134,15 +138,19 @@ class RigidDelassus:
     def gauss_seidel(self, shift: Array, friction: Array, cohesion: Array) -> GaussSeidel:
         """Sweeps forth and back; the same bits for any number of threads.
 
-        The running velocities are made anew on each call, so that rounding cannot pile up.
+        Each call visits every contact at least once; those whose bodies hardly change then sleep until these do. The
+        running velocities are made anew on each call, so that rounding cannot pile up.
         """
-        parallel = len(self.schedule.colour) > 2 and numba.get_num_threads() > 1
+        calm = _CALM * float(np.abs(shift).max(initial=0.0))
+        threads = min(self.threads, numba.config.NUMBA_NUM_THREADS)
+        parallel = len(self.schedule.colour) > 2 and threads > 1
 
         def sweeps(impulse: Array, count: int) -> None:
             change = self.rigid_change(impulse)
-            data = (count, impulse, change, shift, friction, cohesion, self._factors, self.body)
+            data = (count, calm, impulse, change, shift, friction, cohesion, self._factors, self.body)
             more = (self.geometry, self.inertia, self.schedule.group)
             if parallel:
+                numba.set_num_threads(threads)
                 kernel.sweep_parallel(*data, *more, self.schedule.colour)
             else:
                 kernel.sweep(*data, *more)
