@@ -21,12 +21,13 @@ def longer(rows):  # pragma: no cover - compiled
 
 @njit(cache=True)
 def find_disks(
-    centre, radius, velocity, fixed, alert, reach, step, extent, grid
+    centre, radius, velocity, fixed, alert, reach, step, ahead, extent, grid
 ):  # pragma: no cover - compiled
     """Contacts between disks: bodies and feature (n, 3), n and gap (n, 3).
 
     A pair is watched if its gap is at most alert × smaller radius + reach + what it can close in a step at its present
-    relative velocity. The normal points from the second disk to the first, whose index is smaller.
+    relative velocity, + `ahead` (nd,) of both. The normal points from the second disk to the first, which has the
+    smaller index.
     """
     origin, width, low, count, base, buckets, start, order, level, cell = grid
     names, values = np.empty((64, 3), dtype=np.int64), np.empty((64, 3))
@@ -56,7 +57,7 @@ def find_disks(
                     distance = np.sqrt(square)
                     gap = distance - (radius[i] + radius[j])
                     pace = np.hypot(velocity[i, 0] - velocity[j, 0], velocity[i, 1] - velocity[j, 1])
-                    if gap > alert * min(radius[i], radius[j]) + reach + step * pace:
+                    if gap > alert * min(radius[i], radius[j]) + reach + step * pace + ahead[i] + ahead[j]:
                         continue
                     if n == names.shape[0]:
                         names, values = longer(names), longer(values)

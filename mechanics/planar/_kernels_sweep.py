@@ -18,7 +18,6 @@ __all__ = [
     "relative_velocity",
     "solve_local",
     "sweep",
-    "sweep_parallel",
     "velocity_change",
 ]
 
@@ -190,26 +189,12 @@ def _end(impulse, order, record):
         impulse[order[p], 0], impulse[order[p], 1] = record[p, _R], record[p, _R + 1]
 
 
-@njit(cache=True)
-def sweep(count, impulse, order, record, body, inertia):  # pragma: no cover - compiled
-    """`count` passes over the records, every second one backwards; `impulse` is changed in place."""
-    nc = record.shape[0]
-    v = _begin(impulse, order, record, body, inertia)
-    for n in range(count):
-        if n % 2 == 0:
-            for c in range(nc):
-                _solve_contact(c, record, body, v)
-        else:
-            for c in range(nc - 1, -1, -1):
-                _solve_contact(c, record, body, v)
-    _end(impulse, order, record)
-
-
 @njit(cache=True, parallel=True)
-def sweep_parallel(count, impulse, order, record, body, inertia, start, grain):  # pragma: no cover - compiled
-    """The same passes in parallel, with the same bits: records start[k] to start[k+1] share no moving body.
+def sweep(count, impulse, order, record, body, inertia, start, grain):  # pragma: no cover - compiled
+    """`count` passes over the records, colour by colour, every second one backwards; `impulse` is changed in place.
 
-    Colours of fewer than `grain` contacts are not worth waking the other threads.
+    Records start[k] to start[k+1] share no moving body, so several threads give the same bits as one. Colours of fewer
+    than `grain` contacts are not worth waking the other threads.
     """
     v = _begin(impulse, order, record, body, inertia)
     colours = start.shape[0] - 1

@@ -121,6 +121,7 @@ def find_walls(
     alert,
     reach,
     step,
+    ahead,
     grid,
 ):  # pragma: no cover - compiled
     """Contacts of disks with walls: as `find_disks`; the wall w is body nd + w, `pace` (nw,) its largest speed."""
@@ -153,9 +154,8 @@ def find_walls(
                 if fixed[i]:
                     continue
                 x, y = centre[i, 0], centre[i, 1]
-                margin = (
-                    alert * radius[i] + reach + step * (np.hypot(velocity[i, 0], velocity[i, 1]) + pace[w])
-                )
+                closing = step * (np.hypot(velocity[i, 0], velocity[i, 1]) + pace[w])
+                margin = alert * radius[i] + reach + closing + ahead[i]
                 feature, nx, ny, distance = _touch_wall(x, y, w, ends, start_of_end, wall, place, margin)
                 if feature < 0 or distance - radius[i] > margin:
                     continue

@@ -62,25 +62,29 @@ class PlanarDetector:
         self._reach = max(law.reach for law in model.laws.laws)
         self._neighbours: tuple[Ints, Ints, Array] | None = None
 
-    def __call__(self, state: PlanarState) -> PlanarContacts:
-        """The contacts (nc), in an order that depends on the numbers of the bodies alone."""
+    def __call__(self, state: PlanarState, ahead: Array | None = None) -> PlanarContacts:
+        """The contacts (nc), in an order that depends on the numbers of the bodies alone.
+
+        `ahead` (nd,) widens the watch by what each disk may come nearer to anything besides [m].
+        """
         model, nd = self._model, len(self._model.radius)
         scene, alert, step = model.scene, model.scene.alert_distance, model.scene.time.step
         centre, velocity = state.centre[:nd], state.velocity[:nd]
         # without walls relative to the mean, so that disks that travel together are no harder than disks at rest
         common = np.zeros(2) if len(scene.walls) else velocity[:, :2].mean(axis=0)
         pace = np.hypot(velocity[:, 0] - common[0], velocity[:, 1] - common[1])
-        extent = model.radius * (1 + alert) + self._reach + step * pace
+        ahead = np.zeros(nd) if ahead is None else ahead
+        extent = model.radius * (1 + alert) + self._reach + step * pace + ahead
         fixed, grid = model.fixed[:nd], build_grid(centre, extent)
         names, values = find_disks(
-            centre, model.radius, velocity, fixed, alert, self._reach, step, extent, grid
+            centre, model.radius, velocity, fixed, alert, self._reach, step, ahead, extent, grid
         )
         if len(scene.walls):
             ends = model.ends(state)
             speed = self._wall_speed(state)
             of_walls = find_walls(
                 centre, model.radius, velocity, fixed, ends, speed,
-                *self._neighbours_of(ends), alert, self._reach, step, grid,
+                *self._neighbours_of(ends), alert, self._reach, step, ahead, grid,
             )  # fmt: skip
             names, values = np.vstack([names, of_walls[0]]), np.vstack([values, of_walls[1]])
         return self._contacts(state, *sort_contacts(names, values, nd))

@@ -12,7 +12,6 @@ from mechanics.planar._kernels_sweep import (
     records,
     relative_velocity,
     sweep,
-    sweep_parallel,
     velocity_change,
 )
 from mechanics.solvers.colouring import greedy_colours
@@ -22,8 +21,8 @@ __all__ = ["PlanarDelassus", "PlanarGaussSeidel"]
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# contacts from which several threads pay, in all and in one colour
-_PARALLEL, _GRAIN = 8000, 1000
+# contacts of one colour from which several threads pay: some 20 µs of work for one
+_GRAIN = 2000
 
 
 @dataclass(frozen=True)
@@ -103,8 +102,4 @@ class PlanarGaussSeidel:
 
     def __call__(self, impulse: Array, sweeps: int) -> None:
         """Sweep `impulse` (nc, 2) in place."""
-        arrays = impulse, self.order, self.record, self.bodies, self.inertia
-        if len(self.order) >= _PARALLEL:
-            sweep_parallel(sweeps, *arrays, self.start, _GRAIN)
-        else:
-            sweep(sweeps, *arrays)
+        sweep(sweeps, impulse, self.order, self.record, self.bodies, self.inertia, self.start, _GRAIN)

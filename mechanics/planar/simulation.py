@@ -21,6 +21,9 @@ __all__ = ["PlanarSimulation", "PlanarStep"]
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
+# so many times a step is taken anew when it was seen to bring together what was not watched
+_LOOKS = 3
+
 
 @dataclass(frozen=True)
 class PlanarStep:
@@ -66,6 +69,18 @@ class _Stated:
     law: NDArray[np.int64]
 
 
+@dataclass(frozen=True)
+class _Solved:
+    """The contacts of a step, what the solver found, and the velocities (nb, 3) after the kick."""
+
+    contacts: PlanarContacts
+    operator: PlanarDelassus
+    stated: _Stated
+    solution: ContactSolution
+    impulse: Array
+    velocity: Array
+
+
 class PlanarSimulation:
     """A scene of the plane in motion; `step` takes it one time step on.
 
@@ -80,7 +95,7 @@ class PlanarSimulation:
         self.model, self.start, self.state, self.clock = model, start, start, clock
         self._drive = Drive(model, start)
         self._detector = PlanarDetector(model)
-        self._solve = NSGS(solver.tolerance, solver.velocity_tolerance, solver.max_iterations)
+        self._solver = NSGS(solver.tolerance, solver.velocity_tolerance, solver.max_iterations)
         self._memory = Memory(2)
         self._first = True
 
@@ -98,24 +113,44 @@ class PlanarSimulation:
             free = self._driven(kick, kick.velocity + loads)
         with self.clock("detect"):
             contacts = self._detector(kick)
-        with self.clock("assemble"):
-            operator = PlanarDelassus(contacts.bodies, contacts.normal, contacts.lever, model.inertia)
-            start, internal = self._memory.recall(contacts.key)
-            stated = self._state_laws(kick, contacts, operator, free, internal)
-        with self.clock("solve"):
-            solution = self._solved(stated, start)
+        solved = self._solve(kick, free, contacts, self._memory)
+        for _ in range(_LOOKS):
+            with self.clock("detect"):
+                wider = self._overlooked(kick, solved)
+            if wider is None:
+                break
+            found = Memory(2)
+            found.store(
+                contacts.key, replace(solved.solution, impulse=solved.impulse), solved.stated.approach.state
+            )
+            contacts = wider
+            solved = self._solve(kick, free, contacts, found)
         with self.clock("advance"):
-            impulse = solution.impulse.copy()
-            impulse[:, 0] -= stated.terms.adhesion
-            velocity = free + operator.velocity_change(impulse)
-            after = self._drive.place(fly(replace(kick, velocity=velocity), h * theta))
+            after = self._drive.place(fly(replace(kick, velocity=solved.velocity), h * theta))
             if not (np.isfinite(after.velocity).all() and np.isfinite(after.centre).all()):
                 raise SolverError(
                     f"the motion is not finite at t = {after.time:.6g} s",
                     where=model.scene.name,
                     remedy="use a smaller time step",
                 )
-            return self._finish(kick, after, contacts, operator, loads, stated, solution, impulse)
+            return self._finish(kick, after, loads, solved)
+
+    def _overlooked(self, kick: PlanarState, solved: _Solved) -> PlanarContacts | None:
+        """A wider look, if something that was not watched comes to overlap by what the impulses did; else None.
+
+        A disk that is hit may leave faster than anything came, and reach within the step what seemed far away.
+        """
+        scene, radius = self.model.scene, self.model.radius
+        late = scene.time.step * scene.time.theta
+        change = (solved.velocity - kick.velocity)[: len(radius), :2]
+        ahead = late * np.hypot(change[:, 0], change[:, 1])
+        if not np.isfinite(ahead).all() or 2.0 * ahead.max() <= scene.alert_distance * radius.min():
+            return None
+        wider = self._detector(kick, ahead)
+        operator = PlanarDelassus(wider.bodies, wider.normal, wider.lever, self.model.inertia)
+        gap = wider.gap + late * operator.relative_velocity(solved.velocity)[:, 0]
+        new = ~np.isin(wider.key, solved.contacts.key)
+        return wider if (gap[new] < 0).any() else None
 
     def _kick(self, h: float, theta: float) -> PlanarState:
         """The state at the instant of the kick, with the velocities just before it."""
@@ -165,13 +200,26 @@ class PlanarSimulation:
         problem = ContactProblem(operator, u_free, terms.bias, terms.friction, terms.cohesion)
         return _Stated(problem, acting, approach, terms, law)
 
-    def _solved(self, stated: _Stated, start: ContactStart) -> ContactSolution:
+    def _solve(self, kick: PlanarState, free: Array, contacts: PlanarContacts, start: Memory) -> _Solved:
+        """State the problem of these contacts, and solve it from the impulses in `start`."""
+        with self.clock("assemble"):
+            operator = PlanarDelassus(contacts.bodies, contacts.normal, contacts.lever, self.model.inertia)
+            stated = self._state_laws(kick, contacts, operator, free, self._memory.recall(contacts.key)[1])
+        with self.clock("solve"):
+            solution = self._solution(stated, start.recall(contacts.key)[0])
+        with self.clock("advance"):
+            impulse = solution.impulse.copy()
+            impulse[:, 0] -= stated.terms.adhesion
+            velocity = free + operator.velocity_change(impulse)
+        return _Solved(contacts, operator, stated, solution, impulse, velocity)
+
+    def _solution(self, stated: _Stated, start: ContactStart) -> ContactSolution:
         """Solve for the contacts that act; the others have r̃ = 0."""
         problem, acting = stated.problem, stated.acting
         shifted = start.impulse.copy()
         shifted[:, 0] += stated.terms.adhesion
         if acting.all():
-            return self._solve(problem, start=ContactStart(shifted, start.velocity))
+            return self._solver(problem, start=ContactStart(shifted, start.velocity))
         whole = problem.delassus
         assert isinstance(whole, PlanarDelassus)
         some = ContactProblem(
@@ -181,24 +229,15 @@ class PlanarSimulation:
             problem.friction[acting],
             problem.cohesion[acting],
         )
-        part = self._solve(some, start=ContactStart(shifted[acting], start.velocity[acting]))
+        part = self._solver(some, start=ContactStart(shifted[acting], start.velocity[acting]))
         impulse, velocity = np.zeros_like(shifted), np.zeros_like(shifted)
         impulse[acting], velocity[acting] = part.impulse, part.velocity
         return replace(part, impulse=impulse, velocity=velocity)
 
-    def _finish(
-        self,
-        kick: PlanarState,
-        after: PlanarState,
-        contacts: PlanarContacts,
-        operator: PlanarDelassus,
-        loads: Array,
-        stated: _Stated,
-        solution: ContactSolution,
-        impulse: Array,
-    ) -> PlanarStep:
+    def _finish(self, kick: PlanarState, after: PlanarState, loads: Array, solved: _Solved) -> PlanarStep:
         """Let the laws see what came of them, remember, and account."""
-        time, model = self.model.scene.time, self.model
+        time, model, contacts, stated = self.model.scene.time, self.model, solved.contacts, solved.stated
+        operator, solution, impulse = solved.operator, solved.solution, solved.impulse
         u_before = operator.relative_velocity(kick.velocity)
         u = operator.relative_velocity(after.velocity)
         internal = model.laws.after(stated.law, stated.approach, solution.impulse, u)

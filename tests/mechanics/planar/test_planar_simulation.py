@@ -10,6 +10,7 @@ from mechanics.loads.gravity import GravityRamp, TiltingTable
 from mechanics.loads.history import History
 from mechanics.loads.load import Loads
 from mechanics.loads.motions import ImposedMotion
+from mechanics.planar.contacts import PlanarDetector
 from mechanics.planar.model import build_planar_model
 from mechanics.planar.scene import Disk, PlanarScene, PlanarTime, Wall
 from mechanics.planar.simulate import simulate_planar
@@ -152,6 +153,32 @@ def test_a_force_pushes_along_and_turns():
     )
 
 
+@pytest.mark.parametrize("theta", [0.5, 1.0])
+def test_what_is_hit_is_stopped_by_what_nobody_watched(theta):
+    # the first disk hits the second with 10 m/s, which leaves with 5 m/s; the third is at 0.6 of what that is in the
+    # rest of the step, far beyond the alert distance, and before the impact nothing moved towards it
+    second = 0.2 + 10.0 * 1e-2 * (1 - theta)
+    disks = (
+        disk("a", (0.0, 0.0), velocity=(10.0, 0.0, 0.0)),
+        disk("b", (second, 0.0)),
+        disk("c", (second + 0.2 + 0.6 * 5.0 * 1e-2 * theta, 0.0)),
+    )
+    scene = PlanarScene(
+        "row",
+        disks,
+        gravity=(0.0, 0.0),
+        law=DryJoint(0.0),
+        time=PlanarTime(1e-2, theta, 1.0),
+        solver=ACCURATE,
+    )
+    model, start = build_planar_model(scene)
+    assert len(PlanarDetector(model)(start)) == 1
+    step = PlanarSimulation(model, start, Clock()).step()
+    assert step.contacts.bodies.tolist() == [[0, 1], [1, 2]]
+    x = step.after.centre[:, 0]
+    np.testing.assert_array_less(0.2 - 1e-12, np.diff(x))
+
+
 def test_nothing_rests_while_gravity_grows():
     result = run(disk(), loads=Loads(gravity=(GravityRamp(0.1),)), time=PlanarTime(1e-3, 1.0, 1.0))
     assert result.outcome is Outcome.EQUILIBRIUM
@@ -218,8 +245,8 @@ def test_a_disk_runs_through_a_bowl_of_many_pieces_and_up_again(pieces):
         disk(centre=begin),
         walls=walls,
         friction=0.0,
-        time=PlanarTime(2e-4, 0.5, 2.2, **GOES_ON),
-        frame_every=10,
+        time=PlanarTime(5e-4, 0.5, 2.0, **GOES_ON),
+        frame_every=4,
     )
     heights = np.array([frame.position[0, 1] for frame in result.frames])
     drop = begin[1] + 0.9
