@@ -26,6 +26,8 @@ Ints = NDArray[np.int64]
 
 # contact keys number the faces of a stone in six bits
 _MAX_FACES = 64
+# by this fraction the volume of a stone's parts may differ from that of its outline
+_SAME_VOLUME = 1e-6
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,7 @@ class Model:
     mass : (nb,) [kg]
     volume : (nb,) [m³]
     surfaces : for contact detection
+    outline : per body its corners (n, 3) as the scene gives them, from the centre of mass, body axes [m]
     stones : per body its finite elements; None if it has none
     node_ptr : (nb+1,) nodes of each body in State.node
     """
@@ -57,6 +60,7 @@ class Model:
     mass: Array
     volume: Array
     surfaces: Surfaces
+    outline: tuple[Array, ...]
     stones: tuple[Deformable | None, ...]
     node_ptr: Ints
 
@@ -117,6 +121,7 @@ def build_model(scene: Scene, progress: Callable[[int, int], None] | None = None
         mass=density * np.array([p.volume for p in properties]),
         volume=np.array([p.volume for p in properties]),
         surfaces=_surfaces(blocks, centres, stones, node_ptr),
+        outline=tuple(block.vertices - centre for block, centre in zip(blocks, centres, strict=True)),
         stones=tuple(stones),
         node_ptr=node_ptr,
     )
@@ -129,9 +134,17 @@ def _parts(block: Block) -> tuple[Part, ...]:
 
 
 def _mass_properties(block: Block) -> MassProperties:
-    return united(
-        [mass_properties(part.vertices, part.faces, f"stone {block.code}") for part in _parts(block)]
-    )
+    where = f"stone {block.code}"
+    whole = united([mass_properties(part.vertices, part.faces, where) for part in _parts(block)])
+    if block.parts:
+        outline = mass_properties(block.vertices, block.faces, where).volume
+        if abs(outline - whole.volume) > _SAME_VOLUME * outline:
+            raise GeometryError(
+                f"its parts have {whole.volume:.6g} m³, its outline {outline:.6g} m³",
+                where=where,
+                remedy="give convex parts that fill it without overlap",
+            )
+    return whole
 
 
 def _surfaces(

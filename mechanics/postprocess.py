@@ -18,11 +18,10 @@ Array = NDArray[np.float64]
 
 def positions(model: Model, state: State) -> tuple[Array, ...]:
     """Points of each body now: the corners of a rigid one, the nodes of a deformable one [m]."""
-    vptr = model.surfaces.body_vptr
     return tuple(
         state.node[model.nodes_of(b)]
         if stone is not None
-        else state.centre[b] + model.surfaces.vertex[vptr[b] : vptr[b + 1]] @ state.rotation[b].T
+        else state.centre[b] + model.outline[b] @ state.rotation[b].T
         for b, stone in enumerate(model.stones)
     )
 

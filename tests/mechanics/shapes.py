@@ -172,3 +172,24 @@ def pile(seed, stones=8, **more):
             Block(str(k), corners + place, faces, LIMESTONE, Fidelity.FIXED if k == 0 else Fidelity.RIGID)
         )
     return scene(*blocks, **more)
+
+
+def profile(code, outline, parts, depth=1.0, **more):
+    """A stone with a profile (n, 2) in x and z, counter-clockwise seen along y, made of convex profiles.
+
+    It spans 0 ≤ y ≤ depth; an outline with corners that lean in makes it non-convex.
+    """
+
+    def upright(ring):
+        corners, faces = prism(np.asarray(ring, dtype=float), 0.0, depth)
+        # prisms stand on their ring: lay it down, (x, y, z) → (x, depth - z, y)
+        return np.column_stack([corners[:, 0], depth - corners[:, 2], corners[:, 1]]), faces
+
+    vertices, faces = upright(outline)
+    pieces = tuple(Part(*upright(ring)) for ring in parts)
+    return Block(code, vertices, faces, more.pop("material", LIMESTONE), parts=pieces, **more)
+
+
+def rectangle(x0, z0, x1, z1):
+    """Corners of a rectangle, counter-clockwise."""
+    return [(x0, z0), (x1, z0), (x1, z1), (x0, z1)]

@@ -7,8 +7,8 @@ from scipy.spatial.transform import Rotation
 from mechanics.contact.assembly import local_velocity, mixed_delassus, sparse_form, world_impulse
 from mechanics.contact.contacts import gaps
 from mechanics.contact.detection import Detector
-from mechanics.model import build_model
 from mechanics.laws.law import STATE
+from mechanics.model import build_model
 from mechanics.operators.mixed import ELASTIC, NONE, RIGID
 from mechanics.problem import scale_of
 from mechanics.scene import Fidelity
