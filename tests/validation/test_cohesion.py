@@ -13,7 +13,7 @@ from mechanics.loads.history import History
 from mechanics.loads.load import Loads
 from mechanics.materials import Material
 from mechanics.model import build_model
-from mechanics.scene import ContactSettings, Fidelity, LawRule, Placement, Scene, SolverSettings, TimeSettings
+from mechanics.scene import ContactSettings, Fidelity, LawRule, Placement, Scene, TimeSettings
 from mechanics.simulation import Clock, Simulation
 
 STEP = 1e-3
@@ -26,7 +26,6 @@ def started(blocks, contact, loads=None, gravity=(0.0, 0.0, -G), theta=0.5, step
         gravity=gravity,
         contact=contact,
         time=TimeSettings(step, theta),
-        solver=SolverSettings(tolerance=1e-8, max_iterations=5000),
         loads=loads or Loads(),
     )
     return Simulation(*build_model(scene), Clock())
@@ -67,7 +66,8 @@ def test_a_block_on_mortar_is_pulled_off_and_sheared_off_at_its_strength(
     )
     assert broken_at(simulation, 250) is None
     assert broken_at(simulation, 400) is not None
-    after = simulation.step()
+    for _ in range(5):  # contact after contact
+        after = simulation.step()
     assert (after.internal[:, BOND] < 0).all()
     total = after.force.sum(axis=0)
     if direction[0]:
@@ -136,7 +136,7 @@ def test_a_block_on_an_incline_needs_its_cohesion(part, holds):
     step = broken_at(simulation, 200)
     assert (step is None) == holds
     speed = np.linalg.norm(simulation.state.velocity[1, :3])
-    assert (speed < 1e-9) == holds
+    assert (speed < 1e-6) == holds
 
 
 @pytest.mark.parametrize("theta", [0.5, 1.0])
