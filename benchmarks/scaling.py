@@ -33,10 +33,19 @@ _TABLE: Table = (
     ("step_ns", "step ns per contact", ".3g"),
     ("speedup_sweep", "{} threads: sweep", ".2f"),
     ("speedup_step", "step", ".2f"),
+    ("default_first_ms", "default solver: first ms", ".3g"),
+    ("default_iterations", "iterations", "d"),
+    ("default_step_ms", "later ms", ".3g"),
     ("bytes_kept", "bytes per contact kept", ".0f"),
     ("bytes_peak", "at most", ".0f"),
+    ("bytes_peak_default", "default solver", ".0f"),
 )
-_FITTED = ("detection", "step_1")
+_FITTED = {
+    "detection": "detection",
+    "step_1": "step",
+    "default_first": "first step with the default solver",
+    "default_step": "later ones",
+}
 
 
 def main() -> None:
@@ -65,7 +74,7 @@ def main() -> None:
     for kind in options.kinds:
         mine = [row for row in rows if row["kind"] == kind]
         if mine and mine[0]["exponent_step_1"] is not None:
-            fits = ", ".join(f"{key.split('_')[0]} {mine[0][f'exponent_{key}']:.2f}" for key in _FITTED)
+            fits = ", ".join(f"{name} {mine[0][f'exponent_{key}']:.2f}" for key, name in _FITTED.items())
             print(f"\n{kind}: cost ~ contacts to the power of: {fits}")
 
 
@@ -108,6 +117,8 @@ def _derived(row: Row, threads: list[int]) -> Row:
         "sweep_ns": 1e9 * row["sweep_1"] / contacts,
         "step_ms": 1e3 * row["step_1"],
         "step_ns": 1e9 * row["step_1"] / contacts,
+        "default_first_ms": 1e3 * row["default_first"],
+        "default_step_ms": 1e3 * row["default_step"],
         "threads": last,
         "machine": machine(),
     }

@@ -24,6 +24,7 @@ from mechanics.planar.delassus import PlanarDelassus
 from mechanics.planar.model import build_planar_model
 from mechanics.planar.simulation import PlanarSimulation
 from mechanics.problem import Delassus
+from mechanics.scene import SolverSettings
 from mechanics.simulation import Clock, Simulation, detector
 
 __all__ = ["main"]
@@ -33,6 +34,7 @@ Array = NDArray[np.float64]
 # sweeps of the timed step, and timed sweeps for a cache-warm figure
 _STEP_SWEEPS = 50
 _REPEATS, _ENOUGH = 5, 0.2
+_DEFAULT_STEPS = 8
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,7 @@ class _Case:
     u_free : (nc, d) under gravity [m/s]
     friction : μ [-]
     simulation : makes a simulation at the scene's start, whose solver makes `_STEP_SWEEPS` sweeps in each step
+    default : makes one with the default solver and tolerance
     bodies : number of them
     """
 
@@ -54,6 +57,7 @@ class _Case:
     u_free: Array
     friction: float
     simulation: Callable[[], Any]
+    default: Callable[[], Any]
     bodies: int
 
 
@@ -84,6 +88,10 @@ def main() -> None:
     after = peak_bytes()
     row["bytes_peak"] = None if after is None or before is None else (after - before) / contacts
     row |= _times(case, options.threads)
+    numba.set_num_threads(1)
+    row |= _default(case.default())
+    after = peak_bytes()
+    row["bytes_peak_default"] = None if after is None or before is None else (after - before) / contacts
     json.dump(row, sys.stdout)
 
 
@@ -93,6 +101,7 @@ def _once(case: _Case, threads: list[int]) -> None:
         case.detect()
         _sweeps(case, 2)
         case.simulation().step()
+    case.default().step()
 
 
 def _times(case: _Case, threads: list[int]) -> dict[str, Any]:
@@ -107,6 +116,21 @@ def _times(case: _Case, threads: list[int]) -> dict[str, Any]:
             row |= {f"{name}_{count}": cpu, f"{name}_wall_{count}": wall}
     row["same_bits"] = all(np.array_equal(one, impulses[0]) for one in impulses)
     return row
+
+
+def _default(simulation: Any) -> dict[str, float]:
+    """Processor times of the first steps as a user has them: the first, and the median of some more [s]."""
+    times, sweeps = [], []
+    for _ in range(_DEFAULT_STEPS):
+        start = time.process_time()
+        step = simulation.step()
+        times.append(time.process_time() - start)
+        sweeps.append(step.solution.iterations)
+    return {
+        "default_first": times[0],
+        "default_iterations": sweeps[0],
+        "default_step": float(np.median(times[1:])),
+    }
 
 
 def _best(run: Callable[[], Any], prepared: bool = False) -> tuple[float, float]:
@@ -139,6 +163,7 @@ def _wall(bricks: int, courses: int) -> _Case:
     blocks = running_bond(bricks, courses)
     scene = engine_scene(blocks, 1e-3, 0.5, 1e-300, _STEP_SWEEPS, sweeping=True)
     model, state = build_model(scene)
+    usual = replace(model, scene=replace(scene, solver=SolverSettings()))
     find = detector(model)
     reach = np.zeros(len(model.mass))
     contacts = find(state, reach)
@@ -151,13 +176,16 @@ def _wall(bricks: int, courses: int) -> _Case:
         operator,
         operator.relative_velocity(fall),
         blocks.friction,
-        lambda: Simulation(model, replace(state), Clock()),
+        lambda: Simulation(model, state, Clock()),
+        lambda: Simulation(usual, state, Clock()),
         len(model.mass),
     )
 
 
 def _disks(columns: int, rows: int) -> _Case:
-    model, state = build_planar_model(disk_box(columns, rows, sweeps=_STEP_SWEEPS))
+    scene = disk_box(columns, rows, sweeps=_STEP_SWEEPS)
+    model, state = build_planar_model(scene)
+    usual = replace(model, scene=replace(scene, solver=SolverSettings()))
     find = PlanarDetector(model)
     contacts = find(state)
     operator = PlanarDelassus(contacts.bodies, contacts.normal, contacts.lever, model.inertia)
@@ -169,6 +197,7 @@ def _disks(columns: int, rows: int) -> _Case:
         operator.relative_velocity(fall),
         0.3,
         lambda: PlanarSimulation(model, state, Clock()),
+        lambda: PlanarSimulation(usual, state, Clock()),
         len(model.fixed),
     )
 
