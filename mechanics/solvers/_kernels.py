@@ -3,7 +3,16 @@
 import numpy as np
 from numba import njit
 
-__all__ = ["admm_right_side", "admm_update", "local_factors", "natural_errors", "slip", "solve_contact"]
+__all__ = [
+    "admm_right_side",
+    "admm_update",
+    "local_factors",
+    "natural_errors",
+    "onto_cone",
+    "plane_axes",
+    "slip",
+    "solve_contact",
+]
 
 
 @njit(cache=True)
@@ -43,10 +52,10 @@ def slip(nn, n1, n2, co, si, l1, l2, b0, b1, b2, mu, k):  # pragma: no cover - c
     """The impulse of one contact that neither sticks nor is without any load: r_N ≥ 0 and ‖r_T‖ = μ r_N + k.
 
     Slip means u_T = -λ r_T with λ > 0, so r_T(λ) = -(A + λ)⁻¹ c and r_N(λ) = -(b_N + W_NT r_T)/W_NN. The value
-    ‖r_T‖ - μ r_N - k changes its sign on (0, ∞), so the root is bracketed and Newton's method, kept inside the
-    bracket, finds it. Cohesion can also be spent without pressure: then r_N = 0 and ‖r_T‖ ≤ k.
+    ‖r_T‖ - μ r_N⁺ - k changes its sign on (0, ∞), so the root is bracketed and Newton's method, kept inside the
+    bracket, finds it. Where it has no r_N > 0 there, cohesion is spent without pressure: r_N = 0 and ‖r_T‖ ≤ k.
     """
-    if b0 < 0.0:
+    if b0 < 0.0 or k > 0.0:
         r0, r1, r2 = _slip_pressed(nn, n1, n2, co, si, l1, l2, b0, b1, b2, mu, k)
         if r0 > 0.0 or k == 0.0:
             return r0, r1, r2
@@ -61,14 +70,18 @@ def _slip_pressed(nn, n1, n2, co, si, l1, l2, b0, b1, b2, mu, k):
     # in the axes of A
     x1, x2 = co * c1 + si * c2, -si * c1 + co * c2
     m1, m2 = co * n1 + si * n2, -si * n1 + co * n2
+    t1, t2 = -x1 / l1, -x2 / l2
+    n = -(b0 + m1 * t1 + m2 * t2) / nn
+    if n <= 0.0 and t1 * t1 + t2 * t2 <= k * k:
+        # even stuck it would have to be pulled
+        return 0.0, 0.0, 0.0
     low, high = 0.0, -1.0
-    lam = np.sqrt(x1 * x1 + x2 * x2) * nn / (mu * -b0 + k * nn) * 0.5
-    t1 = t2 = n = 0.0
+    lam = np.sqrt(x1 * x1 + x2 * x2) * nn / (mu * max(-b0, 0.0) + k * nn) * 0.5
     for _ in range(100):
         t1, t2 = -x1 / (l1 + lam), -x2 / (l2 + lam)
         n = -(b0 + m1 * t1 + m2 * t2) / nn
         size = np.sqrt(t1 * t1 + t2 * t2)
-        value = size - mu * n - k
+        value = size - mu * max(n, 0.0) - k
         if value > 0.0:
             low = lam
         else:
@@ -76,7 +89,9 @@ def _slip_pressed(nn, n1, n2, co, si, l1, l2, b0, b1, b2, mu, k):
         if abs(value) <= 1e-14 * (size + mu * abs(n) + k):
             break
         d1, d2 = -t1 / (l1 + lam), -t2 / (l2 + lam)
-        slope = (t1 * d1 + t2 * d2) / size + mu * (m1 * d1 + m2 * d2) / nn
+        slope = (t1 * d1 + t2 * d2) / size
+        if n > 0.0:
+            slope += mu * (m1 * d1 + m2 * d2) / nn
         trial = lam - value / slope if slope < 0.0 else -1.0
         if high < 0.0:
             lam = trial if trial > low else 4.0 * lam
