@@ -36,7 +36,7 @@ class Kick:
 
     Attributes
     ----------
-    velocity : (nb, 6) of the rigid bodies; of driven ones, the velocity that takes them to the end of the step
+    velocity : (nb, 6) of the rigid bodies; of driven ones, the velocity that takes them to the next kick
     node_velocity : (nn, 3) of the deformable ones [m/s]
     load : (nb, 6) forces [N] and moments [N m] that acted on the rigid bodies, weight included
     """
@@ -105,10 +105,11 @@ def free_kick(
         answer = inverse_inertia_world(model.inertia, predicted.rotation) @ load[:, 3:, None]
         velocity[:, 3:] += step * answer[..., 0]
     for motion, bodies in model.motions:
-        end, turn = _driven(motion.pose(predicted.time + step * theta), start, bodies)
-        velocity[bodies, :3] = (end - predicted.centre[bodies]) / (step * theta)
+        # with one velocity from kick to kick, as free bodies have
+        end, turn = _driven(motion.pose(predicted.time + step), start, bodies)
+        velocity[bodies, :3] = (end - predicted.centre[bodies]) / step
         vector = Rotation.from_matrix(turn @ predicted.rotation[bodies].transpose(0, 2, 1)).as_rotvec()
-        velocity[bodies, 3:] = vector / (step * theta)
+        velocity[bodies, 3:] = vector / step
     node_velocity = before.node_velocity.copy()
     for b, own in compliance.items():
         stone = model.stones[b]

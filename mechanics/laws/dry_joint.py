@@ -22,9 +22,9 @@ _DRIFT = 1e-4
 
 
 def gap_bias(contacts: Approach) -> Array:
-    """Shift of u_N (n,) with which a closing contact lands exactly: g/(hθ), docs/theory.md §3 [m/s]."""
+    """Shift of u_N (n,) with which a closing contact is closed at the next kick: g/h, docs/theory.md §3 [m/s]."""
     gap = contacts.gap - contacts.state[:, REST]
-    bias: Array = (gap if contacts.push_out else np.maximum(gap, 0.0)) / (contacts.step * contacts.theta)
+    bias: Array = (gap if contacts.push_out else np.maximum(gap, 0.0)) / contacts.step
     return bias
 
 

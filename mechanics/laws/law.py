@@ -33,7 +33,7 @@ class Approach:
     area : (n,) tributary area; zero at an edge or a corner [m²]
     size : (n,) smallest width of the smaller body; tolerances scale with it [m]
     yielding : (n,) W_NN, what one unit of normal impulse does to u_N [1/kg]
-    step, theta : h [s] and θ; the gap at the end of the step is gap + h θ u_N
+    step, theta : h [s] and θ; the gap is gap + h θ u_N at the end of the step, and gap + h u_N at the next kick
     push_out : overlaps are pushed out (relaxation) instead of only kept from growing
     first : this is the first step of the run: bonds that the scene asks for are made here
     state : (n, STATE) internal variables, as the law left them in the last step; zeros for new contacts.

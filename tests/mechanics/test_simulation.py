@@ -106,13 +106,15 @@ def test_a_falling_stone_lands_on_the_ground_not_in_it(theta, fidelity):
 
 
 @pytest.mark.parametrize("theta", [0.5, 0.75, 1.0])
-def test_a_gap_that_closes_within_a_step_ends_closed_to_the_last_digits(theta):
+def test_a_closing_gap_is_closed_at_the_next_kick_to_the_last_digits_and_never_overlaps(theta):
     # at 1 m/s, 1 mm a step; open by 0.3 mm still where contacts are looked for, q + h(1-θ)v
     gap = 1e-3 * (1 - theta) + 3e-4
     block = brick("a", (0, 0, gap), (1, 1, 1 + gap), velocity=(0, 0, -1.0, 0, 0, 0))
     one = scene(ground(), block, gravity=(0, 0, 0), step=1e-3, theta=theta)
-    _, _, (step,) = run(replace(one, solver=SolverSettings(tolerance=1e-13)), 1)
-    np.testing.assert_allclose(step.gap, 0.0, atol=1e-14)
+    _, _, (first, second) = run(replace(one, solver=SolverSettings(tolerance=1e-13)), 2)
+    np.testing.assert_allclose(first.gap, 3e-4 * (1 - theta), atol=1e-14)
+    np.testing.assert_allclose(second.gap, 0.0, atol=1e-14)
+    np.testing.assert_allclose(second.after.velocity, 0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize(("theta", "order"), [(0.5, 1e-2), (1.0, 1e-2)])

@@ -14,7 +14,7 @@ def test_the_pull_acts_within_the_distance_and_not_beyond():
     terms = LAW.terms(approach([-1e-4, 0.0, 0.5e-3, 1e-3, 1.001e-3]))
     np.testing.assert_allclose(terms.adhesion, 1e-3 * np.array([10.0, 10.0, 10.0, 10.0, 0.0]))  # h γ
     assert not terms.cohesion.any()
-    np.testing.assert_allclose(terms.bias, np.array([0.0, 0.0, 0.5e-3, 1e-3, 1.001e-3]) / (1e-3 * 0.5))
+    np.testing.assert_allclose(terms.bias, np.array([0.0, 0.0, 0.5e-3, 1e-3, 1.001e-3]) / 1e-3)
 
 
 @pytest.mark.parametrize("theta", [0.5, 0.75, 1.0])

@@ -48,7 +48,7 @@ def test_bonds_are_made_in_the_first_step_where_a_joint_with_an_area_is_closed()
     terms = MORTAR.terms(contacts)
     np.testing.assert_array_equal(terms.adhesion > 0, [True, True, True, False, False])
     # a bond is at home in its own gap; the third contact, open without a bond, has still to close
-    np.testing.assert_allclose(terms.bias, [0.0, 0.0, 0.0, 3e-3 / (1e-3 * 0.5), 0.0], atol=1e-15)
+    np.testing.assert_allclose(terms.bias, [0.0, 0.0, 0.0, 3e-3 / 1e-3, 0.0], atol=1e-15)
     later = approach(gaps, size=0.25, first=False)
     assert not MORTAR.after(later, np.zeros((5, 3)), np.zeros((5, 3)))[:, BOND].any()
 
