@@ -131,8 +131,8 @@ def apply(r, body, geometry, inertia):  # pragma: no cover - compiled
 
 
 @njit(cache=True)
-def _solve_group(first, last, step, r, v, shift, mu, cohesion, factors, body, geometry, inertia):
-    """Solve the contacts first, first + step, … before last, of one pair of bodies, one after the other.
+def _solve_group(first, last, r, v, shift, mu, cohesion, factors, body, geometry, inertia):
+    """Solve the contacts first:last, those of one pair of bodies, one after the other.
 
     Returns how much the velocities of the two bodies, at the first contact, have changed.
     """
@@ -141,7 +141,7 @@ def _solve_group(first, last, step, r, v, shift, mu, cohesion, factors, body, ge
     q0, q1, q2, q3, q4, q5 = v[j, 0], v[j, 1], v[j, 2], v[j, 3], v[j, 4], v[j, 5]
     m, n = inertia[i], inertia[j]
     changed = False
-    for c in range(first, last, step):
+    for c in range(first, last):
         g, f = geometry[c], factors[c]
         g0, g1, g2, g3, g4, g5, g6, g7, g8 = g[0], g[1], g[2], g[3], g[4], g[5], g[6], g[7], g[8]
         a0, a1, a2, b0, b1, b2 = g[9], g[10], g[11], g[12], g[13], g[14]
@@ -210,7 +210,7 @@ def _solve_group(first, last, step, r, v, shift, mu, cohesion, factors, body, ge
 
 
 @njit(cache=True)
-def _visit(g, forth, path, seen, calm, r, v, shift, mu, cohesion, factors, body, geometry, inertia, group):
+def _visit(g, path, seen, calm, r, v, shift, mu, cohesion, factors, body, geometry, inertia, group):
     """Solve a group unless it sleeps: its bodies have hardly changed since it was last solved.
 
     `path` (nb,) adds up the changes of each body, `seen` (ng, 2) is where the paths were after the last solution. Any
@@ -220,10 +220,7 @@ def _visit(g, forth, path, seen, calm, r, v, shift, mu, cohesion, factors, body,
     i, j = body[start, 0], body[start, 1]
     if path[i] - seen[g, 0] + path[j] - seen[g, 1] <= calm:
         return
-    first, last, step = (start, stop, 1) if forth else (stop - 1, start - 1, -1)
-    moved_i, moved_j = _solve_group(
-        first, last, step, r, v, shift, mu, cohesion, factors, body, geometry, inertia
-    )
+    moved_i, moved_j = _solve_group(start, stop, r, v, shift, mu, cohesion, factors, body, geometry, inertia)
     # bodies that do not move have no path: groups of one colour may share them
     if moved_i > 0.0:
         path[i] += moved_i
@@ -238,19 +235,15 @@ def _visit(g, forth, path, seen, calm, r, v, shift, mu, cohesion, factors, body,
 def sweep(
     count, calm, r, v, shift, mu, cohesion, factors, body, geometry, inertia, group
 ):  # pragma: no cover - compiled
-    """`count` passes over all groups, every second one backwards; r and v are kept up to date in place.
+    """`count` passes over all groups; r and v are kept up to date in place.
 
     The first pass visits every group; in the others, groups sleep whose bodies changed by no more than `calm` [m/s].
     """
     groups = group.shape[0] - 1
     path, seen = np.zeros(inertia.shape[0]), np.full((groups, 2), -np.inf)
-    for s in range(count):
-        for k in range(groups):
-            forth = s % 2 == 0
-            g = k if forth else groups - 1 - k
-            _visit(
-                g, forth, path, seen, calm, r, v, shift, mu, cohesion, factors, body, geometry, inertia, group
-            )
+    for _ in range(count):
+        for g in range(groups):
+            _visit(g, path, seen, calm, r, v, shift, mu, cohesion, factors, body, geometry, inertia, group)
 
 
 @njit(cache=True, parallel=True)
@@ -263,12 +256,9 @@ def sweep_parallel(
     """
     groups, colours = group.shape[0] - 1, colour.shape[0] - 1
     path, seen = np.zeros(inertia.shape[0]), np.full((groups, 2), -np.inf)
-    for s in range(count):
-        forth = s % 2 == 0
+    for _ in range(count):
         for k in range(colours):
-            c = k if forth else colours - 1 - k
-            for g in prange(colour[c], colour[c + 1]):
+            for g in prange(colour[k], colour[k + 1]):
                 _visit(
-                    g, forth, path, seen, calm,
-                    r, v, shift, mu, cohesion, factors, body, geometry, inertia, group,
-                )  # fmt: skip
+                    g, path, seen, calm, r, v, shift, mu, cohesion, factors, body, geometry, inertia, group
+                )

@@ -136,7 +136,7 @@ class RigidDelassus:
         return csr_array((rows[c, s].ravel(), (row.ravel(), column.ravel())), shape=shape)
 
     def gauss_seidel(self, shift: Array, friction: Array, cohesion: Array) -> GaussSeidel:
-        """Sweeps forth and back; the same bits for any number of threads.
+        """Sweeps in the order of the schedule; the same bits for any number of threads.
 
         Each call visits every contact at least once; those whose bodies hardly change then sleep until these do. The
         running velocities are made anew on each call, so that rounding cannot pile up.
