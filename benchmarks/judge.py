@@ -79,15 +79,13 @@ class Judge:
             _width(vertices, faces) for vertices, faces in zip(scene.vertices, scene.faces, strict=True)
         )
 
-    def __call__(self, trace: Trace, landing: float) -> Verdict:
-        """Judge one run; an open contact may close with gap / (h · landing): 1 for LMGC90's law, θ for ours."""
+    def __call__(self, trace: Trace) -> Verdict:
+        """Judge one run."""
         centre, rotation = self._motion(trace)
         velocity = self._velocities(centre, rotation)
         corners = [self._corners(centre[n], rotation[n]) for n in (0, -2, -1)]
         steps = {
-            n: self._judge_step(
-                touch, _Instant(centre[n - 1], rotation[n - 1], velocity[n - 1], velocity[n]), landing
-            )
+            n: self._judge_step(touch, _Instant(centre[n - 1], rotation[n - 1], velocity[n - 1], velocity[n]))
             for n, touch in trace.kept.items()
         }
         last = [value for n, value in steps.items() if n > 1] or list(steps.values())
@@ -125,7 +123,7 @@ class Judge:
         blocks = zip(self._scene.vertices, self._centre, centre, rotation, self._moving, strict=True)
         return np.concatenate([c + (v - c0) @ turn.T for v, c0, c, turn, moving in blocks if moving])
 
-    def _judge_step(self, touch: Touch, at: _Instant, landing: float) -> tuple[float, ...]:
+    def _judge_step(self, touch: Touch, at: _Instant) -> tuple[float, ...]:
         """η, penetration, balance, reaction and momentum of one step."""
         h, theta, moving = self._step, self._theta, self._moving
         centre = at.centre + h * (1 - theta) * at.before[:, :3]
@@ -136,7 +134,7 @@ class Judge:
         free[moving, 2] -= h * self._scene.gravity
         u_free = operator.relative_velocity(free)
         none = np.zeros(len(touch.gap))
-        bias = np.maximum(touch.gap, 0.0) / (h * landing)
+        bias = np.maximum(touch.gap, 0.0) / h
         friction = np.full(len(touch.gap), self._scene.friction)
         problem = ContactProblem(operator, u_free, bias, friction, none)
         u_n = operator.apply(impulse)[:, 0] + u_free[:, 0]

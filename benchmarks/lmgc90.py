@@ -212,13 +212,13 @@ class _Pair:
             *(["--fresh"] if fresh else []),
         ]
         trace = self._child([sys.executable, "-m", "benchmarks.moma_child"], more, "MOMA")
-        return self._run(trace, options.theta)
+        return self._run(trace)
 
     def _lmgc90(self, relaxation: float | None = None) -> _Run:
         options, child = self._options, str(Path(__file__).with_name("lmgc90_child.py"))
         _check_installed(options.lmgc90_python)
         more = [] if relaxation is None else ["--relaxation", repr(relaxation)]
-        return self._run(self._child([options.lmgc90_python, child], more, "LMGC90"), 1.0)
+        return self._run(self._child([options.lmgc90_python, child], more, "LMGC90"))
 
     def _child(self, program: list[str], more: list[str], name: str) -> Trace:
         """Run one side in its own process, single-threaded."""
@@ -244,7 +244,7 @@ class _Pair:
                 )
             return read_trace(out)
 
-    def _run(self, trace: Trace, landing: float) -> _Run:
+    def _run(self, trace: Trace) -> _Run:
         settled = min(self._options.settled, len(trace.cpu) - 1)
         return _Run(
             first=float(trace.cpu[0]),
@@ -252,7 +252,7 @@ class _Pair:
             total=float(trace.cpu.sum()),
             sweeps_first=int(trace.sweeps[0]),
             sweeps=float(np.median(trace.sweeps[-settled:])),
-            verdict=self._judge(trace, landing) if trace.kept else None,
+            verdict=self._judge(trace) if trace.kept else None,
             program=trace.program,
         )
 
