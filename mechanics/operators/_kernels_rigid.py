@@ -6,7 +6,7 @@ A contact keeps its frame and its two lever arms; a body its inverse mass and in
 
 `geometry` (nc, 15) holds R in rows, then a, then b; `inertia` (nb, 7) the inverse mass and the upper triangle of I⁻¹;
 `factors` (nc, 13) the upper triangle of W_αα⁻¹, W_NN, W_NT (2), and axes and eigenvalues of the Schur complement.
-Contacts between the same two bodies form a group; groups of one colour share no moving body.
+Contacts with the same candidate and antagonist form a group; groups of one colour share no moving body.
 """
 
 import numpy as np

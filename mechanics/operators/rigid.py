@@ -29,7 +29,7 @@ class Schedule:
 
     Attributes
     ----------
-    order : (nc,) contacts in sweep order: those between the same two bodies follow one another
+    order : (nc,) contacts in sweep order: those with the same candidate and antagonist follow one another
     group : (ng+1,) where, in that order, each such group begins
     colour : (k+1,) where each colour begins among the groups; groups of one colour share no moving body. One
         colour for few contacts, which are swept by one thread
@@ -41,12 +41,15 @@ class Schedule:
 
 
 def schedule(bodies: Ints, moving: NDArray[np.bool_]) -> Schedule:
-    """Group the contacts (nc, 2) by pairs of bodies, and colour the groups if they are many."""
+    """Group the contacts (nc, 2) by candidate and antagonist, and colour the groups if they are many.
+
+    Stones of several parts may be either to one another; they have two groups then.
+    """
     count = len(bodies)
     if count == 0:
         empty = np.zeros(0, dtype=np.int64)
         return Schedule(empty, np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64))
-    pair = bodies.min(axis=1) * len(moving) + bodies.max(axis=1)
+    pair = 2 * (bodies.min(axis=1) * len(moving) + bodies.max(axis=1)) + (bodies[:, 0] > bodies[:, 1])
     order = np.argsort(pair, kind="stable")
     starts = np.flatnonzero(np.diff(pair[order], prepend=-1))
     sizes = np.diff(starts, append=count)

@@ -1,18 +1,27 @@
 """Stones, scenes and reference operators that the tests of the mechanics share."""
 
 import itertools
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
+from mechanics.contact.assembly import mixed_delassus, rigid_delassus, sparse_form
+from mechanics.contact.contacts import Contacts, gaps, material_points, take
 from mechanics.contact.detection import Detector
 from mechanics.laws.dry_joint import DryJoint
+from mechanics.laws.law import STATE
 from mechanics.materials import Material
-from mechanics.model import build_model
+from mechanics.model import Model, build_model
+from mechanics.operators.mixed import MixedDelassus
+from mechanics.operators.rigid import RigidDelassus, schedule
+from mechanics.problem import ContactProblem
 from mechanics.scene import Block, ContactSettings, Fidelity, Part, Placement, Scene, TimeSettings
+from mechanics.state import State
+from mechanics.statement import state_laws
+from mechanics.stepping import compliances, free_kick
 from tests.pipelines.handmade import BOX_FACES, box
 
 LIMESTONE = Material("limestone", density=2000.0, young=1e9, poisson=0.2)
@@ -81,10 +90,11 @@ def hexahedra(draw):
     return corners @ turn.T + 10.0 * np.array([draw(number) for _ in range(3)])
 
 
-def dense_operator(model, state, contacts, compliance):
+def dense_operator(model, state, contacts, compliance, common=False):
     """ŵ and Hᵀ as dense matrices over six velocities for each rigid body and three for each node, world axes.
 
-    Written from the definitions alone: the velocity of a material point, and the inverse of M + h²θ²K.
+    Written from the definitions alone: the velocity of a material point, and the inverse of M + h²θ²K. With `common`
+    the point lies half-way between the two material points.
     """
     bodies, nodes = len(model.mass), len(state.node)
     w_hat = np.zeros((6 * bodies + 3 * nodes,) * 2)
@@ -100,6 +110,7 @@ def dense_operator(model, state, contacts, compliance):
             moment = turn @ model.inertia.inertia[b] @ turn.T
             w_hat[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = np.linalg.inv(moment)
     weights = contacts.weights.toarray()
+    places = material_points(contacts, state)
     for c, side in itertools.product(range(len(contacts)), range(2)):
         b, sign = contacts.bodies[c, side], 1.0 - 2.0 * side
         rows = slice(3 * c, 3 * c + 3)
@@ -108,7 +119,7 @@ def dense_operator(model, state, contacts, compliance):
                 columns = slice(6 * bodies + 3 * n, 6 * bodies + 3 * n + 3)
                 transpose[rows, columns] += sign * weights[2 * c + side, n] * contacts.frame[c]
         else:
-            x, y, z = state.rotation[b] @ contacts.arm[c, side]
+            x, y, z = (places[c].mean(axis=0) if common else places[c, side]) - state.centre[b]
             lever = np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]])  # ω × arm = lever ω
             transpose[rows, 6 * b : 6 * b + 6] += sign * contacts.frame[c] @ np.hstack([np.eye(3), lever])
     return w_hat, transpose
@@ -161,13 +172,13 @@ def random_stone(rng):
     return hull(rng.uniform(0.3, 0.7) * points / np.linalg.norm(points, axis=1)[:, None])
 
 
-def pile(seed, stones=8, **more):
-    """A scene of random convex stones, close to one another; the first is fixed."""
+def pile(seed, stones=8, near=0.45, **more):
+    """A scene of random convex stones, the closer the smaller `near`; the first is fixed."""
     rng = np.random.default_rng(seed)
     blocks = []
     for k in range(stones):
         corners, faces = random_stone(rng)
-        place = 0.45 * stones ** (1 / 3) * rng.normal(size=3)
+        place = near * stones ** (1 / 3) * rng.normal(size=3)
         blocks.append(
             Block(str(k), corners + place, faces, LIMESTONE, Fidelity.FIXED if k == 0 else Fidelity.RIGID)
         )
@@ -193,3 +204,35 @@ def profile(code, outline, parts, depth=1.0, **more):
 def rectangle(x0, z0, x1, z1):
     """Corners of a rectangle, counter-clockwise."""
     return [(x0, z0), (x1, z0), (x1, z1), (x0, z1)]
+
+
+@dataclass(frozen=True)
+class Posed:
+    """The first step's contact problem of a scene, and what it is made of."""
+
+    model: Model
+    state: State
+    contacts: Contacts
+    operator: RigidDelassus | MixedDelassus
+    compliance: dict
+    problem: ContactProblem
+
+
+def posed(one, step=2e-3, theta=1.0):
+    """The contact problem in the configuration in which a scene begins."""
+    model, state, contacts = detected(one, one.contact.points, one.contact.placement)
+    compliance = compliances(model, step, theta)
+    if model.rigid_only:
+        plan = schedule(contacts.bodies, model.inertia.moving)
+        contacts = take(contacts, plan.order)
+        operator = rigid_delassus(model, state, contacts, plan)
+        sparse = operator.sparse
+    else:
+        operator = mixed_delassus(model, state, contacts, compliance)
+        sparse = sparse_form(model, state, contacts, operator, compliance)
+    free = free_kick(model, state, state, state, compliance, step, theta)
+    statement = state_laws(
+        model, state, contacts, gaps(contacts, state), model.laws.of(contacts.bodies),
+        operator, lambda: sparse, free, np.zeros((len(contacts), STATE)), True,
+    )  # fmt: skip
+    return Posed(model, state, contacts, operator, compliance, statement.problem)

@@ -126,6 +126,23 @@ def test_cohesion_that_pulls_a_contact_shut_presses_it():
     assert_law(w, b, 0.2, 1.0, r, u)
 
 
+@settings(max_examples=200, deadline=None)
+@given(
+    st.lists(number, min_size=9, max_size=9),
+    st.tuples(number, number, number),
+    st.sampled_from([1.0, 10.0]),
+    cohesions,
+)
+def test_where_friction_wedges_the_impulse_is_still_finite_and_in_its_cone(root, b, mu, k):
+    root = np.array(root).reshape(3, 3)
+    w = root @ root.T + 0.05 * np.trace(root @ root.T) * np.eye(3)
+    assume(np.linalg.norm(w) > 1e-3)
+    r, _ = solve_one(w, np.array(b), mu, k)
+    assert np.isfinite(r).all()
+    assert r[0] >= 0
+    assert np.linalg.norm(r[1:]) <= (mu * r[0] + k) * (1 + 1e-12)
+
+
 # --- factors ---
 
 
@@ -222,7 +239,7 @@ def test_the_natural_map_of_one_contact_vanishes_at_its_solution_and_only_there(
     w, b, mu = contact
     assume(np.linalg.norm(b) > 0.01)
     k = cohesion * np.linalg.norm(b) / np.linalg.norm(w, 2)
-    r, u = solve_one(w, b, mu, k)
+    r, _ = solve_one(w, b, mu, k)
     rho, zero = 3.0 / np.trace(w), np.zeros(1)
     scale = np.linalg.norm(b) / np.linalg.norm(w, 2) + k
 
