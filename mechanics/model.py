@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mechanics.balls import ball_properties
 from mechanics.bodies.deformable import Deformable, deformable
 from mechanics.bodies.rigid import RigidInertia
 from mechanics.contact._kernels_narrow import MAX_CORNERS
@@ -134,6 +135,8 @@ def _parts(block: Block) -> tuple[Part, ...]:
 
 
 def _mass_properties(block: Block) -> MassProperties:
+    if block.radius is not None:
+        return ball_properties(block)
     where = f"stone {block.code}"
     whole = united([mass_properties(part.vertices, part.faces, where) for part in _parts(block)])
     if block.parts:
@@ -156,6 +159,7 @@ def _surfaces(
         [part.faces for _, part in shapes],
         [mesh for b, part in shapes for mesh in _face_meshes(part, _mesh_of(stones[b]), int(node_ptr[b]))],
         [b for b, _ in shapes],
+        [blocks[b].radius or 0.0 for b, _ in shapes],
     )
 
 
@@ -207,6 +211,13 @@ def _check_loads(model: Model) -> None:
 
 
 def _check(block: Block) -> None:
+    if block.radius is not None:
+        if block.parts or block.fidelity is Fidelity.DEFORMABLE:
+            raise SceneError(
+                "a ball is deformable or has parts",
+                where=f"stone {block.code}",
+                remedy="make it rigid, or a polyhedron",
+            )
     if block.fidelity is Fidelity.DEFORMABLE and not (block.mesh_size is not None and block.mesh_size > 0):
         raise SceneError(
             f"mesh_size = {block.mesh_size!r} for a deformable stone",
@@ -221,6 +232,8 @@ def _check(block: Block) -> None:
             where=f"stone {block.code}",
             remedy="make it rigid, or make each part a stone of its own",
         )
+    if block.radius is not None:
+        return  # its facets are for pictures
     faces = max(len(part.faces) for part in _parts(block))
     corners = max(len(face) for part in _parts(block) for face in part.faces)
     if faces > _MAX_FACES or corners > MAX_CORNERS:

@@ -60,6 +60,8 @@ class Block:
     mesh_size : target edge length of the finite elements [m]; only for deformable blocks
     velocity : (6,) initial translation [m/s] and rotation [rad/s] velocity; not for fixed blocks
     parts : convex parts that fill a non-convex stone without overlap; empty if it is convex. Not for deformable blocks
+    radius : of a ball, whose surface is the sphere about the mean of its corners; corners and faces are for pictures
+        (mechanics.balls makes them) [m]. None: a polyhedron
     """
 
     code: str
@@ -70,6 +72,7 @@ class Block:
     mesh_size: float | None = None
     velocity: tuple[float, ...] = (0.0,) * 6
     parts: tuple[Part, ...] = ()
+    radius: float | None = None
 
 
 class Placement(StrEnum):

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
+from mechanics.contact._kernels_balls import ball_points
 from mechanics.contact._kernels_broad import boxes, close_pairs, place
 from mechanics.contact._kernels_narrow import EDGES, FACE_FIRST, interface_points, separating_axes
 from mechanics.contact.contacts import Contacts, gaps, take
@@ -33,10 +34,11 @@ THIN = 1e-6
 
 @dataclass(frozen=True)
 class _Pairs:
-    """Pairs of shapes with the feature by which they touch, as `separating_axes` gives them."""
+    """Pairs of shapes with the feature by which they touch, as `separating_axes` gives them; balls have none."""
 
     shapes: Ints
     limit: Array
+    balls: NDArray[np.bool_]
     kind: Ints
     feature: Ints
     axis: Array
@@ -105,19 +107,23 @@ class Detector:
         own = self.surfaces
         margin = np.maximum(self.alert * own.shape_size, self.distance) + reach
         low, high = boxes(own.vptr, placed.vertex, margin)
+        round_ = own.radius > 0
+        around = placed.centre[own.body[round_]], (own.radius + margin)[round_, None]
+        low[round_], high[round_] = around[0] - around[1], around[0] + around[1]
         shapes = close_pairs(low, high, own.body, self.fixed[own.body])
         key = _pair_key(shapes, len(own.body))
         order = np.argsort(key)
         shapes, key = shapes[order], key[order]
         limit = np.maximum(self.alert * own.shape_size[shapes].min(axis=1), self.distance)
         limit = limit + reach[shapes].sum(axis=1)
+        balls = round_[shapes].any(axis=1)
         hint = self._hints.of(key)
         kind, feature, axis = separating_axes(
-            shapes, limit, hint, own.vptr, placed.vertex, own.fptr, own.cptr, own.corner, placed.normal,
-            own.eptr, own.edge_a, own.edge_b, own.edge_face, placed.inside, own.shape_size,
+            shapes, np.where(balls, -np.inf, limit), hint, own.vptr, placed.vertex, own.fptr, own.cptr, own.corner,
+            placed.normal, own.eptr, own.edge_a, own.edge_b, own.edge_face, placed.inside, own.shape_size,
         )  # fmt: skip
         self._hints.key, self._hints.face = key, hint
-        return _Pairs(shapes, limit, kind, feature, axis)
+        return _Pairs(shapes, limit, balls, kind, feature, axis)
 
     def _flat_and_meshed(self, pairs: _Pairs, placed: Placed) -> NDArray[np.bool_]:
         """Pairs of flat faces of which one has finite elements."""
@@ -138,6 +144,14 @@ class Detector:
             own.vptr, placed.vertex, own.fptr, own.cptr, own.corner, placed.normal,
             own.eptr, own.edge_a, own.edge_b, own.shape_size, own.face_area,
         )  # fmt: skip
+        # the antagonist owns the reference face; edges lie on the faces that look along the axis
+        faces = (pairs.kind[found[:, 0]] != EDGES)[:, None]
+        feature = np.where(faces, pairs.feature[found[:, 0]][:, ::-1], -1)
+        if pairs.balls.any():
+            found_, frame_, nearest_, area_ = self._balls(pairs, placed)
+            found, frame = np.concatenate([found, found_]), np.concatenate([frame, frame_])
+            nearest, area = np.concatenate([nearest, nearest_]), np.concatenate([area, area_])
+            feature = np.concatenate([feature, np.full((len(found_), 2), -1)])
         pair, first = found[:, 0], found[:, 1]
         rows = np.arange(len(pair))
         shapes = pairs.shapes[pair]
@@ -147,11 +161,18 @@ class Detector:
         key = _pair_key(shapes, len(own.body)) + found[:, 2]
         weights = csr_array((2 * len(pair), nodes))
         if nodes:
-            # the antagonist owns the reference face; edges lie on the faces that look along the axis
-            edges = pairs.kind[pair] == EDGES
-            feature = np.where(edges[:, None], -1, pairs.feature[pair][:, ::-1])
             weights = surface_weights(own, placed, sides, feature, frame[:, 0], arm, nodes)
         return Contacts(body, key, frame, area, arm, weights)
+
+    def _balls(self, pairs: _Pairs, placed: Placed) -> tuple[Ints, Array, Array, Array]:
+        """As `interface_points`, of the pairs in which a ball takes part."""
+        own, balls = self.surfaces, np.flatnonzero(pairs.balls)
+        place, frame, nearest, area = ball_points(
+            pairs.shapes[balls], pairs.limit[balls], own.radius, placed.centre[own.body], placed.rotation[own.body],
+            placed.vertex, own.fptr, own.cptr, own.corner, placed.normal, own.eptr, own.edge_a, own.edge_b,
+        )  # fmt: skip
+        place[:, 0] = balls[place[:, 0]]
+        return place, frame, nearest, area
 
 
 def _place(surfaces: Surfaces, state: State) -> Placed:

@@ -47,6 +47,7 @@ class Surfaces:
     normal : (nf, 3) outward, body axes
     eptr, edge_a, edge_b : edges of each shape, as vertex indices
     edge_face : (ne, 2) the faces that meet in each edge
+    radius : (ns,) of balls, zero for polyhedra [m]
     shape_size : (ns,) smallest width of each shape [m]
     size : (nb,) smallest width of each body [m]
     face_area : (nf,) [m²]
@@ -65,6 +66,7 @@ class Surfaces:
     edge_a: Ints
     edge_b: Ints
     edge_face: Ints
+    radius: Array
     shape_size: Array
     size: Array
     face_area: Array
@@ -104,8 +106,9 @@ def surfaces(
     faces: Sequence[tuple[tuple[int, ...], ...]],
     face_mesh: Sequence[FaceMesh | None],
     body: Sequence[int],
+    radius: Sequence[float] = (),
 ) -> Surfaces:
-    """Pack shapes given by their corners (body axes), their faces and the body that each belongs to, in order."""
+    """Pack shapes given by corners (body axes), faces, the body each belongs to, in order; `radius` of balls, else 0."""
     vptr, fptr = _pointer([len(v) for v in vertices]), _pointer([len(group) for group in faces])
     corners = [start + np.asarray(face) for start, group in zip(vptr, faces, strict=False) for face in group]
     vertex = np.vstack(list(vertices))
@@ -117,7 +120,13 @@ def surfaces(
     packed = np.vstack(edges)
     owner = np.asarray(body, dtype=np.int64)
     sptr = _pointer(np.bincount(owner).tolist())
-    shape_size = np.array([smallest_width(v, group) for v, group in zip(vertices, faces, strict=True)])
+    radii = np.array(radius, dtype=float) if len(radius) else np.zeros(len(body))
+    shape_size = np.array(
+        [
+            2.0 * r if r > 0 else smallest_width(v, group)
+            for v, group, r in zip(vertices, faces, radii, strict=True)
+        ]
+    )
     return Surfaces(
         body=owner,
         sptr=sptr,
@@ -131,6 +140,7 @@ def surfaces(
         edge_a=np.ascontiguousarray(packed[:, 0]),
         edge_b=np.ascontiguousarray(packed[:, 1]),
         edge_face=np.ascontiguousarray(packed[:, 2:]),
+        radius=radii,
         shape_size=shape_size,
         size=np.minimum.reduceat(shape_size, sptr[:-1]),
         face_area=np.array([_area(p) for p in polygons]),

@@ -3,8 +3,10 @@
 from dataclasses import dataclass
 from functools import cached_property
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array, diags_array
 
 from mechanics.planar._kernels_sweep import (
     apply,
@@ -14,6 +16,7 @@ from mechanics.planar._kernels_sweep import (
     sweep,
     velocity_change,
 )
+from mechanics.problem import SparseForm
 from mechanics.solvers.colouring import greedy_colours
 
 __all__ = ["PlanarDelassus", "PlanarGaussSeidel"]
@@ -36,12 +39,14 @@ class PlanarDelassus:
     lever : (nc, 4) a × n and a × t of the candidate, then of the antagonist, with a from the body's centre to the
         contact point [m]
     inertia : (nb, 2) inverse mass and inverse moment of inertia; zero for fixed and driven bodies [1/kg, 1/(kg m²)]
+    threads : that may sweep at once, at most; the result is the same to the last bit
     """
 
     bodies: Ints
     normal: Array
     lever: Array
     inertia: Array
+    threads: int = 1
 
     @cached_property
     def diagonal(self) -> Array:
@@ -65,6 +70,27 @@ class PlanarDelassus:
         return result
 
     @cached_property
+    def sparse(self) -> SparseForm:
+        """The same W with sparse matrices: three velocities for each body that moves."""
+        moving = np.flatnonzero(self.inertia[:, 0] > 0)
+        place = np.full(len(self.inertia), -1)
+        place[moving] = np.arange(len(moving))
+        mass = 1.0 / self.inertia[moving][:, [0, 0, 1]]
+        tangent = np.column_stack([-self.normal[:, 1], self.normal[:, 0]])
+        frame = np.stack([self.normal, tangent], axis=1)
+        # (nc, side, row, component): both rows of Hᵀ for the candidate, and their negatives for the antagonist
+        rows = np.concatenate(
+            [np.repeat(frame[:, None], 2, axis=1), self.lever.reshape(-1, 2, 2)[..., None]], axis=-1
+        )
+        rows[:, 1] *= -1.0
+        c, s = np.nonzero(place[self.bodies] >= 0)
+        row = np.broadcast_to(2 * c[:, None, None] + np.arange(2)[:, None], (len(c), 2, 3))
+        column = np.broadcast_to(3 * place[self.bodies[c, s]][:, None, None] + np.arange(3), (len(c), 2, 3))
+        shape = (2 * len(self.bodies), 3 * len(moving))
+        across = csr_array((rows[c, s].ravel(), (row.ravel(), column.ravel())), shape=shape)
+        return SparseForm(diags_array(mass.ravel(), format="csc"), across.T.tocsc())
+
+    @cached_property
     def colouring(self) -> tuple[Ints, Ints]:
         """Contacts sorted by colour (nc,), and where each colour begins there."""
         colour = greedy_colours(self.bodies, self.inertia[:, 0] > 0)
@@ -75,7 +101,8 @@ class PlanarDelassus:
         """Sweeps on u = W r + shift with Coulomb's μ and the cohesion k, each (nc,)."""
         order, start = self.colouring
         record = records(order, shift, friction, cohesion, self.normal, self.lever, self.diagonal)
-        return PlanarGaussSeidel(order, start, record, self.bodies[order].astype(np.uint32), self.inertia)
+        bodies = self.bodies[order].astype(np.uint32)
+        return PlanarGaussSeidel(order, start, record, bodies, self.inertia, self.threads)
 
 
 @dataclass(frozen=True)
@@ -92,6 +119,7 @@ class PlanarGaussSeidel:
     record : (nc, 16) what the kernel needs of each contact, in that order
     bodies : (nc, 2) in that order
     inertia : (nb, 2) inverse masses and moments of inertia
+    threads : that may sweep at once, at most
     """
 
     order: Ints
@@ -99,7 +127,18 @@ class PlanarGaussSeidel:
     record: Array
     bodies: NDArray[np.uint32]
     inertia: Array
+    threads: int = 1
 
     def __call__(self, impulse: Array, sweeps: int) -> None:
         """Sweep `impulse` (nc, 2) in place."""
-        sweep(sweeps, impulse, self.order, self.record, self.bodies, self.inertia, self.start, _GRAIN)
+        arrays = impulse, self.order, self.record, self.bodies, self.inertia, self.start
+        threads = min(self.threads, numba.config.NUMBA_NUM_THREADS)
+        if threads == 1:
+            sweep(sweeps, *arrays, len(impulse) + 1)
+            return
+        before = numba.get_num_threads()
+        numba.set_num_threads(threads)
+        try:
+            sweep(sweeps, *arrays, _GRAIN)
+        finally:
+            numba.set_num_threads(before)

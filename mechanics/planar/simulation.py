@@ -147,8 +147,7 @@ class PlanarSimulation:
         if not np.isfinite(ahead).all() or 2.0 * ahead.max() <= scene.alert_distance * radius.min():
             return None
         wider = self._detector(kick, ahead)
-        operator = PlanarDelassus(wider.bodies, wider.normal, wider.lever, self.model.inertia)
-        gap = wider.gap + late * operator.relative_velocity(solved.velocity)[:, 0]
+        gap = wider.gap + late * self._operator(wider).relative_velocity(solved.velocity)[:, 0]
         new = ~np.isin(wider.key, solved.contacts.key)
         return wider if (gap[new] < 0).any() else None
 
@@ -200,10 +199,14 @@ class PlanarSimulation:
         problem = ContactProblem(operator, u_free, terms.bias, terms.friction, terms.cohesion)
         return _Stated(problem, acting, approach, terms, law)
 
+    def _operator(self, contacts: PlanarContacts) -> PlanarDelassus:
+        inertia, threads = self.model.inertia, self.model.scene.solver.threads
+        return PlanarDelassus(contacts.bodies, contacts.normal, contacts.lever, inertia, threads)
+
     def _solve(self, kick: PlanarState, free: Array, contacts: PlanarContacts, start: Memory) -> _Solved:
         """State the problem of these contacts, and solve it from the impulses in `start`."""
         with self.clock("assemble"):
-            operator = PlanarDelassus(contacts.bodies, contacts.normal, contacts.lever, self.model.inertia)
+            operator = self._operator(contacts)
             stated = self._state_laws(kick, contacts, operator, free, self._memory.recall(contacts.key)[1])
         with self.clock("solve"):
             solution = self._solution(stated, start.recall(contacts.key)[0])
@@ -223,7 +226,9 @@ class PlanarSimulation:
         whole = problem.delassus
         assert isinstance(whole, PlanarDelassus)
         some = ContactProblem(
-            PlanarDelassus(whole.bodies[acting], whole.normal[acting], whole.lever[acting], whole.inertia),
+            replace(
+                whole, bodies=whole.bodies[acting], normal=whole.normal[acting], lever=whole.lever[acting]
+            ),
             problem.u_free[acting],
             problem.bias[acting],
             problem.friction[acting],
