@@ -211,37 +211,41 @@ def _check_loads(model: Model) -> None:
 
 
 def _check(block: Block) -> None:
-    if block.radius is not None:
-        if block.parts or block.fidelity is Fidelity.DEFORMABLE:
-            raise SceneError(
-                "a ball is deformable or has parts",
-                where=f"stone {block.code}",
-                remedy="make it rigid, or a polyhedron",
-            )
-    if block.fidelity is Fidelity.DEFORMABLE and not (block.mesh_size is not None and block.mesh_size > 0):
-        raise SceneError(
+    deformable_ = block.fidelity is Fidelity.DEFORMABLE
+    wrong = (
+        (
+            block.radius is not None and (deformable_ or bool(block.parts)),
+            "a ball is deformable or has parts",
+            "make it rigid, or a polyhedron",
+        ),
+        (
+            deformable_ and not (block.mesh_size is not None and block.mesh_size > 0),
             f"mesh_size = {block.mesh_size!r} for a deformable stone",
-            where=f"stone {block.code}",
-            remedy="give metres greater than 0",
-        )
-    if block.fidelity is Fidelity.FIXED and any(block.velocity):
-        raise SceneError("a fixed stone has a velocity", where=f"stone {block.code}", remedy="make it rigid")
-    if block.parts and block.fidelity is Fidelity.DEFORMABLE:
-        raise SceneError(
+            "give metres greater than 0",
+        ),
+        (
+            deformable_ and bool(block.parts),
             "a deformable stone has several parts",
-            where=f"stone {block.code}",
-            remedy="make it rigid, or make each part a stone of its own",
-        )
-    if block.radius is not None:
-        return  # its facets are for pictures
-    faces = max(len(part.faces) for part in _parts(block))
-    corners = max(len(face) for part in _parts(block) for face in part.faces)
-    if faces > _MAX_FACES or corners > MAX_CORNERS:
-        raise GeometryError(
-            f"{faces} faces with up to {corners} corners",
-            where=f"stone {block.code}",
-            remedy=f"simplify it to at most {_MAX_FACES} faces with at most {MAX_CORNERS} corners each",
-        )
+            "make it rigid, or make each part a stone of its own",
+        ),
+        (
+            block.fidelity is Fidelity.FIXED and any(block.velocity),
+            "a fixed stone has a velocity",
+            "make it rigid",
+        ),
+    )
+    for is_wrong, what, remedy in wrong:
+        if is_wrong:
+            raise SceneError(what, where=f"stone {block.code}", remedy=remedy)
+    # the facets of a ball are for pictures
+    for part in _parts(block) if block.radius is None else ():
+        corners = max(len(face) for face in part.faces)
+        if len(part.faces) > _MAX_FACES or corners > MAX_CORNERS:
+            raise GeometryError(
+                f"{len(part.faces)} faces with up to {corners} corners",
+                where=f"stone {block.code}",
+                remedy=f"simplify it to at most {_MAX_FACES} faces with at most {MAX_CORNERS} corners each",
+            )
 
 
 def _inertia(blocks: tuple[Block, ...], properties: list[MassProperties], density: Array) -> RigidInertia:
