@@ -19,6 +19,7 @@ from mechanics.operators.mixed import MixedDelassus
 from mechanics.operators.rigid import RigidDelassus, schedule
 from mechanics.problem import ContactProblem
 from mechanics.scene import Block, ContactSettings, Fidelity, Part, Placement, Scene, TimeSettings
+from mechanics.solvers._kernels import local_factors, solve_contact
 from mechanics.state import State
 from mechanics.statement import state_laws
 from mechanics.stepping import compliances, free_kick
@@ -236,3 +237,12 @@ def posed(one, step=2e-3, theta=1.0):
         operator, lambda: sparse, free, np.zeros((len(contacts), STATE)), True,
     )  # fmt: skip
     return Posed(model, state, contacts, operator, compliance, statement.problem)
+
+
+def slow_pass(dense, r, shift, mu, cohesion, order):
+    """Gauss–Seidel with the dense W, contact by contact in a given order."""
+    for c in order:
+        rows = slice(3 * c, 3 * c + 3)
+        block = dense[rows, rows]
+        b = shift[c] + dense[rows] @ r.ravel() - block @ r[c]
+        solve_contact(local_factors(block[None])[0], b, mu[c], cohesion[c], r[c])

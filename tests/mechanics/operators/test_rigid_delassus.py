@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from mechanics.operators.rigid import RigidDelassus, schedule
-from mechanics.solvers._kernels import local_factors, solve_contact
-from tests.mechanics.shapes import brick, dense_operator, ground, pile, posed, scene
+from tests.mechanics.shapes import brick, dense_operator, ground, pile, posed, scene, slow_pass
 
 ROOT = Path(__file__).parents[3]
 
@@ -136,15 +135,6 @@ def random_start(one, seed=1):
     size = 1.0 / np.abs(one.operator.diagonal).mean()
     cohesion = size * rng.uniform(0, 0.5, count) * rng.integers(0, 2, count)
     return size * rng.normal(size=(count, 3)), shift, rng.uniform(0, 1, count), cohesion
-
-
-def slow_pass(dense, r, shift, mu, cohesion, order):
-    """Gauss–Seidel with the dense W, contact by contact in a given order."""
-    for c in order:
-        rows = slice(3 * c, 3 * c + 3)
-        block = dense[rows, rows]
-        b = shift[c] + dense[rows] @ r.ravel() - block @ r[c]
-        solve_contact(local_factors(block[None])[0], b, mu[c], cohesion[c], r[c])
 
 
 @pytest.mark.parametrize("count", [1, 2, 5])
