@@ -70,32 +70,30 @@ class PlanarDelassus:
         return result
 
     @cached_property
-    def sparse(self) -> SparseForm:
-        """The same W with sparse matrices: three velocities for each body that moves."""
-        moving = np.flatnonzero(self.inertia[:, 0] > 0)
-        place = np.full(len(self.inertia), -1)
-        place[moving] = np.arange(len(moving))
-        mass = 1.0 / self.inertia[moving][:, [0, 0, 1]]
-        tangent = np.column_stack([-self.normal[:, 1], self.normal[:, 0]])
-        frame = np.stack([self.normal, tangent], axis=1)
-        # (nc, side, row, component): both rows of Hᵀ for the candidate, and their negatives for the antagonist
-        rows = np.concatenate(
-            [np.repeat(frame[:, None], 2, axis=1), self.lever.reshape(-1, 2, 2)[..., None]], axis=-1
-        )
-        rows[:, 1] *= -1.0
-        c, s = np.nonzero(place[self.bodies] >= 0)
-        row = np.broadcast_to(2 * c[:, None, None] + np.arange(2)[:, None], (len(c), 2, 3))
-        column = np.broadcast_to(3 * place[self.bodies[c, s]][:, None, None] + np.arange(3), (len(c), 2, 3))
-        shape = (2 * len(self.bodies), 3 * len(moving))
-        across = csr_array((rows[c, s].ravel(), (row.ravel(), column.ravel())), shape=shape)
-        return SparseForm(diags_array(mass.ravel(), format="csc"), across.T.tocsc())
-
-    @cached_property
     def colouring(self) -> tuple[Ints, Ints]:
         """Contacts sorted by colour (nc,), and where each colour begins there."""
         colour = greedy_colours(self.bodies, self.inertia[:, 0] > 0)
         start = np.concatenate([[0], np.cumsum(np.bincount(colour))]).astype(np.int64)
         return np.argsort(colour, kind="stable"), start
+
+    def sparse(self) -> SparseForm:
+        """The same W with sparse matrices: three velocities for each body that moves."""
+        moving = np.flatnonzero(self.inertia[:, 0] > 0)
+        place = np.full(len(self.inertia), -1)
+        place[moving] = np.arange(len(moving))
+        n = self.normal
+        tangent = np.column_stack([-n[:, 1], n[:, 0]])
+        # rows of u_N and u_T: along n and t, and the levers
+        rows = np.stack([np.stack([n, tangent], axis=1)] * 2, axis=1)
+        rows = np.concatenate([rows, self.lever.reshape(-1, 2, 2, 1)], axis=-1)
+        rows[:, 1] *= -1.0
+        c, s = np.nonzero(place[self.bodies] >= 0)
+        row = 2 * c[:, None, None] + np.arange(2)[:, None] + np.zeros(3, dtype=np.int64)
+        column = 3 * place[self.bodies[c, s]][:, None, None] + np.zeros((2, 1), dtype=np.int64) + np.arange(3)
+        shape = (2 * len(n), 3 * len(moving))
+        across = csr_array((rows[c, s].ravel(), (row.ravel(), column.ravel())), shape=shape)
+        mass = 1.0 / self.inertia[moving][:, [0, 0, 1]].ravel()
+        return SparseForm(diags_array(mass, format="csc"), across.T.tocsc())
 
     def gauss_seidel(self, shift: Array, friction: Array, cohesion: Array) -> "PlanarGaussSeidel":
         """Sweeps on u = W r + shift with Coulomb's μ and the cohesion k, each (nc,)."""

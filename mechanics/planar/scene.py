@@ -129,7 +129,7 @@ class PlanarScene:
     rules : laws between two groups of bodies, by their codes; of two that name the same pair, the later holds
     alert_distance : gap below which a contact is watched, relative to the smaller radius [-]
     thickness : of the slice; masses and areas are for it [m]
-    time, solver : settings; the solver is Gauss–Seidel
+    time, solver : settings; the solver is Gauss–Seidel: contacts of disks open and slide all the time
     loads : what acts besides gravity; the plane is z = 0 of their space, moments and turns are about z
     frame_every : keep a frame of the motion every so many steps; 0 keeps the first and last only
     """
