@@ -12,6 +12,9 @@ __all__ = ["Residual", "natural_map", "project_on_cone", "residual"]
 
 Array = NDArray[np.float64]
 
+# of the impulse that would stop the fastest contact: less than this is none
+_NOTHING = 1e-8
+
 
 @dataclass(frozen=True)
 class Residual:
@@ -39,7 +42,8 @@ def residual(problem: ContactProblem, impulse: Array) -> Residual:
     """η = ‖e‖ / ‖r‖, e = r - P_K(r - ρ û), û = u + (bias + μ‖u_T‖) n and ρ = 1 / (mean diagonal of W).
 
     The de Saxcé form of Signorini–Coulomb (de Saxcé & Feng 1991; docs/theory.md §4); independent of units. Zero
-    without contacts; where no impulse is given but one is needed, the size of P_K(-ρ û) replaces ‖r‖, so η is 1.
+    without contacts; where no impulse is given but one is needed, the size of P_K(-ρ û) replaces ‖r‖, so η is 1; where
+    none is needed, rounding counts against 10⁻⁸ of the impulse that would stop the fastest u_free.
     """
     if len(impulse) == 0:
         return Residual(0.0, 0.0, np.zeros(0), np.zeros_like(impulse))
@@ -50,7 +54,8 @@ def residual(problem: ContactProblem, impulse: Array) -> Residual:
     error, whole, largest, size, projected = natural_errors(
         impulse, u, problem.bias, problem.friction, problem.cohesion, rho
     )
-    scale, pace = max(size, projected), float(np.abs(problem.u_free).max())
+    pace = float(np.abs(problem.u_free).max())
+    scale = max(size, projected, _NOTHING * rho * pace)
     return Residual(
         whole / scale if scale > 0 else 0.0,
         largest / rho / pace if pace > 0 else 0.0,

@@ -108,7 +108,7 @@ def surfaces(
     body: Sequence[int],
     radius: Sequence[float] = (),
 ) -> Surfaces:
-    """Pack shapes given by corners (body axes), faces, the body each belongs to, in order; `radius` of balls, else 0."""
+    """Pack shapes given by corners (body axes), faces, the body each belongs to, in order, and radii of balls."""
     vptr, fptr = _pointer([len(v) for v in vertices]), _pointer([len(group) for group in faces])
     corners = [start + np.asarray(face) for start, group in zip(vptr, faces, strict=False) for face in group]
     vertex = np.vstack(list(vertices))

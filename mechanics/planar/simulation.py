@@ -12,7 +12,9 @@ from mechanics.planar.delassus import PlanarDelassus
 from mechanics.planar.model import PlanarModel, PlanarState
 from mechanics.planar.stepping import Drive, fly, load_velocity
 from mechanics.problem import ContactProblem, ContactSolution, ContactStart
+from mechanics.scene import Method
 from mechanics.simulation import Clock
+from mechanics.solvers.alternating import moving_admm
 from mechanics.solvers.nsgs import NSGS
 from moma.errors import SolverError
 
@@ -95,7 +97,9 @@ class PlanarSimulation:
         self.model, self.start, self.state, self.clock = model, start, start, clock
         self._drive = Drive(model, start)
         self._detector = PlanarDetector(model)
-        self._solver = NSGS(solver.tolerance, solver.velocity_tolerance, solver.max_iterations)
+        # a sweep over disks costs a tenth of an iteration of ADMM: where they flow, many sweeps are the cheaper way
+        limits = solver.tolerance, solver.velocity_tolerance, solver.max_iterations
+        self._solver = moving_admm(*limits) if solver.method == Method.ADMM else NSGS(*limits)
         self._memory = Memory(2)
         self._first = True
 
@@ -196,7 +200,9 @@ class PlanarSimulation:
             pull = np.column_stack([terms.adhesion, np.zeros(len(contacts))])
             u_free -= operator.apply(pull)
         acting = np.isfinite(terms.bias)
-        problem = ContactProblem(operator, u_free, terms.bias, terms.friction, terms.cohesion)
+        problem = ContactProblem(
+            operator, u_free, terms.bias, terms.friction, terms.cohesion, operator.sparse
+        )
         return _Stated(problem, acting, approach, terms, law)
 
     def _operator(self, contacts: PlanarContacts) -> PlanarDelassus:
@@ -225,14 +231,16 @@ class PlanarSimulation:
             return self._solver(problem, start=ContactStart(shifted, start.velocity))
         whole = problem.delassus
         assert isinstance(whole, PlanarDelassus)
+        part_of = replace(
+            whole, bodies=whole.bodies[acting], normal=whole.normal[acting], lever=whole.lever[acting]
+        )
         some = ContactProblem(
-            replace(
-                whole, bodies=whole.bodies[acting], normal=whole.normal[acting], lever=whole.lever[acting]
-            ),
+            part_of,
             problem.u_free[acting],
             problem.bias[acting],
             problem.friction[acting],
             problem.cohesion[acting],
+            part_of.sparse,
         )
         part = self._solver(some, start=ContactStart(shifted[acting], start.velocity[acting]))
         impulse, velocity = np.zeros_like(shifted), np.zeros_like(shifted)

@@ -9,7 +9,7 @@ from mechanics.residual import residual
 from mechanics.solvers.admm import ADMM
 from mechanics.solvers.nsgs import NSGS
 
-__all__ = ["Alternating"]
+__all__ = ["Alternating", "moving_admm"]
 
 # sweeps with which every solution begins: near a solution they suffice
 _FIRST_SWEEPS = 20
@@ -21,6 +21,13 @@ _STATIC_PENALTY, _STATIC_ITERATIONS, _STATIC_PATIENCE = 1e-3, 60, 3.0
 _FURTHER = 0.03
 # where contacts open and slide: a larger penalty, balanced, and a shift that is held; for this share of the iterations
 _MOVING_PENALTY, _MOVING_HOLD, _MOVING_SHARE = 0.03, 10, 0.8
+
+
+def moving_admm(tolerance: float, velocity_tolerance: float, max_iterations: int) -> ADMM:
+    """ADMM for rigid bodies of which many slide or open."""
+    return ADMM(
+        tolerance, velocity_tolerance, max_iterations, _MOVING_PENALTY, hold=_MOVING_HOLD, balanced=True
+    )
 
 
 @dataclass(frozen=True)
@@ -63,7 +70,7 @@ class Alternating:
         best = self._better(best, static(problem, cold), problem)
         if not best.converged and self.max_iterations > best.iterations:
             count = int(_MOVING_SHARE * (self.max_iterations - best.iterations))
-            moving = ADMM(*limits, count, _MOVING_PENALTY, hold=_MOVING_HOLD, balanced=True)
+            moving = moving_admm(*limits, count)
             best = self._better(best, moving(problem, start), problem)
         return best if best.converged else self._rest(problem, best)
 

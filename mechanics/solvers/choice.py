@@ -2,7 +2,7 @@
 
 from mechanics.scene import Method, SolverSettings
 from mechanics.solvers.admm import ADMM
-from mechanics.solvers.alternating import Alternating
+from mechanics.solvers.alternating import Alternating, moving_admm
 from mechanics.solvers.nsgs import NSGS
 
 __all__ = ["choose_solver"]
@@ -15,6 +15,8 @@ def choose_solver(settings: SolverSettings, deformable: bool) -> NSGS | ADMM | A
     heavy.
     """
     limits = settings.tolerance, settings.velocity_tolerance, settings.max_iterations
+    if settings.method == Method.ADMM and not deformable:
+        return moving_admm(*limits)
     if settings.method == Method.ADMM or (settings.method == Method.AUTO and deformable):
         return ADMM(*limits)
     return NSGS(*limits) if settings.method == Method.NSGS else Alternating(*limits)
