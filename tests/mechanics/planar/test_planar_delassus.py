@@ -34,6 +34,16 @@ def test_products_are_those_of_the_dense_matrices(seed):
     )
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_the_sparse_form_is_the_same_w(seed):
+    arrays = random_problem(seed)
+    ht, compliance = dense(*arrays)
+    form = PlanarDelassus(*arrays).sparse()
+    inertia, lift = form.inertia.toarray(), form.lift.toarray()
+    np.testing.assert_allclose(lift.T @ np.linalg.inv(inertia) @ lift, ht @ compliance @ ht.T, atol=1e-12)
+    np.testing.assert_array_equal(form.across.toarray(), lift.T)
+
+
 def all_solutions(w, b, mu, k):
     """Every (r_N, r_T) with u = W r + b, 0 ≤ u_N ⊥ r_N ≥ 0 and Coulomb's law, by trying open, stick and both slips."""
     found = []
