@@ -58,7 +58,8 @@ class Disk:
 class Wall:
     """A straight segment, met from both sides; fixed unless a load moves it (`Loads.motions`).
 
-    A polyline is several walls that share end points. What rolls along it meets no end between two of them.
+    A polyline is several walls that share end points. What rolls along it meets no end between two of them. What comes
+    farther than its radius in a step may get through a wall if its law has restitution, which acts on closed contacts.
 
     Attributes
     ----------

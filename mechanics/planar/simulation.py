@@ -142,16 +142,15 @@ class PlanarSimulation:
     def _overlooked(self, kick: PlanarState, solved: _Solved) -> PlanarContacts | None:
         """A wider look, if something that was not watched comes to overlap by what the impulses did; else None.
 
-        A disk that is hit may leave faster than anything came, and reach within the step what seemed far away.
+        A disk that is hit may leave faster than anything came, and reach until the next kick what seemed far away.
         """
-        scene, radius = self.model.scene, self.model.radius
-        late = scene.time.step * scene.time.theta
+        scene, radius, h = self.model.scene, self.model.radius, self.model.scene.time.step
         change = (solved.velocity - kick.velocity)[: len(radius), :2]
-        ahead = late * np.hypot(change[:, 0], change[:, 1])
+        ahead = h * np.hypot(change[:, 0], change[:, 1])
         if not np.isfinite(ahead).all() or 2.0 * ahead.max() <= scene.alert_distance * radius.min():
             return None
         wider = self._detector(kick, ahead)
-        gap = wider.gap + late * self._operator(wider).relative_velocity(solved.velocity)[:, 0]
+        gap = wider.gap + h * self._operator(wider).relative_velocity(solved.velocity)[:, 0]
         new = ~np.isin(wider.key, solved.contacts.key)
         return wider if (gap[new] < 0).any() else None
 
