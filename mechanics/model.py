@@ -16,7 +16,7 @@ from mechanics.loads.load import Force, Motion
 from mechanics.meshing.mesh import TetMesh
 from mechanics.meshing.mesher import mesh_block
 from mechanics.polyhedra import MassProperties, mass_properties, united
-from mechanics.scene import Block, Fidelity, Part, Scene
+from mechanics.scene import Block, Fidelity, LawRule, Part, Scene
 from mechanics.state import State
 from moma.errors import GeometryError, SceneError
 
@@ -115,7 +115,7 @@ def build_model(scene: Scene, progress: Callable[[int, int], None] | None = None
         forces=tuple((force, _indices(scene, force.stones)) for force in scene.loads.forces),
         laws=law_table(
             scene.contact.law,
-            [(_mask(scene, rule.first), _mask(scene, rule.second), rule.law) for rule in scene.contact.rules],
+            [(*_groups(scene, rule), rule.law) for rule in scene.contact.rules],
             len(blocks),
         ),
         inertia=_inertia(blocks, properties, density),
@@ -168,19 +168,25 @@ def _mesh_of(stone: Deformable | None) -> TetMesh | None:
 
 
 def _indices(scene: Scene, codes: frozenset[str]) -> Ints:
-    known = [block.code for block in scene.blocks]
-    missing = sorted(codes.difference(known))
+    _check_codes(scene, codes, "a load")
+    return np.array([b for b, block in enumerate(scene.blocks) if block.code in codes], dtype=np.int64)
+
+
+def _groups(scene: Scene, rule: LawRule) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    _check_codes(scene, rule.first | rule.second, "a law")
+    codes = [block.code for block in scene.blocks]
+    first, second = (np.array([code in group for code in codes]) for group in (rule.first, rule.second))
+    return first, second
+
+
+def _check_codes(scene: Scene, codes: frozenset[str], who: str) -> None:
+    missing = sorted(codes.difference(block.code for block in scene.blocks))
     if missing:
         raise SceneError(
-            f"a load names {', '.join(missing[:5])}",
+            f"{who} names {', '.join(missing[:5])}",
             where=scene.name,
             remedy="give codes of blocks of the scene",
         )
-    return np.array([b for b, code in enumerate(known) if code in codes], dtype=np.int64)
-
-
-def _mask(scene: Scene, codes: frozenset[str]) -> NDArray[np.bool_]:
-    return np.array([block.code in codes for block in scene.blocks], dtype=bool)
 
 
 def _check_loads(model: Model) -> None:

@@ -181,9 +181,10 @@ class Simulation:
         self._memory.store(contacts.key, replace(solution, impulse=impulse), internal, touching.place)
         self._first = False
         u_before = local_velocity(contacts, operator, predicted.velocity, predicted.node_velocity)
-        fixed = np.where(model.fixed[:, None], kick.velocity, 0.0)
-        driving = local_velocity(contacts, operator, fixed, np.zeros_like(after.node))
         theta = self._theta
+        mean = theta * kick.velocity + (1 - theta) * predicted.velocity
+        driven = np.where(model.fixed[:, None], mean, 0.0)
+        driving = local_velocity(contacts, operator, driven, np.zeros_like(after.node))
         self.state, relaxed = self._relax(after)
         return Step(
             before=before,
