@@ -63,6 +63,17 @@ def test_the_python_of_the_readme_runs(place):
     assert done.stdout.startswith("W03-")
 
 
+def test_the_python_of_the_how_to_on_rigid_blocks_prints_what_it_says(place):
+    page = "docs/howto/rigid-blocks.md"
+    done = execute([sys.executable, "-W", "error", "-c", "\n".join(blocks(page, "python"))], place)
+    assert done.returncode == 0, done.stderr
+    said = "".join(blocks(page, "text")).splitlines()
+    energy = said.pop(1)
+    printed = done.stdout.splitlines()
+    assert float(printed.pop(1).split()[-1]) < 1e-12, energy
+    assert printed == said
+
+
 def test_the_links_of_the_pages_lead_somewhere():
     for page in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]:
         for link in re.findall(r"\]\(([^)#]+)", page.read_text(encoding="utf-8")):
