@@ -8,7 +8,7 @@ import numpy as np
 from mechanics.laws.dry_joint import DryJoint
 from mechanics.laws.law import Law
 from mechanics.loads.load import Loads
-from mechanics.scene import LawRule, Method, SolverSettings
+from mechanics.scene import LawRule, SolverSettings
 from moma.errors import SceneError
 
 __all__ = ["Disk", "PlanarScene", "PlanarTime", "Wall"]
@@ -130,7 +130,8 @@ class PlanarScene:
     rules : laws between two groups of bodies, by their codes; of two that name the same pair, the later holds
     alert_distance : gap below which a contact is watched, relative to the smaller radius [-]
     thickness : of the slice; masses and areas are for it [m]
-    time, solver : settings; the solver is Gauss–Seidel: contacts of disks open and slide all the time
+    time, solver : settings; *auto* is Gauss–Seidel here: contacts of disks open and slide all the time, and a sweep
+        over them is cheap. *admm* solves further where they come to rest
     loads : what acts besides gravity; the plane is z = 0 of their space, moments and turns are about z
     frame_every : keep a frame of the motion every so many steps; 0 keeps the first and last only
     """
@@ -164,8 +165,6 @@ class PlanarScene:
         ):
             if not ok:
                 raise SceneError(f"{quantity} = {value!r}", where=self.name, remedy=remedy)
-        if self.solver.method is Method.ADMM:
-            raise SceneError("admm in the plane", where=self.name, remedy="use nsgs")
         self._check_named(known)
 
     def _check_named(self, known: set[str]) -> None:

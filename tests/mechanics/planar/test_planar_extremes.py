@@ -34,7 +34,12 @@ def run(disks, walls=(FLOOR,), friction=0.5, step=1e-3, duration=0.2, theta=1.0,
 
 def column(count, radius=0.1, density=2400.0, top_density=None):
     return [
-        Disk(f"d{i}", (0.0, radius * (1 + 2 * i)), radius, (top_density or density) if i == count - 1 else density)
+        Disk(
+            f"d{i}",
+            (0.0, radius * (1 + 2 * i)),
+            radius,
+            (top_density or density) if i == count - 1 else density,
+        )
         for i in range(count)
     ]
 

@@ -9,7 +9,7 @@ from mechanics.loads.load import Loads
 from mechanics.loads.motions import ImposedMotion
 from mechanics.planar.model import build_planar_model
 from mechanics.planar.scene import Disk, PlanarScene, PlanarTime, Wall
-from mechanics.scene import LawRule, Method, SolverSettings
+from mechanics.scene import LawRule
 from moma.errors import SceneError
 
 DISK = Disk("d", (0.0, 1.0), 0.5)
@@ -44,10 +44,6 @@ def moves(*codes):
         (lambda: PlanarScene("s", (DISK,), thickness=0.0), "thickness"),
         (lambda: PlanarScene("s", (DISK,), gravity=(0.0, np.nan)), "gravity"),
         (lambda: PlanarScene("s", (DISK,), frame_every=-1), "frame_every"),
-        (
-            lambda: PlanarScene("s", (DISK,), solver=SolverSettings(Method.ADMM)),
-            "admm in the plane; use nsgs",
-        ),
         (
             lambda: PlanarScene(
                 "s", (DISK,), rules=(LawRule(frozenset({"x"}), frozenset({"d"}), DryJoint()),)

@@ -1,5 +1,7 @@
 """Steps of the plane: loads, driven walls, energy, rest, and what must not depend on place, turn, order or threads."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from planar_shapes import ACCURATE, G, box, grid_of_disks
@@ -16,7 +18,7 @@ from mechanics.planar.scene import Disk, PlanarScene, PlanarTime, Wall
 from mechanics.planar.simulate import simulate_planar
 from mechanics.planar.simulation import PlanarSimulation
 from mechanics.result import Outcome
-from mechanics.scene import LawRule
+from mechanics.scene import LawRule, Method
 from mechanics.simulation import Clock
 from moma.errors import SceneError, SolverError
 
@@ -265,6 +267,17 @@ def test_a_heap_at_rest_is_solved_from_what_is_remembered():
     assert result.history.iterations.max() > 50
     assert result.history.iterations[-4:].max() <= 20
     assert result.errors.reaction < 1e-7
+
+
+def test_admm_finds_the_rest_that_sweeps_find():
+    # where a heap of frictionless disks comes to rest does not depend on how its steps are solved
+    centres, radii = grid_of_disks(3, 2)
+    scene = box(centres, radii, friction=0.0, time=PlanarTime(2e-3, 1.0, 3.0, balance_tolerance=1e-6))
+    other = replace(scene, solver=replace(scene.solver, method=Method.ADMM, tolerance=1e-9))
+    swept, split = simulate_planar(scene), simulate_planar(other)
+    assert swept.outcome is split.outcome is Outcome.EQUILIBRIUM
+    assert split.errors.unconverged_steps == 0
+    np.testing.assert_allclose(split.position[:, :2], swept.position[:, :2], atol=1e-5 * radii.min())
 
 
 def heap(turn=0.0, shift=(0.0, 0.0), scale=1.0, order=None, mirror=False):
