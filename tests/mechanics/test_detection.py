@@ -1,5 +1,7 @@
 """Contacts between stones whose interfaces are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -209,6 +211,51 @@ def test_contacts_do_not_change_when_the_whole_scene_is_moved_turned_or_scaled(t
     found, found_soft = summary([moved(s, turn, shift, scale) for s in mixed()], scale)
     np.testing.assert_allclose(found, reference, atol=2e-8)
     assert found_soft == pytest.approx(soft, rel=1e-3)
+
+
+@pytest.mark.parametrize("points", [1, 4, 8])
+@pytest.mark.parametrize("seed", range(4))
+def test_contacts_do_not_change_when_the_stones_come_in_another_order(seed, points):
+    """A wall of boxes, some of them shifted and turned a little; as places, areas and normals on the upper stone."""
+    stones = bond()
+    order = np.random.default_rng(seed).permutation(len(stones))
+    reference = places(stones, points)
+    assert len(reference) == 37 * min(points, 4)
+    np.testing.assert_allclose(places([stones[k] for k in order], points), reference, atol=1e-9)
+
+
+def bond():
+    """Four courses in half-brick bond on the ground, with joints of different widths, and two bricks that stand out."""
+    stones = [ground((-1, -1, -1), (5, 2, 0))]
+    for z in range(4):
+        for x in range(4):
+            low = np.array([x + 0.5 * (z % 2), 0.05 * ((x + z) % 3), 0.5 * z])
+            stones.append(brick(f"{z}.{x}", low, low + np.array([0.99, 0.5, 0.5])))
+    return stones
+
+
+def places(stones, points):
+    """Codes of both stones, mean place, area and gap of every contact, in an order of their own."""
+    model, state, contacts = detected(scene(*stones), points)
+    codes = [block.code for block in model.scene.blocks]
+    number = {code: n for n, code in enumerate(sorted(codes))}
+    pair = np.sort([[number[codes[b]] for b in pair] for pair in contacts.bodies], axis=1)
+    middle = material_points(contacts, state).mean(axis=1)
+    rows = np.column_stack([pair, middle, contacts.area, gaps(contacts, state)])
+    return rows[np.lexsort(np.round(rows[:, [4, 3, 2, 1, 0]], 6).T)]
+
+
+@pytest.mark.parametrize("points", [1, 4, 8])
+def test_contacts_do_not_change_in_a_mirror(points):
+    def mirrored(block):
+        faces = tuple(face[::-1] for face in block.faces)
+        return replace(block, vertices=block.vertices * [-1, 1, 1], faces=faces)
+
+    reference = places(bond(), points)
+    found = places([mirrored(block) for block in bond()], points)
+    found[:, 2] *= -1
+    found = found[np.lexsort(np.round(found[:, [4, 3, 2, 1, 0]], 6).T)]
+    np.testing.assert_allclose(found, reference, atol=1e-9)
 
 
 def test_keys_stay_when_stones_move_a_little():
