@@ -275,28 +275,25 @@ def point_areas(x, y, count, area, mx, my, out):  # pragma: no cover - compiled
 
 @njit(cache=True)
 def _spread(x, y, count, wanted, chosen):
-    """`wanted` of the points, far from one another: the farthest from the middle, then farthest from those chosen."""
-    cx = cy = 0.0
+    """`wanted` corners of a convex polygon, in order: those that cut off least are left out, one after the other.
+
+    What a corner cuts off is the triangle with its two neighbours (Visvalingam & Whyatt 1993), so points on an edge go
+    first, and true corners stay.
+    """
     for p in range(count):
-        cx += x[p] / count
-        cy += y[p] / count
-    distance = np.empty(count)
-    pick, best = 0, -1.0
-    for p in range(count):
-        distance[p] = np.inf
-        d = (x[p] - cx) ** 2 + (y[p] - cy) ** 2
-        if d > best * (1.0 + 1e-6):
-            best, pick = d, p
-    for k in range(wanted):
-        chosen[k] = pick
-        best, following = -1.0, pick
-        for p in range(count):
-            d = (x[p] - x[pick]) ** 2 + (y[p] - y[pick]) ** 2
-            distance[p] = min(distance[p], d)
-            if distance[p] > best * (1.0 + 1e-6):
-                best, following = distance[p], p
-        pick = following
-    chosen[:wanted].sort()
+        chosen[p] = p
+    kept = count
+    while kept > wanted:
+        out, least = 0, np.inf
+        for p in range(kept):
+            a, b, c = chosen[p - 1 if p else kept - 1], chosen[p], chosen[p + 1 if p + 1 < kept else 0]
+            area = abs((x[b] - x[a]) * (y[c] - y[a]) - (x[c] - x[a]) * (y[b] - y[a]))
+            # of corners that cut off the same the first goes, whatever the rounding
+            if area < least * (1.0 - 1e-6):
+                out, least = p, area
+        for p in range(out, kept - 1):
+            chosen[p] = chosen[p + 1]
+        kept -= 1
 
 
 @njit(cache=True)
