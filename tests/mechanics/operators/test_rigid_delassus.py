@@ -189,7 +189,7 @@ def test_contacts_that_sleep_change_the_solution_by_less_than_their_tolerance(ca
     np.testing.assert_allclose(fast, slow, atol=1e-7 * np.abs(shift).max())
 
 
-def wall(courses=14, width=20):
+def wall(courses=12, width=17):
     """A dry wall of more than 2,000 contacts, pushed sideways."""
     stones = [ground((-1, -1, -1), (width + 1, 2, 0))]
     for z, x in itertools.product(range(courses), range(width)):
