@@ -9,7 +9,10 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from mechanics.contact.contacts import gaps, material_points
+from mechanics.contact.detection import Detector
+from mechanics.model import build_model
 from mechanics.scene import Fidelity
+from mechanics.simulation import Clock, Simulation
 from tests.mechanics.shapes import TURN, brick, detected, ground, moved, scene
 
 SOFT = Fidelity.DEFORMABLE
@@ -78,6 +81,29 @@ def test_a_gap_is_watched_up_to_the_alert_distance(fidelity, shift, count):
     # 5 % of the smallest width, 1 m
     _, _, contacts = detected(scene(ground(), brick("a", (0, 0, shift), (1, 1, 1 + shift), fidelity)))
     assert (len(contacts) > 0) == (count > 0)
+
+
+@pytest.mark.parametrize(("reach", "distance", "count"), [
+    (0.0, 0.0, 0), (0.26, 0.0, 4), (0.24, 0.0, 0), (0.0, 0.31, 4), (0.0, 0.29, 0), (0.1, 0.21, 4),
+])  # fmt: skip
+def test_a_gap_is_watched_farther_where_stones_are_fast_or_laws_reach_across_it(reach, distance, count):
+    """A gap of 0.3 m; 5 % of the smallest width, or the reach of a law, and how far the stone moves in the step."""
+    model, state = build_model(scene(ground(), brick("a", (0, 0, 0.3), (1, 1, 1.3))))
+    find = Detector(model.surfaces, model.fixed, 0.05, distance=distance)
+    assert len(find(state, np.array([0.0, reach]))) == count
+
+
+@pytest.mark.parametrize("speed", [1.0, 100.0])
+def test_a_fast_stone_does_not_fly_through_a_thin_one(speed):
+    """At 100 m/s it flies 1 m a step, ten times its width, at a plate of 0.2 m; inelastic, so it stops there."""
+    plate = brick("plate", (-1, -1, -0.2), (1, 1, 0), Fidelity.FIXED)
+    shot = brick("shot", (-0.05, -0.05, 1.234), (0.05, 0.05, 1.334), velocity=(0, 0, -speed, 0, 0, 0))
+    one = scene(plate, shot, gravity=(0, 0, 0), step=0.01, theta=0.5)
+    simulation = Simulation(*build_model(one), Clock())
+    for _ in range(int(1.5 / (0.01 * speed)) + 3):
+        step = simulation.step()
+    np.testing.assert_allclose(step.after.centre[1], [0, 0, 0.05], atol=1e-6)
+    np.testing.assert_allclose(step.after.velocity[1], 0.0, atol=1e-4 * speed)  # to the solver's tolerance
 
 
 def test_pairs_of_fixed_stones_are_left_out():
