@@ -29,6 +29,8 @@ _TABLE: Table = (
     ("contacts", "contacts", "d"),
     ("detection_ms", "detection ms", ".3g"),
     ("sweep_ns", "sweep ns per contact", ".3g"),
+    ("sliding", "of which slide", ".0%"),
+    ("stick_ns", "where all stick", ".3g"),
     ("step_ms", "step ms", ".3g"),
     ("step_ns", "step ns per contact", ".3g"),
     ("speedup_sweep", "{} threads: sweep", ".2f"),
@@ -115,6 +117,7 @@ def _derived(row: Row, threads: list[int]) -> Row:
     row |= {
         "detection_ms": 1e3 * row["detection"],
         "sweep_ns": 1e9 * row["sweep_1"] / contacts,
+        "stick_ns": 1e9 * row["sweep_stick"] / contacts,
         "step_ms": 1e3 * row["step_1"],
         "step_ns": 1e9 * row["step_1"] / contacts,
         "default_first_ms": 1e3 * row["default_first"],

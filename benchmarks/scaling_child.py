@@ -6,9 +6,9 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,7 +18,7 @@ from benchmarks.scenes import engine_scene
 from mechanics.contact.assembly import rigid_delassus
 from mechanics.contact.contacts import take
 from mechanics.model import build_model
-from mechanics.operators.rigid import schedule
+from mechanics.operators import rigid
 from mechanics.planar.contacts import PlanarDetector
 from mechanics.planar.delassus import PlanarDelassus
 from mechanics.planar.model import build_planar_model
@@ -35,6 +35,8 @@ Array = NDArray[np.float64]
 _STEP_SWEEPS = 50
 _REPEATS, _ENOUGH = 5, 0.2
 _DEFAULT_STEPS = 8
+# friction with which next to nothing slides
+_STICKING = 10.0
 
 
 @dataclass(frozen=True)
@@ -70,9 +72,10 @@ def main() -> None:
     parser.add_argument("--threads", type=int, nargs="+", default=[1])
     options = parser.parse_args()
     make = _wall if options.kind == "wall" else _disks
-    _once(make(4, 4), options.threads)  # compiles every kernel
+    for count in options.threads:  # compiles every kernel
+        _once(make(4, 4, count))
     before = peak_bytes()
-    case = make(options.across, options.high)
+    case = make(options.across, options.high, 1)
     contacts = len(case.u_free)
     row: dict[str, Any] = {
         "kind": options.kind,
@@ -81,41 +84,59 @@ def main() -> None:
         "bodies": case.bodies,
         "contacts": contacts,
     }
-    numba.set_num_threads(1)
     simulation = case.simulation()
     simulation.step()
     row["bytes_kept"] = arrays_bytes(simulation) / contacts
-    after = peak_bytes()
-    row["bytes_peak"] = None if after is None or before is None else (after - before) / contacts
-    row |= _times(case, options.threads)
-    numba.set_num_threads(1)
+    row["bytes_peak"] = _since(before, contacts)
+    del simulation
+    row["detection"] = _best(case.detect)[0]
+    cases = {count: make(options.across, options.high, count) for count in options.threads}
+    row |= _times(cases)
     row |= _default(case.default())
-    after = peak_bytes()
-    row["bytes_peak_default"] = None if after is None or before is None else (after - before) / contacts
+    row["bytes_peak_default"] = _since(before, contacts)
     json.dump(row, sys.stdout)
 
 
-def _once(case: _Case, threads: list[int]) -> None:
-    for count in threads:
-        numba.set_num_threads(count)
-        case.detect()
-        _sweeps(case, 2)
-        case.simulation().step()
+def _since(before: int | None, contacts: int) -> float | None:
+    """By how much the largest memory of this process has grown, for each contact."""
+    after = peak_bytes()
+    return None if after is None or before is None else (after - before) / contacts
+
+
+def _once(case: _Case) -> None:
+    case.detect()
+    _sweeps(case, 2)
+    case.simulation().step()
     case.default().step()
 
 
-def _times(case: _Case, threads: list[int]) -> dict[str, Any]:
-    row: dict[str, Any] = {"detection": _best(case.detect)[0]}
+def _times(cases: dict[int, _Case]) -> dict[str, Any]:
+    """Sweeps and whole steps, by number of threads."""
+    row: dict[str, Any] = {}
     impulses = []
-    for count in threads:
-        numba.set_num_threads(count)
+    for count, case in cases.items():
         sweep, impulse = _sweeps(case, _STEP_SWEEPS)
-        step = _best(lambda: case.simulation().step, prepared=True)
+        step = _best(partial(_ready, case), prepared=True)
         impulses.append(impulse)
         for name, (cpu, wall) in (("sweep", sweep), ("step", step)):
             row |= {f"{name}_{count}": cpu, f"{name}_wall_{count}": wall}
+    sticking, _ = _sweeps(cases[1], _STEP_SWEEPS, friction=_STICKING)
+    row["sweep_stick"] = sticking[0]
+    row["sliding"] = _sliding(impulses[0], cases[1].friction)
     row["same_bits"] = all(np.array_equal(one, impulses[0]) for one in impulses)
     return row
+
+
+def _sliding(impulse: Array, friction: float) -> float:
+    """Share of the contacts that slide."""
+    tangential, limit = np.linalg.norm(impulse[:, 1:], axis=1), friction * impulse[:, 0]
+    return float(np.mean((tangential >= limit * (1 - 1e-9)) & (limit > 0)))
+
+
+def _ready(case: _Case) -> Callable[[], Any]:
+    """The first step of a new simulation."""
+    step: Callable[[], Any] = case.simulation().step
+    return step
 
 
 def _default(simulation: Any) -> dict[str, float]:
@@ -148,10 +169,13 @@ def _best(run: Callable[[], Any], prepared: bool = False) -> tuple[float, float]
     return cpu, wall
 
 
-def _sweeps(case: _Case, count: int) -> tuple[tuple[float, float], Array]:
-    """Times of one sweep [s] near the solution, and the impulses after a fixed number of sweeps."""
+def _sweeps(case: _Case, count: int, friction: float | None = None) -> tuple[tuple[float, float], Array]:
+    """Times of one sweep over all contacts [s] near the solution, and the impulses after a fixed number of sweeps."""
     none = np.zeros(len(case.u_free))
-    sweep = case.operator.gauss_seidel(case.u_free, none + case.friction, none)
+    asleep, rigid._CALM = rigid._CALM, -1.0  # no contact sleeps: this is the cost of solving every one
+    mu = case.friction if friction is None else friction
+    sweep = case.operator.gauss_seidel(case.u_free, none + mu, none)
+    rigid._CALM = asleep
     impulse = np.zeros_like(case.u_free)
     sweep(impulse, count)
     early = impulse.copy()
@@ -159,15 +183,16 @@ def _sweeps(case: _Case, count: int) -> tuple[tuple[float, float], Array]:
     return (cpu / count, wall / count), early
 
 
-def _wall(bricks: int, courses: int) -> _Case:
+def _wall(bricks: int, courses: int, threads: int) -> _Case:
     blocks = running_bond(bricks, courses)
     scene = engine_scene(blocks, 1e-3, 0.5, 1e-300, _STEP_SWEEPS, sweeping=True)
+    scene = replace(scene, solver=replace(scene.solver, threads=threads))
     model, state = build_model(scene)
     usual = replace(model, scene=replace(scene, solver=SolverSettings()))
     find = detector(model)
     reach = np.zeros(len(model.mass))
     contacts = find(state, reach)
-    plan = schedule(contacts.bodies, model.inertia.moving)
+    plan = rigid.schedule(contacts.bodies, model.inertia.moving)
     operator = rigid_delassus(model, state, take(contacts, plan.order), plan)
     fall = np.zeros((len(model.mass), 6))
     fall[model.inertia.moving, 2] = -9.81e-3
@@ -182,13 +207,14 @@ def _wall(bricks: int, courses: int) -> _Case:
     )
 
 
-def _disks(columns: int, rows: int) -> _Case:
+def _disks(columns: int, rows: int, threads: int) -> _Case:
     scene = disk_box(columns, rows, sweeps=_STEP_SWEEPS)
+    scene = replace(scene, solver=replace(scene.solver, threads=threads))
     model, state = build_planar_model(scene)
     usual = replace(model, scene=replace(scene, solver=SolverSettings()))
     find = PlanarDetector(model)
     contacts = find(state)
-    operator = PlanarDelassus(contacts.bodies, contacts.normal, contacts.lever, model.inertia)
+    operator = PlanarDelassus(contacts.bodies, contacts.normal, contacts.lever, model.inertia, threads)
     fall = np.zeros((len(model.fixed), 3))
     fall[~model.fixed, 1] = -9.81e-4
     return _Case(
