@@ -167,7 +167,7 @@ class SolverSettings:
 
     method: Method = Method.AUTO
     tolerance: float = 1e-6
-    velocity_tolerance: float = 1e-4
+    velocity_tolerance: float = 1e-5
     max_iterations: int = 2000
     threads: int = 1
 

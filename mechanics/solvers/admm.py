@@ -47,7 +47,7 @@ class ADMM:
     """
 
     tolerance: float = 1e-6
-    velocity_tolerance: float = 1e-4
+    velocity_tolerance: float = 1e-5
     max_iterations: int = 2000
     penalty: float = 0.1
     check_every: int = 10

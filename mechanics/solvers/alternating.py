@@ -46,7 +46,7 @@ class Alternating:
     """
 
     tolerance: float = 1e-6
-    velocity_tolerance: float = 1e-4
+    velocity_tolerance: float = 1e-5
     max_iterations: int = 2000
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:

@@ -34,7 +34,7 @@ class NSGS:
     """
 
     tolerance: float = 1e-6
-    velocity_tolerance: float = 1e-4
+    velocity_tolerance: float = 1e-5
     max_iterations: int = 2000
     check_every: int = 20
     depth: int = 0
