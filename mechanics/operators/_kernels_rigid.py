@@ -168,7 +168,10 @@ def _solve_group(first, last, r, v, shift, mu, cohesion, factors, body, geometry
                 along = r0 + (d * r1 + e * r2) / w
                 t1 = u1 - d * along - h0 * r1 - h1 * r2
                 t2 = u2 - e * along - h1 * r1 - h2 * r2
-                s0, s1, s2 = slip(w, d, e, co, si, l1, l2, bn, t1, t2, mu[c], k)
+                held = r1 * r1 + r2 * r2
+                # λ = ‖u_T‖/‖r_T‖ where it slid before
+                guess = np.sqrt((u1 * u1 + u2 * u2) / held) if held > 0.0 else 0.0
+                s0, s1, s2 = slip(w, d, e, co, si, l1, l2, bn, t1, t2, mu[c], k, guess)
         r0, r1, r2 = s0 - r0, s1 - r1, s2 - r2
         if r0 == 0.0 and r1 == 0.0 and r2 == 0.0:
             continue

@@ -144,7 +144,8 @@ class RigidDelassus:
         Each call visits every contact at least once; those whose bodies hardly change then sleep until these do. The
         running velocities are made anew on each call, so that rounding cannot pile up.
         """
-        calm = _CALM * float(np.abs(shift).max(initial=0.0))
+        # what opens needs no impulse, however fast
+        calm = _CALM * max(float(np.abs(shift[:, 1:]).max(initial=0.0)), float(-shift[:, 0].min(initial=0.0)))
         threads = min(self.threads, numba.config.NUMBA_NUM_THREADS)
         parallel = len(self.schedule.colour) > 2 and threads > 1
 

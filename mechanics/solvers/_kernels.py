@@ -48,22 +48,23 @@ def plane_axes(a, b, d):  # pragma: no cover - compiled
 
 
 @njit(cache=True)
-def slip(nn, n1, n2, co, si, l1, l2, b0, b1, b2, mu, k):  # pragma: no cover - compiled
+def slip(nn, n1, n2, co, si, l1, l2, b0, b1, b2, mu, k, guess):  # pragma: no cover - compiled
     """The impulse of one contact that neither sticks nor is without any load: r_N ≥ 0 and ‖r_T‖ = μ r_N + k.
 
     Slip means u_T = -λ r_T with λ > 0, so r_T(λ) = -(A + λ)⁻¹ c and r_N(λ) = -(b_N + W_NT r_T)/W_NN. The value
     ‖r_T‖ - μ r_N⁺ - k changes its sign on (0, ∞), so the root is bracketed and Newton's method, kept inside the
-    bracket, finds it. Where it has no r_N > 0 there, cohesion is spent without pressure: r_N = 0 and ‖r_T‖ ≤ k.
+    bracket, finds it, beginning at λ = `guess` if that is positive. Where it has no r_N > 0 there, cohesion is spent
+    without pressure: r_N = 0 and ‖r_T‖ ≤ k.
     """
     if b0 < 0.0 or k > 0.0:
-        r0, r1, r2 = _slip_pressed(nn, n1, n2, co, si, l1, l2, b0, b1, b2, mu, k)
+        r0, r1, r2 = _slip_pressed(nn, n1, n2, co, si, l1, l2, b0, b1, b2, mu, k, guess)
         if r0 > 0.0 or k == 0.0:
             return r0, r1, r2
     return _slip_unpressed(nn, n1, n2, co, si, l1, l2, b1, b2, k)
 
 
 @njit(cache=True)
-def _slip_pressed(nn, n1, n2, co, si, l1, l2, b0, b1, b2, mu, k):
+def _slip_pressed(nn, n1, n2, co, si, l1, l2, b0, b1, b2, mu, k, guess):
     if mu == 0.0 and k == 0.0:
         return -b0 / nn, 0.0, 0.0
     c1, c2 = b1 - n1 * b0 / nn, b2 - n2 * b0 / nn
@@ -76,7 +77,9 @@ def _slip_pressed(nn, n1, n2, co, si, l1, l2, b0, b1, b2, mu, k):
         # even stuck it would have to be pulled
         return 0.0, 0.0, 0.0
     low, high = 0.0, -1.0
-    lam = np.sqrt(x1 * x1 + x2 * x2) * nn / (mu * max(-b0, 0.0) + k * nn) * 0.5
+    lam = guess
+    if not lam > 0.0:
+        lam = np.sqrt(x1 * x1 + x2 * x2) * nn / (mu * max(-b0, 0.0) + k * nn) * 0.5
     for _ in range(100):
         t1, t2 = -x1 / (l1 + lam), -x2 / (l2 + lam)
         n = -(b0 + m1 * t1 + m2 * t2) / nn
@@ -145,7 +148,7 @@ def solve_contact(f, b, mu, k, r):  # pragma: no cover - compiled
     limit = mu * r[0] + k
     if r[0] >= 0.0 and r[1] * r[1] + r[2] * r[2] <= limit * limit:
         return
-    r[0], r[1], r[2] = slip(f[9], f[10], f[11], f[12], f[13], f[14], f[15], b[0], b[1], b[2], mu, k)
+    r[0], r[1], r[2] = slip(f[9], f[10], f[11], f[12], f[13], f[14], f[15], b[0], b[1], b[2], mu, k, 0.0)
 
 
 @njit(cache=True)
