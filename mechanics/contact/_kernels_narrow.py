@@ -17,6 +17,8 @@ SEPARATED, FACE_FIRST, FACE_SECOND, EDGES = 0, 1, 2, 3
 # of the smaller shape's size: how much better the second shape's face, or two edges, must separate to be preferred,
 # so that the choice between features that are as good does not flicker
 _PREFERENCE = 1e-3
+# cosine of 10⁻⁶ rad: two faces flatter on one another are one plane
+_SAME_PLANE = 1.0 - 5e-13
 # faces flatter on one another than this need no look at edges
 _PARALLEL = 0.999999
 # of the smaller shape's size: closer to a side than this is on it, so that faces which end together clip cleanly
@@ -159,7 +161,14 @@ def separating_axes(
             hint[p] = face_j
             continue
         small = min(size[i], size[j])
-        use_i = gap_i >= gap_j - _PREFERENCE * small
+        alike = -(
+            normals[face_i, 0] * normals[face_j, 0]
+            + normals[face_i, 1] * normals[face_j, 1]
+            + normals[face_i, 2] * normals[face_j, 2]
+        )
+        # where the choice makes no difference the first, so that it does not flicker; else the better, so that
+        # nothing depends on the order of the stones
+        use_i = gap_i >= gap_j - (_PREFERENCE * small if alike > _SAME_PLANE else 0.0)
         face, other = (face_i, j) if use_i else (face_j, i)
         n0, n1, n2 = normals[face, 0], normals[face, 1], normals[face, 2]
         incident = _opposite_face(other, n0, n1, n2, fptr, normals)
