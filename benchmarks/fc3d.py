@@ -5,9 +5,6 @@ Siconos: of the file siconos.csv beside the problems, and live where an interpre
 """
 
 import argparse
-import csv
-import json
-import subprocess
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
+from benchmarks.siconos import Siconos
 from mechanics.operators.stored import StoredDelassus
 from mechanics.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.residual import project_on_cone
 from mechanics.solvers.admm import ADMM
 from mechanics.solvers.alternating import Alternating
 from mechanics.solvers.nsgs import NSGS
-from moma.errors import MissingLibraryError, UsageError
+from moma.errors import UsageError
 
 __all__ = ["main", "read_problem", "siconos_error"]
 
@@ -66,7 +64,7 @@ def main() -> None:
         raise UsageError(
             "no .npz problems", where=str(folder), remedy="see benchmarks/README.md for what one holds"
         )
-    known = _Siconos(folder / "siconos.csv", options)
+    known = Siconos(folder / "siconos.csv", options)
     _warm_up(options.solver)
     rows = [_row(path, options, known) for path in paths]
     if options.json:
@@ -200,7 +198,7 @@ def _warm_up(solver: str) -> None:
     _solve(problem, argparse.Namespace(solver=solver, max_iterations=200), 1e-10)
 
 
-def _row(path: Path, options: argparse.Namespace, known: "_Siconos") -> Row:
+def _row(path: Path, options: argparse.Namespace, known: Siconos) -> Row:
     progress(path.stem)
     problem = read_problem(path)
     found, strict = _both(problem, options)
@@ -230,80 +228,6 @@ def _row(path: Path, options: argparse.Namespace, known: "_Siconos") -> Row:
         "machine": machine(),
         "versions": environment("moma-masonry", "numba", "numpy", "scipy"),
     }
-
-
-class _Siconos:
-    """What Siconos reached: live, or as the file beside the problems says."""
-
-    def __init__(self, table: Path, options: argparse.Namespace) -> None:
-        self._options = options
-        self._rows: list[dict[str, str]] = []
-        self.source = "not there"
-        if options.siconos_python:
-            self._check()
-            self.source = f"live, {options.siconos_python}"
-        elif table.exists():
-            with table.open(newline="", encoding="utf-8") as file:
-                self._rows = [row for row in csv.DictReader(file) if float(row["tol"]) == options.tolerance]
-            self.source = f"{table.name}, measured on another machine"
-
-    def figures(self, path: Path) -> Row:
-        """The fastest method that solved the problem, and the fastest NSGS."""
-        methods = self._live(path) if self._options.siconos_python else self._stored(path.stem)
-        solved = sorted((one for one in methods if one["solved"]), key=lambda one: one["cpu"])
-        sweeping = [one for one in solved if one["method"].startswith("NSGS")]
-        best, nsgs = next(iter(solved), None), next(iter(sweeping), None)
-        return {
-            "siconos_solved": len(solved),
-            "siconos_tried": len(methods),
-            "siconos_best": best and best["method"],
-            "siconos_best_cpu": best and best["cpu"],
-            "siconos_best_iterations": best and best["iterations"],
-            "siconos_nsgs": nsgs and nsgs["method"],
-            "siconos_nsgs_cpu": nsgs and nsgs["cpu"],
-            "siconos_nsgs_iterations": nsgs and nsgs["iterations"],
-        }
-
-    def _stored(self, name: str) -> list[Row]:
-        return [
-            {
-                "method": row["solver"],
-                "solved": row["solved"] == "1",
-                "iterations": int(row["iterations"] or 0),
-                "cpu": float(row["cpu_s"] or "nan"),
-            }
-            for row in self._rows
-            if row["problem"] == name
-        ]
-
-    def _live(self, path: Path) -> list[Row]:
-        options, child = self._options, Path(__file__).with_name("siconos_child.py")
-        command = [options.siconos_python, "-W", "ignore", str(child), str(path.resolve())]
-        command += [repr(options.tolerance), str(options.max_iterations)]
-        said: bytes
-        try:
-            said = subprocess.run(
-                command,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,
-                check=False,
-                timeout=options.siconos_limit,
-            ).stdout
-        except subprocess.TimeoutExpired as late:  # what had been solved by then counts
-            said = late.stdout or b""
-        lines = said.decode(errors="replace").splitlines()
-        return [json.loads(line.removeprefix("ROW ")) for line in lines if line.startswith("ROW ")]
-
-    def _check(self) -> None:
-        python = self._options.siconos_python
-        asked = [python, "-c", "import scipy.sparse, siconos.numerics"]
-        try:
-            found = subprocess.run(asked, check=False, capture_output=True).returncode == 0
-        except OSError:
-            raise UsageError("no such interpreter", where=f"--siconos-python {python}") from None
-        if not found:
-            remedy = "on Debian and Ubuntu, apt-get install python3-siconos python3-scipy"
-            raise MissingLibraryError("siconos.numerics cannot be imported", where=python, remedy=remedy)
 
 
 if __name__ == "__main__":

@@ -5,20 +5,15 @@ own with one thread, the two programs in turns. See benchmarks/README.md for wha
 """
 
 import argparse
-import os
-import subprocess
 import sys
-import tempfile
-from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.judge import Judge, Verdict
 from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
-from benchmarks.scenes import list_scenes, read_scene
-from benchmarks.trace import Trace, read_trace
-from moma.errors import MissingLibraryError, SolverError, UsageError
+from benchmarks.runs import Run, Runner, fastest, figures
+from benchmarks.scenes import list_scenes
+from moma.errors import UsageError
 
 __all__ = ["main"]
 
@@ -72,30 +67,6 @@ _RELAXED: Table = (
 # in these the run at the same accuracy must be no worse than LMGC90's
 _MATCHED = ("eta", "penetration", "drift", "balance")
 _TIGHTER = 10**0.5
-_INSTALL = (
-    "pip install compas_lmgc90, or name an interpreter that has it with --lmgc90-python, or use --ours-only"
-)
-
-
-@dataclass(frozen=True)
-class _Run:
-    """One side of a scene.
-
-    Attributes
-    ----------
-    first, step, total : processor time of the first step, median of the settled ones, and of all [s]
-    sweeps_first, sweeps : of the first step, median of the settled ones
-    verdict : how exact it was; None if only times were asked for
-    program : its name and version
-    """
-
-    first: float
-    step: float
-    total: float
-    sweeps_first: int
-    sweeps: float
-    verdict: Verdict | None
-    program: str
 
 
 def main() -> None:
@@ -162,39 +133,38 @@ class _Pair:
 
     def __init__(self, path: Path, options: argparse.Namespace) -> None:
         self._path, self._options = path, options
-        self._scene = read_scene(path)
-        self._judge = Judge(self._scene, options.step, options.theta)
+        self._runner = Runner(path, options)
 
     def rows(self) -> list[Row]:
         """One row, and one more for the accurate setting."""
         options = self._options
-        theirs = None if options.ours_only else self._lmgc90()
+        theirs = None if options.ours_only else self._runner.lmgc90()
         tolerance, ours = self._matched(theirs)
         for _ in range(options.repeats - 1):
-            theirs = None if theirs is None else _fastest(theirs, self._lmgc90())
-            ours = _fastest(ours, self._moma(tolerance))
+            theirs = None if theirs is None else fastest(theirs, self._runner.lmgc90())
+            ours = fastest(ours, self._runner.moma(tolerance))
         driven = None
         if theirs is not None and options.relaxation is not None:
-            driven = self._lmgc90(options.relaxation)
+            driven = self._runner.lmgc90(options.relaxation)
         rows = [self._row("same accuracy" if theirs else "given", tolerance, ours, theirs, driven)]
         if options.accurate:
             exact = options.accurate_tolerance
-            rows.append(self._row("accurate", exact, self._moma(exact), theirs, driven))
+            rows.append(self._row("accurate", exact, self._runner.moma(exact), theirs, driven))
         for row in rows:
-            fresh = self._moma(row["tolerance"], fresh=True)
+            fresh = self._runner.moma(row["tolerance"], fresh=True)
             row["ours_step_fresh"] = fresh.step
             row["ratio_step_fresh"] = None if theirs is None else theirs.step / fresh.step
         return rows
 
-    def _matched(self, theirs: _Run | None) -> tuple[float, _Run]:
+    def _matched(self, theirs: Run | None) -> tuple[float, Run]:
         """The loosest tolerance, from LMGC90's own η downwards, at which our run is nowhere less exact than its."""
         if self._options.tolerance is not None or theirs is None or theirs.verdict is None:
             tolerance = self._options.tolerance or 1e-4
-            return tolerance, self._moma(tolerance)
+            return tolerance, self._runner.moma(tolerance)
         goal = theirs.verdict
         tolerance = _rounded(min(goal.eta_first, goal.eta))
         while True:
-            ours = self._moma(tolerance)
+            ours = self._runner.moma(tolerance)
             assert ours.verdict is not None
             worse = [key for key in _MATCHED if getattr(ours.verdict, key) > getattr(goal, key)]
             if not worse or tolerance < self._options.accurate_tolerance:
@@ -202,76 +172,20 @@ class _Pair:
             progress(f"{self._path.stem}: at η = {tolerance:.1e} less exact in {', '.join(worse)}")
             tolerance /= _TIGHTER
 
-    def _moma(self, tolerance: float, fresh: bool = False) -> _Run:
-        options = self._options
-        more = [
-            "--tolerance",
-            repr(tolerance),
-            "--sweeps",
-            str(options.sweeps),
-            *(["--fresh"] if fresh else []),
-        ]
-        trace = self._child([sys.executable, "-m", "benchmarks.moma_child"], more, "MOMA")
-        return self._run(trace)
-
-    def _lmgc90(self, relaxation: float | None = None) -> _Run:
-        options, child = self._options, str(Path(__file__).with_name("lmgc90_child.py"))
-        _check_installed(options.lmgc90_python)
-        more = [] if relaxation is None else ["--relaxation", repr(relaxation)]
-        return self._run(self._child([options.lmgc90_python, child], more, "LMGC90"))
-
-    def _child(self, program: list[str], more: list[str], name: str) -> Trace:
-        """Run one side in its own process, single-threaded."""
-        options = self._options
-        progress(f"{self._path.stem}: {name} {' '.join(more)}")
-        with tempfile.TemporaryDirectory() as folder:
-            out = Path(folder) / "trace.npz"
-            common = ["--steps", str(options.steps), "--keep", str(min(options.settled, options.steps - 1))]
-            common += ["--step", repr(options.step), "--theta", repr(options.theta)]
-            done = subprocess.run(
-                [*program, str(self._path.resolve()), str(out), *common, *more],
-                cwd=Path(__file__).resolve().parents[1],
-                env=os.environ | _single_threaded(),
-                capture_output=True,
-                text=True,
-                check=False,
-            )
-            if not out.exists():
-                said = (done.stderr or done.stdout).strip().splitlines()
-                raise SolverError(
-                    f"{name} ended with code {done.returncode}: {said[-1] if said else 'no word'}",
-                    where=self._path.stem,
-                )
-            return read_trace(out)
-
-    def _run(self, trace: Trace) -> _Run:
-        settled = min(self._options.settled, len(trace.cpu) - 1)
-        return _Run(
-            first=float(trace.cpu[0]),
-            step=float(np.median(trace.cpu[-settled:])),
-            total=float(trace.cpu.sum()),
-            sweeps_first=int(trace.sweeps[0]),
-            sweeps=float(np.median(trace.sweeps[-settled:])),
-            verdict=self._judge(trace) if trace.kept else None,
-            program=trace.program,
-        )
-
-    def _row(
-        self, setting: str, tolerance: float, ours: _Run, theirs: _Run | None, driven: _Run | None
-    ) -> Row:
+    def _row(self, setting: str, tolerance: float, ours: Run, theirs: Run | None, driven: Run | None) -> Row:
         options = self._options
         assert ours.verdict is not None
         row: Row = {
             "scene": self._path.stem,
             "setting": setting,
-            "blocks": len(self._scene.vertices),
+            "blocks": len(self._runner.scene.vertices),
             "contacts": ours.verdict.contacts,
             "contacts_theirs": theirs.verdict.contacts if theirs and theirs.verdict else None,
             "tolerance": tolerance,
-            "size": self._judge.size,
+            "size": self._runner.judge.size,
         }
         for side, run in (("ours", ours), ("theirs", theirs)):
-            row |= {f"{side}_{key}": value for key, value in _figures(run).items()}
+            row |= {f"{side}_{key}": value for key, value in figures(run).items()}
         for key in ("step", "first", "total"):
             row[f"ratio_{key}"] = None if theirs is None else getattr(theirs, key) / getattr(ours, key)
         row |= {
@@ -289,50 +203,10 @@ class _Pair:
         return row
 
 
-def _figures(run: _Run | None) -> Row:
-    """What a row says of one side; the same keys whether it ran or not."""
-    keys = [key for key in Verdict.__dataclass_fields__ if key != "contacts"]
-    exact = asdict(run.verdict) if run and run.verdict else {}
-    figures: Row = {
-        key: getattr(run, key) if run else None
-        for key in ("step", "first", "total", "sweeps", "sweeps_first")
-    }
-    return figures | {key: exact.get(key) for key in keys}
-
-
-def _fastest(one: _Run, other: _Run) -> _Run:
-    """The same work done twice: the smaller times are less disturbed by the rest of the machine."""
-    return _Run(
-        min(one.first, other.first),
-        min(one.step, other.step),
-        min(one.total, other.total),
-        one.sweeps_first,
-        one.sweeps,
-        one.verdict,
-        one.program,
-    )
-
-
 def _rounded(value: float) -> float:
     """Down to one significant figure."""
     unit = 10.0 ** np.floor(np.log10(value))
     return float(np.floor(value / unit) * unit)
-
-
-def _single_threaded() -> dict[str, str]:
-    names = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-    return dict.fromkeys(names, "1")
-
-
-def _check_installed(python: str) -> None:
-    """Raise MissingLibraryError unless the interpreter has the package."""
-    asked = "import sys, importlib.util as u; sys.exit(0 if u.find_spec('compas_lmgc90') else 1)"
-    try:
-        found = subprocess.run([python, "-c", asked], check=False, capture_output=True).returncode == 0
-    except OSError:
-        raise UsageError("no such interpreter", where=f"--lmgc90-python {python}") from None
-    if not found:
-        raise MissingLibraryError("compas_lmgc90 is not installed", where=python, remedy=_INSTALL)
 
 
 if __name__ == "__main__":
