@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.reference import Siconos
 from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
-from benchmarks.siconos import Siconos
 from mechanics.operators.stored import StoredDelassus
 from mechanics.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.residual import project_on_cone

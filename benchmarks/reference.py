@@ -7,7 +7,7 @@ import subprocess
 from pathlib import Path
 
 from benchmarks.report import Row
-from moma.errors import MissingLibraryError, UsageError
+from moma.errors import MissingLibraryError, SolverError, UsageError
 
 __all__ = ["Siconos"]
 
@@ -61,18 +61,19 @@ class Siconos:
         command = [options.siconos_python, "-W", "ignore", str(child), str(path.resolve())]
         command += [repr(options.tolerance), str(options.max_iterations)]
         said: bytes
+        complaint = b""
         try:
-            said = subprocess.run(
-                command,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,
-                check=False,
-                timeout=options.siconos_limit,
-            ).stdout
+            done = subprocess.run(command, check=False, capture_output=True, timeout=options.siconos_limit)
+            said, complaint = done.stdout, done.stderr
         except subprocess.TimeoutExpired as late:  # what had been solved by then counts
             said = late.stdout or b""
         lines = said.decode(errors="replace").splitlines()
-        return [json.loads(line.removeprefix("ROW ")) for line in lines if line.startswith("ROW ")]
+        rows = [json.loads(line.removeprefix("ROW ")) for line in lines if line.startswith("ROW ")]
+        if not rows and complaint:
+            raise SolverError(
+                complaint.decode(errors="replace").splitlines()[-1], where=f"Siconos on {path.stem}"
+            )
+        return rows
 
     def _check(self) -> None:
         python = self._options.siconos_python
