@@ -1,9 +1,19 @@
-"""Blocks and scenes of the validation cases."""
+"""Blocks, scenes and motions of the validation cases."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
+from mechanics.laws.dry_joint import DryJoint
 from mechanics.materials import Material
-from mechanics.scene import Block, Fidelity
+from mechanics.model import Model, build_model
+from mechanics.scene import Block, ContactSettings, Fidelity, Method, Scene, SolverSettings, TimeSettings
+from mechanics.simulation import Clock, Simulation, Step
+
+Array = NDArray[np.float64]
 
 FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
 CORNERS = np.array(
@@ -28,3 +38,237 @@ def tilted_gravity(degrees):
     """Gravity as a plane tilted by an angle about y feels it; x points down the slope."""
     angle = np.radians(degrees)
     return (G * float(np.sin(angle)), 0.0, -G * float(np.cos(angle)))
+
+
+def rotation(axis, degrees):
+    """The rotation matrix (3, 3) about an axis (3,) by an angle."""
+    x, y, z = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    angle = np.radians(degrees)
+    skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * skew + (1 - np.cos(angle)) * skew @ skew
+
+
+def moved(block, turn=None, shift=(0.0, 0.0, 0.0), *, scale=1.0, mirrored=False):
+    """A block scaled about the origin, mirrored in y, turned by `turn` (3, 3) and then shifted by `shift` (3,) [m].
+
+    Velocities go along as in a scene of the same gravity: lengths as `scale`, times as its root (Froude).
+    """
+    turn = np.eye(3) if turn is None else np.asarray(turn)
+    mirror = np.diag([1.0, -1.0 if mirrored else 1.0, 1.0])
+    linear, angular = np.array(block.velocity[:3]), np.array(block.velocity[3:])
+    # the rotation velocity is an axial vector
+    angular = np.linalg.det(mirror) * turn @ mirror @ angular / np.sqrt(scale)
+    linear = turn @ mirror @ linear * np.sqrt(scale)
+    return replace(
+        block,
+        vertices=scale * block.vertices @ mirror.T @ turn.T + np.asarray(shift),
+        faces=tuple(face[::-1] if mirrored else face for face in block.faces),
+        velocity=(*linear, *angular),
+    )
+
+
+def dynamic(
+    name,
+    blocks,
+    *,
+    friction=0.6,
+    restitution=0.0,
+    gravity=(0.0, 0.0, -G),
+    step=1e-3,
+    theta=0.5,
+    duration=1.0,
+    tolerance=1e-10,
+    max_iterations=2000,
+    method=Method.NSGS,
+    **settings,
+):
+    """A scene in true motion that does not stop before its time is over.
+
+    Few stones are solved soonest by sweeps alone; many want Method.AUTO.
+    """
+    return Scene(
+        name,
+        tuple(blocks),
+        gravity=tuple(gravity),
+        contact=ContactSettings(DryJoint(friction, restitution=restitution)),
+        time=TimeSettings(step, theta, duration, stop_at_equilibrium=False),
+        solver=SolverSettings(method, tolerance=tolerance, max_iterations=max_iterations),
+        **settings,
+    )
+
+
+@dataclass(frozen=True)
+class Path:
+    """A motion step by step; row 0 is the start.
+
+    Attributes
+    ----------
+    model : what moved
+    time : (n,) [s]
+    centre : (n, nb, 3) [m]
+    rotation : (n, nb, 3, 3) since the start [-]
+    velocity : (n, nb, 6) [m/s], [rad/s]
+    iterations : (n-1,) of the solver
+    natural_map : (n-1,) η after each solve [-]
+    gap : (n-1,) smallest at the end of each step [m]
+    support : (n-1, 3) sum of the contact forces of fixed bodies on the others [N]
+    bend : (n-1,) most energy that the curvature of the paths of held points can let in [J]: a point of arm R that is
+        held after a kick moves at h ω² R before the next, so a contact may work by ½ ‖r‖ h ω² R, of first order in h
+    last : the last step
+    """
+
+    model: Model
+    time: Array
+    centre: Array
+    rotation: Array
+    velocity: Array
+    iterations: Array
+    natural_map: Array
+    gap: Array
+    support: Array
+    bend: Array
+    last: Step
+
+    @property
+    def momentum(self) -> Array:
+        """Linear momentum of all bodies that move (n, 3) [N s]."""
+        mass = np.where(self.model.fixed, 0.0, self.model.mass)
+        return np.einsum("b,nbi->ni", mass, self.velocity[..., :3])
+
+    @property
+    def angular_momentum(self) -> Array:
+        """Angular momentum about the origin (n, 3) [N m s]."""
+        mass = np.where(self.model.fixed, 0.0, self.model.mass)
+        orbital = np.einsum("b,nbi->ni", mass, np.cross(self.centre, self.velocity[..., :3]))
+        return orbital + self.spin.sum(axis=1)
+
+    @property
+    def spin(self) -> Array:
+        """Angular momentum of each body about its own centre (n, nb, 3) [N m s]."""
+        inertia = np.where(self.model.fixed[:, None, None], 0.0, self.model.inertia.inertia)
+        local = np.einsum("nbji,nbj->nbi", self.rotation, self.velocity[..., 3:])
+        return np.einsum("nbij,bjk,nbk->nbi", self.rotation, inertia, local)
+
+    @property
+    def kinetic(self) -> Array:
+        """Kinetic energy (n,) [J]."""
+        mass = np.where(self.model.fixed, 0.0, self.model.mass)
+        linear = np.einsum("b,nbi,nbi->n", mass, self.velocity[..., :3], self.velocity[..., :3])
+        return 0.5 * (linear + np.einsum("nbi,nbi->n", self.spin, self.velocity[..., 3:]))
+
+    @property
+    def potential(self) -> Array:
+        """Energy of the weight (n,) [J]."""
+        mass = np.where(self.model.fixed, 0.0, self.model.mass)
+        return -np.einsum("b,nbi,i->n", mass, self.centre, self.model.scene.gravity)
+
+    @property
+    def made(self) -> Array:
+        """Energy gained in each step beyond `bend` (n-1,), which nothing may give [J]."""
+        gained: Array = np.diff(self.kinetic + self.potential) - self.bend
+        return gained
+
+    def corners(self, body) -> Array:
+        """The corners of a body (n, nv, 3) [m]."""
+        start = self.model.scene.blocks[body].vertices - self.centre[0, body]
+        return self.centre[:, None, body] + np.einsum("nij,vj->nvi", self.rotation[:, body], start)
+
+
+def follow(scene: Scene, until: Callable[[Step], bool] | None = None) -> Path:
+    """Run a scene step by step for its duration, or until `until` is true of a step, and keep the whole motion."""
+    model, state = build_model(scene)
+    simulation = Simulation(model, state, Clock())
+    states, rows = [state], []
+    for _ in range(round(scene.time.duration / scene.time.step)):
+        step = simulation.step()
+        states.append(step.after)
+        bodies = step.contacts.bodies
+        sign = model.fixed[bodies[:, 1]].astype(float) - model.fixed[bodies[:, 0]]
+        solution = step.solution
+        rows.append(
+            (
+                solution.iterations,
+                solution.natural_map,
+                np.min(step.gap, initial=np.inf),
+                *(sign @ step.force),
+                _bend(scene.time.step, step),
+            )
+        )
+        if until is not None and until(step):
+            break
+    table = np.array(rows)
+    return Path(
+        model,
+        np.array([s.time for s in states]),
+        np.array([s.centre for s in states]),
+        np.array([s.rotation for s in states]),
+        np.array([s.velocity for s in states]),
+        table[:, 0],
+        table[:, 1],
+        table[:, 2],
+        table[:, 3:6],
+        table[:, 6],
+        step,
+    )
+
+
+def _bend(duration, step):
+    """Σ ½ ‖r‖ h ω² R over the contacts of one step, both sides [J]."""
+    rates = np.maximum(*(np.sum(s.velocity[:, 3:] ** 2, axis=1) for s in (step.before, step.after)))
+    arms = np.linalg.norm(step.contacts.arm, axis=2)
+    pushes = np.linalg.norm(step.impulse, axis=1)
+    return 0.5 * duration * float(pushes @ (rates[step.contacts.bodies] * arms).sum(axis=1))
+
+
+def arch(count=15, radius=2.0, thickness=0.3, width=0.5):
+    """A semicircular arch of equal voussoirs about the y axis, on two fixed springers."""
+    angle = np.linspace(0.0, np.pi, count + 1)
+    inner, outer = radius - thickness / 2, radius + thickness / 2
+
+    def voussoir(code, a, b):
+        section = [(inner, b), (outer, b), (outer, a), (inner, a)]
+        flat = np.array([[r * np.cos(t), r * np.sin(t)] for r, t in section])
+        y = width / 2
+        vertices = np.array([[x, -y, z] for x, z in flat] + [[x, y, z] for x, z in flat])
+        # corner order of `box`: counter-clockwise below, then above, where "up" is y
+        return Block(code, vertices[:, [0, 1, 2]], _outward(vertices), STONE)
+
+    stones = [voussoir(f"V{i + 1}", angle[i], angle[i + 1]) for i in range(count)]
+    springers = [
+        box(
+            f"S{k}",
+            [np.sign(x) * radius - thickness, -width, -0.3],
+            [np.sign(x) * radius + thickness, width, 0.0],
+            fidelity=Fidelity.FIXED,
+        )
+        for k, x in enumerate((1.0, -1.0))
+    ]
+    return (*springers, *stones)
+
+
+def _outward(vertices):
+    """The faces of a hexahedron in the corner order of `box`, or turned inside out if its corners are mirrored."""
+    a, b, d = (vertices[i] - vertices[0] for i in (1, 3, 4))
+    mirrored = np.linalg.det([a, b, d]) < 0
+    return tuple(face[::-1] if mirrored else face for face in FACES)
+
+
+def wall(columns=5, courses=6, brick=(0.30, 0.15, 0.10)):
+    """A wall in running bond, with half bricks at the ends of every other course, on a fixed plinth."""
+    length, width, height = brick
+    plinth = box(
+        "plinth",
+        [-length, -width, -2 * height],
+        [(columns + 1) * length, 2 * width, 0.0],
+        fidelity=Fidelity.FIXED,
+    )
+    stones = []
+    for course in range(courses):
+        ends = np.arange(columns + 1.0) * length
+        if course % 2:
+            ends = np.concatenate([[0.0], ends[:-1] + length / 2, [columns * length]])
+        stones += [
+            box(f"W{course + 1}-{i + 1}", [a, 0.0, course * height], [b, width, (course + 1) * height])
+            for i, (a, b) in enumerate(pairwise(ends))
+        ]
+    return (plinth, *stones)
