@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -218,57 +217,3 @@ def _bend(duration, step):
     arms = np.linalg.norm(step.contacts.arm, axis=2)
     pushes = np.linalg.norm(step.impulse, axis=1)
     return 0.5 * duration * float(pushes @ (rates[step.contacts.bodies] * arms).sum(axis=1))
-
-
-def arch(count=15, radius=2.0, thickness=0.3, width=0.5):
-    """A semicircular arch of equal voussoirs about the y axis, on two fixed springers."""
-    angle = np.linspace(0.0, np.pi, count + 1)
-    inner, outer = radius - thickness / 2, radius + thickness / 2
-
-    def voussoir(code, a, b):
-        section = [(inner, b), (outer, b), (outer, a), (inner, a)]
-        flat = np.array([[r * np.cos(t), r * np.sin(t)] for r, t in section])
-        y = width / 2
-        vertices = np.array([[x, -y, z] for x, z in flat] + [[x, y, z] for x, z in flat])
-        # corner order of `box`: counter-clockwise below, then above, where "up" is y
-        return Block(code, vertices[:, [0, 1, 2]], _outward(vertices), STONE)
-
-    stones = [voussoir(f"V{i + 1}", angle[i], angle[i + 1]) for i in range(count)]
-    springers = [
-        box(
-            f"S{k}",
-            [np.sign(x) * radius - thickness, -width, -0.3],
-            [np.sign(x) * radius + thickness, width, 0.0],
-            fidelity=Fidelity.FIXED,
-        )
-        for k, x in enumerate((1.0, -1.0))
-    ]
-    return (*springers, *stones)
-
-
-def _outward(vertices):
-    """The faces of a hexahedron in the corner order of `box`, or turned inside out if its corners are mirrored."""
-    a, b, d = (vertices[i] - vertices[0] for i in (1, 3, 4))
-    mirrored = np.linalg.det([a, b, d]) < 0
-    return tuple(face[::-1] if mirrored else face for face in FACES)
-
-
-def wall(columns=5, courses=6, brick=(0.30, 0.15, 0.10)):
-    """A wall in running bond, with half bricks at the ends of every other course, on a fixed plinth."""
-    length, width, height = brick
-    plinth = box(
-        "plinth",
-        [-length, -width, -2 * height],
-        [(columns + 1) * length, 2 * width, 0.0],
-        fidelity=Fidelity.FIXED,
-    )
-    stones = []
-    for course in range(courses):
-        ends = np.arange(columns + 1.0) * length
-        if course % 2:
-            ends = np.concatenate([[0.0], ends[:-1] + length / 2, [columns * length]])
-        stones += [
-            box(f"W{course + 1}-{i + 1}", [a, 0.0, course * height], [b, width, (course + 1) * height])
-            for i, (a, b) in enumerate(pairwise(ends))
-        ]
-    return (plinth, *stones)

@@ -8,7 +8,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scenes import G, arch, dynamic, follow, moved, rotation, wall
+from masonry import bond, running_bond, semicircular_arch
+from scenes import G, dynamic, follow, moved, rotation
 
 from mechanics.scene import Method
 
@@ -22,6 +23,16 @@ def leaning(degrees):
     """Gravity of a table that leans by an angle towards +x."""
     angle = np.radians(degrees)
     return np.array([G * np.sin(angle), 0.0, -G * np.cos(angle)])
+
+
+def arch():
+    """Fifteen voussoirs, R = 2 m, 0.3 m thick."""
+    return semicircular_arch(15, 0.3, radius=2.0, depth=0.5)
+
+
+def wall():
+    """Five bricks of 0.3 × 0.15 × 0.1 m by six courses in running bond."""
+    return running_bond(bond(5, 6, halves_first=False), 0.3, 0.1, depth=0.15)
 
 
 # name → blocks, gravity, friction, duration: two stand and two move
