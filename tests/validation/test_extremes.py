@@ -264,7 +264,9 @@ def test_columns_stand_in_every_corner_of_the_matrix(count, ratio, friction, ste
     fall for one step.
     """
     if (count, ratio, step) == (100, 1e6, 1e-1):
-        reason = "no step is solved, and what the solver leaves moves the light stones enough to count as a fall"
+        reason = (
+            "no step is solved, and what the solver leaves moves the light stones enough to count as a fall"
+        )
         request.applymarker(pytest.mark.xfail(reason=reason, strict=True))
     scene = resting("matrix", column(count, ratio=ratio), friction=friction, step=step, duration=20 * step)
     result = simulate(scene)
