@@ -9,7 +9,7 @@ from scipy.sparse import csc_array, csr_array
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 from mechanics.materials import Material
-from mechanics.meshing.mesh import TetMesh
+from mechanics.meshing.mesh import SolidMesh
 
 __all__ = [
     "ElasticOperators",
@@ -43,7 +43,7 @@ class ElasticOperators:
     nodal_mass: Array
 
 
-def elastic_operators(mesh: TetMesh, material: Material) -> ElasticOperators:
+def elastic_operators(mesh: SolidMesh, material: Material) -> ElasticOperators:
     """Assemble M and K of the weak form ∫ρ v̇·w + ∫σ(u):ε(w) (Zienkiewicz & Taylor, vol. 1)."""
     basis = _basis(mesh)
     stiffness = linear_elasticity(*lame_parameters(material.young, material.poisson)).assemble(basis)
@@ -52,19 +52,19 @@ def elastic_operators(mesh: TetMesh, material: Material) -> ElasticOperators:
     return ElasticOperators(csc_array(mass), csc_array(stiffness), nodal_mass)
 
 
-def _basis(mesh: TetMesh) -> "skfem.Basis":
+def _basis(mesh: SolidMesh) -> "skfem.Basis":
     return skfem.Basis(
-        skfem.MeshTet(np.ascontiguousarray(mesh.nodes.T), np.ascontiguousarray(mesh.tetrahedra.T)),
+        skfem.MeshTet(np.ascontiguousarray(mesh.nodes.T), np.ascontiguousarray(mesh.cells.T)),
         skfem.ElementVector(skfem.ElementTetP1()),
         intorder=2,
     )
 
 
-def element_stress(mesh: TetMesh, material: Material, displacement: Array) -> Array:
+def element_stress(mesh: SolidMesh, material: Material, displacement: Array) -> Array:
     """Stress of each tetrahedron (nt, 6), order xx, yy, zz, xy, yz, zx [Pa], from nodal displacement (n, 3) [m]."""
-    corners = mesh.nodes[mesh.tetrahedra]
+    corners = mesh.nodes[mesh.cells]
     edges = corners[:, 1:] - corners[:, :1]
-    jumps = displacement[mesh.tetrahedra][:, 1:] - displacement[mesh.tetrahedra][:, :1]
+    jumps = displacement[mesh.cells][:, 1:] - displacement[mesh.cells][:, :1]
     gradient = np.linalg.solve(edges, jumps)  # rows: derivative along x, y, z of the displacement
     strain = 0.5 * (gradient + gradient.transpose(0, 2, 1))
     lam, mu = lame_parameters(material.young, material.poisson)
@@ -72,16 +72,16 @@ def element_stress(mesh: TetMesh, material: Material, displacement: Array) -> Ar
     return to_voigt(stress)
 
 
-def recovery(mesh: TetMesh) -> "csr_array[np.float64]":
+def recovery(mesh: SolidMesh) -> "csr_array[np.float64]":
     """Weights (n, nt) that give nodal values from those of the tetrahedra (superconvergent patch recovery).
 
     Around each node a linear polynomial is fitted by least squares to the values at the tetrahedra's centroids
     (Zienkiewicz & Zhu 1992). A patch that cannot carry the fit, as at a corner, is widened by its neighbours.
     """
-    nodes, count = len(mesh.nodes), len(mesh.tetrahedra)
-    centroid = mesh.nodes[mesh.tetrahedra].mean(axis=1)
+    nodes, count = len(mesh.nodes), len(mesh.cells)
+    centroid = mesh.nodes[mesh.cells].mean(axis=1)
     touches = csr_array(
-        (np.ones(4 * count), (mesh.tetrahedra.ravel(), np.repeat(np.arange(count), 4))), shape=(nodes, count)
+        (np.ones(4 * count), (mesh.cells.ravel(), np.repeat(np.arange(count), 4))), shape=(nodes, count)
     )
     wider = (touches @ touches.T) @ touches
     columns, weights = [], []

@@ -17,12 +17,18 @@ class Material:
     density : ρ [kg/m³]
     young : Young's modulus E [Pa]; not used by rigid blocks
     poisson : Poisson's ratio ν [-], 0 ≤ ν < 0.5
+    mass_damping, stiffness_damping : α [1/s] and β [s] of Rayleigh's damping V = α M + β K
+    tensile_strength, compressive_strength : both positive [Pa]; None: not known
     """
 
     name: str
     density: float
     young: float
     poisson: float
+    mass_damping: float = 0.0
+    stiffness_damping: float = 0.0
+    tensile_strength: float | None = None
+    compressive_strength: float | None = None
 
     def __post_init__(self) -> None:
         for quantity, ok, remedy in (

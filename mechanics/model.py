@@ -13,7 +13,7 @@ from mechanics.contact._kernels_narrow import MAX_CORNERS
 from mechanics.contact.surfaces import FaceMesh, Surfaces, surfaces
 from mechanics.laws.table import LawTable, law_table
 from mechanics.loads.load import Force, Motion
-from mechanics.meshing.mesh import TetMesh
+from mechanics.meshing.mesh import SolidMesh
 from mechanics.meshing.mesher import mesh_block
 from mechanics.polyhedra import MassProperties, mass_properties, united
 from mechanics.scene import Block, Fidelity, LawRule, Part, Scene
@@ -163,7 +163,7 @@ def _surfaces(
     )
 
 
-def _mesh_of(stone: Deformable | None) -> TetMesh | None:
+def _mesh_of(stone: Deformable | None) -> SolidMesh | None:
     return None if stone is None else stone.mesh
 
 
@@ -266,13 +266,14 @@ def _inertia(blocks: tuple[Block, ...], properties: list[MassProperties], densit
     )
 
 
-def _face_meshes(part: Part, mesh: TetMesh | None, start: int) -> list[FaceMesh | None]:
+def _face_meshes(part: Part, mesh: SolidMesh | None, start: int) -> list[FaceMesh | None]:
     if mesh is None:
         return [None] * len(part.faces)
     result: list[FaceMesh | None] = []
     for face in range(len(part.faces)):
-        node, triangle = np.unique(mesh.triangles[mesh.triangle_face == face], return_inverse=True)
-        result.append(FaceMesh(start + node, mesh.nodes[node], triangle.reshape(-1, 3).astype(np.int64)))
+        own = mesh.facets[mesh.facet_face == face]
+        node, facet = np.unique(own, return_inverse=True)
+        result.append(FaceMesh(start + node, mesh.nodes[node], facet.reshape(own.shape).astype(np.int64)))
     return result
 
 

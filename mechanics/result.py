@@ -54,7 +54,7 @@ class BodyResult:
     reference : (n, 3) points before the run: corners of a rigid block, mesh nodes of a deformable one [m]
     position : (n, 3) the same points now [m]
     faces : outward polygons on those points (the corners' polygons, or the mesh's boundary triangles)
-    tetrahedra : (nt, 4) node indices; empty for rigid and fixed blocks
+    cells : (nc, k) node indices of the finite elements, in VTK's order; empty for rigid and fixed blocks
     stress : (n, 6) recovered nodal stress xx, yy, zz, xy, yz, zx in world axes [Pa]; None if rigid
     von_mises : (n,) Von Mises stress of the recovered nodal stress [Pa]; None if rigid
     volume : [m³]
@@ -67,7 +67,7 @@ class BodyResult:
     reference: Array
     position: Array
     faces: tuple[tuple[int, ...], ...]
-    tetrahedra: Ints
+    cells: Ints
     stress: Array | None
     von_mises: Array | None
     volume: float

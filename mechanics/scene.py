@@ -10,6 +10,7 @@ from mechanics.laws.dry_joint import DryJoint
 from mechanics.laws.law import Law
 from mechanics.loads.load import Loads
 from mechanics.materials import Material
+from mechanics.meshing.elements import Element
 from moma.errors import SceneError
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "Placement",
     "Scene",
     "SolverSettings",
+    "Start",
     "TimeSettings",
 ]
 
@@ -58,6 +60,7 @@ class Block:
     material : density and elasticity
     fidelity : fixed, rigid or deformable
     mesh_size : target edge length of the finite elements [m]; only for deformable blocks
+    element : kind of its finite elements; hexahedra suit blocks with six faces of four corners
     velocity : (6,) initial translation [m/s] and rotation [rad/s] velocity; not for fixed blocks
     parts : convex parts that fill a non-convex stone without overlap; empty if it is convex. Not for deformable blocks
     radius : of a ball, whose surface is the sphere about the mean of its corners; corners and faces are for pictures
@@ -70,6 +73,7 @@ class Block:
     material: Material
     fidelity: Fidelity = Fidelity.RIGID
     mesh_size: float | None = None
+    element: Element = Element.TET4
     velocity: tuple[float, ...] = (0.0,) * 6
     parts: tuple[Part, ...] = ()
     radius: float | None = None
@@ -116,6 +120,13 @@ class ContactSettings:
             raise SceneError(f"points = {self.points!r}", where="contact", remedy="give 1, 3, 4 or 8")
 
 
+class Start(StrEnum):
+    """The state in which a run begins."""
+
+    REST = "rest"
+    EQUILIBRIUM = "equilibrium"
+
+
 @dataclass(frozen=True)
 class TimeSettings:
     """Time integration.
@@ -127,6 +138,9 @@ class TimeSettings:
     duration : longest simulated time [s]
     relaxation : kinetic damping: all velocities are set to zero each time the kinetic energy has passed a peak;
         leads to a static equilibrium soonest, but the way there is no longer the true motion
+    start : *rest*: all stones without stress, loads come at once; *equilibrium*: in the static equilibrium under the
+        loads of the first instant, found at once where there is one
+    lumped_mass : mass of deformable stones on the diagonal, instead of the consistent one
     stop_at_equilibrium : stop as soon as every block is at rest and in balance, or the scene has collapsed
     balance_tolerance : unbalanced force of a block over its weight below which it is in balance [-]
     collapse_displacement : a block that moved by more than this fraction of its smallest dimension
@@ -137,6 +151,8 @@ class TimeSettings:
     theta: float = 1.0
     duration: float = 1.0
     relaxation: bool = False
+    start: Start = Start.REST
+    lumped_mass: bool = False
     stop_at_equilibrium: bool = True
     balance_tolerance: float = 1e-4
     collapse_displacement: float = 0.5

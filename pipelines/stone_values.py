@@ -32,11 +32,11 @@ class StressStatistics:
 
 def node_volumes(body: BodyResult) -> Array:
     """(n,) volume that each node stands for: a quarter of every tetrahedron around it [m³]."""
-    corners = body.reference[body.tetrahedra]
+    corners = body.reference[body.cells]
     edges = corners[:, 1:] - corners[:, :1]
     quarter = np.abs(np.linalg.det(edges)) / 24.0
     return np.bincount(
-        body.tetrahedra.ravel(), weights=np.repeat(quarter, 4), minlength=len(body.reference)
+        body.cells.ravel(), weights=np.repeat(quarter, 4), minlength=len(body.reference)
     ).astype(np.float64)
 
 

@@ -96,7 +96,7 @@ def contact_grid(result: Result) -> Grid:
 def _cells_of(body: BodyResult, offset: int) -> tuple[list[list[int]], list[list[list[int]]], int]:
     """Cells, their faces, and the cell type of one stone."""
     if body.fidelity is Fidelity.DEFORMABLE:
-        tetrahedra = (body.tetrahedra + offset).tolist()
+        tetrahedra = (body.cells + offset).tolist()
         return tetrahedra, [[] for _ in tetrahedra], TETRAHEDRON
     polygons = [[node + offset for node in face] for face in body.faces]
     return [sorted({node for face in polygons for node in face})], [polygons], POLYHEDRON

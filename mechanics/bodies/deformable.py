@@ -8,7 +8,7 @@ In body axes, with d the displacement of the nodes from the undeformed stone, th
 turning stone keeps its strain small. Contacts touch the surface nodes alone: C = S ŵ Sᵀ is their compliance.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,7 @@ from mechanics.elasticity import (
     to_voigt,
 )
 from mechanics.materials import Material
-from mechanics.meshing.mesh import TetMesh
+from mechanics.meshing.mesh import SolidMesh
 
 __all__ = ["Deformable", "DynamicCompliance", "body_frame", "deformable", "dynamic_compliance"]
 
@@ -44,7 +44,7 @@ class Deformable:
     surface : (ns,) boundary nodes
     """
 
-    mesh: TetMesh
+    mesh: SolidMesh
     material: Material
     operators: ElasticOperators
     surface: Ints
@@ -65,12 +65,12 @@ class Deformable:
         return float(0.5 * d @ (self.operators.stiffness @ d))
 
 
-def deformable(mesh: TetMesh, material: Material) -> tuple[Deformable, Array]:
+def deformable(mesh: SolidMesh, material: Material) -> tuple[Deformable, Array]:
     """The elastic stone of a mesh, and its centre of mass (3,) [m]."""
     operators = elastic_operators(mesh, material)
     centre = operators.nodal_mass @ mesh.nodes / operators.nodal_mass.sum()
-    local = TetMesh(mesh.nodes - centre, mesh.tetrahedra, mesh.triangles, mesh.triangle_face)
-    return Deformable(local, material, operators, np.unique(mesh.triangles)), centre
+    local = replace(mesh, nodes=mesh.nodes - centre)
+    return Deformable(local, material, operators, np.unique(mesh.facets)), centre
 
 
 def body_frame(body: Deformable, node: Array) -> tuple[Array, Array]:

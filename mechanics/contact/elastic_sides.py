@@ -136,8 +136,8 @@ def _mortar(
     outline = (corners - origin) @ flat
     x_c = (_world(placed, candidate, mesh_c) - origin) @ flat
     x_a = outline if mesh_a is None else (_world(placed, antagonist, mesh_a) - origin) @ flat
-    t_a = np.zeros((0, 3), dtype=np.int64) if mesh_a is None else mesh_a.triangle
-    area, own, other, centre = mortar_integrals(x_c, mesh_c.triangle, x_a, t_a, outline)
+    t_a = np.zeros((0, 3), dtype=np.int64) if mesh_a is None else mesh_a.facet
+    area, own, other, centre = mortar_integrals(x_c, mesh_c.facet, x_a, t_a, outline)
     if area.sum() < thin * min(surfaces.face_area[face_c], surfaces.face_area[face_a]):
         return frame, []
     points = []
@@ -176,7 +176,7 @@ def _face_at(surfaces: Surfaces, placed: Placed, shape: int, direction: Array) -
 
 def _nearest_triangle(mesh: FaceMesh, arm: Array) -> tuple[Ints, Array]:
     """The nodes of the triangle that holds a point of the face (body axes), and its barycentric weights."""
-    corners = mesh.reference[mesh.triangle]
+    corners = mesh.reference[mesh.facet]
     a, b, r = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], arm - corners[:, 0]
     aa, bb, ab = (np.einsum("ti,ti->t", x, y) for x, y in ((a, a), (b, b), (a, b)))
     ra, rb = np.einsum("ti,ti->t", r, a), np.einsum("ti,ti->t", r, b)
@@ -184,10 +184,10 @@ def _nearest_triangle(mesh: FaceMesh, arm: Array) -> tuple[Ints, Array]:
     w1, w2 = (bb * ra - ab * rb) / det, (aa * rb - ab * ra) / det
     t = int(np.minimum(np.minimum(w1, w2), 1.0 - w1 - w2).argmax())
     weight = np.clip([1.0 - w1[t] - w2[t], w1[t], w2[t]], 0.0, 1.0)
-    return mesh.node[mesh.triangle[t]], weight / weight.sum()
+    return mesh.node[mesh.facet[t]], weight / weight.sum()
 
 
 def _fineness(surfaces: Surfaces, face: int) -> float:
     """Finite-element triangles per area of a face; zero if its body is rigid."""
     mesh = surfaces.face_mesh[face]
-    return 0.0 if mesh is None else len(mesh.triangle) / float(surfaces.face_area[face])
+    return 0.0 if mesh is None else len(mesh.facet) / float(surfaces.face_area[face])

@@ -16,18 +16,18 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class FaceMesh:
-    """The finite-element nodes and triangles on one face of a deformable body.
+    """The finite-element nodes and facets on one face of a deformable body.
 
     Attributes
     ----------
     node : (k,) nodes, numbered over all deformable bodies
     reference : (k, 3) their places in body axes [m]
-    triangle : (m, 3) indices into `node`
+    facet : (m, 3 | 6 | 4 | 8 | 9) indices into `node`, in VTK's order, corners first, counter-clockwise from outside
     """
 
     node: Ints
     reference: Array
-    triangle: Ints
+    facet: Ints
 
 
 @dataclass(frozen=True)

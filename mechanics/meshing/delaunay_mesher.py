@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
-from mechanics.meshing.mesh import TetMesh, tet_mesh
+from mechanics.meshing.mesh import SolidMesh, tet_mesh
 from mechanics.polyhedra import face_plane, fan
 
 __all__ = ["mesh_with_delaunay"]
@@ -16,7 +16,7 @@ Faces = tuple[tuple[int, ...], ...]
 _JITTER = 0.12
 
 
-def mesh_with_delaunay(vertices: Array, faces: Faces, size: float, code: str) -> TetMesh:
+def mesh_with_delaunay(vertices: Array, faces: Faces, size: float, code: str) -> SolidMesh:
     """Mesh one convex polyhedron with linear tetrahedra of edge length about `size` [m].
 
     Points are laid on the faces and on shrunken copies of them, each moved a little within the faces that it

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.meshing.mesh import TetMesh, tet_mesh
+from mechanics.meshing.mesh import SolidMesh, tet_mesh
 from moma.errors import MeshError, MissingLibraryError
 
 __all__ = ["mesh_with_gmsh"]
@@ -14,7 +14,7 @@ _SYSTEM_PACKAGES = "libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1"
 
 def mesh_with_gmsh(
     vertices: NDArray[np.float64], faces: tuple[tuple[int, ...], ...], size: float, code: str
-) -> TetMesh:
+) -> SolidMesh:
     """Mesh one polyhedron with linear tetrahedra of edge length about `size` [m].
 
     The model is built at unit size, so that gmsh's absolute tolerances mean the same for every stone, and in

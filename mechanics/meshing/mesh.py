@@ -1,35 +1,38 @@
-"""A tetrahedral mesh of one stone, and its boundary."""
+"""The mesh of one stone, and its boundary."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mechanics.meshing.elements import Element
 from mechanics.polyhedra import face_plane
 from moma.errors import MeshError
 
-__all__ = ["TetMesh", "boundary_triangles", "tet_mesh"]
+__all__ = ["SolidMesh", "boundary_triangles", "tet_mesh"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class TetMesh:
-    """Linear tetrahedra, with the boundary triangles that lie on each face of the stone.
+class SolidMesh:
+    """The finite elements of one stone, and the facets of its boundary; edges are straight, with nodes at their middle.
 
     Attributes
     ----------
+    element : kind of all cells
     nodes : (n, 3) [m]
-    tetrahedra : (nt, 4) node indices, positive volume
-    triangles : (ns, 3) boundary node indices, counter-clockwise seen from outside
-    triangle_face : (ns,) the stone's face that each boundary triangle lies on
+    cells : (nc, element.cell_nodes) node indices in VTK's order, positive volume
+    facets : (ns, element.facet_nodes) boundary node indices in VTK's order, corners counter-clockwise seen from outside
+    facet_face : (ns,) the stone's face that each boundary facet lies on
     """
 
+    element: Element
     nodes: Array
-    tetrahedra: Ints
-    triangles: Ints
-    triangle_face: Ints
+    cells: Ints
+    facets: Ints
+    facet_face: Ints
 
 
 def boundary_triangles(tetrahedra: Ints) -> Ints:
@@ -42,7 +45,7 @@ def boundary_triangles(tetrahedra: Ints) -> Ints:
 
 def tet_mesh(
     nodes: Array, tetrahedra: Ints, vertices: Array, faces: tuple[tuple[int, ...], ...], code: str
-) -> TetMesh:
+) -> SolidMesh:
     """Orient the tetrahedra, drop unused nodes, and tell which stone face each boundary triangle lies on.
 
     Raises
@@ -67,4 +70,4 @@ def tet_mesh(
             where=f"stone {code}",
             remedy="give a smaller mesh size, or make the stone's faces planar",
         )
-    return TetMesh(nodes, tetrahedra, triangles, triangle_face)
+    return SolidMesh(Element.TET4, nodes, tetrahedra, triangles, triangle_face)

@@ -4,14 +4,14 @@ import warnings
 
 from mechanics.meshing.delaunay_mesher import mesh_with_delaunay
 from mechanics.meshing.gmsh_mesher import mesh_with_gmsh
-from mechanics.meshing.mesh import TetMesh
+from mechanics.meshing.mesh import SolidMesh
 from mechanics.scene import Block
 from moma.errors import MissingLibraryError
 
 __all__ = ["mesh_block"]
 
 
-def mesh_block(block: Block) -> TetMesh:
+def mesh_block(block: Block) -> SolidMesh:
     """Linear tetrahedra of one deformable block, of edge length about its mesh size.
 
     Raises

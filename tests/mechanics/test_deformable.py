@@ -34,7 +34,7 @@ def test_centre_is_that_of_the_mass(mesh):
     stone, centre = deformable(mesh, LIMESTONE)
     np.testing.assert_allclose(centre, np.array([0.4, 0.25, 0.3]) @ TURN.T + 3.0, atol=1e-12)
     np.testing.assert_allclose(stone.operators.nodal_mass @ stone.mesh.nodes, 0, atol=1e-10)
-    np.testing.assert_array_equal(stone.surface, np.unique(mesh.triangles))
+    np.testing.assert_array_equal(stone.surface, np.unique(mesh.facets))
 
 
 vector = st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3)

@@ -52,7 +52,7 @@ def test_linear_displacement_gives_constant_stress_and_no_force_inside(mesh, ope
     found = element_stress(mesh, LIMESTONE, displacement)
     np.testing.assert_allclose(found, np.tile(to_voigt(stress), (len(found), 1)), atol=1e-10 * stress.max())
     force = (operators.stiffness @ displacement.ravel()).reshape(-1, 3)
-    inside = np.setdiff1d(np.arange(len(mesh.nodes)), mesh.triangles)
+    inside = np.setdiff1d(np.arange(len(mesh.nodes)), mesh.facets)
     assert len(inside) >= 3
     assert np.abs(force[inside]).max() < 1e-10 * np.abs(force).max()
 
@@ -60,11 +60,11 @@ def test_linear_displacement_gives_constant_stress_and_no_force_inside(mesh, ope
 def test_surface_forces_of_a_linear_displacement_are_the_tractions(mesh, operators):
     # each triangle passes a third of σ n A to each corner
     force = (operators.stiffness @ (mesh.nodes @ GRADIENT.T).ravel()).reshape(-1, 3)
-    a, b, c = (mesh.nodes[mesh.triangles[:, k]] for k in range(3))
+    a, b, c = (mesh.nodes[mesh.facets[:, k]] for k in range(3))
     traction = 0.5 * np.cross(b - a, c - a) @ hooke(GRADIENT) / 3
     expected = np.zeros_like(force)
     for k in range(3):
-        np.add.at(expected, mesh.triangles[:, k], traction)
+        np.add.at(expected, mesh.facets[:, k], traction)
     np.testing.assert_allclose(force, expected, atol=1e-10 * np.abs(expected).max())
 
 
@@ -95,7 +95,7 @@ def test_mass_is_that_of_the_stone_and_positive_definite(mesh, operators):
 
 def test_recovery_is_exact_for_stresses_that_vary_linearly(mesh):
     weights = recovery(mesh)
-    centroids = mesh.nodes[mesh.tetrahedra].mean(axis=1)
+    centroids = mesh.nodes[mesh.cells].mean(axis=1)
     field = np.array([3.0, -1.0, 2.0])
     np.testing.assert_allclose(weights @ (centroids @ field + 5), mesh.nodes @ field + 5, rtol=1e-9)
 

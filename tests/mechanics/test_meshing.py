@@ -23,7 +23,7 @@ STONE = box((0, 0, 0), (0.6, 0.4, 0.3)) @ TURN.T + 5.0
 
 
 def tetrahedron_volumes(mesh):
-    return np.linalg.det(mesh.nodes[mesh.tetrahedra[:, 1:]] - mesh.nodes[mesh.tetrahedra[:, :1]]) / 6
+    return np.linalg.det(mesh.nodes[mesh.cells[:, 1:]] - mesh.nodes[mesh.cells[:, :1]]) / 6
 
 
 def assert_fills(mesh, corners, faces):
@@ -32,16 +32,16 @@ def assert_fills(mesh, corners, faces):
     volumes = tetrahedron_volumes(mesh)
     assert volumes.sum() == pytest.approx(whole.volume, rel=1e-10)
     assert volumes.min() > 1e-9 * volumes.max()
-    assert set(mesh.tetrahedra.ravel()) == set(range(len(mesh.nodes)))
-    edges = [(t[k], t[(k + 1) % 3]) for t in mesh.triangles.tolist() for k in range(3)]
+    assert set(mesh.cells.ravel()) == set(range(len(mesh.nodes)))
+    edges = [(t[k], t[(k + 1) % 3]) for t in mesh.facets.tolist() for k in range(3)]
     assert len(set(edges)) == len(edges)
     assert {(b, a) for a, b in edges} == set(edges)
-    surface = mass_properties(mesh.nodes, mesh.triangles)
+    surface = mass_properties(mesh.nodes, mesh.facets)
     assert surface.volume == pytest.approx(whole.volume, rel=1e-10)
     for k, face in enumerate(faces):
         polygon = corners[list(face)]
         normal, origin = face_plane(polygon)
-        tri = mesh.nodes[mesh.triangles[mesh.triangle_face == k]]
+        tri = mesh.nodes[mesh.facets[mesh.facet_face == k]]
         np.testing.assert_allclose((tri - origin) @ normal, 0, atol=1e-9)
         local = polygon - origin
         area = 0.5 * np.cross(local, np.roll(local, -1, axis=0)).sum(axis=0) @ normal
@@ -82,13 +82,13 @@ def test_a_stone_always_gets_the_same_mesh(mesher):
     first = mesher(STONE, BOX_FACES, 0.15, "A1")
     mesher(box((0, 0, 0), (1, 1, 1)), BOX_FACES, 0.4, "another in between")
     second = mesher(STONE, BOX_FACES, 0.15, "A1")
-    for name in ("nodes", "tetrahedra", "triangles", "triangle_face"):
+    for name in ("nodes", "cells", "facets", "facet_face"):
         assert getattr(first, name).tobytes() == getattr(second, name).tobytes()
 
 
 @MESHERS
 def test_smaller_size_gives_more_tetrahedra(mesher):
-    counts = [len(mesher(STONE, BOX_FACES, size, "A1").tetrahedra) for size in (0.4, 0.2, 0.1)]
+    counts = [len(mesher(STONE, BOX_FACES, size, "A1").cells) for size in (0.4, 0.2, 0.1)]
     assert counts == sorted(set(counts))
 
 
@@ -98,7 +98,7 @@ def test_mesh_does_not_depend_on_the_unit_of_length(mesher, scale):
     one = mesher(STONE, BOX_FACES, 0.2, "A1")
     other = mesher(scale * STONE, BOX_FACES, scale * 0.2, "A1")
     # rounding may flip a diagonal, no more
-    assert len(other.tetrahedra) == pytest.approx(len(one.tetrahedra), rel=0.1)
+    assert len(other.cells) == pytest.approx(len(one.cells), rel=0.1)
     assert tetrahedron_volumes(other).sum() == pytest.approx(0.6 * 0.4 * 0.3 * scale**3, rel=1e-10)
 
 

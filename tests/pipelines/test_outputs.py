@@ -124,7 +124,7 @@ def test_paraview_files_hold_every_stone_and_the_last_frame_its_stress(mixed, tm
     elastic = mixed.bodies[1]
     assert last["Points"].shape == (8 + len(elastic.reference) + 8, 3)
     assert list(np.unique(last["types"])) == [10, 42]
-    assert np.count_nonzero(last["types"] == 10) == len(elastic.tetrahedra)
+    assert np.count_nonzero(last["types"] == 10) == len(elastic.cells)
     assert last["stone"].max() == 2
     assert np.isnan(first["von_mises"]).all()
     assert last["von_mises"][8:-8] == pytest.approx(elastic.von_mises)
