@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 from sqlalchemy.orm import Session
 
 from archmodel.records import StoneRecord
+from mechanics.meshing.elements import Element
 from mechanics.scene import Block, Fidelity, Scene
 from pipelines.joint_laws import law_rules
 from pipelines.scene_loads import build_loads, thrown
-from pipelines.scenefile import SceneFile
+from pipelines.scenefile import MeshSettings, SceneFile
 from pipelines.selection import Groups, StoneModel, select_groups, select_stones
 from survey.blocky import BlockyStone, simplify
 from survey.depth import Depth
@@ -66,7 +67,11 @@ def assemble_stones(scene: SceneFile, models: tuple[StoneModel, ...], groups: Gr
     if scene.joints is not None:
         closed = close_joints(simplified, scene.joints)
         solids, closing = closed.solids, closed.report
-    blocks = tuple(_block(model, solid, scene) for model, solid in zip(models, solids, strict=True))
+    meshes = _meshes(scene, groups)
+    blocks = tuple(
+        _block(model, solid, meshes.get(solid.code, scene.mesh))
+        for model, solid in zip(models, solids, strict=True)
+    )
     return Assembly(
         scene=_scene(scene, blocks, groups),
         models=models,
@@ -118,14 +123,28 @@ def _scene(scene: SceneFile, blocks: Sequence[Block], groups: Groups) -> Scene:
     )
 
 
-def _block(model: StoneModel, solid: Solid, scene: SceneFile) -> Block:
+def _meshes(scene: SceneFile, groups: Groups) -> dict[str, MeshSettings]:
+    """The meshes of the stones that an entry of [[meshes]] names; of two, the later counts."""
+    meshes: dict[str, MeshSettings] = {}
+    for entry in scene.meshes:
+        size, element = entry.values["size"], entry.values["element"]
+        for code in groups[entry.path][0]:
+            meshes[code] = MeshSettings(
+                scene.mesh.size if size is None else size,
+                scene.mesh.element if element is None else Element(element),
+            )
+    return meshes
+
+
+def _block(model: StoneModel, solid: Solid, mesh: MeshSettings) -> Block:
     return Block(
         code=solid.code,
         vertices=solid.vertices,
         faces=solid.faces,
         material=model.material,
         fidelity=model.fidelity,
-        mesh_size=scene.mesh_size if model.fidelity is Fidelity.DEFORMABLE else None,
+        mesh_size=mesh.size if model.fidelity is Fidelity.DEFORMABLE else None,
+        element=mesh.element,
     )
 
 

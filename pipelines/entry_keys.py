@@ -155,7 +155,7 @@ THROW_KEYS = (
     Key("spin", Kind.VECTOR, "Turning velocity about the axes x, y, z.", "°/s", (0.0, 0.0, 0.0)),
 )
 
-ARRAYS = ("laws", "loads", "throw")
+ARRAYS = ("meshes", "laws", "loads", "throw")
 
 # what may stand in the inline table of a history, besides time and value
 HISTORY_FILE = Key(

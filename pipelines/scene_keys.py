@@ -3,11 +3,22 @@
 from collections.abc import Mapping
 
 from mechanics.laws.dry_joint import DryJoint
-from mechanics.scene import ContactSettings, Fidelity, Method, Placement, SolverSettings, TimeSettings
+from mechanics.materials import Material
+from mechanics.meshing.elements import Element
+from mechanics.scene import (
+    Block,
+    ContactSettings,
+    Fidelity,
+    Method,
+    Placement,
+    SolverSettings,
+    Start,
+    TimeSettings,
+)
 from pipelines.schema import Key, Kind
 from survey.joint_lines import JointSettings
 
-__all__ = ["MATERIAL_KEYS", "PICTURES", "TABLES"]
+__all__ = ["MATERIAL_KEYS", "MESH_KEYS", "PICTURES", "TABLES"]
 
 PICTURES = ("von_mises", "displacement")
 
@@ -15,6 +26,31 @@ MATERIAL_KEYS = (
     Key("density", Kind.NUMBER, "Density ρ.", "kg/m³", above=0),
     Key("young", Kind.NUMBER, "Young's modulus E; only deformable stones use it.", "Pa", above=0),
     Key("poisson", Kind.NUMBER, "Poisson's ratio ν.", "-", at_least=0, below=0.5),
+    Key(
+        "mass_damping",
+        Kind.NUMBER,
+        "α of Rayleigh's damping V = α M + β K of deformable stones; it also slows their motion as a whole.",
+        "1/s",
+        Material.mass_damping,
+        at_least=0,
+    ),
+    Key(
+        "stiffness_damping",
+        Kind.NUMBER,
+        "β of Rayleigh's damping; it slows their deformation alone.",
+        "s",
+        Material.stiffness_damping,
+        at_least=0,
+    ),
+    Key("tensile_strength", Kind.NUMBER, "Tension that it bears; else no utilisation.", "Pa", None, above=0),
+    Key(
+        "compressive_strength",
+        Kind.NUMBER,
+        "Compression that it bears, positive; else no utilisation.",
+        "Pa",
+        None,
+        above=0,
+    ),
     Key(
         "stones",
         Kind.TEXTS,
@@ -145,7 +181,24 @@ _GRAVITY = (
     Key("direction", Kind.VECTOR, "Where things fall to; its length does not matter.", "-", (0.0, 0.0, -1.0)),
 )
 
-_MESH = (Key("size", Kind.NUMBER, "Target edge length of the finite elements.", "m", 0.2, above=0),)
+_ELEMENTS = tuple(one.value for one in Element)
+
+_MESH = (
+    Key("size", Kind.NUMBER, "Target edge length of the finite elements.", "m", 0.2, above=0),
+    Key(
+        "element",
+        Kind.TEXT,
+        "Their kind: tetrahedra (tet…) or hexahedra (hex…), of the first (tet4, hex8) or second order.",
+        default=Block.element.value,
+        choices=_ELEMENTS,
+    ),
+)
+
+MESH_KEYS = (
+    Key("stones", Kind.STONES, "Codes or expressions of the stones that are meshed otherwise."),
+    Key("size", Kind.NUMBER, "Target edge length; else that of `[mesh]`.", "m", None, above=0),
+    Key("element", Kind.TEXT, "Kind of element; else that of `[mesh]`.", default=None, choices=_ELEMENTS),
+)
 
 _TIME = (
     Key("step", Kind.NUMBER, "Time step h.", "s", TimeSettings.step, above=0),
@@ -164,6 +217,19 @@ _TIME = (
         Kind.BOOLEAN,
         "Kinetic damping: all velocities become zero when the kinetic energy has passed a peak.",
         default=TimeSettings.relaxation,
+    ),
+    Key(
+        "start",
+        Kind.TEXT,
+        "rest: all loads come at once; equilibrium: the stones already bear the loads of the first instant.",
+        default=TimeSettings.start.value,
+        choices=tuple(one.value for one in Start),
+    ),
+    Key(
+        "lumped_mass",
+        Kind.BOOLEAN,
+        "Mass of deformable stones at their nodes alone, not along the shape functions.",
+        default=TimeSettings.lumped_mass,
     ),
     Key(
         "stop_at_equilibrium",

@@ -14,18 +14,36 @@ import numpy as np
 
 from mechanics.laws.dry_joint import DryJoint
 from mechanics.materials import Material
-from mechanics.scene import ContactSettings, Fidelity, Method, Placement, SolverSettings, TimeSettings
+from mechanics.meshing.elements import Element
+from mechanics.scene import (
+    ContactSettings,
+    Fidelity,
+    Method,
+    Placement,
+    SolverSettings,
+    Start,
+    TimeSettings,
+)
 from moma.errors import SceneError
-from pipelines.entries import Entry
+from pipelines.entries import Entry, read_entries
 from pipelines.entry_keys import ARRAYS
 from pipelines.joint_laws import JointLaw, read_laws
-from pipelines.scene_keys import MATERIAL_KEYS, PICTURES, TABLES
+from pipelines.scene_keys import MATERIAL_KEYS, MESH_KEYS, PICTURES, TABLES
 from pipelines.scene_loads import read_loads, read_throws
 from pipelines.schema import Document, check_table, nearest
 from pipelines.toml_lines import key_lines
 from survey.joint_lines import JointSettings
 
-__all__ = ["Fidelities", "MaterialRule", "Output", "SceneFile", "Selection", "parse_scene", "read_scene"]
+__all__ = [
+    "Fidelities",
+    "MaterialRule",
+    "MeshSettings",
+    "Output",
+    "SceneFile",
+    "Selection",
+    "parse_scene",
+    "read_scene",
+]
 
 
 @dataclass(frozen=True)
@@ -56,6 +74,14 @@ class Fidelities:
 
 
 @dataclass(frozen=True)
+class MeshSettings:
+    """Finite elements of deformable stones: target edge length [m], and kind."""
+
+    size: float
+    element: Element
+
+
+@dataclass(frozen=True)
 class Output:
     """What to keep: a frame every so many steps (0: first and last), and the names of the pictures."""
 
@@ -74,7 +100,8 @@ class SceneFile:
     name : title
     joints : how joints are closed; None: they stay open
     gravity : (3,) acceleration [m/s²]
-    mesh_size : target edge length of the finite elements [m]
+    mesh : finite elements of deformable stones that no entry of `meshes` names
+    meshes : groups of stones that are meshed otherwise
     laws : of particular joints; the general law is in `contact`
     loads, throws : what acts besides gravity, and what begins in motion
     """
@@ -88,7 +115,8 @@ class SceneFile:
     joints: JointSettings | None
     contact: ContactSettings
     gravity: tuple[float, float, float]
-    mesh_size: float
+    mesh: MeshSettings
+    meshes: tuple[Entry, ...]
     time: TimeSettings
     solver: SolverSettings
     output: Output
@@ -135,7 +163,8 @@ def parse_scene(text: str, path: str) -> SceneFile:
         joints=_joints(**tables["joints"]),
         contact=_contact(document, **tables["contact"]),
         gravity=_gravity(document, **tables["gravity"]),
-        mesh_size=tables["mesh"]["size"],
+        mesh=MeshSettings(tables["mesh"]["size"], Element(tables["mesh"]["element"])),
+        meshes=read_entries(document, given, "meshes", {"mesh": MESH_KEYS}),
         time=_time(document, tables["time"]),
         solver=SolverSettings(**tables["solver"] | {"method": Method(tables["solver"]["method"])}),
         output=_output(document, **tables["output"]),
@@ -227,7 +256,7 @@ def _time(document: Document, values: dict[str, Any]) -> TimeSettings:
             "duration",
             remedy="give at least one step",
         )
-    return TimeSettings(**values)
+    return TimeSettings(**values | {"start": Start(values["start"])})
 
 
 def _output(document: Document, frame_every: int, pictures: tuple[str, ...]) -> Output:

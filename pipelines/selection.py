@@ -53,14 +53,14 @@ def select_stones(scene: SceneFile, session: Session) -> tuple[StoneModel, ...]:
 
 
 def select_groups(scene: SceneFile, session: Session, models: Sequence[StoneModel]) -> Groups:
-    """Which of the selected stones the laws, loads and throws of a scene name.
+    """Which of the selected stones the meshes, laws, loads and throws of a scene name.
 
     Raises
     ------
     SceneError : at the key whose expression cannot be understood or names no stone
     """
     records = {model.record.code: model.record for model in models}
-    entries = (*(one.entry for one in scene.laws), *scene.loads, *scene.throws)
+    entries = (*scene.meshes, *(one.entry for one in scene.laws), *scene.loads, *scene.throws)
     return {
         entry.path: tuple(
             frozenset(_named(scene, session, records, (*entry.path, key), items))

@@ -11,6 +11,7 @@ from mechanics.laws.cohesive_zone import CohesiveZone
 from mechanics.laws.dry_joint import DryJoint
 from mechanics.laws.lennard_jones import LennardJones
 from mechanics.laws.mortar import MortarJoint
+from mechanics.meshing.elements import Element
 from mechanics.polyhedra import mass_properties
 from mechanics.scene import Placement
 from moma.errors import SceneError
@@ -19,6 +20,7 @@ from pipelines.check import check_scene
 from pipelines.entry_keys import LAW_KEYS, LAW_TYPES, LOAD_TYPES, THROW_KEYS
 from pipelines.ingest import ingest
 from pipelines.joint_laws import law_rules
+from pipelines.scene_keys import MESH_KEYS
 from pipelines.scenefile import parse_scene
 from pipelines.toml_lines import key_lines
 from tests.pipelines.test_scenefile import default_text, message_of
@@ -153,6 +155,13 @@ def test_the_general_law_and_the_contact_points_are_those_of_the_contact_table()
             5,
             "unit = 'gal' is unknown",
         ),
+        ("[[meshes]]\nsize = 0.1\n", 1, "[[meshes]] has no 'stones'"),
+        ("[[meshes]]\nstones = ['S']\nsize = 0\n", 3, "give a number [m], greater than 0"),
+        (
+            "[[meshes]]\nstones = ['S']\nelement = 'hex9'\n",
+            3,
+            "element = 'hex9' is unknown; did you mean 'hex8'",
+        ),
         ("[[throw]]\nvelocity = [1, 0, 0]\n", 1, "[[throw]] has no 'stones'"),
         ("[[throw]]\nstones = ['S']\nvelocity = [1, 0]\n", 3, "not a list of three numbers"),
     ],
@@ -279,6 +288,7 @@ def test_tables_of_an_array_have_their_own_lines():
 def test_every_key_of_the_arrays_is_documented_with_its_unit_and_default():
     documented = (ROOT / "docs/scene.md").read_text(encoding="utf-8")
     for array, common, types in (
+        ("meshes", MESH_KEYS, {}),
         ("laws", LAW_KEYS, LAW_TYPES),
         ("loads", (), LOAD_TYPES),
         ("throw", THROW_KEYS, {}),
@@ -295,9 +305,9 @@ def test_every_key_of_the_arrays_is_documented_with_its_unit_and_default():
 def test_the_examples_of_the_documentation_are_valid():
     documented = (ROOT / "docs/scene.md").read_text(encoding="utf-8")
     examples = re.findall(r"^```toml\n(.*?)^```$", documented, re.MULTILINE | re.DOTALL)
-    assert len(examples) == 3
+    assert len(examples) == 4
     scene = parse_scene("\n".join(examples), "scene.toml")
-    assert len(scene.laws) == len(scene.loads) == 2
+    assert len(scene.meshes) == len(scene.laws) == len(scene.loads) == 2
 
 
 LOW = """
@@ -435,6 +445,27 @@ def test_what_does_not_suit_its_stones_is_named_with_its_line(build, text, line,
         build(text)
     assert str(caught.value).startswith(f"scene.toml:{line}: ")
     assert said in str(caught.value)
+
+
+def test_groups_of_stones_have_meshes_of_their_own_and_the_later_counts(build):
+    scene = build(
+        "deformable = ['course = 2']\n[mesh]\nsize = 0.3\nelement = 'tet10'\n"
+        "[[meshes]]\nstones = ['course = 2 and depth > 0.4', 'W02-01']\nsize = 0.5\n"
+        "[[meshes]]\nstones = ['W02-01']\nelement = 'hex8'\n"
+    )
+    meshes = {block.code: (block.mesh_size, block.element) for block in scene.blocks}
+    assert meshes["W02-01"] == (0.3, Element.HEX8)
+    deep = {code for code, mesh in meshes.items() if mesh == (0.5, Element.TET10)}
+    assert deep
+    assert {mesh for code, mesh in meshes.items() if code not in deep | {"W02-01"}} == {
+        (0.3, Element.TET10),
+        (None, Element.TET10),  # fixed
+    }
+
+
+def test_a_mesh_of_no_stone_is_named_with_its_line(build):
+    with pytest.raises(SceneError, match=r"scene.toml:14: stones: 'W02-99' is not the code"):
+        build("[[meshes]]\nstones = ['W02-99']\nsize = 0.1\n")
 
 
 def test_check_tells_laws_and_loads(url, tmp_path):

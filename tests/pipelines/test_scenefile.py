@@ -10,10 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mechanics.laws.dry_joint import DryJoint
-from mechanics.scene import ContactSettings, Fidelity, SolverSettings, TimeSettings
+from mechanics.meshing.elements import Element
+from mechanics.scene import ContactSettings, Fidelity, SolverSettings, Start, TimeSettings
 from moma.errors import MomaError, SceneError
 from pipelines.scene_keys import MATERIAL_KEYS, TABLES
-from pipelines.scenefile import parse_scene, read_scene
+from pipelines.scenefile import MeshSettings, parse_scene, read_scene
 from pipelines.schema import REQUIRED
 from pipelines.toml_lines import key_lines
 from survey.joint_lines import JointSettings
@@ -38,6 +39,20 @@ def test_the_smallest_scene_has_a_material_and_defaults_for_the_rest():
     assert scene.bodies.default is Fidelity.DEFORMABLE
     assert scene.materials[0].material.density == 2000.0
     assert scene.contact.law.friction == 0.6
+
+
+def test_damping_strengths_and_the_way_to_start_are_read():
+    scene = parse_scene(
+        STONE
+        + "mass_damping = 2\nstiffness_damping = 1e-4\ntensile_strength = 2e6\ncompressive_strength = 3e7\n"
+        + "[time]\nstart = 'equilibrium'\nlumped_mass = true\n[mesh]\nelement = 'hex20'\n",
+        "scene.toml",
+    )
+    material = scene.materials[0].material
+    assert (material.mass_damping, material.stiffness_damping) == (2.0, 1e-4)
+    assert (material.tensile_strength, material.compressive_strength) == (2e6, 3e7)
+    assert (scene.time.start, scene.time.lumped_mass) == (Start.EQUILIBRIUM, True)
+    assert scene.mesh == MeshSettings(0.2, Element.HEX20)
 
 
 def test_the_sample_scene_is_valid():
@@ -70,6 +85,8 @@ def test_the_sample_scene_is_valid():
         ("[gravity]\ndirection = [0, 0, 0]\n", 2, "direction has no length"),
         ("[output]\npictures = ['von_mise']\n", 2, "did you mean 'von_mises'?"),
         ("[joints]\nmode = 'shut'\n", 2, "mode = 'shut' is unknown"),
+        ("[mesh]\nelement = 'tet5'\n", 2, "element = 'tet5' is unknown; did you mean 'tet4'"),
+        ("[time]\nstart = 'still'\n", 2, "start = 'still' is unknown; known here: equilibrium, rest"),
         ("[time]\nstep = \n", 2, "not TOML"),
         ("[time\n", 1, "not TOML"),
         ("time = 3\n", 1, "'time' is not a table"),
@@ -88,6 +105,8 @@ def test_a_mistake_is_named_with_its_line(text, line, said):
         ("[materials]\ndensity = 2000\n", 2, "'density' stands in no material"),
         ("[materials.a]\ndensity = 2000\nyoung = 1e10\n", 1, "[materials.a] has no 'poisson'"),
         (STONE.replace("0.2", "0.5"), 4, "poisson = 0.5 is out of range"),
+        (STONE + "tensile_strength = 0\n", 5, "give a number [Pa], greater than 0"),
+        (STONE + "stiffness_damping = -1e-4\n", 5, "give a number [s], at least 0"),
         (STONE + STONE.replace("stone", "brick"), 5, "'stone' and 'brick' both lack 'stones'"),
     ],
 )
