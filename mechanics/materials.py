@@ -1,24 +1,55 @@
-"""Isotropic elastic materials."""
+"""Linear elastic materials."""
 
 from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
 
 from moma.errors import SceneError
 
-__all__ = ["Material"]
+__all__ = ["Material", "Orthotropy"]
+
+Array = NDArray[np.float64]
+
+# tensor components of the six stresses and strains, in the order xx, yy, zz, xy, yz, zx
+_FIRST, _SECOND = (0, 1, 2, 0, 1, 2), (0, 1, 2, 1, 2, 0)
+# by this much a product of axes may differ from 0 or 1
+_ORTHONORMAL = 1e-6
+_WORLD_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+@dataclass(frozen=True)
+class Orthotropy:
+    """Elasticity with three planes of symmetry, as of bedded stone or of homogenised masonry.
+
+    Attributes
+    ----------
+    young : E₁, E₂, E₃ along the axes [Pa]
+    shear : shear moduli G₁₂, G₂₃, G₃₁ [Pa]
+    poisson : ν₁₂, ν₂₃, ν₃₁ [-]; ν_ij is minus the strain along j over that along i under a stress along i
+    axes : unit vectors of the three axes in the scene's initial state, right angles between them [-]
+    """
+
+    young: tuple[float, float, float]
+    shear: tuple[float, float, float]
+    poisson: tuple[float, float, float]
+    axes: tuple[tuple[float, float, float], ...] = _WORLD_AXES
 
 
 @dataclass(frozen=True)
 class Material:
-    """An isotropic, linear elastic material.
+    """A linear elastic material.
 
     Attributes
     ----------
     name : as in the scene
     density : ρ [kg/m³]
     young : Young's modulus E [Pa]; not used by rigid blocks
-    poisson : Poisson's ratio ν [-], 0 ≤ ν < 0.5
+    poisson : Poisson's ratio ν [-], 0 ≤ ν < 0.5; linear elements are too stiff above about 0.4, take quadratic ones
     mass_damping, stiffness_damping : α [1/s] and β [s] of Rayleigh's damping V = α M + β K
     tensile_strength, compressive_strength : both positive [Pa]; None: not known
+    orthotropy : replaces young and poisson; None: isotropic
     """
 
     name: str
@@ -29,12 +60,21 @@ class Material:
     stiffness_damping: float = 0.0
     tensile_strength: float | None = None
     compressive_strength: float | None = None
+    orthotropy: Orthotropy | None = None
 
     def __post_init__(self) -> None:
         for quantity, ok, remedy in (
             ("density", self.density > 0, "give kg/m³ greater than 0"),
             ("young", self.young > 0, "give pascals greater than 0"),
             ("poisson", 0 <= self.poisson < 0.5, "give a ratio from 0 up to, but not including, 0.5"),
+            ("mass_damping", self.mass_damping >= 0, "give 1/s, 0 or greater"),
+            ("stiffness_damping", self.stiffness_damping >= 0, "give seconds, 0 or greater"),
+            ("tensile_strength", _unknown_or_positive(self.tensile_strength), "give pascals greater than 0"),
+            (
+                "compressive_strength",
+                _unknown_or_positive(self.compressive_strength),
+                "give pascals greater than 0",
+            ),
         ):
             if not ok:
                 raise SceneError(
@@ -42,3 +82,78 @@ class Material:
                     where=f"material {self.name!r}",
                     remedy=remedy,
                 )
+        if self.orthotropy is not None:
+            _check_orthotropy(self.orthotropy, f"material {self.name!r}")
+
+    @property
+    def stiffness(self) -> Array:
+        """C (6, 6) of σ = C ε, order xx, yy, zz, xy, yz, zx, shear strains γ = 2ε, scene axes [Pa]; read-only."""
+        return _stiffness(self)
+
+
+def _unknown_or_positive(strength: float | None) -> bool:
+    return strength is None or strength > 0
+
+
+@cache
+def _stiffness(material: Material) -> Array:
+    if material.orthotropy is not None:
+        own = np.linalg.inv(_compliance(material.orthotropy)).astype(np.float64)
+        stiffness = _turned(own, np.array(material.orthotropy.axes, dtype=float))
+    else:
+        lam = material.young * material.poisson / ((1 + material.poisson) * (1 - 2 * material.poisson))
+        shear = material.young / (2 * (1 + material.poisson))
+        stiffness = np.diag([2 * shear] * 3 + [shear] * 3)
+        stiffness[:3, :3] += lam
+    stiffness.flags.writeable = False
+    return stiffness
+
+
+def _compliance(orthotropy: Orthotropy) -> Array:
+    """C⁻¹ (6, 6) in the axes of the material [1/Pa] (Ting 1996, §2.4)."""
+    young, poisson = orthotropy.young, orthotropy.poisson
+    compliance = np.diag([1.0 / modulus for modulus in (*young, *orthotropy.shear)])
+    for i, j, ratio, modulus in zip((0, 1, 2), (1, 2, 0), poisson, young, strict=True):
+        compliance[i, j] = compliance[j, i] = -ratio / modulus
+    return compliance
+
+
+def _turned(stiffness: Array, axes: Array) -> Array:
+    """The matrix C in the axes in which the rows of `axes` are given."""
+    tensor = np.zeros((3, 3, 3, 3))
+    for p in range(6):
+        for q in range(6):
+            i, j, k, m = _FIRST[p], _SECOND[p], _FIRST[q], _SECOND[q]
+            tensor[i, j, k, m] = tensor[j, i, k, m] = tensor[i, j, m, k] = tensor[j, i, m, k] = stiffness[
+                p, q
+            ]
+    turned = np.einsum("ijkl,ia,jb,kc,ld->abcd", tensor, axes, axes, axes, axes)
+    voigt = turned[_FIRST, _SECOND][:, _FIRST, _SECOND]
+    result: Array = 0.5 * (voigt + voigt.T)
+    return result
+
+
+def _check_orthotropy(orthotropy: Orthotropy, where: str) -> None:
+    for quantity in ("young", "shear"):
+        if not min(getattr(orthotropy, quantity)) > 0:
+            raise SceneError(
+                f"orthotropy {quantity} = {getattr(orthotropy, quantity)!r}",
+                where=where,
+                remedy="give pascals greater than 0",
+            )
+    axes = np.array(orthotropy.axes, dtype=float)
+    if axes.shape != (3, 3) or not np.allclose(axes @ axes.T, np.eye(3), rtol=0, atol=_ORTHONORMAL):
+        raise SceneError(
+            f"orthotropy axes = {orthotropy.axes!r}",
+            where=where,
+            remedy="give three unit vectors at right angles",
+        )
+    # scaled by the moduli, so that the bound means the same for every material
+    scale = np.sqrt(np.array([*orthotropy.young, *orthotropy.shear]))
+    least = float(np.linalg.eigvalsh(_compliance(orthotropy) * np.outer(scale, scale))[0])
+    if not least > 0:
+        raise SceneError(
+            f"orthotropy poisson = {orthotropy.poisson!r}: some strain would release energy",
+            where=where,
+            remedy="give smaller ratios: |ν_ij| < √(E_i/E_j) and 1 - Σ ν_ij ν_ji - 2 ν₁₂ ν₂₃ ν₃₁ > 0",
+        )

@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mechanics.meshing.delaunay_mesher import mesh_with_delaunay
+from mechanics.meshing.elements import Element
 from mechanics.meshing.gmsh_mesher import mesh_with_gmsh
-from mechanics.meshing.mesh import boundary_triangles, tet_mesh
+from mechanics.meshing.mesh import boundary_facets, tet_mesh
 from mechanics.meshing.mesher import mesh_block
 from mechanics.polyhedra import face_plane, mass_properties
 from mechanics.scene import Fidelity
@@ -103,7 +104,7 @@ def test_mesh_does_not_depend_on_the_unit_of_length(mesher, scale):
 
 
 def test_boundary_of_one_tetrahedron_is_its_four_faces_outwards():
-    triangles = boundary_triangles(np.array([[0, 1, 2, 3]]))
+    triangles = boundary_facets(Element.TET4, np.array([[0, 1, 2, 3]]))
     assert {frozenset(t) for t in triangles.tolist()} == {frozenset(t) for t in TETRAHEDRON_FACES}
     corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     assert mass_properties(corners, triangles).volume == pytest.approx(1 / 6)
@@ -119,7 +120,7 @@ def test_mirrored_tetrahedra_are_turned_round_and_loose_nodes_dropped():
 
 def test_a_mesh_that_leaves_a_hole_is_refused_with_the_stone_named():
     corners = box((0, 0, 0), (1, 1, 1))
-    with pytest.raises(MeshError, match="stone A7: a boundary triangle lies"):
+    with pytest.raises(MeshError, match="stone A7: a boundary facet lies"):
         tet_mesh(corners, np.array([[0, 1, 3, 4], [1, 2, 3, 6]]), corners, BOX_FACES, "A7")
 
 

@@ -1,0 +1,68 @@
+"""Structured hexahedra for stones with six faces and eight corners."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.meshing.elements import Element
+from mechanics.meshing.mesh import SolidMesh, solid_mesh
+from moma.errors import MeshError
+
+__all__ = ["mesh_with_hexahedra"]
+
+Array = NDArray[np.float64]
+Faces = tuple[tuple[int, ...], ...]
+
+# the corners at the start and at the end of the four edges along each direction of a hexahedron, VTK's order
+_EDGES = (((0, 3, 4, 7), (1, 2, 5, 6)), ((0, 1, 4, 5), (3, 2, 7, 6)), ((0, 1, 2, 3), (4, 5, 6, 7)))
+
+
+def mesh_with_hexahedra(vertices: Array, faces: Faces, size: float, code: str) -> SolidMesh:
+    """Mesh a stone with linear hexahedra: the trilinear map of a cube that is cut into equal parts.
+
+    In each direction there are as many parts as the mean edge holds `size` [m], at least one.
+
+    Raises
+    ------
+    MeshError : if the stone has not the corners, edges and faces of a cube, or its cells would be turned inside out
+    """
+    corners = vertices[_corners(faces, len(vertices), code)]
+    lengths = [np.linalg.norm(corners[list(b)] - corners[list(a)], axis=1).mean() for a, b in _EDGES]
+    counts = np.maximum(1, np.rint(np.array(lengths) / size)).astype(np.int64)
+    x, y, z = np.meshgrid(*(np.arange(n + 1) / n for n in counts), indexing="ij")
+    grid = np.stack([x, y, z], axis=-1).reshape(-1, 3)
+    nodes = _trilinear(grid) @ corners
+    strides = np.array([(counts[1] + 1) * (counts[2] + 1), counts[2] + 1, 1])
+    first = (
+        np.stack(np.meshgrid(*(np.arange(n) for n in counts), indexing="ij"), axis=-1).reshape(-1, 3)
+        @ strides
+    )
+    steps = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)])
+    return solid_mesh(Element.HEX8, nodes, first[:, None] + steps @ strides, vertices, faces, code)
+
+
+def _corners(faces: Faces, count: int, code: str) -> list[int]:
+    """The stone's corners in VTK's order of a hexahedron whose bottom is the first face."""
+    neighbours: dict[int, set[int]] = {corner: set() for corner in range(count)}
+    for face in faces:
+        for a, b in zip(face, (*face[1:], face[0]), strict=True):
+            neighbours[a].add(b)
+            neighbours[b].add(a)
+    like_a_cube = count == 8 and sorted(map(len, faces)) == [4] * 6
+    if not like_a_cube or any(len(around) != 3 for around in neighbours.values()):
+        raise MeshError(
+            f"hexahedra need six faces with four corners each, found {count} corners and faces with "
+            f"{', '.join(str(len(face)) for face in faces)}",
+            where=f"stone {code}",
+            remedy="use element = tet10",
+        )
+    bottom = list(faces[0][::-1])  # counter-clockwise seen from above
+    top = [next(iter(neighbours[corner] - set(bottom))) for corner in bottom]
+    return bottom + top
+
+
+def _trilinear(grid: Array) -> Array:
+    """Weights (n, 8) of the corners at places (n, 3) of the unit cube."""
+    (x, y, z), (u, v, w) = grid.T, 1.0 - grid.T
+    return np.column_stack(
+        [u * v * w, x * v * w, x * y * w, u * y * w, u * v * z, x * v * z, x * y * z, u * y * z]
+    )
