@@ -18,9 +18,9 @@ from scipy.sparse.linalg import splu
 from mechanics.elasticity import (
     ElasticOperators,
     elastic_operators,
-    element_stress,
     from_voigt,
     recovery,
+    sampled_stress,
     to_voigt,
 )
 from mechanics.materials import Material
@@ -51,7 +51,7 @@ class Deformable:
 
     def stress(self, node: Array, centre: Array, rotation: Array) -> Array:
         """Recovered nodal stress (n, 6) in world axes [Pa]."""
-        strained = element_stress(self.mesh, self.material, self.displacement(node, centre, rotation))
+        strained = sampled_stress(self.mesh, self.material, self.displacement(node, centre, rotation))
         local = recovery(self.mesh) @ strained
         return to_voigt(rotation @ from_voigt(local) @ rotation.T)
 
