@@ -11,6 +11,7 @@ from mechanics.bodies.deformable import Deformable, deformable
 from mechanics.bodies.rigid import RigidInertia
 from mechanics.contact._kernels_narrow import MAX_CORNERS
 from mechanics.contact.surfaces import FaceMesh, Surfaces, surfaces
+from mechanics.elastic_stones import ElasticStones, elastic_stones
 from mechanics.laws.table import LawTable, law_table
 from mechanics.loads.load import Force, Motion
 from mechanics.meshing.mesh import SolidMesh
@@ -27,6 +28,8 @@ Ints = NDArray[np.int64]
 
 # contact keys number the faces of a stone in six bits
 _MAX_FACES = 64
+# stones whose corners differ by less than this part of their size are equal
+_EQUAL = 1e-11
 # by this fraction the volume of a stone's parts may differ from that of its outline
 _SAME_VOLUME = 1e-6
 
@@ -43,12 +46,13 @@ class Model:
     forces : forces, each with the bodies on which it acts
     laws : contact laws, and between which bodies they hold
     inertia : of the rigid bodies
+    flight : of all bodies that move, the elastic ones by their rigid motion
     mass : (nb,) [kg]
     volume : (nb,) [m³]
     surfaces : for contact detection
     outline : per body its corners (n, 3) as the scene gives them, from the centre of mass, body axes [m]
     stones : per body its finite elements; None if it has none
-    node_ptr : (nb+1,) nodes of each body in State.node
+    elastic_stones : the same, packed; equal stones together
     """
 
     scene: Scene
@@ -58,12 +62,13 @@ class Model:
     forces: tuple[tuple[Force, Ints], ...]
     laws: LawTable
     inertia: RigidInertia
+    flight: RigidInertia
     mass: Array
     volume: Array
     surfaces: Surfaces
     outline: tuple[Array, ...]
     stones: tuple[Deformable | None, ...]
-    node_ptr: Ints
+    elastic_stones: ElasticStones
 
     @property
     def rigid_only(self) -> bool:
@@ -79,7 +84,8 @@ class Model:
 
     def nodes_of(self, body: int) -> slice:
         """Where the nodes of a body lie in State.node."""
-        return slice(int(self.node_ptr[body]), int(self.node_ptr[body + 1]))
+        start = self.elastic_stones.start
+        return slice(int(start[body]), int(start[body + 1]))
 
 
 def build_model(scene: Scene, progress: Callable[[int, int], None] | None = None) -> tuple[Model, State]:
@@ -94,18 +100,18 @@ def build_model(scene: Scene, progress: Callable[[int, int], None] | None = None
     properties = [_mass_properties(block) for block in blocks]
     stones: list[Deformable | None] = []
     centres = np.array([p.centroid for p in properties])
+    workshop = _Workshop(scene.time.lumped_mass)
     for index, block in enumerate(blocks):
         _check(block)
         if block.fidelity is Fidelity.DEFORMABLE:
-            stone, centres[index] = deformable(mesh_block(block), block.material)
+            stone, centres[index] = workshop(block)
             stones.append(stone)
         else:
             stones.append(None)
         if progress is not None:
             progress(index + 1, len(blocks))
-    node_ptr = np.concatenate(
-        [[0], np.cumsum([0 if s is None else len(s.mesh.nodes) for s in stones])]
-    ).astype(np.int64)
+    packed = elastic_stones(stones)
+    inertia = _inertia(blocks, properties, np.array([block.material.density for block in blocks]))
     density = np.array([block.material.density for block in blocks])
     model = Model(
         scene=scene,
@@ -118,16 +124,49 @@ def build_model(scene: Scene, progress: Callable[[int, int], None] | None = None
             [(*_groups(scene, rule), rule.law) for rule in scene.contact.rules],
             len(blocks),
         ),
-        inertia=_inertia(blocks, properties, density),
+        inertia=inertia,
+        flight=_flight(inertia, stones),
         mass=density * np.array([p.volume for p in properties]),
         volume=np.array([p.volume for p in properties]),
-        surfaces=_surfaces(blocks, centres, stones, node_ptr),
+        surfaces=_surfaces(blocks, centres, stones, packed.start),
         outline=tuple(block.vertices - centre for block, centre in zip(blocks, centres, strict=True)),
         stones=tuple(stones),
-        node_ptr=node_ptr,
+        elastic_stones=packed,
     )
     _check_loads(model)
     return model, _start(model, centres)
+
+
+class _Workshop:
+    """Makes elastic stones; equal blocks share one."""
+
+    def __init__(self, lumped: bool) -> None:
+        self._lumped = lumped
+        self._made: dict[tuple[object, ...], tuple[Deformable, Array]] = {}
+
+    def __call__(self, block: Block) -> tuple[Deformable, Array]:
+        """The finite elements of a block, and its centre of mass (3,) [m]."""
+        corner = block.vertices[0]
+        size = float(np.ptp(block.vertices, axis=0).max())
+        # equal but for rounding: blocks come at different places
+        shape = np.round((block.vertices - corner) / (_EQUAL * size)).astype(np.int64).tobytes()
+        key = shape, block.faces, block.mesh_size, block.element, block.material, tuple(map(id, block.parts))
+        if key not in self._made:
+            stone, centre = deformable(mesh_block(block), block.material, self._lumped)
+            self._made[key] = stone, centre - corner
+        stone, arm = self._made[key]
+        return stone, corner + arm
+
+
+def _flight(inertia: RigidInertia, stones: list[Deformable | None]) -> RigidInertia:
+    """The inertia of all bodies that fly."""
+    mass, inverse = inertia.mass.copy(), inertia.inverse_mass.copy()
+    own, inverted = inertia.inertia.copy(), inertia.inverse_inertia.copy()
+    for b, stone in enumerate(stones):
+        if stone is not None:
+            mass[b], inverse[b] = stone.mass, 1.0 / stone.mass
+            own[b], inverted[b] = stone.inertia, np.linalg.inv(stone.inertia)
+    return RigidInertia(mass, inverse, own, inverted)
 
 
 def _parts(block: Block) -> tuple[Part, ...]:
@@ -279,7 +318,7 @@ def _face_meshes(part: Part, mesh: SolidMesh | None, start: int) -> list[FaceMes
 
 def _start(model: Model, centres: Array) -> State:
     velocity = np.array([block.velocity for block in model.scene.blocks], dtype=float)
-    node = np.zeros((int(model.node_ptr[-1]), 3))
+    node = np.zeros((int(model.elastic_stones.start[-1]), 3))
     node_velocity = np.zeros_like(node)
     for body, stone in enumerate(model.stones):
         if stone is not None:

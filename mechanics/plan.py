@@ -69,12 +69,12 @@ def plan(scene: Scene) -> Plan:
 
 
 def _memory(model: Model, bodies: Ints) -> int:
-    """Bytes of the deformable blocks' compliances, on surface and contacts, and of the contact points."""
+    """Bytes of the deformable blocks' compliances, between surface nodes and contacts, and of the contact points."""
     sides = np.bincount(bodies.ravel(), minlength=len(model.mass))
     numbers = _CONTACT_NUMBERS * len(bodies)
-    for body, stone in enumerate(model.stones):
-        if stone is not None:
-            numbers += (3 * len(stone.surface)) ** 2 + (3 * int(sides[body])) ** 2
+    for group in model.elastic_stones.groups:
+        numbers += (3 * len(np.unique(group.stone.mesh.facets))) ** 2
+        numbers += int(((3 * sides[group.bodies]) ** 2).sum())
     return numbers * _NUMBER
 
 

@@ -20,6 +20,7 @@ __all__ = [
     "ContactSolution",
     "ContactStart",
     "Delassus",
+    "Form",
     "GaussSeidel",
     "SparseForm",
     "scale_of",
@@ -61,7 +62,10 @@ class Delassus(Protocol):
 
 
 def scale_of(delassus: Delassus) -> float:
-    """Mean diagonal of W [1/kg]; what r and u are measured against."""
+    """What u over r is measured against [1/kg]: the mean diagonal of W, if the operator does not say otherwise."""
+    given = getattr(delassus, "scale", None)
+    if given is not None:
+        return float(given)
     diagonal = delassus.diagonal
     return float(np.einsum("cii->", diagonal) / (len(diagonal) * diagonal.shape[1]))
 
@@ -69,6 +73,13 @@ def scale_of(delassus: Delassus) -> float:
 class _Factor(Protocol):
     def solve(self, rhs: Array) -> Array:
         """Solve for one right-hand side."""
+
+
+class Form(Protocol):
+    """W in a form that can be factorised."""
+
+    def relaxed(self, sigma: float) -> Callable[[Array], Array]:
+        """(W/σ + 1)⁻¹ as a function of b (d nc,); its factors are kept for the next call."""
 
 
 class SparseForm:
@@ -94,6 +105,11 @@ class SparseForm:
             )
         return self._factors[sigma]
 
+    def relaxed(self, sigma: float) -> Callable[[Array], Array]:
+        """(W/σ + 1)⁻¹ as a function of b (d nc,), by the Woodbury identity."""
+        factor = self.factor(sigma)
+        return lambda b: b - (self.across @ factor.solve(self.lift @ b)) / sigma
+
 
 @dataclass(frozen=True)
 class ContactProblem:
@@ -114,7 +130,7 @@ class ContactProblem:
     bias: Array
     friction: Array
     cohesion: Array
-    sparse: Callable[[], SparseForm] | None = None
+    sparse: Callable[[], Form] | None = None
 
 
 @dataclass(frozen=True)

@@ -148,7 +148,7 @@ class Energies:
     ----------
     external : work of the weight, of the loads and of what drives supports
     contact : work of the contacts; negative: they dissipate
-    scheme : dissipation of the time integration and of the relaxation
+    scheme : dissipation of the time integration, of Rayleigh's damping and of the relaxation
     """
 
     external: float

@@ -15,7 +15,6 @@ from mechanics.result import Energies, Errors, Frame, History, Outcome, Result
 from mechanics.scene import Scene
 from mechanics.simulation import Clock, Simulation, Step
 from mechanics.state import State
-from mechanics.stepping import follow_nodes
 
 __all__ = ["simulate"]
 
@@ -121,7 +120,7 @@ def _result(
     history, scene = log.history(), model.scene
     support = support_reaction(model, last.contacts, last.force, last.after.time)
     with clock("stress"):
-        bodies = body_results(model, start, follow_nodes(model, last.after), log.balance)
+        bodies = body_results(model, start, last.after, log.balance)
     errors = Errors(
         natural_map=float(history.natural_map[-LASTING:].max()),
         penetration=log.penetration / float(model.surfaces.size.min()),

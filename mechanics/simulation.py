@@ -9,12 +9,11 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.bodies.deformable import DynamicCompliance
 from mechanics.contact.assembly import (
+    condensed_form,
     local_velocity,
     mixed_delassus,
     rigid_delassus,
-    sparse_form,
     world_impulse,
 )
 from mechanics.contact.contacts import Contacts, gaps, take
@@ -26,11 +25,11 @@ from mechanics.observers.energy import kinetic_energy
 from mechanics.observers.equilibrium import displacement, speed
 from mechanics.operators.mixed import MixedDelassus
 from mechanics.operators.rigid import RigidDelassus, schedule
-from mechanics.problem import ContactSolution, SparseForm
+from mechanics.problem import ContactSolution, Form
 from mechanics.solvers.choice import choose_solver
 from mechanics.state import State
 from mechanics.statement import Statement, state_laws
-from mechanics.stepping import Kick, advance, compliances, follow_nodes, free_kick, kicked, predict
+from mechanics.stepping import Kick, advance, compliances, free_kick, kicked, predict
 from moma.errors import SolverError
 
 __all__ = ["Clock", "Simulation", "Step", "detector"]
@@ -107,7 +106,7 @@ class _Touching:
     place: Array
     law: NDArray[np.int64]
     operator: RigidDelassus | MixedDelassus
-    sparse: Callable[[], SparseForm]
+    sparse: Callable[[], Form]
     configuration: State
 
 
@@ -119,7 +118,7 @@ class Simulation:
         self.model, self.start, self.state, self.clock = model, start, start, clock
         self._step, self._theta = settings.time.step, settings.time.theta
         with clock("assemble"):
-            self._compliance: dict[int, DynamicCompliance] = compliances(model, self._step, self._theta)
+            self._compliance = compliances(model, self._step, self._theta)
         self._detector = detector(model)
         self._solve = choose_solver(settings.solver, not model.rigid_only)
         self._memory = Memory()
@@ -137,13 +136,11 @@ class Simulation:
         h, theta, model = self._step, self._theta, self.model
         with self.clock("advance"):
             predicted = predict(model, self.start, self.state, h * (1 - theta))
-        predicted, touching = self._detect(predicted)
+        before, touching = self.state, self._detect(predicted)
         contacts, operator = touching.contacts, touching.operator
-        # one frame for the whole step: the linear problem of a deformable body is stated in it
-        before = self._with_frames_of(predicted, self.state)
         remembered, internal = self._memory.recall(contacts.key, touching.place)
         with self.clock("assemble"):
-            free = free_kick(model, self.start, before, predicted, self._compliance, h, theta)
+            free = free_kick(model, self.start, predicted, self._compliance, h, theta)
             statement = state_laws(
                 model, predicted, contacts, gaps(contacts, predicted), touching.law,
                 operator, touching.sparse, free, internal, self._first,
@@ -152,7 +149,9 @@ class Simulation:
             solution = self._solve(statement.problem, start=statement.started(remembered))
         impulse = statement.real(solution.impulse)
         with self.clock("advance"):
-            kick = kicked(model, free, before, contacts, operator, impulse, self._compliance)
+            kick = kicked(
+                model, free, touching.configuration.rotation, contacts, operator, impulse, self._compliance
+            )
             after = advance(model, self.start, predicted, kick, h * theta)
         if not (np.isfinite(after.velocity).all() and np.isfinite(after.node_velocity).all()):
             raise SolverError(
@@ -215,17 +214,16 @@ class Simulation:
         )
         return halted, kinetic
 
-    def _detect(self, predicted: State) -> tuple[State, _Touching]:
+    def _detect(self, predicted: State) -> _Touching:
         """The contacts at the predicted configuration; found anew only when something has moved."""
         model, known = self.model, self._touching
         if known is not None and not self._stale(known, predicted):
-            return self._with_frames_of(known.configuration, predicted), known
+            return known
         with self.clock("detect"):
-            predicted = follow_nodes(model, predicted)
             contacts = self._detector(predicted, self._step * speed(model, predicted))
         with self.clock("assemble"):
             operator: RigidDelassus | MixedDelassus
-            sparse: Callable[[], SparseForm]
+            sparse: Callable[[], Form]
             if model.rigid_only:
                 plan = schedule(contacts.bodies, model.inertia.moving)
                 contacts = take(contacts, plan.order)
@@ -234,13 +232,13 @@ class Simulation:
             else:
                 mixed = mixed_delassus(model, predicted, contacts, self._compliance)
                 operator = mixed
-                sparse = cache(lambda: sparse_form(model, predicted, contacts, mixed, self._compliance))
+                sparse = cache(lambda: condensed_form(model, predicted, contacts, mixed))
         # in the axes of one of the two bodies, the same whichever is the candidate
         side = contacts.bodies.argmin(axis=1)
         place = contacts.arm[np.arange(len(side)), side]
         law = model.laws.of(contacts.bodies)
         self._touching = _Touching(contacts, place, law, operator, sparse, predicted)
-        return predicted, self._touching
+        return self._touching
 
     def _stale(self, known: _Touching, predicted: State) -> bool:
         """Whether the known contacts no longer serve."""
@@ -250,15 +248,6 @@ class Simulation:
             return moved > _STALE_RIGID
         pace = self._step * float(speed(self.model, predicted).max()) / width
         return moved > _STALE or (moved > _SETTLED and pace < _SLOWED * moved)
-
-    def _with_frames_of(self, source: State, state: State) -> State:
-        """`state` with the frames of the deformable bodies taken from `source`."""
-        elastic = self.model.elastic
-        return replace(
-            state,
-            centre=np.where(elastic[:, None], source.centre, state.centre),
-            rotation=np.where(elastic[:, None, None], source.rotation, state.rotation),
-        )
 
 
 def detector(model: Model) -> Detector:

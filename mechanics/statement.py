@@ -12,7 +12,7 @@ from mechanics.laws.law import Approach, Terms
 from mechanics.model import Model
 from mechanics.operators.mixed import MixedDelassus
 from mechanics.operators.rigid import RigidDelassus
-from mechanics.problem import ContactProblem, ContactStart, SparseForm
+from mechanics.problem import ContactProblem, ContactStart, Form
 from mechanics.state import State
 from mechanics.stepping import Kick
 
@@ -64,7 +64,7 @@ def state_laws(
     gap: Array,
     law: Ints,
     operator: RigidDelassus | MixedDelassus,
-    sparse: Callable[[], SparseForm] | None,
+    sparse: Callable[[], Form] | None,
     free: Kick,
     memory: Array,
     first: bool,

@@ -1,15 +1,18 @@
 """One time step in the order of docs/theory.md §2: flight, kick, flight."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from mechanics.bodies.deformable import DynamicCompliance, body_frame, dynamic_compliance
+from mechanics.bodies._kernels_elastic import deform, rigid_part
+from mechanics.bodies.deformable import Compliance, compliance
 from mechanics.bodies.rigid import free_flight, inverse_inertia_world
 from mechanics.contact.assembly import world_impulse
 from mechanics.contact.contacts import Contacts
+from mechanics.elastic_stones import ElasticGroup
 from mechanics.loads.load import Pose
 from mechanics.model import Model
 from mechanics.operators.mixed import MixedDelassus
@@ -20,7 +23,6 @@ __all__ = [
     "Kick",
     "advance",
     "compliances",
-    "follow_nodes",
     "free_kick",
     "kicked",
     "predict",
@@ -46,26 +48,36 @@ class Kick:
     load: Array
 
 
-def compliances(model: Model, step: float, theta: float) -> dict[int, DynamicCompliance]:
-    """ŵ of every deformable body, for this step and θ."""
-    return {b: dynamic_compliance(s, step, theta) for b, s in enumerate(model.stones) if s is not None}
+def compliances(model: Model, step: float, theta: float) -> tuple[Compliance, ...]:
+    """ŵ of every group of equal elastic stones, for this step and θ."""
+    return tuple(compliance(group.stone, step, theta) for group in model.elastic_stones.groups)
 
 
 def predict(model: Model, start: State, state: State, duration: float) -> State:
-    """Fly for `duration` [s]: no forces act, driven bodies follow their motion, frames of deformable bodies stay.
+    """Fly for `duration` [s]: no forces act; driven bodies follow their motion.
 
-    `start` is the state in which the run began, to which imposed motions refer.
+    An elastic stone flies as a rigid one, and in its axes its deformation grows at a constant rate. `start` is the
+    state in which the run began, to which imposed motions refer.
     """
-    time = state.time + duration
-    centre, rotation, velocity = free_flight(
-        model.inertia, state.centre, state.rotation, state.velocity, duration
-    )
-    for motion, bodies in model.motions:
-        pose = motion.pose(time)
+    time, elastic = state.time + duration, model.elastic_stones
+    velocity, rate = state.velocity, np.zeros((0, 3))
+    if elastic.groups:
+        motion, rate = rigid_part(
+            elastic.start, elastic.reference, elastic.projector, state.rotation, state.node_velocity
+        )
+        velocity = np.where(model.elastic[:, None], motion, velocity)
+    centre, rotation, velocity = free_flight(model.flight, state.centre, state.rotation, velocity, duration)
+    for motion_, bodies in model.motions:
+        pose = motion_.pose(time)
         centre[bodies], rotation[bodies] = _driven(pose, start, bodies)
-    return State(
-        time, centre, rotation, velocity, state.node + duration * state.node_velocity, state.node_velocity
-    )
+    node, node_velocity = state.node, state.node_velocity
+    if elastic.groups:
+        node, node_velocity = deform(
+            elastic.start, elastic.reference, state.centre, state.rotation, state.node, rate, duration,
+            centre, rotation, velocity,
+        )  # fmt: skip
+        velocity = np.where(model.elastic[:, None], 0.0, velocity)
+    return State(time, centre, rotation, velocity, node, node_velocity)
 
 
 def _driven(pose: Pose, start: State, bodies: Ints) -> tuple[Array, Array]:
@@ -73,28 +85,12 @@ def _driven(pose: Pose, start: State, bodies: Ints) -> tuple[Array, Array]:
     return centre, pose.rotation @ start.rotation[bodies]
 
 
-def follow_nodes(model: Model, state: State) -> State:
-    """Let the frames of the deformable bodies follow their nodes."""
-    centre, rotation = state.centre.copy(), state.rotation.copy()
-    for b, stone in enumerate(model.stones):
-        if stone is not None:
-            centre[b], rotation[b] = body_frame(stone, state.node[model.nodes_of(b)])
-    return replace(state, centre=centre, rotation=rotation)
-
-
 def free_kick(
-    model: Model,
-    start: State,
-    before: State,
-    predicted: State,
-    compliance: dict[int, DynamicCompliance],
-    step: float,
-    theta: float,
+    model: Model, start: State, predicted: State, compliance: Sequence[Compliance], step: float, theta: float
 ) -> Kick:
-    """v_free = v + ŵ [ -h K (d + hθ v) + h P ] with P the weight and the loads; rigid: ŵ = M⁻¹, K = 0.
+    """v_free = v + ŵ [ -h V v - h K (d + hθ v) + h P ] with P the weight and the loads; rigid: ŵ = M⁻¹, K = V = 0.
 
-    Loads are taken at the instant of the kick. `before` is the state at the start of the step, in the frames of the
-    step; `predicted` that at the kick.
+    Loads are taken at the instant of the kick; `predicted` is the state there, d that at the start of the step.
     """
     gravity = model.gravity(predicted.time)
     load = _loads(model, predicted, gravity)
@@ -110,17 +106,33 @@ def free_kick(
         velocity[bodies, :3] = (end - predicted.centre[bodies]) / step
         vector = Rotation.from_matrix(turn @ predicted.rotation[bodies].transpose(0, 2, 1)).as_rotvec()
         velocity[bodies, 3:] = vector / step
-    node_velocity = before.node_velocity.copy()
-    for b, own in compliance.items():
-        stone = model.stones[b]
-        assert stone is not None
-        rows, turned = model.nodes_of(b), before.rotation[b]
-        local = before.node_velocity[rows] @ turned
-        stretched = stone.displacement(before.node[rows], before.centre[b], turned) + step * theta * local
-        force = np.outer(stone.operators.nodal_mass, gravity @ turned)
-        force -= (stone.operators.stiffness @ stretched.ravel()).reshape(-1, 3)
-        node_velocity[rows] += own.respond(step * force) @ turned.T
+    node_velocity = predicted.node_velocity.copy()
+    for group, own in zip(model.elastic_stones.groups, compliance, strict=True):
+        turn = predicted.rotation[group.bodies]
+        force = _elastic_force(group, predicted, gravity, step, theta)
+        node_velocity[group.nodes] += own.respond(step * force) @ turn.transpose(0, 2, 1)
     return Kick(velocity, node_velocity, load)
+
+
+def _elastic_force(group: ElasticGroup, predicted: State, gravity: Array, step: float, theta: float) -> Array:
+    """P - V v - K (d + hθ v) of equal stones (k, n, 3), body axes [N]; P holds the centrifugal forces."""
+    stone, turn = group.stone, predicted.rotation[group.bodies]
+    count = len(group.bodies)
+    velocity = predicted.node_velocity[group.nodes] @ turn
+    # d at the kick is that of the start of the step plus h(1-θ) v; K does not see the rigid part of v
+    strained = (predicted.node[group.nodes] - predicted.centre[group.bodies, None]) @ turn
+    strained += step * (2.0 * theta - 1.0) * velocity - stone.mesh.nodes
+    force = -(stone.operators.stiffness @ strained.reshape(count, -1).T)
+    if stone.damping.nnz:
+        force -= stone.damping @ velocity.reshape(count, -1).T
+    spin = velocity.reshape(count, -1) @ stone.projector[3:].T
+    outward = -np.cross(spin[:, None], np.cross(spin[:, None], stone.mesh.nodes)).reshape(count, -1)
+    # what turns the stone as a whole is part of its flight
+    outward -= (outward @ stone.projector.T) @ stone.modes.T
+    force += stone.operators.mass @ outward.T
+    weight = stone.weight[:, None] * (gravity @ turn)[:, None]
+    result: Array = force.T.reshape(count, -1, 3) + weight
+    return result
 
 
 def _loads(model: Model, state: State, gravity: Array) -> Array:
@@ -138,22 +150,22 @@ def _loads(model: Model, state: State, gravity: Array) -> Array:
 def kicked(
     model: Model,
     free: Kick,
-    frames: State,
+    rotation: Array,
     contacts: Contacts,
     operator: RigidDelassus | MixedDelassus,
     impulse: Array,
-    compliance: dict[int, DynamicCompliance],
+    compliance: Sequence[Compliance],
 ) -> Kick:
-    """v_{i+1} = v_free + ŵ H r."""
+    """v_{i+1} = v_free + ŵ H r; `rotation` (nb, 3, 3) is that for which the operator was made."""
     velocity = free.velocity + operator.rigid_change(impulse)
-    node_velocity = free.node_velocity.copy()
+    node_velocity = free.node_velocity
     if compliance:
         world = world_impulse(contacts, impulse)
         nodal = contacts.weights.T @ np.stack([world, -world], axis=1).reshape(-1, 3)
-        for b, own in compliance.items():
-            rows, turn = model.nodes_of(b), frames.rotation[b]
-            if nodal[rows].any():
-                node_velocity[rows] += own.respond(nodal[rows] @ turn) @ turn.T
+        node_velocity = node_velocity.copy()
+        for group, own in zip(model.elastic_stones.groups, compliance, strict=True):
+            turn = rotation[group.bodies]
+            node_velocity[group.nodes] += own.respond(nodal[group.nodes] @ turn) @ turn.transpose(0, 2, 1)
     return Kick(velocity, node_velocity, free.load)
 
 

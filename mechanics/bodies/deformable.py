@@ -1,11 +1,13 @@
-"""One elastic stone: finite elements in a frame that follows its mean motion (co-rotation).
+"""One elastic stone: finite elements in axes that move with it (co-rotation).
 
-In body axes, with d the displacement of the nodes from the undeformed stone, the θ-scheme reads
+The motion of a stone is that of its axes, a rigid one, and a displacement d of its nodes in them that has no part in
+any rigid motion (Rᵀ M d = 0, with R the six rigid modes: Tisserand's mean axes). In body axes the θ-scheme reads
 
-    v_free = v + ŵ [ -h K (d + h θ v) + h P ],     ŵ = (M + h² θ² K)⁻¹
+    v_new = v + ŵ [ -h V v - h K (d + h θ v) + h P + H r ],     ŵ = (M + h θ V + h² θ² K)⁻¹
 
-(docs/theory.md §2). Only M and K of the undeformed stone are needed, so ŵ is factorised once, and a
-turning stone keeps its strain small. Contacts touch the surface nodes alone: C = S ŵ Sᵀ is their compliance.
+with d and v at the start of the step (docs/theory.md §2). Only matrices of the undeformed stone are needed, so ŵ is
+factorised once, and a stone may turn as far as it likes while its strain stays small. Equal stones share one
+`Deformable`.
 """
 
 from dataclasses import dataclass, replace
@@ -26,7 +28,7 @@ from mechanics.elasticity import (
 from mechanics.materials import Material
 from mechanics.meshing.mesh import SolidMesh
 
-__all__ = ["Deformable", "DynamicCompliance", "body_frame", "deformable", "dynamic_compliance"]
+__all__ = ["Compliance", "Deformable", "compliance", "deformable"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -39,15 +41,28 @@ class Deformable:
     Attributes
     ----------
     mesh : nodes relative to the centre of mass
-    material : density and elasticity
-    operators : M, K and the nodal masses
-    surface : (ns,) boundary nodes
+    material : density, elasticity and damping
+    operators : M and K
+    damping : V = α M + β K [kg/s]
+    weight : (n,) M times a unit acceleration: the nodal weights of a uniform one [kg]
+    modes : R (3n, 6), nodal velocities of unit translations and of unit rotations
+    projector : (6, 3n) (Rᵀ M R)⁻¹ Rᵀ M, the rigid motion in nodal velocities
+    inertia : (3, 3) about the centre of mass, body axes [kg m²]
     """
 
     mesh: SolidMesh
     material: Material
     operators: ElasticOperators
-    surface: Ints
+    damping: "csc_array[np.float64]"
+    weight: Array
+    modes: Array
+    projector: Array
+    inertia: Array
+
+    @property
+    def mass(self) -> float:
+        """[kg]."""
+        return float(self.weight.sum())
 
     def stress(self, node: Array, centre: Array, rotation: Array) -> Array:
         """Recovered nodal stress (n, 6) in world axes [Pa]."""
@@ -65,50 +80,87 @@ class Deformable:
         return float(0.5 * d @ (self.operators.stiffness @ d))
 
 
-def deformable(mesh: SolidMesh, material: Material) -> tuple[Deformable, Array]:
+def deformable(mesh: SolidMesh, material: Material, lumped: bool = False) -> tuple[Deformable, Array]:
     """The elastic stone of a mesh, and its centre of mass (3,) [m]."""
-    operators = elastic_operators(mesh, material)
-    centre = operators.nodal_mass @ mesh.nodes / operators.nodal_mass.sum()
+    operators = elastic_operators(mesh, material, lumped)
+    weight = np.asarray(operators.mass.sum(axis=1)).reshape(-1, 3)[:, 0]
+    centre = weight @ mesh.nodes / weight.sum()
     local = replace(mesh, nodes=mesh.nodes - centre)
-    return Deformable(local, material, operators, np.unique(mesh.facets)), centre
+    modes = _rigid_modes(local.nodes)
+    momentum = np.ascontiguousarray((operators.mass @ modes).T)
+    inertia = momentum @ modes
+    damping = material.mass_damping * operators.mass + material.stiffness_damping * operators.stiffness
+    stone = Deformable(
+        local,
+        material,
+        operators,
+        csc_array(damping),
+        weight,
+        modes,
+        np.linalg.solve(inertia, momentum),
+        inertia[3:, 3:],
+    )
+    return stone, centre
 
 
-def body_frame(body: Deformable, node: Array) -> tuple[Array, Array]:
-    """Centre (3,) and rotation (3, 3) of the rigid motion nearest to the nodes, weighted by mass (Kabsch 1976)."""
-    weight = body.operators.nodal_mass
-    centre = weight @ node / weight.sum()
-    u, _, vt = np.linalg.svd((node - centre).T @ (weight[:, None] * body.mesh.nodes))
-    flip = np.array([1.0, 1.0, np.linalg.det(u @ vt)])
-    return centre, (u * flip) @ vt
+def _rigid_modes(nodes: Array) -> Array:
+    """R (3n, 6): nodal velocities of three unit translations and of unit rotations about three axes."""
+    modes = np.zeros((len(nodes), 3, 6))
+    modes[:, :, :3] = np.eye(3)
+    for axis in range(3):
+        modes[:, :, 3 + axis] = np.cross(np.eye(3)[axis], nodes)
+    return modes.reshape(-1, 6)
 
 
-@dataclass(frozen=True)
-class DynamicCompliance:
-    """ŵ of one stone for one time step and θ.
+class Compliance:
+    """ŵ = (M + h θ V + h² θ² K)⁻¹ of one stone, for one time step and θ.
 
     Attributes
     ----------
-    matrix : M + h² θ² K, (3n, 3n), body axes [kg]
-    factor : its sparse LU factors
-    surface : C = S ŵ Sᵀ, (3 ns, 3 ns), the compliance of the surface nodes [1/kg]
+    matrix : ŵ⁻¹, (3n, 3n), body axes [kg]
     """
 
-    matrix: "csc_array[np.float64]"
-    factor: object
-    surface: Array
+    def __init__(self, matrix: "csc_array[np.float64]") -> None:
+        self.matrix = matrix
+        self._factor = splu(
+            matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
+        self._nodes = np.zeros(0, dtype=np.int64)
+        self._condensed = np.zeros((0, 0))
 
     def respond(self, impulse: Array) -> Array:
-        """Velocity ŵ p (n, 3) that the nodal impulses p (n, 3) [N s] give, body axes [m/s]."""
-        velocity: Array = self.factor.solve(impulse.ravel()).reshape(-1, 3)  # type: ignore[attr-defined]
+        """Velocities ŵ p (…, n, 3) that nodal impulses p (…, n, 3) [N s] give, body axes [m/s]."""
+        columns = impulse.reshape(-1, self.matrix.shape[0]).T
+        velocity: Array = self._factor.solve(np.ascontiguousarray(columns)).T.reshape(impulse.shape)
         return velocity
 
+    def between(self, nodes: Ints) -> Array:
+        """C = S ŵ Sᵀ (3k, 3k) between k nodes, in ascending order [1/kg].
 
-def dynamic_compliance(body: Deformable, step: float, theta: float) -> DynamicCompliance:
-    """Factorise M + h² θ² K once, and condense its inverse on the surface nodes."""
-    matrix = csc_array(body.operators.mass + (step * theta) ** 2 * body.operators.stiffness)
-    factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    dofs = (3 * body.surface[:, None] + np.arange(3)).ravel()
-    unit = np.zeros((matrix.shape[0], len(dofs)))
-    unit[dofs, np.arange(len(dofs))] = 1.0
-    surface = factor.solve(unit)[dofs]
-    return DynamicCompliance(matrix, factor, 0.5 * (surface + surface.T))
+        Nodes that were asked for are kept condensed: those of faces that touch are asked for again and again.
+        """
+        new = np.setdiff1d(nodes, self._nodes)
+        if len(new):
+            self._condense(np.union1d(self._nodes, new))
+        if len(nodes) == len(self._nodes):
+            return self._condensed
+        places = _dofs(np.searchsorted(self._nodes, nodes))
+        return self._condensed[np.ix_(places, places)]
+
+    def _condense(self, nodes: Ints) -> None:
+        dofs = _dofs(nodes)
+        unit = np.zeros((self.matrix.shape[0], len(dofs)))
+        unit[dofs, np.arange(len(dofs))] = 1.0
+        square = self._factor.solve(unit)[dofs]
+        self._nodes, self._condensed = nodes, 0.5 * (square + square.T)
+
+
+def _dofs(nodes: Ints) -> Ints:
+    dofs: Ints = (3 * nodes[:, None] + np.arange(3)).ravel()
+    return dofs
+
+
+def compliance(stone: Deformable, step: float, theta: float) -> Compliance:
+    """Factorise M + h θ V + h² θ² K once."""
+    operators, h = stone.operators, step * theta
+    return Compliance(csc_array(operators.mass + h * stone.damping + h**2 * operators.stiffness))

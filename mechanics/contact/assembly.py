@@ -1,21 +1,21 @@
 """From contact points to the Delassus operator: the Jacobians of rigid sides, the compliance between elastic ones."""
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import block_diag, csc_array, csr_array, eye_array, hstack, kron
+from scipy.sparse import block_diag, csc_array, csr_array
 
-from mechanics.bodies.deformable import DynamicCompliance
+from mechanics.bodies.deformable import Compliance
 from mechanics.bodies.rigid import inverse_inertia_world
 from mechanics.contact.contacts import Contacts, material_points
 from mechanics.model import Model
+from mechanics.operators.condensed import CondensedForm
 from mechanics.operators.mixed import ELASTIC, NONE, RIGID, MixedDelassus
 from mechanics.operators.rigid import RigidDelassus, Schedule
-from mechanics.problem import SparseForm
 from mechanics.state import State
 
-__all__ = ["local_velocity", "mixed_delassus", "rigid_delassus", "sparse_form", "world_impulse"]
+__all__ = ["condensed_form", "local_velocity", "mixed_delassus", "rigid_delassus", "world_impulse"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -40,24 +40,54 @@ def rigid_delassus(model: Model, state: State, contacts: Contacts, schedule: Sch
 
 
 def mixed_delassus(
-    model: Model, state: State, contacts: Contacts, compliance: Mapping[int, DynamicCompliance]
+    model: Model,
+    state: State,
+    contacts: Contacts,
+    compliance: Sequence[Compliance],
+    elastic_scale: bool = False,
 ) -> MixedDelassus:
-    """W of the contacts at the configuration of `state`: condense each deformable body on its contact sides."""
+    """W of the contacts at the configuration of `state`: condense each deformable body on its contact sides.
+
+    With `elastic_scale`, r and u are measured against the elastic part of W alone. In steps so long that nothing but
+    friction holds a stone back, W is nearly all rigid motion, and forces inside the joints would not count.
+    """
     body = contacts.bodies
     kind = np.where(model.fixed[body], NONE, np.where(model.elastic[body], ELASTIC, RIGID)).astype(np.int64)
     count, slot = _slots(body, kind, len(model.mass))
     yptr = np.concatenate([[0], np.cumsum(3 * count)]).astype(np.int64)
     bptr = np.concatenate([[0], np.cumsum((3 * count) ** 2)]).astype(np.int64)
     block, diagonal = np.zeros(int(bptr[-1])), np.zeros((2 * len(contacts), 3, 3))
-    for b in np.flatnonzero(count):
-        sides = np.flatnonzero((body.ravel() == b) & (kind.ravel() == ELASTIC))
-        square = _compliance_block(model, state, contacts, int(b), sides, compliance[int(b)])
-        block[bptr[b] : bptr[b + 1]] = square.ravel()
-        n = np.arange(len(sides))
-        diagonal[sides] = square.reshape(len(sides), 3, len(sides), 3)[n, :, n]
+    sides = np.argsort(np.where(kind == ELASTIC, body, -1).ravel(), kind="stable")[
+        -int(count.sum()) or 2 * len(body) :
+    ]
+    first = np.concatenate([[0], np.cumsum(count)])
+    for group, own in zip(model.elastic_stones.groups, compliance, strict=True):
+        for b in group.bodies[count[group.bodies] > 0]:
+            rows = sides[first[b] : first[b + 1]]
+            square = _compliance_block(model, state, contacts, int(b), rows, own)
+            block[bptr[b] : bptr[b + 1]] = square.ravel()
+            n = np.arange(len(rows))
+            diagonal[rows] = square.reshape(len(rows), 3, len(rows), 3)[n, :, n]
     jacobian, response = _rigid_sides(model, state, contacts)
     total = (diagonal.reshape(-1, 2, 3, 3) + jacobian @ response).sum(axis=1)
-    return MixedDelassus(body, kind, jacobian, response, slot, yptr, bptr, block, total)
+    own_part = total - _rigid_share(model, state, contacts, kind) if elastic_scale else total
+    scale = float(np.einsum("cii->", own_part) / max(3 * len(contacts), 1))
+    return MixedDelassus(body, kind, jacobian, response, slot, yptr, bptr, block, total, scale)
+
+
+def _rigid_share(model: Model, state: State, contacts: Contacts, kind: Ints) -> Array:
+    """The part of W_αα (nc, 3, 3) that is the motion of elastic stones as a whole, where a side is elastic."""
+    body = contacts.bodies
+    point = (contacts.weights @ state.node).reshape(-1, 2, 3)
+    arm = point - state.centre[body]
+    frame = np.broadcast_to(contacts.frame[:, None], (*body.shape, 3, 3))
+    lever = np.cross(arm[:, :, None, :], frame)
+    turned = inverse_inertia_world(model.flight, state.rotation)[body]
+    share = lever @ turned @ lever.transpose(0, 1, 3, 2)
+    share = share + model.flight.inverse_mass[body][..., None, None] * np.eye(3)
+    elastic = (kind == ELASTIC)[..., None, None]
+    result: Array = np.where(elastic, share, 0.0).sum(axis=1)
+    return result
 
 
 def _rigid_sides(model: Model, state: State, contacts: Contacts) -> tuple[Array, Array]:
@@ -86,44 +116,36 @@ def _slots(body: Ints, kind: Ints, bodies: int) -> tuple[Ints, Ints]:
 
 
 def _compliance_block(
-    model: Model, state: State, contacts: Contacts, b: int, sides: Ints, compliance: DynamicCompliance
+    model: Model, state: State, contacts: Contacts, b: int, sides: Ints, compliance: Compliance
 ) -> Array:
-    """G B C Bᵀ Gᵀ of one body: C of its surface nodes, B the weights of its contact sides, G to local frames."""
-    stone = model.stones[b]
-    assert stone is not None
-    columns = model.node_ptr[b] + stone.surface
-    weights = kron(contacts.weights[sides][:, columns], csr_array(np.eye(3)), format="csr")
-    half = weights @ compliance.surface
-    size = len(sides)
-    middle = (weights @ half.T).reshape(size, 3, size, 3)
+    """T C Tᵀ of one body: C between the nodes that its contact sides touch, T their weights in local frames."""
+    weights = contacts.weights[sides]
+    nodes, column = np.unique(weights.indices, return_inverse=True)
     turn = contacts.frame[sides // 2] @ state.rotation[b]
-    block = np.einsum("aik,akbl,bjl->aibj", turn, middle, turn, optimize=True).reshape(3 * size, 3 * size)
+    side = np.repeat(np.arange(len(sides)), np.diff(weights.indptr))
+    values = weights.data[:, None, None] * turn[side]
+    rows = 3 * side[:, None, None] + np.arange(3)[:, None] + np.zeros(3, dtype=np.int64)
+    columns = 3 * column[:, None, None] + np.zeros((3, 1), dtype=np.int64) + np.arange(3)
+    spread = csr_array(
+        (values.ravel(), (rows.ravel(), columns.ravel())), shape=(3 * len(sides), 3 * len(nodes))
+    )
+    half = spread @ compliance.between(nodes - model.elastic_stones.start[b])
+    block = spread @ half.T
     symmetric: Array = 0.5 * (block + block.T)
     return symmetric
 
 
-def sparse_form(
-    model: Model,
-    state: State,
-    contacts: Contacts,
-    operator: MixedDelassus,
-    compliance: Mapping[int, DynamicCompliance],
-) -> SparseForm:
-    """The same W in sparse matrices: six velocities for each rigid body, then those of all nodes, world axes."""
+def condensed_form(model: Model, state: State, contacts: Contacts, operator: MixedDelassus) -> CondensedForm:
+    """The same W for methods that factorise: elastic bodies condensed on the contacts, rigid ones by six velocities."""
     rigid = np.flatnonzero(model.inertia.inverse_mass > 0)
     turn = state.rotation[rigid]
     spin = turn @ model.inertia.inertia[rigid] @ turn.transpose(0, 2, 1)
-    blocks: list[object] = [
+    blocks = [
         block for b, moment in zip(rigid, spin, strict=True) for block in (model.mass[b] * np.eye(3), moment)
     ]
-    for b, own in compliance.items():
-        axes = kron(eye_array(own.matrix.shape[0] // 3), csr_array(state.rotation[b]), format="csr")
-        blocks.append(axes @ own.matrix @ axes.T)
-    signed = contacts.weights[0::2] - contacts.weights[1::2]
     # scipy makes no block diagonal of nothing
-    frames = block_diag(list(contacts.frame), format="csr") if len(contacts) else csr_array((0, 0))
-    lift = hstack([_rigid_lift(rigid, operator), frames @ kron(signed, eye_array(3), format="csr")]).T
-    return SparseForm(block_diag(blocks, format="csc"), csc_array(lift))
+    inertia = block_diag(blocks, format="csc") if blocks else csc_array((0, 0))
+    return CondensedForm(operator.elastic_part(), _rigid_lift(rigid, operator), inertia)
 
 
 def _rigid_lift(rigid: Ints, operator: MixedDelassus) -> "csr_array[np.float64]":

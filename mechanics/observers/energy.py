@@ -4,8 +4,9 @@ With v_θ = θ v_{i+1} + (1-θ) v_i, the scheme gives exactly
 
     ΔE = W_ext + W_contact - D_scheme,   W_contact = r·u_θ,   D_scheme = (θ - ½) (‖Δv‖²_M + ‖Δq‖²_K)
 
-where Δv is the jump at the kick; the flights before and after it keep the energy of a rigid body as it is. Deformable
-bodies that turn leave a remainder that shrinks with the step. W_ext holds the loads and what driven bodies put in.
+where Δv is the jump at the kick, and Δq the change of the deformation of an elastic body in its own axes; its damping,
+h v_θᵀ V v_θ, counts with the scheme. The flights before and after the kick keep the energy of a body as it is. Elastic
+bodies that turn leave a remainder of the order of their strain. W_ext holds the loads and what driven bodies put in.
 """
 
 from typing import TYPE_CHECKING
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mechanics.elastic_stones import ElasticGroup
 from mechanics.model import Model
 from mechanics.state import State
 
@@ -50,14 +52,30 @@ def _mass_norm(model: Model, rotation: Array, velocity: Array, node_velocity: Ar
     return total
 
 
-def _stiffness_norm(model: Model, before: State, after: State) -> float:
+def _elastic_dissipation(model: Model, step: "Step", theta: float, duration: float) -> float:
+    """(θ - ½) ‖Δq‖²_K + h v_θᵀ V v_θ of all deformable bodies [J]."""
     total = 0.0
-    for b, stone in enumerate(model.stones):
-        if stone is not None:
-            rows = model.nodes_of(b)
-            move = ((after.node[rows] - before.node[rows]) @ before.rotation[b]).ravel()
-            total += float(move @ (stone.operators.stiffness @ move))
+    for group in model.elastic_stones.groups:
+        stone, count = group.stone, len(group.bodies)
+        before, after = (
+            _in_axes(group, state, state.node, state.centre) for state in (step.before, step.after)
+        )
+        change = (after - before).reshape(count, -1)
+        total += (theta - 0.5) * float(np.sum(change.T * (stone.operators.stiffness @ change.T)))
+        if stone.damping.nnz:
+            mean = theta * step.kick.node_velocity + (1 - theta) * step.predicted.node_velocity
+            mean = _in_axes(group, step.predicted, mean).reshape(count, -1)
+            total += duration * float(np.sum(mean.T * (stone.damping @ mean.T)))
     return total
+
+
+def _in_axes(group: ElasticGroup, state: State, nodal: Array, origin: Array | None = None) -> Array:
+    """Nodal vectors (k, n, 3) of equal stones in their own axes."""
+    own = nodal[group.nodes]
+    if origin is not None:
+        own = own - origin[group.bodies, None]
+    turned: Array = own @ state.rotation[group.bodies]
+    return turned
 
 
 class EnergyBalance:
@@ -65,8 +83,8 @@ class EnergyBalance:
 
     Attributes
     ----------
-    external, contact, scheme : work of loads and driven bodies, work of the contacts, dissipation of scheme and
-        relaxation, so far [J]
+    external, contact, scheme : work of loads and driven bodies, work of the contacts, dissipation of scheme, damping
+        and relaxation, so far [J]
     unexplained : ΔE - external - contact + scheme, so far [J]
     reference : the largest energy that was in play so far, at least 10⁻⁹ of weight times smallest width [J]
     """
@@ -89,7 +107,7 @@ class EnergyBalance:
             kick.velocity - before.velocity,
             kick.node_velocity - before.node_velocity,
         )
-        scheme = (theta - 0.5) * (jump + _stiffness_norm(model, step.before, step.after))
+        scheme = (theta - 0.5) * jump + _elastic_dissipation(model, step, theta, model.scene.time.step)
         energy = kinetic_energy(model, step.after) + elastic_energy(model, step.after)
         self.unexplained += energy - self._energy - external - step.work + scheme
         self.external += external
@@ -109,7 +127,7 @@ class EnergyBalance:
             if stone is not None:
                 rows = model.nodes_of(b)
                 move = (step.after.node - step.before.node)[rows]
-                work += float(stone.operators.nodal_mass @ (move @ gravity))
+                work += float(stone.weight @ (move @ gravity))
         return work
 
     @property

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csc_array
 
 from mechanics.operators._kernels_mixed import apply_delassus, sweep
 from mechanics.problem import GaussSeidel
@@ -35,6 +36,7 @@ class MixedDelassus:
     bptr : (nb+1,) where each body's compliance block begins
     block : flat symmetric compliance blocks of the elastic bodies, between their contact sides [1/kg]
     diagonal : (nc, 3, 3) W_αα [1/kg]
+    scale : what u over r is measured against [1/kg]
     """
 
     body: Ints
@@ -46,6 +48,7 @@ class MixedDelassus:
     bptr: Ints
     block: Array
     diagonal: Array
+    scale: float
 
     @property
     def _arrays(self) -> tuple[NDArray[np.generic], ...]:
@@ -60,6 +63,24 @@ class MixedDelassus:
         """Velocities (nb, 6) that the impulses give to the rigid bodies [m/s, rad/s]."""
         change: Array = apply_delassus(impulse, *self._arrays)[1]
         return change
+
+    def elastic_part(self) -> "csc_array[np.float64]":
+        """W of the elastic bodies alone, (3 nc, 3 nc)."""
+        size = 3 * len(self.body)
+        rows, columns, values = [], [], []
+        for b in np.flatnonzero(np.diff(self.yptr)):
+            contact, side = np.nonzero((self.body == b) & (self.kind == ELASTIC))
+            order = np.argsort(self.slot[contact, side])
+            contact, sign = contact[order], np.where(side[order] == 0, 1.0, -1.0).repeat(3)
+            place = (3 * contact[:, None] + np.arange(3)).ravel().astype(np.int32)
+            square = self.block[self.bptr[b] : self.bptr[b + 1]].reshape(len(place), -1)
+            values.append((sign[:, None] * square * sign).ravel())
+            rows.append(np.repeat(place, len(place)))
+            columns.append(np.tile(place, len(place)))
+        if not values:
+            return csc_array((size, size))
+        entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
+        return csc_array(entries, shape=(size, size))
 
     def gauss_seidel(self, shift: Array, friction: Array, cohesion: Array) -> GaussSeidel:
         """Sweeps forth and back; running velocities are made anew on each call, so that rounding cannot pile up."""

@@ -97,7 +97,7 @@ class _Run:
         self._scale = scale_of(problem.delassus)
         self._shift = problem.u_free.copy()
         self._shift[:, 0] += problem.bias
-        self._sigma, self._factor = sigma, self._form.factor(sigma)
+        self._sigma, self._relaxed = sigma, self._form.relaxed(sigma)
         self.z = project_on_cone(start.impulse, problem.friction, problem.cohesion)
         self._y = -start.velocity / sigma
         self._lag = np.zeros(len(self.z))
@@ -111,13 +111,12 @@ class _Run:
 
     def iterate(self, count: int) -> None:
         """So many times r, z and y."""
-        form, problem, sigma = self._form, self._problem, self._sigma
+        problem, sigma = self._problem, self._sigma
         for _ in range(count):
             if self.iterations % self._hold == 0:
                 self._lag = problem.friction * np.sqrt((self._y[:, 1:] ** 2).sum(axis=1))
             admm_right_side(self.z, self._y, self._shift, self._lag, sigma, self._right)
-            inner = self._factor.solve(form.lift @ self._right.ravel())
-            self._r = self._right - (form.across @ inner).reshape(self._right.shape) / sigma
+            self._r = self._relaxed(self._right.ravel()).reshape(self._right.shape)
             self._last = self.z.copy()
             admm_update(self._r, self.z, self._y, problem.friction, problem.cohesion, _OVER_RELAXATION)
             self.iterations += 1
@@ -133,7 +132,7 @@ class _Run:
         new = float(np.clip(sigma / factor, _BOUNDS[0] * self._scale, _BOUNDS[1] * self._scale))
         self._y *= sigma / new
         self._lag *= sigma / new
-        self._sigma, self._factor = new, self._form.factor(new)
+        self._sigma, self._relaxed = new, self._form.relaxed(new)
 
 
 def _norm(values: Array) -> float:

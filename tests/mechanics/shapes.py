@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from mechanics.contact.assembly import mixed_delassus, rigid_delassus, sparse_form
+from mechanics.contact.assembly import condensed_form, mixed_delassus, rigid_delassus
 from mechanics.contact.contacts import Contacts, gaps, material_points, take
 from mechanics.contact.detection import Detector
 from mechanics.laws.dry_joint import DryJoint
@@ -97,13 +97,16 @@ def dense_operator(model, state, contacts, compliance, common=False):
     Written from the definitions alone: the velocity of a material point, and the inverse of M + h²θ²K. With `common`
     the point lies half-way between the two material points.
     """
+    groups = zip(model.elastic_stones.groups, compliance, strict=True)
+    compliance = {int(b): own for group, own in groups for b in group.bodies}
+    start = model.elastic_stones.start
     bodies, nodes = len(model.mass), len(state.node)
     w_hat = np.zeros((6 * bodies + 3 * nodes,) * 2)
     transpose = np.zeros((3 * len(contacts), len(w_hat)))
     for b in range(bodies):
         turn = state.rotation[b]
         if b in compliance:
-            rows = slice(6 * bodies + 3 * model.node_ptr[b], 6 * bodies + 3 * model.node_ptr[b + 1])
+            rows = slice(6 * bodies + 3 * start[b], 6 * bodies + 3 * start[b + 1])
             axes = np.kron(np.eye(len(model.stones[b].mesh.nodes)), turn)
             w_hat[rows, rows] = axes @ np.linalg.inv(compliance[b].matrix.toarray()) @ axes.T
         elif not model.fixed[b]:
@@ -215,7 +218,7 @@ class Posed:
     state: State
     contacts: Contacts
     operator: RigidDelassus | MixedDelassus
-    compliance: dict
+    compliance: tuple
     problem: ContactProblem
 
 
@@ -230,8 +233,8 @@ def posed(one, step=2e-3, theta=1.0):
         sparse = operator.sparse
     else:
         operator = mixed_delassus(model, state, contacts, compliance)
-        sparse = sparse_form(model, state, contacts, operator, compliance)
-    free = free_kick(model, state, state, state, compliance, step, theta)
+        sparse = condensed_form(model, state, contacts, operator)
+    free = free_kick(model, state, state, compliance, step, theta)
     statement = state_laws(
         model, state, contacts, gaps(contacts, state), model.laws.of(contacts.bodies),
         operator, lambda: sparse, free, np.zeros((len(contacts), STATE)), True,

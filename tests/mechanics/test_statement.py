@@ -25,7 +25,7 @@ def stated(one, memory=None, first=True, velocity=None):
     there = posed(one, STEP, one.time.theta)
     state = there.state if velocity is None else replace(there.state, velocity=velocity)
     contacts, model = there.contacts, there.model
-    free = free_kick(model, state, state, state, there.compliance, STEP, one.time.theta)
+    free = free_kick(model, state, state, there.compliance, STEP, one.time.theta)
     memory = np.zeros((len(contacts), STATE)) if memory is None else memory
     law = model.laws.of(contacts.bodies)
     gap = gaps(contacts, state)
