@@ -1,19 +1,35 @@
-"""From the last state to what is asked of it: stresses, positions, contact forces."""
+"""From a state to what is asked of it: positions, stresses, contact forces, joints."""
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
+from mechanics.bodies.deformable import Deformable
 from mechanics.contact.contacts import material_points
-from mechanics.elasticity import von_mises
+from mechanics.elasticity import (
+    from_voigt,
+    node_volumes,
+    principal,
+    recovery,
+    sampled_stress,
+    stress_error,
+    to_voigt,
+    von_mises,
+)
+from mechanics.interfaces import Faces, Interfaces, find_interfaces, placed_faces
+from mechanics.joints import StartingJoints, joint_results, slides, starting_joints
 from mechanics.laws.status import contact_status
 from mechanics.model import Model
-from mechanics.result import BodyResult, ContactResult
+from mechanics.result import BodyResult, ContactResult, Frame, JointResult
+from mechanics.scene import Block
 from mechanics.simulation import Step
 from mechanics.state import State
+from mechanics.stress_values import stress_values
 
-__all__ = ["body_results", "contact_results", "positions"]
+__all__ = ["Observer", "positions", "velocities"]
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 
 def positions(model: Model, state: State) -> tuple[Array, ...]:
@@ -26,39 +42,167 @@ def positions(model: Model, state: State) -> tuple[Array, ...]:
     )
 
 
-def body_results(model: Model, start: State, state: State, balance: Array) -> tuple[BodyResult, ...]:
-    """What became of each body; `balance` (nb,) as `imbalance` gives it."""
-    results = []
-    before, now = positions(model, start), positions(model, state)
-    for b, (block, stone) in enumerate(zip(model.scene.blocks, model.stones, strict=True)):
-        stress = None if stone is None else stone.stress(now[b], state.centre[b], state.rotation[b])
-        results.append(
-            BodyResult(
-                code=block.code,
-                fidelity=block.fidelity,
-                reference=before[b],
-                position=now[b],
-                faces=block.faces if stone is None else tuple(map(tuple, stone.mesh.facets.tolist())),
-                cells=np.zeros((0, 4), dtype=np.int64) if stone is None else stone.mesh.cells,
-                stress=stress,
-                von_mises=None if stress is None else von_mises(stress),
-                volume=float(model.volume[b]),
-                mass=float(model.mass[b]),
-                balance=float(balance[b]),
-            )
+def velocities(model: Model, state: State) -> tuple[Array, ...]:
+    """Velocities of the same points [m/s]."""
+    return tuple(
+        state.node_velocity[model.nodes_of(b)]
+        if stone is not None
+        else state.velocity[b, :3] + np.cross(state.velocity[b, 3:], model.outline[b] @ state.rotation[b].T)
+        for b, stone in enumerate(model.stones)
+    )
+
+
+class Observer:
+    """What is seen of a run: frames while it goes on; bodies, contacts and joints at its end.
+
+    Parameters
+    ----------
+    model, start : the run, and the state in which it begins
+    """
+
+    def __init__(self, model: Model, start: State) -> None:
+        self._model, self._start = model, start
+        self._joints: StartingJoints | None = None
+        self._recovery: dict[int, csr_array[np.float64]] = {}
+
+    def first_frame(self) -> Frame:
+        """The instant at which the run begins, before there are contact forces."""
+        return self._frame(self._start, _no_contacts())
+
+    def begin(self, step: Step) -> None:
+        """Take the contacts of the first step as the joints that there are at the start."""
+        self._joints = starting_joints(self._model, self._start, step.contacts)
+
+    def frame(self, step: Step) -> Frame:
+        """The end of a step."""
+        _, interfaces = self._interfaces(step)
+        return self._frame(step.after, self._contacts(step, interfaces))
+
+    def contacts_and_joints(self, step: Step) -> tuple[ContactResult, JointResult]:
+        """The contact points of a step with their mean forces, and what they add up to."""
+        faces, interfaces = self._interfaces(step)
+        contacts = self._contacts(step, interfaces)
+        assert self._joints is not None
+        return contacts, joint_results(self._model, self._joints, faces, interfaces.face, step, contacts)
+
+    def bodies(self, state: State, balance: Array) -> tuple[BodyResult, ...]:
+        """What became of each body; `balance` (nb,) as `imbalance` gives it."""
+        model = self._model
+        before, now = positions(model, self._start), positions(model, state)
+        return tuple(
+            _rigid_result(model, b, block, before[b], now[b], float(balance[b]))
+            if stone is None
+            else self._elastic_result(b, stone, state, before[b], float(balance[b]))
+            for b, (block, stone) in enumerate(zip(model.scene.blocks, model.stones, strict=True))
         )
-    return tuple(results)
+
+    def _frame(self, state: State, contacts: ContactResult) -> Frame:
+        stresses = tuple(
+            None if stone is None else _in_world(self._stress(b, stone, state)[0], state.rotation[b])
+            for b, stone in enumerate(self._model.stones)
+        )
+        return Frame(
+            state.time, positions(self._model, state), velocities(self._model, state), stresses, contacts
+        )
+
+    def _interfaces(self, step: Step) -> tuple[Faces, Interfaces]:
+        assert self._joints is not None
+        faces = placed_faces(self._model, step.after)
+        return faces, find_interfaces(faces, step.contacts, step.after, self._joints.face)
+
+    def _contacts(self, step: Step, interfaces: Interfaces) -> ContactResult:
+        contacts, normal = step.contacts, step.contacts.frame[:, 0]
+        pressing = np.einsum("ci,ci->c", step.force, normal)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            pressure = np.where(contacts.area > 0, pressing / contacts.area, np.nan)
+        return ContactResult(
+            bodies=contacts.bodies,
+            point=material_points(contacts, step.after).mean(axis=1),
+            normal=normal,
+            force=step.force,
+            gap=step.gap,
+            area=contacts.area,
+            pressure=pressure,
+            slide=np.linalg.norm(slides(contacts, self._start, step.after), axis=1),
+            status=contact_status(step.internal, step.terms, step.solution.impulse),
+            joint=interfaces.joint,
+        )
+
+    def _stress(self, body: int, stone: Deformable, state: State) -> tuple[Array, Array]:
+        """Recovered stress of the nodes (n, 6) [Pa] and their displacement (n, 3) [m], both in body axes."""
+        # equal stones share their finite elements, and so the weights of the recovery
+        if id(stone) not in self._recovery:
+            self._recovery[id(stone)] = recovery(stone.mesh)
+        node = state.node[self._model.nodes_of(body)]
+        displacement = stone.displacement(node, state.centre[body], state.rotation[body])
+        stress: Array = self._recovery[id(stone)] @ sampled_stress(stone.mesh, stone.material, displacement)
+        return stress, displacement
+
+    def _elastic_result(
+        self, body: int, stone: Deformable, state: State, before: Array, balance: float
+    ) -> BodyResult:
+        model, block = self._model, self._model.scene.blocks[body]
+        local, displacement = self._stress(body, stone, state)
+        stress = _in_world(local, state.rotation[body])
+        now, volume = state.node[model.nodes_of(body)], node_volumes(stone.mesh)
+        error = stress_error(stone.mesh, stone.material, displacement, local)
+        return BodyResult(
+            code=block.code,
+            fidelity=block.fidelity,
+            reference=before,
+            position=now,
+            faces=tuple(map(tuple, stone.mesh.facets[:, : stone.mesh.element.facet_corners].tolist())),
+            element=stone.mesh.element,
+            cells=stone.mesh.cells,
+            stress=stress,
+            von_mises=von_mises(stress),
+            principal=principal(stress)[0],
+            node_volume=volume,
+            values=stress_values(stress, now, volume, stone.material, error),
+            volume=float(model.volume[body]),
+            mass=float(model.mass[body]),
+            balance=balance,
+        )
 
 
-def contact_results(step: Step) -> ContactResult:
-    """The contact points of a step, with their mean force."""
-    contacts = step.contacts
+def _rigid_result(
+    model: Model, body: int, block: Block, before: Array, now: Array, balance: float
+) -> BodyResult:
+    return BodyResult(
+        code=block.code,
+        fidelity=block.fidelity,
+        reference=before,
+        position=now,
+        faces=block.faces,
+        element=None,
+        cells=np.zeros((0, 4), dtype=np.int64),
+        stress=None,
+        von_mises=None,
+        principal=None,
+        node_volume=None,
+        values=None,
+        volume=float(model.volume[body]),
+        mass=float(model.mass[body]),
+        balance=balance,
+    )
+
+
+def _in_world(stress: Array, rotation: Array) -> Array:
+    """Stress (n, 6) from body to world axes."""
+    return to_voigt(rotation @ from_voigt(stress) @ rotation.T)
+
+
+def _no_contacts() -> ContactResult:
+    none, vectors = np.zeros(0), np.zeros((0, 3))
     return ContactResult(
-        bodies=contacts.bodies,
-        point=material_points(contacts, step.after).mean(axis=1),
-        normal=contacts.frame[:, 0],
-        force=step.force,
-        gap=step.gap,
-        area=contacts.area,
-        status=contact_status(step.internal, step.terms, step.solution.impulse),
+        bodies=np.zeros((0, 2), dtype=np.int64),
+        point=vectors,
+        normal=vectors,
+        force=vectors,
+        gap=none,
+        area=none,
+        pressure=none,
+        slide=none,
+        status=np.zeros(0, dtype=np.str_),
+        joint=np.zeros(0, dtype=np.int64),
     )

@@ -6,12 +6,27 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from mechanics.meshing.elements import Element
 from mechanics.scene import Fidelity, Scene
+from mechanics.stress_values import StressValues
 
-__all__ = ["BodyResult", "ContactResult", "Energies", "Errors", "Frame", "History", "Outcome", "Result"]
+__all__ = [
+    "BodyResult",
+    "ContactResult",
+    "Energies",
+    "Errors",
+    "Frame",
+    "History",
+    "JointResult",
+    "Outcome",
+    "Result",
+]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+# by this much a number that may be at most one may exceed it
+_ROUNDING = 1e-9
 
 
 class Outcome(StrEnum):
@@ -53,10 +68,14 @@ class BodyResult:
     code, fidelity : as in the scene
     reference : (n, 3) points before the run: corners of a rigid block, mesh nodes of a deformable one [m]
     position : (n, 3) the same points now [m]
-    faces : outward polygons on those points (the corners' polygons, or the mesh's boundary triangles)
+    faces : outward polygons on those points (the corners' polygons, or the corners of the mesh's boundary facets)
+    element : kind of the finite elements; None if rigid
     cells : (nc, k) node indices of the finite elements, in VTK's order; empty for rigid and fixed blocks
     stress : (n, 6) recovered nodal stress xx, yy, zz, xy, yz, zx in world axes [Pa]; None if rigid
     von_mises : (n,) Von Mises stress of the recovered nodal stress [Pa]; None if rigid
+    principal : (n, 3) principal stresses of the same, largest first [Pa]; None if rigid
+    node_volume : (n,) volume that each node stands for [m³]; None if rigid
+    values : the stress in a few numbers; None if rigid
     volume : [m³]
     mass : [kg]
     balance : unbalanced force, or moment over its smallest width, over its weight [-]
@@ -67,9 +86,13 @@ class BodyResult:
     reference: Array
     position: Array
     faces: tuple[tuple[int, ...], ...]
+    element: Element | None
     cells: Ints
     stress: Array | None
     von_mises: Array | None
+    principal: Array | None
+    node_volume: Array | None
+    values: StressValues | None
     volume: float
     mass: float
     balance: float
@@ -82,7 +105,7 @@ class BodyResult:
 
 @dataclass(frozen=True)
 class ContactResult:
-    """The contact points at the end of the run.
+    """The contact points at one instant.
 
     Attributes
     ----------
@@ -91,8 +114,11 @@ class ContactResult:
     normal : (nc, 3) from antagonist to candidate [-]
     force : (nc, 3) mean force over the last step, on the candidate, world axes [N]
     gap : (nc,) [m]
-    area : (nc,) tributary area [m²]
+    area : (nc,) tributary area; zero between edges [m²]
+    pressure : (nc,) normal force over area; NaN between edges [Pa]
+    slide : (nc,) how far its two material points have parted across the normal since the start [m]
     status : (nc,) "open", "stick", "slip", "bonded" or "broken"
+    joint : (nc,) the joint that it belongs to; -1: none, as between edges
     """
 
     bodies: Ints
@@ -101,15 +127,95 @@ class ContactResult:
     force: Array
     gap: Array
     area: Array
+    pressure: Array
+    slide: Array
     status: NDArray[np.str_]
+    joint: Ints
+
+
+@dataclass(frozen=True)
+class JointResult:
+    """The joints at the end of the run: pairs of flat faces of two stones that touch, or that touched at the start.
+
+    Attributes
+    ----------
+    bodies : (nj, 2) indices into the scene's blocks, the lower first
+    parted : (nj,) it touched at the start and is now open beyond the distance in which contacts are watched; its
+        polygon is that of the start, carried along by the second stone
+    polygon : the common polygon of both faces, (k, 3) corners for each joint [m]
+    frame : (nj, 3, 3) rows n, t1, t2; n from the second to the first stone, t1 along the larger second moment [-]
+    centroid : (nj, 3) of the polygon [m]
+    area : (nj,) [m²]
+    second_moment : (nj, 2) ∫ y₁² and ∫ y₂² along t1 and t2 about the centroid [m⁴]
+    force : (nj, 3) resultant on the first stone, world axes [N]
+    moment : (nj, 3) about the centroid [N m]
+    centre_of_pressure : (nj, 3) where the resultant meets the joint; NaN without compression [m]
+    eccentricity : (nj, 2) the same from the centroid, along t1 and t2; NaN without compression [m]
+    kern : (nj,) largest tension that a linear pressure would have, over the mean pressure: 0 if centred, up to 1
+        within the kern; NaN without compression [-]
+    edge : (nj,) how far out the centre of pressure lies: 0 at the centroid, 1 at the edge; NaN without compression [-]
+    pressure_mean : (nj,) compression over area; negative: tension [Pa]
+    pressure_max : (nj,) largest of a contact point [Pa]
+    opening : (nj,) largest gap [m]
+    sliding : (nj,) largest slide of a contact point since the start [m]
+    slipping, open : (nj,) part of the area of the watched contact points that slips, or that bears nothing [-]
+    friction_use : (nj,) shear force over what friction and cohesion can bear; NaN where that is nothing [-]
+    """
+
+    bodies: Ints
+    parted: NDArray[np.bool_]
+    polygon: tuple[Array, ...]
+    frame: Array
+    centroid: Array
+    area: Array
+    second_moment: Array
+    force: Array
+    moment: Array
+    centre_of_pressure: Array
+    eccentricity: Array
+    kern: Array
+    edge: Array
+    pressure_mean: Array
+    pressure_max: Array
+    opening: Array
+    sliding: Array
+    slipping: Array
+    open: Array
+    friction_use: Array
+
+    def __len__(self) -> int:
+        return len(self.bodies)
+
+    @property
+    def pressed(self) -> NDArray[np.bool_]:
+        """(nj,) it bears compression."""
+        return np.isfinite(self.kern)
+
+    @property
+    def in_kern(self) -> NDArray[np.bool_]:
+        """(nj,) it bears compression, within the kern."""
+        inside: NDArray[np.bool_] = self.kern <= 1.0 + _ROUNDING
+        return inside
 
 
 @dataclass(frozen=True)
 class Frame:
-    """The motion at one instant: positions[i] are the points of body i, as in its BodyResult."""
+    """One instant.
+
+    Attributes
+    ----------
+    time : [s]
+    positions : of the points of each body, as in its BodyResult [m]
+    velocities : (n, 3) of the same points [m/s]
+    stresses : (n, 6) as in BodyResult; None if rigid [Pa]
+    contacts : the contact points; joints of the start have the same numbers as at the end
+    """
 
     time: float
     positions: tuple[Array, ...]
+    velocities: tuple[Array, ...]
+    stresses: tuple[Array | None, ...]
+    contacts: ContactResult
 
 
 @dataclass(frozen=True)
@@ -168,6 +274,7 @@ class Result:
     time : simulated time [s]
     bodies : one per block, in the scene's order
     contacts : the contact points at the end
+    joints : what each joint carries at the end
     errors : how far the result can be trusted
     energies : where the energy went
     rest_time : when the spell of rest began in which the run ended; None if it did not end at rest [s]
@@ -184,6 +291,7 @@ class Result:
     time: float
     bodies: tuple[BodyResult, ...]
     contacts: ContactResult
+    joints: JointResult
     errors: Errors
     energies: Energies
     rest_time: float | None

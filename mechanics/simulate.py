@@ -9,7 +9,7 @@ from mechanics.model import Model, build_model
 from mechanics.observers.energy import EnergyBalance, kinetic_energy
 from mechanics.observers.equilibrium import imbalance, settlement, speed, support_reaction
 from mechanics.outcome import LASTING, Watch
-from mechanics.postprocess import body_results, contact_results, positions
+from mechanics.postprocess import Observer
 from mechanics.progress import Progress
 from mechanics.result import Energies, Errors, Frame, History, Outcome, Result
 from mechanics.scene import Scene
@@ -37,12 +37,15 @@ def simulate(scene: Scene, progress: Callable[[Progress], None] | None = None) -
     log = _Log(model, start)
     watch = Watch(model, start)
     settings = scene.time
-    frames = [Frame(start.time, positions(model, start))]
+    observer = Observer(model, start)
+    frames = [observer.first_frame()]
     outcome, step = Outcome.MOVING, None
     total = max(1, round(settings.duration / settings.step))
     for count in range(1, total + 1):
         step = simulation.step()
         with clock("observe"):
+            if count == 1:
+                observer.begin(step)
             balance = log(step)
             outcome = watch(step.after, balance, step.solution)
         report(
@@ -50,11 +53,12 @@ def simulate(scene: Scene, progress: Callable[[Progress], None] | None = None) -
         )
         done = settings.stop_at_equilibrium and outcome is not Outcome.MOVING
         if done or count == total or (scene.frame_every and count % scene.frame_every == 0):
-            frames.append(Frame(step.after.time, positions(model, step.after)))
+            with clock("stress"):
+                frames.append(observer.frame(step))
         if done:
             break
     assert step is not None
-    return _result(model, start, step, outcome, watch.rest_time, log, frames, clock)
+    return _result(model, observer, step, outcome, watch.rest_time, log, frames, clock)
 
 
 class _Log:
@@ -109,7 +113,7 @@ class _Log:
 
 def _result(
     model: Model,
-    start: State,
+    observer: Observer,
     last: Step,
     outcome: Outcome,
     rest_time: float,
@@ -120,7 +124,8 @@ def _result(
     history, scene = log.history(), model.scene
     support = support_reaction(model, last.contacts, last.force, last.after.time)
     with clock("stress"):
-        bodies = body_results(model, start, last.after, log.balance)
+        bodies = observer.bodies(last.after, log.balance)
+        contacts, joints = observer.contacts_and_joints(last)
     errors = Errors(
         natural_map=float(history.natural_map[-LASTING:].max()),
         penetration=log.penetration / float(model.surfaces.size.min()),
@@ -135,7 +140,8 @@ def _result(
         steps=len(history.time),
         time=last.after.time,
         bodies=bodies,
-        contacts=contact_results(last),
+        contacts=contacts,
+        joints=joints,
         errors=errors,
         energies=Energies(log.energy.external, log.energy.contact, log.energy.scheme),
         rest_time=rest_time if outcome is Outcome.EQUILIBRIUM else None,

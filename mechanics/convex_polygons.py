@@ -1,0 +1,70 @@
+"""Many convex plane polygons at once: their overlaps, areas and moments.
+
+A polygon is a row of corners (m, 2), counter-clockwise, of which the first `count` are meant.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["following", "moments", "overlaps"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def following(count: Ints, most: int) -> Ints:
+    """Which corner comes after each one (n, most), of polygons with these counts of corners (n,)."""
+    place = np.arange(most)
+    return np.where(place + 1 < count[:, None], place + 1, 0)
+
+
+def overlaps(first: Array, first_count: Ints, second: Array, second_count: Ints) -> tuple[Array, Ints]:
+    """Common parts of two rows of polygons, pair by pair (Sutherland & Hodgman 1974)."""
+    polygon, count = first, first_count
+    rows = np.arange(len(second))
+    for k in range(second.shape[1]):
+        a = second[:, k]
+        b = second[rows, np.where(k + 1 < second_count, k + 1, 0)]
+        polygon, count = _clipped(polygon, count, a, b, k < second_count)
+    return polygon, count
+
+
+def _clipped(
+    polygon: Array, count: Ints, a: Array, b: Array, wanted: NDArray[np.bool_]
+) -> tuple[Array, Ints]:
+    """Keep what lies to the left of the lines a → b (n, 2), in those rows that are wanted."""
+    number, most = polygon.shape[:2]
+    place = np.arange(most)
+    meant = place < count[:, None]
+    after = following(count, most)
+    along, away = (b - a)[:, None], polygon - a[:, None]
+    left = np.where(wanted[:, None], along[..., 0] * away[..., 1] - along[..., 1] * away[..., 0], 1.0)
+    rows = np.arange(number)[:, None]
+    ahead = left[rows, after]
+    crosses = meant & (left * ahead < 0)
+    part = np.where(crosses, left, 0.0) / np.where(crosses, left - ahead, 1.0)
+    crossing = polygon + part[..., None] * (polygon[rows, after] - polygon)
+    # each corner gives itself, if it is kept, and then the point where its edge crosses the line
+    found = np.stack([polygon, crossing], axis=2).reshape(number, 2 * most, 2)
+    kept = np.stack([meant & (left >= 0), crosses], axis=2).reshape(number, 2 * most)
+    order = np.argsort(~kept, axis=1, kind="stable")
+    left_over = kept.sum(axis=1)
+    return found[rows, order][:, : max(int(left_over.max(initial=0)), 1)], left_over
+
+
+def moments(polygon: Array, count: Ints) -> tuple[Array, Array, Array]:
+    """Area (n,), centroid (n, 2), and second moments ∫(x-c)(x-c)ᵀ (n, 2, 2) of each; zeros where nothing is left."""
+    rows, place = np.arange(len(polygon))[:, None], np.arange(polygon.shape[1])
+    origin = polygon[:, :1]
+    meant = (place < count[:, None])[..., None]
+    p = np.where(meant, polygon - origin, 0.0)
+    q = np.where(meant, p[rows, following(count, polygon.shape[1])], 0.0)
+    # each edge spans a triangle with the first corner
+    twice = p[..., 0] * q[..., 1] - p[..., 1] * q[..., 0]
+    area = 0.5 * twice.sum(axis=1)
+    safe = np.where(area > 0, area, 1.0)
+    middle = np.einsum("nk,nki->ni", twice, p + q) / (6.0 * safe[:, None])
+    second = np.einsum("nk,nki,nkj->nij", twice, p, p) + np.einsum("nk,nki,nkj->nij", twice, q, q)
+    second += np.einsum("nk,nki,nkj->nij", twice, p + q, p + q)
+    second = second / 24.0 - area[:, None, None] * middle[:, :, None] * middle[:, None, :]
+    return area, origin[:, 0] + middle, second
