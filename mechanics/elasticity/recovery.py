@@ -1,40 +1,130 @@
-"""Stress at the nodes from that at the sampling points."""
+"""Stress at the nodes from that at the sampling points (superconvergent patch recovery)."""
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import coo_array, csr_array
 
+from mechanics.elasticity.stress import SAMPLE_ORDER
 from mechanics.meshing.mesh import SolidMesh
+from mechanics.meshing.shape_functions import integration
 
 __all__ = ["recovery"]
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
-# a linear fit has four unknowns; so many values make it a mean, not an interpolation
-_PATCH = 10
+# directions, and quadratic terms, that a patch sees with less than this part of the largest variance are left out
+_UNSEEN = {1: 1e-8, 2: 0.03}
+# a polynomial whose value is a sum of so much more than the sampled values is not trusted
+_AMPLIFIED = 6.0
+# weights (_FLAT + d²/d̄²)^-power fall with the distance d from the patch's corner, d̄² its mean square
+_FLAT, _POWER = 0.1, {1: 1.0, 2: 1.5}
+# so many patches are fitted at once
+_AT_ONCE = 128
 
 
 def recovery(mesh: SolidMesh) -> "csr_array[np.float64]":
-    """Weights (n, nt) that give nodal values from those of the tetrahedra (superconvergent patch recovery).
+    """Weights (n, nq) that give nodal values from those of `sampled_stress` (Zienkiewicz & Zhu 1992).
 
-    Around each node a linear polynomial is fitted by least squares to the values at the tetrahedra's centroids
-    (Zienkiewicz & Zhu 1992). A patch that cannot carry the fit, as at a corner, is widened by its neighbours.
+    Around each corner of the cells a polynomial of the element's order is fitted by weighted least squares to the
+    values at the sampling points of the cells that touch it; around a corner on the surface, also to those of the cells
+    that touch these, as a patch on one side of a point says little of its value. Terms that a patch does not see are
+    left out, the quadratic ones first: constants are always exact. A middle node has the mean of the values that the
+    polynomials of its corners give there.
     """
-    nodes, count = len(mesh.nodes), len(mesh.cells)
-    centroid = mesh.nodes[mesh.cells].mean(axis=1)
-    touches = csr_array(
-        (np.ones(4 * count), (mesh.cells.ravel(), np.repeat(np.arange(count), 4))), shape=(nodes, count)
-    )
+    corner, touches, owner, target = _patches(mesh)
+    rule = integration(mesh.element, mesh.nodes, mesh.cells, SAMPLE_ORDER[mesh.element])
+    samples, points = rule.point.shape[1], rule.point.reshape(-1, 3)
+    outside = np.isin(corner, mesh.facets)
     wider = (touches @ touches.T) @ touches
-    columns, weights = [], []
-    for node in range(nodes):
-        patch = touches.indices[touches.indptr[node] : touches.indptr[node + 1]]
-        if len(patch) < _PATCH:
-            patch = wider.indices[wider.indptr[node] : wider.indptr[node + 1]]
-        # fitted about the patch's mean point: where the centroids lie on one plane, a constant stays exact
-        mean = centroid[patch].mean(axis=0)
-        slope = np.linalg.pinv(centroid[patch] - mean)
-        columns.append(patch)
-        weights.append(1.0 / len(patch) + (mesh.nodes[node] - mean) @ slope)
-    pointer = np.concatenate([[0], np.cumsum([len(c) for c in columns])])
-    return csr_array((np.concatenate(weights), np.concatenate(columns), pointer), shape=(nodes, count))
+    rows, columns, weights = [], [], []
+    for patches, cells in ((np.flatnonzero(~outside), touches), (np.flatnonzero(outside), wider)):
+        # those of about the same size together
+        patches = patches[np.argsort(np.diff(cells.indptr)[patches], kind="stable")]
+        for start in range(0, len(patches), _AT_ONCE):
+            part = patches[start : start + _AT_ONCE]
+            number, held = _rows(cells, part)
+            number = (samples * number[:, :, None] + np.arange(samples)).reshape(len(part), -1)
+            held = np.repeat(held, samples, axis=1)
+            place, wanted = _rows(owner, part)
+            node = target[place]
+            found = _fit(points[number], held, mesh.nodes[corner[part]], mesh.nodes[node], mesh.element.order)
+            kept = wanted[:, :, None] & held[:, None, :]
+            rows.append(np.broadcast_to(node[:, :, None], kept.shape)[kept])
+            columns.append(np.broadcast_to(number[:, None, :], kept.shape)[kept])
+            weights.append(found[kept])
+    whole = coo_array(
+        (np.concatenate(weights), (np.concatenate(rows), np.concatenate(columns))),
+        shape=(len(mesh.nodes), len(points)),
+    ).tocsr()
+    count = np.bincount(target, minlength=len(mesh.nodes))
+    whole.data /= np.repeat(count, np.diff(whole.indptr))
+    return csr_array(whole)
+
+
+def _patches(mesh: SolidMesh) -> tuple[Ints, "csr_array[np.float64]", "csr_array[np.float64]", Ints]:
+    """Corners (np,), cells that touch each, nodes that each gives a value to (rows of places in `target`), `target`."""
+    corners, cells = mesh.element.corners, len(mesh.cells)
+    distinct, number = np.unique(mesh.cells[:, :corners], return_inverse=True)
+    number = number.reshape(cells, corners)
+    touches = csr_array(
+        (np.ones(number.size), (number.ravel(), np.repeat(np.arange(cells), corners))),
+        shape=(len(distinct), cells),
+    )
+    ends = [(corner, node) for node, of in enumerate(mesh.element.node_corners) for corner in of]
+    first, second = np.array(ends).T
+    pairs = np.unique(number[:, first].ravel() * len(mesh.nodes) + mesh.cells[:, second].ravel())
+    counts = np.bincount(pairs // len(mesh.nodes), minlength=len(distinct))
+    pointer = np.concatenate([[0], np.cumsum(counts)])
+    owner = csr_array(
+        (np.ones(len(pairs)), np.arange(len(pairs)), pointer), shape=(len(distinct), len(pairs))
+    )
+    return distinct, touches, owner, pairs % len(mesh.nodes)
+
+
+def _rows(matrix: "csr_array[np.float64]", rows: Ints) -> tuple[Ints, NDArray[np.bool_]]:
+    """Columns (nr, m) of some rows, filled up with the first of each, and which of them are the row's own."""
+    start, count = matrix.indptr[rows], np.diff(matrix.indptr)[rows]
+    place = np.arange(count.max())
+    held = place < count[:, None]
+    return matrix.indices[start[:, None] + np.where(held, place, 0)].astype(np.int64), held
+
+
+def _fit(points: Array, held: NDArray[np.bool_], corner: Array, target: Array, order: int) -> Array:
+    """Weights (np, nt, m) of the values at points (np, m, 3) of patches for targets (np, nt, 3).
+
+    Coordinates are turned and stretched so that the points of each patch have unit variance along each axis: the
+    fit does not know how slender the cells are.
+    """
+    distance = ((points - corner[:, None]) ** 2).sum(axis=2)
+    mean_square = (distance * held).sum(axis=1, keepdims=True) / held.sum(axis=1, keepdims=True)
+    part = held * (_FLAT + distance / mean_square) ** -_POWER[order]
+    part = (part / part.sum(axis=1, keepdims=True))[:, :, None]
+    mean = (part * points).sum(axis=1, keepdims=True)
+    local = points - mean
+    stretch = _inverse_root(local.transpose(0, 2, 1) @ (part * local), _UNSEEN[1])
+    y, z = local @ stretch, (target - mean) @ stretch
+    weighted = (part * y).transpose(0, 2, 1)
+    linear = part.transpose(0, 2, 1) + z @ weighted
+    if order == 1:
+        return linear
+    # what the squares and products have beyond the constant and linear polynomials
+    squares, aim = _squares(y), _squares(z)
+    level, slope = (part * squares).sum(axis=1, keepdims=True), weighted @ squares
+    rest, aim = squares - level - y @ slope, aim - level - z @ slope
+    root = _inverse_root(rest.transpose(0, 2, 1) @ (part * rest), _UNSEEN[2])
+    full = linear + aim @ root @ root.transpose(0, 2, 1) @ (part * rest).transpose(0, 2, 1)
+    return np.where(np.abs(full).sum(axis=2, keepdims=True) > _AMPLIFIED, linear, full)
+
+
+def _squares(y: Array) -> Array:
+    return y[..., [0, 1, 2, 0, 1, 2]] * y[..., [0, 1, 2, 1, 2, 0]]
+
+
+def _inverse_root(variance: Array, unseen: float) -> Array:
+    """Columns that bring (np, k, k) to the unit matrix; zero for the directions of hardly any variance."""
+    values, vectors = np.linalg.eigh(variance)
+    seen = values > unseen * np.maximum(values[:, -1:], np.finfo(float).tiny)
+    scale = np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)
+    result: Array = vectors * scale[:, None, :]
+    return result
