@@ -25,7 +25,7 @@ G = 9.81
 def box(code, low, high, material=STONE, fidelity=Fidelity.RIGID, mesh_size=None, velocity=(0.0,) * 6):
     """An axis-parallel block from corner `low` to corner `high` [m]."""
     low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
-    return Block(code, low + CORNERS * (high - low), FACES, material, fidelity, mesh_size, velocity)
+    return Block(code, low + CORNERS * (high - low), FACES, material, fidelity, mesh_size, velocity=velocity)
 
 
 def ground(half=5.0, depth=1.0):
