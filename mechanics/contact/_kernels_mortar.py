@@ -1,122 +1,483 @@
-"""Numba kernels of the mortar method: integrals over the overlap of two triangulated faces."""
+"""Numba kernels of the mortar method: integrals over the overlap of two meshed faces, and the weights they give."""
 
 import numpy as np
 from numba import njit
 
-from mechanics.contact._kernels_narrow import MAX_POINTS
+from mechanics.contact._kernels_facets import QUADRATURE, corner_count, degree, hats, locate, rule_of, shapes
 
-__all__ = ["mortar_integrals"]
+__all__ = ["mortar_rows", "overlap_area"]
 
-
-@njit(cache=True)
-def _clip_flat(polygon, count, ax, ay, bx, by):
-    """Keep what lies to the left of the line a → b of a plane polygon (MAX_POINTS, 2), in place."""
-    kept = np.empty_like(polygon)
-    k = 0
-    for p in range(count):
-        q = (p + 1) % count
-        dp = (bx - ax) * (polygon[p, 1] - ay) - (by - ay) * (polygon[p, 0] - ax)
-        dq = (bx - ax) * (polygon[q, 1] - ay) - (by - ay) * (polygon[q, 0] - ax)
-        if dp >= 0.0 and k < MAX_POINTS:
-            kept[k] = polygon[p]
-            k += 1
-        if (dp > 0.0 > dq or dq > 0.0 > dp) and k < MAX_POINTS:
-            kept[k] = polygon[p] + dp / (dp - dq) * (polygon[q] - polygon[p])
-            k += 1
-    polygon[:k] = kept[:k]
-    return k
+# corners that a facet can have when it is cut by another facet and by the outlines of two faces
+_MAX_CUT = 64
+# a node whose share of the overlap is below this part of a neighbour's is joined to it
+_SLIVER = 1e-2
 
 
 @njit(cache=True)
-def _barycentric(x, y, tri):
-    ax, ay = tri[0]
-    bx, by = tri[1]
-    cx, cy = tri[2]
-    det = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
-    w1 = ((x - ax) * (cy - ay) - (cx - ax) * (y - ay)) / det
-    w2 = ((bx - ax) * (y - ay) - (x - ax) * (by - ay)) / det
-    return 1.0 - w1 - w2, w1, w2
+def _clip_flat(polygon, count, cutter, corners, kept):
+    """Keep what lies inside a convex polygon `cutter`, whichever way round it is, of `polygon`, in place."""
+    turn = 0.0
+    for k in range(1, corners - 1):
+        turn += (cutter[k, 0] - cutter[0, 0]) * (cutter[k + 1, 1] - cutter[0, 1]) - (
+            cutter[k + 1, 0] - cutter[0, 0]
+        ) * (cutter[k, 1] - cutter[0, 1])
+    sign = 1.0 if turn > 0.0 else -1.0
+    for c in range(corners):
+        d = c + 1 if c + 1 < corners else 0
+        ax, ay = cutter[c, 0], cutter[c, 1]
+        ux, uy = sign * (cutter[d, 0] - ax), sign * (cutter[d, 1] - ay)
+        k = 0
+        for p in range(count):
+            q = p + 1 if p + 1 < count else 0
+            dp = ux * (polygon[p, 1] - ay) - uy * (polygon[p, 0] - ax)
+            dq = ux * (polygon[q, 1] - ay) - uy * (polygon[q, 0] - ax)
+            if dp >= 0.0:
+                kept[k, 0], kept[k, 1] = polygon[p, 0], polygon[p, 1]
+                k += 1
+            if dp > 0.0 > dq or dq > 0.0 > dp:
+                t = dp / (dp - dq)
+                kept[k, 0] = polygon[p, 0] + t * (polygon[q, 0] - polygon[p, 0])
+                kept[k, 1] = polygon[p, 1] + t * (polygon[q, 1] - polygon[p, 1])
+                k += 1
+        count = k
+        for p in range(count):
+            polygon[p, 0], polygon[p, 1] = kept[p, 0], kept[p, 1]
+        if count < 3:
+            return 0
+    return count
 
 
 @njit(cache=True)
-def _counter_clockwise(tri):
-    ax, ay = tri[0]
-    bx, by = tri[1]
-    cx, cy = tri[2]
-    if (bx - ax) * (cy - ay) - (cx - ax) * (by - ay) < 0.0:
-        return tri[::-1].copy()
-    return tri
+def overlap_area(one, other):  # pragma: no cover - compiled
+    """Area common to two convex polygons (n, 2), (m, 2) of the plane."""
+    polygon, kept = np.empty((_MAX_CUT, 2)), np.empty((_MAX_CUT, 2))
+    polygon[: one.shape[0]] = one
+    count = _clip_flat(polygon, one.shape[0], other, other.shape[0], kept)
+    area = 0.0
+    for k in range(1, count - 1):
+        area += _triangle(polygon, k)
+    return abs(area)
 
 
 @njit(cache=True)
-def mortar_integrals(xc, tc, xa, ta, outline):  # pragma: no cover - compiled
-    """Integrals of the shape functions over the overlap of two triangulated plane faces.
+def _triangle(polygon, k):
+    """Area of the triangle 0, k, k + 1."""
+    return 0.5 * (
+        (polygon[k, 0] - polygon[0, 0]) * (polygon[k + 1, 1] - polygon[0, 1])
+        - (polygon[k + 1, 0] - polygon[0, 0]) * (polygon[k, 1] - polygon[0, 1])
+    )
+
+
+@njit(cache=True)
+def _flattened(points, centre, rotation, origin, frame):
+    """Coordinates (n, 2) along the second and third row of a frame of points given in body axes."""
+    out = np.empty((points.shape[0], 2))
+    for d in range(2):
+        t = frame[1 + d]
+        shift = 0.0
+        for e in range(3):
+            shift += t[e] * (centre[e] - origin[e])
+        # Rᵀ t, so that each point costs one product
+        a0 = t[0] * rotation[0, 0] + t[1] * rotation[1, 0] + t[2] * rotation[2, 0]
+        a1 = t[0] * rotation[0, 1] + t[1] * rotation[1, 1] + t[2] * rotation[2, 1]
+        a2 = t[0] * rotation[0, 2] + t[1] * rotation[1, 2] + t[2] * rotation[2, 2]
+        for k in range(points.shape[0]):
+            out[k, d] = shift + a0 * points[k, 0] + a1 * points[k, 1] + a2 * points[k, 2]
+    return out
+
+
+@njit(cache=True)
+def _facet_boxes(x, facet, corners):
+    low, high = np.full((facet.shape[0], 2), np.inf), np.full((facet.shape[0], 2), -np.inf)
+    for t in range(facet.shape[0]):
+        for k in range(corners):
+            for d in range(2):
+                low[t, d] = min(low[t, d], x[facet[t, k], d])
+                high[t, d] = max(high[t, d], x[facet[t, k], d])
+    return low, high
+
+
+@njit(cache=True)
+def _grid(low, high):
+    """Origin, cell sizes, cells along both axes of a grid with about one cell per box, and the boxes in each cell."""
+    n = low.shape[0]
+    origin, top = np.full(2, np.inf), np.full(2, -np.inf)
+    for t in range(n):
+        for d in range(2):
+            origin[d], top[d] = min(origin[d], low[t, d]), max(top[d], high[t, d])
+    width, height = max(top[0] - origin[0], 1e-300), max(top[1] - origin[1], 1e-300)
+    nx = min(max(int(np.sqrt(n * width / height)), 1), n)
+    ny = max(n // nx, 1)
+    size = np.array([width / nx, height / ny])
+    start = np.zeros(nx * ny + 1, dtype=np.int64)
+    for t in range(n):
+        x0, x1, y0, y1 = _cells(low[t], high[t], origin, size, nx, ny)
+        for i in range(x0, x1 + 1):
+            for j in range(y0, y1 + 1):
+                start[i * ny + j + 1] += 1
+    for c in range(nx * ny):
+        start[c + 1] += start[c]
+    item, cursor = np.empty(start[-1], dtype=np.int64), start[:-1].copy()
+    for t in range(n):
+        x0, x1, y0, y1 = _cells(low[t], high[t], origin, size, nx, ny)
+        for i in range(x0, x1 + 1):
+            for j in range(y0, y1 + 1):
+                item[cursor[i * ny + j]] = t
+                cursor[i * ny + j] += 1
+    return origin, size, nx, ny, start, item
+
+
+@njit(cache=True)
+def _cells(low, high, origin, size, nx, ny):
+    """First and last cell along both axes; none where the box lies beside the grid."""
+    x0, x1 = int(np.floor((low[0] - origin[0]) / size[0])), int(np.floor((high[0] - origin[0]) / size[0]))
+    y0, y1 = int(np.floor((low[1] - origin[1]) / size[1])), int(np.floor((high[1] - origin[1]) / size[1]))
+    # what ends at the far side of the grid lies in its last cell
+    return max(min(x0, nx - 1), 0), min(x1, nx - 1), max(min(y0, ny - 1), 0), min(y1, ny - 1)
+
+
+@njit(cache=True)
+def _close_facets(low, high, low_a, high_a):
+    """Facets of the antagonist whose boxes overlap that of each candidate facet: pointers and facets."""
+    origin, size, nx, ny, start, item = _grid(low_a, high_a)
+    seen = np.full(low_a.shape[0], -1)
+    pointer = np.zeros(low.shape[0] + 1, dtype=np.int64)
+    found = np.empty(4 * low.shape[0] + 4, dtype=np.int64)
+    count = 0
+    for t in range(low.shape[0]):
+        x0, x1, y0, y1 = _cells(low[t], high[t], origin, size, nx, ny)
+        for i in range(x0, x1 + 1):
+            for j in range(y0, y1 + 1):
+                for e in range(start[i * ny + j], start[i * ny + j + 1]):
+                    a = item[e]
+                    if seen[a] == t:
+                        continue
+                    seen[a] = t
+                    if (
+                        low_a[a, 0] < high[t, 0]
+                        and high_a[a, 0] > low[t, 0]
+                        and low_a[a, 1] < high[t, 1]
+                        and high_a[a, 1] > low[t, 1]
+                    ):
+                        found = _room(found, count + 1)
+                        found[count] = a
+                        count += 1
+        pointer[t + 1] = count
+    return pointer, found
+
+
+@njit(cache=True)
+def _room(array, needed):
+    """The array, or a copy with at least this many places."""
+    if needed <= array.shape[0]:
+        return array
+    grown = np.empty(max(needed, 2 * array.shape[0]), dtype=array.dtype)
+    grown[: array.shape[0]] = array
+    return grown
+
+
+@njit(cache=True)
+def _integrate(polygon, count, own, kind, far, far_kind, n_psi, n_own, n_far, share, moment, mass, cross):
+    """Add ∫ψ_i, ∫ψ_i x, ∫ψ_i N_k and ∫ψ_i N_j over a polygon that lies in the facets `own` and, if kind > 0, `far`."""
+    corners = corner_count(kind)
+    wanted = corners - 2 + max(degree(kind), degree(far_kind) if far_kind > 0 else 1)
+    first, last = rule_of(wanted)
+    for t in range(1, count - 1):
+        area = abs(_triangle(polygon, t))
+        for q in range(first, last):
+            a, b, w = QUADRATURE[q, 0], QUADRATURE[q, 1], QUADRATURE[q, 2] * area
+            c = 1.0 - a - b
+            x = a * polygon[0, 0] + b * polygon[t, 0] + c * polygon[t + 1, 0]
+            y = a * polygon[0, 1] + b * polygon[t, 1] + c * polygon[t + 1, 1]
+            r, s = locate(own, corners, x, y)
+            hats(corners, r, s, n_psi)
+            shapes(kind, r, s, n_own)
+            if far_kind > 0:
+                r, s = locate(far, corner_count(far_kind), x, y)
+                shapes(far_kind, r, s, n_far)
+            for i in range(corners):
+                psi = w * n_psi[i]
+                share[i] += psi
+                moment[i, 0] += psi * x
+                moment[i, 1] += psi * y
+                for k in range(kind):
+                    mass[i, k] += psi * n_own[k]
+                for k in range(far_kind):
+                    cross[i, k] += psi * n_far[k]
+
+
+@njit(cache=True)
+def _take_corners(x, facet, corners, out):
+    for k in range(corners):
+        out[k, 0], out[k, 1] = x[facet[k], 0], x[facet[k], 1]
+
+
+@njit(cache=True)
+def _overlap_integrals(x_c, facet_c, kind_c, x_a, facet_a, kind_a, outlines, outline_size, share, moment):
+    """Integrals over the overlap of two faces, by facets of the candidate.
 
     Parameters
     ----------
-    xc, tc : (nc, 2) nodes and (mc, 3) triangles of the candidate face
-    xa, ta : (na, 2) nodes and (ma, 3) triangles of the antagonist face; ma = 0 when it is rigid
-    outline : (k, 2) convex polygon of a rigid antagonist's face, counter-clockwise; k = 0 when it is deformable
+    x_c, facet_c, kind_c : plane nodes, facets and nodes of a facet of the candidate
+    x_a, facet_a, kind_a : those of the antagonist; kind_a = 0 if it is rigid
+    outlines, outline_size : convex polygons that bound the overlap besides the meshes
+    share, moment : (nodes,), (nodes, 2) to which ∫ψ_i and ∫ψ_i x are added
 
     Returns
     -------
-    area : (nc,) ∫ N_i
-    own : (nc, nc) ∫ N_i N_k
-    other : (nc, na) ∫ N_i N_j of the antagonist
-    centre : (nc, 2) ∫ N_i x
+    used : facets of the candidate that meet the antagonist
+    mass : ∫ψ_i N_k of each, flat
+    pointer, far, cross : facets of the antagonist that each of these meets, and ∫ψ_i N_j of each pair, flat
     """
-    nc, na = xc.shape[0], xa.shape[0]
-    area, own, other, centre = np.zeros(nc), np.zeros((nc, nc)), np.zeros((nc, na)), np.zeros((nc, 2))
-    polygon = np.empty((MAX_POINTS, 2))
-    corners = np.empty((3, 2))
-    cutters = max(ta.shape[0], 1)
-    for c in range(tc.shape[0]):
-        tri_c = np.empty((3, 2))
-        for k in range(3):
-            tri_c[k] = xc[tc[c, k]]
-        lo_x, hi_x = tri_c[:, 0].min(), tri_c[:, 0].max()
-        lo_y, hi_y = tri_c[:, 1].min(), tri_c[:, 1].max()
-        for a in range(cutters):
-            tri_a = np.empty((3, 2))
-            if ta.shape[0] > 0:
-                for k in range(3):
-                    tri_a[k] = xa[ta[a, k]]
-                cutter = _counter_clockwise(tri_a)
-            else:
-                cutter = outline
-            if (
-                cutter[:, 0].min() >= hi_x
-                or cutter[:, 0].max() <= lo_x
-                or cutter[:, 1].min() >= hi_y
-                or cutter[:, 1].max() <= lo_y
-            ):
+    corners, corners_a = corner_count(kind_c), corner_count(kind_a) if kind_a > 0 else 0
+    low, high = _facet_boxes(x_c, facet_c, corners)
+    most = facet_c.shape[0]
+    if kind_a > 0:
+        near_ptr, near = _close_facets(low, high, *_facet_boxes(x_a, facet_a, corners_a))
+    else:
+        near_ptr, near = np.arange(most + 1), np.zeros(most, dtype=np.int64)
+    used, pointer = np.empty(most, dtype=np.int64), np.zeros(most + 1, dtype=np.int64)
+    mass = np.zeros(most * corners * kind_c)
+    far, cross = np.empty(near_ptr[-1], dtype=np.int64), np.zeros(near_ptr[-1] * corners * kind_a)
+    polygon, kept = np.empty((_MAX_CUT, 2)), np.empty((_MAX_CUT, 2))
+    own, other = np.empty((4, 2)), np.empty((4, 2))
+    n_psi, n_own, n_far = np.empty(4), np.empty(9), np.empty(9)
+    part, middle = np.empty(4), np.empty((4, 2))
+    count, pairs = 0, 0
+    for t in range(most):
+        _take_corners(x_c, facet_c[t], corners, own)
+        block = mass[count * corners * kind_c : (count + 1) * corners * kind_c].reshape(corners, kind_c)
+        met = False
+        for e in range(near_ptr[t], near_ptr[t + 1]):
+            polygon[:corners] = own[:corners]
+            k = corners
+            if kind_a > 0:
+                _take_corners(x_a, facet_a[near[e]], corners_a, other)
+                k = _clip_flat(polygon, k, other, corners_a, kept)
+            begin = 0
+            for o in outline_size:
+                if k > 0 and o > 0:
+                    k = _clip_flat(polygon, k, outlines[begin : begin + o], o, kept)
+                begin += o
+            if k < 3:
                 continue
-            polygon[:3] = tri_c
-            count = 3
-            for k in range(cutter.shape[0]):
-                m = (k + 1) % cutter.shape[0]
-                count = _clip_flat(polygon, count, cutter[k, 0], cutter[k, 1], cutter[m, 0], cutter[m, 1])
-                if count < 3:
-                    break
-            for s in range(1, count - 1):
-                corners[0], corners[1], corners[2] = polygon[0], polygon[s], polygon[s + 1]
-                part = 0.5 * abs(
-                    (corners[1, 0] - corners[0, 0]) * (corners[2, 1] - corners[0, 1])
-                    - (corners[2, 0] - corners[0, 0]) * (corners[1, 1] - corners[0, 1])
+            met = True
+            part[:] = 0.0
+            middle[:] = 0.0
+            pair = cross[pairs * corners * kind_a : (pairs + 1) * corners * kind_a].reshape(corners, kind_a)
+            _integrate(polygon, k, own, kind_c, other, kind_a, n_psi, n_own, n_far, part, middle, block, pair)
+            for i in range(corners):
+                node = facet_c[t, i]
+                share[node] += part[i]
+                moment[node, 0] += middle[i, 0]
+                moment[node, 1] += middle[i, 1]
+            far[pairs] = near[e]
+            pairs += 1
+        if met:
+            used[count] = t
+            count += 1
+            pointer[count] = pairs
+    return used[:count], mass, pointer[: count + 1], far[:pairs], cross
+
+
+@njit(cache=True)
+def _join_slivers(facet, used, corners, share):
+    """The node for which each node counts (itself, or a neighbour with a share many times as large); -1: none."""
+    best = np.full(share.shape[0], -1)
+    for t in used:
+        top = facet[t, 0]
+        for i in range(1, corners):
+            if share[facet[t, i]] > share[top]:
+                top = facet[t, i]
+        for i in range(corners):
+            node = facet[t, i]
+            if best[node] < 0 or share[top] > share[best[node]]:
+                best[node] = top
+    root = np.full(share.shape[0], -1)
+    for node in range(share.shape[0]):
+        if best[node] < 0:
+            continue
+        r = node
+        # shares grow on the way, so it ends
+        while share[r] < _SLIVER * share[best[r]]:
+            r = best[r]
+        root[node] = r
+    return root
+
+
+@njit(cache=True)
+def _incidence(facet, used, corners, key, count):
+    """Places in `used` × corners, sorted by the key of their node: pointers and places."""
+    start = np.zeros(count + 1, dtype=np.int64)
+    for t in used:
+        for i in range(corners):
+            start[key[facet[t, i]] + 1] += 1
+    for k in range(count):
+        start[k + 1] += start[k]
+    place, cursor = np.empty(start[-1], dtype=np.int64), start[:-1].copy()
+    for u in range(used.shape[0]):
+        for i in range(corners):
+            k = key[facet[used[u], i]]
+            place[cursor[k]] = u * corners + i
+            cursor[k] += 1
+    return start, place
+
+
+@njit(cache=True)
+def _scatter(nodes, values, name, scale, slot, column, value, base, end):
+    """Add values to a sparse row that begins at `base` and ends at `end`; its new end."""
+    for k in range(nodes.shape[0]):
+        node = nodes[k]
+        at = slot[node]
+        if at < base:
+            at = end
+            slot[node] = at
+            column[at] = name[node]
+            value[at] = 0.0
+            end += 1
+        value[at] += scale * values[k]
+    return end
+
+
+@njit(cache=True)
+def mortar_rows(
+    mesh, face, body, frame, origin, least, centre, rotation,
+    node_ptr, node, reference, facet_ptr, facet, kind, cut, vertices, cptr, corner,
+):  # fmt: skip  # pragma: no cover - compiled
+    """Weighted points of flat interfaces: one per corner node of the candidate's facets.
+
+    ψ_α is linear or bilinear on the facets of the candidate, one at its node α and zero at the other corners; where
+    a node has next to no share of the overlap, its ψ is added to a neighbour's. Quadrature has the degree of ψ times
+    a shape function, 2 to 6, so it is exact on triangles and parallelograms; on other quadrilaterals both sides
+    still see the same points, and so the same constants and places.
+
+    Parameters
+    ----------
+    mesh : (ni, 2) meshes of candidate and antagonist; -1: rigid
+    face, body : (ni, 2) their faces and bodies
+    frame, origin : (ni, 3, 3), (ni, 3)
+    least : (ni,) overlaps of less area do not touch
+    centre, rotation : of the bodies
+    node_ptr … cut : of all meshes, as in mechanics.contact.face_meshes
+    vertices, cptr, corner : of all faces, world axes
+
+    Returns
+    -------
+    interface, key : (nc,) interface and node (numbered over all bodies) of each contact
+    area : (nc,) ∫ψ; middle : (nc, 2) ∫ψ x / ∫ψ, along the second and third row of the frame from the origin
+    pointer, column, value : (2 nc + 1,), … csr rows ∫ψ N_k / ∫ψ of candidate and antagonist
+    """
+    interface, key = np.empty(64, dtype=np.int64), np.empty(64, dtype=np.int64)
+    area, middle_x, middle_y = np.empty(64), np.empty(64), np.empty(64)
+    pointer = np.zeros(129, dtype=np.int64)
+    column, value = np.empty(1024, dtype=np.int64), np.empty(1024)
+    largest = 0
+    for m in range(node_ptr.shape[0] - 1):
+        largest = max(largest, node_ptr[m + 1] - node_ptr[m])
+    # where a node has its place in the row at work; places only grow, so old entries need no clearing
+    slot_c, slot_a = np.full(largest, -1), np.full(largest, -1)
+    none = np.empty((0, 2))
+    count, end = 0, 0
+    for p in range(mesh.shape[0]):
+        m, a = mesh[p, 0], mesh[p, 1]
+        kind_c, kind_a = kind[m], kind[a] if a >= 0 else 0
+        own = facet[facet_ptr[m] : facet_ptr[m + 1], :kind_c]
+        if own.shape[0] == 0 or (a >= 0 and facet_ptr[a] == facet_ptr[a + 1]):
+            continue
+        first_c, last_c = node_ptr[m], node_ptr[m + 1]
+        b = body[p, 0]
+        x_c = _flattened(reference[first_c:last_c], centre[b], rotation[b], origin[p], frame[p])
+        x_a, other, name_a = none, facet[:0, :0], node[:0]
+        if a >= 0:
+            b = body[p, 1]
+            first_a, last_a = node_ptr[a], node_ptr[a + 1]
+            x_a = _flattened(reference[first_a:last_a], centre[b], rotation[b], origin[p], frame[p])
+            other, name_a = facet[facet_ptr[a] : facet_ptr[a + 1], :kind_a], node[first_a:last_a]
+        name_c = node[first_c:last_c]
+        outlines, size = _outlines(
+            face[p], cut[m], a < 0 or cut[a], vertices, cptr, corner, origin[p], frame[p]
+        )
+        share, moment = np.zeros(last_c - first_c), np.zeros((last_c - first_c, 2))
+        used, mass, met_ptr, met, cross = _overlap_integrals(
+            x_c, own, kind_c, x_a, other, kind_a, outlines, size, share, moment
+        )
+        if not share.sum() >= least[p] or used.shape[0] == 0:
+            continue
+        corners = corner_count(kind_c)
+        root = _join_slivers(own, used, corners, share)
+        start, place = _incidence(own, used, corners, root, share.shape[0])
+        joined, joined_moment = np.zeros(share.shape[0]), np.zeros((share.shape[0], 2))
+        for n in range(share.shape[0]):
+            if root[n] >= 0:
+                joined[root[n]] += share[n]
+                joined_moment[root[n]] += moment[n]
+        for n in range(share.shape[0]):
+            if start[n] == start[n + 1] or joined[n] <= 0.0:
+                continue
+            interface, key = _room(interface, count + 1), _room(key, count + 1)
+            area, pointer = _room(area, count + 1), _room(pointer, 2 * count + 3)
+            middle_x, middle_y = _room(middle_x, count + 1), _room(middle_y, count + 1)
+            interface[count], key[count], area[count] = p, name_c[n], joined[n]
+            middle_x[count], middle_y[count] = (
+                joined_moment[n, 0] / joined[n],
+                joined_moment[n, 1] / joined[n],
+            )
+            scale = 1.0 / joined[n]
+            base = end
+            for e in range(start[n], start[n + 1]):
+                u, i = place[e] // corners, place[e] % corners
+                column, value = _room(column, end + kind_c), _room(value, end + kind_c)
+                at = (u * corners + i) * kind_c
+                end = _scatter(
+                    own[used[u]], mass[at : at + kind_c], name_c, scale, slot_c, column, value, base, end
                 )
-                # the three-point rule is exact for products of linear functions
-                for g in range(3):
-                    x = (corners.sum(axis=0) + 3.0 * corners[g]) / 6.0
-                    w = part / 3.0
-                    n_c = _barycentric(x[0], x[1], tri_c)
-                    for i in range(3):
-                        area[tc[c, i]] += w * n_c[i]
-                        centre[tc[c, i]] += w * n_c[i] * x
-                        for k in range(3):
-                            own[tc[c, i], tc[c, k]] += w * n_c[i] * n_c[k]
-                    if ta.shape[0] > 0:
-                        n_a = _barycentric(x[0], x[1], tri_a)
-                        for i in range(3):
-                            for k in range(3):
-                                other[tc[c, i], ta[a, k]] += w * n_c[i] * n_a[k]
-    return area, own, other, centre
+            pointer[2 * count + 1] = end
+            base = end
+            if a >= 0:
+                for e in range(start[n], start[n + 1]):
+                    u, i = place[e] // corners, place[e] % corners
+                    for f in range(met_ptr[u], met_ptr[u + 1]):
+                        column, value = _room(column, end + kind_a), _room(value, end + kind_a)
+                        at = (f * corners + i) * kind_a
+                        end = _scatter(
+                            other[met[f]],
+                            cross[at : at + kind_a],
+                            name_a,
+                            scale,
+                            slot_a,
+                            column,
+                            value,
+                            base,
+                            end,
+                        )
+            pointer[2 * count + 2] = end
+            count += 1
+    middle = np.column_stack((middle_x[:count], middle_y[:count]))
+    return (
+        interface[:count],
+        key[:count],
+        area[:count],
+        middle,
+        pointer[: 2 * count + 1],
+        column[:end],
+        value[:end],
+    )
+
+
+@njit(cache=True)
+def _outlines(face, with_first, with_second, vertices, cptr, corner, origin, frame):
+    """The polygons in the plane of those of two faces that bound the overlap besides their meshes, and their sizes."""
+    size = np.zeros(2, dtype=np.int64)
+    for s in range(2):
+        if with_second if s else with_first:
+            size[s] = cptr[face[s] + 1] - cptr[face[s]]
+    out = np.empty((size.sum(), 2))
+    k = 0
+    for s in range(2):
+        for c in range(cptr[face[s]], cptr[face[s]] + size[s]):
+            v = vertices[corner[c]]
+            for d in range(2):
+                t = frame[1 + d]
+                out[k, d] = t[0] * (v[0] - origin[0]) + t[1] * (v[1] - origin[1]) + t[2] * (v[2] - origin[2])
+            k += 1
+    return out, size

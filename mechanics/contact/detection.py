@@ -2,7 +2,7 @@
 
 Boxes that overlap (broad phase) → separating axis → the interface of each pair of shapes: two faces, or two edges.
 Faces of rigid stones touch in points of their overlap; a deformable face that lies flat on another touches in one
-weighted point per node (mortar); elsewhere a deformable stone touches in single points of its surface.
+weighted point per corner node of its mesh (mortar); elsewhere a deformable stone touches in single points.
 All tolerances are fractions of the stones' own sizes.
 """
 
@@ -127,7 +127,7 @@ class Detector:
 
     def _flat_and_meshed(self, pairs: _Pairs, placed: Placed) -> NDArray[np.bool_]:
         """Pairs of flat faces of which one has finite elements."""
-        meshed = np.array([mesh is not None for mesh in self.surfaces.face_mesh])
+        meshed = self.surfaces.meshes.of_face >= 0
         faces = (pairs.kind > 0) & (pairs.kind != EDGES)
         chosen: NDArray[np.bool_] = faces & meshed[np.where(faces[:, None], pairs.feature, 0)].any(axis=1)
         normal = placed.normal[pairs.feature[chosen]]
@@ -161,7 +161,8 @@ class Detector:
         key = _pair_key(shapes, len(own.body)) + found[:, 2]
         weights = csr_array((2 * len(pair), nodes))
         if nodes:
-            weights = surface_weights(own, placed, sides, feature, frame[:, 0], arm, nodes)
+            weights, outside = surface_weights(own, placed, sides, feature, frame[:, 0], arm, nodes)
+            return take(Contacts(body, key, frame, area, arm, weights), np.flatnonzero(outside))
         return Contacts(body, key, frame, area, arm, weights)
 
     def _balls(self, pairs: _Pairs, placed: Placed) -> tuple[Ints, Array, Array, Array]:

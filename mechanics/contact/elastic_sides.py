@@ -1,48 +1,32 @@
 """Contacts of deformable stones: weighted points between flat faces (mortar), single points of a surface elsewhere."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from mechanics.contact._kernels_mortar import mortar_integrals
+from mechanics.contact._kernels_mortar import mortar_rows
+from mechanics.contact._kernels_points import surface_points
 from mechanics.contact.contacts import Contacts
-from mechanics.contact.surfaces import FaceMesh, Placed, Surfaces
+from mechanics.contact.surfaces import Placed, Surfaces
 
 __all__ = ["mortar_contacts", "surface_weights"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
-# a node whose share of the interface is below this part of the largest share makes no contact of its own
-_SLIVER = 1e-3
-_NO_NODES = np.zeros(0, dtype=np.int64)
-
-
-@dataclass(frozen=True)
-class _Side:
-    """One side of a contact: a place in body axes, or weighted nodes."""
-
-    arm: Array
-    node: Ints
-    weight: Array
-
-
-@dataclass(frozen=True)
-class _Point:
-    """One contact of an interface."""
-
-    node: int
-    area: float
-    sides: tuple[_Side, _Side]
+# two faces as fine, or as large, up to this fraction are the same
+_ALIKE = 1e-6
+# none of the directions in which faces of stones are likely to look
+_ASKEW = np.array([0.3015113446, 0.5381, 0.7870])
+# of a shape's width: a point farther from all finite elements lies on a face between the parts of a stone
+_BESIDE = 1e-3
 
 
 def surface_weights(
     surfaces: Surfaces, placed: Placed, sides: Ints, face: Ints, normal: Array, arm: Array, nodes: int
-) -> "csr_array[np.float64]":
-    """Weights (2 nc, nodes) of the nodes of deformable bodies at single contact points.
+) -> "tuple[csr_array[np.float64], Bools]":
+    """Weights (2 nc, nodes) of the nodes of deformable bodies at single contact points: their shape functions there.
 
     Parameters
     ----------
@@ -50,23 +34,31 @@ def surface_weights(
         that looks most towards the other side
     normal : (nc, 3) from antagonist to candidate
     arm : (nc, 2, 3) the points in body axes [m]
+
+    Returns
+    -------
+    weights : rows of rigid sides are empty
+    outside : (nc,) the points lie on the surface of both bodies, and not where parts of one meet
     """
-    rows, columns, values = [], [], []
-    meshed = np.array([surfaces.face_mesh[f] is not None for f in surfaces.fptr[:-1]])
-    for c, s in zip(*np.nonzero(meshed[sides]), strict=True):
-        shape, on = int(sides[c, s]), int(face[c, s])
-        if on < 0:
-            on = _face_at(surfaces, placed, shape, normal[c] * (1.0 if s else -1.0))
-        mesh = surfaces.face_mesh[on]
-        assert mesh is not None
-        node, weight = _nearest_triangle(mesh, arm[c, s])
-        rows.append(np.full(3, 2 * c + s))
-        columns.append(node)
-        values.append(weight)
-    shape_ = (2 * len(sides), nodes)
-    if not rows:
-        return csr_array(shape_)
-    return csr_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape_)
+    meshes = surfaces.meshes
+    elastic = (meshes.of_face[surfaces.fptr[:-1]] >= 0)[sides]
+    row = np.flatnonzero(elastic.ravel())
+    shape = sides.ravel()[row]
+    sign = np.where(row % 2, 1.0, -1.0)[:, None]
+    towards = np.einsum("rji,rj->ri", placed.rotation[surfaces.body[shape]], sign * normal[row // 2])
+    column, value, size, off = surface_points(
+        shape, face.ravel()[row], arm.reshape(-1, 3)[row], towards,
+        surfaces.fptr, surfaces.normal, meshes.of_face, meshes.node_ptr, meshes.node, meshes.reference,
+        meshes.facet_ptr, meshes.facet, meshes.kind,
+    )  # fmt: skip
+    count = np.zeros(2 * len(sides), dtype=np.int64)
+    count[row] = size
+    filled = np.arange(column.shape[1]) < size[:, None]
+    pointer = np.concatenate([[0], np.cumsum(count)])
+    weights = csr_array((value[filled], column[filled], pointer), shape=(2 * len(sides), nodes))
+    outside = np.ones((len(sides), 2), dtype=bool)
+    outside.reshape(-1)[row] = off <= _BESIDE * surfaces.shape_size[shape]
+    return weights, outside[:, 0] & outside[:, 1]
 
 
 def mortar_contacts(
@@ -79,7 +71,7 @@ def mortar_contacts(
     nodes: int,
     thin: float,
 ) -> tuple[Contacts, Array]:
-    """One weighted point per node of the candidate faces of flat interfaces, and the alert distance of each [m].
+    """One weighted point per corner node of the candidate faces of flat interfaces, and the alert distance of each [m].
 
     Parameters
     ----------
@@ -87,107 +79,75 @@ def mortar_contacts(
     key, limit : (np,) first key and alert distance of each interface
     thin : faces that overlap by less than this part of the smaller one do not touch
     """
-    bodies, keys, frames, points, limits = [], [], [], [], []
-    for pair, face, first, far in zip(shapes, faces, key, limit, strict=True):
-        # the candidate is deformable, the finer of two
-        finer = _fineness(surfaces, face[0]) > _fineness(surfaces, face[1])
-        candidate, antagonist = (0, 1) if finer else (1, 0)
-        own = surfaces.body[pair]
-        frame, found = _mortar(
-            surfaces, placed, own[[candidate, antagonist]], face[[candidate, antagonist]], thin
-        )
-        for point in found:
-            bodies.append(own[[candidate, antagonist]])
-            keys.append(int(first) + (1 << 23) + point.node)
-            frames.append(frame)
-            points.append(point)
-            limits.append(far)
+    first = np.where(_first_is_candidate(surfaces, placed, shapes, faces), 0, 1)
+    order, rows = np.column_stack([first, 1 - first]), np.arange(len(first))[:, None]
+    face, body = faces[rows, order], surfaces.body[shapes[rows, order]]
+    frame, origin = _frames(surfaces, placed, face)
+    meshes = surfaces.meshes
+    interface, node, area, middle, pointer, column, value = mortar_rows(
+        meshes.of_face[face], face, body, frame, origin, thin * surfaces.face_area[face].min(axis=1),
+        placed.centre, placed.rotation, meshes.node_ptr, meshes.node, meshes.reference, meshes.facet_ptr,
+        meshes.facet, meshes.kind, meshes.cut, placed.vertex, surfaces.cptr, surfaces.corner,
+    )  # fmt: skip
+    arm = np.zeros((len(interface), 2, 3))
+    rigid = np.flatnonzero(meshes.of_face[face[interface, 1]] < 0)
+    on = interface[rigid]
+    at = _foot(origin[on], frame[on], placed.normal[face[on, 1]], middle[rigid]) - placed.centre[body[on, 1]]
+    arm[rigid, 1] = np.einsum("cji,cj->ci", placed.rotation[body[on, 1]], at)
     contacts = Contacts(
-        np.array(bodies, dtype=np.int64).reshape(-1, 2),
-        np.array(keys, dtype=np.int64),
-        np.array(frames).reshape(-1, 3, 3),
-        np.array([point.area for point in points]),
-        np.array([[side.arm for side in point.sides] for point in points]).reshape(-1, 2, 3),
-        _packed([side for point in points for side in point.sides], nodes),
+        body[interface],
+        key[interface] + (1 << 23) + node,
+        frame[interface],
+        area,
+        arm,
+        csr_array((value, column, pointer), shape=(2 * len(interface), nodes)),
     )
-    return contacts, np.array(limits)
+    return contacts, limit[interface]
 
 
-def _packed(sides: Sequence[_Side], nodes: int) -> "csr_array[np.float64]":
-    if not sides:
-        return csr_array((0, nodes))
-    pointer = np.concatenate([[0], np.cumsum([len(side.node) for side in sides])])
-    values = np.concatenate([side.weight for side in sides])
-    columns = np.concatenate([side.node for side in sides])
-    return csr_array((values, columns, pointer), shape=(len(sides), nodes))
+def _first_is_candidate(surfaces: Surfaces, placed: Placed, shapes: Ints, faces: Ints) -> Bools:
+    """Whether the first face of each pair (np, 2) carries the contacts; the same whichever comes first in the scene.
+
+    The finer mesh does, else the smaller face, else that of the smaller part, else the face that looked more against
+    some askew direction when the run began, or does now if both looked the same way.
+    """
+    count = len(surfaces.body)
+    # the smaller number wins
+    judges = (
+        (-surfaces.meshes.fineness[faces], _ALIKE),
+        (surfaces.face_area[faces], _ALIKE),
+        (surfaces.shape_size[shapes], _ALIKE),
+        (surfaces.normal[faces] @ _ASKEW, 1e-3),
+        (placed.normal[faces] @ _ASKEW, 1e-9),
+        (shapes / count, 0.0),
+    )
+    chosen, open_ = np.zeros(len(faces), dtype=bool), np.ones(len(faces), dtype=bool)
+    for measure, tolerance in judges:
+        apart = np.abs(measure[:, 0] - measure[:, 1]) > tolerance * np.abs(measure).max(axis=1)
+        chosen = np.where(open_ & apart, measure[:, 0] < measure[:, 1], chosen)
+        open_ &= ~apart
+    return chosen
 
 
-def _mortar(
-    surfaces: Surfaces, placed: Placed, body: Ints, face: Ints, thin: float
-) -> tuple[Array, list[_Point]]:
-    """Frame and points of one interface; `body`, `face` (2,) of candidate and antagonist."""
-    (candidate, antagonist), (face_c, face_a) = body.tolist(), face.tolist()
-    mesh_c, mesh_a = surfaces.face_mesh[face_c], surfaces.face_mesh[face_a]
-    assert mesh_c is not None
-    corners = placed.vertex[surfaces.corner[surfaces.cptr[face_a] : surfaces.cptr[face_a + 1]]]
-    n = placed.normal[face_a] - placed.normal[face_c]
-    frame = _frame(n / np.linalg.norm(n), corners)
-    origin, flat = corners[0], frame[1:].T
-    outline = (corners - origin) @ flat
-    x_c = (_world(placed, candidate, mesh_c) - origin) @ flat
-    x_a = outline if mesh_a is None else (_world(placed, antagonist, mesh_a) - origin) @ flat
-    t_a = np.zeros((0, 3), dtype=np.int64) if mesh_a is None else mesh_a.facet
-    area, own, other, centre = mortar_integrals(x_c, mesh_c.facet, x_a, t_a, outline)
-    if area.sum() < thin * min(surfaces.face_area[face_c], surfaces.face_area[face_a]):
-        return frame, []
-    points = []
-    for i in np.flatnonzero(area > _SLIVER * area.max()):
-        if mesh_a is None:
-            # the point of a rigid antagonist lies on its face, straight below along n
-            at = origin + flat @ (centre[i] / area[i])
-            slope = frame[0] @ placed.normal[face_a]
-            at = at + frame[0] * ((origin - at) @ placed.normal[face_a] / slope)
-            arm = placed.rotation[antagonist].T @ (at - placed.centre[antagonist])
-            far_side = _Side(arm, _NO_NODES, np.zeros(0))
-        else:
-            far_side = _Side(np.zeros(3), mesh_a.node, other[i] / area[i])
-        sides = _Side(np.zeros(3), mesh_c.node, own[i] / area[i]), far_side
-        points.append(_Point(int(mesh_c.node[i]), float(area[i]), sides))
-    return frame, points
+def _frames(surfaces: Surfaces, placed: Placed, face: Ints) -> tuple[Array, Array]:
+    """Rows n, t1, t2 (np, 3, 3) and origins (np, 3) of interfaces of candidate and antagonist faces (np, 2).
+
+    n is half-way between both normals; t1 runs along the first edge of the antagonist, so that the frame turns with
+    the stones.
+    """
+    n = placed.normal[face[:, 1]] - placed.normal[face[:, 0]]
+    n = n / np.linalg.norm(n, axis=1)[:, None]
+    start = surfaces.cptr[face[:, 1]]
+    origin = placed.vertex[surfaces.corner[start]]
+    edge = placed.vertex[surfaces.corner[start + 1]] - origin
+    t1 = edge - np.einsum("pi,pi->p", edge, n)[:, None] * n
+    t1 = t1 / np.linalg.norm(t1, axis=1)[:, None]
+    return np.stack([n, t1, np.cross(n, t1)], axis=1), origin
 
 
-def _frame(n: Array, corners: Array) -> Array:
-    """Rows n, t1, t2, with t1 along the face's first edge, so that the frame turns with the stones."""
-    edge = corners[1] - corners[0]
-    t1 = edge - (edge @ n) * n
-    t1 = t1 / np.linalg.norm(t1)
-    return np.array([n, t1, np.cross(n, t1)])
-
-
-def _world(placed: Placed, body: int, mesh: FaceMesh) -> Array:
-    at: Array = placed.centre[body] + mesh.reference @ placed.rotation[body].T
-    return at
-
-
-def _face_at(surfaces: Surfaces, placed: Placed, shape: int, direction: Array) -> int:
-    start, stop = surfaces.fptr[shape], surfaces.fptr[shape + 1]
-    return int(start + np.argmax(placed.normal[start:stop] @ direction))
-
-
-def _nearest_triangle(mesh: FaceMesh, arm: Array) -> tuple[Ints, Array]:
-    """The nodes of the triangle that holds a point of the face (body axes), and its barycentric weights."""
-    corners = mesh.reference[mesh.facet]
-    a, b, r = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], arm - corners[:, 0]
-    aa, bb, ab = (np.einsum("ti,ti->t", x, y) for x, y in ((a, a), (b, b), (a, b)))
-    ra, rb = np.einsum("ti,ti->t", r, a), np.einsum("ti,ti->t", r, b)
-    det = aa * bb - ab**2
-    w1, w2 = (bb * ra - ab * rb) / det, (aa * rb - ab * ra) / det
-    t = int(np.minimum(np.minimum(w1, w2), 1.0 - w1 - w2).argmax())
-    weight = np.clip([1.0 - w1[t] - w2[t], w1[t], w2[t]], 0.0, 1.0)
-    return mesh.node[mesh.facet[t]], weight / weight.sum()
-
-
-def _fineness(surfaces: Surfaces, face: int) -> float:
-    """Finite-element triangles per area of a face; zero if its body is rigid."""
-    mesh = surfaces.face_mesh[face]
-    return 0.0 if mesh is None else len(mesh.facet) / float(surfaces.face_area[face])
+def _foot(origin: Array, frame: Array, normal: Array, middle: Array) -> Array:
+    """The points of plane faces through `origin` above which plane coordinates `middle` (nc, 2) lie along n."""
+    across = np.einsum("cd,cdi->ci", middle, frame[:, 1:])
+    rise = np.einsum("ci,ci->c", across, normal) / np.einsum("ci,ci->c", frame[:, 0], normal)
+    foot: Array = origin + across - rise[:, None] * frame[:, 0]
+    return foot

@@ -6,28 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mechanics.contact.face_meshes import FaceMesh, PackedMeshes, packed_meshes
 from mechanics.polyhedra import face_plane, smallest_width
 
 __all__ = ["FaceMesh", "Placed", "Surfaces", "surfaces"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-
-@dataclass(frozen=True)
-class FaceMesh:
-    """The finite-element nodes and facets on one face of a deformable body.
-
-    Attributes
-    ----------
-    node : (k,) nodes, numbered over all deformable bodies
-    reference : (k, 3) their places in body axes [m]
-    facet : (m, 3 | 6 | 4 | 8 | 9) indices into `node`, in VTK's order, corners first, counter-clockwise from outside
-    """
-
-    node: Ints
-    reference: Array
-    facet: Ints
 
 
 @dataclass(frozen=True)
@@ -52,6 +37,7 @@ class Surfaces:
     size : (nb,) smallest width of each body [m]
     face_area : (nf,) [m²]
     face_mesh : per face, its finite elements; None for rigid bodies
+    meshes : the same, packed
     """
 
     body: Ints
@@ -71,6 +57,7 @@ class Surfaces:
     size: Array
     face_area: Array
     face_mesh: tuple[FaceMesh | None, ...]
+    meshes: PackedMeshes
 
     @property
     def body_vptr(self) -> Ints:
@@ -127,6 +114,7 @@ def surfaces(
             for v, group, r in zip(vertices, faces, radii, strict=True)
         ]
     )
+    face_area = np.array([_area(p) for p in polygons])
     return Surfaces(
         body=owner,
         sptr=sptr,
@@ -143,8 +131,9 @@ def surfaces(
         radius=radii,
         shape_size=shape_size,
         size=np.minimum.reduceat(shape_size, sptr[:-1]),
-        face_area=np.array([_area(p) for p in polygons]),
+        face_area=face_area,
         face_mesh=tuple(face_mesh),
+        meshes=packed_meshes(face_mesh, face_area),
     )
 
 

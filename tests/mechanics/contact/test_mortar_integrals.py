@@ -1,4 +1,4 @@
-"""Integrals over the overlap of two triangulated faces, against a slow twin and closed forms."""
+"""Weighted contacts between meshed faces, against a slow twin and what must hold of them."""
 
 import itertools
 
@@ -6,109 +6,192 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.spatial import Delaunay
 
-from mechanics.contact import _kernels_mortar as kernel
-from tests.mechanics.polygons import overlap
+from mechanics.contact.contacts import material_points
+from mechanics.contact.elastic_sides import mortar_contacts
+from mechanics.state import State
+from tests.mechanics.contact.faces import BOTTOM, KINDS, TOP, nodes_of, two_boxes
+from tests.mechanics.polygons import moments, overlap
 
-
-def barycentric(x, tri):
-    return np.linalg.solve(np.vstack([tri.T, np.ones(3)]), [*x, 1.0])
-
-
-def clip_flat(polygon, cutter):
-    """The part of a plane polygon inside another, counter-clockwise."""
-    flat = [np.column_stack([points, np.zeros(len(points))]) for points in (cutter, polygon)]
-    return overlap(*flat, np.array([0.0, 0.0, 1.0]))[:, :2]
+LOWER = ((0.0, 0.0, -0.5), (1.0, 0.7, 0.0))
+PAIRS = [(9, 6), (8, 3), (4, 8), (6, 9), (3, 4), (6, None), (4, None), (9, None)]
 
 
-def mortar_integrals(xc, tc, xa, ta, outline):
-    """Cut each candidate triangle by each antagonist polygon; seven-point Radon quadrature, exact to degree 5."""
-    root = np.sqrt(15.0)
-    points = [(1 / 3, 1 / 3, 1 / 3, 9 / 40)]
-    for sign in (1, -1):
-        near, weight = (6 + sign * root) / 21, (155 + sign * root) / 1200
-        far = 1 - 2 * near
-        points += [(near, near, far, weight), (near, far, near, weight), (far, near, near, weight)]
-    area, own = np.zeros(len(xc)), np.zeros((len(xc),) * 2)
-    other, centre = np.zeros((len(xc), len(xa))), np.zeros((len(xc), 2))
-    for t in tc:
-        for s in ta if len(ta) else [None]:
-            cutter = outline if s is None else xa[s]
-            if np.cross(np.append(cutter[1] - cutter[0], 0), np.append(cutter[2] - cutter[0], 0))[2] < 0:
+def corners(kind):
+    return 3 if kind in (3, 6) else 4
+
+
+def contacts_of(shapes, placed, nodes):
+    """Contacts between the lower box's top and the upper one's bottom."""
+    pair, face = np.array([[0, 1]]), np.array([[TOP, 6 + BOTTOM]])
+    return mortar_contacts(shapes, placed, pair, face, np.array([0]), np.array([1.0]), len(nodes), 1e-6)[0]
+
+
+def places(contacts, placed, nodes):
+    state = State(0.0, placed.centre, placed.rotation, np.zeros((2, 6)), nodes, np.zeros_like(nodes))
+    return material_points(contacts, state)
+
+
+def gauss():
+    """Points and weights of a tensor rule squeezed on the unit triangle, exact to degree 10."""
+    x, w = np.polynomial.legendre.leggauss(6)
+    x, w = (x + 1) / 2, w / 2
+    return [
+        ((a, b * (1 - a)), 2 * u * v * (1 - a))
+        for (a, u), (b, v) in itertools.product(zip(x, w, strict=True), repeat=2)
+    ]
+
+
+def functions(kind, x):
+    """Shape functions as the polynomials that are one at their node: by inverting the matrix of monomials."""
+    powers = {
+        3: [(0, 0), (1, 0), (0, 1)],
+        6: [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)],
+        4: [(0, 0), (1, 0), (0, 1), (1, 1)],
+        8: [(0, 0), (1, 0), (0, 1), (1, 1), (2, 0), (0, 2), (2, 1), (1, 2)],
+        9: list(itertools.product(range(3), repeat=2)),
+    }[kind]
+
+    def monomials(points):
+        return np.array([[p[0] ** a * p[1] ** b for a, b in powers] for p in points])
+
+    return np.linalg.solve(monomials(nodes_of(kind)).T, monomials([x])[0])
+
+
+def inverse(corner, kind, point):
+    """Reference coordinates in a triangle or parallelogram."""
+    o, u, v = (corner[0], corner[1] - corner[0], corner[-1] - corner[0])
+    if kind in (3, 6):
+        return np.linalg.solve(np.column_stack([u, corner[2] - corner[0]]), point - o)
+    return 2 * np.linalg.solve(np.column_stack([u, v]), point - o) - 1
+
+
+def twin(own, other, outline, x_own, x_other):
+    """∫ψ_i, ∫ψ_i N_k and ∫ψ_i N_j by cutting each facet of `own` with each of `other`, or with an outline (n, 2)."""
+    z = np.array([0.0, 0.0, 1.0])
+    share = np.zeros(len(x_own))
+    mass, cross = np.zeros((len(x_own),) * 2), np.zeros((len(x_own), len(x_other)))
+    for facet in own.facet:
+        kind = len(facet)
+        mine = x_own[facet[: corners(kind)]]
+        for far in [None] if other is None else other.facet:
+            cutter = outline if far is None else x_other[far[: corners(len(far))]]
+            if np.linalg.det([cutter[1] - cutter[0], cutter[2] - cutter[0]]) < 0:
                 cutter = cutter[::-1]
-            polygon = clip_flat(xc[t], cutter)
-            for k in range(1, len(polygon) - 1):
-                tri = polygon[[0, k, k + 1]]
-                size = 0.5 * abs(np.linalg.det(tri[1:] - tri[0]))
-                for *bary, weight in points:
-                    x = np.array(bary) @ tri
-                    n_c, w = barycentric(x, xc[t]), size * weight
-                    area[t] += w * n_c
-                    centre[t] += w * np.outer(n_c, x)
-                    own[np.ix_(t, t)] += w * np.outer(n_c, n_c)
-                    if s is not None:
-                        other[np.ix_(t, s)] += w * np.outer(n_c, barycentric(x, xa[s]))
-    return area, own, other, centre
+            piece = overlap(*(np.column_stack([p, np.zeros(len(p))]) for p in (cutter, mine)), z)[:, :2]
+            for k in range(1, len(piece) - 1):
+                o, u, v = piece[0], piece[k] - piece[0], piece[k + 1] - piece[0]
+                area = 0.5 * abs(np.linalg.det([u, v]))
+                for (a, b), weight in gauss():
+                    x = o + a * u + b * v
+                    r = inverse(mine, kind, x)
+                    psi = area * weight * functions(corners(kind), r)
+                    top = facet[: corners(kind)]
+                    share[top] += psi
+                    mass[np.ix_(top, facet)] += np.outer(psi, functions(kind, r))
+                    if far is not None:
+                        theirs = x_other[far[: corners(len(far))]]
+                        n = functions(len(far), inverse(theirs, len(far), x))
+                        cross[np.ix_(top, far)] += np.outer(psi, n)
+    return share, mass, cross
 
 
-def patch(width, height, count, angle=0.0, shift=(0.0, 0.0), seed=0, flip=False):
-    """A triangulated rectangle with uneven nodes inside."""
-    rng = np.random.default_rng(seed)
-    s = np.linspace(0, 1, count)
-    edge = np.array([p for p in itertools.product(s, s) if 0 in p or 1 in p])
-    x = np.vstack([edge, rng.uniform(0.15, 0.85, (count, 2))])
-    triangles = Delaunay(x).simplices.astype(np.int64)
-    flat = np.abs(np.linalg.det(x[triangles[:, 1:]] - x[triangles[:, :1]])) < 1e-9
-    c, s = np.cos(angle), np.sin(angle)
-    triangles = triangles[~flat]
-    return (x * [width, height]) @ np.array([[c, s], [-s, c]]) + shift, (
-        triangles[:, ::-1].copy() if flip else triangles
+@pytest.mark.parametrize(("kind", "far"), PAIRS)
+@pytest.mark.parametrize("angle", [0.0, 0.4])
+def test_weights_are_the_integrals_of_their_twin(kind, far, angle):
+    """The upper box is the finer, so it carries the contacts; facets are triangles and parallelograms."""
+    uneven = 0.2 if kind in (3, 6) else 0.0
+    upper = ((0.25, -0.1, 0.0), (0.85, 0.5, 0.4))
+    shapes, placed, nodes = two_boxes(
+        LOWER, upper, None if far is None else (far, 2, 2, 0.0), (kind, 4, 3, uneven), angle
     )
+    contacts = contacts_of(shapes, placed, nodes)
+    own, other = shapes.face_mesh[6 + BOTTOM], shapes.face_mesh[TOP]
+    flat = nodes[:, :2]
+    outline = np.array([(0, 0), (1, 0), (1, 0.7), (0, 0.7)])
+    x_other = flat[other.node] if other is not None else np.zeros((0, 2))
+    share, mass, cross = twin(own, other, outline, flat[own.node], x_other)
+    assert (contacts.bodies == [1, 0]).all()
+    weights = contacts.weights.toarray()
+    # none of these overlaps leaves slivers
+    found = np.searchsorted(own.node, contacts.key - (1 << 23))
+    np.testing.assert_array_equal(found, np.flatnonzero(share > 0))
+    np.testing.assert_allclose(contacts.area, share[found], atol=1e-14)
+    own_rows = weights[0::2][:, own.node] * contacts.area[:, None]
+    np.testing.assert_allclose(own_rows, mass[found], atol=1e-14)
+    if other is not None:
+        far_rows = weights[1::2][:, other.node] * contacts.area[:, None]
+        np.testing.assert_allclose(far_rows, cross[found], atol=1e-14)
 
 
-NOTHING = np.zeros((0, 3), dtype=np.int64)
+@settings(max_examples=40, deadline=None)
+@given(
+    st.sampled_from(list(itertools.product(KINDS, [*KINDS, None]))),
+    st.floats(-1.5, 1.5),
+    st.tuples(st.floats(-0.4, 0.9), st.floats(-0.4, 0.6)),
+    st.integers(1, 5),
+)
+def test_both_sides_reproduce_constants_and_places_and_share_out_the_overlap(kinds, angle, shift, count):
+    """On uneven quadrilaterals too, where the integrals themselves are not exact."""
+    kind, far = kinds
+    low = np.array([*shift, 0.0])
+    shapes, placed, nodes = two_boxes(
+        LOWER,
+        (low, low + np.array([0.8, 0.6, 0.4])),
+        None if far is None else (far, 3, 2, 0.25),
+        (kind, count, count, 0.25),
+        angle,
+    )
+    contacts = contacts_of(shapes, placed, nodes)
+    faces = [placed.vertex[shapes.corner[shapes.cptr[f] : shapes.cptr[f + 1]]] for f in (TOP, 6 + BOTTOM)]
+    whole = moments(overlap(*faces, np.array([0.0, 0.0, 1.0]))[:, :2])[0]
+    if whole < 1e-6 * 0.48:
+        assert len(contacts) == 0
+        return
+    assert contacts.area.sum() == pytest.approx(whole, rel=1e-12)
+    assert contacts.area.min() > 0
+    sums = contacts.weights.sum(axis=1).reshape(-1, 2)
+    elastic = [shapes.face_mesh[6 * b] is not None for b in contacts.bodies[0]]
+    np.testing.assert_allclose(sums, np.broadcast_to(np.array(elastic, float), sums.shape), atol=1e-13)
+    points = places(contacts, placed, nodes)
+    np.testing.assert_allclose(points[:, 0], points[:, 1], atol=1e-12)
+    assert len(set(contacts.key.tolist())) == len(contacts)
 
 
-@pytest.mark.parametrize("flip", [False, True])
-@pytest.mark.parametrize("angle", [0.0, 0.4, 1.3])
-def test_mortar_integrals_between_two_meshes_are_those_of_their_twin(angle, flip):
-    xc, tc = patch(1.0, 0.7, 4)
-    xa, ta = patch(0.8, 1.1, 3, angle, (0.3, -0.2), seed=1, flip=flip)
-    found = kernel.mortar_integrals(xc, tc, xa, ta, np.zeros((0, 2)))
-    for ours, twin in zip(found, mortar_integrals(xc, tc, xa, ta, None), strict=True):
-        np.testing.assert_allclose(ours, twin, atol=1e-13)
+@pytest.mark.parametrize("kind", KINDS)
+def test_quadratic_facets_have_contacts_at_corners_alone(kind):
+    shapes, placed, nodes = two_boxes(LOWER, ((0, 0, 0), (1, 0.7, 1)), None, (kind, 4, 3, 0.0))
+    assert len(contacts_of(shapes, placed, nodes)) == 5 * 4
 
 
-@settings(max_examples=25, deadline=None)
-@given(st.floats(-1.5, 1.5), st.tuples(st.floats(-0.4, 0.9), st.floats(-0.4, 0.6)), st.booleans())
-def test_mortar_integrals_share_out_the_overlap(angle, shift, rigid):
-    xc, tc = patch(1.0, 0.7, 4)
-    outline, _ = patch(0.8, 0.6, 2, angle, shift)
-    outline = outline[[0, 2, 3, 1]]
-    xa, ta = (outline, NOTHING) if rigid else patch(0.8, 0.6, 3, angle, shift, seed=2)
-    area, own, other, centre = kernel.mortar_integrals(xc, tc, xa, ta, outline if rigid else np.zeros((0, 2)))
-    overlap = clip_flat(np.array([(0, 0), (1, 0), (1, 0.7), (0, 0.7)], dtype=float), outline)
-    local = overlap - overlap.mean(axis=0) if len(overlap) else np.zeros((1, 2))
-    nxt = np.roll(local, -1, axis=0)
-    whole = 0.5 * (local[:, 0] * nxt[:, 1] - local[:, 1] * nxt[:, 0]).sum()
-    assert area.sum() == pytest.approx(whole, abs=1e-12)  # the N_i add up to 1
-    np.testing.assert_allclose(own.sum(axis=1), area, atol=1e-13)
-    np.testing.assert_allclose(own, own.T, atol=1e-15)
-    if not rigid:
-        np.testing.assert_allclose(other.sum(axis=1), area, atol=1e-13)
-        np.testing.assert_allclose(other @ xa, centre, atol=1e-13)  # shape functions reproduce x
-    np.testing.assert_allclose(own @ xc, centre, atol=1e-13)
+@pytest.mark.parametrize("width", [1e-2, 1e-4, 1e-8, 1e-15])
+@pytest.mark.parametrize("kind", KINDS)
+def test_slivers_join_their_neighbours(kind, width):
+    """The overlap ends `width` beyond a row of nodes: the next row would have next to nothing of it."""
+    shapes, placed, nodes = two_boxes(
+        LOWER, ((0.5 - width, 0.0, 0.0), (1.5 - width, 0.7, 1.0)), None, (kind, 10, 7, 0.0)
+    )
+    contacts = contacts_of(shapes, placed, nodes)
+    assert contacts.area.sum() == pytest.approx((0.5 + width) * 0.7, rel=1e-12)
+    assert contacts.area.min() > 1e-3 * contacts.area.max()
+    points = places(contacts, placed, nodes)
+    np.testing.assert_allclose(points[:, 0], points[:, 1], atol=1e-12)
+    # a uniform pressure has its resultant in the middle of the overlap
+    middle = contacts.area @ points[:, 0] / contacts.area.sum()
+    np.testing.assert_allclose(middle, [0.75 - width / 2, 0.35, 0.0], atol=1e-12)
 
 
-def test_mortar_integrals_of_two_triangles_on_a_larger_rectangle_have_their_closed_form():
-    # ∫N = A/3, ∫N² = A/6, ∫N_i N_k = A/12 on each triangle of area A = ab/2
-    a, b = 0.8, 0.3
-    xc, tc = np.array([(0, 0), (a, 0), (a, b), (0, b)]), np.array([(0, 1, 2), (0, 2, 3)])
-    outline = np.array([(-1, -1), (2, -1), (2, 2), (-1, 2)], dtype=float)
-    area, own, _, centre = kernel.mortar_integrals(xc, tc, outline, NOTHING, outline)
-    part = a * b / 2
-    np.testing.assert_allclose(area, part * np.array([2, 1, 2, 1]) / 3, rtol=1e-13)
-    np.testing.assert_allclose(own[0], part / 12 * np.array([4, 1, 2, 1]), rtol=1e-13)
-    np.testing.assert_allclose(own[1], part / 12 * np.array([1, 2, 1, 0]), atol=1e-16)
-    np.testing.assert_allclose(centre.sum(axis=0), a * b * np.array([a / 2, b / 2]), rtol=1e-13)
+@pytest.mark.parametrize("swap", [False, True])
+def test_two_faces_just_as_fine_have_one_candidate_whatever_their_order(swap):
+    """The one that looks down; and of two meshes the finer."""
+    lower, upper = LOWER, ((0.0, 0.0, 0.0), (1.0, 0.7, 0.5))
+    mesh = (4, 3, 2, 0.0)
+    shapes, placed, nodes = two_boxes(lower, upper, mesh, mesh)
+    pair, face = np.array([[0, 1]]), np.array([[TOP, 6 + BOTTOM]])
+    if swap:
+        pair, face = pair[:, ::-1], face[:, ::-1]
+    found, _ = mortar_contacts(shapes, placed, pair, face, np.array([0]), np.array([1.0]), len(nodes), 1e-6)
+    assert (found.bodies == [1, 0]).all()
+    finer, placed, nodes = two_boxes(lower, upper, (4, 3, 3, 0.0), mesh)
+    found, _ = mortar_contacts(finer, placed, pair, face, np.array([0]), np.array([1.0]), len(nodes), 1e-6)
+    assert (found.bodies == [0, 1]).all()

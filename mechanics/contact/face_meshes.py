@@ -1,0 +1,106 @@
+"""The finite elements on the faces of deformable bodies, one by one and packed in flat arrays."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["FaceMesh", "PackedMeshes", "packed_meshes"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# most nodes of a facet
+_WIDEST = 9
+# by this fraction the facets of a face may be larger than it, for rounding
+_SAME_AREA = 1e-9
+
+
+@dataclass(frozen=True)
+class FaceMesh:
+    """The finite-element nodes and facets on one face of a deformable body.
+
+    Attributes
+    ----------
+    node : (k,) nodes, numbered over all deformable bodies
+    reference : (k, 3) their places in body axes [m]
+    facet : (m, 3 | 6 | 4 | 8 | 9) indices into `node`, in VTK's order, corners first, counter-clockwise from outside
+    """
+
+    node: Ints
+    reference: Array
+    facet: Ints
+
+
+@dataclass(frozen=True)
+class PackedMeshes:
+    """The meshes of all faces; mesh m owns nodes node_ptr[m]:node_ptr[m+1] and facets facet_ptr[m]:facet_ptr[m+1].
+
+    Attributes
+    ----------
+    of_face : (nf,) the mesh of each face; -1 for those of rigid bodies
+    node_ptr, node, reference : nodes of each mesh, as in `FaceMesh`
+    facet_ptr, facet : (·, 9) facets of each mesh, padded with -1
+    kind : (nm,) nodes of a facet of each mesh
+    cut : (nm,) whether the face cuts through its facets, so that they reach beyond it
+    fineness : (nf,) triangles (a quadrilateral counts for two) per area of each face [1/m²]; 0 without facets, -1 if
+        rigid
+    """
+
+    of_face: Ints
+    node_ptr: Ints
+    node: Ints
+    reference: Array
+    facet_ptr: Ints
+    facet: Ints
+    kind: Ints
+    cut: NDArray[np.bool_]
+    fineness: Array
+
+
+def packed_meshes(meshes: Sequence[FaceMesh | None], face_area: Array) -> PackedMeshes:
+    """Pack the meshes of all faces, whose areas are given (nf,) [m²]."""
+    own = [mesh for mesh in meshes if mesh is not None]
+    has = np.array([mesh is not None for mesh in meshes], dtype=bool)
+    of_face = np.where(has, np.cumsum(has) - 1, -1).astype(np.int64)
+    covered = np.array([_area(mesh) for mesh in own])
+    triangles = np.array([len(mesh.facet) * (_corners(mesh) - 2) for mesh in own], dtype=float)
+    fineness = np.full(len(meshes), -1.0)
+    fineness[has] = triangles / np.where(covered > 0, covered, 1.0)
+    return PackedMeshes(
+        of_face=of_face,
+        node_ptr=_pointer([len(mesh.node) for mesh in own]),
+        node=np.concatenate([*(mesh.node for mesh in own), np.zeros(0)]).astype(np.int64),
+        reference=np.vstack([*(mesh.reference for mesh in own), np.zeros((0, 3))]),
+        facet_ptr=_pointer([len(mesh.facet) for mesh in own]),
+        facet=np.vstack([*map(_padded, own), np.zeros((0, _WIDEST))]).astype(np.int64),
+        kind=np.array([mesh.facet.shape[1] for mesh in own], dtype=np.int64),
+        cut=covered > (1.0 + _SAME_AREA) * face_area[has],
+        fineness=fineness,
+    )
+
+
+def _pointer(counts: Sequence[int]) -> Ints:
+    return np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+
+
+def _padded(mesh: FaceMesh) -> Ints:
+    rows, columns = mesh.facet.shape
+    return np.hstack([mesh.facet, np.full((rows, _WIDEST - columns), -1)])
+
+
+def _corners(mesh: FaceMesh) -> int:
+    return 3 if mesh.facet.shape[1] in (3, 6) else 4
+
+
+def _area(mesh: FaceMesh) -> float:
+    """Area of the facets [m²]."""
+    x = mesh.reference[mesh.facet[:, : _corners(mesh)]]
+    # half the cross product of the diagonals, of a triangle of two edges
+    cross = np.cross(x[:, 2] - x[:, 0], x[:, -1] - x[:, 1]) if x.shape[1] == 4 else np.cross(*_two_edges(x))
+    return float(0.5 * np.linalg.norm(cross, axis=1).sum())
+
+
+def _two_edges(x: Array) -> tuple[Array, Array]:
+    return x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]
