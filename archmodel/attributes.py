@@ -4,10 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from sqlalchemy import Select, and_, func, select
+from sqlalchemy import ColumnElement, Select, and_, func, select
 from sqlalchemy.orm import InstrumentedAttribute, aliased
 
 from archmodel.entities import Entity
+from archmodel.records import STONE_VALUES
 from archmodel.tables import EntityResult, Measurement, Survey
 
 __all__ = ["ATTRIBUTES", "Attribute", "with_attributes"]
@@ -30,7 +31,7 @@ class Attribute:
     name: str
     unit: str | None
     definition: str
-    column: InstrumentedAttribute[Any]
+    column: InstrumentedAttribute[Any] | ColumnElement[Any]
 
     @property
     def is_number(self) -> bool:
@@ -58,6 +59,10 @@ _ALL = (
     Attribute("von_mises_mean", "Pa", "mean Von Mises stress, latest run", EntityResult.von_mises_mean),
     Attribute("displacement_max", "m", "largest displacement, latest run", EntityResult.displacement_max),
     Attribute("contact_force_max", "N", "largest contact force, latest run", EntityResult.contact_force_max),
+    *(
+        Attribute(name, unit, f"{meaning}, latest run", EntityResult.values[name].as_float())
+        for name, (unit, meaning) in STONE_VALUES.items()
+    ),
     Attribute("fidelity", None, "fixed, rigid or deformable, latest run", EntityResult.fidelity),
     Attribute("survey", None, "name of the survey that measured it", Survey.name),
 )

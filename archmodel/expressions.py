@@ -31,6 +31,9 @@ from moma.errors import UsageError
 
 __all__ = ["condition"]
 
+# so many attributes are named where none is like what was written
+_SHOWN = 20
+
 _OPERATORS: Mapping[str, Callable[[Any, Any], Any]] = {
     "=": operator.eq,
     "!=": operator.ne,
@@ -87,7 +90,8 @@ def _attribute(name: Token) -> Attribute:
 def _nearest(name: str) -> str:
     """What the user may have meant."""
     near = difflib.get_close_matches(name[:40].lower(), ATTRIBUTES, n=3, cutoff=0.5)
-    return f"did you mean {' or '.join(near)}?" if near else f"the attributes are {', '.join(ATTRIBUTES)}"
+    shown = [*list(ATTRIBUTES)[:_SHOWN], "…"] if len(ATTRIBUTES) > _SHOWN else list(ATTRIBUTES)
+    return f"did you mean {' or '.join(near)}?" if near else f"the attributes are {', '.join(shown)}"
 
 
 def _operand(attribute: Attribute, value: Token) -> Any:

@@ -97,12 +97,17 @@ class Observer:
         )
 
     def _frame(self, state: State, contacts: ContactResult) -> Frame:
-        stresses = tuple(
-            None if stone is None else _in_world(self._stress(b, stone, state)[0], state.rotation[b])
+        seen = [
+            (None, None) if stone is None else self._stress(b, stone, state)
             for b, stone in enumerate(self._model.stones)
-        )
+        ]
         return Frame(
-            state.time, positions(self._model, state), velocities(self._model, state), stresses, contacts
+            time=state.time,
+            positions=positions(self._model, state),
+            velocities=velocities(self._model, state),
+            stresses=tuple(stress for stress, _ in seen),
+            stress_errors=tuple(error for _, error in seen),
+            contacts=contacts,
         )
 
     def _interfaces(self, step: Step) -> tuple[Faces, Interfaces]:
@@ -128,24 +133,23 @@ class Observer:
             joint=interfaces.joint,
         )
 
-    def _stress(self, body: int, stone: Deformable, state: State) -> tuple[Array, Array]:
-        """Recovered stress of the nodes (n, 6) [Pa] and their displacement (n, 3) [m], both in body axes."""
+    def _stress(self, body: int, stone: Deformable, state: State) -> tuple[Array, float]:
+        """Recovered stress of the nodes (n, 6), world axes [Pa], and its estimated relative error [-]."""
         # equal stones share their finite elements, and so the weights of the recovery
         if id(stone) not in self._recovery:
             self._recovery[id(stone)] = recovery(stone.mesh)
-        node = state.node[self._model.nodes_of(body)]
-        displacement = stone.displacement(node, state.centre[body], state.rotation[body])
-        stress: Array = self._recovery[id(stone)] @ sampled_stress(stone.mesh, stone.material, displacement)
-        return stress, displacement
+        node, turn = state.node[self._model.nodes_of(body)], state.rotation[body]
+        displacement = stone.displacement(node, state.centre[body], turn)
+        local = self._recovery[id(stone)] @ sampled_stress(stone.mesh, stone.material, displacement)
+        error = stress_error(stone.mesh, stone.material, displacement, local)
+        return to_voigt(turn @ from_voigt(local) @ turn.T), error
 
     def _elastic_result(
         self, body: int, stone: Deformable, state: State, before: Array, balance: float
     ) -> BodyResult:
         model, block = self._model, self._model.scene.blocks[body]
-        local, displacement = self._stress(body, stone, state)
-        stress = _in_world(local, state.rotation[body])
+        stress, error = self._stress(body, stone, state)
         now, volume = state.node[model.nodes_of(body)], node_volumes(stone.mesh)
-        error = stress_error(stone.mesh, stone.material, displacement, local)
         return BodyResult(
             code=block.code,
             fidelity=block.fidelity,
@@ -185,11 +189,6 @@ def _rigid_result(
         mass=float(model.mass[body]),
         balance=balance,
     )
-
-
-def _in_world(stress: Array, rotation: Array) -> Array:
-    """Stress (n, 6) from body to world axes."""
-    return to_voigt(rotation @ from_voigt(stress) @ rotation.T)
 
 
 def _no_contacts() -> ContactResult:

@@ -208,6 +208,7 @@ class Frame:
     positions : of the points of each body, as in its BodyResult [m]
     velocities : (n, 3) of the same points [m/s]
     stresses : (n, 6) as in BodyResult; None if rigid [Pa]
+    stress_errors : as StressValues.error; None if rigid [-]
     contacts : the contact points; joints of the start have the same numbers as at the end
     """
 
@@ -215,6 +216,7 @@ class Frame:
     positions: tuple[Array, ...]
     velocities: tuple[Array, ...]
     stresses: tuple[Array | None, ...]
+    stress_errors: tuple[float | None, ...]
     contacts: ContactResult
 
 

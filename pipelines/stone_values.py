@@ -1,15 +1,16 @@
 """Numbers of a result, by stone and over the scene: what tables, database and reports show."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from archmodel.records import StoneResult
-from mechanics.result import BodyResult, Result
-from mechanics.scene import Fidelity
+from mechanics.result import BodyResult, JointResult, Result
+from mechanics.stress_values import StressValues, volume_quantile
 
-__all__ = ["StressStatistics", "node_volumes", "stone_results", "stress_statistics"]
+__all__ = ["StressStatistics", "stone_results", "stress_statistics"]
 
 Array = NDArray[np.float64]
 
@@ -30,56 +31,84 @@ class StressStatistics:
     mean: float
 
 
-def node_volumes(body: BodyResult) -> Array:
-    """(n,) volume that each node stands for: a quarter of every tetrahedron around it [m³]."""
-    corners = body.reference[body.cells]
-    edges = corners[:, 1:] - corners[:, :1]
-    quarter = np.abs(np.linalg.det(edges)) / 24.0
-    return np.bincount(
-        body.cells.ravel(), weights=np.repeat(quarter, 4), minlength=len(body.reference)
-    ).astype(np.float64)
-
-
 def stress_statistics(result: Result) -> StressStatistics | None:
     """Statistics of the Von Mises stress; None if no stone deforms."""
-    stressed = [(body.von_mises, node_volumes(body)) for body in result.bodies if body.von_mises is not None]
+    stressed = [
+        (body.von_mises, body.node_volume)
+        for body in result.bodies
+        if body.von_mises is not None and body.node_volume is not None
+    ]
     if not stressed:
         return None
     values = np.concatenate([value for value, _ in stressed])
     volumes = np.concatenate([volume for _, volume in stressed])
-    order = np.argsort(values)
-    below = np.cumsum(volumes[order]) / volumes.sum()
-    p99 = values[order][min(int(np.searchsorted(below, 0.99)), len(values) - 1)]
-    return StressStatistics(float(values.max()), float(p99), float(np.average(values, weights=volumes)))
+    return StressStatistics(
+        float(values.max()),
+        volume_quantile(values, volumes, 0.99),
+        float(np.average(values, weights=volumes)),
+    )
 
 
 def stone_results(result: Result) -> tuple[StoneResult, ...]:
     """What goes back to the database, one per stone, in the scene's order."""
-    largest = _largest_contact_forces(result)
+    force = np.linalg.norm(result.contacts.force, axis=1)
+    largest = _largest(result.contacts.bodies, force, len(result.bodies))
+    of_joints = _joint_values(result.joints, len(result.bodies))
     return tuple(
         StoneResult(
             code=body.code,
             fidelity=str(body.fidelity),
-            von_mises_max=None if body.von_mises is None else float(body.von_mises.max()),
-            von_mises_mean=_mean_stress(body),
+            von_mises_max=None if body.values is None else body.values.von_mises_max,
+            von_mises_mean=None if body.values is None else body.values.von_mises_mean,
             displacement_max=float(np.linalg.norm(body.displacement, axis=1).max()),
-            contact_force_max=None if np.isnan(force) else float(force),
-            values={"volume": body.volume, "mass": body.mass},
+            contact_force_max=None if np.isnan(largest[number]) else float(largest[number]),
+            values=_values(body, {name: float(one[number]) for name, one in of_joints.items()}),
         )
-        for body, force in zip(result.bodies, largest, strict=True)
+        for number, body in enumerate(result.bodies)
     )
 
 
-def _mean_stress(body: BodyResult) -> float | None:
-    if body.von_mises is None or body.fidelity is not Fidelity.DEFORMABLE:
-        return None
-    return float(np.average(body.von_mises, weights=node_volumes(body)))
+def _values(body: BodyResult, of_joints: Mapping[str, float]) -> dict[str, float]:
+    """The named values of a stone, those that are known; archmodel.records.STONE_VALUES says what they are."""
+    values: dict[str, float | None] = {"volume": body.volume, "mass": body.mass, **of_joints}
+    if body.values is not None:
+        values |= _stresses(body.values)
+    return {name: value for name, value in values.items() if value is not None and np.isfinite(value)}
 
 
-def _largest_contact_forces(result: Result) -> Array:
-    """(nb,) largest force of one contact point of each body [N]; NaN without a contact."""
-    force = np.linalg.norm(result.contacts.force, axis=1)
-    largest = np.full(len(result.bodies), -np.inf)
+def _stresses(stress: StressValues) -> dict[str, float | None]:
+    return {
+        "von_mises_p99": stress.von_mises_p99,
+        "principal_tension": stress.principal_tension,
+        "principal_compression": stress.principal_compression,
+        "mean_pressure": stress.mean_pressure,
+        "tension_zone": stress.tension_zone,
+        "overstressed_zone": stress.overstressed_zone,
+        "utilisation": stress.utilisation,
+        "utilisation_tension": stress.utilisation_tension,
+        "utilisation_compression": stress.utilisation_compression,
+        "stress_error": stress.error,
+    }
+
+
+def _joint_values(joints: JointResult, count: int) -> dict[str, Array]:
+    """(nb,) the worst of the joints of each stone; NaN where it has none of which there is something to say."""
+    return {
+        f"joint_{name}": _largest(joints.bodies, getattr(joints, attribute), count)
+        for name, attribute in (
+            ("pressure", "pressure_max"),
+            ("kern", "kern"),
+            ("opening", "opening"),
+            ("sliding", "sliding"),
+            ("friction_use", "friction_use"),
+        )
+    }
+
+
+def _largest(bodies: NDArray[np.int64], values: Array, count: int) -> Array:
+    """Largest of the values (n,) of the pairs of bodies (n, 2) that each body (count,) is in; NaN without one."""
+    largest = np.full(count, -np.inf)
+    known = np.isfinite(values)
     for side in (0, 1):
-        np.maximum.at(largest, result.contacts.bodies[:, side], force)
+        np.maximum.at(largest, bodies[known, side], values[known])
     return np.where(np.isfinite(largest), largest, np.nan)

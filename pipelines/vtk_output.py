@@ -1,109 +1,211 @@
-"""The motion and the stresses as files for ParaView: one .vtu per frame, their index, contacts.vtu."""
+"""Results as files for ParaView: stones and contact points as time series, the joints at the end."""
 
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mechanics.elasticity import principal, von_mises
 from mechanics.laws.status import STATUSES
-from mechanics.result import BodyResult, Result
+from mechanics.result import BodyResult, ContactResult, Frame, JointResult, Result
 from mechanics.scene import Fidelity
-from pipelines.vtu import POLYHEDRON, TETRAHEDRON, VERTEX, Grid, write_pvd, write_vtu
+from mechanics.stress_values import utilisation
+from pipelines.vtu import CELL_TYPES, POLYGON, POLYHEDRON, VERTEX, Cells, Grid, cells_of, write_pvd, write_vtu
 
-__all__ = ["body_grid", "contact_grid", "write_frames"]
+__all__ = ["UNITS", "body_cells", "body_grid", "contact_grid", "joint_grid", "write_frames"]
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 _FIDELITIES = (Fidelity.FIXED, Fidelity.RIGID, Fidelity.DEFORMABLE)
 
+UNITS: Mapping[str, str] = {
+    **dict.fromkeys(("displacement", "gap", "slide", "opening", "sliding", "eccentricity"), "m"),
+    "centre_of_pressure": "m",
+    "velocity": "m/s",
+    **dict.fromkeys(("stress", "von_mises", "principal", "mean_pressure"), "Pa"),
+    **dict.fromkeys(("pressure", "pressure_mean", "pressure_max"), "Pa"),
+    "force": "N",
+    "moment": "N m",
+    "area": "m²",
+}
+"""Units of the arrays; what is not here is a ratio, a direction or a number."""
+
 
 def write_frames(result: Result, folder: Path) -> None:
-    """Write every frame, the index `results.pvd`, and the contact points at the end.
+    """Write every frame of stones and contacts with their indices `results.pvd` and `contacts.pvd`, and `joints.vtu`.
 
-    The last frame carries the stresses; in earlier ones, and in rigid stones, they are NaN (not computed).
+    What is not computed is NaN: stresses of rigid stones.
     """
-    datasets = []
-    last = len(result.frames) - 1
-    digits = max(4, len(str(last)))
+    cells, digits = body_cells(result), max(4, len(str(len(result.frames) - 1)))
+    series: dict[str, list[tuple[float, str]]] = {"results": [], "contacts": []}
     for number, frame in enumerate(result.frames):
-        name = f"results_{number:0{digits}d}.vtu"
-        write_vtu(folder / name, body_grid(result, frame.positions, stressed=number == last))
-        datasets.append((frame.time, name))
-    write_pvd(folder / "results.pvd", datasets)
-    write_vtu(folder / "contacts.vtu", contact_grid(result))
+        for kind, grid in (
+            ("results", body_grid(result, frame, cells)),
+            ("contacts", contact_grid(frame.contacts)),
+        ):
+            name = f"{kind}_{number:0{digits}d}.vtu"
+            write_vtu(folder / name, grid)
+            series[kind].append((frame.time, name))
+    for kind, datasets in series.items():
+        write_pvd(folder / f"{kind}.pvd", datasets)
+    write_vtu(folder / "joints.vtu", joint_grid(result.joints))
 
 
-def body_grid(result: Result, positions: tuple[Array, ...], *, stressed: bool) -> Grid:
-    """All stones where they are now: tetrahedra of deformable ones, one polyhedron for each other one.
-
-    Point data: displacement [m], von_mises [Pa], stress (xx, yy, zz, xy, yz, zx) [Pa].
-    Cell data: stone (index in the scene), fidelity (0 fixed, 1 rigid, 2 deformable).
-    """
-    cells: list[list[int]] = []
-    faces: list[list[list[int]]] = []
-    types: list[int] = []
-    stones: list[int] = []
-    offset = 0
-    for index, body in enumerate(result.bodies):
-        own_cells, own_faces, kind = _cells_of(body, offset)
-        cells += own_cells
-        faces += own_faces
-        types += [kind] * len(own_cells)
-        stones += [index] * len(own_cells)
+def body_cells(result: Result) -> Cells:
+    """The finite elements of deformable stones, one polyhedron for each other one."""
+    connectivity, sizes, types, streams, ends = [], [], [], [], []
+    offset, end = 0, 0
+    for body in result.bodies:
+        if body.element is not None:
+            connectivity.append((body.cells + offset).ravel())
+            sizes.append(np.full(len(body.cells), body.cells.shape[1]))
+            types.append(np.full(len(body.cells), CELL_TYPES[body.element]))
+            ends.append(np.full(len(body.cells), -1))
+        else:
+            connectivity.append(offset + np.unique([node for face in body.faces for node in face]))
+            stream = np.fromiter(_stream(body, offset), dtype=np.int64)
+            sizes.append(np.array([len(connectivity[-1])]))
+            types.append(np.array([POLYHEDRON]))
+            streams.append(stream)
+            end += len(stream)
+            ends.append(np.array([end]))
         offset += len(body.reference)
-    before = np.concatenate([body.reference for body in result.bodies])
-    now = np.concatenate(positions)
-    fidelities = np.array([_FIDELITIES.index(body.fidelity) for body in result.bodies])
-    stone = np.array(stones, dtype=np.int64)
-    return Grid(
-        points=now,
-        cells=cells,
-        types=np.array(types, dtype=np.uint8),
-        faces=faces,
-        point_data={
-            "displacement": now - before,
-            "von_mises": np.concatenate(
-                [_nodal(body, body.von_mises, 1, stressed)[:, 0] for body in result.bodies]
-            ),
-            "stress": np.concatenate([_nodal(body, body.stress, 6, stressed) for body in result.bodies]),
-        },
-        cell_data={"stone": stone, "fidelity": fidelities[stone].astype(np.int64)},
+    no_faces = np.zeros(0, dtype=np.int64)
+    return Cells(
+        connectivity=np.concatenate(connectivity).astype(np.int64),
+        offsets=np.cumsum(np.concatenate(sizes)).astype(np.int64),
+        types=np.concatenate(types).astype(np.uint8),
+        faces=np.concatenate(streams) if streams else no_faces,
+        face_offsets=np.concatenate(ends).astype(np.int64) if streams else no_faces,
     )
 
 
-def contact_grid(result: Result) -> Grid:
-    """The contact points at the end, with their force [N], normal, gap [m], area [m²] and status (in STATUSES)."""
-    contacts = result.contacts
+def _stream(body: BodyResult, offset: int) -> Iterator[int]:
+    """A polyhedron's faces as VTK lists them."""
+    yield len(body.faces)
+    for face in body.faces:
+        yield len(face)
+        yield from (node + offset for node in face)
+
+
+def body_grid(result: Result, frame: Frame, cells: Cells) -> Grid:
+    """All stones in one frame.
+
+    Point data: displacement [m], velocity [m/s]; stress (xx, yy, zz, xy, yz, zx), von_mises, principal (σ1 ≥ σ2 ≥ σ3),
+    mean_pressure [Pa]; principal_direction_1, principal_direction_3; utilisation [-].
+    Cell data: stone (index in the scene), fidelity (0 fixed, 1 rigid, 2 deformable), stress_error [-].
+    """
+    bodies = result.bodies
+    stone = np.repeat(np.arange(len(bodies)), [max(len(body.cells), 1) for body in bodies])
+    fidelity = np.array([_FIDELITIES.index(body.fidelity) for body in bodies])
+    error = np.array([np.nan if one is None else one for one in frame.stress_errors])
+    before, now = np.concatenate([body.reference for body in bodies]), np.concatenate(frame.positions)
+    return Grid(
+        points=now,
+        cells=cells,
+        point_data={
+            "displacement": now - before,
+            "velocity": np.concatenate(frame.velocities),
+            **_stresses(result, frame),
+        },
+        cell_data={
+            "stone": stone.astype(np.int64),
+            "fidelity": fidelity[stone].astype(np.int64),
+            "stress_error": error[stone],
+        },
+        units=UNITS,
+    )
+
+
+def _stresses(result: Result, frame: Frame) -> dict[str, Array]:
+    """What follows from the stress of the points; NaN where there is none."""
+    stress = np.concatenate(
+        [
+            np.full((len(place), 6), np.nan) if one is None else one
+            for place, one in zip(frame.positions, frame.stresses, strict=True)
+        ]
+    )
+    known = np.isfinite(stress[:, 0])
+    values, first, third = (np.full((len(stress), 3), np.nan) for _ in range(3))
+    values[known], directions = principal(stress[known])
+    first[known], third[known] = directions[:, 0], directions[:, 2]
+    used, start = np.full(len(stress), np.nan), 0
+    for block, place in zip(result.scene.blocks, frame.positions, strict=True):
+        rows = slice(start, start := start + len(place))
+        used[rows] = utilisation(values[rows], block.material)
+    return {
+        "stress": stress,
+        "von_mises": von_mises(stress),
+        "principal": values,
+        "principal_direction_1": first,
+        "principal_direction_3": third,
+        "mean_pressure": -values.mean(axis=1),
+        "utilisation": used,
+    }
+
+
+def contact_grid(contacts: ContactResult) -> Grid:
+    """Contact points: force [N], pressure [Pa], normal, gap and slide [m], area [m²], status, bodies, joint."""
     count = len(contacts.gap)
     status = np.array([STATUSES.index(str(one)) for one in contacts.status], dtype=np.int64)
     return Grid(
         points=contacts.point,
-        cells=[[index] for index in range(count)],
-        types=np.full(count, VERTEX, dtype=np.uint8),
-        faces=[[] for _ in range(count)],
+        cells=cells_of(VERTEX, [[index] for index in range(count)]),
         point_data={
             "force": contacts.force,
+            "pressure": contacts.pressure,
             "normal": contacts.normal,
             "gap": contacts.gap,
+            "slide": contacts.slide,
             "area": contacts.area,
             "status": status,
             "bodies": contacts.bodies.astype(np.int64),
+            "joint": contacts.joint.astype(np.int64),
         },
         cell_data={},
+        units=UNITS,
     )
 
 
-def _cells_of(body: BodyResult, offset: int) -> tuple[list[list[int]], list[list[list[int]]], int]:
-    """Cells, their faces, and the cell type of one stone."""
-    if body.fidelity is Fidelity.DEFORMABLE:
-        tetrahedra = (body.cells + offset).tolist()
-        return tetrahedra, [[] for _ in tetrahedra], TETRAHEDRON
-    polygons = [[node + offset for node in face] for face in body.faces]
-    return [sorted({node for face in polygons for node in face})], [polygons], POLYHEDRON
+def joint_grid(joints: JointResult) -> Grid:
+    """The polygons of the joints, with what `JointResult` says of each."""
+    # where faces no longer overlap, a point stands for the polygon
+    polygons = [
+        one if len(one) > 2 else np.tile(centre, (3, 1))
+        for one, centre in zip(joints.polygon, joints.centroid, strict=True)
+    ]
+    sizes = np.array([len(one) for one in polygons], dtype=np.int64)
+    ends = np.cumsum(sizes)
+    return Grid(
+        points=np.concatenate([*polygons, np.zeros((0, 3))]),
+        cells=cells_of(POLYGON, [range(end - size, end) for size, end in zip(sizes, ends, strict=True)]),
+        point_data={},
+        cell_data={
+            "bodies": joints.bodies.astype(np.int64),
+            "parted": joints.parted.astype(np.int64),
+            "normal": joints.frame[:, 0],
+            "in_kern": joints.in_kern.astype(np.int64),
+            **{name: getattr(joints, name) for name in _JOINT_ARRAYS},
+        },
+        units=UNITS,
+    )
 
 
-def _nodal(body: BodyResult, values: Array | None, components: int, stressed: bool) -> Array:
-    count = len(body.reference)
-    if values is None or not stressed:
-        return np.full((count, components), np.nan)
-    return values.reshape(count, components)
+_JOINT_ARRAYS = (
+    "area",
+    "force",
+    "moment",
+    "centre_of_pressure",
+    "eccentricity",
+    "kern",
+    "edge",
+    "pressure_mean",
+    "pressure_max",
+    "opening",
+    "sliding",
+    "slipping",
+    "open",
+    "friction_use",
+)

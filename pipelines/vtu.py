@@ -3,19 +3,60 @@
 import base64
 import struct
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
+from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["POLYHEDRON", "TETRAHEDRON", "VERTEX", "Grid", "write_pvd", "write_vtu"]
+from mechanics.meshing.elements import Element
 
-VERTEX, TETRAHEDRON, POLYHEDRON = 1, 10, 42  # cell types of VTK
+__all__ = [
+    "CELL_TYPES",
+    "POLYGON",
+    "POLYHEDRON",
+    "VERTEX",
+    "Cells",
+    "Grid",
+    "cells_of",
+    "write_pvd",
+    "write_vtu",
+]
 
+# cell types of VTK
+VERTEX, POLYGON, POLYHEDRON = 1, 7, 42
+CELL_TYPES: Mapping[Element, int] = {
+    Element.TET4: 10,
+    Element.TET10: 24,
+    Element.HEX8: 12,
+    Element.HEX20: 25,
+    Element.HEX27: 29,
+}
+
+Ints = NDArray[np.int64]
 Arrays = Mapping[str, NDArray[np.generic]]
 _NAMES = {"f8": "Float64", "i8": "Int64", "i4": "Int32", "u1": "UInt8"}
+
+
+@dataclass(frozen=True)
+class Cells:
+    """The cells of a grid.
+
+    Attributes
+    ----------
+    connectivity : node indices of all cells, one cell after the other
+    offsets : (nc,) where each cell ends in it
+    types : (nc,) VTK cell types
+    faces : of polyhedra: number of faces, then for each its number of nodes and the nodes
+    face_offsets : (nc,) where each polyhedron ends in it; -1 for other cells; empty if there are no polyhedra
+    """
+
+    connectivity: Ints
+    offsets: Ints
+    types: NDArray[np.uint8]
+    faces: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    face_offsets: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
 
 @dataclass(frozen=True)
@@ -25,38 +66,45 @@ class Grid:
     Attributes
     ----------
     points : (n, 3) [m]
-    cells : node indices of each cell
-    types : (nc,) VTK cell types
-    faces : for each polyhedron, its faces as node indices; for other cells, nothing
+    cells : on these points
     point_data, cell_data : named arrays of n or nc rows
+    units : of the arrays, by name; none for what is a ratio or a number
     """
 
     points: NDArray[np.float64]
-    cells: Sequence[Sequence[int]]
-    types: NDArray[np.uint8]
-    faces: Sequence[Sequence[Sequence[int]]]
+    cells: Cells
     point_data: Arrays
     cell_data: Arrays
+    units: Mapping[str, str] = field(default_factory=dict)
+
+
+def cells_of(kind: int, rows: Sequence[Sequence[int]]) -> Cells:
+    """Cells of one type, not polyhedra."""
+    return Cells(
+        connectivity=np.fromiter((node for row in rows for node in row), dtype=np.int64),
+        offsets=np.cumsum([len(row) for row in rows], dtype=np.int64),
+        types=np.full(len(rows), kind, dtype=np.uint8),
+    )
 
 
 def write_vtu(path: Path, grid: Grid) -> None:
     """Write one unstructured grid, binary, readable by any ParaView since 4."""
     lines = [
-        '<?xml version="1.0"?>',
+        '<?xml version="1.0" encoding="UTF-8"?>',
         '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64">',
         "<UnstructuredGrid>",
-        f'<Piece NumberOfPoints="{len(grid.points)}" NumberOfCells="{len(grid.types)}">',
+        f'<Piece NumberOfPoints="{len(grid.points)}" NumberOfCells="{len(grid.cells.types)}">',
         "<PointData>",
-        *(_array(name, values) for name, values in grid.point_data.items()),
+        *(_array(name, values, grid.units.get(name)) for name, values in grid.point_data.items()),
         "</PointData>",
         "<CellData>",
-        *(_array(name, values) for name, values in grid.cell_data.items()),
+        *(_array(name, values, grid.units.get(name)) for name, values in grid.cell_data.items()),
         "</CellData>",
         "<Points>",
-        _array("Points", grid.points),
+        _array("Points", grid.points, "m"),
         "</Points>",
         "<Cells>",
-        *_cells(grid),
+        *_cells(grid.cells),
         "</Cells>",
         "</Piece>",
         "</UnstructuredGrid>",
@@ -81,33 +129,27 @@ def write_pvd(path: Path, datasets: Sequence[tuple[float, str]]) -> None:
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def _cells(grid: Grid) -> list[str]:
-    counts = [len(cell) for cell in grid.cells]
+def _cells(cells: Cells) -> list[str]:
     arrays = [
-        _array("connectivity", _flat(grid.cells)),
-        _array("offsets", np.cumsum(counts, dtype=np.int64)),
-        _array("types", grid.types.astype(np.uint8)),
+        _array("connectivity", cells.connectivity),
+        _array("offsets", cells.offsets),
+        _array("types", cells.types),
     ]
-    if any(grid.faces):
-        streams = [
-            [len(faces), *(n for face in faces for n in (len(face), *face))] if faces else []
-            for faces in grid.faces
-        ]
-        ends = np.cumsum([len(stream) for stream in streams], dtype=np.int64)
-        offsets = np.where([bool(stream) for stream in streams], ends, -1).astype(np.int64)
-        arrays += [_array("faces", _flat(streams)), _array("faceoffsets", offsets)]
+    if len(cells.faces):
+        arrays += [_array("faces", cells.faces), _array("faceoffsets", cells.face_offsets)]
     return arrays
 
 
-def _flat(rows: Sequence[Sequence[int]]) -> NDArray[np.int64]:
-    return np.fromiter((n for row in rows for n in row), dtype=np.int64)
-
-
-def _array(name: str, values: NDArray[np.generic]) -> str:
-    """One binary array: base64 of its length in bytes, then of its bytes."""
+def _array(name: str, values: NDArray[np.generic], unit: str | None = None) -> str:
+    """One binary array: base64 of its length in bytes, then of its bytes; its unit where VTK looks for it."""
     kind = _NAMES[values.dtype.str[1:]]
     components = values.shape[1] if values.ndim > 1 else 1
     content = np.ascontiguousarray(values).astype(values.dtype.newbyteorder("<")).tobytes()
     encoded = base64.b64encode(struct.pack("<Q", len(content)) + content).decode("ascii")
     shape = f' NumberOfComponents="{components}"' if components > 1 else ""
-    return f'<DataArray type="{kind}" Name={quoteattr(name)}{shape} format="binary">{encoded}</DataArray>'
+    label = ""
+    if unit is not None:
+        label = f'<InformationKey name="UNITS_LABEL" location="vtkDataArray">{escape(unit)}</InformationKey>'
+    return (
+        f'<DataArray type="{kind}" Name={quoteattr(name)}{shape} format="binary">{encoded}{label}</DataArray>'
+    )

@@ -1,6 +1,7 @@
 """Stones whose every number is known in closed form, and the contents of a database as text."""
 
 import sqlite3
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -61,8 +62,12 @@ def hash_of(code: str) -> int:
     return int.from_bytes(code.encode()[:6], "big")
 
 
-def run_record(results: dict[str, float | None], scene: str = "window") -> RunRecord:
-    """A run with the given largest Von Mises stress by code; None for a rigid stone."""
+def run_record(
+    results: dict[str, float | None],
+    scene: str = "window",
+    values: Mapping[str, Mapping[str, float]] | None = None,
+) -> RunRecord:
+    """A run with the given largest Von Mises stress by code, None for a rigid stone, and further values by code."""
     return RunRecord(
         scene=scene,
         scene_text=f'name = "{scene}"\n',
@@ -77,7 +82,7 @@ def run_record(results: dict[str, float | None], scene: str = "window") -> RunRe
                 von_mises_mean=None if stress is None else stress / 4,
                 displacement_max=1e-5,
                 contact_force_max=1250.0,
-                values={"weight": 900.5},
+                values={"weight": 900.5, **(values or {}).get(code, {})},
             )
             for code, stress in results.items()
         ),

@@ -77,7 +77,7 @@ def test_what_an_expression_finds(filled: Database, expression: str, expected: l
     ("expression", "message"),
     [
         ("", "the end is not an attribute; begin a test with an attribute, e.g. depth > 0.4"),
-        ("von_mises > 2e5", "unknown attribute 'von_mises'; did you mean von_mises_m"),
+        ("von_mises > 2e5", "unknown attribute 'von_mises'; did you mean von_mises_"),
         ("depth > 0.4m", "'0.4m' is neither a number nor an attribute, and depth is a number"),
         ("depth > '0.4'", "depth is a number, '0.4' is not; write a number without quotes"),
         ("depth in (0.4, deep)", "at character 16: depth is a number, 'deep' is not"),

@@ -38,7 +38,13 @@ def table(heading: str) -> list[list[str]]:
 def simulated(filled: Database) -> Database:
     with filled.session() as session:
         store_run(session, run_record({"V1": 9e5, "V2": 8e5, "V3": 7e5}))
-        store_run(session, run_record({"V1": 3e5, "V2": 1.5e5, "V3": None}))
+        store_run(
+            session,
+            run_record(
+                {"V1": 3e5, "V2": 1.5e5, "V3": None},
+                values={"V1": {"utilisation": 0.2}, "V2": {"utilisation": 0.8, "tension_zone": 0.05}},
+            ),
+        )
     return filled
 
 
