@@ -178,7 +178,7 @@ def _room(array, needed):
 
 @njit(cache=True)
 def _integrate(polygon, count, own, kind, far, far_kind, n_psi, n_own, n_far, share, moment, mass, cross):
-    """Add ∫ψ_i, ∫ψ_i x, ∫ψ_i N_k and ∫ψ_i N_j over a polygon that lies in the facets `own` and, if kind > 0, `far`."""
+    """Add ∫ψ_i, ∫ψ_i (x, y, x² + y²), ∫ψ_i N_k, ∫ψ_i N_j over a polygon in the facets `own` and, if kind > 0, `far`."""
     corners = corner_count(kind)
     wanted = corners - 2 + max(degree(kind), degree(far_kind) if far_kind > 0 else 1)
     first, last = rule_of(wanted)
@@ -200,6 +200,7 @@ def _integrate(polygon, count, own, kind, far, far_kind, n_psi, n_own, n_far, sh
                 share[i] += psi
                 moment[i, 0] += psi * x
                 moment[i, 1] += psi * y
+                moment[i, 2] += psi * (x * x + y * y)
                 for k in range(kind):
                     mass[i, k] += psi * n_own[k]
                 for k in range(far_kind):
@@ -221,7 +222,7 @@ def _overlap_integrals(x_c, facet_c, kind_c, x_a, facet_a, kind_a, outlines, out
     x_c, facet_c, kind_c : plane nodes, facets and nodes of a facet of the candidate
     x_a, facet_a, kind_a : those of the antagonist; kind_a = 0 if it is rigid
     outlines, outline_size : convex polygons that bound the overlap besides the meshes
-    share, moment : (nodes,), (nodes, 2) to which ∫ψ_i and ∫ψ_i x are added
+    share, moment : (nodes,), (nodes, 3) to which ∫ψ_i and ∫ψ_i (x, y, x² + y²) are added
 
     Returns
     -------
@@ -242,7 +243,7 @@ def _overlap_integrals(x_c, facet_c, kind_c, x_a, facet_a, kind_a, outlines, out
     polygon, kept = np.empty((_MAX_CUT, 2)), np.empty((_MAX_CUT, 2))
     own, other = np.empty((4, 2)), np.empty((4, 2))
     n_psi, n_own, n_far = np.empty(4), np.empty(9), np.empty(9)
-    part, middle = np.empty(4), np.empty((4, 2))
+    part, middle = np.empty(4), np.empty((4, 3))
     count, pairs = 0, 0
     for t in range(most):
         _take_corners(x_c, facet_c[t], corners, own)
@@ -269,8 +270,8 @@ def _overlap_integrals(x_c, facet_c, kind_c, x_a, facet_a, kind_a, outlines, out
             for i in range(corners):
                 node = facet_c[t, i]
                 share[node] += part[i]
-                moment[node, 0] += middle[i, 0]
-                moment[node, 1] += middle[i, 1]
+                for d in range(3):
+                    moment[node, d] += middle[i, d]
             far[pairs] = near[e]
             pairs += 1
         if met:
@@ -364,11 +365,12 @@ def mortar_rows(
     Returns
     -------
     interface, key : (nc,) interface and node (numbered over all bodies) of each contact
-    area : (nc,) ∫ψ; middle : (nc, 2) ∫ψ x / ∫ψ, along the second and third row of the frame from the origin
+    area : (nc,) ∫ψ
+    middle : (nc, 3) ∫ψ (x, y, x² + y²) / ∫ψ, with x, y along the second and third row of the frame from the origin
     pointer, column, value : (2 nc + 1,), … csr rows ∫ψ N_k / ∫ψ of candidate and antagonist
     """
     interface, key = np.empty(64, dtype=np.int64), np.empty(64, dtype=np.int64)
-    area, middle_x, middle_y = np.empty(64), np.empty(64), np.empty(64)
+    area, middle = np.empty(64), np.empty(3 * 64)
     pointer = np.zeros(129, dtype=np.int64)
     column, value = np.empty(1024, dtype=np.int64), np.empty(1024)
     largest = 0
@@ -397,7 +399,7 @@ def mortar_rows(
         outlines, size = _outlines(
             face[p], cut[m], a < 0 or cut[a], vertices, cptr, corner, origin[p], frame[p]
         )
-        share, moment = np.zeros(last_c - first_c), np.zeros((last_c - first_c, 2))
+        share, moment = np.zeros(last_c - first_c), np.zeros((last_c - first_c, 3))
         used, mass, met_ptr, met, cross = _overlap_integrals(
             x_c, own, kind_c, x_a, other, kind_a, outlines, size, share, moment
         )
@@ -406,7 +408,7 @@ def mortar_rows(
         corners = corner_count(kind_c)
         root = _join_slivers(own, used, corners, share)
         start, place = _incidence(own, used, corners, root, share.shape[0])
-        joined, joined_moment = np.zeros(share.shape[0]), np.zeros((share.shape[0], 2))
+        joined, joined_moment = np.zeros(share.shape[0]), np.zeros((share.shape[0], 3))
         for n in range(share.shape[0]):
             if root[n] >= 0:
                 joined[root[n]] += share[n]
@@ -416,12 +418,9 @@ def mortar_rows(
                 continue
             interface, key = _room(interface, count + 1), _room(key, count + 1)
             area, pointer = _room(area, count + 1), _room(pointer, 2 * count + 3)
-            middle_x, middle_y = _room(middle_x, count + 1), _room(middle_y, count + 1)
+            middle = _room(middle, 3 * count + 3)
             interface[count], key[count], area[count] = p, name_c[n], joined[n]
-            middle_x[count], middle_y[count] = (
-                joined_moment[n, 0] / joined[n],
-                joined_moment[n, 1] / joined[n],
-            )
+            middle[3 * count : 3 * count + 3] = joined_moment[n] / joined[n]
             scale = 1.0 / joined[n]
             base = end
             for e in range(start[n], start[n + 1]):
@@ -452,12 +451,11 @@ def mortar_rows(
                         )
             pointer[2 * count + 2] = end
             count += 1
-    middle = np.column_stack((middle_x[:count], middle_y[:count]))
     return (
         interface[:count],
         key[:count],
         area[:count],
-        middle,
+        middle[: 3 * count].reshape(count, 3),
         pointer[: 2 * count + 1],
         column[:end],
         value[:end],

@@ -1,15 +1,16 @@
 """Contact points as a structure of arrays, and the material points that they tie together."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, vstack
 
 from mechanics.contact._kernels_broad import points_of
 from mechanics.state import State
 
-__all__ = ["Contacts", "gaps", "material_points", "take"]
+__all__ = ["Contacts", "gaps", "joined", "material_points", "take"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -21,8 +22,9 @@ class Contacts:
 
     A side is a material point of its body: for a rigid body a fixed place in its axes (`arm`), for a deformable
     one a weighted mean of nodes (`weights`). Where a deformable face meets a parallel face, the weights are those
-    of the mortar method: contact i stands for the shape function N_i of one candidate node, both sides are means
-    over the overlap weighted by N_i, and a uniform pressure is transmitted exactly (Puso & Laursen 2004).
+    of the mortar method: contact α stands for the linear hat ψ_α of one corner node of the candidate's facets, both
+    sides are means over the overlap weighted by ψ_α, and a uniform pressure is transmitted exactly (Puso & Laursen
+    2004; for quadratic elements Puso, Laursen & Solberg 2008).
 
     Attributes
     ----------
@@ -59,6 +61,18 @@ def take(contacts: Contacts, rows: Ints) -> Contacts:
         contacts.area[rows],
         contacts.arm[rows],
         weights,
+    )
+
+
+def joined(parts: Sequence[Contacts]) -> Contacts:
+    """The contacts of all parts, one after the other."""
+    return Contacts(
+        np.concatenate([part.bodies for part in parts]),
+        np.concatenate([part.key for part in parts]),
+        np.concatenate([part.frame for part in parts]),
+        np.concatenate([part.area for part in parts]),
+        np.concatenate([part.arm for part in parts]),
+        csr_array(vstack([part.weights for part in parts], format="csr")),
     )
 
 

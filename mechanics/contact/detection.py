@@ -2,7 +2,8 @@
 
 Boxes that overlap (broad phase) → separating axis → the interface of each pair of shapes: two faces, or two edges.
 Faces of rigid stones touch in points of their overlap; a deformable face that lies flat on another touches in one
-weighted point per corner node of its mesh (mortar); elsewhere a deformable stone touches in single points.
+weighted point per corner node of its mesh (mortar), and so it does on a ball that its mesh is fine enough to see;
+elsewhere a deformable stone touches in single points.
 All tolerances are fractions of the stones' own sizes.
 """
 
@@ -10,12 +11,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array, vstack
+from scipy.sparse import csr_array
 
 from mechanics.contact._kernels_balls import ball_points
 from mechanics.contact._kernels_broad import boxes, close_pairs, place
 from mechanics.contact._kernels_narrow import EDGES, FACE_FIRST, interface_points, separating_axes
-from mechanics.contact.contacts import Contacts, gaps, take
+from mechanics.contact.ball_sides import FaceCells, ball_contacts, face_cells
+from mechanics.contact.contacts import Contacts, gaps, joined, take
 from mechanics.contact.elastic_sides import mortar_contacts, surface_weights
 from mechanics.contact.surfaces import Placed, Surfaces
 from mechanics.scene import Placement
@@ -42,6 +44,21 @@ class _Pairs:
     kind: Ints
     feature: Ints
     axis: Array
+
+
+@dataclass(frozen=True)
+class _Singles:
+    """Single contact points as `interface_points` gives them."""
+
+    place: Ints
+    frame: Array
+    nearest: Array
+    area: Array
+
+    def without(self, rows: Ints) -> "_Singles":
+        """All points but some."""
+        keep = np.delete(np.arange(len(self.place)), rows)
+        return _Singles(self.place[keep], self.frame[keep], self.nearest[keep], self.area[keep])
 
 
 @dataclass
@@ -79,15 +96,17 @@ class Detector:
     placement: Placement = Placement.CORNERS
     distance: float = 0.0
     _hints: _Hints = field(default_factory=_Hints, repr=False)
+    _cells: list[FaceCells] = field(default_factory=list, repr=False)
 
     def __call__(self, state: State, reach: Array) -> Contacts:
         """Contacts at the configuration of `state`; `reach` (nb,) is how far each body may move in the step [m]."""
         surfaces, placed = self.surfaces, _place(self.surfaces, state)
         pairs = self._touching(placed, reach[surfaces.body])
         flat = self._flat_and_meshed(pairs, placed)
-        points = self._points(pairs, flat, placed, len(state.node))
+        curved, singles = self._curved(pairs, placed, state)
+        points = self._points(pairs, flat, singles, placed, len(state.node))
         if not flat.any():
-            return points
+            return joined([points, *curved]) if curved else points
         owner = np.where(pairs.kind == FACE_FIRST, 0, 1)[flat]
         rows = np.arange(len(owner))
         contacts, limit = mortar_contacts(
@@ -100,7 +119,7 @@ class Detector:
             len(state.node),
             THIN,
         )
-        return _joined(points, take(contacts, np.flatnonzero(gaps(contacts, state) <= limit)))
+        return joined([points, *curved, take(contacts, np.flatnonzero(gaps(contacts, state) <= limit))])
 
     def _touching(self, placed: Placed, reach: Array) -> _Pairs:
         """Pairs of shapes nearer than their alert distance."""
@@ -134,8 +153,10 @@ class Detector:
         chosen[chosen] = -np.einsum("pi,pi->p", normal[:, 0], normal[:, 1]) > _FLAT
         return chosen
 
-    def _points(self, pairs: _Pairs, but: NDArray[np.bool_], placed: Placed, nodes: int) -> Contacts:
-        """Contacts in single points, of all pairs but some."""
+    def _points(
+        self, pairs: _Pairs, but: NDArray[np.bool_], balls: _Singles | None, placed: Placed, nodes: int
+    ) -> Contacts:
+        """Contacts in single points: of polyhedra, of all pairs but some, and those of balls."""
         own = self.surfaces
         kind = np.where(but, 0, pairs.kind)
         found, frame, nearest, area = interface_points(
@@ -147,11 +168,10 @@ class Detector:
         # the antagonist owns the reference face; edges lie on the faces that look along the axis
         faces = (pairs.kind[found[:, 0]] != EDGES)[:, None]
         feature = np.where(faces, pairs.feature[found[:, 0]][:, ::-1], -1)
-        if pairs.balls.any():
-            found_, frame_, nearest_, area_ = self._balls(pairs, placed)
-            found, frame = np.concatenate([found, found_]), np.concatenate([frame, frame_])
-            nearest, area = np.concatenate([nearest, nearest_]), np.concatenate([area, area_])
-            feature = np.concatenate([feature, np.full((len(found_), 2), -1)])
+        if balls is not None:
+            found, frame = np.concatenate([found, balls.place]), np.concatenate([frame, balls.frame])
+            nearest, area = np.concatenate([nearest, balls.nearest]), np.concatenate([area, balls.area])
+            feature = np.concatenate([feature, np.full((len(balls.place), 2), -1)])
         pair, first = found[:, 0], found[:, 1]
         rows = np.arange(len(pair))
         shapes = pairs.shapes[pair]
@@ -165,15 +185,33 @@ class Detector:
             return take(Contacts(body, key, frame, area, arm, weights), np.flatnonzero(outside))
         return Contacts(body, key, frame, area, arm, weights)
 
-    def _balls(self, pairs: _Pairs, placed: Placed) -> tuple[Ints, Array, Array, Array]:
-        """As `interface_points`, of the pairs in which a ball takes part."""
+    def _balls(self, pairs: _Pairs, placed: Placed) -> _Singles:
+        """Single points of the pairs in which a ball takes part."""
         own, balls = self.surfaces, np.flatnonzero(pairs.balls)
         place, frame, nearest, area = ball_points(
             pairs.shapes[balls], pairs.limit[balls], own.radius, placed.centre[own.body], placed.rotation[own.body],
             placed.vertex, own.fptr, own.cptr, own.corner, placed.normal, own.eptr, own.edge_a, own.edge_b,
         )  # fmt: skip
         place[:, 0] = balls[place[:, 0]]
-        return place, frame, nearest, area
+        return _Singles(place, frame, nearest, area)
+
+    def _curved(self, pairs: _Pairs, placed: Placed, state: State) -> tuple[list[Contacts], _Singles | None]:
+        """Weighted contacts of balls with meshes that see them, and single points of all other balls."""
+        if not pairs.balls.any():
+            return [], None
+        own, points = self.surfaces, self._balls(pairs, placed)
+        meshed = own.meshes.of_face[own.fptr[:-1]][pairs.shapes[points.place[:, 0]]].max(axis=1) >= 0
+        rows = np.flatnonzero(meshed)
+        if len(rows) == 0:
+            return [], points
+        pair = points.place[rows, 0]
+        shapes = pairs.shapes[pair]
+        gap = np.einsum("ci,ci->c", points.frame[rows, 0], points.nearest[rows, 0] - points.nearest[rows, 1])
+        key = _pair_key(shapes, len(own.body))
+        if not self._cells:
+            self._cells.append(face_cells(own, len(state.node)))
+        found, seen = ball_contacts(own, placed, state, self._cells[0], shapes, key, pairs.limit[pair], gap)
+        return found, points.without(rows[seen])
 
 
 def _place(surfaces: Surfaces, state: State) -> Placed:
@@ -187,14 +225,3 @@ def _place(surfaces: Surfaces, state: State) -> Placed:
 def _pair_key(shapes: Ints, count: int) -> Ints:
     key: Ints = (shapes[:, 0] * count + shapes[:, 1]) << 24
     return key
-
-
-def _joined(one: Contacts, other: Contacts) -> Contacts:
-    return Contacts(
-        np.concatenate([one.bodies, other.bodies]),
-        np.concatenate([one.key, other.key]),
-        np.concatenate([one.frame, other.frame]),
-        np.concatenate([one.area, other.area]),
-        np.concatenate([one.arm, other.arm]),
-        csr_array(vstack([one.weights, other.weights], format="csr")),
-    )

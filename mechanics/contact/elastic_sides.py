@@ -92,7 +92,10 @@ def mortar_contacts(
     arm = np.zeros((len(interface), 2, 3))
     rigid = np.flatnonzero(meshes.of_face[face[interface, 1]] < 0)
     on = interface[rigid]
-    at = _foot(origin[on], frame[on], placed.normal[face[on, 1]], middle[rigid]) - placed.centre[body[on, 1]]
+    at = (
+        _foot(origin[on], frame[on], placed.normal[face[on, 1]], middle[rigid, :2])
+        - placed.centre[body[on, 1]]
+    )
     arm[rigid, 1] = np.einsum("cji,cj->ci", placed.rotation[body[on, 1]], at)
     contacts = Contacts(
         body[interface],
