@@ -105,7 +105,7 @@ def _fit(points: Array, held: NDArray[np.bool_], corner: Array, target: Array, o
     stretch = _inverse_root(local.transpose(0, 2, 1) @ (part * local), _UNSEEN[1])
     y, z = local @ stretch, (target - mean) @ stretch
     weighted = (part * y).transpose(0, 2, 1)
-    linear = part.transpose(0, 2, 1) + z @ weighted
+    linear: Array = part.transpose(0, 2, 1) + z @ weighted
     if order == 1:
         return linear
     # what the squares and products have beyond the constant and linear polynomials
@@ -114,7 +114,8 @@ def _fit(points: Array, held: NDArray[np.bool_], corner: Array, target: Array, o
     rest, aim = squares - level - y @ slope, aim - level - z @ slope
     root = _inverse_root(rest.transpose(0, 2, 1) @ (part * rest), _UNSEEN[2])
     full = linear + aim @ root @ root.transpose(0, 2, 1) @ (part * rest).transpose(0, 2, 1)
-    return np.where(np.abs(full).sum(axis=2, keepdims=True) > _AMPLIFIED, linear, full)
+    result: Array = np.where(np.abs(full).sum(axis=2, keepdims=True) > _AMPLIFIED, linear, full)
+    return result
 
 
 def _squares(y: Array) -> Array:
