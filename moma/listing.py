@@ -7,6 +7,8 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from archmodel.records import STONE_VALUES
+
 __all__ = ["as_csv", "as_json", "as_lines", "as_table", "shown_columns"]
 
 # what a table shows, and what --where asks for; CSV and JSON give every attribute
@@ -42,6 +44,7 @@ _UNITS = {
     "displacement_max": "m",
     "contact_force_max": "N",
     "mass": "kg",
+    **{name: unit for name, (unit, _) in STONE_VALUES.items() if unit != "-"},
 }
 
 

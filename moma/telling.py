@@ -79,6 +79,13 @@ def run_lines(report: "RunReport", verbose: bool) -> list[str]:
             f"  Von Mises stress: mean {mean:.4f} MPa, 1 % of the volume above {p99:.4f} MPa, "
             f"largest {largest:.4f} MPa"
         )
+    joints = summary["joints"]
+    if joints["count"]:
+        lines.append(
+            f"  {joints['count']} joints: {joints['out_of_kern']} of {joints['pressed']} pressed ones bear outside "
+            f"their kern, largest opening {joints['largest_opening'] * 1e3:.3g} mm, "
+            f"largest sliding {joints['largest_sliding'] * 1e3:.3g} mm"
+        )
     errors = {name: value for name, value in summary["errors"].items() if value is not None}
     lines.append("  errors: " + ", ".join(f"{name} {_short(value)}" for name, value in errors.items()))
     if verbose:

@@ -16,6 +16,7 @@ from mechanics.simulate import simulate
 from moma.errors import DatabaseError, MissingLibraryError
 from pipelines.assemble import Assembly, assemble
 from pipelines.folder import check_replaceable, replacing
+from pipelines.joint_table import write_joints
 from pipelines.pictures import draw_pictures
 from pipelines.progress import Listener, Progress, silent
 from pipelines.report import write_report
@@ -113,6 +114,7 @@ def write_results(
     with _timed(seconds, "files"):
         progress(Progress("write", 0, 3, "results.pvd"))
         write_frames(result, folder)
+        write_joints(folder / "joints.csv", result)
     with _timed(seconds, "pictures"):
         progress(Progress("write", 1, 3, "pictures"))
         try:

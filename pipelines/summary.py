@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.result import Result
+from mechanics.result import JointResult, Result
 from mechanics.scene import Fidelity
 from pipelines.stone_values import stress_statistics
 
@@ -45,6 +45,8 @@ def summarise(result: Result, *, version: str, seconds: Mapping[str, float]) -> 
         },
         "errors": asdict(result.errors),
         "von_mises": None if stress is None else asdict(stress),
+        "stress": _stress(result),
+        "joints": _joints(result.joints),
         "energies": asdict(result.energies),
         "displacement": {"max": displacement},
         "settlement": {"max": float(result.history.settlement[-1])},
@@ -57,6 +59,46 @@ def summarise(result: Result, *, version: str, seconds: Mapping[str, float]) -> 
 def as_json(value: Mapping[str, Any] | list[Any]) -> str:
     """JSON text with a final newline; refuses numbers that JSON cannot say."""
     return json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _stress(result: Result) -> dict[str, Any] | None:
+    """The worst of all deformable stones, each value with its stone; None if none deforms."""
+    values = [(body.code, body.values) for body in result.bodies if body.values is not None]
+    if not values:
+        return None
+    pulled, tension = max(values, key=lambda pair: pair[1].principal_tension)
+    pressed, compression = min(values, key=lambda pair: pair[1].principal_compression)
+    worst, error = max(values, key=lambda pair: pair[1].error)
+    used = [(code, one.utilisation, one.governing) for code, one in values if one.utilisation is not None]
+    code, utilisation, governing = max(used, key=lambda one: one[1], default=(None, None, None))
+    return {
+        "tension": {
+            "value": tension.principal_tension,
+            "stone": pulled,
+            "point": tension.tension_point.tolist(),
+            "direction": tension.tension_direction.tolist(),
+        },
+        "compression": {
+            "value": compression.principal_compression,
+            "stone": pressed,
+            "point": compression.compression_point.tolist(),
+            "direction": compression.compression_direction.tolist(),
+        },
+        "utilisation": {"value": utilisation, "stone": code, "governing": governing},
+        "error": {"value": error.error, "stone": worst},
+    }
+
+
+def _joints(joints: JointResult) -> dict[str, Any]:
+    return {
+        "count": len(joints),
+        "pressed": int(joints.pressed.sum()),
+        "parted": int(joints.parted.sum()),
+        "out_of_kern": int((joints.pressed & ~joints.in_kern).sum()),
+        "largest_opening": float(joints.opening.max(initial=0.0)),
+        "largest_sliding": float(joints.sliding.max(initial=0.0)),
+        "largest_pressure": float(joints.pressure_max.max(initial=0.0)),
+    }
 
 
 def _finite(value: Any) -> Any:

@@ -4,9 +4,24 @@ import itertools
 
 import numpy as np
 
+from mechanics.elasticity import node_volumes, principal
+from mechanics.elasticity import von_mises as equivalent_stress
 from mechanics.materials import Material
-from mechanics.result import BodyResult, ContactResult, Energies, Errors, Frame, History, Outcome, Result
+from mechanics.meshing.elements import Element
+from mechanics.meshing.mesh import SolidMesh
+from mechanics.result import (
+    BodyResult,
+    ContactResult,
+    Energies,
+    Errors,
+    Frame,
+    History,
+    JointResult,
+    Outcome,
+    Result,
+)
 from mechanics.scene import Block, Fidelity, Scene
+from mechanics.stress_values import stress_values
 
 LIMESTONE = Material("limestone", density=2000.0, young=1e10, poisson=0.2)
 BOX_FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
@@ -57,66 +72,128 @@ def rigid_body(code, low, high, fidelity=Fidelity.RIGID, shift=(0.0, 0.0, 0.0)):
         reference=corners,
         position=corners + np.array(shift),
         faces=BOX_FACES,
+        element=None,
         cells=np.empty((0, 4), dtype=np.int64),
         stress=None,
         von_mises=None,
+        principal=None,
+        node_volume=None,
+        values=None,
         volume=volume,
         mass=volume * LIMESTONE.density,
         balance=3e-5,
     )
 
 
-def deformable_body(code, low, high, von_mises, size=0.1, shift=(0.0, 0.0, 0.0)):
-    """A meshed box whose Von Mises stress is the given function of its points."""
+def deformable_body(
+    code, low, high, von_mises, size=0.1, shift=(0.0, 0.0, 0.0), material=LIMESTONE, error=0.1
+):
+    """A meshed box, pressed upright by the given function of its points, which is its Von Mises stress too."""
     nodes, tetrahedra = box_mesh(low, high, size)
+    facets = np.array(boundary(tetrahedra))
+    mesh = SolidMesh(Element.TET4, nodes, tetrahedra, facets, np.zeros(len(facets), dtype=np.int64))
     stress = np.zeros((len(nodes), 6))
     stress[:, 2] = -von_mises(nodes)
-    volume = float(np.prod(np.subtract(high, low)))
+    return meshed_body(code, mesh, stress, shift, material, error)
+
+
+def meshed_body(code, mesh, stress, shift=(0.0, 0.0, 0.0), material=LIMESTONE, error=0.1):
+    """A stone of finite elements of any kind, with the given stress (n, 6) of its nodes."""
+    volume = node_volumes(mesh)
     return BodyResult(
         code=code,
         fidelity=Fidelity.DEFORMABLE,
-        reference=nodes,
-        position=nodes + np.array(shift),
-        faces=boundary(tetrahedra),
-        cells=tetrahedra,
+        reference=mesh.nodes,
+        position=mesh.nodes + np.array(shift),
+        faces=tuple(map(tuple, mesh.facets[:, : mesh.element.facet_corners].tolist())),
+        element=mesh.element,
+        cells=mesh.cells,
         stress=stress,
-        von_mises=von_mises(nodes),
-        volume=volume,
-        mass=volume * LIMESTONE.density,
+        von_mises=equivalent_stress(stress),
+        principal=principal(stress)[0],
+        node_volume=volume,
+        values=stress_values(stress, mesh.nodes + np.array(shift), volume, material, error),
+        volume=float(volume.sum()),
+        mass=float(volume.sum()) * material.density,
         balance=3e-5,
+    )
+
+
+def joints_of(pairs, forces, heights):
+    """One joint per pair of bodies: a level square of 1 m² at a height, its resultant at 0.1 m, 0.2 m, … along x."""
+    count = len(pairs)
+    square = box((0, 0, 0), (1, 1, 1))[:4]
+    normal = np.array(forces, dtype=float).reshape(-1, 3)[:, 2]
+    away = 0.1 * np.arange(1, count + 1)
+    centroid = np.array([[0.5, 0.5, height] for height in heights]).reshape(-1, 3)
+    return JointResult(
+        bodies=np.sort(np.array(pairs, dtype=np.int64).reshape(-1, 2), axis=1),
+        parted=np.zeros(count, dtype=bool),
+        polygon=tuple(square + np.array([0.0, 0.0, height]) for height in heights),
+        frame=np.tile(np.array([[0.0, 0, -1], [1, 0, 0], [0, -1, 0]]), (count, 1, 1)),
+        centroid=centroid,
+        area=np.ones(count),
+        second_moment=np.full((count, 2), 1.0 / 12.0),
+        force=-np.array(forces, dtype=float).reshape(-1, 3),
+        moment=np.column_stack([np.zeros(count), normal * away, np.zeros(count)]),
+        centre_of_pressure=centroid + np.column_stack([away, np.zeros((count, 2))]),
+        eccentricity=np.column_stack([away, np.zeros(count)]),
+        kern=6.0 * away,
+        edge=2.0 * away,
+        pressure_mean=normal,
+        pressure_max=1.5 * normal,
+        opening=1e-4 * np.arange(count),
+        sliding=1e-3 * np.arange(1, count + 1),
+        slipping=np.zeros(count),
+        open=np.zeros(count),
+        friction_use=np.full(count, 0.5),
+    )
+
+
+def contacts_of(pairs, forces):
+    """One contact point per pair of bodies."""
+    count, force = len(pairs), np.array(forces, dtype=float).reshape(-1, 3)
+    return ContactResult(
+        bodies=np.array(pairs, dtype=np.int64).reshape(-1, 2),
+        point=np.zeros((count, 3)),
+        normal=np.tile([0.0, 0.0, 1.0], (count, 1)),
+        force=force,
+        gap=np.zeros(count),
+        area=np.full(count, 0.01),
+        pressure=force[:, 2] / 0.01,
+        slide=np.full(count, 1e-3),
+        status=np.array(["stick"] * count),
+        joint=np.arange(count),
     )
 
 
 def result_of(
-    bodies, outcome=Outcome.EQUILIBRIUM, name="by hand", pairs=((1, 0),), forces=((0.0, 0.0, 1000.0),)
+    bodies,
+    outcome=Outcome.EQUILIBRIUM,
+    name="by hand",
+    pairs=((1, 0),),
+    forces=((0.0, 0.0, 1000.0),),
+    material=LIMESTONE,
 ):
     """A result of ten steps around some bodies, whose first frame is the reference."""
-    blocks = tuple(Block(b.code, box((0, 0, 0), (1, 1, 1)), BOX_FACES, LIMESTONE, b.fidelity) for b in bodies)
-    count = len(pairs)
-    steps = np.arange(1, 11)
+    blocks = tuple(Block(b.code, box((0, 0, 0), (1, 1, 1)), BOX_FACES, material, b.fidelity) for b in bodies)
+    contacts, steps = contacts_of(pairs, forces), np.arange(1, 11)
     return Result(
         scene=Scene(name, blocks),
         outcome=outcome,
         steps=10,
         time=0.1,
         bodies=tuple(bodies),
-        contacts=ContactResult(
-            bodies=np.array(pairs, dtype=np.int64).reshape(-1, 2),
-            point=np.zeros((count, 3)),
-            normal=np.tile([0.0, 0.0, 1.0], (count, 1)),
-            force=np.array(forces, dtype=float).reshape(-1, 3),
-            gap=np.zeros(count),
-            area=np.full(count, 0.01),
-            status=np.array(["stick"] * count),
-        ),
+        contacts=contacts,
+        joints=joints_of(pairs, forces, [bodies[under].position[:, 2].max() for _, under in pairs]),
         errors=Errors(1e-7, 2e-6, 3e-5, 4e-4, float("nan"), 1),
         energies=Energies(5.0, -4.0, 1.0),
         rest_time=0.06,
         reaction=20010.0,
         weight=20000.0,
         frames=(
-            Frame(0.0, tuple(b.reference for b in bodies)),
-            Frame(0.1, tuple(b.position for b in bodies)),
+            frame_of(0.0, bodies, [b.reference for b in bodies], 0.0, contacts_of((), ())),
+            frame_of(0.1, bodies, [b.position for b in bodies], 1.0, contacts),
         ),
         history=History(
             time=steps * 0.01,
@@ -125,9 +202,21 @@ def result_of(
             balance=10.0 ** (-steps / 2),
             natural_map=np.full(10, 1e-7),
             iterations=np.full(10, 100),
-            contacts=np.full(10, count),
+            contacts=np.full(10, len(pairs)),
             penetration=np.full(10, 1e-8),
             settlement=steps * 1e-6,
         ),
         wall_time={"mesh": 0.5, "solve": 1.5},
+    )
+
+
+def frame_of(time, bodies, positions, load, contacts):
+    """An instant at which the bodies bear a part of their stress."""
+    return Frame(
+        time=time,
+        positions=tuple(positions),
+        velocities=tuple(np.full(b.reference.shape, 0.5) for b in bodies),
+        stresses=tuple(None if b.stress is None else load * b.stress for b in bodies),
+        stress_errors=tuple(None if b.values is None else b.values.error for b in bodies),
+        contacts=contacts,
     )

@@ -10,18 +10,30 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
+from mechanics.meshing.elements import Element
+from mechanics.meshing.mesher import mesh_block
 from mechanics.result import Outcome
-from mechanics.scene import Fidelity
+from mechanics.scene import Block, Fidelity
 from moma.errors import MissingLibraryError
 from pipelines import pictures
 from pipelines.drawing import colouring, nice_ceiling
 from pipelines.pictures import draw_pictures, package_of
 from pipelines.report import write_report
-from pipelines.stone_values import node_volumes, stone_results, stress_statistics
+from pipelines.stone_values import stone_results, stress_statistics
 from pipelines.summary import as_json, summarise
 from pipelines.surfaces import load_surface, save_surface, wall_surface
 from pipelines.vtk_output import contact_grid, write_frames
-from tests.pipelines.handmade import deformable_body, result_of, rigid_body
+from pipelines.vtu import CELL_TYPES
+from tests.pipelines.handmade import (
+    BOX_FACES,
+    LIMESTONE,
+    box,
+    contacts_of,
+    deformable_body,
+    meshed_body,
+    result_of,
+    rigid_body,
+)
 
 TOWARDS = np.array([0.0, -1.0, 0.0])
 
@@ -54,7 +66,7 @@ def rigid():
 
 
 def test_the_volume_of_the_nodes_is_the_volume_of_the_stone(mixed):
-    assert node_volumes(mixed.bodies[1]).sum() == pytest.approx(2.0)
+    assert mixed.bodies[1].node_volume.sum() == pytest.approx(2.0)
 
 
 def test_stress_statistics_are_weighted_by_volume(mixed):
@@ -110,7 +122,7 @@ def read_array(node):
     return np.frombuffer(content[8:], kind).reshape(-1, int(node.get("NumberOfComponents", 1))).squeeze()
 
 
-def test_paraview_files_hold_every_stone_and_the_last_frame_its_stress(mixed, tmp_path):
+def test_paraview_files_hold_every_stone_and_each_frame_its_stress(mixed, tmp_path):
     write_frames(mixed, tmp_path)
     datasets = ElementTree.parse(tmp_path / "results.pvd").getroot().findall(".//DataSet")
     assert [float(one.get("timestep")) for one in datasets] == [0.0, 0.1]
@@ -126,21 +138,78 @@ def test_paraview_files_hold_every_stone_and_the_last_frame_its_stress(mixed, tm
     assert list(np.unique(last["types"])) == [10, 42]
     assert np.count_nonzero(last["types"] == 10) == len(elastic.cells)
     assert last["stone"].max() == 2
-    assert np.isnan(first["von_mises"]).all()
+    assert set(first) == set(last)
+    assert first["von_mises"][8:-8] == pytest.approx(0.0)  # not loaded yet
     assert last["von_mises"][8:-8] == pytest.approx(elastic.von_mises)
+    assert last["principal"][8:-8, 2] == pytest.approx(-elastic.von_mises)
+    assert last["mean_pressure"][8:-8] == pytest.approx(elastic.von_mises / 3)
+    assert np.abs(last["principal_direction_3"][8:-8][elastic.von_mises > 0, 2]) == pytest.approx(1.0)
     assert np.isnan(last["von_mises"][:8]).all()
+    assert np.isnan(last["utilisation"]).all()  # no strengths
+    assert last["velocity"] == pytest.approx(0.5)
     assert last["displacement"][-1] == pytest.approx([0.0, 0.003, -0.004])
+    assert np.isnan(last["stress_error"][[0, -1]]).all()
+    assert last["stress_error"][1:-1] == pytest.approx(0.1)
 
 
-def test_vtk_reads_the_files_as_closed_stones(mixed, tmp_path):
+def test_vtk_reads_the_files_as_closed_stones_contacts_and_joints(mixed, tmp_path):
     pyvista = pytest.importorskip("pyvista")
     write_frames(mixed, tmp_path)
     grid = pyvista.read(tmp_path / "results_0001.vtu")
     sizes = grid.compute_cell_sizes()["Volume"]
     for index, body in enumerate(mixed.bodies):
         assert abs(sizes[grid["stone"] == index]).sum() == pytest.approx(body.volume)
-    contacts = pyvista.read(tmp_path / "contacts.vtu")
+    before, contacts = (pyvista.read(tmp_path / f"contacts_000{number}.vtu") for number in (0, 1))
+    assert before.n_points == 0
     assert contacts["force"][1] == pytest.approx([0.0, 600.0, 800.0])
+    assert contacts["pressure"] == pytest.approx([3e5, 8e4])
+    joints = pyvista.read(tmp_path / "joints.vtu")
+    assert joints.compute_cell_sizes()["Area"] == pytest.approx(joints["area"])
+    assert joints["kern"] == pytest.approx([0.6, 1.2])
+    assert joints["in_kern"].tolist() == [1, 0]
+    assert joints.cell_centers().points[:, 2] == pytest.approx([1.0, 2.998])
+
+
+def test_vtk_finds_the_units(mixed, tmp_path):
+    vtk = pytest.importorskip("vtkmodules.all")
+    write_frames(mixed, tmp_path)
+    for name, fields in {
+        "results_0001.vtu": {
+            "stress": "Pa",
+            "velocity": "m/s",
+            "displacement": "m",
+            "principal_direction_1": None,
+        },
+        "contacts_0001.vtu": {"force": "N", "area": "m²", "pressure": "Pa", "gap": "m", "normal": None},
+        "joints.vtu": {"moment": "N m", "opening": "m", "kern": None, "area": "m²"},
+    }.items():
+        reader = vtk.vtkXMLUnstructuredGridReader()
+        reader.SetFileName(str(tmp_path / name))
+        reader.Update()
+        grid = reader.GetOutput()
+        for array, unit in fields.items():
+            found = grid.GetPointData().GetArray(array) or grid.GetCellData().GetArray(array)
+            label = vtk.vtkDataArray.UNITS_LABEL()
+            assert (label.Get(found.GetInformation()) if found.HasInformation() else None) == unit, array
+
+
+@pytest.mark.parametrize("element", Element)
+def test_vtk_opens_every_kind_of_element(element, tmp_path):
+    """The volume by VTK's own shape functions, and the middle of the gradient of a linear field, are exact."""
+    pyvista = pytest.importorskip("pyvista")
+    block = Block("a", box((0, 0, 0), (1, 0.5, 2)), BOX_FACES, LIMESTONE, Fidelity.DEFORMABLE, 0.5, element)
+    mesh = mesh_block(block)
+    stress = np.zeros((len(mesh.nodes), 6))
+    stress[:, 2] = -1e6 * mesh.nodes[:, 2]
+    result = result_of([meshed_body("a", mesh, stress, (0.0, 0.0, 1.0))], pairs=(), forces=())
+    write_frames(result, tmp_path)
+    grid = pyvista.read(tmp_path / "results_0001.vtu")
+    assert set(grid.celltypes) == {CELL_TYPES[element]}
+    assert grid.compute_cell_sizes()["Volume"].sum() == pytest.approx(1.0)
+    gradient = grid.compute_derivative(scalars="von_mises")["gradient"]
+    assert gradient == pytest.approx(np.tile([0.0, 0.0, 1e6], (grid.n_points, 1)), abs=1.0)
+    skin = grid.extract_surface(algorithm="dataset_surface", nonlinear_subdivision=0)
+    assert skin.area == pytest.approx(7.0)
 
 
 def test_the_edges_drawn_are_those_of_the_stones_not_of_the_mesh(mixed):
@@ -270,12 +339,7 @@ def test_the_report_of_a_rigid_collapse_says_so(rigid, tmp_path):
     assert "Most stressed" not in text
 
 
-def test_every_status_of_a_contact_has_its_number(mixed):
+def test_every_status_of_a_contact_has_its_number():
     many = np.array(["open", "stick", "slip", "bonded", "broken"])
-    contacts = replace(
-        result_of(
-            [rigid_body("a", (0, 0, 0), (1, 1, 1))], pairs=((0, 0),) * 5, forces=((0, 0, 0),) * 5
-        ).contacts,
-        status=many,
-    )
-    assert contact_grid(replace(mixed, contacts=contacts)).point_data["status"].tolist() == [0, 1, 2, 3, 4]
+    contacts = replace(contacts_of(((0, 0),) * 5, ((0, 0, 0),) * 5), status=many)
+    assert contact_grid(contacts).point_data["status"].tolist() == [0, 1, 2, 3, 4]

@@ -1,0 +1,69 @@
+"""joints.csv: one line per joint, for spreadsheets."""
+
+import csv
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.result import JointResult, Result
+
+__all__ = ["JOINT_COLUMNS", "write_joints"]
+
+JOINT_COLUMNS: Mapping[str, str] = {
+    "first": "code of one stone",
+    "second": "code of the other",
+    "x": "centroid of the joint [m]",
+    "y": "centroid of the joint [m]",
+    "z": "centroid of the joint [m]",
+    "area": "[m²]",
+    "force_normal": "resultant across the joint, positive in compression [N]",
+    "force_shear": "resultant along the joint [N]",
+    "eccentricity": "of the resultant, from the centroid; empty without compression [m]",
+    "kern": "up to 1: within the kern; empty without compression [-]",
+    "edge": "0: at the centroid, 1: at the edge of the joint; empty without compression [-]",
+    "pressure_mean": "[Pa]",
+    "pressure_max": "largest of a contact point [Pa]",
+    "opening": "largest gap [m]",
+    "sliding": "largest, since the start [m]",
+    "slipping": "part of the contact area that slips [-]",
+    "open": "part of the contact area that bears nothing [-]",
+    "friction_use": "shear over what friction and cohesion can bear; empty where that is nothing [-]",
+    "parted": "1: it touched at the start and is now wide open",
+}
+"""Columns, and what they hold."""
+
+
+def write_joints(path: Path, result: Result) -> None:
+    """Write the table, joints in the order of `Result.joints`."""
+    columns = _columns(result.joints)
+    codes = [body.code for body in result.bodies]
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(JOINT_COLUMNS)
+        for number, (first, second) in enumerate(result.joints.bodies):
+            numbers = (columns[name][number] for name in list(JOINT_COLUMNS)[2:])
+            writer.writerow([codes[first], codes[second], *map(_cell, numbers)])
+
+
+def _columns(joints: JointResult) -> dict[str, NDArray[np.float64]]:
+    n = joints.frame[:, 0]
+    normal = np.einsum("ji,ji->j", joints.force, n)
+    shear = joints.force - normal[:, None] * n
+    values = {
+        name: getattr(joints, name)
+        for name in JOINT_COLUMNS
+        if hasattr(joints, name) and name not in ("eccentricity", "parted")
+    }
+    return values | {
+        **{axis: joints.centroid[:, k] for k, axis in enumerate("xyz")},
+        "force_normal": normal,
+        "force_shear": np.linalg.norm(shear, axis=1),
+        "eccentricity": np.linalg.norm(joints.eccentricity, axis=1),
+        "parted": joints.parted.astype(np.float64),
+    }
+
+
+def _cell(value: float) -> str:
+    return f"{value:.9g}" if np.isfinite(value) else ""
