@@ -109,7 +109,7 @@ def traction_forces(mesh, facets, traction):
     return force
 
 
-def body_forces(mesh, density, order=8):
+def body_forces(mesh, density, order=6):
     """Nodal forces (n, 3) of a force density(x) → (…, 3) [N/m³]."""
     rule = integration(mesh.element, mesh.nodes, mesh.cells, order)
     force = np.zeros((len(mesh.nodes), 3))
@@ -128,7 +128,7 @@ def solve(mesh, material, force, held, values=None):
     return found.reshape(-1, 3)
 
 
-def norm(mesh, field, order=8, matrix=None):
+def norm(mesh, field, order=6, matrix=None):
     """√∫ f·f, or √∫ f·A f, of field(rule) → (nc, nq, m) at the points of a rule."""
     rule = integration(mesh.element, mesh.nodes, mesh.cells, order)
     f = field(rule)

@@ -1,7 +1,7 @@
 """Frequencies of free elastic stones: VALIDATION F07 and F08.
 
-Reference: polynomials x^i y^j z^k up to order 12 as in Visscher, Migliori, Bell & Reinert, J. Acoust. Soc. Am. 90 (1991)
-2154; one of them, Lamé's mode of the cube, is exact: f = c_s/(√2 L).
+Reference: polynomials x^i y^j z^k up to order 12 as in Visscher, Migliori, Bell & Reinert, J. Acoust. Soc. Am. 90
+(1991) 2154; one of them, Lamé's mode of the cube, is exact: f = c_s/(√2 L).
 """
 
 import numpy as np
