@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csc_array, dia_array
+from scipy.sparse import bsr_array, coo_array, csc_array, dia_array
 
 from mechanics.materials import Material
 from mechanics.meshing.elements import Element
@@ -63,7 +63,7 @@ def elastic_operators(mesh: SolidMesh, material: Material, lumped: bool = False)
         diagonal = np.repeat(_gather(mesh, _on_diagonal(consistent.reshape(-1, k, k))), 3)
         mass = csc_array(dia_array((diagonal[None], [0]), shape=(3 * size, 3 * size)))
     else:
-        mass = _in_three_directions(_assembled(mesh.cells, consistent, size))
+        mass = _in_three_directions(_assembled(mesh, consistent.reshape(-1, k, k, 1, 1)))
     return ElasticOperators(mass, _stiffness(mesh, material), nodal_mass)
 
 
@@ -89,9 +89,7 @@ def _stiffness(mesh: SolidMesh, material: Material) -> "csc_array[np.float64]":
                     tensor[m, n, i, j] = material.stiffness[p, q]
     pairs = _gradient_products(rule).reshape(cells, k, 3, k, 3).transpose(0, 1, 3, 2, 4)
     blocks = (pairs.reshape(-1, 9) @ tensor.reshape(9, 9)).reshape(cells, k, k, 3, 3)
-    entries = blocks.transpose(0, 1, 3, 2, 4).reshape(cells, -1)
-    dofs = (3 * mesh.cells[:, :, None] + np.arange(3)).reshape(cells, -1)
-    return _assembled(dofs, entries, 3 * len(mesh.nodes))
+    return _assembled(mesh, 0.5 * (blocks + blocks.transpose(0, 2, 1, 4, 3)))
 
 
 def _gradient_products(rule: Integration) -> Array:
@@ -124,13 +122,18 @@ def _gather(mesh: SolidMesh, values: Array) -> Array:
     return sums
 
 
-def _assembled(dofs: NDArray[np.int64], entries: Array, size: int) -> "csc_array[np.float64]":
-    """Sum the matrices (nc, m²) of cells with the unknowns (nc, m); the result is symmetric to the last bit."""
-    width = dofs.shape[1]
-    rows = np.repeat(dofs, width, axis=1).ravel().astype(np.int32)
-    columns = np.tile(dofs, (1, width)).ravel().astype(np.int32)
-    whole = coo_array((entries.ravel(), (rows, columns)), shape=(size, size)).tocsc()
-    return csc_array(0.5 * (whole + whole.T))
+def _assembled(mesh: SolidMesh, blocks: Array) -> "csc_array[np.float64]":
+    """Sum the blocks (nc, k, k, b, b) of pairs of nodes; symmetric to the last bit, if those of the cells are."""
+    k, size, width = mesh.element.cell_nodes, len(mesh.nodes), blocks.shape[-1]
+    pair = (np.repeat(mesh.cells, k, axis=1) * size + np.tile(mesh.cells, (1, k))).ravel()
+    order = np.argsort(pair, kind="stable")  # so both sums of a symmetric pair have the order of the cells
+    pair = pair[order]
+    first = np.flatnonzero(np.concatenate([[True], pair[1:] != pair[:-1]]))
+    sums = np.add.reduceat(blocks.reshape(-1, width, width)[order], first, axis=0)
+    pointer = np.searchsorted(pair[first], np.arange(size + 1) * size)
+    rows = bsr_array((sums, pair[first] % size, pointer), shape=(size * width, size * width)).tocsr()
+    # rows of a symmetric matrix are its columns
+    return csc_array((rows.data, rows.indices, rows.indptr), shape=rows.shape)
 
 
 def _in_three_directions(scalar: "csc_array[np.float64]") -> "csc_array[np.float64]":
