@@ -52,7 +52,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.deformable_wall", description=__doc__)
     parser.add_argument("--element", choices=[one.value for one in Element], default=Element.HEX8.value)
     parser.add_argument("--steps", type=int, default=60, help="time steps of each run (60)")
-    parser.add_argument("--warm-up", type=int, default=10, help="first steps that are left out of the median (10)")
+    parser.add_argument(
+        "--warm-up", type=int, default=10, help="first steps that are left out of the median (10)"
+    )
     parser.add_argument("--starts", nargs="+", choices=[one.value for one in Start], default=[*Start])
     parser.add_argument("--json", action="store_true", help="print an array of objects, one for each start")
     options = parser.parse_args()
