@@ -11,6 +11,8 @@ __all__ = ["mortar_rows", "overlap_area"]
 _MAX_CUT = 64
 # a node whose share of the overlap is below this part of a neighbour's is joined to it
 _SLIVER = 1e-2
+# covered up to this part a facet is tested by hats, which stay within the overlap; from that part on by dual functions
+_HATS, _DUAL = 0.8, 0.98
 
 
 @njit(cache=True)
@@ -214,8 +216,87 @@ def _take_corners(x, facet, corners, out):
 
 
 @njit(cache=True)
+def _hat_products(kind, corners, mass, out):
+    """∫ψ_i ψ_j from ∫ψ_i N_k: a hat is the sum of the shape functions, each by its value at their node."""
+    for i in range(corners):
+        for j in range(corners):
+            before = j - 1 if j > 0 else corners - 1
+            out[i, j] = mass[i, j]
+            if kind > corners:
+                out[i, j] += 0.5 * (mass[i, corners + j] + mass[i, corners + before])
+            if kind == 9:
+                out[i, j] += 0.25 * mass[i, 8]
+
+
+@njit(cache=True)
+def _solve_small(matrix, right, count):
+    """Gauss elimination of symmetric positive matrices, in place; `right` becomes the solution."""
+    for k in range(count):
+        for i in range(k + 1, count):
+            f = matrix[i, k] / matrix[k, k]
+            for j in range(k, count):
+                matrix[i, j] -= f * matrix[k, j]
+            for j in range(count):
+                right[i, j] -= f * right[k, j]
+    for k in range(count - 1, -1, -1):
+        for j in range(count):
+            for i in range(k + 1, count):
+                right[k, j] -= matrix[k, i] * right[i, j]
+            right[k, j] /= matrix[k, k]
+
+
+@njit(cache=True)
+def _turn_rows(turn, corners, rows):
+    """rows ← turn · rows."""
+    was = rows.copy()
+    for i in range(corners):
+        for k in range(rows.shape[1]):
+            x = 0.0
+            for j in range(corners):
+                x += turn[i, j] * was[j, k]
+            rows[i, k] = x
+
+
+@njit(cache=True)
+def _turn_dual(own, kind, share, moment, mass, cross):
+    """Integrals with the hats of a facet become integrals with functions dual to them, where it is nearly all covered.
+
+    The dual functions φ are combinations of the hats, T ψ with T ∫ψψᵀ = diag ∫ψ. They have the same integrals and the
+    same sum, one; φ_i meets no other node's hat, so that on linear facets a contact is its node alone (Wohlmuth 2000),
+    and pressures do not swing where a contact ends.
+    """
+    corners = corner_count(kind)
+    whole = covered = 0.0
+    for k in range(1, corners - 1):
+        whole += abs(_triangle(own, k))
+    for i in range(corners):
+        covered += share[i]
+    dual = min(max((covered / whole - _HATS) / (_DUAL - _HATS), 0.0), 1.0)
+    if dual == 0.0:
+        return
+    products, turn = np.empty((corners, corners)), np.zeros((corners, corners))
+    _hat_products(kind, corners, mass, products)
+    for i in range(corners):
+        turn[i, i] = share[i]
+    # its rows are the columns of T
+    _solve_small(products, turn, corners)
+    turn = dual * turn.T.copy()
+    for i in range(corners):
+        turn[i, i] += 1.0 - dual
+    _turn_rows(turn, corners, mass)
+    _turn_rows(turn, corners, moment)
+    for e in range(cross.shape[0]):
+        _turn_rows(turn, corners, cross[e])
+    if kind == corners and dual == 1.0:
+        # what is zero is so without rounding, and takes no place
+        for i in range(corners):
+            for k in range(corners):
+                mass[i, k] = share[i] if i == k else 0.0
+
+
+@njit(cache=True)
 def _overlap_integrals(x_c, facet_c, kind_c, x_a, facet_a, kind_a, outlines, outline_size, share, moment):
-    """Integrals over the overlap of two faces, by facets of the candidate.
+    """Integrals over the overlap of two faces, by facets of the candidate, with hats or their dual functions as ψ.
 
     Parameters
     ----------
@@ -238,8 +319,9 @@ def _overlap_integrals(x_c, facet_c, kind_c, x_a, facet_a, kind_a, outlines, out
     else:
         near_ptr, near = np.arange(most + 1), np.zeros(most, dtype=np.int64)
     used, pointer = np.empty(most, dtype=np.int64), np.zeros(most + 1, dtype=np.int64)
-    mass = np.zeros(most * corners * kind_c)
-    far, cross = np.empty(near_ptr[-1], dtype=np.int64), np.zeros(near_ptr[-1] * corners * kind_a)
+    stride_c, stride_a = corners * kind_c, corners * kind_a
+    mass = np.zeros(most * stride_c)
+    far, cross = np.empty(near_ptr[-1], dtype=np.int64), np.zeros(near_ptr[-1] * stride_a)
     polygon, kept = np.empty((_MAX_CUT, 2)), np.empty((_MAX_CUT, 2))
     own, other = np.empty((4, 2)), np.empty((4, 2))
     n_psi, n_own, n_far = np.empty(4), np.empty(9), np.empty(9)
@@ -247,8 +329,8 @@ def _overlap_integrals(x_c, facet_c, kind_c, x_a, facet_a, kind_a, outlines, out
     count, pairs = 0, 0
     for t in range(most):
         _take_corners(x_c, facet_c[t], corners, own)
-        block = mass[count * corners * kind_c : (count + 1) * corners * kind_c].reshape(corners, kind_c)
-        met = False
+        block = mass[count * stride_c : (count + 1) * stride_c].reshape(corners, kind_c)
+        part[:], middle[:] = 0.0, 0.0
         for e in range(near_ptr[t], near_ptr[t + 1]):
             polygon[:corners] = own[:corners]
             k = corners
@@ -262,22 +344,22 @@ def _overlap_integrals(x_c, facet_c, kind_c, x_a, facet_a, kind_a, outlines, out
                 begin += o
             if k < 3:
                 continue
-            met = True
-            part[:] = 0.0
-            middle[:] = 0.0
-            pair = cross[pairs * corners * kind_a : (pairs + 1) * corners * kind_a].reshape(corners, kind_a)
+            pair = cross[pairs * stride_a : (pairs + 1) * stride_a].reshape(corners, kind_a)
             _integrate(polygon, k, own, kind_c, other, kind_a, n_psi, n_own, n_far, part, middle, block, pair)
-            for i in range(corners):
-                node = facet_c[t, i]
-                share[node] += part[i]
-                for d in range(3):
-                    moment[node, d] += middle[i, d]
             far[pairs] = near[e]
             pairs += 1
-        if met:
-            used[count] = t
-            count += 1
-            pointer[count] = pairs
+        if pairs == pointer[count]:
+            continue
+        pair = cross[pointer[count] * stride_a : pairs * stride_a].reshape(-1, corners, kind_a)
+        _turn_dual(own, kind_c, part, middle, block, pair)
+        for i in range(corners):
+            node = facet_c[t, i]
+            share[node] += part[i]
+            for d in range(3):
+                moment[node, d] += middle[i, d]
+        used[count] = t
+        count += 1
+        pointer[count] = pairs
     return used[:count], mass, pointer[: count + 1], far[:pairs], cross
 
 
@@ -328,6 +410,8 @@ def _incidence(facet, used, corners, key, count):
 def _scatter(nodes, values, name, scale, slot, column, value, base, end):
     """Add values to a sparse row that begins at `base` and ends at `end`; its new end."""
     for k in range(nodes.shape[0]):
+        if values[k] == 0.0:
+            continue
         node = nodes[k]
         at = slot[node]
         if at < base:
@@ -347,8 +431,9 @@ def mortar_rows(
 ):  # fmt: skip  # pragma: no cover - compiled
     """Weighted points of flat interfaces: one per corner node of the candidate's facets.
 
-    ψ_α is linear or bilinear on the facets of the candidate, one at its node α and zero at the other corners; where
-    a node has next to no share of the overlap, its ψ is added to a neighbour's. Quadrature has the degree of ψ times
+    ψ_α is linear or bilinear on the facets of the candidate: the hat, one at its node α and zero at the other corners,
+    or where the overlap covers a facet the function dual to it. Where a node has next to no share of the overlap,
+    its ψ is added to a neighbour's. Quadrature has the degree of ψ times
     a shape function, 2 to 6, so it is exact on triangles and parallelograms; on other quadrilaterals both sides
     still see the same points, and so the same constants and places.
 

@@ -17,7 +17,8 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-# of the radius: where a ball would sink deeper than this before the nodes see it, the mesh is too coarse
+# of the radius: where a ball would sink deeper than this before the nodes see it, or rises by more than this over what
+# a node stands for, the mesh is too coarse
 _UNSEEN = 1e-3
 # cosine of the widest angle between the normals of ball and face
 _WIDEST = 0.1
@@ -25,7 +26,7 @@ _WIDEST = 0.1
 
 @dataclass(frozen=True)
 class FaceCells:
-    """What each corner node of the meshed faces stands for: its hat ψ over the whole face.
+    """What each corner node of the meshed faces stands for: its test function ψ over the whole face.
 
     Attributes
     ----------
@@ -46,7 +47,7 @@ class FaceCells:
 
 
 def face_cells(surfaces: Surfaces, nodes: int) -> FaceCells:
-    """The hats of all meshed faces, as the mortar method integrates them over each face as a whole."""
+    """The test functions of all meshed faces, as the mortar method integrates them over each face as a whole."""
     meshes = surfaces.meshes
     face = np.flatnonzero(meshes.of_face >= 0)
     origin = surfaces.vertex[surfaces.corner[surfaces.cptr[face]]]
@@ -101,7 +102,11 @@ def ball_contacts(
         own = surfaces.body[other]
         at = (centre - placed.centre[own]) @ placed.rotation[own]
         before, _ = _gaps(cells.middle[rows], cells.spread[rows], at, radius)
-        seen[p] = len(before) > 0 and before.min() <= gap[p] + _UNSEEN * radius
+        if len(before) == 0:
+            continue
+        nearest = before.argmin()
+        curved = abs(cells.spread[rows][nearest]) / (2.0 * radius)
+        seen[p] = max(before[nearest] - gap[p], curved) <= _UNSEEN * radius
         if seen[p]:
             found.append(_pair(surfaces, placed, state, cells, rows, (ball, other), key[p], limit[p]))
     return found, seen

@@ -22,9 +22,9 @@ class Contacts:
 
     A side is a material point of its body: for a rigid body a fixed place in its axes (`arm`), for a deformable
     one a weighted mean of nodes (`weights`). Where a deformable face meets a parallel face, the weights are those
-    of the mortar method: contact α stands for the linear hat ψ_α of one corner node of the candidate's facets, both
-    sides are means over the overlap weighted by ψ_α, and a uniform pressure is transmitted exactly (Puso & Laursen
-    2004; for quadratic elements Puso, Laursen & Solberg 2008).
+    of the mortar method: contact α stands for a linear test function ψ_α of one corner node of the candidate's facets,
+    both sides are means over the overlap weighted by ψ_α, and a uniform pressure is transmitted exactly (Puso &
+    Laursen 2004; for quadratic elements Puso, Laursen & Solberg 2008; dual functions: Wohlmuth 2000).
 
     Attributes
     ----------

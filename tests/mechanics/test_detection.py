@@ -36,7 +36,9 @@ def assert_weights(model, contacts):
     """Each elastic side is a mean of nodes of its own body, each rigid side has none."""
     elastic = model.elastic[contacts.bodies].ravel()
     np.testing.assert_allclose(contacts.weights.sum(axis=1), elastic.astype(float), atol=1e-12)
-    assert contacts.weights.data.min(initial=0.0) > -1e-12
+    # dual test functions weigh some nodes of antagonists a little less than not at all
+    assert contacts.weights[0::2].data.min(initial=0.0) > -1e-12
+    assert contacts.weights.data.min(initial=0.0) > -0.2
     for row, body in enumerate(contacts.bodies.ravel()):
         nodes = contacts.weights.indices[contacts.weights.indptr[row] : contacts.weights.indptr[row + 1]]
         owned = model.nodes_of(int(body))
