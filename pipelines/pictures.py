@@ -12,12 +12,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.result import Outcome, Result
+from mechanics.materials import Material
+from mechanics.result import BodyResult, Outcome, Result
+from mechanics.stress_values import volume_quantile
 from moma.errors import MissingLibraryError
-from pipelines.stone_values import stress_statistics
-from pipelines.surfaces import save_surface, wall_surface
+from pipelines.surfaces import FIELDS, save_surface, stone_fields, wall_surface
 
-__all__ = ["draw_pictures", "package_of"]
+__all__ = ["draw_pictures", "missing", "package_of"]
 
 _TIMEOUT = 300.0  # seconds; software rendering of 10⁵ triangles takes a few
 _PACKAGES = {
@@ -33,6 +34,19 @@ _PACKAGES = {
     "libXt": "libxt6",
     "libSM": "libsm6",
     "libICE": "libice6",
+}
+_TITLES = {
+    "von_mises": "Von Mises stress",
+    "displacement": "displacement",
+    "principal_tension": "tension",
+    "principal_compression": "compression",
+    "utilisation": "stress over strength",
+    "error": "error of the stress",
+    "pressure": "pressure in the joints",
+    "resultants": "resultants of the joints",
+}
+_NOTES = {
+    "resultants": "strokes: as long as the force is large; blue: within the kern, red: outside",
 }
 _ENDINGS = {
     Outcome.EQUILIBRIUM: "at equilibrium",
@@ -50,16 +64,15 @@ def package_of(message: str) -> str | None:
 def draw_pictures(
     result: Result, folder: Path, names: Sequence[str], towards: NDArray[np.float64]
 ) -> tuple[str, ...]:
-    """Draw the named pictures (von_mises, displacement) into a folder, seen from the side `towards`.
+    """Draw the named pictures into a folder, seen from the side `towards`; the file names.
 
-    Returns the file names. `von_mises` is left out when no stone deforms.
+    Pictures for which `missing` has a reason are left out.
 
     Raises
     ------
     MissingLibraryError : VTK cannot be loaded or cannot draw on this machine
     """
-    statistics = stress_statistics(result)
-    wanted = [name for name in names if name != "von_mises" or statistics is not None]
+    wanted = [name for name in names if missing(result, name) is None]
     if not wanted:
         return ()
     up = -np.array(result.scene.gravity)
@@ -67,8 +80,9 @@ def draw_pictures(
         {
             "quantity": name,
             "path": str((folder / f"{name}.png").absolute()),
-            "top": statistics.p99 if name == "von_mises" and statistics is not None else None,
-            "title": _title(result, name),
+            "top": _top(result, name),
+            "title": f"{result.scene.name}: {_TITLES[name]}, {_ENDINGS[result.outcome]} after {result.time:.3g} s",
+            "note": _NOTES.get(name, ""),
             "towards": towards.tolist(),
             "up": up.tolist() if up.any() else [0.0, 0.0, 1.0],
         }
@@ -83,9 +97,34 @@ def draw_pictures(
     return tuple(f"{name}.png" for name in wanted)
 
 
-def _title(result: Result, quantity: str) -> str:
-    what = {"von_mises": "Von Mises stress", "displacement": "displacement"}[quantity]
-    return f"{result.scene.name}: {what}, {_ENDINGS[result.outcome]} after {result.time:.3g} s"
+def missing(result: Result, name: str) -> str | None:
+    """Why a picture would show nothing of this result; None: it shows something."""
+    stressed = [body.values for body in result.bodies if body.values is not None]
+    if name in ("pressure", "resultants"):
+        return None if result.joints.pressed.any() else "no joint is pressed"
+    if name != "displacement" and not stressed:
+        return "no stone deforms"
+    if name == "utilisation" and all(one.utilisation is None for one in stressed):
+        return "no material of a deformable stone has a strength"
+    return None
+
+
+def _top(result: Result, name: str) -> float | None:
+    """End of the scale: what 1 % of the volume exceeds; None: the largest value."""
+    if name not in ("von_mises", "principal_tension", "principal_compression", "utilisation"):
+        return None
+    known = [
+        (_fields_of(body, block.material, name), body.node_volume)
+        for body, block in zip(result.bodies, result.scene.blocks, strict=True)
+        if body.node_volume is not None
+    ]
+    values, volumes = (np.concatenate(column) for column in zip(*known, strict=True))
+    finite = np.isfinite(values)
+    return volume_quantile(values[finite], volumes[finite], 0.99) or None
+
+
+def _fields_of(body: BodyResult, material: Material, name: str) -> NDArray[np.float64]:
+    return stone_fields(body, material)[:, FIELDS.index(name)]
 
 
 def _draw_apart(job_file: Path) -> None:

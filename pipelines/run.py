@@ -17,7 +17,7 @@ from moma.errors import DatabaseError, MissingLibraryError
 from pipelines.assemble import Assembly, assemble
 from pipelines.folder import check_replaceable, replacing
 from pipelines.joint_table import write_joints
-from pipelines.pictures import draw_pictures
+from pipelines.pictures import draw_pictures, missing
 from pipelines.progress import Listener, Progress, silent
 from pipelines.report import write_report
 from pipelines.scenefile import SceneFile, read_scene
@@ -26,6 +26,8 @@ from pipelines.summary import as_json, summarise
 from pipelines.vtk_output import write_frames
 
 __all__ = ["RunReport", "run_scene", "write_results"]
+
+_USUAL = ("von_mises", "displacement")  # pictures where a scene asks for none in particular
 
 
 @dataclass(frozen=True)
@@ -117,8 +119,10 @@ def write_results(
         write_joints(folder / "joints.csv", result)
     with _timed(seconds, "pictures"):
         progress(Progress("write", 1, 3, "pictures"))
+        pictures, omitted = _pictures(scene, result)
+        warnings += omitted
         try:
-            draw_pictures(result, folder, scene.output.pictures, assembly.towards)
+            draw_pictures(result, folder, pictures, assembly.towards)
         except MissingLibraryError as error:
             warnings.append(f"no pictures: {error}")
     progress(Progress("write", 2, 3, "report.html"))
@@ -130,6 +134,15 @@ def write_results(
     (folder / "summary.json").write_text(as_json(summary), encoding="utf-8")
     progress(Progress("write", 3, 3))
     return summary, tuple(warnings)
+
+
+def _pictures(scene: SceneFile, result: Result) -> tuple[tuple[str, ...], list[str]]:
+    """The pictures to draw, and what to say of those that were asked for but would show nothing."""
+    asked = _USUAL if scene.output.pictures is None else scene.output.pictures
+    reasons = {name: missing(result, name) for name in asked}
+    omitted = [f"no picture {name}: {reason}" for name, reason in reasons.items() if reason is not None]
+    drawn = tuple(name for name, reason in reasons.items() if reason is None)
+    return drawn, [] if scene.output.pictures is None else omitted
 
 
 @contextmanager

@@ -20,7 +20,16 @@ from survey.joint_lines import JointSettings
 
 __all__ = ["MATERIAL_KEYS", "MESH_KEYS", "PICTURES", "TABLES"]
 
-PICTURES = ("von_mises", "displacement")
+PICTURES = (
+    "von_mises",
+    "displacement",
+    "principal_tension",
+    "principal_compression",
+    "utilisation",
+    "error",
+    "pressure",
+    "resultants",
+)
 
 MATERIAL_KEYS = (
     Key("density", Kind.NUMBER, "Density ρ.", "kg/m³", above=0),
@@ -308,7 +317,12 @@ _OUTPUT = (
         0,
         at_least=0,
     ),
-    Key("pictures", Kind.TEXTS, "Pictures to draw: von_mises, displacement.", "", PICTURES),
+    Key(
+        "pictures",
+        Kind.TEXTS,
+        "Pictures to draw, see below; else displacement, and von_mises where a stone deforms.",
+        default=None,
+    ),
 )
 
 TABLES: Mapping[str, tuple[Key, ...]] = {

@@ -83,10 +83,10 @@ class MeshSettings:
 
 @dataclass(frozen=True)
 class Output:
-    """What to keep: a frame every so many steps (0: first and last), and the names of the pictures."""
+    """What to keep: a frame every so many steps (0: first and last), and the names of the pictures; None: the usual."""
 
     frame_every: int
-    pictures: tuple[str, ...]
+    pictures: tuple[str, ...] | None
 
 
 @dataclass(frozen=True)
@@ -259,8 +259,8 @@ def _time(document: Document, values: dict[str, Any]) -> TimeSettings:
     return TimeSettings(**values | {"start": Start(values["start"])})
 
 
-def _output(document: Document, frame_every: int, pictures: tuple[str, ...]) -> Output:
-    for name in pictures:
+def _output(document: Document, frame_every: int, pictures: tuple[str, ...] | None) -> Output:
+    for name in pictures or ():
         if name not in PICTURES:
             document.fail(f"unknown picture {name!r}", "output", "pictures", remedy=nearest(name, PICTURES))
     return Output(frame_every, pictures)

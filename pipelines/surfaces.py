@@ -1,4 +1,4 @@
-"""The visible surface of a result, triangles to colour and stone edges to draw, in one .npz file."""
+"""What pictures show of a result: faces, edges and fields of the stones, joints and resultants; in one .npz file."""
 
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -6,20 +6,26 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.result import BodyResult, Result
+from mechanics.materials import Material
+from mechanics.result import BodyResult, JointResult, Result
 from mechanics.scene import Fidelity
+from mechanics.stress_values import utilisation
 
-__all__ = ["WallSurface", "load_surface", "save_surface", "wall_surface"]
+__all__ = ["FIELDS", "WallSurface", "load_surface", "save_surface", "stone_fields", "wall_surface"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+FIELDS = ("von_mises", "displacement", "principal_tension", "principal_compression", "utilisation", "error")
+"""Columns of `WallSurface.fields`."""
 
 _EDGE_ANGLE = np.deg2rad(20.0)  # faces that meet at less than this are one face of the stone
 
 
 @dataclass(frozen=True)
 class WallSurface:
-    """Outer faces of all stones at the end of a run, fanned into triangles.
+    """Outer faces of all stones at the end of a run, fanned into triangles, and what the joints carry.
 
     Attributes
     ----------
@@ -28,17 +34,33 @@ class WallSurface:
     deformable : (nt,) whether the triangle belongs to a deformable stone
     fixed : (nt,) whether it belongs to a fixed one
     edges : (ne, 2) edges of the stones
-    von_mises : (n,) [Pa]; NaN where no stress was computed
-    displacement : (n,) length of the displacement [m]
+    fields : (n, len(FIELDS)) Von Mises stress [Pa], length of the displacement [m], σ1 and -σ3 where they are positive
+        [Pa], utilisation and estimated error of the stress [-]; NaN where they are not known
+    joint_points : (m, 3) corners of the pressed joints [m]
+    joint_triangles : (k, 3) of these joints
+    joint_pressure : (k,) mean pressure of the joint of each triangle [Pa]
+    resultant_points : (r, 3) where the resultants meet the pressed joints [m]
+    resultants : (r, 3) on one of the two stones [N]
+    in_kern : (r,) whether they are within the kern
     """
 
     points: Array
     triangles: Ints
-    deformable: NDArray[np.bool_]
-    fixed: NDArray[np.bool_]
+    deformable: Flags
+    fixed: Flags
     edges: Ints
-    von_mises: Array
-    displacement: Array
+    fields: Array
+    joint_points: Array
+    joint_triangles: Ints
+    joint_pressure: Array
+    resultant_points: Array
+    resultants: Array
+    in_kern: Flags
+
+    def field(self, name: str) -> Array:
+        """(n,) one of FIELDS."""
+        column: Array = self.fields[:, FIELDS.index(name)]
+        return column
 
 
 def wall_surface(result: Result) -> WallSurface:
@@ -47,6 +69,8 @@ def wall_surface(result: Result) -> WallSurface:
     offsets = np.concatenate([[0], np.cumsum(sizes)[:-1]])
     triangles = [_fans(body.faces) for body in result.bodies]
     counts = [len(one) for one in triangles]
+    pressed = np.flatnonzero(result.joints.pressed)
+    corners, of_joints, pressure = _joints(result.joints, pressed)
     return WallSurface(
         points=np.concatenate([body.position for body in result.bodies]),
         triangles=np.concatenate([one + offset for one, offset in zip(triangles, offsets, strict=True)]),
@@ -58,13 +82,45 @@ def wall_surface(result: Result) -> WallSurface:
                 for body, one, offset in zip(result.bodies, triangles, offsets, strict=True)
             ]
         ),
-        von_mises=np.concatenate(
+        fields=np.concatenate(
             [
-                np.full(size, np.nan) if body.von_mises is None else body.von_mises
-                for body, size in zip(result.bodies, sizes, strict=True)
+                stone_fields(body, block.material)
+                for body, block in zip(result.bodies, result.scene.blocks, strict=True)
             ]
         ),
-        displacement=np.concatenate([np.linalg.norm(body.displacement, axis=1) for body in result.bodies]),
+        joint_points=corners,
+        joint_triangles=of_joints,
+        joint_pressure=pressure,
+        resultant_points=result.joints.centre_of_pressure[pressed],
+        resultants=result.joints.force[pressed],
+        in_kern=result.joints.in_kern[pressed],
+    )
+
+
+def stone_fields(body: BodyResult, material: Material) -> Array:
+    """FIELDS of the points of one stone (n, len(FIELDS)), as in `WallSurface`."""
+    fields_ = np.full((len(body.reference), len(FIELDS)), np.nan)
+    fields_[:, 1] = np.linalg.norm(body.displacement, axis=1)
+    if body.von_mises is not None and body.principal is not None and body.values is not None:
+        fields_[:, 0] = body.von_mises
+        fields_[:, 2] = np.maximum(body.principal[:, 0], 0.0)
+        fields_[:, 3] = np.maximum(-body.principal[:, 2], 0.0)
+        fields_[:, 4] = utilisation(body.principal, material)
+        fields_[:, 5] = body.values.error
+    return fields_
+
+
+def _joints(joints: JointResult, chosen: Ints) -> tuple[Array, Ints, Array]:
+    """Corners, triangles and pressures of some joints."""
+    polygons = [joints.polygon[number] for number in chosen]
+    starts = np.cumsum([0, *map(len, polygons)])
+    fans = [
+        _fans((tuple(range(len(one))),)) + start for one, start in zip(polygons, starts[:-1], strict=True)
+    ]
+    return (
+        np.concatenate([*polygons, np.zeros((0, 3))]),
+        np.concatenate([*fans, np.zeros((0, 3), dtype=np.int64)]),
+        np.repeat(joints.pressure_mean[chosen], [len(one) for one in fans]),
     )
 
 

@@ -17,8 +17,9 @@ from mechanics.scene import Block, Fidelity
 from moma.errors import MissingLibraryError
 from pipelines import pictures
 from pipelines.drawing import colouring, nice_ceiling
-from pipelines.pictures import draw_pictures, package_of
+from pipelines.pictures import draw_pictures, missing, package_of
 from pipelines.report import write_report
+from pipelines.scene_keys import PICTURES
 from pipelines.stone_values import stone_results, stress_statistics
 from pipelines.summary import as_json, summarise
 from pipelines.surfaces import load_surface, save_surface, wall_surface
@@ -227,7 +228,8 @@ def test_a_surface_survives_its_file(mixed, tmp_path):
     surface = wall_surface(mixed)
     save_surface(tmp_path / "s.npz", surface)
     again = load_surface(tmp_path / "s.npz")
-    assert np.array_equal(again.von_mises, surface.von_mises, equal_nan=True)
+    assert np.array_equal(again.field("von_mises"), surface.field("von_mises"), equal_nan=True)
+    assert np.array_equal(again.resultants, surface.resultants)
     assert np.array_equal(again.edges, surface.edges)
 
 
@@ -252,21 +254,89 @@ def test_colours_are_in_the_unit_that_the_scale_names(mixed):
     assert (moved.top, moved.saturated) == (pytest.approx(5.0), False)
 
 
-def test_pictures_show_the_wall_in_colour_on_white(mixed, tmp_path):
+@pytest.fixture(scope="module")
+def strong():
+    """As `mixed`, of a material with strengths."""
+    material = replace(LIMESTONE, tensile_strength=1e6, compressive_strength=4e6)
+    return result_of(
+        [
+            rigid_body("base", (0, 0, 0), (1, 1, 1), Fidelity.FIXED),
+            deformable_body("D1", (0, 0, 1), (1, 1, 3), height, size=0.5, material=material),
+            rigid_body("top", (0, 0, 3), (1, 1, 4)),
+        ],
+        pairs=((1, 0), (2, 1)),
+        forces=((0.0, 0.0, 3000.0), (0.0, 600.0, 800.0)),
+        material=material,
+    )
+
+
+def test_the_surface_shows_tension_compression_and_what_joints_carry(strong):
+    surface = wall_surface(strong)
+    elastic = slice(8, -8)
+    assert np.nanmax(surface.field("principal_compression")) == pytest.approx(2e6)
+    assert surface.field("principal_tension")[elastic] == pytest.approx(0.0, abs=1e-6)
+    assert np.nanmax(surface.field("utilisation")) == pytest.approx(0.5)
+    assert surface.field("error")[elastic] == pytest.approx(0.1)
+    assert surface.joint_pressure == pytest.approx([3000.0, 3000.0, 800.0, 800.0])  # two triangles each
+    assert surface.joint_points[surface.joint_triangles][:, :, 2].mean(axis=1) == pytest.approx([1, 1, 3, 3])
+    assert surface.in_kern.tolist() == [True, False]
+    assert surface.resultant_points[1] == pytest.approx([0.7, 0.5, 3.0])
+
+
+def test_pictures_show_the_wall_in_colour_on_white(strong, tmp_path):
     from PIL import Image
 
-    names = draw_pictures(mixed, tmp_path, ("von_mises", "displacement"), TOWARDS)
-    assert names == ("von_mises.png", "displacement.png")
+    names = draw_pictures(strong, tmp_path, PICTURES, TOWARDS)
+    assert names == tuple(f"{name}.png" for name in PICTURES)
     for name in names:
         pixels = np.asarray(Image.open(tmp_path / name).convert("RGB")).astype(int)
         assert (pixels[[0, -1], :, :][:, [0, -1]] == 255).all()  # corners: background
         spread = np.ptp(pixels, axis=2)
-        assert (spread > 60).mean() > 0.02  # coloured
-        assert ((spread < 12) & (pixels.mean(axis=2) < 220)).mean() > 0.02  # grey stones
+        coloured, grey = (spread > 60).mean(), ((spread < 12) & (pixels.mean(axis=2) < 220)).mean()
+        if name in ("resultants.png", "principal_tension.png"):
+            continue  # two thin strokes; no tension
+        assert coloured > 0.005, name
+        assert grey > 0.01, name
+
+
+def test_the_resultants_are_blue_within_the_kern_and_red_outside(strong, tmp_path):
+    from PIL import Image
+
+    draw_pictures(strong, tmp_path, ("resultants",), TOWARDS)
+    pixels = np.asarray(Image.open(tmp_path / "resultants.png").convert("RGB")).astype(int)
+    red, green, blue = np.moveaxis(pixels, 2, 0)
+    rows = {
+        "blue": np.flatnonzero(((blue - red) > 80).any(axis=1)),
+        "red": np.flatnonzero(((red - green) > 80).any(axis=1)),
+    }
+    assert len(rows["blue"]) > len(rows["red"]) > 0  # the larger force has the longer stroke
+    assert rows["red"].max() < rows["blue"].min()  # the upper joint is out of its kern
+
+
+@pytest.mark.parametrize(
+    ("which", "name", "reason"),
+    [
+        ("rigid", "von_mises", "no stone deforms"),
+        ("rigid", "error", "no stone deforms"),
+        ("mixed", "utilisation", "no material of a deformable stone has a strength"),
+        ("mixed", "von_mises", None),
+        ("mixed", "resultants", None),
+        ("rigid", "displacement", None),
+        ("strong", "utilisation", None),
+    ],
+)
+def test_a_picture_that_would_show_nothing_has_a_reason(request, which, name, reason):
+    assert missing(request.getfixturevalue(which), name) == reason
+
+
+def test_without_pressed_joints_there_is_no_picture_of_them():
+    alone = result_of([rigid_body("a", (0, 0, 0), (1, 1, 1))], pairs=(), forces=())
+    assert missing(alone, "pressure") == missing(alone, "resultants") == "no joint is pressed"
+    assert wall_surface(alone).joint_triangles.shape == (0, 3)
 
 
 def test_without_deformable_stones_no_stress_is_drawn(rigid, tmp_path):
-    assert draw_pictures(rigid, tmp_path, ("von_mises",), TOWARDS) == ()
+    assert draw_pictures(rigid, tmp_path, ("von_mises", "utilisation"), TOWARDS) == ()
 
 
 @pytest.mark.parametrize(
