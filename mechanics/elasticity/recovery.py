@@ -1,5 +1,7 @@
 """Stress at the nodes from that at the sampling points (superconvergent patch recovery)."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
@@ -14,7 +16,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 # directions, and quadratic terms, that a patch sees with less than this part of the largest variance are left out
-_UNSEEN = {1: 1e-8, 2: 0.03}
+_UNSEEN = 0.03
 # a polynomial whose value is a sum of so much more than the sampled values is not trusted
 _AMPLIFIED = 6.0
 # weights (_FLAT + d²/d̄²)^-power fall with the distance d from the patch's corner, d̄² its mean square
@@ -32,38 +34,44 @@ def recovery(mesh: SolidMesh) -> "csr_array[np.float64]":
     left out, the quadratic ones first: constants are always exact. A middle node has the mean of the values that the
     polynomials of its corners give there.
     """
-    corner, touches, owner, target = _patches(mesh)
+    patches = _patches(mesh)
     rule = integration(mesh.element, mesh.nodes, mesh.cells, SAMPLE_ORDER[mesh.element])
-    samples, points = rule.point.shape[1], rule.point.reshape(-1, 3)
-    outside = np.isin(corner, mesh.facets)
-    wider = (touches @ touches.T) @ touches
-    rows, columns, weights = [], [], []
-    for patches, cells in ((np.flatnonzero(~outside), touches), (np.flatnonzero(outside), wider)):
+    spread = _spread(mesh)
+    outside = np.isin(patches.corner, mesh.facets)
+    wider = (patches.cells @ patches.cells.T) @ patches.cells
+    wider.data[:] = 1.0
+    parts = []
+    for chosen, cells in ((np.flatnonzero(~outside), patches.cells), (np.flatnonzero(outside), wider)):
         # those of about the same size together
-        patches = patches[np.argsort(np.diff(cells.indptr)[patches], kind="stable")]
-        for start in range(0, len(patches), _AT_ONCE):
-            part = patches[start : start + _AT_ONCE]
-            number, held = _rows(cells, part)
-            number = (samples * number[:, :, None] + np.arange(samples)).reshape(len(part), -1)
-            held = np.repeat(held, samples, axis=1)
-            place, wanted = _rows(owner, part)
-            node = target[place]
-            found = _fit(points[number], held, mesh.nodes[corner[part]], mesh.nodes[node], mesh.element.order)
-            kept = wanted[:, :, None] & held[:, None, :]
-            rows.append(np.broadcast_to(node[:, :, None], kept.shape)[kept])
-            columns.append(np.broadcast_to(number[:, None, :], kept.shape)[kept])
-            weights.append(found[kept])
-    whole = coo_array(
-        (np.concatenate(weights), (np.concatenate(rows), np.concatenate(columns))),
-        shape=(len(mesh.nodes), len(points)),
-    ).tocsr()
-    count = np.bincount(target, minlength=len(mesh.nodes))
+        chosen = chosen[np.argsort(np.diff(cells.indptr)[chosen], kind="stable")]
+        for start in range(0, len(chosen), _AT_ONCE):
+            parts.append(_weights(mesh, rule.point, spread, patches, cells, chosen[start : start + _AT_ONCE]))
+    row, column, weight = (np.concatenate(one) for one in zip(*parts, strict=True))
+    whole = coo_array((weight, (row, column)), shape=(len(mesh.nodes), rule.volume.size)).tocsr()
+    count = np.bincount(patches.target, minlength=len(mesh.nodes))
     whole.data /= np.repeat(count, np.diff(whole.indptr))
     return csr_array(whole)
 
 
-def _patches(mesh: SolidMesh) -> tuple[Ints, "csr_array[np.float64]", "csr_array[np.float64]", Ints]:
-    """Corners (np,), cells that touch each, nodes that each gives a value to (rows of places in `target`), `target`."""
+@dataclass(frozen=True)
+class _Patches:
+    """Patches around the corners.
+
+    Attributes
+    ----------
+    corner : (np,) the node that each belongs to
+    cells : a row per patch, a column per cell that touches the corner
+    target : (nt,) nodes that get a value from a patch
+    targets : a row per patch, a column per one of these
+    """
+
+    corner: Ints
+    cells: "csr_array[np.float64]"
+    target: Ints
+    targets: "csr_array[np.float64]"
+
+
+def _patches(mesh: SolidMesh) -> _Patches:
     corners, cells = mesh.element.corners, len(mesh.cells)
     distinct, number = np.unique(mesh.cells[:, :corners], return_inverse=True)
     number = number.reshape(cells, corners)
@@ -76,10 +84,44 @@ def _patches(mesh: SolidMesh) -> tuple[Ints, "csr_array[np.float64]", "csr_array
     pairs = np.unique(number[:, first].ravel() * len(mesh.nodes) + mesh.cells[:, second].ravel())
     counts = np.bincount(pairs // len(mesh.nodes), minlength=len(distinct))
     pointer = np.concatenate([[0], np.cumsum(counts)])
-    owner = csr_array(
+    targets = csr_array(
         (np.ones(len(pairs)), np.arange(len(pairs)), pointer), shape=(len(distinct), len(pairs))
     )
-    return distinct, touches, owner, pairs % len(mesh.nodes)
+    return _Patches(distinct, touches, pairs % len(mesh.nodes), targets)
+
+
+def _weights(
+    mesh: SolidMesh,
+    points: Array,
+    spread: Array,
+    patches: _Patches,
+    cells: "csr_array[np.float64]",
+    chosen: Ints,
+) -> tuple[Ints, Ints, Array]:
+    """Node, sampling point and weight of all that some patches give, fitted to points (nc, s, 3) of their cells."""
+    samples = points.shape[1]
+    cell, held = _rows(cells, chosen)
+    number = (samples * cell[:, :, None] + np.arange(samples)).reshape(len(chosen), -1)
+    held = np.repeat(held, samples, axis=1)
+    place, wanted = _rows(patches.targets, chosen)
+    node = patches.target[place]
+    size = (cells[chosen] @ spread).reshape(-1, 3, 3) / np.diff(cells.indptr)[chosen][:, None, None]
+    corner = mesh.nodes[patches.corner[chosen]]
+    found = _fit(points.reshape(-1, 3)[number], held, size, corner, mesh.nodes[node], mesh.element.order)
+    kept = wanted[:, :, None] & held[:, None, :]
+    row, column = (
+        np.broadcast_to(node[:, :, None], kept.shape),
+        np.broadcast_to(number[:, None, :], kept.shape),
+    )
+    return row[kept], column[kept], found[kept]
+
+
+def _spread(mesh: SolidMesh) -> Array:
+    """Mean square distances (nc, 9) of the corners of each cell from their mean."""
+    corners = mesh.nodes[mesh.cells[:, : mesh.element.corners]]
+    local = corners - corners.mean(axis=1, keepdims=True)
+    spread: Array = (local.transpose(0, 2, 1) @ local).reshape(-1, 9) / mesh.element.corners
+    return spread
 
 
 def _rows(matrix: "csr_array[np.float64]", rows: Ints) -> tuple[Ints, NDArray[np.bool_]]:
@@ -90,11 +132,14 @@ def _rows(matrix: "csr_array[np.float64]", rows: Ints) -> tuple[Ints, NDArray[np
     return matrix.indices[start[:, None] + np.where(held, place, 0)].astype(np.int64), held
 
 
-def _fit(points: Array, held: NDArray[np.bool_], corner: Array, target: Array, order: int) -> Array:
+def _fit(
+    points: Array, held: NDArray[np.bool_], size: Array, corner: Array, target: Array, order: int
+) -> Array:
     """Weights (np, nt, m) of the values at points (np, m, 3) of patches for targets (np, nt, 3).
 
     Coordinates are turned and stretched so that the points of each patch have unit variance along each axis: the
-    fit does not know how slender the cells are.
+    fit does not know how slender the cells are. An axis is not seen where the points vary little beside the size of the
+    cells, its mean square (np, 3, 3), as in a single layer of cells with one point each.
     """
     distance = ((points - corner[:, None]) ** 2).sum(axis=2)
     mean_square = (distance * held).sum(axis=1, keepdims=True) / held.sum(axis=1, keepdims=True)
@@ -102,7 +147,9 @@ def _fit(points: Array, held: NDArray[np.bool_], corner: Array, target: Array, o
     part = (part / part.sum(axis=1, keepdims=True))[:, :, None]
     mean = (part * points).sum(axis=1, keepdims=True)
     local = points - mean
-    stretch = _inverse_root(local.transpose(0, 2, 1) @ (part * local), _UNSEEN[1])
+    variance = local.transpose(0, 2, 1) @ (part * local)
+    stretch = _inverse_root(variance + size, 0.0)
+    stretch = stretch @ _inverse_root(stretch.transpose(0, 2, 1) @ variance @ stretch, _UNSEEN)
     y, z = local @ stretch, (target - mean) @ stretch
     weighted = (part * y).transpose(0, 2, 1)
     linear: Array = part.transpose(0, 2, 1) + z @ weighted
@@ -112,7 +159,7 @@ def _fit(points: Array, held: NDArray[np.bool_], corner: Array, target: Array, o
     squares, aim = _squares(y), _squares(z)
     level, slope = (part * squares).sum(axis=1, keepdims=True), weighted @ squares
     rest, aim = squares - level - y @ slope, aim - level - z @ slope
-    root = _inverse_root(rest.transpose(0, 2, 1) @ (part * rest), _UNSEEN[2])
+    root = _inverse_root(rest.transpose(0, 2, 1) @ (part * rest), _UNSEEN)
     full = linear + aim @ root @ root.transpose(0, 2, 1) @ (part * rest).transpose(0, 2, 1)
     result: Array = np.where(np.abs(full).sum(axis=2, keepdims=True) > _AMPLIFIED, linear, full)
     return result

@@ -102,7 +102,10 @@ def _jacobian(slope: Array, corners: Array) -> Array:
 
 @cache
 def tabulated(element: Element, order: int) -> Tabulated:
-    """Tabulate an element at the points of scikit-fem's rule of an order."""
+    """Tabulate an element at the points of scikit-fem's rule of an order.
+
+    Its rules for tetrahedra are exact up to order 4; those of 5 to 9 are so to one order less (scikit-fem 12).
+    """
     if order == 1:  # the centroid, for which scikit-fem has no rule in hexahedra
         centre = reference_points(element)[: element.corners].mean(axis=0)
         points, weight = centre[:, None], np.array([1 / 6 if element.is_tetrahedron else 1.0])
