@@ -44,8 +44,10 @@ def recovery(mesh: SolidMesh) -> "csr_array[np.float64]":
     for chosen, cells in ((np.flatnonzero(~outside), patches.cells), (np.flatnonzero(outside), wider)):
         # those of about the same size together
         chosen = chosen[np.argsort(np.diff(cells.indptr)[chosen], kind="stable")]
-        for start in range(0, len(chosen), _AT_ONCE):
-            parts.append(_weights(mesh, rule.point, spread, patches, cells, chosen[start : start + _AT_ONCE]))
+        parts += [
+            _weights(mesh, rule.point, spread, patches, cells, chosen[start : start + _AT_ONCE])
+            for start in range(0, len(chosen), _AT_ONCE)
+        ]
     row, column, weight = (np.concatenate(one) for one in zip(*parts, strict=True))
     whole = coo_array((weight, (row, column)), shape=(len(mesh.nodes), rule.volume.size)).tocsr()
     count = np.bincount(patches.target, minlength=len(mesh.nodes))

@@ -1,1 +1,1 @@
-"""Tetrahedral meshes of single stones."""
+"""Finite-element meshes of single stones."""
