@@ -1,17 +1,16 @@
 """report.html: one page that explains a run to whoever was not there; it needs no other file."""
 
 import base64
-import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from archmodel.records import StoneResult
 from mechanics.result import Result
 from pipelines.history_plot import history_svg
+from pipelines.html_tables import megapascals, millimetres, percent, ratio, scientific, table
+from pipelines.joint_report import joint_sections
 
 __all__ = ["write_report"]
 
@@ -46,11 +45,21 @@ _ERRORS = (
     ("unconverged_steps", "Unsolved steps", "Steps that the solver left above its tolerance."),
 )
 
+_GREY = "Rigid and fixed stones are grey: no stress was computed in them."
 _CAPTIONS = {
     "von_mises.png": "Von Mises stress on the stones' surface, in MPa. The scale ends at the stress that 1 % "
-    "of the volume exceeds, rounded up. Rigid and fixed stones are grey: no stress was computed in them.",
+    f"of the volume exceeds, rounded up. {_GREY}",
     "displacement.png": "How far each point has moved since the start; stones are drawn where they are now, "
     "not exaggerated. Fixed stones are grey.",
+    "principal_tension.png": f"Largest principal stress, where it is tension. {_GREY}",
+    "principal_compression.png": f"Smallest principal stress, where it is compression. {_GREY}",
+    "utilisation.png": f"Stress over strength, the larger of tension and compression: at 1 a stone fails. {_GREY}",
+    "error.png": "Estimated error of the stress of each stone (Zienkiewicz and Zhu): where it is large, the mesh is "
+    f"too coarse for its stress. {_GREY}",
+    "pressure.png": "Mean pressure of each joint that is pressed; the stones are drawn as glass.",
+    "resultants.png": "The resultant of each joint, drawn through the point where it meets the joint, as long as it is "
+    "large. Blue: within the kern, so that a linear pressure presses everywhere. Red: outside, so that part of the "
+    "joint bears nothing.",
 }
 
 
@@ -77,16 +86,19 @@ def write_report(
         *(f'<p class="warning">{escape(warning)}</p>' for warning in warnings),
         *(_figure(path.parent / name) for name in pictures),
         "<h2>Summary</h2>",
-        _table(_summary_rows(summary)),
+        table(_summary_rows(summary)),
         "<h2>How far it can be trusted</h2>",
-        _table((name, _scientific(summary["errors"][key]), words) for key, name, words in _ERRORS),
+        table((name, scientific(summary["errors"][key]), words) for key, name, words in _ERRORS),
         *_stressed(stones),
+        *_pulled(stones),
+        *_uncertain(stones),
+        *joint_sections(result),
         "<h2>History</h2>",
         f"<figure>{history_svg(result.history)}<figcaption>Step by step: speed of the fastest point, "
         "unbalanced force of the worst stone over its weight, and residual of the contact law.</figcaption>"
         "</figure>",
         "<h2>Time spent</h2>",
-        _table((stage, f"{seconds:.2f} s") for stage, seconds in summary["time"]["by_stage"].items()),
+        table((stage, f"{seconds:.2f} s") for stage, seconds in summary["time"]["by_stage"].items()),
         f"<p>Made by MOMA {escape(str(summary['version']))}.</p>",
     ]
     page = [
@@ -105,13 +117,13 @@ def _summary_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("Contact points", str(summary["contacts"])),
         ("Weight carried", f"{reaction['weight'] / 1e3:.2f} kN"),
         ("Reaction of the supports", f"{reaction['total_vertical'] / 1e3:.2f} kN"),
-        ("Largest displacement", _millimetres(summary["displacement"]["max"])),
+        ("Largest displacement", millimetres(summary["displacement"]["max"])),
     ]
     if stress is not None:
         rows += [
-            ("Von Mises stress, mean", _megapascals(stress["mean"])),
-            ("Von Mises stress, exceeded in 1 % of the volume", _megapascals(stress["p99"])),
-            ("Von Mises stress, largest", _megapascals(stress["max"])),
+            ("Von Mises stress, mean", megapascals(stress["mean"])),
+            ("Von Mises stress, exceeded in 1 % of the volume", megapascals(stress["p99"])),
+            ("Von Mises stress, largest", megapascals(stress["max"])),
         ]
     time = summary["time"]
     rows.append(
@@ -122,21 +134,57 @@ def _summary_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 def _stressed(stones: Sequence[StoneResult]) -> list[str]:
     """The ten stones with the largest stress; nothing where no stone deforms."""
-    known = [(stone.von_mises_max, stone) for stone in stones if stone.von_mises_max is not None]
-    if not known:
-        return []
-    known.sort(key=lambda pair: pair[0], reverse=True)
     rows = [
         (
             stone.code,
-            _megapascals(largest),
-            _megapascals(stone.von_mises_mean),
-            _millimetres(stone.displacement_max),
+            megapascals(stone.von_mises_max),
+            megapascals(stone.von_mises_mean),
+            millimetres(stone.displacement_max),
         )
-        for largest, stone in known[:10]
+        for stone in _worst(stones, lambda stone: stone.von_mises_max)
     ]
     head = ("Stone", "Von Mises, largest", "Von Mises, mean", "Largest displacement")
-    return ["<h2>Most stressed stones</h2>", _table(rows, head)]
+    return ["<h2>Most stressed stones</h2>", table(rows, head)] if rows else []
+
+
+def _pulled(stones: Sequence[StoneResult]) -> list[str]:
+    """The ten stones that are nearest to their strength, or, where no strength is known, with the largest tension."""
+    used = _worst(stones, lambda stone: stone.values.get("utilisation"))
+    rows = [
+        (
+            stone.code,
+            ratio(stone.values.get("utilisation")),
+            megapascals(stone.values["principal_tension"]),
+            percent(stone.values["tension_zone"]),
+            megapascals(stone.values["principal_compression"]),
+            megapascals(stone.values["mean_pressure"]),
+        )
+        for stone in used or _worst(stones, lambda stone: stone.values.get("principal_tension"))
+    ]
+    head = (
+        "Stone", "Stress over strength", "Tension, largest", "Volume in tension", "Compression, largest",
+        "Pressure, mean",
+    )  # fmt: skip
+    title = "Stones nearest to their strength" if used else "Stones with the largest tension"
+    return [f"<h2>{title}</h2>", table(rows, head)] if rows else []
+
+
+def _uncertain(stones: Sequence[StoneResult]) -> list[str]:
+    """The ten stones whose stress is least certain."""
+    rows = [
+        (stone.code, percent(stone.values["stress_error"]), megapascals(stone.von_mises_max))
+        for stone in _worst(stones, lambda stone: stone.values.get("stress_error"))
+    ]
+    words = "<p>Estimated from the jumps of the stress between finite elements; a finer mesh makes it smaller.</p>"
+    head = ("Stone", "Error of the stress", "Von Mises, largest")
+    return ["<h2>Stones with the least certain stress</h2>", words, table(rows, head)] if rows else []
+
+
+def _worst(stones: Sequence[StoneResult], value: Callable[[StoneResult], float | None]) -> list[StoneResult]:
+    """The ten stones with the largest values, of those that have one."""
+    known = [(found, stone) for stone in stones if (found := value(stone)) is not None]
+    known.sort(key=lambda pair: pair[0], reverse=True)
+    return [stone for _, stone in known[:10]]
 
 
 def _figure(picture: Path) -> str:
@@ -146,32 +194,3 @@ def _figure(picture: Path) -> str:
         f'<figure><img alt="{escape(caption)}" src="data:image/png;base64,{content}">'
         f"<figcaption>{escape(caption)}</figcaption></figure>"
     )
-
-
-def _table(rows: Iterable[Sequence[str]], head: Sequence[str] = ()) -> str:
-    out = io.StringIO()
-    out.write("<table>")
-    if head:
-        out.write("<tr>" + "".join(f"<th>{escape(name)}</th>" for name in head) + "</tr>")
-    for first, *rest in rows:
-        cells = "".join(
-            f'<td class="number">{escape(cell)}</td>' if cell[:1].isdigit() else f"<td>{escape(cell)}</td>"
-            for cell in rest
-        )
-        out.write(f"<tr><th>{escape(first)}</th>{cells}</tr>")
-    out.write("</table>")
-    return out.getvalue()
-
-
-def _megapascals(pascals: float | None) -> str:
-    return "–" if pascals is None else f"{pascals / 1e6:.4f} MPa"
-
-
-def _millimetres(metres: float) -> str:
-    return f"{metres * 1e3:.4g} mm"
-
-
-def _scientific(value: float | int | None) -> str:
-    if value is None or not np.isfinite(value):
-        return "not known"
-    return str(value) if isinstance(value, int) else f"{value:.1e}"

@@ -18,7 +18,7 @@ from mechanics.scene import (
 from pipelines.schema import Key, Kind
 from survey.joint_lines import JointSettings
 
-__all__ = ["MATERIAL_KEYS", "MESH_KEYS", "PICTURES", "TABLES"]
+__all__ = ["MATERIAL_KEYS", "MESH_KEYS", "ORTHOTROPY_KEYS", "PICTURES", "TABLES"]
 
 PICTURES = (
     "von_mises",
@@ -66,6 +66,21 @@ MATERIAL_KEYS = (
         "Expressions; stones that satisfy any of them are of this material. "
         "One material may leave this out: it is that of all other stones.",
         default=(),
+    ),
+)
+
+ORTHOTROPY_KEYS = (
+    Key("young", Kind.VECTOR, "Young's moduli E₁, E₂, E₃ along three axes.", "Pa", above=0),
+    Key("shear", Kind.VECTOR, "Shear moduli G₁₂, G₂₃, G₃₁.", "Pa", above=0),
+    Key(
+        "poisson", Kind.VECTOR, "Ratios ν₁₂, ν₂₃, ν₃₁; ν_ij: contraction along j under a stress along i.", "-"
+    ),
+    Key(
+        "axes",
+        Kind.ROWS,
+        "The three axes, at right angles, as the scene begins; else x, y, z. Their lengths do not matter.",
+        "-",
+        None,
     ),
 )
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from mechanics.laws.dry_joint import DryJoint
-from mechanics.materials import Material
+from mechanics.materials import Material, Orthotropy
 from mechanics.meshing.elements import Element
 from mechanics.scene import (
     ContactSettings,
@@ -28,7 +28,7 @@ from moma.errors import SceneError
 from pipelines.entries import Entry, read_entries
 from pipelines.entry_keys import ARRAYS
 from pipelines.joint_laws import JointLaw, read_laws
-from pipelines.scene_keys import MATERIAL_KEYS, MESH_KEYS, PICTURES, TABLES
+from pipelines.scene_keys import MATERIAL_KEYS, MESH_KEYS, ORTHOTROPY_KEYS, PICTURES, TABLES
 from pipelines.scene_loads import read_loads, read_throws
 from pipelines.schema import Document, check_table, nearest
 from pipelines.toml_lines import key_lines
@@ -207,9 +207,13 @@ def _materials(document: Document, given: Mapping[str, Any]) -> tuple[MaterialRu
             document.fail(
                 f"{name!r} stands in no material", "materials", name, remedy="write it under [materials.NAME]"
             )
-        values: dict[str, Any] = check_table(document, ("materials", name), content, MATERIAL_KEYS)
+        plain = {key: value for key, value in content.items() if key != "orthotropy"}
+        values: dict[str, Any] = check_table(document, ("materials", name), plain, MATERIAL_KEYS)
         stones = values.pop("stones")
-        rules.append(MaterialRule(Material(name, **values), stones))
+        if "orthotropy" in content:
+            values["orthotropy"] = _orthotropy(document, name, content["orthotropy"])
+        with document.at("materials", name, "orthotropy"):
+            rules.append(MaterialRule(Material(name, **values), stones))
     general = [rule.material.name for rule in rules if not rule.stones]
     if len(general) > 1:
         document.fail(
@@ -219,6 +223,22 @@ def _materials(document: Document, given: Mapping[str, Any]) -> tuple[MaterialRu
             remedy="only one material can be that of all other stones",
         )
     return tuple(rules)
+
+
+def _orthotropy(document: Document, material: str, content: Any) -> Orthotropy:
+    path = ("materials", material, "orthotropy")
+    if not isinstance(content, dict):
+        document.fail("'orthotropy' is not a table", *path, remedy=f"write [{'.'.join(path)}]")
+    values: dict[str, Any] = check_table(document, path, content, ORTHOTROPY_KEYS)
+    axes = values.pop("axes")
+    if axes is None:
+        return Orthotropy(**values)
+    lengths = np.linalg.norm(np.array(axes), axis=1)
+    if len(axes) != 3 or not lengths.all():
+        document.fail(
+            "axes are not three directions", *path, "axes", remedy="give for example [[1, 0, 0], …]"
+        )
+    return Orthotropy(**values, axes=tuple(map(tuple, (np.array(axes) / lengths[:, None]).tolist())))
 
 
 def _joints(mode: str, **settings: float) -> JointSettings | None:

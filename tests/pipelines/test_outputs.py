@@ -401,6 +401,21 @@ def test_the_report_explains_the_run_and_needs_no_other_file(mixed, tmp_path):
     assert all(source.startswith("data:image/png;base64,") for source in page.sources)
 
 
+def test_the_report_names_the_worst_stones_and_joints(strong, tmp_path):
+    summary = summarise(strong, version="1.2", seconds={})
+    write_report(tmp_path / "report.html", strong, summary, stone_results(strong), [])
+    page = Words()
+    page.feed((tmp_path / "report.html").read_text(encoding="utf-8"))
+    words = [word for word in page.text if word.strip()]
+    place = words.index("Stones nearest to their strength")
+    assert words[place + 7 : place + 10] == ["D1", "0.5", words[place + 9]]
+    place = words.index("Joints with the most eccentric resultants")
+    assert words[place + 9 : place + 12] == ["D1 – top", "1.2", "0.4"]
+    assert "10.0 %" in words  # error
+    assert words[words.index("Joints that slid most") + 8] == "D1 – top"
+    assert words[words.index("Joints that opened most") + 8] == "D1 – top"
+
+
 def test_the_report_of_a_rigid_collapse_says_so(rigid, tmp_path):
     summary = summarise(rigid, version="1.2", seconds={})
     write_report(tmp_path / "report.html", rigid, summary, stone_results(rigid), [])

@@ -13,7 +13,7 @@ from mechanics.laws.dry_joint import DryJoint
 from mechanics.meshing.elements import Element
 from mechanics.scene import ContactSettings, Fidelity, SolverSettings, Start, TimeSettings
 from moma.errors import MomaError, SceneError
-from pipelines.scene_keys import MATERIAL_KEYS, TABLES
+from pipelines.scene_keys import MATERIAL_KEYS, ORTHOTROPY_KEYS, TABLES
 from pipelines.scenefile import MeshSettings, parse_scene, read_scene
 from pipelines.schema import REQUIRED
 from pipelines.toml_lines import key_lines
@@ -53,6 +53,17 @@ def test_damping_strengths_and_the_way_to_start_are_read():
     assert (material.tensile_strength, material.compressive_strength) == (2e6, 3e7)
     assert (scene.time.start, scene.time.lumped_mass) == (Start.EQUILIBRIUM, True)
     assert scene.mesh == MeshSettings(0.2, Element.HEX20)
+
+
+LAYERS = "[materials.stone.orthotropy]\nyoung = [3e9, 2e9, 1e9]\nshear = [1e9, 1e9, 1e9]\npoisson = [0.2, 0.1, 0.1]\n"
+
+
+def test_a_material_may_have_axes_of_its_own():
+    scene = parse_scene(STONE + LAYERS + "axes = [[0, 3, 0], [-1, 0, 0], [0, 0, 1]]\n", "scene.toml")
+    orthotropy = scene.materials[0].material.orthotropy
+    assert orthotropy.young == (3e9, 2e9, 1e9)
+    assert orthotropy.axes == ((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    assert parse_scene(STONE, "scene.toml").materials[0].material.orthotropy is None
 
 
 def test_the_sample_scene_is_valid():
@@ -105,6 +116,20 @@ def test_a_mistake_is_named_with_its_line(text, line, said):
         ("[materials]\ndensity = 2000\n", 2, "'density' stands in no material"),
         ("[materials.a]\ndensity = 2000\nyoung = 1e10\n", 1, "[materials.a] has no 'poisson'"),
         (STONE.replace("0.2", "0.5"), 4, "poisson = 0.5 is out of range"),
+        (
+            STONE + LAYERS.replace("3e9", "0"),
+            6,
+            "is out of range; give a list of three numbers [Pa], greater than 0",
+        ),
+        (STONE + LAYERS.replace("shear", "sheer"), 7, "unknown key 'sheer'"),
+        (STONE + LAYERS + "axes = [[1, 0, 0]]\n", 9, "axes are not three directions"),
+        (
+            STONE + LAYERS + "axes = [[1, 0, 0], [0, 1, 0], [0, 1, 1]]\n",
+            5,
+            "give three unit vectors at right angles",
+        ),
+        (STONE + LAYERS.replace("0.2, 0.1", "5.0, 0.1"), 5, "poisson"),
+        (STONE + "orthotropy = 3\n", 5, "'orthotropy' is not a table"),
         (STONE + "tensile_strength = 0\n", 5, "give a number [Pa], greater than 0"),
         (STONE + "stiffness_damping = -1e-4\n", 5, "give a number [s], at least 0"),
         (STONE + STONE.replace("stone", "brick"), 5, "'stone' and 'brick' both lack 'stones'"),
@@ -191,7 +216,8 @@ def test_every_setting_of_the_contact_has_a_key_with_its_default():
 
 def test_every_key_of_a_scene_is_documented_with_its_unit_and_default():
     documented = (ROOT / "docs/scene.md").read_text(encoding="utf-8")
-    for table, keys in {**TABLES, "materials.NAME": MATERIAL_KEYS}.items():
+    materials = {"materials.NAME": MATERIAL_KEYS, "materials.NAME.orthotropy": ORTHOTROPY_KEYS}
+    for table, keys in {**TABLES, **materials}.items():
         section = documented.split(f"## `[{table}]`")[1].split("\n## ")[0]
         rows = [line for line in section.splitlines() if line.startswith("| `")]
         assert [row.split("`")[1] for row in rows] == [key.name for key in keys]
