@@ -1,6 +1,6 @@
 """A scene made ready to compute: meshes, masses, surfaces; what does not change while it runs."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,9 @@ from mechanics.balls import ball_properties
 from mechanics.bodies.deformable import Deformable, deformable
 from mechanics.bodies.rigid import RigidInertia
 from mechanics.contact._kernels_narrow import MAX_CORNERS
-from mechanics.contact.surfaces import FaceMesh, Surfaces, surfaces
+from mechanics.contact.face_meshes import FaceMesh
+from mechanics.contact.part_faces import face_meshes, part_face_meshes
+from mechanics.contact.surfaces import Surfaces, surfaces
 from mechanics.elastic_stones import ElasticStones, elastic_stones
 from mechanics.laws.table import LawTable, law_table
 from mechanics.loads.load import Force, Motion
@@ -196,7 +198,11 @@ def _surfaces(
     return surfaces(
         [part.vertices - centres[b] for b, part in shapes],
         [part.faces for _, part in shapes],
-        [mesh for b, part in shapes for mesh in _face_meshes(part, _mesh_of(stones[b]), int(node_ptr[b]))],
+        [
+            mesh
+            for b, part in shapes
+            for mesh in _face_meshes(blocks[b], part, _mesh_of(stones[b]), centres[b], int(node_ptr[b]))
+        ],
         [b for b, _ in shapes],
         [blocks[b].radius or 0.0 for b, _ in shapes],
     )
@@ -269,11 +275,6 @@ def _check(block: Block) -> None:
             "give metres greater than 0",
         ),
         (
-            deformable_ and bool(block.parts),
-            "a deformable stone has several parts",
-            "make it rigid, or make each part a stone of its own",
-        ),
-        (
             block.fidelity is Fidelity.FIXED and any(block.velocity),
             "a fixed stone has a velocity",
             "make it rigid",
@@ -305,15 +306,14 @@ def _inertia(blocks: tuple[Block, ...], properties: list[MassProperties], densit
     )
 
 
-def _face_meshes(part: Part, mesh: SolidMesh | None, start: int) -> list[FaceMesh | None]:
+def _face_meshes(
+    block: Block, part: Part, mesh: SolidMesh | None, centre: Array, start: int
+) -> Sequence[FaceMesh | None]:
     if mesh is None:
         return [None] * len(part.faces)
-    result: list[FaceMesh | None] = []
-    for face in range(len(part.faces)):
-        own = mesh.facets[mesh.facet_face == face]
-        node, facet = np.unique(own, return_inverse=True)
-        result.append(FaceMesh(start + node, mesh.nodes[node], facet.reshape(own.shape).astype(np.int64)))
-    return result
+    if not block.parts:
+        return face_meshes(mesh, len(block.faces), start)
+    return part_face_meshes(mesh, part.vertices - centre, part.faces, start)
 
 
 def _start(model: Model, centres: Array) -> State:

@@ -62,7 +62,7 @@ class Block:
     mesh_size : target edge length of the finite elements [m]; only for deformable blocks
     element : kind of its finite elements; hexahedra suit blocks with six faces of four corners
     velocity : (6,) initial translation [m/s] and rotation [rad/s] velocity; not for fixed blocks
-    parts : convex parts that fill a non-convex stone without overlap; empty if it is convex. Not for deformable blocks
+    parts : convex parts that fill a non-convex stone without overlap; empty if it is convex
     radius : of a ball, whose surface is the sphere about the mean of its corners; corners and faces are for pictures
         (mechanics.balls makes them) [m]. None: a polyhedron
     """

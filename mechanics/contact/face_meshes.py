@@ -13,8 +13,6 @@ Ints = NDArray[np.int64]
 
 # most nodes of a facet
 _WIDEST = 9
-# by this fraction the facets of a face may be larger than it, for rounding
-_SAME_AREA = 1e-9
 
 
 @dataclass(frozen=True)
@@ -26,11 +24,13 @@ class FaceMesh:
     node : (k,) nodes, numbered over all deformable bodies
     reference : (k, 3) their places in body axes [m]
     facet : (m, 3 | 6 | 4 | 8 | 9) indices into `node`, in VTK's order, corners first, counter-clockwise from outside
+    cut : the face, one of several parts, cuts through some facets, so that they reach beyond it
     """
 
     node: Ints
     reference: Array
     facet: Ints
+    cut: bool = False
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class PackedMeshes:
     node_ptr, node, reference : nodes of each mesh, as in `FaceMesh`
     facet_ptr, facet : (·, 9) facets of each mesh, padded with -1
     kind : (nm,) nodes of a facet of each mesh
-    cut : (nm,) whether the face cuts through its facets, so that they reach beyond it
+    cut : (nm,) as in `FaceMesh`
     fineness : (nf,) triangles (a quadrilateral counts for two) per area of each face [1/m²]; 0 without facets, -1 if
         rigid
     """
@@ -59,8 +59,8 @@ class PackedMeshes:
     fineness: Array
 
 
-def packed_meshes(meshes: Sequence[FaceMesh | None], face_area: Array) -> PackedMeshes:
-    """Pack the meshes of all faces, whose areas are given (nf,) [m²]."""
+def packed_meshes(meshes: Sequence[FaceMesh | None]) -> PackedMeshes:
+    """Pack the meshes of all faces."""
     own = [mesh for mesh in meshes if mesh is not None]
     has = np.array([mesh is not None for mesh in meshes], dtype=bool)
     of_face = np.where(has, np.cumsum(has) - 1, -1).astype(np.int64)
@@ -76,7 +76,7 @@ def packed_meshes(meshes: Sequence[FaceMesh | None], face_area: Array) -> Packed
         facet_ptr=_pointer([len(mesh.facet) for mesh in own]),
         facet=np.vstack([*map(_padded, own), np.zeros((0, _WIDEST))]).astype(np.int64),
         kind=np.array([mesh.facet.shape[1] for mesh in own], dtype=np.int64),
-        cut=covered > (1.0 + _SAME_AREA) * face_area[has],
+        cut=np.array([mesh.cut for mesh in own], dtype=bool),
         fineness=fineness,
     )
 

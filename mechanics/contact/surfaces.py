@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from mechanics.contact.face_meshes import FaceMesh, PackedMeshes, packed_meshes
 from mechanics.polyhedra import face_plane, smallest_width
 
-__all__ = ["FaceMesh", "Placed", "Surfaces", "surfaces"]
+__all__ = ["Placed", "Surfaces", "surfaces"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -114,7 +114,6 @@ def surfaces(
             for v, group, r in zip(vertices, faces, radii, strict=True)
         ]
     )
-    face_area = np.array([_area(p) for p in polygons])
     return Surfaces(
         body=owner,
         sptr=sptr,
@@ -131,9 +130,9 @@ def surfaces(
         radius=radii,
         shape_size=shape_size,
         size=np.minimum.reduceat(shape_size, sptr[:-1]),
-        face_area=face_area,
+        face_area=np.array([_area(p) for p in polygons]),
         face_mesh=tuple(face_mesh),
-        meshes=packed_meshes(face_mesh, face_area),
+        meshes=packed_meshes(face_mesh),
     )
 
 

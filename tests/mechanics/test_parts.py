@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from mechanics.contact.contacts import gaps, material_points
+from mechanics.meshing.elements import Element
 from mechanics.model import build_model
 from mechanics.polyhedra import mass_properties
 from mechanics.result import Outcome
 from mechanics.scene import Fidelity, Part
 from mechanics.simulate import simulate
-from moma.errors import GeometryError, SceneError
+from moma.errors import GeometryError
 from tests.mechanics.shapes import (
     TURN,
     brick,
@@ -67,12 +68,75 @@ def test_parts_that_do_not_fill_the_outline_are_refused():
         build_model(scene(missing))
 
 
-def test_a_deformable_stone_of_parts_is_refused():
-    soft = replace(portal(), fidelity=Fidelity.DEFORMABLE, mesh_size=0.5)
-    with pytest.raises(
-        SceneError, match=r"stone portal: a deformable stone has several parts.*make it rigid"
-    ):
-        build_model(scene(soft))
+def soft(block, size, element=Element.TET4):
+    """The same stone, made of finite elements."""
+    return replace(block, fidelity=Fidelity.DEFORMABLE, mesh_size=size, element=element)
+
+
+@pytest.mark.parametrize("turn", [np.eye(3), TURN], ids=["straight", "turned"])
+def test_the_facets_of_a_deformable_stone_lie_on_the_faces_of_its_parts(turn):
+    """What lies between parts has none; the outer walls are cut along the seam, and facets reach across it."""
+    model, state = build_model(scene(moved(soft(portal(), 0.4), turn)))
+    own = model.surfaces
+    area = []
+    for mesh in own.face_mesh:
+        x = mesh.reference[mesh.facet]
+        area.append(0.5 * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1).sum())
+    middle = np.array([own.vertex[c].mean(axis=0) for c in np.split(own.corner, own.cptr[1:-1])])
+    middle = (middle + state.centre[0]) @ turn
+    normal = own.normal @ turn
+    # the tops of both feet, and of the lintel's underside what does not lie on them
+    seam = (np.abs(normal[:, 2]) > 0.9) & (np.abs(middle[:, 2] - 1.0) < 1e-9)
+    assert sorted(np.array(area)[seam]) == pytest.approx([0.0, 0.0, 2.0], abs=1e-9)
+    inner = (np.abs(normal[:, 0]) > 0.9) & (np.abs(middle[:, 0] - 1.5) < 1.4)
+    flat = np.abs(normal[:, 2]) > 0.9
+    for face in np.flatnonzero(~seam):
+        if inner[face] or flat[face]:
+            assert area[face] == pytest.approx(own.face_area[face], rel=1e-9)
+            assert not own.face_mesh[face].cut
+        else:
+            assert own.face_mesh[face].cut
+            assert area[face] > own.face_area[face] * 1.001
+
+
+@pytest.mark.parametrize("element", [Element.HEX8, Element.HEX20, Element.TET10])
+def test_a_brick_cut_through_its_elements_stands_as_the_whole(element):
+    """The cut lies at 0.37 of its length, beside all nodes: forces, areas and places add up to the same."""
+    whole = soft(brick("a", (0, 0, 0), (1, 0.5, 0.4)), 0.25, element)
+    pieces = [brick("b", (low, 0, 0), (high, 0.5, 0.4)) for low, high in ((0, 0.37), (0.37, 1))]
+    cut = replace(whole, parts=tuple(Part(piece.vertices, piece.faces) for piece in pieces))
+    ends = []
+    for block in (whole, cut):
+        result = simulate(scene(ground(), block, step=5e-3, duration=1.0, relaxation=True))
+        assert result.outcome is Outcome.EQUILIBRIUM
+        assert result.reaction == pytest.approx(result.weight, rel=1e-4)
+        assert result.contacts.area.sum() == pytest.approx(0.5, rel=1e-9)
+        ends.append(result.bodies[1].displacement[:, 2])
+    assert len(ends[0]) == len(ends[1])
+    sunk = 2000 * 9.81 * 0.4**2 / (2 * 1e9)
+    np.testing.assert_allclose(ends[1], ends[0], atol=0.02 * sunk)
+
+
+@pytest.mark.parametrize("turn", [np.eye(3), TURN], ids=["straight", "turned"])
+def test_infill_with_the_shape_of_a_t_carries_its_weight_between_two_leaves(turn):
+    """Its stem stands on the ground between two rigid leaves, its arms lie on their tops."""
+    outline = [(1, 0), (2, 0), (2, 1), (3, 1), (3, 1.5), (0, 1.5), (0, 1), (1, 1)]
+    parts = [rectangle(1, 0, 2, 1), rectangle(0, 1, 3, 1.5)]
+    infill = soft(profile("infill", outline, parts), 0.3)
+    leaves = brick("left", (0, 0, 0), (1, 1, 1)), brick("right", (2, 0, 0), (3, 1, 1))
+    one = scene(ground((-1, -1, -1), (4, 2, 0)), *leaves, infill, step=5e-3, duration=2.0, relaxation=True)
+    gravity = tuple(float(g) for g in turn @ [0.0, 0.0, -9.81])
+    result = simulate(replace(transformed(one, turn), gravity=gravity))
+    assert result.outcome is Outcome.EQUILIBRIUM
+    assert result.errors.penetration < 1e-6
+    contacts = result.contacts
+    sign = (contacts.bodies[:, 0] == 3).astype(float) - (contacts.bodies[:, 1] == 3)
+    on = [sign * (contacts.bodies == other).any(axis=1) @ contacts.force @ turn for other in range(3)]
+    weight = 2000 * 9.81 * 2.5
+    np.testing.assert_allclose(sum(on), [0, 0, weight], atol=1e-4 * weight)
+    # the same on the left and on the right, and something under the stem
+    assert on[1][2] == pytest.approx(on[2][2], rel=0.05)
+    assert min(force[2] for force in on) > 0.1 * weight
 
 
 def test_a_convex_stone_cut_in_parts_moves_as_the_whole():

@@ -1,0 +1,65 @@
+"""Which finite elements lie on the faces of a deformable block, and on those of its convex parts."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.contact._kernels_mortar import overlap_area
+from mechanics.contact.face_meshes import FaceMesh
+from mechanics.meshing.mesh import SolidMesh
+from mechanics.polyhedra import face_plane
+
+__all__ = ["face_meshes", "part_face_meshes"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+Faces = Sequence[Sequence[int]]
+
+# of the block's size, and of a facet's area: what lies nearer, or overlaps by less, does so by rounding
+_NEAR = 1e-6
+_SAME_AREA = 1e-6
+
+
+def face_meshes(mesh: SolidMesh, faces: int, start: int) -> list[FaceMesh]:
+    """The meshes of the first `faces` faces of a block; its nodes are numbered from `start` on."""
+    return [_face_mesh(mesh, mesh.facet_face == face, start) for face in range(faces)]
+
+
+def part_face_meshes(mesh: SolidMesh, vertices: Array, faces: Faces, start: int) -> list[FaceMesh]:
+    """The meshes of the faces of a convex part, whose corners are given in the axes of the mesh (nv, 3) [m].
+
+    A facet belongs to each face with which it shares area, and such a face may cut through it. A face between two
+    parts has no facets.
+    """
+    corners = 3 if mesh.element.is_tetrahedron else 4
+    x = mesh.nodes[mesh.facets[:, :corners]]
+    normal = np.cross(x[:, 1] - x[:, 0], x[:, -1] - x[:, 0])
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    near = _NEAR * float(np.ptp(mesh.nodes, axis=0).max())
+    found = []
+    for face in faces:
+        polygon = vertices[list(face)]
+        n, origin = face_plane(polygon)
+        inside = (np.abs((x - origin) @ n).max(axis=1) < near) & (normal @ n > 0.5)
+        inside[inside], cut = _overlaps(x[inside], polygon, n)
+        found.append(_face_mesh(mesh, inside, start, cut))
+    return found
+
+
+def _overlaps(facets: Array, polygon: Array, n: Array) -> tuple[Bools, bool]:
+    """Which facets (n, k, 3) share area with a convex polygon in their plane, and whether it cuts through any."""
+    t1 = polygon[1] - polygon[0]
+    t1 = t1 / np.linalg.norm(t1)
+    flat = np.column_stack([t1, np.cross(n, t1)])
+    outline, plane = (polygon - polygon[0]) @ flat, (facets - polygon[0]) @ flat
+    share = np.array([overlap_area(facet, outline) / overlap_area(facet, facet) for facet in plane])
+    inside = share > _SAME_AREA
+    return inside, bool((share[inside] < 1.0 - _SAME_AREA).any())
+
+
+def _face_mesh(mesh: SolidMesh, rows: Bools, start: int, cut: bool = False) -> FaceMesh:
+    own = mesh.facets[rows]
+    node, facet = np.unique(own, return_inverse=True)
+    return FaceMesh(start + node, mesh.nodes[node], facet.reshape(own.shape).astype(np.int64), cut)
