@@ -7,10 +7,10 @@ in the middle of the loaded edge in plane stress.
 
 import numpy as np
 import pytest
-from solids import body_forces, facets_at, grid, norm, solve, traction_forces
+from solids import body_forces, facets_at, grid, norm, solve, strain, traction_forces
 
 from mechanics.elasticity import recovery, sampled_stress
-from mechanics.materials import Material
+from mechanics.materials import Material, Orthotropy
 from mechanics.meshing.elements import Element
 
 QUADRATIC = (Element.TET10, Element.HEX20, Element.HEX27)
@@ -136,7 +136,14 @@ def test_straight_beam_of_macneal_and_harder(element, force, expected):
     assert moved[np.argmax(force)] == pytest.approx(expected, rel=0.05)
 
 
-def cook(element, n, thickness=1.0):
+MEMBRANE = Material("membrane", 1.0, 1.0, 1 / 3)
+# nothing across the plane: plane stress without a slab's narrowing, exact in three dimensions
+PLANE = Material(
+    "plane", 1.0, 1.0, 1 / 3, orthotropy=Orthotropy((1.0, 1.0, 1.0), (0.375, 0.5, 0.5), (1 / 3, 0.0, 0.0))
+)
+
+
+def cook(element, n, material=MEMBRANE, thickness=1.0):
     """Mean vertical displacement through the thickness in the middle of the loaded edge, for n × n elements."""
     corners = np.array([(0, 0), (48, 44), (48, 60), (0, 44)], dtype=float)
 
@@ -157,7 +164,7 @@ def cook(element, n, thickness=1.0):
     held[np.abs(z) < 1e-9, 2] = True  # one of the two free sides of the slab is a plane of symmetry
     facets = facets_at(mesh, lambda p: p[:, 0] > 48 - 1e-9)
     load = traction_forces(mesh, facets, lambda p, normal: np.broadcast_to([0, 1 / 16, 0], p.shape))
-    displacement = solve(mesh, Material("membrane", 1.0, 1.0, 1 / 3), load, held)
+    displacement = solve(mesh, material, load, held)
     return displacement[(x > 48 - 1e-9) & (np.abs(y - 52) < 1e-6), 1].mean()
 
 
@@ -170,3 +177,55 @@ def test_membrane_of_cook_with_bricks_of_the_first_order_converges_from_below():
     found = [cook(Element.HEX8, n) for n in (8, 16, 32)]
     assert found == sorted(found)
     assert found[-1] == pytest.approx(23.965, rel=0.01)
+
+
+@pytest.mark.parametrize("element", QUADRATIC)
+def test_membrane_of_cook_in_exact_plane_stress_converges_from_below(element):
+    # no faster than h^1.35, whatever the order: the obtuse clamped corner is singular (Williams 1952, λ = 0.677)
+    found = [cook(element, n, PLANE) for n in (8, 16, 32)]
+    assert found == sorted(found)
+    assert found[-1] == pytest.approx(23.965, rel=1e-3)
+
+
+def clamped_end(x):
+    """Cantilever 4 × 1 × 1, E = 1, ν = 0, clamped at x = 0, sheared at its end: displacement and stress (…, 6).
+
+    Timoshenko & Goodier, Theory of Elasticity, §21, without Poisson's effect, exact in three dimensions.
+    """
+    length, depth = 4.0, 0.5
+    a, y = x[..., 0], x[..., 1] - depth
+    zero = np.zeros_like(a)
+    moved = np.stack(
+        [
+            -y * (length * a - a**2 / 2) + depth**2 * y - y**3 / 3,
+            length * a**2 / 2 - a**3 / 6,
+            zero,
+        ],
+        axis=-1,
+    )
+    stress = np.stack([-(length - a) * y, zero, zero, (depth**2 - y**2) / 2, zero, zero], axis=-1)
+    return moved, stress
+
+
+@pytest.mark.parametrize("element", [Element.TET4, Element.HEX8, *QUADRATIC])
+def test_cantilever_converges_at_the_theoretical_rates(element):
+    material = Material("beam", 1.0, 1.0, 0.0)
+    errors = []
+    for n in (6, 12) if element.order == 1 else (2, 4):
+        mesh = grid(element, (4 * n, n, n), lambda x: x * [4.0, 1, 1])
+        held = np.repeat((mesh.nodes[:, 0] < 1e-9)[:, None], 3, axis=1)
+        end = facets_at(mesh, lambda x: x[:, 0] > 4.0 - 1e-9)
+        load = traction_forces(mesh, end, lambda x, _: clamped_end(x)[1][..., [0, 3, 5]])
+        found = solve(mesh, material, load, held, clamped_end(mesh.nodes)[0])
+
+        def off(rule, mesh=mesh, found=found):
+            return rule.value @ found[mesh.cells] - clamped_end(rule.point)[0]
+
+        def stress_off(rule, mesh=mesh, found=found):
+            return strain(rule, mesh, found) @ material.stiffness - clamped_end(rule.point)[1]
+
+        errors.append((norm(mesh, off), norm(mesh, stress_off, matrix=np.linalg.inv(material.stiffness))))
+    displacement, stress = np.log2(np.array(errors[0]) / errors[1])
+    # the solution is of the third order only, and what is beyond the element's is small: faster is no surprise
+    assert displacement > element.order + 1 - 0.15
+    assert stress == pytest.approx(element.order, abs=0.15)
