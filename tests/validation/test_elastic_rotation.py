@@ -100,7 +100,7 @@ STEEP = Material("bar", density=2000.0, young=1e9, poisson=0.0, stiffness_dampin
 def test_a_spinning_bar_bears_the_centrifugal_stress(element):
     """σ_xx = ρω²(L²/4 - x²)/2 along a bar that spins at 20 rad/s about z; 2 % of its largest, 100 kPa. Closed form.
 
-    Its spin goes down as it lengthens: ω is that of its end. Angular momentum stays within 1e-5.
+    Angular momentum stays within 2ε of itself, by which the inertia changes: small strain leaves that out.
     """
     size = 0.05 if element is Element.HEX8 else 0.1
     block = bar(LENGTH, SIDE, STEEP, size, element, (0, 0, 0, 0, 0, RATE))
@@ -108,7 +108,8 @@ def test_a_spinning_bar_bears_the_centrifugal_stress(element):
     scene = Scene("bar", (block,), gravity=(0.0, 0.0, 0.0), time=time)
     path, result = elastic_follow(scene), simulate(scene)
     spin = path.angular_momentum[:, 2]
-    assert np.abs(spin / spin[0] - 1).max() < 1e-5
+    strain = STEEP.density * RATE**2 * LENGTH**2 / (8 * STEEP.young)
+    assert np.abs(spin / spin[0] - 1).max() < 2 * strain
     (body,) = result.bodies
     x, y, _ = body.reference.T
     largest = STEEP.density * RATE**2 * LENGTH**2 / 8
@@ -124,12 +125,20 @@ def test_a_spinning_bar_bears_the_centrifugal_stress(element):
 
 
 def test_a_spin_with_vibration_keeps_energy_and_momentum():
-    """θ = ½, no damping: ten turns of a bar that swings by 1e-4 of its length; energy 1e-4, momentum 1e-6."""
+    """θ = ½, no damping: one turn of a bar that swings by twice its centrifugal strain, ε = 1e-4.
+
+    Angular momentum and energy change by 2·2ε at most, as small strain leaves out what the swing does to the inertia;
+    the momentum's mean over many swings and its direction stay, within 1e-2 ε.
+    """
     material = Material("bar", density=2000.0, young=1e9, poisson=0.2)
     block = bar(LENGTH, SIDE, material, 0.1, Element.HEX8, (0, 0, 0, 1.0, 2.0, RATE))
-    time = TimeSettings(2e-4, 0.5, 0.2, stop_at_equilibrium=False)
+    time = TimeSettings(2e-4, 0.5, 0.4, stop_at_equilibrium=False)
     scene = Scene("bar", (block,), gravity=(0.0, 0.0, 0.0), time=time)
-    path = elastic_follow(scene)
-    spin = path.angular_momentum
-    assert np.abs(spin - spin[0]).max() < 1e-6 * np.linalg.norm(spin[0])
-    assert simulate(scene).errors.energy < 1e-4
+    spin = elastic_follow(scene).angular_momentum / (material.density * LENGTH**3 * SIDE**2 * RATE / 12)
+    strain = material.density * RATE**2 * LENGTH**2 / (8 * material.young)
+    size = np.linalg.norm(spin, axis=1)
+    assert np.abs(size / size[0] - 1).max() < 4 * strain
+    early, late = size[1:1001].mean(), size[-1000:].mean()
+    assert late == pytest.approx(early, rel=1e-2 * strain)
+    assert np.abs(spin / size[:, None] - spin[0] / size[0]).max() < 1e-2 * strain
+    assert simulate(scene).errors.energy < 4 * strain
