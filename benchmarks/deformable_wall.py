@@ -20,13 +20,13 @@ from mechanics.observers.equilibrium import imbalance, support_reaction
 from mechanics.scene import Block, ContactSettings, Fidelity, LawRule, Scene, Start, TimeSettings
 from mechanics.simulation import Clock, Simulation
 
-__all__ = ["deformable_wall", "main"]
+__all__ = ["deformable_wall", "main", "wall_scene"]
 
 # length, depth and height of a brick [m]; head joints are open by this, so that they never touch [m]
 _BRICK, _HEAD_JOINT = (0.30, 0.15, 0.10), 1e-3
 _BRICKS, _COURSES = 4, 6
 _STONE = Material("stone", density=2400.0, young=5e9, poisson=0.2)
-# what holds the base at its bottom never breaks
+# what holds the base at its bottom does not break
 _GLUE = MortarJoint(friction=1.0, tension=1e5, shear=1e5)
 _TABLE: Table = (
     ("start", "start", ""),
@@ -70,30 +70,44 @@ def main() -> None:
 
 
 def deformable_wall(element: Element, start: Start) -> Scene:
-    """27 bricks and half bricks in running bond on an elastic base, bed joints with Coulomb 0.5; h = 1e-4 s, θ = 0.505."""
+    """27 bricks and half bricks in running bond on an elastic base; h = 1e-4 s, θ = 0.505."""
+    return wall_scene(_BRICKS, _COURSES, element, start)
+
+
+def wall_scene(
+    bricks: int,
+    courses: int,
+    element: Element,
+    start: Start,
+    size: float = _BRICK[0] / 4,
+    step: float = 1e-4,
+    theta: float = 0.505,
+    duration: float = 1.0,
+    base: bool = True,
+) -> Scene:
+    """Running bond, on an elastic base that is held at its bottom or on rigid ground; head joints are open, μ = 0.5."""
     length, depth, height = _BRICK
-    wide = _BRICKS * length
-    cells = [("base", 0.0, wide, 0)]
-    for row in range(1, _COURSES + 1):
-        cuts = np.arange(_BRICKS + 1) * length
+    wide = bricks * length
+    cells = [("base", 0.0, wide, 0)] if base else []
+    for row in range(len(cells), courses + len(cells)):
+        cuts = np.arange(bricks + 1) * length
         if row % 2 == 0:
             cuts = np.concatenate([[0.0], cuts[:-1] + length / 2, [wide]])
         cells += [
             (f"{row}-{k + 1}", cuts[k] + _HEAD_JOINT / 2, cuts[k + 1] - _HEAD_JOINT / 2, row)
             for k in range(len(cuts) - 1)
         ]
-    size = length / 4
     blocks = [_box("ground", (0.0, wide), depth, (-height, 0.0), Fidelity.FIXED, element, size)]
     blocks += [
         _box(code, (low, high), depth, (row * height, (row + 1) * height), Fidelity.DEFORMABLE, element, size)
         for code, low, high, row in cells
     ]
-    held = LawRule(frozenset({"ground"}), frozenset({"base"}), _GLUE)
+    held = (LawRule(frozenset({"ground"}), frozenset({"base"}), _GLUE),) if base else ()
     return Scene(
-        "deformable wall",
+        f"deformable wall {bricks} x {courses}",
         tuple(blocks),
-        contact=ContactSettings(DryJoint(0.5), rules=(held,), alert_distance=_HEAD_JOINT / height / 2),
-        time=TimeSettings(step=1e-4, theta=0.505, start=start),
+        contact=ContactSettings(DryJoint(0.5), rules=held, alert_distance=_HEAD_JOINT / height / 2),
+        time=TimeSettings(step, theta, duration, start=start),
     )
 
 
