@@ -14,10 +14,13 @@ from mechanics.result import ContactResult, JointResult
 from mechanics.simulation import Step
 from mechanics.state import State
 
-__all__ = ["StartingJoints", "joint_results", "slides", "starting_joints"]
+__all__ = ["StartingJoints", "joint_results", "parting", "starting_joints"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+# status of contacts that bear nothing
+_IDLE = ("open", "broken")
 
 
 @dataclass(frozen=True)
@@ -43,13 +46,20 @@ def starting_joints(model: Model, start: State, contacts: Contacts) -> StartingJ
     return StartingJoints(start, face, sections(faces, face))
 
 
-def slides(contacts: Contacts, start: State, state: State) -> Array:
-    """How far the two material points of each contact have parted across its normal since the start, (nc, 3) [m].
+def parting(contacts: Contacts, start: State, state: State) -> tuple[Array, Array]:
+    """How far the two material points of each contact have parted since the start.
 
-    In axes that turn with the antagonist: stones that turn together do not slide.
+    In axes that turn with the antagonist: stones that turn together do not part.
+
+    Returns
+    -------
+    opening : (nc,) along the normal [m]
+    slide : (nc, 3) across it [m]
     """
     now, then = (np.subtract(*np.moveaxis(material_points(contacts, one), 1, 0)) for one in (state, start))
-    return _across(contacts.frame[:, 0], now - _turned(start, state, contacts.bodies[:, 1], then))
+    body, normal = contacts.bodies[:, 1], contacts.frame[:, 0]
+    parted = now - np.einsum("nab,nb->na", _turn(start, state, body), then)
+    return np.einsum("ci,ci->c", parted, normal), _across(normal, parted)
 
 
 def joint_results(
@@ -66,19 +76,19 @@ def joint_results(
     count, bodies = len(face), faces.body[face]
     own = np.flatnonzero(contacts.joint >= 0)
     joint = contacts.joint[own]
-    parted = np.flatnonzero(np.bincount(joint, minlength=count) == 0)
-    section, slide = _carried_along(sections(faces, face), start, bodies, step.after, parted)
+    parted = np.bincount(joint, minlength=count) == 0
+    section = _with_parted(sections(faces, face), start, bodies, step.after, np.flatnonzero(parted))
     force, moment = _resultants(section, bodies, contacts, own)
-    n = section.frame[:, 0]
-    compression = np.einsum("ji,ji->j", force, n)
+    n, status = section.frame[:, 0], contacts.status[own]
     # what is less than the solver leaves is no force
     least = model.scene.solver.tolerance * float(np.linalg.norm(force, axis=1).max(initial=0.0))
     place, kern, edge = eccentricity(section, force, moment, least)
-    status, area = contacts.status[own], contacts.area[own]
+    opening, sliding = _movement(section, start, bodies, step.after, contacts, own)
     bearing = _sums(joint, _bearing(model, step)[own], count)
+    shear = np.linalg.norm(_across(n, force), axis=1)
     return JointResult(
         bodies=bodies,
-        parted=np.isin(np.arange(count), parted),
+        parted=parted,
         polygon=tuple(section.polygon(number) for number in range(count)),
         frame=section.frame,
         centroid=section.centroid,
@@ -90,17 +100,30 @@ def joint_results(
         eccentricity=place,
         kern=kern,
         edge=edge,
-        pressure_mean=_ratio(compression, section.area),
+        pressure_mean=_ratio(np.einsum("ji,ji->j", force, n), section.area),
         pressure_max=_largest(joint, contacts.pressure[own], count),
-        opening=np.maximum(_widest(section), _largest(joint, contacts.gap[own], count)),
-        sliding=np.maximum(slide, _largest(joint, contacts.slide[own], count)),
-        slipping=_share(joint, area, status == "slip", count),
-        open=np.where(
-            np.bincount(joint, minlength=count) > 0, _share(joint, area, _idle(status), count), 1.0
-        ),
-        friction_use=_ratio(
-            np.linalg.norm(_across(n, force), axis=1), np.where(bearing > least, bearing, 0.0)
-        ),
+        gap=np.maximum(_at_most(section, section.gap), _largest(joint, contacts.gap[own], count)),
+        opening=opening,
+        sliding=sliding,
+        slipping=_share(joint, contacts.area[own], status == "slip", count),
+        open=np.where(parted, 1.0, _share(joint, contacts.area[own], np.isin(status, _IDLE), count)),
+        friction_use=_ratio(shear, np.where(bearing > least, bearing, 0.0)),
+    )
+
+
+def _movement(
+    section: Section, start: StartingJoints, bodies: Ints, state: State, contacts: ContactResult, own: Ints
+) -> tuple[Array, Array]:
+    """(nj,) opening and sliding since the start, the largest of the corners and of the contact points [m]."""
+    joint, count = contacts.joint[own], len(bodies)
+    opened, slid = _moved_apart(section, start.state, state, bodies)
+    # what is new has no start from which to count
+    opened[len(start.face) :] = _at_most(section, section.gap)[len(start.face) :]
+    # where there are contacts, these know it better: stones deform
+    slid[np.bincount(joint, minlength=count) > 0] = 0.0
+    return (
+        np.maximum(opened, _largest(joint, contacts.opening[own], count)),
+        np.maximum(slid, _largest(joint, contacts.slide[own], count)),
     )
 
 
@@ -122,44 +145,67 @@ def _bearing(model: Model, step: Step) -> Array:
     return bearing
 
 
-def _carried_along(
+def _with_parted(
     section: Section, start: StartingJoints, bodies: Ints, state: State, parted: Ints
-) -> tuple[Section, Array]:
-    """The sections, those of parted joints as at the start but carried along by the second stone; their slides."""
-    slide = np.zeros(len(bodies))
+) -> Section:
+    """The sections, those of parted joints as at the start but carried along by the second stone."""
     if not len(parted):
-        return section, slide
-    then, (first, second) = start.section, bodies[parted].T
-    n = then.frame[parted, 0]
-    flat = then.centroid[parted, None] + np.einsum(
-        "jkd,jdi->jki", then.corner[parted], then.frame[parted, 1:]
-    )
-    ends = [
-        flat + (then.middle[parted] + half * then.gap[parted])[..., None] * n[:, None] for half in (0.5, -0.5)
-    ]
-    moved = [_moved(start.state, state, body, end) for body, end in zip((first, second), ends, strict=True)]
-    turn = state.rotation[second] @ start.state.rotation[second].transpose(0, 2, 1)
-    apart = moved[0] - moved[1]
+        return section
+    then, second = start.section, bodies[parted, 1]
+    turn = _turn(start.state, state, second)
     frame = then.frame[parted] @ turn.transpose(0, 2, 1)
-    sheared = _across(frame[:, None, 0], apart - np.einsum("jab,jkb->jka", turn, ends[0] - ends[1]))
-    meant = np.arange(apart.shape[1]) < then.count[parted, None]
-    slide[parted] = np.where(meant, np.linalg.norm(sheared, axis=2), 0.0).max(axis=1)
-    old = replace(
-        then,
-        gap=_put(then.gap, parted, np.einsum("jki,ji->jk", apart, frame[:, 0])),
-        frame=_put(then.frame, parted, frame),
-        centroid=_put(
-            then.centroid, parted, _moved(start.state, state, second, then.centroid[parted, None])[:, 0]
-        ),
+    first_sides, second_sides = (
+        _moved(start.state, state, body, side)
+        for body, side in zip(bodies[parted].T, _sides(then, parted), strict=True)
     )
-    return _merged(section, old, parted), slide
+    gap = np.einsum("jki,ji->jk", first_sides - second_sides, frame[:, 0])
+    centroid = _moved(start.state, state, second, then.centroid[parted, None])[:, 0]
+    moved = replace(
+        then,
+        frame=_put(then.frame, parted, frame),
+        centroid=_put(then.centroid, parted, centroid),
+        gap=_put(then.gap, parted, gap),
+        # on the second stone
+        middle=_put(then.middle, parted, then.middle[parted] + 0.5 * (gap - then.gap[parted])),
+    )
+    return _merged(section, moved, parted)
+
+
+def _sides(section: Section, rows: Ints) -> tuple[Array, Array]:
+    """Corners (n, m, 3) of some sections on the faces of the first and of the second stones [m]."""
+    n = section.frame[rows, 0][:, None]
+    middle = section.centroid[rows, None] + np.einsum(
+        "jkd,jdi->jki", section.corner[rows], section.frame[rows, 1:]
+    )
+    return tuple(
+        middle + (section.middle[rows] + half * section.gap[rows])[..., None] * n for half in (0.5, -0.5)
+    )
+
+
+def _moved_apart(section: Section, start: State, state: State, bodies: Ints) -> tuple[Array, Array]:
+    """How far the two stones of each joint have parted since the start at its corners, at most: across it, along it.
+
+    As if they were rigid. Returns (nj,), not less than zero, and (nj,) [m].
+    """
+    sides = _sides(section, np.arange(len(bodies)))
+    then = [_moved(state, start, body, side) for body, side in zip(bodies.T, sides, strict=True)]
+    turn = _turn(start, state, bodies[:, 1])
+    parted = sides[0] - sides[1] - np.einsum("jab,jkb->jka", turn, then[0] - then[1])
+    n = section.frame[:, None, 0]
+    opened = np.einsum("jki,jni->jk", parted, n)
+    return _at_most(section, opened), _at_most(section, np.linalg.norm(_across(n, parted), axis=2))
+
+
+def _turn(start: State, state: State, body: Ints) -> Array:
+    """(n, 3, 3) by how much bodies have turned since the start."""
+    turn: Array = state.rotation[body] @ start.rotation[body].transpose(0, 2, 1)
+    return turn
 
 
 def _moved(start: State, state: State, body: Ints, point: Array) -> Array:
-    """Where places (n, k, 3) of bodies (n,) at the start are now, if these are rigid."""
-    turn = state.rotation[body] @ start.rotation[body].transpose(0, 2, 1)
+    """Where places (n, k, 3) of bodies (n,) at the start are at a state, if these are rigid."""
     moved: Array = state.centre[body, None] + np.einsum(
-        "jab,jkb->jka", turn, point - start.centre[body, None]
+        "jab,jkb->jka", _turn(start, state, body), point - start.centre[body, None]
     )
     return moved
 
@@ -194,28 +240,17 @@ def _put(values: Array, rows: Ints, new: Array) -> Array:
     return changed
 
 
-def _turned(start: State, state: State, body: Ints, vector: Array) -> Array:
-    """Vectors (n, 3) fixed to bodies (n,), as these have turned since the start."""
-    local = np.einsum("nba,nb->na", start.rotation[body], vector)
-    turned: Array = np.einsum("nab,nb->na", state.rotation[body], local)
-    return turned
-
-
 def _across(normal: Array, vector: Array) -> Array:
     """The part of vectors (…, 3) at right angles to unit normals."""
     across: Array = vector - np.sum(vector * normal, axis=-1, keepdims=True) * normal
     return across
 
 
-def _widest(section: Section) -> Array:
-    """(nj,) largest gap at a corner, not less than zero [m]."""
-    meant = np.arange(section.gap.shape[1]) < section.count[:, None]
-    widest: Array = np.where(meant, section.gap, 0.0).max(axis=1, initial=0.0)
-    return widest
-
-
-def _idle(status: NDArray[np.str_]) -> NDArray[np.bool_]:
-    return np.isin(status, ("open", "broken"))
+def _at_most(section: Section, values: Array) -> Array:
+    """Largest of the values (nj, m) at the corners of each joint, not less than zero."""
+    meant = np.arange(values.shape[1]) < section.count[:, None]
+    largest: Array = np.where(meant, values, 0.0).max(axis=1, initial=0.0)
+    return largest
 
 
 def _share(joint: Ints, area: Array, chosen: NDArray[np.bool_], count: int) -> Array:

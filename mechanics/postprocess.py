@@ -17,7 +17,7 @@ from mechanics.elasticity import (
     von_mises,
 )
 from mechanics.interfaces import Faces, Interfaces, find_interfaces, placed_faces
-from mechanics.joints import StartingJoints, joint_results, slides, starting_joints
+from mechanics.joints import StartingJoints, joint_results, parting, starting_joints
 from mechanics.laws.status import contact_status
 from mechanics.model import Model
 from mechanics.result import BodyResult, ContactResult, Frame, JointResult
@@ -117,6 +117,7 @@ class Observer:
 
     def _contacts(self, step: Step, interfaces: Interfaces) -> ContactResult:
         contacts, normal = step.contacts, step.contacts.frame[:, 0]
+        opening, slide = parting(contacts, self._start, step.after)
         pressing = np.einsum("ci,ci->c", step.force, normal)
         with np.errstate(divide="ignore", invalid="ignore"):
             pressure = np.where(contacts.area > 0, pressing / contacts.area, np.nan)
@@ -128,7 +129,8 @@ class Observer:
             gap=step.gap,
             area=contacts.area,
             pressure=pressure,
-            slide=np.linalg.norm(slides(contacts, self._start, step.after), axis=1),
+            opening=opening,
+            slide=np.linalg.norm(slide, axis=1),
             status=contact_status(step.internal, step.terms, step.solution.impulse),
             joint=interfaces.joint,
         )
@@ -201,6 +203,7 @@ def _no_contacts() -> ContactResult:
         gap=none,
         area=none,
         pressure=none,
+        opening=none,
         slide=none,
         status=np.zeros(0, dtype=np.str_),
         joint=np.zeros(0, dtype=np.int64),

@@ -116,7 +116,8 @@ class ContactResult:
     gap : (nc,) [m]
     area : (nc,) tributary area; zero between edges [m²]
     pressure : (nc,) normal force over area; NaN between edges [Pa]
-    slide : (nc,) how far its two material points have parted across the normal since the start [m]
+    opening : (nc,) how much its gap has grown since the start [m]
+    slide : (nc,) how far its two material points have moved along each other since the start [m]
     status : (nc,) "open", "stick", "slip", "bonded" or "broken"
     joint : (nc,) the joint that it belongs to; -1: none, as between edges
     """
@@ -128,6 +129,7 @@ class ContactResult:
     gap: Array
     area: Array
     pressure: Array
+    opening: Array
     slide: Array
     status: NDArray[np.str_]
     joint: Ints
@@ -156,7 +158,8 @@ class JointResult:
     edge : (nj,) how far out the centre of pressure lies: 0 at the centroid, 1 at the edge; NaN without compression [-]
     pressure_mean : (nj,) compression over area; negative: tension [Pa]
     pressure_max : (nj,) largest of a contact point [Pa]
-    opening : (nj,) largest gap [m]
+    gap : (nj,) largest gap, not less than zero [m]
+    opening : (nj,) by how much the gap has grown since the start, at most; of joints found later, their gap [m]
     sliding : (nj,) largest slide of a contact point since the start [m]
     slipping, open : (nj,) part of the area of the watched contact points that slips, or that bears nothing [-]
     friction_use : (nj,) shear force over what friction and cohesion can bear; NaN where that is nothing [-]
@@ -177,6 +180,7 @@ class JointResult:
     edge: Array
     pressure_mean: Array
     pressure_max: Array
+    gap: Array
     opening: Array
     sliding: Array
     slipping: Array

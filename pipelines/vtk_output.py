@@ -147,7 +147,7 @@ def _stresses(result: Result, frame: Frame) -> dict[str, Array]:
 
 
 def contact_grid(contacts: ContactResult) -> Grid:
-    """Contact points: force [N], pressure [Pa], normal, gap and slide [m], area [m²], status, bodies, joint."""
+    """Contact points: force [N], pressure [Pa], normal, gap, opening, slide [m], area [m²], status, bodies, joint."""
     count = len(contacts.gap)
     status = np.array([STATUSES.index(str(one)) for one in contacts.status], dtype=np.int64)
     return Grid(
@@ -158,6 +158,7 @@ def contact_grid(contacts: ContactResult) -> Grid:
             "pressure": contacts.pressure,
             "normal": contacts.normal,
             "gap": contacts.gap,
+            "opening": contacts.opening,
             "slide": contacts.slide,
             "area": contacts.area,
             "status": status,
@@ -203,6 +204,7 @@ _JOINT_ARRAYS = (
     "edge",
     "pressure_mean",
     "pressure_max",
+    "gap",
     "opening",
     "sliding",
     "slipping",

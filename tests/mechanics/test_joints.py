@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mechanics.joints import slides
+from mechanics.joints import parting
 from mechanics.model import build_model
 from mechanics.scene import Fidelity, Part
 from mechanics.simulate import simulate
@@ -128,7 +128,8 @@ def test_a_toppling_block_opens_its_joint_and_leans_on_its_edge():
     turn = np.arcsin((position[0, 2] - position[1, 2]) / width)
     assert np.radians(0.5) < turn < np.radians(30)
     joints = result.joints
-    assert joints.opening[0] == pytest.approx(2 * width * np.sin(turn / 2), rel=1e-5)
+    assert joints.gap[0] == pytest.approx(2 * width * np.sin(turn / 2), rel=1e-5)
+    assert joints.opening[0] == pytest.approx(joints.gap[0], rel=1e-3)
     assert joints.edge[0] == pytest.approx(1.0, abs=1e-3)
     assert joints.kern[0] == pytest.approx(3.0, rel=5e-3)
     assert not joints.in_kern[0]
@@ -169,17 +170,31 @@ def test_a_joint_that_is_found_later_comes_after_those_of_the_start():
     assert all((frame.contacts.joint < 2).all() for frame in result.frames)
 
 
+def test_a_gap_that_was_there_at_the_start_is_no_opening():
+    """Two stones on the ground, 4 mm apart."""
+    one = scene(
+        ground(), brick("a", (0, 0, 0), (0.5, 0.5, 0.5)), brick("b", (0.504, 0, 0), (1, 0.5, 0.5)), step=0.01
+    )
+    result = simulate(one)
+    between_them = between(result, "a", "b")
+    assert result.joints.gap[between_them] == pytest.approx(0.004)
+    assert result.joints.opening == pytest.approx(0.0, abs=1e-7)
+    assert result.joints.open[between_them] == 1.0
+
+
 def test_stones_that_turn_together_do_not_slide():
     _, start, contacts = detected(scene(ground(), brick("a", (0, 0, 0), (1, 1, 1))))
     turn = Rotation.from_rotvec([0.4, -0.7, 1.1]).as_matrix()
     turned = replace(start, centre=start.centre @ turn.T + 3.0, rotation=turn @ start.rotation)
     there = replace(contacts, frame=contacts.frame @ turn.T)
-    assert slides(there, start, turned) == pytest.approx(0.0, abs=1e-12)
+    for still in parting(there, start, turned):
+        assert still == pytest.approx(0.0, abs=1e-12)
     pushed = turned.centre.copy()
     pushed[1] += turn @ [0.01, 0.0, 0.02]
-    slid = slides(there, start, replace(turned, centre=pushed)) @ turn
+    opening, slid = parting(there, start, replace(turned, centre=pushed))
     sign = np.where(contacts.bodies[:, :1] == 1, 1.0, -1.0)
-    np.testing.assert_allclose(sign * slid, np.tile([0.01, 0.0, 0.0], (len(slid), 1)), atol=1e-12)
+    np.testing.assert_allclose(sign * slid @ turn, np.tile([0.01, 0.0, 0.0], (len(slid), 1)), atol=1e-12)
+    assert opening == pytest.approx(0.02)
 
 
 def test_a_stone_of_two_parts_has_a_joint_for_each_face_that_touches():
