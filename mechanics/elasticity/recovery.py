@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
 from mechanics.elasticity.stress import SAMPLE_ORDER
+from mechanics.meshing.elements import Element
 from mechanics.meshing.mesh import SolidMesh
 from mechanics.meshing.shape_functions import integration
 
@@ -21,6 +22,8 @@ _UNSEEN = 0.03
 _AMPLIFIED = 6.0
 # weights (_FLAT + d²/d̄²)^-power fall with the distance d from the patch's corner, d̄² its mean square
 _FLAT, _POWER = 0.1, {1: 1.0, 2: 1.5}
+# on the surface a patch takes in the cells that share so many corners with its own; one where nothing is said
+_SHARED = {Element.HEX20: 4, Element.HEX27: 4}
 # so many patches are fitted at once
 _AT_ONCE = 128
 
@@ -30,7 +33,7 @@ def recovery(mesh: SolidMesh) -> "csr_array[np.float64]":
 
     Around each corner of the cells a polynomial of the element's order is fitted by weighted least squares to the
     values at the sampling points of the cells that touch it; around a corner on the surface, also to those of the cells
-    that touch these, as a patch on one side of a point says little of its value. Terms that a patch does not see are
+    beside these, as a patch on one side of a point says little of its value. Terms that a patch does not see are
     left out, the quadratic ones first: constants are always exact. A middle node has the mean of the values that the
     polynomials of its corners give there.
     """
@@ -38,8 +41,7 @@ def recovery(mesh: SolidMesh) -> "csr_array[np.float64]":
     rule = integration(mesh.element, mesh.nodes, mesh.cells, SAMPLE_ORDER[mesh.element])
     spread = _spread(mesh)
     outside = np.isin(patches.corner, mesh.facets)
-    wider = (patches.cells @ patches.cells.T) @ patches.cells
-    wider.data[:] = 1.0
+    wider = _widened(patches.cells, _SHARED.get(mesh.element, 1))
     parts = []
     for chosen, cells in ((np.flatnonzero(~outside), patches.cells), (np.flatnonzero(outside), wider)):
         # those of about the same size together
@@ -90,6 +92,16 @@ def _patches(mesh: SolidMesh) -> _Patches:
         (np.ones(len(pairs)), np.arange(len(pairs)), pointer), shape=(len(distinct), len(pairs))
     )
     return _Patches(distinct, touches, pairs % len(mesh.nodes), targets)
+
+
+def _widened(cells: "csr_array[np.float64]", shared: int) -> "csr_array[np.float64]":
+    """The patches with all cells that have so many corners in common with one of theirs."""
+    neighbours = csr_array(cells.T @ cells)
+    neighbours.data = (neighbours.data > shared - 0.5).astype(float)
+    neighbours.eliminate_zeros()
+    wider = csr_array(cells @ neighbours)
+    wider.data[:] = 1.0
+    return wider
 
 
 def _weights(
