@@ -3,10 +3,7 @@
 from collections.abc import Mapping
 
 from mechanics.laws.dry_joint import DryJoint
-from mechanics.materials import Material
-from mechanics.meshing.elements import Element
 from mechanics.scene import (
-    Block,
     ContactSettings,
     Fidelity,
     Method,
@@ -16,9 +13,10 @@ from mechanics.scene import (
     TimeSettings,
 )
 from pipelines.schema import Key, Kind
+from pipelines.stone_keys import MESH
 from survey.joint_lines import JointSettings
 
-__all__ = ["MATERIAL_KEYS", "MESH_KEYS", "ORTHOTROPY_KEYS", "PICTURES", "TABLES"]
+__all__ = ["PICTURES", "TABLES"]
 
 PICTURES = (
     "von_mises",
@@ -29,59 +27,6 @@ PICTURES = (
     "error",
     "pressure",
     "resultants",
-)
-
-MATERIAL_KEYS = (
-    Key("density", Kind.NUMBER, "Density ρ.", "kg/m³", above=0),
-    Key("young", Kind.NUMBER, "Young's modulus E; only deformable stones use it.", "Pa", above=0),
-    Key("poisson", Kind.NUMBER, "Poisson's ratio ν.", "-", at_least=0, below=0.5),
-    Key(
-        "mass_damping",
-        Kind.NUMBER,
-        "α of Rayleigh's damping V = α M + β K of deformable stones; it also slows their motion as a whole.",
-        "1/s",
-        Material.mass_damping,
-        at_least=0,
-    ),
-    Key(
-        "stiffness_damping",
-        Kind.NUMBER,
-        "β of Rayleigh's damping; it slows their deformation alone.",
-        "s",
-        Material.stiffness_damping,
-        at_least=0,
-    ),
-    Key("tensile_strength", Kind.NUMBER, "Tension that it bears; else no utilisation.", "Pa", None, above=0),
-    Key(
-        "compressive_strength",
-        Kind.NUMBER,
-        "Compression that it bears, positive; else no utilisation.",
-        "Pa",
-        None,
-        above=0,
-    ),
-    Key(
-        "stones",
-        Kind.TEXTS,
-        "Expressions; stones that satisfy any of them are of this material. "
-        "One material may leave this out: it is that of all other stones.",
-        default=(),
-    ),
-)
-
-ORTHOTROPY_KEYS = (
-    Key("young", Kind.VECTOR, "Young's moduli E₁, E₂, E₃ along three axes.", "Pa", above=0),
-    Key("shear", Kind.VECTOR, "Shear moduli G₁₂, G₂₃, G₃₁.", "Pa", above=0),
-    Key(
-        "poisson", Kind.VECTOR, "Ratios ν₁₂, ν₂₃, ν₃₁; ν_ij: contraction along j under a stress along i.", "-"
-    ),
-    Key(
-        "axes",
-        Kind.ROWS,
-        "The three axes, at right angles, as the scene begins; else x, y, z. Their lengths do not matter.",
-        "-",
-        None,
-    ),
 )
 
 _SCENE = (Key("name", Kind.TEXT, "Title of reports and pictures; else the file's name.", default=None),)
@@ -203,25 +148,6 @@ _CONTACT = (
 _GRAVITY = (
     Key("magnitude", Kind.NUMBER, "Acceleration of gravity.", "m/s²", 9.81, at_least=0),
     Key("direction", Kind.VECTOR, "Where things fall to; its length does not matter.", "-", (0.0, 0.0, -1.0)),
-)
-
-_ELEMENTS = tuple(one.value for one in Element)
-
-_MESH = (
-    Key("size", Kind.NUMBER, "Target edge length of the finite elements.", "m", 0.2, above=0),
-    Key(
-        "element",
-        Kind.TEXT,
-        "Their kind: tetrahedra (tet…) or hexahedra (hex…), of the first (tet4, hex8) or second order.",
-        default=Block.element.value,
-        choices=_ELEMENTS,
-    ),
-)
-
-MESH_KEYS = (
-    Key("stones", Kind.STONES, "Codes or expressions of the stones that are meshed otherwise."),
-    Key("size", Kind.NUMBER, "Target edge length; else that of `[mesh]`.", "m", None, above=0),
-    Key("element", Kind.TEXT, "Kind of element; else that of `[mesh]`.", default=None, choices=_ELEMENTS),
 )
 
 _TIME = (
@@ -347,7 +273,7 @@ TABLES: Mapping[str, tuple[Key, ...]] = {
     "joints": _JOINTS,
     "contact": _CONTACT,
     "gravity": _GRAVITY,
-    "mesh": _MESH,
+    "mesh": MESH,
     "time": _TIME,
     "solver": _SOLVER,
     "output": _OUTPUT,

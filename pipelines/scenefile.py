@@ -28,9 +28,10 @@ from moma.errors import SceneError
 from pipelines.entries import Entry, read_entries
 from pipelines.entry_keys import ARRAYS
 from pipelines.joint_laws import JointLaw, read_laws
-from pipelines.scene_keys import MATERIAL_KEYS, MESH_KEYS, ORTHOTROPY_KEYS, PICTURES, TABLES
+from pipelines.scene_keys import PICTURES, TABLES
 from pipelines.scene_loads import read_loads, read_throws
 from pipelines.schema import Document, check_table, nearest
+from pipelines.stone_keys import MATERIAL_KEYS, MESH_KEYS, ORTHOTROPY_KEYS
 from pipelines.toml_lines import key_lines
 from survey.joint_lines import JointSettings
 

@@ -20,8 +20,8 @@ from pipelines.check import check_scene
 from pipelines.entry_keys import LAW_KEYS, LAW_TYPES, LOAD_TYPES, THROW_KEYS
 from pipelines.ingest import ingest
 from pipelines.joint_laws import law_rules
-from pipelines.scene_keys import MESH_KEYS
 from pipelines.scenefile import parse_scene
+from pipelines.stone_keys import MESH_KEYS
 from pipelines.toml_lines import key_lines
 from tests.pipelines.test_scenefile import default_text, message_of
 

@@ -13,9 +13,10 @@ from mechanics.laws.dry_joint import DryJoint
 from mechanics.meshing.elements import Element
 from mechanics.scene import ContactSettings, Fidelity, SolverSettings, Start, TimeSettings
 from moma.errors import MomaError, SceneError
-from pipelines.scene_keys import MATERIAL_KEYS, ORTHOTROPY_KEYS, TABLES
+from pipelines.scene_keys import TABLES
 from pipelines.scenefile import MeshSettings, parse_scene, read_scene
 from pipelines.schema import REQUIRED
+from pipelines.stone_keys import MATERIAL_KEYS, ORTHOTROPY_KEYS
 from pipelines.toml_lines import key_lines
 from survey.joint_lines import JointSettings
 
