@@ -1,7 +1,7 @@
 """Linear elastic materials."""
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,27 +85,26 @@ class Material:
         if self.orthotropy is not None:
             _check_orthotropy(self.orthotropy, f"material {self.name!r}")
 
-    @property
+    @cached_property
     def stiffness(self) -> Array:
         """C (6, 6) of σ = C ε, order xx, yy, zz, xy, yz, zx, shear strains γ = 2ε, scene axes [Pa]; read-only."""
-        return _stiffness(self)
+        if self.orthotropy is None:
+            stiffness = _isotropic(self.young, self.poisson)
+        else:
+            own = np.linalg.inv(_compliance(self.orthotropy)).astype(np.float64)
+            stiffness = _turned(own, np.array(self.orthotropy.axes, dtype=float))
+        stiffness.flags.writeable = False
+        return stiffness
 
 
 def _unknown_or_positive(strength: float | None) -> bool:
     return strength is None or strength > 0
 
 
-@cache
-def _stiffness(material: Material) -> Array:
-    if material.orthotropy is not None:
-        own = np.linalg.inv(_compliance(material.orthotropy)).astype(np.float64)
-        stiffness = _turned(own, np.array(material.orthotropy.axes, dtype=float))
-    else:
-        lam = material.young * material.poisson / ((1 + material.poisson) * (1 - 2 * material.poisson))
-        shear = material.young / (2 * (1 + material.poisson))
-        stiffness = np.diag([2 * shear] * 3 + [shear] * 3)
-        stiffness[:3, :3] += lam
-    stiffness.flags.writeable = False
+def _isotropic(young: float, poisson: float) -> Array:
+    shear = young / (2 * (1 + poisson))
+    stiffness = np.diag([2 * shear] * 3 + [shear] * 3)
+    stiffness[:3, :3] += young * poisson / ((1 + poisson) * (1 - 2 * poisson))
     return stiffness
 
 
@@ -134,13 +133,14 @@ def _turned(stiffness: Array, axes: Array) -> Array:
 
 
 def _check_orthotropy(orthotropy: Orthotropy, where: str) -> None:
-    for quantity in ("young", "shear"):
-        if not min(getattr(orthotropy, quantity)) > 0:
-            raise SceneError(
-                f"orthotropy {quantity} = {getattr(orthotropy, quantity)!r}",
-                where=where,
-                remedy="give pascals greater than 0",
-            )
+    for quantity, least, remedy in (
+        ("young", 0.0, "give three values in pascals greater than 0"),
+        ("shear", 0.0, "give three values in pascals greater than 0"),
+        ("poisson", -np.inf, "give three ratios"),
+    ):
+        values = getattr(orthotropy, quantity)
+        if len(values) != 3 or not all(value > least for value in values):
+            raise SceneError(f"orthotropy {quantity} = {values!r}", where=where, remedy=remedy)
     axes = np.array(orthotropy.axes, dtype=float)
     if axes.shape != (3, 3) or not np.allclose(axes @ axes.T, np.eye(3), rtol=0, atol=_ORTHONORMAL):
         raise SceneError(

@@ -99,6 +99,8 @@ def test_stress_turns_with_the_axes_of_the_material():
     [
         ({"young": (1e9, 0.0, 1e9)}, "orthotropy young"),
         ({"shear": (1e9, 1e9, -1.0)}, "orthotropy shear"),
+        ({"young": (1e9, 1e9)}, "orthotropy young"),
+        ({"poisson": (0.2, 0.2, float("nan"))}, "orthotropy poisson"),
         ({"axes": ((1, 0, 0), (0, 1, 0), (0, 0.1, 1))}, "orthotropy axes"),
         ({"poisson": (0.9, 0.9, 0.9)}, "orthotropy poisson"),
         # ν₁₂ < √(E₁/E₂) bounds each ratio
