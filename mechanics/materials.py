@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from moma.errors import SceneError
 
-__all__ = ["Material", "Orthotropy"]
+__all__ = ["Material", "Orthotropy", "fourth_order"]
 
 Array = NDArray[np.float64]
 
@@ -117,16 +117,16 @@ def _compliance(orthotropy: Orthotropy) -> Array:
     return compliance
 
 
+def fourth_order(stiffness: Array) -> Array:
+    """The tensor c_ijkl (3, 3, 3, 3) of a matrix C (6, 6), order xx, yy, zz, xy, yz, zx."""
+    number = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
+    tensor: Array = stiffness[number[:, :, None, None], number]
+    return tensor
+
+
 def _turned(stiffness: Array, axes: Array) -> Array:
     """The matrix C in the axes in which the rows of `axes` are given."""
-    tensor = np.zeros((3, 3, 3, 3))
-    for p in range(6):
-        for q in range(6):
-            i, j, k, m = _FIRST[p], _SECOND[p], _FIRST[q], _SECOND[q]
-            tensor[i, j, k, m] = tensor[j, i, k, m] = tensor[i, j, m, k] = tensor[j, i, m, k] = stiffness[
-                p, q
-            ]
-    turned = np.einsum("ijkl,ia,jb,kc,ld->abcd", tensor, axes, axes, axes, axes)
+    turned = np.einsum("ijkl,ia,jb,kc,ld->abcd", fourth_order(stiffness), axes, axes, axes, axes)
     voigt = turned[_FIRST, _SECOND][:, _FIRST, _SECOND]
     result: Array = 0.5 * (voigt + voigt.T)
     return result

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array, coo_array, csc_array, dia_array
 
-from mechanics.materials import Material
+from mechanics.materials import Material, fourth_order
 from mechanics.meshing.elements import Element
 from mechanics.meshing.mesh import SolidMesh
 from mechanics.meshing.shape_functions import Integration, integration
@@ -25,9 +25,6 @@ STIFFNESS_ORDER = {
     Element.HEX27: 5,
 }
 MASS_ORDER = {Element.TET4: 2, Element.TET10: 4, Element.HEX8: 5, Element.HEX20: 7, Element.HEX27: 7}
-
-# tensor components of the six stresses, order xx, yy, zz, xy, yz, zx
-_FIRST, _SECOND = (0, 1, 2, 0, 1, 2), (0, 1, 2, 1, 2, 0)
 
 
 @dataclass(frozen=True)
@@ -81,12 +78,7 @@ def _stiffness(mesh: SolidMesh, material: Material) -> "csc_array[np.float64]":
     """K_{ai,bj} = c_{ikjl} ∫ ∂_k N_a ∂_l N_b."""
     rule = integration(mesh.element, mesh.nodes, mesh.cells, STIFFNESS_ORDER[mesh.element])
     cells, k = len(mesh.cells), mesh.element.cell_nodes
-    tensor = np.zeros((3, 3, 3, 3))  # as [k, l, i, j]
-    for p in range(6):
-        for q in range(6):
-            for i, m in {(_FIRST[p], _SECOND[p]), (_SECOND[p], _FIRST[p])}:
-                for j, n in {(_FIRST[q], _SECOND[q]), (_SECOND[q], _FIRST[q])}:
-                    tensor[m, n, i, j] = material.stiffness[p, q]
+    tensor = fourth_order(material.stiffness).transpose(1, 3, 0, 2)  # as [k, l, i, j]
     pairs = _gradient_products(rule).reshape(cells, k, 3, k, 3).transpose(0, 1, 3, 2, 4)
     blocks = (pairs.reshape(-1, 9) @ tensor.reshape(9, 9)).reshape(cells, k, k, 3, 3)
     return _assembled(mesh, 0.5 * (blocks + blocks.transpose(0, 2, 1, 4, 3)))
@@ -94,10 +86,7 @@ def _stiffness(mesh: SolidMesh, material: Material) -> "csc_array[np.float64]":
 
 def _gradient_products(rule: Integration) -> Array:
     """(nc, 3k, 3k) of ∫ ∂_k N_a ∂_l N_b."""
-    cells, points = rule.volume.shape
-    gradient = np.broadcast_to(rule.gradient, (cells, points, *rule.gradient.shape[2:])).reshape(
-        cells, points, -1
-    )
+    gradient = rule.gradient.reshape(*rule.volume.shape, -1)
     products: Array = gradient.transpose(0, 2, 1) @ (rule.volume[:, :, None] * gradient)
     return products
 
