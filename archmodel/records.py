@@ -21,7 +21,7 @@ STONE_VALUES: Mapping[str, tuple[str, str]] = {
     "utilisation_tension": ("-", "largest tension over the tensile strength"),
     "utilisation_compression": ("-", "largest compression over the compressive strength"),
     "stress_error": ("-", "estimated relative error of its stress"),
-    "joint_pressure": ("Pa", "largest pressure of a contact point in its joints"),
+    "joint_pressure": ("Pa", "largest pressure in its joints"),
     "joint_kern": ("-", "largest of its joints: up to 1, the resultant is within the kern"),
     "joint_opening": ("m", "largest opening of its joints"),
     "joint_sliding": ("m", "largest sliding in its joints since the start"),

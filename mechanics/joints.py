@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechanics.contact.contacts import Contacts, material_points
+from mechanics.contact_patches import patch_pressure
 from mechanics.interfaces import Faces, find_interfaces, placed_faces
 from mechanics.joint_sections import Section, eccentricity, sections
 from mechanics.model import Model
@@ -101,7 +102,7 @@ def joint_results(
         kern=kern,
         edge=edge,
         pressure_mean=_ratio(np.einsum("ji,ji->j", force, n), section.area),
-        pressure_max=_largest(joint, contacts.pressure[own], count),
+        pressure_max=_largest(joint, _patches(contacts, own), count),
         gap=np.maximum(_at_most(section, section.gap), _largest(joint, contacts.gap[own], count)),
         opening=opening,
         sliding=sliding,
@@ -136,6 +137,12 @@ def _resultants(section: Section, bodies: Ints, contacts: ContactResult, own: In
     return _sums(joint, force, count), _sums(
         joint, np.cross(contacts.point[own] - section.centroid[joint], force), count
     )
+
+
+def _patches(contacts: ContactResult, own: Ints) -> Array:
+    """(n,) pressure around each contact point of a joint [Pa]."""
+    area = contacts.area[own]
+    return patch_pressure(contacts.point[own], contacts.pressure[own] * area, area, contacts.joint[own])
 
 
 def _bearing(model: Model, step: Step) -> Array:

@@ -157,7 +157,7 @@ class JointResult:
         within the kern; NaN without compression [-]
     edge : (nj,) how far out the centre of pressure lies: 0 at the centroid, 1 at the edge; NaN without compression [-]
     pressure_mean : (nj,) compression over area; negative: tension [Pa]
-    pressure_max : (nj,) largest of a contact point [Pa]
+    pressure_max : (nj,) largest around a contact point, as mechanics.contact_patches has it [Pa]
     gap : (nj,) largest gap, not less than zero [m]
     opening : (nj,) by how much the gap has grown since the start, at most; of joints found later, their gap [m]
     sliding : (nj,) largest slide of a contact point since the start [m]

@@ -24,7 +24,7 @@ JOINT_COLUMNS: Mapping[str, str] = {
     "kern": "up to 1: within the kern; empty without compression [-]",
     "edge": "0: at the centroid, 1: at the edge of the joint; empty without compression [-]",
     "pressure_mean": "[Pa]",
-    "pressure_max": "largest of a contact point [Pa]",
+    "pressure_max": "largest of the contact points, each with its neighbours [Pa]",
     "gap": "largest gap [m]",
     "opening": "by how much the gap has grown since the start, at most [m]",
     "sliding": "largest, since the start [m]",

@@ -50,7 +50,10 @@ def test_eccentric_blocks_press_where_their_weights_are(fidelity):
     assert joints.in_kern[[lower, upper]].tolist() == [True, False]
     assert joints.centre_of_pressure[upper] == pytest.approx([a + 0.5, 0.5, 0.5], abs=2e-3)
     assert joints.pressure_mean[[lower, upper]] == pytest.approx([2 * weight, weight / 0.7], rel=2e-3)
-    assert (joints.pressure_max >= joints.pressure_mean).all()
+    # a linear pressure would reach 1 + kern times the mean; bearing on corners, it is more
+    largest = joints.pressure_mean * (1 + joints.kern)
+    assert (joints.pressure_max > joints.pressure_mean).all()
+    assert (joints.pressure_max < 1.6 * largest).all()
     assert joints.sliding.max() < 1e-6
     assert not joints.parted.any()
     own = result.contacts.joint >= 0

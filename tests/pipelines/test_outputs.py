@@ -171,6 +171,17 @@ def test_vtk_reads_the_files_as_closed_stones_contacts_and_joints(mixed, tmp_pat
     assert joints.cell_centers().points[:, 2] == pytest.approx([1.0, 2.998])
 
 
+def test_a_series_has_every_field_at_every_time(mixed, tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    write_frames(mixed, tmp_path)
+    for name, fields in (("results", {"stress", "velocity"}), ("contacts", {"force", "joint"})):
+        reader = pyvista.get_reader(tmp_path / f"{name}.pvd")
+        assert reader.time_values == [0.0, 0.1]
+        for time in reader.time_values:
+            reader.set_active_time_value(time)
+            assert fields <= set(reader.read()[0].array_names)
+
+
 def test_vtk_finds_the_units(mixed, tmp_path):
     vtk = pytest.importorskip("vtkmodules.all")
     write_frames(mixed, tmp_path)

@@ -9,6 +9,7 @@ import pytest
 
 from archmodel.database import open_database
 from archmodel.query import describe, find_rows
+from archmodel.records import STONE_VALUES
 from mechanics.result import Outcome
 from mechanics.scene import Fidelity
 from moma.errors import MissingLibraryError, SceneError, UsageError
@@ -161,15 +162,33 @@ def test_a_run_writes_its_folder_and_keeps_its_results(tmp_path):
     )
     with open_database(url, create=False) as database, database.session(read_only=True) as session:
         rows = find_rows(session, "entity", ["von_mises_max > 0"])
+        worst = find_rows(session, "entity", ["stress_error > 0 and principal_compression < 0"])
+        bearing = find_rows(session, "entity", ["joint_pressure > 1000", "joint_kern < 3"])
         (run,) = describe(session, "W02-02")["runs"]
         assert len(find_rows(session, "entity", ["fidelity = fixed"])) == summary["bodies"]["fixed"]
-    assert [row["code"] for row in rows] == ["W02-02"]
+    assert [row["code"] for row in rows] == [row["code"] for row in worst] == ["W02-02"]
+    assert 0 < rows[0]["stress_error"] < 1
+    assert rows[0]["utilisation"] is None  # no strengths
+    assert {"W02-02", "W01-03"} <= {row["code"] for row in bearing}
+    assert set(run["values"]) <= {*STONE_VALUES, "volume", "mass"}
+    assert summary["stress"]["error"]["stone"] == "W02-02"
+    assert summary["joints"]["count"] >= summary["joints"]["pressed"] > 8
     assert run["scene"] == "Two courses"
     assert rows[0]["von_mises_max"] == pytest.approx(summary["von_mises"]["max"])
     # once more, in the place of the first
     again = run_scene(tmp_path / "low.toml", url, tmp_path / "out")
     assert again.run > done.run
     assert again.summary["von_mises"] == done.summary["von_mises"]
+
+
+def test_a_picture_that_shows_nothing_is_a_warning(tmp_path):
+    url = f"sqlite:///{tmp_path / 'own.db'}"
+    ingest([SURVEY], url)
+    text = LOW.replace('deformable = ["W02-02"]\n', "") + '[output]\npictures = ["error", "resultants"]\n'
+    (tmp_path / "low.toml").write_text(text, encoding="utf-8")
+    done = run_scene(tmp_path / "low.toml", url, tmp_path / "out")
+    assert done.warnings == ("no picture error: no stone deforms",)
+    assert [name for name in done.summary["files"] if name.endswith(".png")] == ["resultants.png"]
 
 
 def test_without_pictures_the_rest_is_written_and_a_warning_says_what_to_install(tmp_path, monkeypatch):
