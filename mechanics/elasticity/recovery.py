@@ -25,7 +25,7 @@ _FLAT, _POWER = 0.1, {1: 1.0, 2: 1.5}
 # on the surface a patch takes in the cells that share so many corners with its own; one where nothing is said
 _SHARED = {Element.HEX20: 4, Element.HEX27: 4}
 # so many patches are fitted at once
-_AT_ONCE = 128
+_AT_ONCE = 64
 
 
 def recovery(mesh: SolidMesh) -> "csr_array[np.float64]":
@@ -165,18 +165,22 @@ def _fit(
     stretch = _inverse_root(variance + size, 0.0)
     stretch = stretch @ _inverse_root(stretch.transpose(0, 2, 1) @ variance @ stretch, _UNSEEN)
     y, z = local @ stretch, (target - mean) @ stretch
-    weighted = (part * y).transpose(0, 2, 1)
-    linear: Array = part.transpose(0, 2, 1) + z @ weighted
-    if order == 1:
-        return linear
-    # what the squares and products have beyond the constant and linear polynomials
-    squares, aim = _squares(y), _squares(z)
-    level, slope = (part * squares).sum(axis=1, keepdims=True), weighted @ squares
-    rest, aim = squares - level - y @ slope, aim - level - z @ slope
-    root = _inverse_root(rest.transpose(0, 2, 1) @ (part * rest), _UNSEEN)
-    full = linear + aim @ root @ root.transpose(0, 2, 1) @ (part * rest).transpose(0, 2, 1)
-    result: Array = np.where(np.abs(full).sum(axis=2, keepdims=True) > _AMPLIFIED, linear, full)
-    return result
+    fitted, wanted = [part, part * y], [np.ones((*z.shape[:2], 1)), z]
+    if order == 2:
+        # what the squares and products have beyond the constant and linear polynomials
+        squares, aim = _squares(y), _squares(z)
+        level, slope = (part * squares).sum(axis=1, keepdims=True), fitted[1].transpose(0, 2, 1) @ squares
+        rest, aim = squares - level - y @ slope, aim - level - z @ slope
+        root = _inverse_root(rest.transpose(0, 2, 1) @ (part * rest), _UNSEEN)
+        fitted.append((part * rest) @ root)
+        wanted.append(aim @ root)
+    columns, rows = np.concatenate(fitted, axis=2).transpose(0, 2, 1), np.concatenate(wanted, axis=2)
+    weights: Array = rows @ columns
+    amplified = np.abs(weights).sum(axis=2) > _AMPLIFIED
+    if order == 2 and amplified.any():
+        rows[amplified, 4:] = 0.0
+        weights = rows @ columns
+    return weights
 
 
 def _squares(y: Array) -> Array:
