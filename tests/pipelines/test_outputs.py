@@ -4,6 +4,7 @@ import base64
 import json
 import struct
 import xml.etree.ElementTree as ElementTree
+import zlib
 from dataclasses import replace
 from html.parser import HTMLParser
 
@@ -115,12 +116,14 @@ def test_without_deformable_stones_there_is_no_stress(rigid):
 
 
 def read_array(node):
-    """Values of a binary DataArray, decoded from the format's description."""
-    content = base64.b64decode(node.text)
-    (length,) = struct.unpack("<Q", content[:8])
-    assert length == len(content) - 8
-    kind = {"Float64": "<f8", "Int64": "<i8", "UInt8": "<u1"}[node.get("type")]
-    return np.frombuffer(content[8:], kind).reshape(-1, int(node.get("NumberOfComponents", 1))).squeeze()
+    """Values of a compressed DataArray, decoded from the format's description."""
+    blocks, size, _, packed = struct.unpack("<4Q", base64.b64decode(node.text[:44]))
+    content = zlib.decompress(base64.b64decode(node.text[44:]))
+    assert blocks == 1
+    assert len(content) == size
+    assert len(base64.b64decode(node.text[44:])) == packed
+    kind = {"Float64": "<f8", "Float32": "<f4", "Int64": "<i8", "UInt8": "<u1"}[node.get("type")]
+    return np.frombuffer(content, kind).reshape(-1, int(node.get("NumberOfComponents", 1))).squeeze()
 
 
 def test_paraview_files_hold_every_stone_and_each_frame_its_stress(mixed, tmp_path):
