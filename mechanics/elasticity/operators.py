@@ -1,6 +1,8 @@
 """Mass and stiffness of one stone."""
 
 from dataclasses import dataclass
+from functools import reduce
+from operator import add
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +27,8 @@ STIFFNESS_ORDER = {
     Element.HEX27: 5,
 }
 MASS_ORDER = {Element.TET4: 2, Element.TET10: 4, Element.HEX8: 5, Element.HEX20: 7, Element.HEX27: 7}
+# the blocks of so many pairs of nodes take some hundred megabytes at once
+_PAIRS_AT_ONCE = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -60,7 +64,7 @@ def elastic_operators(mesh: SolidMesh, material: Material, lumped: bool = False)
         diagonal = np.repeat(_gather(mesh, _on_diagonal(consistent.reshape(-1, k, k))), 3)
         mass = csc_array(dia_array((diagonal[None], [0]), shape=(3 * size, 3 * size)))
     else:
-        mass = _in_three_directions(_assembled(mesh, consistent.reshape(-1, k, k, 1, 1)))
+        mass = _in_three_directions(_assembled(mesh.cells, size, consistent.reshape(-1, k, k, 1, 1)))
     return ElasticOperators(mass, _stiffness(mesh, material), nodal_mass)
 
 
@@ -76,12 +80,17 @@ def node_volumes(mesh: SolidMesh) -> Array:
 
 def _stiffness(mesh: SolidMesh, material: Material) -> "csc_array[np.float64]":
     """K_{ai,bj} = c_{ikjl} ∫ ∂_k N_a ∂_l N_b."""
-    rule = integration(mesh.element, mesh.nodes, mesh.cells, STIFFNESS_ORDER[mesh.element])
-    cells, k = len(mesh.cells), mesh.element.cell_nodes
-    tensor = fourth_order(material.stiffness).transpose(1, 3, 0, 2)  # as [k, l, i, j]
-    pairs = _gradient_products(rule).reshape(cells, k, 3, k, 3).transpose(0, 1, 3, 2, 4)
-    blocks = (pairs.reshape(-1, 9) @ tensor.reshape(9, 9)).reshape(cells, k, k, 3, 3)
-    return _assembled(mesh, 0.5 * (blocks + blocks.transpose(0, 2, 1, 4, 3)))
+    tensor = fourth_order(material.stiffness).transpose(1, 3, 0, 2).reshape(9, 9)  # as [k, l, i, j]
+    k, parts = mesh.element.cell_nodes, []
+    at_once = _PAIRS_AT_ONCE // k**2
+    for start in range(0, len(mesh.cells), at_once):
+        cells = mesh.cells[start : start + at_once]
+        rule = integration(mesh.element, mesh.nodes, cells, STIFFNESS_ORDER[mesh.element])
+        pairs = _gradient_products(rule).reshape(-1, k, 3, k, 3).transpose(0, 1, 3, 2, 4)
+        blocks = (pairs.reshape(-1, 9) @ tensor).reshape(-1, k, k, 3, 3)
+        blocks = 0.5 * (blocks + blocks.transpose(0, 2, 1, 4, 3))
+        parts.append(_assembled(cells, len(mesh.nodes), blocks))
+    return csc_array(reduce(add, parts))
 
 
 def _gradient_products(rule: Integration) -> Array:
@@ -111,10 +120,10 @@ def _gather(mesh: SolidMesh, values: Array) -> Array:
     return sums
 
 
-def _assembled(mesh: SolidMesh, blocks: Array) -> "csc_array[np.float64]":
+def _assembled(cells: NDArray[np.int64], size: int, blocks: Array) -> "csc_array[np.float64]":
     """Sum the blocks (nc, k, k, b, b) of pairs of nodes; symmetric to the last bit, if those of the cells are."""
-    k, size, width = mesh.element.cell_nodes, len(mesh.nodes), blocks.shape[-1]
-    pair = (np.repeat(mesh.cells, k, axis=1) * size + np.tile(mesh.cells, (1, k))).ravel()
+    k, width = cells.shape[1], blocks.shape[-1]
+    pair = (np.repeat(cells, k, axis=1) * size + np.tile(cells, (1, k))).ravel()
     order = np.argsort(pair, kind="stable")  # so both sums of a symmetric pair have the order of the cells
     pair = pair[order]
     first = np.flatnonzero(np.concatenate([[True], pair[1:] != pair[:-1]]))

@@ -154,3 +154,15 @@ def test_estimate_of_the_error_is_the_distance_of_two_stresses_in_the_energy_nor
     )
     nothing = np.zeros_like(displacement)
     assert stress_error(mesh, BEDDED, nothing, np.zeros((len(nothing), 6))) == 0.0
+
+
+@EACH
+def test_large_stones_are_assembled_in_parts(element, monkeypatch):
+    mesh = leaning(element)
+    whole = elastic_operators(mesh, BEDDED).stiffness
+    assert len(mesh.cells) >= 4
+    monkeypatch.setattr("mechanics.elasticity.operators._PAIRS_AT_ONCE", 3 * element.cell_nodes**2)
+    parts = elastic_operators(mesh, BEDDED).stiffness
+    assert abs(whole - parts).max() < 1e-14 * abs(whole).max()
+    for matrix in (whole, parts):
+        assert abs(matrix - matrix.T).max() == 0.0
