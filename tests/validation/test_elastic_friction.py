@@ -16,8 +16,8 @@ from mechanics.scene import ContactSettings, LawRule, Scene, SolverSettings, Tim
 from mechanics.simulate import simulate
 
 # μq = 2 kN/m and P = 0.4 m · μq, in the proportions of F15: q = ρ g A
-LENGTH, SIDE, FRICTION, YOUNG = 1.0, 0.04, 0.5, 1e9
-AREA = SIDE**2
+LENGTH, SIDE, THICK, FRICTION, YOUNG = 1.0, 0.04, 0.02, 0.5, 1e9
+AREA = SIDE * THICK
 WEIGHT = 4000.0
 BAR = Material("bar", density=WEIGHT / (G * AREA), young=YOUNG, poisson=0.0)
 # as light as it can be: it only takes the pull
@@ -26,20 +26,18 @@ PULL = 0.4 * FRICTION * WEIGHT
 
 
 def pulled(times, parts, duration, size=SIDE):
-    """The bar lies on the ground, its end at x = 0 is bonded to a rigid head that is pulled along -x, low down."""
+    """The bar lies on the ground, its end at x = 0 is bonded to a rigid head in the air that is pulled along -x."""
     half = SIDE / 2
     blocks = (
         ground(half=2.0),
-        elastic_box("bar", [0.0, -half, 0.0], [LENGTH, half, SIDE], BAR, size),
-        box("head", [-SIDE, -half, 0.0], [0.0, half, SIDE], HEAD),
+        elastic_box("bar", [0.0, -half, 0.0], [LENGTH, half, THICK], BAR, size),
+        box("head", [-SIDE, -half, THICK / 4], [0.0, half, THICK], HEAD),
     )
-    rules = (
-        LawRule(frozenset({"bar"}), frozenset({"head"}), MortarJoint(0.6, 4 * PULL / AREA, 4 * PULL / AREA)),
-        LawRule(frozenset({"ground"}), frozenset({"head"}), DryJoint(0.0)),
-    )
-    force = StoneForce(
-        frozenset({"head"}), History(times, np.outer(np.array(parts) * PULL, [-1.0, 0.0, 0.0]))
-    )
+    glue = MortarJoint(0.6, 16 * PULL / AREA, 16 * PULL / AREA)
+    rules = (LawRule(frozenset({"bar"}), frozenset({"head"}), glue),)
+    # in the plane of the foundation, so that it does not tip the bar
+    history = History(times, np.outer(np.array(parts) * PULL, [-1.0, 0.0, 0.0]))
+    force = StoneForce(frozenset({"head"}), history, arm=(0.0, 0.0, -5 / 8 * THICK))
     scene = Scene(
         "pull",
         blocks,
@@ -67,14 +65,11 @@ def mobilised(result):
     x, _ = sections(result)
     at = np.abs(point[:, :1] - x).argmin(axis=1)
     along, up = (np.bincount(at, force[:, k], len(x)) for k in (0, 2))
-    return along / up
+    return np.divide(along, up, out=np.zeros_like(up), where=up > 0)
 
 
 def test_slip_reaches_as_far_as_friction_holds_the_pull():
-    """u = P²/(2EAμq) (1 - x/l)² up to l = P/μq = 0.4 m, at rest beyond: u₀ within 3 %, slip length within an element.
-
-    The pull acts at the middle of the section, friction at its foot: the bar is thin, and q keeps it down.
-    """
+    """u = P²/(2EAμq) (1 - x/l)² up to l = P/μq = 0.4 m, at rest beyond: u₀ and slip length within 3 %."""
     result = pulled([0.0, 0.4, 1.4], [0.0, 0.0, 1.0], 1.6)
     x, u = sections(result)
     reach, end = PULL / (FRICTION * WEIGHT), PULL**2 / (2 * YOUNG * AREA * FRICTION * WEIGHT)
@@ -85,7 +80,8 @@ def test_slip_reaches_as_far_as_friction_holds_the_pull():
     slope, start = np.polyfit(x[exact > 0.05 * end], np.sqrt(u[exact > 0.05 * end]), 1)
     assert -start / slope == pytest.approx(reach, rel=0.03)
     ratio = mobilised(result)
-    assert ratio[x < reach - SIDE] == pytest.approx(FRICTION, rel=0.02)
+    # its very end may lift off under the pull
+    assert ratio[(x > SIDE / 2) & (x < reach - SIDE)] == pytest.approx(FRICTION, rel=0.02)
     # the free end keeps a little of its swing when gravity came
     idle = (x > reach + 2 * SIDE) & (x < LENGTH - 2 * SIDE)
     assert np.abs(ratio[idle]).max() < 0.1 * FRICTION
