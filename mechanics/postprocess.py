@@ -1,5 +1,7 @@
 """From a state to what is asked of it: positions, stresses, contact forces, joints."""
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
@@ -19,6 +21,8 @@ from mechanics.elasticity import (
 from mechanics.interfaces import Faces, Interfaces, find_interfaces, placed_faces
 from mechanics.joints import StartingJoints, joint_results, parting, starting_joints
 from mechanics.laws.status import contact_status
+from mechanics.meshing.elements import Element
+from mechanics.meshing.mesh import SolidMesh
 from mechanics.model import Model
 from mechanics.result import BodyResult, ContactResult, Frame, JointResult
 from mechanics.scene import Block
@@ -26,10 +30,26 @@ from mechanics.simulation import Step
 from mechanics.state import State
 from mechanics.stress_values import stress_values
 
-__all__ = ["Observer", "positions", "velocities"]
+__all__ = ["Observer", "positions", "surface_polygons", "velocities"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+
+# parts of a facet that have all its nodes for corners, counter-clockwise seen from outside
+_FACET_PARTS: Mapping[Element, tuple[tuple[int, ...], ...]] = {
+    Element.TET4: ((0, 1, 2),),
+    Element.TET10: ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)),
+    Element.HEX8: ((0, 1, 2, 3),),
+    Element.HEX20: ((0, 4, 7), (4, 1, 5), (5, 2, 6), (6, 3, 7), (4, 5, 6, 7)),
+    Element.HEX27: ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3)),
+}
+
+
+def surface_polygons(mesh: SolidMesh) -> tuple[tuple[int, ...], ...]:
+    """Outward polygons that cover the boundary, with a corner in every node of it."""
+    parts = [mesh.facets[:, part] for part in _FACET_PARTS[mesh.element]]
+    return tuple(tuple(polygon) for part in parts for polygon in part.tolist())
 
 
 def positions(model: Model, state: State) -> tuple[Array, ...]:
@@ -157,7 +177,7 @@ class Observer:
             fidelity=block.fidelity,
             reference=before,
             position=now,
-            faces=tuple(map(tuple, stone.mesh.facets[:, : stone.mesh.element.facet_corners].tolist())),
+            faces=surface_polygons(stone.mesh),
             element=stone.mesh.element,
             cells=stone.mesh.cells,
             stress=stress,

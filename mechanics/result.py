@@ -68,7 +68,7 @@ class BodyResult:
     code, fidelity : as in the scene
     reference : (n, 3) points before the run: corners of a rigid block, mesh nodes of a deformable one [m]
     position : (n, 3) the same points now [m]
-    faces : outward polygons on those points (the corners' polygons, or the corners of the mesh's boundary facets)
+    faces : outward polygons on those points (the corners' polygons, or parts of the mesh's boundary facets)
     element : kind of the finite elements; None if rigid
     cells : (nc, k) node indices of the finite elements, in VTK's order; empty for rigid and fixed blocks
     stress : (n, 6) recovered nodal stress xx, yy, zz, xy, yz, zx in world axes [Pa]; None if rigid

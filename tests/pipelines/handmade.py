@@ -9,6 +9,7 @@ from mechanics.elasticity import von_mises as equivalent_stress
 from mechanics.materials import Material
 from mechanics.meshing.elements import Element
 from mechanics.meshing.mesh import SolidMesh
+from mechanics.postprocess import surface_polygons
 from mechanics.result import (
     BodyResult,
     ContactResult,
@@ -105,7 +106,7 @@ def meshed_body(code, mesh, stress, shift=(0.0, 0.0, 0.0), material=LIMESTONE, e
         fidelity=Fidelity.DEFORMABLE,
         reference=mesh.nodes,
         position=mesh.nodes + np.array(shift),
-        faces=tuple(map(tuple, mesh.facets[:, : mesh.element.facet_corners].tolist())),
+        faces=surface_polygons(mesh),
         element=mesh.element,
         cells=mesh.cells,
         stress=stress,

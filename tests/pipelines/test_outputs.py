@@ -225,6 +225,16 @@ def test_vtk_opens_every_kind_of_element(element, tmp_path):
     assert gradient == pytest.approx(np.tile([0.0, 0.0, 1e6], (grid.n_points, 1)), abs=1.0)
     skin = grid.extract_surface(algorithm="dataset_surface", nonlinear_subdivision=0)
     assert skin.area == pytest.approx(7.0)
+    drawn = wall_surface(result)
+    assert set(drawn.triangles.ravel()) == set(
+        mesh.facets.ravel()
+    )  # every node of the surface shows its value
+    a, b, c = drawn.points[drawn.triangles].transpose(1, 0, 2)
+    outward = np.cross(b - a, c - a) / 2
+    assert np.linalg.norm(outward, axis=1).sum() == pytest.approx(7.0)
+    assert np.einsum("ti,ti->", a, outward) / 3 == pytest.approx(1.0)  # the volume within, if all look out
+    ends = drawn.points[drawn.edges]
+    assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() == pytest.approx(4 * 3.5)
 
 
 def test_the_edges_drawn_are_those_of_the_stones_not_of_the_mesh(mixed):
