@@ -37,6 +37,7 @@ def check_lines(report: "CheckReport", verbose: bool) -> list[str]:
             for one in report.materials
         ),
     ]
+    lines += [f"  mesh {one.element}, {one.size:g} m: {one.stones} stones" for one in report.meshes]
     lines += [f"  law {one}" for one in report.laws] + [f"  load {one}" for one in report.loads]
     if report.joints is not None:
         joints = report.joints

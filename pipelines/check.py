@@ -19,7 +19,7 @@ from survey.joints import ClosingReport
 from survey.solids import Solid
 from survey.watertight import check_watertight
 
-__all__ = ["CheckReport", "Cost", "JointsReport", "MaterialUse", "check_scene"]
+__all__ = ["CheckReport", "Cost", "JointsReport", "MaterialUse", "MeshUse", "check_scene"]
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,15 @@ class MaterialUse:
     density: float
     young: float
     poisson: float
+    stones: int
+
+
+@dataclass(frozen=True)
+class MeshUse:
+    """Finite elements of one kind and target edge length [m], and how many stones are of them."""
+
+    element: str
+    size: float
     stones: int
 
 
@@ -84,6 +93,7 @@ class CheckReport:
     kinds: Mapping[str, int]
     bodies: Mapping[str, int]
     materials: tuple[MaterialUse, ...]
+    meshes: tuple[MeshUse, ...]
     joints: JointsReport | None
     cost: Cost | None
     laws: tuple[str, ...]
@@ -110,9 +120,11 @@ def check_scene(path: str | Path, url: str) -> CheckReport:
     uses = Counter(model.material for model in models)
     problems: list[str] = []
     joints, cost = None, None
+    meshes: tuple[MeshUse, ...] = ()
     try:
         assembly = assemble_stones(scene, models, groups)
         joints = _joints(assembly.closing) if assembly.closing is not None else None
+        meshes = _meshes(assembly.scene)
         problems += _unsound_solids(assembly.scene)
         needs = plan(assembly.scene)
         cost = _cost(needs, assembly.scene)
@@ -126,12 +138,20 @@ def check_scene(path: str | Path, url: str) -> CheckReport:
         materials=tuple(
             MaterialUse(one.name, one.density, one.young, one.poisson, count) for one, count in uses.items()
         ),
+        meshes=meshes,
         joints=joints,
         cost=cost,
         laws=tuple(describe(one.entry, groups) for one in scene.laws),
         loads=tuple(describe(entry, groups) for entry in (*scene.loads, *scene.throws)),
         problems=tuple(problems),
     )
+
+
+def _meshes(scene: Scene) -> tuple[MeshUse, ...]:
+    uses = Counter(
+        (str(block.element), block.mesh_size) for block in scene.blocks if block.mesh_size is not None
+    )
+    return tuple(MeshUse(element, size, count) for (element, size), count in uses.items())
 
 
 def _joints(closing: ClosingReport) -> JointsReport:

@@ -13,7 +13,7 @@ from mechanics.laws.lennard_jones import LennardJones
 from mechanics.laws.mortar import MortarJoint
 from mechanics.meshing.elements import Element
 from mechanics.polyhedra import mass_properties
-from mechanics.scene import Placement
+from mechanics.scene import Block, Placement
 from moma.errors import SceneError
 from pipelines.assemble import assemble
 from pipelines.check import check_scene
@@ -471,6 +471,16 @@ def test_groups_of_stones_have_meshes_of_their_own_and_the_later_counts(build):
 def test_a_mesh_of_no_stone_is_named_with_its_line(build):
     with pytest.raises(SceneError, match=r"scene.toml:14: stones: 'W02-99' is not the code"):
         build("[[meshes]]\nstones = ['W02-99']\nsize = 0.1\n")
+
+
+def test_check_tells_the_meshes(url, tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(
+        LOW + "deformable = ['W02-01', 'W02-02', 'W02-03']\n[mesh]\nsize = 0.4\n"
+        "[[meshes]]\nstones = ['W02-02']\nelement = 'hex8'\n"
+    )
+    uses = {(one.element, one.size, one.stones) for one in check_scene(path, url).meshes}
+    assert uses == {(str(Block.element), 0.4, 2), ("hex8", 0.4, 1)}
 
 
 def test_check_tells_laws_and_loads(url, tmp_path):
