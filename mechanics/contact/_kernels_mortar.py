@@ -5,7 +5,7 @@ from numba import njit
 
 from mechanics.contact._kernels_facets import QUADRATURE, corner_count, degree, hats, locate, rule_of, shapes
 
-__all__ = ["mortar_rows", "overlap_area"]
+__all__ = ["mortar_rows", "mortar_shares", "overlap_area"]
 
 # corners that a facet can have when it is cut by another facet and by the outlines of two faces
 _MAX_CUT = 64
@@ -364,25 +364,30 @@ def _overlap_integrals(x_c, facet_c, kind_c, x_a, facet_a, kind_a, outlines, out
 
 
 @njit(cache=True)
-def _join_slivers(facet, used, corners, share):
-    """The node for which each node counts (itself, or a neighbour with a share many times as large); -1: none."""
-    best = np.full(share.shape[0], -1)
+def _join(facet, used, corners, share, kept):
+    """The node for which each node counts: itself, or a neighbour that is kept; -1 where nothing is covered.
+
+    Nodes join a neighbour that are not `kept`, or whose share is a sliver of the neighbour's.
+    """
+    best, seen = np.full(share.shape[0], -1), np.zeros(share.shape[0], dtype=np.bool_)
     for t in used:
-        top = facet[t, 0]
-        for i in range(1, corners):
-            if share[facet[t, i]] > share[top]:
-                top = facet[t, i]
+        top = -1
         for i in range(corners):
             node = facet[t, i]
-            if best[node] < 0 or share[top] > share[best[node]]:
+            seen[node] = True
+            if kept[node] and (top < 0 or share[node] > share[top]):
+                top = node
+        for i in range(corners):
+            node = facet[t, i]
+            if top >= 0 and (best[node] < 0 or share[top] > share[best[node]]):
                 best[node] = top
     root = np.full(share.shape[0], -1)
     for node in range(share.shape[0]):
-        if best[node] < 0:
+        if not seen[node]:
             continue
         r = node
-        # shares grow on the way, so it ends
-        while share[r] < _SLIVER * share[best[r]]:
+        # a kept node has a sliver only beside a much larger share, so the way ends
+        while best[r] >= 0 and (not kept[r] or share[r] < _SLIVER * share[best[r]]):
             r = best[r]
         root[node] = r
     return root
@@ -425,20 +430,76 @@ def _scatter(nodes, values, name, scale, slot, column, value, base, end):
 
 
 @njit(cache=True)
-def mortar_rows(
+def _interface(
+    p, mesh, face, body, frame, origin, centre, rotation,
+    node_ptr, reference, facet_ptr, facet, kind, cut, vertices, cptr, corner,
+):  # fmt: skip
+    """Shares and moments (nodes,), (nodes, 3) of the candidate's nodes in one interface, and `_overlap_integrals`."""
+    m, a = mesh[p, 0], mesh[p, 1]
+    kind_c, kind_a = kind[m], kind[a] if a >= 0 else 0
+    b = body[p, 0]
+    x_c = _flattened(reference[node_ptr[m] : node_ptr[m + 1]], centre[b], rotation[b], origin[p], frame[p])
+    x_a, other = np.empty((0, 2)), facet[:0, :0]
+    if a >= 0:
+        b = body[p, 1]
+        x_a = _flattened(
+            reference[node_ptr[a] : node_ptr[a + 1]], centre[b], rotation[b], origin[p], frame[p]
+        )
+        other = facet[facet_ptr[a] : facet_ptr[a + 1], :kind_a]
+    outlines, size = _outlines(face[p], cut[m], a < 0 or cut[a], vertices, cptr, corner, origin[p], frame[p])
+    share, moment = np.zeros(x_c.shape[0]), np.zeros((x_c.shape[0], 3))
+    own = facet[facet_ptr[m] : facet_ptr[m + 1], :kind_c]
+    return (
+        share,
+        moment,
+        _overlap_integrals(x_c, own, kind_c, x_a, other, kind_a, outlines, size, share, moment),
+    )
+
+
+@njit(cache=True)
+def _bare(p, mesh, facet_ptr):
+    """Whether a face of the interface is a deformable body's, but has no facets."""
+    m, a = mesh[p, 0], mesh[p, 1]
+    return facet_ptr[m] == facet_ptr[m + 1] or (a >= 0 and facet_ptr[a] == facet_ptr[a + 1])
+
+
+@njit(cache=True)
+def mortar_shares(
     mesh, face, body, frame, origin, least, centre, rotation,
+    node_ptr, node, reference, facet_ptr, facet, kind, cut, vertices, cptr, corner,
+):  # fmt: skip  # pragma: no cover - compiled
+    """∫ψ of all nodes of the candidate in each interface, as of `mortar_rows`: pointers (ni+1,) and shares."""
+    pointer = np.zeros(mesh.shape[0] + 1, dtype=np.int64)
+    for p in range(mesh.shape[0]):
+        pointer[p + 1] = pointer[p] + node_ptr[mesh[p, 0] + 1] - node_ptr[mesh[p, 0]]
+    shares = np.zeros(pointer[-1])
+    for p in range(mesh.shape[0]):
+        if not _bare(p, mesh, facet_ptr):
+            share, _, _ = _interface(
+                p, mesh, face, body, frame, origin, centre, rotation,
+                node_ptr, reference, facet_ptr, facet, kind, cut, vertices, cptr, corner,
+            )  # fmt: skip
+            if share.sum() >= least[p]:
+                shares[pointer[p] : pointer[p + 1]] = share
+    return pointer, shares
+
+
+@njit(cache=True)
+def mortar_rows(
+    kept_ptr, kept, mesh, face, body, frame, origin, least, centre, rotation,
     node_ptr, node, reference, facet_ptr, facet, kind, cut, vertices, cptr, corner,
 ):  # fmt: skip  # pragma: no cover - compiled
     """Weighted points of flat interfaces: one per corner node of the candidate's facets.
 
     ψ_α is linear or bilinear on the facets of the candidate: the hat, one at its node α and zero at the other corners,
-    or where the overlap covers a facet the function dual to it. Where a node has next to no share of the overlap,
-    its ψ is added to a neighbour's. Quadrature has the degree of ψ times
-    a shape function, 2 to 6, so it is exact on triangles and parallelograms; on other quadrilaterals both sides
-    still see the same points, and so the same constants and places.
+    or where the overlap covers a facet the function dual to it. Where a node is not kept, or has next to no share of
+    the overlap, its ψ is added to a neighbour's. Quadrature has the degree of ψ times a shape function, 2 to 6, so it
+    is exact on triangles and parallelograms; on other quadrilaterals both sides still see the same points, and so the
+    same constants and places.
 
     Parameters
     ----------
+    kept_ptr, kept : (ni+1,), flags of the nodes of the candidate in each interface: it may have a contact
     mesh : (ni, 2) meshes of candidate and antagonist; -1: rigid
     face, body : (ni, 2) their faces and bodies
     frame, origin : (ni, 3, 3), (ni, 3)
@@ -463,35 +524,27 @@ def mortar_rows(
         largest = max(largest, node_ptr[m + 1] - node_ptr[m])
     # where a node has its place in the row at work; places only grow, so old entries need no clearing
     slot_c, slot_a = np.full(largest, -1), np.full(largest, -1)
-    none = np.empty((0, 2))
     count, end = 0, 0
     for p in range(mesh.shape[0]):
-        m, a = mesh[p, 0], mesh[p, 1]
-        kind_c, kind_a = kind[m], kind[a] if a >= 0 else 0
-        own = facet[facet_ptr[m] : facet_ptr[m + 1], :kind_c]
-        if own.shape[0] == 0 or (a >= 0 and facet_ptr[a] == facet_ptr[a + 1]):
+        if _bare(p, mesh, facet_ptr):
             continue
-        first_c, last_c = node_ptr[m], node_ptr[m + 1]
-        b = body[p, 0]
-        x_c = _flattened(reference[first_c:last_c], centre[b], rotation[b], origin[p], frame[p])
-        x_a, other, name_a = none, facet[:0, :0], node[:0]
-        if a >= 0:
-            b = body[p, 1]
-            first_a, last_a = node_ptr[a], node_ptr[a + 1]
-            x_a = _flattened(reference[first_a:last_a], centre[b], rotation[b], origin[p], frame[p])
-            other, name_a = facet[facet_ptr[a] : facet_ptr[a + 1], :kind_a], node[first_a:last_a]
-        name_c = node[first_c:last_c]
-        outlines, size = _outlines(
-            face[p], cut[m], a < 0 or cut[a], vertices, cptr, corner, origin[p], frame[p]
-        )
-        share, moment = np.zeros(last_c - first_c), np.zeros((last_c - first_c, 3))
-        used, mass, met_ptr, met, cross = _overlap_integrals(
-            x_c, own, kind_c, x_a, other, kind_a, outlines, size, share, moment
-        )
+        share, moment, (used, mass, met_ptr, met, cross) = _interface(
+            p, mesh, face, body, frame, origin, centre, rotation,
+            node_ptr, reference, facet_ptr, facet, kind, cut, vertices, cptr, corner,
+        )  # fmt: skip
         if not share.sum() >= least[p] or used.shape[0] == 0:
             continue
+        m, a = mesh[p, 0], mesh[p, 1]
+        kind_c, kind_a = kind[m], kind[a] if a >= 0 else 0
+        own, name_c = facet[facet_ptr[m] : facet_ptr[m + 1], :kind_c], node[node_ptr[m] : node_ptr[m + 1]]
+        other, name_a = facet[:0, :0], node[:0]
+        if a >= 0:
+            other, name_a = (
+                facet[facet_ptr[a] : facet_ptr[a + 1], :kind_a],
+                node[node_ptr[a] : node_ptr[a + 1]],
+            )
         corners = corner_count(kind_c)
-        root = _join_slivers(own, used, corners, share)
+        root = _join(own, used, corners, share, kept[kept_ptr[p] : kept_ptr[p + 1]])
         start, place = _incidence(own, used, corners, root, share.shape[0])
         joined, joined_moment = np.zeros(share.shape[0]), np.zeros((share.shape[0], 3))
         for n in range(share.shape[0]):

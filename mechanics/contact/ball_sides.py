@@ -57,7 +57,9 @@ def face_cells(surfaces: Surfaces, nodes: int) -> FaceCells:
     t1 = t1 / np.linalg.norm(t1, axis=1)[:, None]
     frame = np.stack([n, t1, np.cross(n, t1)], axis=1)
     both = np.column_stack([face, face])
+    size = np.diff(meshes.node_ptr)[meshes.of_face[face]]
     row, node, area, middle, pointer, column, value = mortar_rows(
+        np.concatenate([[0], np.cumsum(size)]), np.ones(int(size.sum()), dtype=bool),
         np.column_stack([meshes.of_face[face], np.full(len(face), -1)]), both, np.zeros_like(both), frame, origin,
         np.zeros(len(face)), np.zeros((1, 3)), np.eye(3)[None], meshes.node_ptr, meshes.node, meshes.reference,
         meshes.facet_ptr, meshes.facet, meshes.kind, meshes.cut, surfaces.vertex, surfaces.cptr, surfaces.corner,

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from mechanics.contact._kernels_mortar import mortar_rows
+from mechanics.contact._kernels_mortar import mortar_rows, mortar_shares
 from mechanics.contact._kernels_points import surface_points
 from mechanics.contact.contacts import Contacts
 from mechanics.contact.surfaces import Placed, Surfaces
@@ -84,11 +84,13 @@ def mortar_contacts(
     face, body = faces[rows, order], surfaces.body[shapes[rows, order]]
     frame, origin = _frames(surfaces, placed, face)
     meshes = surfaces.meshes
-    interface, node, area, middle, pointer, column, value = mortar_rows(
+    arguments = (
         meshes.of_face[face], face, body, frame, origin, thin * surfaces.face_area[face].min(axis=1),
         placed.centre, placed.rotation, meshes.node_ptr, meshes.node, meshes.reference, meshes.facet_ptr,
         meshes.facet, meshes.kind, meshes.cut, placed.vertex, surfaces.cptr, surfaces.corner,
     )  # fmt: skip
+    kept = _kept(surfaces, face[:, 0], *mortar_shares(*arguments))
+    interface, node, area, middle, pointer, column, value = mortar_rows(*kept, *arguments)
     arm = np.zeros((len(interface), 2, 3))
     rigid = np.flatnonzero(meshes.of_face[face[interface, 1]] < 0)
     on = interface[rigid]
@@ -130,6 +132,24 @@ def _first_is_candidate(surfaces: Surfaces, placed: Placed, shapes: Ints, faces:
         chosen = np.where(open_ & apart, measure[:, 0] < measure[:, 1], chosen)
         open_ &= ~apart
     return chosen
+
+
+def _kept(surfaces: Surfaces, face: Ints, pointer: Ints, share: Array) -> tuple[Ints, Bools]:
+    """In which interfaces each node of candidate faces (ni,) has a contact: where its share is the largest.
+
+    Else a node beside the seam of two antagonists would have one with each, more contacts than nodes, whose forces are
+    not unique. Faces of parts in one plane count as one face. Shares (·,) are those of all nodes of each candidate.
+    """
+    meshes = surfaces.meshes
+    own = meshes.of_face[face]
+    place = np.arange(len(share)) + np.repeat(meshes.node_ptr[own] - pointer[:-1], np.diff(pointer))
+    plane = np.repeat(surfaces.plane[face], np.diff(pointer))
+    order = np.lexsort([meshes.node[place], plane])
+    new = np.flatnonzero(np.diff(plane[order], prepend=-1) | np.diff(meshes.node[place][order], prepend=-1))
+    largest = np.maximum.reduceat(share[order], new) if len(new) else share
+    kept = np.empty(len(share), dtype=bool)
+    kept[order] = share[order] >= (1.0 - _ALIKE) * np.repeat(largest, np.diff(new, append=len(share)))
+    return pointer, kept
 
 
 def _frames(surfaces: Surfaces, placed: Placed, face: Ints) -> tuple[Array, Array]:

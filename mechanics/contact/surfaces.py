@@ -15,6 +15,10 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
+# faces of the parts of a body lie in one plane up to this cosine, and this part of its size
+_SAME_WAY, _SAME_PLANE = 1.0 - 1e-12, 1e-6
+
+
 @dataclass(frozen=True)
 class Surfaces:
     """The convex polyhedra of all bodies, in body axes, as in mechanics.contact._kernels_narrow.
@@ -36,6 +40,7 @@ class Surfaces:
     shape_size : (ns,) smallest width of each shape [m]
     size : (nb,) smallest width of each body [m]
     face_area : (nf,) [m²]
+    plane : (nf,) a number that faces of one body share if they lie in one plane
     face_mesh : per face, its finite elements; None for rigid bodies
     meshes : the same, packed
     """
@@ -56,6 +61,7 @@ class Surfaces:
     shape_size: Array
     size: Array
     face_area: Array
+    plane: Ints
     face_mesh: tuple[FaceMesh | None, ...]
     meshes: PackedMeshes
 
@@ -131,6 +137,7 @@ def surfaces(
         shape_size=shape_size,
         size=np.minimum.reduceat(shape_size, sptr[:-1]),
         face_area=np.array([_area(p) for p in polygons]),
+        plane=_planes(owner, np.diff(fptr), normal, np.array([p[0] for p in polygons])),
         face_mesh=tuple(face_mesh),
         meshes=packed_meshes(face_mesh),
     )
@@ -143,6 +150,19 @@ def _pointer(counts: Sequence[int]) -> Ints:
 def _area(polygon: Array) -> float:
     local = polygon - polygon.mean(axis=0)
     return float(0.5 * np.linalg.norm(np.cross(local, np.roll(local, -1, axis=0)).sum(axis=0)))
+
+
+def _planes(body: Ints, count: Ints, normal: Array, corner: Array) -> Ints:
+    """For each face the first face of its body that lies in the same plane; one shape has no two of them."""
+    plane, start = np.arange(len(normal)), np.cumsum(count) - count
+    for b in np.flatnonzero(np.bincount(body) > 1):
+        shapes = np.flatnonzero(body == b)
+        own = np.arange(start[shapes[0]], start[shapes[-1]] + count[shapes[-1]])
+        size = np.ptp(corner[own], axis=0).max()
+        alike = normal[own] @ normal[own].T > _SAME_WAY
+        off = np.abs(np.einsum("fgi,fi->fg", corner[own] - corner[own][:, None], normal[own]))
+        plane[own] = own[(alike & (off < _SAME_PLANE * size)).argmax(axis=1)]
+    return plane
 
 
 def _edges(
