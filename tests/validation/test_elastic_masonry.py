@@ -42,9 +42,7 @@ def test_leaves_and_infill_share_a_load_by_their_stiffness(element, ratio):
     leaf = Material("stone", density=1000.0, young=1e10, poisson=0.0)
     core = Material("infill", density=1000.0, young=1e10 / ratio, poisson=0.0)
     blocks = three_leaves(leaf, core, element)
-    result = resting(
-        "three leaves", blocks, DryJoint(0.0), step=1e-3, duration=0.5, tolerance=1e-9, balance=1e-6
-    )
+    result = resting("three leaves", blocks, DryJoint(0.0), step=1e-3, duration=0.5, tolerance=1e-9)
     assert result.outcome is Outcome.EQUILIBRIUM
     load = PLATE.density * G * (2 * LEAF + CORE) * WIDTH * PLATE_HEIGHT
     areas = WIDTH * np.array([LEAF, CORE, LEAF])
