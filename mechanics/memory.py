@@ -74,3 +74,11 @@ class Memory:
         """Remember this step: its solution, the internal variables (nc, STATE) that the laws left, and the places."""
         self._key, self._place = key, place
         self._values = np.hstack([solution.impulse, solution.velocity, state])
+
+    def at_rest(self, factor: float) -> "Memory":
+        """The same forces over a step that is `factor` times as long, in bodies that have come to rest."""
+        d, other = self._dimension, Memory(self._dimension)
+        other._key, other._place, other._values = self._key, self._place, self._values.copy()
+        other._values[:, :d] *= factor
+        other._values[:, d : 2 * d] = 0.0
+        return other

@@ -152,7 +152,15 @@ class _Workshop:
         size = float(np.ptp(block.vertices, axis=0).max())
         # equal but for rounding: blocks come at different places
         shape = np.round((block.vertices - corner) / (_EQUAL * size)).astype(np.int64).tobytes()
-        key = shape, block.faces, block.mesh_size, block.element, block.material, tuple(map(id, block.parts))
+        key = (
+            shape,
+            float(f"{size:.10e}"),
+            block.faces,
+            block.mesh_size,
+            block.element,
+            block.material,
+            tuple(map(id, block.parts)),
+        )
         if key not in self._made:
             stone, centre = deformable(mesh_block(block), block.material, self._lumped)
             self._made[key] = stone, centre - corner

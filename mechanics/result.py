@@ -20,6 +20,7 @@ __all__ = [
     "JointResult",
     "Outcome",
     "Result",
+    "StaticStart",
 ]
 
 Array = NDArray[np.float64]
@@ -269,6 +270,25 @@ class Energies:
 
 
 @dataclass(frozen=True)
+class StaticStart:
+    """How the static equilibrium was sought.
+
+    Attributes
+    ----------
+    found : whether there is one; else the run begins with all stones at rest and without stress
+    steps, iterations : of the search, and of its solver
+    natural_map : η of the last step, r and u measured against the elastic part of W [-]
+    balance : unbalanced force of a body over its weight, largest over the bodies [-]
+    """
+
+    found: bool
+    steps: int
+    iterations: int
+    natural_map: float
+    balance: float
+
+
+@dataclass(frozen=True)
 class Result:
     """The end of a run, with its history.
 
@@ -289,6 +309,7 @@ class Result:
     frames : the motion, at least its first and last instant
     history : one value per step
     wall_time : wall seconds by stage: mesh, assemble, detect, solve, advance, stress
+    static : the search for the equilibrium in which the run began; None if it began at rest
     """
 
     scene: Scene
@@ -306,3 +327,4 @@ class Result:
     frames: tuple[Frame, ...]
     history: History
     wall_time: dict[str, float]
+    static: StaticStart | None = None

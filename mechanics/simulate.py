@@ -11,10 +11,11 @@ from mechanics.observers.equilibrium import imbalance, settlement, speed, suppor
 from mechanics.outcome import LASTING, Watch
 from mechanics.postprocess import Observer
 from mechanics.progress import Progress
-from mechanics.result import Energies, Errors, Frame, History, Outcome, Result
-from mechanics.scene import Scene
+from mechanics.result import Energies, Errors, Frame, History, Outcome, Result, StaticStart
+from mechanics.scene import Scene, Start
 from mechanics.simulation import Clock, Simulation, Step
 from mechanics.state import State
+from mechanics.static_start import static_start
 
 __all__ = ["simulate"]
 
@@ -34,7 +35,12 @@ def simulate(scene: Scene, progress: Callable[[Progress], None] | None = None) -
     with clock("mesh"):
         model, start = build_model(scene, lambda done, total: report(Progress("mesh", done, total)))
     simulation = Simulation(model, start, clock)
-    log = _Log(model, start)
+    static = None
+    if scene.time.start == Start.EQUILIBRIUM:
+        static, search = static_start(model, start, clock, report)
+        if static.found:
+            simulation.take_over(search)
+    log = _Log(model, start, simulation.state)
     watch = Watch(model, start)
     settings = scene.time
     observer = Observer(model, start)
@@ -58,16 +64,16 @@ def simulate(scene: Scene, progress: Callable[[Progress], None] | None = None) -
         if done:
             break
     assert step is not None
-    return _result(model, observer, step, outcome, watch.rest_time, log, frames, clock)
+    return _result(model, observer, step, outcome, watch.rest_time, log, frames, clock, static)
 
 
 class _Log:
     """Collects what the observers say of each step."""
 
-    def __init__(self, model: Model, start: State) -> None:
+    def __init__(self, model: Model, start: State, first: State) -> None:
         self._model, self._start = model, start
         self.balance = np.zeros(len(model.mass))
-        self.energy = EnergyBalance(model, start)
+        self.energy = EnergyBalance(model, first)
         self.penetration = 0.0
         self.unconverged = 0
         self.rows: list[tuple[float, ...]] = []
@@ -120,6 +126,7 @@ def _result(
     log: _Log,
     frames: list[Frame],
     clock: Clock,
+    static: StaticStart | None,
 ) -> Result:
     history, scene = log.history(), model.scene
     support = support_reaction(model, last.contacts, last.force, last.after.time)
@@ -150,4 +157,5 @@ def _result(
         frames=tuple(frames),
         history=history,
         wall_time=dict(clock.seconds),
+        static=static,
     )

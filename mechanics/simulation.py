@@ -4,13 +4,11 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechanics.contact.assembly import (
-    condensed_form,
     local_velocity,
     mixed_delassus,
     rigid_delassus,
@@ -26,7 +24,7 @@ from mechanics.observers.equilibrium import displacement, speed
 from mechanics.operators.mixed import MixedDelassus
 from mechanics.operators.rigid import RigidDelassus, schedule
 from mechanics.problem import ContactSolution, Form
-from mechanics.solvers.choice import choose_solver
+from mechanics.solvers.choice import Solver, choose_solver
 from mechanics.state import State
 from mechanics.statement import Statement, state_laws
 from mechanics.stepping import Kick, advance, compliances, free_kick, kicked, predict
@@ -111,20 +109,49 @@ class _Touching:
 
 
 class Simulation:
-    """A scene in motion; `step` takes it one time step on."""
+    """A scene in motion; `step` takes it one time step on.
 
-    def __init__(self, model: Model, start: State, clock: Clock) -> None:
+    Parameters
+    ----------
+    model, start : as `build_model` makes them
+    clock : takes the time of each stage
+    solver : of the contact problems; else what the scene asks for
+    elastic_scale : measure how well they are solved against the elastic part of W alone (`mixed_delassus`)
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        start: State,
+        clock: Clock,
+        solver: Solver | None = None,
+        elastic_scale: bool = False,
+    ) -> None:
         settings = model.scene
         self.model, self.start, self.state, self.clock = model, start, start, clock
         self._step, self._theta = settings.time.step, settings.time.theta
         with clock("assemble"):
             self._compliance = compliances(model, self._step, self._theta)
         self._detector = detector(model)
-        self._solve = choose_solver(settings.solver, not model.rigid_only)
+        self._solve = solver or choose_solver(settings.solver, not model.rigid_only)
+        self._elastic_scale = elastic_scale
         self._memory = Memory()
         self._touching: _Touching | None = None
         self._kinetic = 0.0
         self._first = True
+
+    def halt(self) -> None:
+        """Bring all bodies to a halt."""
+        own = self.state
+        self.state = replace(
+            own, velocity=np.zeros_like(own.velocity), node_velocity=np.zeros_like(own.node_velocity)
+        )
+
+    def take_over(self, other: "Simulation") -> None:
+        """Go on from where another run with the same bodies has ended, with its forces and what its laws remember."""
+        self.state = replace(other.state, time=self.state.time)
+        self._memory = other._memory.at_rest(self._step / other._step)
+        self._first = False
 
     def step(self) -> Step:
         """Predict, detect, state the problem, solve, advance.
@@ -230,9 +257,8 @@ class Simulation:
                 rigid = rigid_delassus(model, predicted, contacts, plan)
                 operator, sparse = rigid, lambda: rigid.sparse
             else:
-                mixed = mixed_delassus(model, predicted, contacts, self._compliance)
-                operator = mixed
-                sparse = cache(lambda: condensed_form(model, predicted, contacts, mixed))
+                mixed = mixed_delassus(model, predicted, contacts, self._compliance, self._elastic_scale)
+                operator, sparse = mixed, lambda: mixed.sparse
         # in the axes of one of the two bodies, the same whichever is the candidate
         side = contacts.bodies.argmin(axis=1)
         place = contacts.arm[np.arange(len(side)), side]

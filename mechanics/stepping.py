@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from mechanics.bodies._kernels_elastic import deform, rigid_part
-from mechanics.bodies.deformable import Compliance, compliance
+from mechanics.bodies.deformable import Compliance
 from mechanics.bodies.rigid import free_flight, inverse_inertia_world
 from mechanics.contact.assembly import world_impulse
 from mechanics.contact.contacts import Contacts
@@ -50,7 +50,7 @@ class Kick:
 
 def compliances(model: Model, step: float, theta: float) -> tuple[Compliance, ...]:
     """ŵ of every group of equal elastic stones, for this step and θ."""
-    return tuple(compliance(group.stone, step, theta) for group in model.elastic_stones.groups)
+    return tuple(Compliance(group.stone, step, theta) for group in model.elastic_stones.groups)
 
 
 def predict(model: Model, start: State, state: State, duration: float) -> State:
@@ -109,30 +109,37 @@ def free_kick(
     node_velocity = predicted.node_velocity.copy()
     for group, own in zip(model.elastic_stones.groups, compliance, strict=True):
         turn = predicted.rotation[group.bodies]
-        force = _elastic_force(group, predicted, gravity, step, theta)
-        node_velocity[group.nodes] += own.respond(step * force) @ turn.transpose(0, 2, 1)
+        inner, outer = _elastic_forces(group, predicted, gravity, step, theta)
+        # inner forces move no stone as a whole, whatever their rounding
+        answer = own.deform(step * (inner + outer)) + own.shift(step * outer)
+        node_velocity[group.nodes] += answer @ turn.transpose(0, 2, 1)
     return Kick(velocity, node_velocity, load)
 
 
-def _elastic_force(group: ElasticGroup, predicted: State, gravity: Array, step: float, theta: float) -> Array:
-    """P - V v - K (d + hθ v) of equal stones (k, n, 3), body axes [N]; P holds the centrifugal forces."""
-    stone, turn = group.stone, predicted.rotation[group.bodies]
-    count = len(group.bodies)
+def _elastic_forces(
+    group: ElasticGroup, predicted: State, gravity: Array, step: float, theta: float
+) -> tuple[Array, Array]:
+    """Nodal forces of equal stones (k, n, 3), body axes [N]: inner ones, and the others.
+
+    Inner are -K (d + (hθ + β) v) and the centrifugal forces; the others are the weight and -α M v.
+    """
+    stone, turn, count = group.stone, predicted.rotation[group.bodies], len(group.bodies)
+    material = stone.material
     velocity = predicted.node_velocity[group.nodes] @ turn
     # d at the kick is that of the start of the step plus h(1-θ) v; K does not see the rigid part of v
-    strained = (predicted.node[group.nodes] - predicted.centre[group.bodies, None]) @ turn
-    strained += step * (2.0 * theta - 1.0) * velocity - stone.mesh.nodes
-    force = -(stone.operators.stiffness @ strained.reshape(count, -1).T)
-    if stone.damping.nnz:
-        force -= stone.damping @ velocity.reshape(count, -1).T
-    spin = velocity.reshape(count, -1) @ stone.projector[3:].T
-    outward = -np.cross(spin[:, None], np.cross(spin[:, None], stone.mesh.nodes)).reshape(count, -1)
+    strained = (predicted.node[group.nodes] - predicted.centre[group.bodies, None]) @ turn - stone.mesh.nodes
+    strained += (step * (2.0 * theta - 1.0) + material.stiffness_damping) * velocity
+    rate = velocity.reshape(count, -1).T
+    spin = (stone.projector[3:] @ rate).T[:, None]
+    outward = -np.cross(spin, np.cross(spin, stone.mesh.nodes)).reshape(count, -1).T
     # what turns the stone as a whole is part of its flight
-    outward -= (outward @ stone.projector.T) @ stone.modes.T
-    force += stone.operators.mass @ outward.T
-    weight = stone.weight[:, None] * (gravity @ turn)[:, None]
-    result: Array = force.T.reshape(count, -1, 3) + weight
-    return result
+    outward -= stone.modes @ (stone.projector @ outward)
+    mass = stone.operators.mass
+    inner = mass @ outward - stone.operators.stiffness @ strained.reshape(count, -1).T
+    outer = stone.weight[:, None] * (gravity @ turn)[:, None]
+    if material.mass_damping:
+        outer = outer - material.mass_damping * (mass @ rate).T.reshape(count, -1, 3)
+    return inner.T.reshape(count, -1, 3), outer
 
 
 def _loads(model: Model, state: State, gravity: Array) -> Array:

@@ -28,7 +28,7 @@ from mechanics.elasticity import (
 from mechanics.materials import Material
 from mechanics.meshing.mesh import SolidMesh
 
-__all__ = ["Compliance", "Deformable", "compliance", "deformable"]
+__all__ = ["Compliance", "Deformable", "deformable"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -115,23 +115,47 @@ def _rigid_modes(nodes: Array) -> Array:
 class Compliance:
     """ŵ = (M + h θ V + h² θ² K)⁻¹ of one stone, for one time step and θ.
 
+    ŵ moves the stone as a whole, through its mass, and deforms it. In long steps the first part is larger by many
+    orders, and rounding of one would drown the other; so they are kept apart, and momentum is exact.
+
     Attributes
     ----------
     matrix : ŵ⁻¹, (3n, 3n), body axes [kg]
     """
 
-    def __init__(self, matrix: "csc_array[np.float64]") -> None:
-        self.matrix = matrix
+    def __init__(self, stone: Deformable, step: float, theta: float) -> None:
+        operators, h = stone.operators, step * theta
+        self.matrix = csc_array(operators.mass + h * stone.damping + h**2 * operators.stiffness)
         self._factor = splu(
-            matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+            self.matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
         )
+        self._modes, self._projector = stone.modes, stone.projector
+        momentum = operators.mass @ stone.modes
+        # V acts on rigid motion by its part α M alone
+        self._whole = np.linalg.inv(stone.modes.T @ momentum) / (1.0 + h * stone.material.mass_damping)
         self._nodes = np.zeros(0, dtype=np.int64)
         self._condensed = np.zeros((0, 0))
 
     def respond(self, impulse: Array) -> Array:
         """Velocities ŵ p (…, n, 3) that nodal impulses p (…, n, 3) [N s] give, body axes [m/s]."""
+        return self.deform(impulse) + self.shift(impulse)
+
+    def deform(self, impulse: Array) -> Array:
+        """The part of ŵ p that deforms the stone."""
         columns = impulse.reshape(-1, self.matrix.shape[0]).T
-        velocity: Array = self._factor.solve(np.ascontiguousarray(columns)).T.reshape(impulse.shape)
+        velocity: Array = self._deforming(columns).T.reshape(impulse.shape)
+        return velocity
+
+    def shift(self, impulse: Array) -> Array:
+        """The part of ŵ p that moves the stone as a whole."""
+        columns = impulse.reshape(-1, self.matrix.shape[0]).T
+        velocity: Array = (self._modes @ (self._whole @ (self._modes.T @ columns))).T.reshape(impulse.shape)
+        return velocity
+
+    def _deforming(self, columns: Array) -> Array:
+        own = columns - self._projector.T @ (self._modes.T @ columns)
+        velocity: Array = self._factor.solve(np.ascontiguousarray(own))
+        velocity -= self._modes @ (self._projector @ velocity)
         return velocity
 
     def between(self, nodes: Ints) -> Array:
@@ -151,16 +175,10 @@ class Compliance:
         dofs = _dofs(nodes)
         unit = np.zeros((self.matrix.shape[0], len(dofs)))
         unit[dofs, np.arange(len(dofs))] = 1.0
-        square = self._factor.solve(unit)[dofs]
+        square = self._deforming(unit)[dofs] + self._modes[dofs] @ self._whole @ self._modes[dofs].T
         self._nodes, self._condensed = nodes, 0.5 * (square + square.T)
 
 
 def _dofs(nodes: Ints) -> Ints:
     dofs: Ints = (3 * nodes[:, None] + np.arange(3)).ravel()
     return dofs
-
-
-def compliance(stone: Deformable, step: float, theta: float) -> Compliance:
-    """Factorise M + h θ V + h² θ² K once."""
-    operators, h = stone.operators, step * theta
-    return Compliance(csc_array(operators.mass + h * stone.damping + h**2 * operators.stiffness))

@@ -4,18 +4,17 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import block_diag, csc_array, csr_array
+from scipy.sparse import csr_array
 
 from mechanics.bodies.deformable import Compliance
 from mechanics.bodies.rigid import inverse_inertia_world
 from mechanics.contact.contacts import Contacts, material_points
 from mechanics.model import Model
-from mechanics.operators.condensed import CondensedForm
 from mechanics.operators.mixed import ELASTIC, NONE, RIGID, MixedDelassus
 from mechanics.operators.rigid import RigidDelassus, Schedule
 from mechanics.state import State
 
-__all__ = ["condensed_form", "local_velocity", "mixed_delassus", "rigid_delassus", "world_impulse"]
+__all__ = ["local_velocity", "mixed_delassus", "rigid_delassus", "world_impulse"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -133,31 +132,6 @@ def _compliance_block(
     block = spread @ half.T
     symmetric: Array = 0.5 * (block + block.T)
     return symmetric
-
-
-def condensed_form(model: Model, state: State, contacts: Contacts, operator: MixedDelassus) -> CondensedForm:
-    """The same W for methods that factorise: elastic bodies condensed on the contacts, rigid ones by six velocities."""
-    rigid = np.flatnonzero(model.inertia.inverse_mass > 0)
-    turn = state.rotation[rigid]
-    spin = turn @ model.inertia.inertia[rigid] @ turn.transpose(0, 2, 1)
-    blocks = [
-        block for b, moment in zip(rigid, spin, strict=True) for block in (model.mass[b] * np.eye(3), moment)
-    ]
-    # scipy makes no block diagonal of nothing
-    inertia = block_diag(blocks, format="csc") if blocks else csc_array((0, 0))
-    return CondensedForm(operator.elastic_part(), _rigid_lift(rigid, operator), inertia)
-
-
-def _rigid_lift(rigid: Ints, operator: MixedDelassus) -> "csr_array[np.float64]":
-    """Hᵀ of the rigid sides, (3 nc, 6 nr)."""
-    place = np.full(operator.body.max(initial=0) + 1, -1)
-    place[rigid[rigid < len(place)]] = np.flatnonzero(rigid < len(place))
-    c, s = np.nonzero(operator.kind == RIGID)
-    rows = 3 * c[:, None, None] + np.arange(3)[:, None] + np.zeros(6, dtype=np.int64)
-    columns = 6 * place[operator.body[c, s]][:, None, None] + np.zeros((3, 1), dtype=np.int64) + np.arange(6)
-    values = operator.jacobian[c, s] * np.where(s == 0, 1.0, -1.0)[:, None, None]
-    shape = (3 * len(operator.body), 6 * len(rigid))
-    return csr_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
 
 
 def local_velocity(

@@ -1,12 +1,14 @@
 """W of rigid and deformable bodies together: rigid sides by their Jacobians, deformable ones by dense blocks."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array
 
 from mechanics.operators._kernels_mixed import apply_delassus, sweep
+from mechanics.operators.condensed import CondensedForm
+from mechanics.operators.multifrontal import Cliques
 from mechanics.problem import GaussSeidel
 from mechanics.solvers._kernels import local_factors
 
@@ -64,23 +66,33 @@ class MixedDelassus:
         change: Array = apply_delassus(impulse, *self._arrays)[1]
         return change
 
-    def elastic_part(self) -> "csc_array[np.float64]":
-        """W of the elastic bodies alone, (3 nc, 3 nc)."""
-        size = 3 * len(self.body)
-        rows, columns, values = [], [], []
-        for b in np.flatnonzero(np.diff(self.yptr)):
-            contact, side = np.nonzero((self.body == b) & (self.kind == ELASTIC))
-            order = np.argsort(self.slot[contact, side])
-            contact, sign = contact[order], np.where(side[order] == 0, 1.0, -1.0).repeat(3)
-            place = (3 * contact[:, None] + np.arange(3)).ravel().astype(np.int32)
-            square = self.block[self.bptr[b] : self.bptr[b + 1]].reshape(len(place), -1)
-            values.append((sign[:, None] * square * sign).ravel())
-            rows.append(np.repeat(place, len(place)))
-            columns.append(np.tile(place, len(place)))
-        if not values:
-            return csc_array((size, size))
-        entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
-        return csc_array(entries, shape=(size, size))
+    @cached_property
+    def cliques(self) -> Cliques:
+        """W as a sum of blocks, one for each body that moves, between its contacts."""
+        contacts, blocks = [], []
+        bodies = self.body.ravel()
+        order = np.argsort(bodies, kind="stable")
+        for b, sides in enumerate(
+            np.split(order, np.cumsum(np.bincount(bodies, minlength=len(self.yptr) - 1))[:-1])
+        ):
+            if not len(sides) or self.kind.ravel()[sides[0]] == NONE:
+                continue
+            sign = np.where(sides % 2 == 0, 1.0, -1.0).repeat(3)
+            if self.kind.ravel()[sides[0]] == ELASTIC:
+                sides = sides[np.argsort(self.slot.ravel()[sides])]
+                sign = np.where(sides % 2 == 0, 1.0, -1.0).repeat(3)
+                square = self.block[self.bptr[b] : self.bptr[b + 1]].reshape(len(sign), -1)
+            else:
+                square = self.jacobian.reshape(-1, 3, 6)[sides].reshape(-1, 6)
+                square = square @ self.response.reshape(-1, 6, 3)[sides].transpose(1, 0, 2).reshape(6, -1)
+            contacts.append(sides // 2)
+            blocks.append(sign[:, None] * square * sign)
+        return Cliques(tuple(contacts), tuple(blocks))
+
+    @cached_property
+    def sparse(self) -> CondensedForm:
+        """W for methods that factorise."""
+        return CondensedForm(self.body, self.cliques)
 
     def gauss_seidel(self, shift: Array, friction: Array, cohesion: Array) -> GaussSeidel:
         """Sweeps forth and back; running velocities are made anew on each call, so that rounding cannot pile up."""

@@ -1,15 +1,26 @@
 """Which solver a scene gets."""
 
+from typing import Protocol
+
+from mechanics.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.scene import Method, SolverSettings
 from mechanics.solvers.admm import ADMM
 from mechanics.solvers.alternating import Alternating, moving_admm
+from mechanics.solvers.elastic import Elastic
 from mechanics.solvers.nsgs import NSGS
 
-__all__ = ["choose_solver"]
+__all__ = ["Solver", "choose_solver"]
 
 
-def choose_solver(settings: SolverSettings, deformable: bool) -> NSGS | ADMM | Alternating:
-    """The solver that the settings ask for; *auto*: ADMM as soon as a body is deformable, else both in turn.
+class Solver(Protocol):
+    """Solves contact problems."""
+
+    def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
+        """Solve from `start`."""
+
+
+def choose_solver(settings: SolverSettings, deformable: bool) -> Solver:
+    """The solver that the settings ask for; *auto* never sweeps where a body is deformable.
 
     Deformable bodies make Gauss–Seidel slow: their contacts are many, and each is far stiffer than the stone is
     heavy.
@@ -17,6 +28,8 @@ def choose_solver(settings: SolverSettings, deformable: bool) -> NSGS | ADMM | A
     limits = settings.tolerance, settings.velocity_tolerance, settings.max_iterations
     if settings.method == Method.ADMM and not deformable:
         return moving_admm(*limits)
-    if settings.method == Method.ADMM or (settings.method == Method.AUTO and deformable):
+    if settings.method == Method.ADMM:
         return ADMM(*limits)
+    if settings.method == Method.AUTO and deformable:
+        return Elastic(*limits)
     return NSGS(*limits) if settings.method == Method.NSGS else Alternating(*limits)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from mechanics.contact.assembly import condensed_form, mixed_delassus, rigid_delassus
+from mechanics.contact.assembly import mixed_delassus, rigid_delassus
 from mechanics.contact.contacts import Contacts, gaps, material_points, take
 from mechanics.contact.detection import Detector
 from mechanics.laws.dry_joint import DryJoint
@@ -233,7 +233,7 @@ def posed(one, step=2e-3, theta=1.0):
         sparse = operator.sparse
     else:
         operator = mixed_delassus(model, state, contacts, compliance)
-        sparse = condensed_form(model, state, contacts, operator)
+        sparse = operator.sparse
     free = free_kick(model, state, state, compliance, step, theta)
     statement = state_laws(
         model, state, contacts, gaps(contacts, state), model.laws.of(contacts.bodies),

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from mechanics.bodies.deformable import compliance, deformable
+from mechanics.bodies.deformable import Compliance, deformable
 from mechanics.elasticity import from_voigt, von_mises
 from mechanics.meshing.gmsh_mesher import mesh_with_gmsh
 from tests.mechanics.shapes import LIMESTONE, TURN
@@ -29,7 +29,7 @@ def stone(mesh):
 
 @pytest.fixture(scope="module")
 def response(stone):
-    return compliance(stone, STEP, THETA)
+    return Compliance(stone, STEP, THETA)
 
 
 def test_centre_is_that_of_the_mass(mesh):
@@ -93,7 +93,7 @@ def test_response_is_the_inverse_of_m_plus_h2_theta2_k(stone, response):
 
 
 def test_condensed_compliance_is_the_inverse_seen_from_some_nodes(stone):
-    response = compliance(stone, STEP, THETA)
+    response = Compliance(stone, STEP, THETA)
     inverse = np.linalg.inv(response.matrix.toarray())
     rng, count = np.random.default_rng(1), len(stone.mesh.nodes)
     # asked for bit by bit, what is kept grows
@@ -110,7 +110,8 @@ def test_responses_of_equal_stones_come_at_once(stone, response):
     push = np.random.default_rng(2).normal(size=(4, len(stone.mesh.nodes), 3))
     together = response.respond(push)
     for k in range(4):
-        np.testing.assert_allclose(together[k], response.respond(push[k]), rtol=1e-12)
+        alone = response.respond(push[k])
+        np.testing.assert_allclose(together[k], alone, atol=1e-12 * np.abs(alone).max())
 
 
 def test_rayleigh_damping_is_part_of_the_compliance(mesh):
@@ -120,7 +121,7 @@ def test_rayleigh_damping_is_part_of_the_compliance(mesh):
     m, k, h = stone.operators.mass, stone.operators.stiffness, STEP * THETA
     np.testing.assert_allclose(stone.damping.toarray(), (alpha * m + beta * k).toarray(), rtol=1e-13)
     expected = (m + h * (alpha * m + beta * k) + h**2 * k).toarray()
-    found = compliance(stone, STEP, THETA).matrix.toarray()
+    found = Compliance(stone, STEP, THETA).matrix.toarray()
     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12 * np.abs(expected).max())
 
 

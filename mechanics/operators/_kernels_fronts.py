@@ -1,0 +1,69 @@
+"""Numba kernels of the multifrontal factors: assembly of fronts, and the solves forth and back."""
+
+import numpy as np
+from numba import njit
+
+__all__ = ["add_into", "solve"]
+
+
+@njit(cache=True)
+def add_into(front, place, own, block):  # pragma: no cover - compiled
+    """front[place, place] += block[own, own]; `place` and `own` (m,)."""
+    for j in range(place.shape[0]):
+        column, source = place[j], own[j]
+        for i in range(place.shape[0]):
+            front[place[i], column] += block[own[i], source]
+
+
+@njit(cache=True)
+def solve(b, order, width, dptr, dof, fptr, pptr, pivots, factor):  # pragma: no cover - compiled
+    """Solve (W + Θ) x = b (n,) in place.
+
+    `order` (nf,) fronts as they were eliminated; `width` (nf,) pivots of each; `dof[dptr[f]:dptr[f+1]]` its k + m
+    unknowns, pivots first; `factor[fptr[f]:]` the LU factors (k, k) of its pivot block, F11⁻¹ F12 (k, m) and
+    F21 (m, k), all by columns; `pivots[pptr[f]:]` the row exchanges.
+    """
+    longest = 0
+    for f in range(order.shape[0]):
+        longest = max(longest, dptr[f + 1] - dptr[f])
+    local = np.empty(longest)
+    for n in range(order.shape[0]):
+        f = order[n]
+        k, start = width[f], dptr[f]
+        m = dptr[f + 1] - start - k
+        for i in range(k + m):
+            local[i] = b[dof[start + i]]
+        at = fptr[f]
+        for i in range(k):
+            p = pivots[pptr[f] + i]
+            if p != i:
+                local[i], local[p] = local[p], local[i]
+        for j in range(k):
+            x = local[j]
+            for i in range(j + 1, k):
+                local[i] -= factor[at + j * k + i] * x
+        for j in range(k - 1, -1, -1):
+            local[j] /= factor[at + j * k + j]
+            x = local[j]
+            for i in range(j):
+                local[i] -= factor[at + j * k + i] * x
+        at += k * k + k * m
+        for j in range(k):
+            x = local[j]
+            for i in range(m):
+                local[k + i] -= factor[at + j * m + i] * x
+        for i in range(k + m):
+            b[dof[start + i]] = local[i]
+    for n in range(order.shape[0] - 1, -1, -1):
+        f = order[n]
+        k, start = width[f], dptr[f]
+        m = dptr[f + 1] - start - k
+        at = fptr[f] + k * k
+        for i in range(k):
+            local[i] = b[dof[start + i]]
+        for j in range(m):
+            x = b[dof[start + k + j]]
+            for i in range(k):
+                local[i] -= factor[at + j * k + i] * x
+        for i in range(k):
+            b[dof[start + i]] = local[i]

@@ -1,0 +1,86 @@
+"""Many second-order cones x₀ ≥ ‖(x₁, x₂)‖ at once, one in each row (nc, 3) (Alizadeh & Goldfarb 2003)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Scaling", "divide", "product", "reach", "scaling"]
+
+Array = NDArray[np.float64]
+
+_MIRROR = np.array([1.0, -1.0, -1.0])
+
+
+def product(x: Array, y: Array) -> Array:
+    """Jordan's product x ∘ y = (x·y, x₀ y_T + y₀ x_T)."""
+    return np.column_stack([(x * y).sum(axis=1), x[:, :1] * y[:, 1:] + y[:, :1] * x[:, 1:]])
+
+
+def divide(x: Array, y: Array) -> Array:
+    """The z with x ∘ z = y, for x inside its cone."""
+    first = (x[:, 0] * y[:, 0] - (x[:, 1:] * y[:, 1:]).sum(axis=1)) / _determinant(x)
+    return np.column_stack([first, (y[:, 1:] - first[:, None] * x[:, 1:]) / x[:, :1]])
+
+
+def reach(x: Array, step: Array) -> float:
+    """Largest a with x + a · step in all cones, for x inside them; infinite if there is none."""
+    a = step[:, 0] ** 2 - (step[:, 1:] ** 2).sum(axis=1)
+    b = 2.0 * (x[:, 0] * step[:, 0] - (x[:, 1:] * step[:, 1:]).sum(axis=1))
+    c = _determinant(x)
+    # the roots of a α² + b α + c without cancellation; the first positive one is where the cone is left
+    q = -0.5 * (b + np.where(b >= 0, 1.0, -1.0) * np.sqrt(np.maximum(b * b - 4.0 * a * c, 0.0)))
+    with np.errstate(all="ignore"):
+        roots = np.column_stack([q / a, c / q, np.where(step[:, 0] < 0, -x[:, 0] / step[:, 0], np.inf)])
+    roots[~(roots > 0)] = np.inf
+    return float(roots.min(initial=np.inf))
+
+
+def _determinant(x: Array) -> Array:
+    size = np.sqrt((x[:, 1:] ** 2).sum(axis=1))
+    result: Array = (x[:, 0] - size) * (x[:, 0] + size)
+    return result
+
+
+@dataclass(frozen=True)
+class Scaling:
+    """The matrices T with T z = T⁻¹ s, symmetric, that keep the cones (Nesterov & Todd 1997).
+
+    Attributes
+    ----------
+    axis : (nc, 3) on the unit hyperboloid
+    size : (nc,)
+    """
+
+    axis: Array
+    size: Array
+
+    def __call__(self, x: Array) -> Array:
+        """T x."""
+        return self._apply(self.axis, x) * self.size[:, None]
+
+    def inverse(self, x: Array) -> Array:
+        """T⁻¹ x."""
+        return self._apply(self.axis * _MIRROR, x) / self.size[:, None]
+
+    @property
+    def inverse_squared(self) -> Array:
+        """T⁻² (nc, 3, 3)."""
+        v = self.axis * _MIRROR
+        square = 2.0 * v[:, :, None] * v[:, None, :] - np.diag(_MIRROR)
+        result: Array = square / (self.size**2)[:, None, None]
+        return result
+
+    @staticmethod
+    def _apply(axis: Array, x: Array) -> Array:
+        along = (axis[:, 1:] * x[:, 1:]).sum(axis=1)
+        rest = x[:, 1:] + (x[:, 0] + along / (1.0 + axis[:, 0]))[:, None] * axis[:, 1:]
+        return np.column_stack([axis[:, 0] * x[:, 0] + along, rest])
+
+
+def scaling(s: Array, z: Array) -> Scaling:
+    """The scaling of s and z (nc, 3), both inside their cones."""
+    own, other = np.sqrt(_determinant(s)), np.sqrt(_determinant(z))
+    unit, dual = s / own[:, None], z / other[:, None]
+    gamma = np.sqrt(0.5 * (1.0 + (unit * dual).sum(axis=1)))
+    return Scaling((unit + _MIRROR * dual) / (2.0 * gamma[:, None]), np.sqrt(own / other))

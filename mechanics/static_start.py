@@ -1,0 +1,58 @@
+"""The static equilibrium in which a run may begin, found at once instead of by waiting for it."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from mechanics.model import Model
+from mechanics.observers.equilibrium import displacement, imbalance
+from mechanics.progress import Progress
+from mechanics.result import StaticStart
+from mechanics.scene import TimeSettings
+from mechanics.simulation import Clock, Simulation
+from mechanics.solvers.choice import Solver
+from mechanics.solvers.interior_point import InteriorPoint
+from mechanics.state import State
+
+__all__ = ["static_start"]
+
+# so long that inertia holds nothing back: a structure of 1 Hz keeps less than a part in 40 of its motion to come
+_STEP = 1.0
+# steps until inertia and changes of shape count for nothing; few need more than three
+_STEPS = 10
+# how much further than asked for it is solved: Newton's last steps cost little, and the first steps of the run none
+_FURTHER = 0.02
+# a stone that moves by this part of its width does not settle, it falls
+_FALLS = 0.2
+
+
+def static_start(
+    model: Model, start: State, clock: Clock, report: Callable[[Progress], None]
+) -> tuple[StaticStart, Simulation]:
+    """Take steps of 1 s, each from a halt, until every body is in balance under the loads of the first instant.
+
+    With θ = 1 such a step is the static problem (docs/theory.md §2): M/h² is next to nothing beside K, but holds what
+    nothing else does. Driven supports stay where they are.
+    """
+    settings = TimeSettings(step=_STEP, theta=1.0, relaxation=True, lumped_mass=model.scene.time.lumped_mass)
+    still = replace(model, scene=replace(model.scene, time=settings), motions=())
+    asked = model.scene.solver
+    solver: Solver | None = None
+    if not model.rigid_only:
+        solver = InteriorPoint(_FURTHER * asked.tolerance, _FURTHER * asked.velocity_tolerance)
+    search = Simulation(still, start, clock, solver, elastic_scale=True)
+    limit = model.scene.time.balance_tolerance
+    iterations, count, balance, eta, found = 0, 0, np.inf, np.inf, False
+    while count < _STEPS and not found:
+        step = search.step()
+        search.halt()
+        count += 1
+        iterations += step.solution.iterations
+        eta = step.solution.natural_map
+        balance = float(imbalance(still, step.after, step.contacts, step.force, step.kick.load).max())
+        report(Progress("static", count, _STEPS, f"balance {balance:.1e}, η {eta:.1e}"))
+        if not bool((displacement(still, start, step.after) < _FALLS * still.surfaces.size).all()):
+            break
+        found = eta <= asked.tolerance and balance <= limit
+    return StaticStart(found, count, iterations, eta, balance), search
