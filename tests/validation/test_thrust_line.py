@@ -1,8 +1,8 @@
 """The line of thrust, from the resultants of the joints: in a semicircular arch just above its least thickness.
 
-At the least thickness an arch has but one state of equilibrium (Milankovitch 1907; Heyman 1995): its thrust touches the extrados at
-the springings and at the crown and the intrados in between, where 27 voussoirs have a joint at 33.3° (a continuous
-arch: at 35.5°). Contact points: sharp corners of straight-faced voussoirs.
+At the least thickness an arch has but one state of equilibrium (Milankovitch 1907; Heyman 1995): its thrust touches the
+extrados at the springings and at the crown and the intrados in between, where 27 voussoirs have a joint at 33.3° (a
+continuous arch: at 35.5°). Contact points: sharp corners of straight-faced voussoirs.
 """
 
 import numpy as np
