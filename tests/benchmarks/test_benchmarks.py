@@ -145,3 +145,18 @@ def test_cost_is_given_for_each_size():
         assert key in first
     assert all(row["same_bits"] for row in found)
     assert 0 < first["bytes_kept"] < 10_000
+
+
+def test_deformable_bricks_are_timed_and_judged():
+    """The wall as LMGC90 was timed on it: 28 bodies with 4 × 2 × 2 linear hexahedra a brick."""
+    (row,) = rows("deformable_wall", "--steps", 4, "--warm-up", 1, "--starts", "rest")
+    assert row["bodies"] == 28
+    assert row["eta"] <= 1e-6
+    assert row["unconverged"] == 0
+    assert row["step_ms"] > 0
+
+
+def test_unknown_sizes_of_deformable_walls_are_refused():
+    done = run("deformable_scaling", "--stones", 7)
+    assert done.returncode == 2
+    assert "invalid choice: 7" in done.stderr
