@@ -20,6 +20,8 @@ __all__ = ["StartingJoints", "joint_results", "parting", "starting_joints"]
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+# over the size of the smaller stone
+_CLOSED = 1e-2
 # status of contacts that bear nothing
 _IDLE = ("open", "broken")
 
@@ -33,18 +35,23 @@ class StartingJoints:
     state : where it begins
     face : (nj, 2) pairs of faces
     section : their polygons then
+    closed : (nj,) whether they are open by no more than a hundredth of the smaller stone's size, as for bonds
     """
 
     state: State
     face: Ints
     section: Section
+    closed: NDArray[np.bool_]
 
 
 def starting_joints(model: Model, start: State, contacts: Contacts) -> StartingJoints:
     """The joints of the contacts of the first step."""
     faces = placed_faces(model, start)
     face = find_interfaces(faces, contacts, start).face
-    return StartingJoints(start, face, sections(faces, face))
+    section = sections(faces, face)
+    meant = np.arange(section.gap.shape[1]) < section.count[:, None]
+    nearest = np.where(meant, section.gap, np.inf).min(axis=1, initial=np.inf)
+    return StartingJoints(start, face, section, nearest <= _CLOSED * faces.size[face].min(axis=1))
 
 
 def parting(contacts: Contacts, start: State, state: State) -> tuple[Array, Array]:
@@ -77,8 +84,8 @@ def joint_results(
     count, bodies = len(face), faces.body[face]
     own = np.flatnonzero(contacts.joint >= 0)
     joint = contacts.joint[own]
-    parted = np.bincount(joint, minlength=count) == 0
-    section = _with_parted(sections(faces, face), start, bodies, step.after, np.flatnonzero(parted))
+    away = np.bincount(joint, minlength=count) == 0
+    section = _with_parted(sections(faces, face), start, bodies, step.after, np.flatnonzero(away))
     force, moment = _resultants(section, bodies, contacts, own)
     n, status = section.frame[:, 0], contacts.status[own]
     # what is less than the solver leaves is no force
@@ -89,7 +96,7 @@ def joint_results(
     shear = np.linalg.norm(_across(n, force), axis=1)
     return JointResult(
         bodies=bodies,
-        parted=parted,
+        parted=away & np.append(start.closed, np.zeros(count - len(start.face), dtype=bool)),
         polygon=tuple(section.polygon(number) for number in range(count)),
         frame=section.frame,
         centroid=section.centroid,
@@ -107,7 +114,7 @@ def joint_results(
         opening=opening,
         sliding=sliding,
         slipping=_share(joint, contacts.area[own], status == "slip", count),
-        open=np.where(parted, 1.0, _share(joint, contacts.area[own], np.isin(status, _IDLE), count)),
+        open=np.where(away, 1.0, _share(joint, contacts.area[own], np.isin(status, _IDLE), count)),
         friction_use=_ratio(shear, np.where(bearing > least, bearing, 0.0)),
     )
 

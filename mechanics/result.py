@@ -143,7 +143,7 @@ class JointResult:
     Attributes
     ----------
     bodies : (nj, 2) indices into the scene's blocks, the lower first
-    parted : (nj,) it touched at the start and is now open beyond the distance in which contacts are watched; its
+    parted : (nj,) it was closed at the start and is now open beyond the distance in which contacts are watched; its
         polygon is that of the start, carried along by the second stone
     polygon : the common polygon of both faces, (k, 3) corners for each joint [m]
     frame : (nj, 3, 3) rows n, t1, t2; n from the second to the first stone, t1 along the larger second moment [-]

@@ -31,7 +31,7 @@ JOINT_COLUMNS: Mapping[str, str] = {
     "slipping": "part of the contact area that slips [-]",
     "open": "part of the contact area that bears nothing [-]",
     "friction_use": "shear over what friction and cohesion can bear; empty where that is nothing [-]",
-    "parted": "1: it touched at the start and is now wide open",
+    "parted": "1: it was closed at the start and is now wide open",
 }
 """Columns, and what they hold."""
 

@@ -159,6 +159,21 @@ def test_a_joint_that_has_parted_is_not_forgotten():
     assert len(joints.polygon[0]) == 4
 
 
+def test_stones_that_were_only_near_each_other_do_not_part():
+    """A block that flies past 20 mm above the ground has not left it, but the gap has grown."""
+    one = scene(
+        ground(),
+        brick("a", (0, 0, 0.02), (0.5, 0.5, 0.52), velocity=(0, 0, 2.0, 0, 0, 0)),
+        step=1e-3,
+        duration=0.1,
+        **FALLING,
+    )
+    result = simulate(one)
+    assert result.joints.parted.tolist() == [False]
+    assert result.joints.opening[0] == pytest.approx(result.bodies[1].displacement[0, 2])
+    assert result.joints.gap[0] == pytest.approx(result.bodies[1].displacement[0, 2] + 0.02)
+
+
 def test_a_joint_that_is_found_later_comes_after_those_of_the_start():
     one = scene(
         ground(),
