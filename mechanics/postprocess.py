@@ -77,7 +77,7 @@ class Observer:
 
     Parameters
     ----------
-    model, start : the run, and the state in which it begins
+    model, start : the run, and its stones before they bear anything: displacements count from there
     """
 
     def __init__(self, model: Model, start: State) -> None:
@@ -85,9 +85,9 @@ class Observer:
         self._joints: StartingJoints | None = None
         self._recovery: dict[int, csr_array[np.float64]] = {}
 
-    def first_frame(self) -> Frame:
-        """The instant at which the run begins, before there are contact forces."""
-        return self._frame(self._start, _no_contacts())
+    def first_frame(self, state: State) -> Frame:
+        """The instant at which the motion begins, before its first contact forces are known."""
+        return self._frame(state, _no_contacts())
 
     def begin(self, step: Step) -> None:
         """Take the contacts of the first step as the joints that there are at the start."""

@@ -44,7 +44,7 @@ def simulate(scene: Scene, progress: Callable[[Progress], None] | None = None) -
     watch = Watch(model, start)
     settings = scene.time
     observer = Observer(model, start)
-    frames = [observer.first_frame()]
+    frames = [observer.first_frame(simulation.state)]
     outcome, step = Outcome.MOVING, None
     total = max(1, round(settings.duration / settings.step))
     for count in range(1, total + 1):

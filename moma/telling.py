@@ -80,6 +80,11 @@ def run_lines(report: "RunReport", verbose: bool) -> list[str]:
             f"  Von Mises stress: mean {mean:.4f} MPa, 1 % of the volume above {p99:.4f} MPa, "
             f"largest {largest:.4f} MPa"
         )
+    if (static := summary["static"]) is not None and static["found"]:
+        lines.append(
+            f"  began in static equilibrium: {static['steps']} steps of the search, balance {static['balance']:.1e}, "
+            f"natural_map {static['natural_map']:.1e}"
+        )
     joints = summary["joints"]
     if joints["count"]:
         lines.append(

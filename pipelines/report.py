@@ -125,6 +125,13 @@ def _summary_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
             ("Von Mises stress, exceeded in 1 % of the volume", megapascals(stress["p99"])),
             ("Von Mises stress, largest", megapascals(stress["max"])),
         ]
+    if (static := summary["static"]) is not None and static["found"]:
+        rows.append(
+            (
+                "Began in static equilibrium",
+                f"found in {static['steps']} steps, balance {static['balance']:.1e}",
+            )
+        )
     time = summary["time"]
     rows.append(
         ("Simulated", f"{time['simulated']:.4g} s in {summary['steps']} steps, {time['wall']:.1f} s of work")

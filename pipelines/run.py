@@ -113,6 +113,11 @@ def write_results(
             f"{result.errors.unconverged_steps} of {result.steps} steps were left above the solver's "
             "tolerance; allow more max_iterations in [solver], or a smaller step in [time]"
         )
+    if result.static is not None and not result.static.found:
+        warnings.append(
+            f"no static equilibrium was found in {result.static.steps} steps, with balance "
+            f"{result.static.balance:.1e}; the run began at rest, all loads at once"
+        )
     with _timed(seconds, "files"):
         progress(Progress("write", 0, 3, "results.pvd"))
         write_frames(result, folder)

@@ -44,6 +44,7 @@ def summarise(result: Result, *, version: str, seconds: Mapping[str, float]) -> 
             "by_stage": dict(seconds),
         },
         "errors": asdict(result.errors),
+        "static": None if result.static is None else asdict(result.static),
         "von_mises": None if stress is None else asdict(stress),
         "stress": _stress(result),
         "joints": _joints(result.joints),

@@ -212,6 +212,25 @@ def test_a_place_that_is_taken_is_refused_before_anything_runs(tmp_path, url, mo
         run_scene(tmp_path / "low.toml", url, tmp_path)
 
 
+def test_a_static_start_is_told_and_a_warning_where_there_is_none(tmp_path):
+    url = f"sqlite:///{tmp_path / 'own.db'}"
+    ingest([SURVEY], url)
+    text = LOW + 'start = "equilibrium"\n[output]\npictures = []\n'
+    (tmp_path / "low.toml").write_text(text, encoding="utf-8")
+    done = run_scene(tmp_path / "low.toml", url, tmp_path / "out")
+    assert done.summary["static"]["found"]
+    assert done.warnings == ()
+    assert "Began in static equilibrium" in (tmp_path / "out/report.html").read_text(encoding="utf-8")
+    # without the course that holds them up, the stones fall
+    falling = (
+        text.replace('where = ["course <= 2"]', 'where = ["course in (1, 3)"]') + "[joints]\nmode = 'open'\n"
+    )
+    (tmp_path / "falling.toml").write_text(falling.replace('["W02-02"]', '["W03-02"]'), encoding="utf-8")
+    done = run_scene(tmp_path / "falling.toml", url, tmp_path / "out2")
+    assert not done.summary["static"]["found"]
+    assert any("no static equilibrium was found" in one for one in done.warnings)
+
+
 @pytest.mark.parametrize(
     ("relaxation", "outcome", "warned"),
     [(False, "equilibrium", True), (True, "equilibrium", False), (True, "moving", True)],
