@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from mechanics.contact.contacts import Contacts, material_points
 from mechanics.contact_patches import patch_pressure
+from mechanics.contact_result import ContactResult, JointResult
 from mechanics.interfaces import Faces, find_interfaces, placed_faces
 from mechanics.joint_sections import Section, eccentricity, sections
 from mechanics.model import Model
-from mechanics.result import ContactResult, JointResult
 from mechanics.simulation import Step
 from mechanics.state import State
 

@@ -8,6 +8,7 @@ from scipy.sparse import csr_array
 
 from mechanics.bodies.deformable import Deformable
 from mechanics.contact.contacts import material_points
+from mechanics.contact_result import ContactResult, JointResult
 from mechanics.elasticity import (
     from_voigt,
     node_volumes,
@@ -24,7 +25,7 @@ from mechanics.laws.status import contact_status
 from mechanics.meshing.elements import Element
 from mechanics.meshing.mesh import SolidMesh
 from mechanics.model import Model
-from mechanics.result import BodyResult, ContactResult, Frame, JointResult
+from mechanics.result import BodyResult, Frame
 from mechanics.scene import Block
 from mechanics.simulation import Step
 from mechanics.state import State

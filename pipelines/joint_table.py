@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.result import JointResult, Result
+from mechanics.contact_result import JointResult
+from mechanics.result import Result
 
 __all__ = ["JOINT_COLUMNS", "write_joints"]
 

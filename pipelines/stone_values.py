@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from archmodel.records import StoneResult
-from mechanics.result import BodyResult, JointResult, Result
+from mechanics.contact_result import JointResult
+from mechanics.result import BodyResult, Result
 from mechanics.stress_values import StressValues, volume_quantile
 
 __all__ = ["StressStatistics", "stone_results", "stress_statistics"]

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.result import JointResult, Result
+from mechanics.contact_result import JointResult
+from mechanics.result import Result
 from mechanics.scene import Fidelity
 from pipelines.stone_values import stress_statistics
 

@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from mechanics.contact_result import JointResult
 from mechanics.materials import Material
-from mechanics.result import BodyResult, JointResult, Result
+from mechanics.result import BodyResult, Result
 from mechanics.scene import Fidelity
 from mechanics.stress_values import utilisation
 

@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from mechanics.contact_result import ContactResult, JointResult
 from mechanics.elasticity import principal, von_mises
 from mechanics.laws.status import STATUSES
-from mechanics.result import BodyResult, ContactResult, Frame, JointResult, Result
+from mechanics.result import BodyResult, Frame, Result
 from mechanics.scene import Fidelity
 from mechanics.stress_values import utilisation
 from pipelines.vtu import CELL_TYPES, POLYGON, POLYHEDRON, VERTEX, Cells, Grid, cells_of, write_pvd, write_vtu

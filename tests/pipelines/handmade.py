@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 
+from mechanics.contact_result import ContactResult, JointResult
 from mechanics.elasticity import node_volumes, principal
 from mechanics.elasticity import von_mises as equivalent_stress
 from mechanics.materials import Material
@@ -12,12 +13,10 @@ from mechanics.meshing.mesh import SolidMesh
 from mechanics.postprocess import surface_polygons
 from mechanics.result import (
     BodyResult,
-    ContactResult,
     Energies,
     Errors,
     Frame,
     History,
-    JointResult,
     Outcome,
     Result,
 )

@@ -1,0 +1,113 @@
+"""What a simulation says of contacts: point by point, and joint by joint."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["ContactResult", "JointResult"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# by this much a number that may be at most one may exceed it
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class ContactResult:
+    """The contact points at one instant.
+
+    Attributes
+    ----------
+    bodies : (nc, 2) indices into the scene's blocks: candidate, antagonist
+    point : (nc, 3) [m]
+    normal : (nc, 3) from antagonist to candidate [-]
+    force : (nc, 3) mean force over the last step, on the candidate, world axes [N]
+    gap : (nc,) [m]
+    area : (nc,) tributary area; zero between edges [m²]
+    pressure : (nc,) normal force over area; NaN between edges [Pa]
+    opening : (nc,) how much its gap has grown since the start [m]
+    slide : (nc,) how far its two material points have moved along each other since the start [m]
+    status : (nc,) "open", "stick", "slip", "bonded" or "broken"
+    joint : (nc,) the joint that it belongs to; -1: none, as between edges
+    """
+
+    bodies: Ints
+    point: Array
+    normal: Array
+    force: Array
+    gap: Array
+    area: Array
+    pressure: Array
+    opening: Array
+    slide: Array
+    status: NDArray[np.str_]
+    joint: Ints
+
+
+@dataclass(frozen=True)
+class JointResult:
+    """The joints at the end of the run: pairs of flat faces of two stones that touch, or that touched at the start.
+
+    Attributes
+    ----------
+    bodies : (nj, 2) indices into the scene's blocks, the lower first
+    parted : (nj,) it was closed at the start and is now open beyond the distance in which contacts are watched; its
+        polygon is that of the start, carried along by the second stone
+    polygon : the common polygon of both faces, (k, 3) corners for each joint [m]
+    frame : (nj, 3, 3) rows n, t1, t2; n from the second to the first stone, t1 along the larger second moment [-]
+    centroid : (nj, 3) of the polygon [m]
+    area : (nj,) [m²]
+    second_moment : (nj, 2) ∫ y₁² and ∫ y₂² along t1 and t2 about the centroid [m⁴]
+    force : (nj, 3) resultant on the first stone, world axes [N]
+    moment : (nj, 3) about the centroid [N m]
+    centre_of_pressure : (nj, 3) where the resultant meets the joint; NaN without compression [m]
+    eccentricity : (nj, 2) the same from the centroid, along t1 and t2; NaN without compression [m]
+    kern : (nj,) largest tension that a linear pressure would have, over the mean pressure: 0 if centred, up to 1
+        within the kern; NaN without compression [-]
+    edge : (nj,) how far out the centre of pressure lies: 0 at the centroid, 1 at the edge; NaN without compression [-]
+    pressure_mean : (nj,) compression over area; negative: tension [Pa]
+    pressure_max : (nj,) largest around a contact point, as mechanics.contact_patches has it [Pa]
+    gap : (nj,) largest gap, not less than zero [m]
+    opening : (nj,) by how much the gap has grown since the start, at most; of joints found later, their gap [m]
+    sliding : (nj,) largest slide of a contact point since the start [m]
+    slipping, open : (nj,) part of the area of the watched contact points that slips, or that bears nothing [-]
+    friction_use : (nj,) shear force over what friction and cohesion can bear; NaN where that is nothing [-]
+    """
+
+    bodies: Ints
+    parted: NDArray[np.bool_]
+    polygon: tuple[Array, ...]
+    frame: Array
+    centroid: Array
+    area: Array
+    second_moment: Array
+    force: Array
+    moment: Array
+    centre_of_pressure: Array
+    eccentricity: Array
+    kern: Array
+    edge: Array
+    pressure_mean: Array
+    pressure_max: Array
+    gap: Array
+    opening: Array
+    sliding: Array
+    slipping: Array
+    open: Array
+    friction_use: Array
+
+    def __len__(self) -> int:
+        return len(self.bodies)
+
+    @property
+    def pressed(self) -> NDArray[np.bool_]:
+        """(nj,) it bears compression."""
+        return np.isfinite(self.kern)
+
+    @property
+    def in_kern(self) -> NDArray[np.bool_]:
+        """(nj,) it bears compression, within the kern."""
+        inside: NDArray[np.bool_] = self.kern <= 1.0 + _ROUNDING
+        return inside
