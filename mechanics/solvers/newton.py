@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechanics.problem import ContactProblem, ContactSolution, ContactStart, scale_of
-from mechanics.residual import project_on_cone, residual
+from mechanics.residual import Residual, project_on_cone, residual
 from moma.errors import SolverError
 
 __all__ = ["Newton", "projection_derivative"]
@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 _SOFT = 1e-7
 # shortest fraction of a step, and what a step must gain over what it promises
 _SHORTEST, _GAIN = 0.02, 0.1
+# how many steps that gain nothing are taken all the same
+_DARING = 2
 
 
 @dataclass(frozen=True)
@@ -54,21 +56,35 @@ class Newton:
         form, limits = problem.sparse(), (self.tolerance, self.velocity_tolerance)
         # not put on the cones first: that would break the balance, by which they are told apart
         impulse = start.impulse
-        left, count = residual(problem, impulse), 0
-        while not left.within(*limits) and count < self.max_iterations:
+        left, count, daring = residual(problem, impulse), 0, 0
+        best = left, impulse
+        while not left.within(*limits) and count < self.max_iterations and daring <= _DARING:
             count += 1
             step = _step(problem, form, impulse)
-            length, found = 1.0, None
-            while found is None and length > _SHORTEST:
-                new = impulse + length * step
-                after = residual(problem, new)
-                if np.linalg.norm(after.error) < (1.0 - _GAIN * length) * np.linalg.norm(left.error):
-                    found = new, after
-                length *= 0.5
+            found = _search(problem, impulse, left, step)
             if found is None:
-                break
+                # the natural map has kinks: beyond one, a step that gains nothing at first may still lead on
+                daring += 1
+                found = impulse + step, residual(problem, impulse + step)
             impulse, left = found
+            if left.natural_map < best[0].natural_map:
+                best = left, impulse
+        left, impulse = best
         return ContactSolution(impulse, left.dual, count, left.natural_map, left.within(*limits))
+
+
+def _search(
+    problem: ContactProblem, impulse: Array, left: Residual, step: Array
+) -> tuple[Array, Residual] | None:
+    """The first of ever shorter parts of a step that brings Φ down, and what is left there; None if none does."""
+    size, length = np.linalg.norm(left.error), 1.0
+    while length > _SHORTEST:
+        new = impulse + length * step
+        after = residual(problem, new)
+        if np.linalg.norm(after.error) < (1.0 - _GAIN * length) * size:
+            return new, after
+        length *= 0.5
+    return None
 
 
 def _step(problem: ContactProblem, form: object, r: Array) -> Array:
