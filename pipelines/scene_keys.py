@@ -253,7 +253,7 @@ _OUTPUT = (
     Key(
         "frame_every",
         Kind.INTEGER,
-        "Keep the motion every so many steps; 0: first and last.",
+        "Keep motion, stresses and contacts every so many steps; 0: first and last.",
         "",
         0,
         at_least=0,
