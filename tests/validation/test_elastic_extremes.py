@@ -155,13 +155,13 @@ def test_a_stone_without_support_falls():
 
 
 def test_a_stone_beyond_the_edge_of_its_support_topples():
-    """Its centre of mass lies 1 cm outside: there is no equilibrium, it turns as the rigid one, 10 %."""
-    low, high = [-0.21, -0.1, 0.0], [0.19, 0.1, 0.2]
+    """Its centre of mass lies 5 cm outside: it turns over the edge as the rigid one does, within 5 %."""
+    low, high = [-0.25, -0.1, 0.0], [0.15, 0.1, 0.2]
     table = box("table", [0.0, -1, -0.5], [1.0, 1, 0.0], fidelity=Fidelity.FIXED)
     angles = []
-    for block in (elastic_box("stone", low, high, stone(1e9), 0.1), box("stone", low, high, stone(1e9))):
+    for block in (elastic_box("stone", low, high, stone(1e9), 0.05), box("stone", low, high, stone(1e9))):
         start = Start.EQUILIBRIUM if block.fidelity is Fidelity.DEFORMABLE else Start.REST
-        time = TimeSettings(1e-3, 1.0, 0.4, start=start, stop_at_equilibrium=False)
+        time = TimeSettings(1e-3, 1.0, 0.2, start=start, stop_at_equilibrium=False)
         result = simulate(Scene("topple", (table, block), contact=ContactSettings(DryJoint(0.6)), time=time))
         assert result.outcome is not Outcome.EQUILIBRIUM
         body = result.bodies[1]
@@ -169,7 +169,7 @@ def test_a_stone_beyond_the_edge_of_its_support_topples():
         along = ends[1] - ends[0]
         angles.append(np.arcsin(along[2] / np.linalg.norm(along)))
     assert angles[1] > 0.05
-    assert angles[0] == pytest.approx(angles[1], rel=0.1)
+    assert angles[0] == pytest.approx(angles[1], rel=0.05)
 
 
 @pytest.mark.parametrize(

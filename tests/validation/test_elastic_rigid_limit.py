@@ -18,9 +18,9 @@ YOUNGS = (1e10, 1e11, 1e12, 1e13)
 DENSITY = 2400.0
 
 
-def slope(values, numbers=YOUNGS):
-    """d log value / d log E by least squares [-]."""
-    return np.polyfit(np.log10(numbers), np.log10(values), 1)[0]
+def slope(values):
+    """d log value / d log E by least squares up to 10³ GPa, beyond which the solver's tolerance shows [-]."""
+    return np.polyfit(np.log10(YOUNGS[:3]), np.log10(values[:3]), 1)[0]
 
 
 def elastic(block: Block, young, size, element=Element.HEX8) -> Block:
@@ -67,7 +67,7 @@ def test_joints_of_a_leaning_stack_bear_as_between_rigid_stones():
             "lean",
             [elastic(block, young, 0.2) for block in blocks],
             gravity=tilted_gravity(LEAN),
-            tolerance=1e-9,
+            tolerance=1e-10,
             balance=1e-6,
             step=1e-2,
         )
@@ -129,7 +129,7 @@ def test_a_rocking_block_tends_to_the_rigid_one():
 
 
 def test_a_sliding_stack_moves_as_the_rigid_one():
-    """Two stones that slide and hold on an incline: places after 0.2 s tend to the rigid ones ∝ 1/E or faster."""
+    """Two stones that slide and hold on an incline: places after 0.2 s tend to the rigid ones ∝ 1/E, to 1e-7 m."""
     material = Material("stone", DENSITY, 1e10, 0.2)
     blocks = [
         ground(half=2.0),
@@ -150,5 +150,5 @@ def test_a_sliding_stack_moves_as_the_rigid_one():
 
     exact = places(blocks)
     errors = [np.abs(places([elastic(b, young, 0.2) for b in blocks]) - exact).max() for young in YOUNGS]
-    assert errors[-1] < 1e-5
+    assert errors[-1] < 1e-7
     assert slope(errors) < -0.9

@@ -10,12 +10,9 @@ from mechanics.laws.dry_joint import DryJoint
 from mechanics.laws.mortar import MortarJoint
 from mechanics.materials import Material
 from mechanics.meshing.elements import Element
-from mechanics.model import build_model
-from mechanics.observers.equilibrium import imbalance, support_reaction
 from mechanics.result import Outcome
 from mechanics.scene import Block, ContactSettings, Fidelity, Scene, SolverSettings, Start, TimeSettings
 from mechanics.simulate import simulate
-from mechanics.simulation import Clock, Simulation
 
 STONE = Material("stone", density=2000.0, young=5e9, poisson=0.2)
 
@@ -30,13 +27,21 @@ def scene(
     gravity=(0.0, 0.0, -G),
     stop=False,
     tolerance=1e-6,
+    balance=1e-4,
 ):
     return Scene(
         "start",
         tuple(blocks),
         gravity=gravity,
         contact=ContactSettings(law or DryJoint(0.6)),
-        time=TimeSettings(step, theta, duration, start=Start.EQUILIBRIUM, stop_at_equilibrium=stop),
+        time=TimeSettings(
+            step,
+            theta,
+            duration,
+            start=Start.EQUILIBRIUM,
+            stop_at_equilibrium=stop,
+            balance_tolerance=balance,
+        ),
         solver=SolverSettings(tolerance=tolerance),
     )
 
@@ -85,18 +90,17 @@ SCENES = {"stack": stack, "wall": wall, "arch": arch}
 def test_the_steps_that_follow_are_in_balance(name, theta):
     """From the first step on: reaction = weight within 1e-6, balance ≤ 1e-4, η ≤ 1e-6, and next to no motion.
 
+    Asked for are a balance of 1e-6 and η ≤ 1e-8, as a vibration that is left does not die with θ = ½.
+
     Motion: slower than 10⁻⁴ √(g · 0.1 m), the speed of rest.
     """
-    model, state = build_model(scene(SCENES[name](), theta=theta))
-    simulation = Simulation(model, state, Clock())
-    for _ in range(10):
-        step = simulation.step()
-        support = support_reaction(model, step.contacts, step.force, step.after.time)
-        balance = imbalance(model, step.after, step.contacts, step.force, step.kick.load)
-        assert step.solution.natural_map <= 1e-6
-        assert balance.max() <= 1e-4
-        assert support.error <= 1e-6
-        assert np.abs(step.after.node_velocity).max() < 1e-4 * np.sqrt(G * 0.1)
+    result = simulate(scene(SCENES[name](), theta=theta, tolerance=1e-8, balance=1e-6))
+    history = result.history
+    assert result.static.found
+    assert history.natural_map.max() <= 1e-6
+    assert history.balance.max() <= 1e-4
+    assert result.errors.reaction <= 1e-6
+    assert history.speed.max() < 1e-4 * np.sqrt(G * 0.1)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -113,7 +117,7 @@ def test_it_has_the_stresses_of_a_slow_relaxation():
     """A stack that leans by 5°, statically determinate: stresses at all nodes agree within 1e-3 of the largest."""
     lean = tilted_gravity(5.0)
     slow = resting("slow", stack(), gravity=lean, tolerance=1e-9, balance=1e-6)
-    soon = simulate(scene(stack(), theta=1.0, gravity=lean, stop=True, tolerance=1e-9))
+    soon = simulate(scene(stack(), theta=1.0, gravity=lean, stop=True, tolerance=1e-8))
     assert slow.outcome is soon.outcome is Outcome.EQUILIBRIUM
     largest = max(np.abs(body.stress).max() for body in slow.bodies[1:])
     for one, other in zip(slow.bodies[1:], soon.bodies[1:], strict=True):
@@ -151,18 +155,19 @@ def test_where_there_is_no_equilibrium_stones_fall(kind):
     They are not at rest when the time is over, nothing has exploded: no point is faster than 1.5 times a free fall, and
     the start makes no energy: kinetic energy stays below the work of the weight.
     """
-    gravity, blocks = (0.0, 0.0, -G), stack(2)
+    gravity, blocks, friction = (0.0, 0.0, -G), stack(2), 0.6
     if kind == "too steep":
         gravity = tilted_gravity(40.0)
         blocks = stack(1)
     elif kind == "overturning":
-        gravity = tilted_gravity(25.0)
+        gravity, friction = tilted_gravity(36.0), 0.9
     elif kind == "too thin":
         blocks = arch(9, 0.09)
     else:
         blocks = [ground(half=1.0), elastic_box("stone", [-0.1, -0.1, 0.5], [0.1, 0.1, 0.7], STONE, 0.1)]
     duration = 0.15
-    result = simulate(scene(blocks, gravity=gravity, theta=1.0, duration=duration))
+    result = simulate(scene(blocks, law=DryJoint(friction), gravity=gravity, theta=1.0, duration=duration))
+    assert not result.static.found
     assert result.outcome is not Outcome.EQUILIBRIUM
     assert result.history.speed[-1] > 0.02
     assert result.history.speed.max() < 1.5 * G * duration
@@ -183,4 +188,5 @@ def test_the_start_tells_a_stack_that_stands_from_one_that_overturns():
                 stack(2), law=DryJoint(0.9), gravity=tilted_gravity(angle), theta=1.0, duration=0.2, stop=True
             )
         )
+        assert result.static.found == stands
         assert (result.outcome is Outcome.EQUILIBRIUM) == stands
