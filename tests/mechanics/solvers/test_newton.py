@@ -1,5 +1,6 @@
 """Newton's method on the natural map: its derivative, its convergence, and what it does where it fails."""
 
+import itertools
 from dataclasses import replace
 from functools import cache
 
@@ -132,7 +133,7 @@ def test_from_nearby_it_converges_quadratically(law):
             break
     assert eta[0] > 1e-5
     assert eta[-1] < 1e-12
-    for last, new in zip(eta[:-1], eta[1:], strict=True):
+    for last, new in itertools.pairwise(eta):
         assert new < max(last**1.5, 1e-12)
 
 
