@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from elastic import resting
+from masonry import semicircular_arch
 from scenes import G, box, ground, moved, rotation, tilted_gravity
 
 from mechanics.laws.dry_joint import DryJoint
@@ -129,7 +130,7 @@ def test_a_rocking_block_tends_to_the_rigid_one():
 
 
 def test_a_sliding_stack_moves_as_the_rigid_one():
-    """Two stones that slide and hold on an incline: places after 0.2 s tend to the rigid ones ∝ 1/E, to 1e-7 m."""
+    """Two stones that slide and hold on an incline: places after 0.1 s tend to the rigid ones ∝ 1/E, to 1e-7 m."""
     material = Material("stone", DENSITY, 1e10, 0.2)
     blocks = [
         ground(half=2.0),
@@ -143,7 +144,7 @@ def test_a_sliding_stack_moves_as_the_rigid_one():
             tuple(stones),
             gravity=tilted_gravity(10.0),
             contact=ContactSettings(DryJoint(0.4)),
-            time=TimeSettings(1e-3, 1.0, 0.2, stop_at_equilibrium=False),
+            time=TimeSettings(1e-3, 1.0, 0.1, stop_at_equilibrium=False),
             solver=SolverSettings(tolerance=1e-10),
         )
         return np.array([body.position.mean(axis=0) for body in simulate(scene).bodies[1:]])
@@ -152,3 +153,29 @@ def test_a_sliding_stack_moves_as_the_rigid_one():
     errors = [np.abs(places([elastic(b, young, 0.2) for b in blocks]) - exact).max() for young in YOUNGS]
     assert errors[-1] < 1e-7
     assert slope(errors) < -0.9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("young", "allowed"), [(1e10, 0.07), (1e11, 0.01), (1e13, 0.01)])
+def test_an_arch_that_is_too_thin_falls_as_the_rigid_one(young, allowed):
+    """Nine voussoirs 0.09 m thick on a mean radius of 1 m, for 0.25 s: the crown sinks by 27 mm, all stones alike.
+
+    From 100 GPa on no stone is farther from its rigid twin than 1 % of that, hinges and all; at 10 GPa 7 %.
+    """
+    rigid = semicircular_arch(9, 0.09)
+
+    def centres(stones):
+        scene = Scene(
+            "arch",
+            tuple(stones),
+            contact=ContactSettings(DryJoint(0.7)),
+            time=TimeSettings(1e-3, 1.0, 0.25, stop_at_equilibrium=False),
+            solver=SolverSettings(tolerance=1e-9),
+        )
+        return np.array([body.displacement.mean(axis=0) for body in simulate(scene).bodies])
+
+    exact = centres(rigid)
+    largest = np.linalg.norm(exact, axis=1).max()
+    assert largest == pytest.approx(0.027, rel=0.05)
+    found = centres([elastic(block, young, 0.1) for block in rigid])
+    assert np.linalg.norm(found - exact, axis=1).max() < allowed * largest
