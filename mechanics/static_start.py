@@ -23,6 +23,8 @@ _STEP = 1.0
 _STEPS = 10
 # how much further than asked for it is solved: Newton's last steps cost little, and the first steps of the run none
 _FURTHER = 0.1
+# what rounding leaves of η in steps that long
+_ROUNDING = 1e-7
 # a stone that moves by this part of its width does not settle, it falls
 _FALLS = 0.2
 
@@ -40,7 +42,9 @@ def static_start(
     asked = model.scene.solver
     solver: Solver | None = None
     if not model.rigid_only:
-        solver = InteriorPoint(_FURTHER * asked.tolerance, _FURTHER * asked.velocity_tolerance)
+        solver = InteriorPoint(
+            max(_FURTHER * asked.tolerance, _FURTHER * _ROUNDING), _FURTHER * asked.velocity_tolerance
+        )
     search = Simulation(still, start, clock, solver, elastic_scale=True)
     limit = model.scene.time.balance_tolerance
     iterations, count, balance, eta, found = 0, 0, np.inf, np.inf, False
@@ -54,5 +58,5 @@ def static_start(
         report(Progress("static", count, _STEPS, f"balance {balance:.1e}, η {eta:.1e}"))
         if not bool((displacement(still, start, step.after) < _FALLS * still.surfaces.size).all()):
             break
-        found = eta <= asked.tolerance and balance <= limit
+        found = eta <= max(asked.tolerance, _ROUNDING) and balance <= limit
     return StaticStart(found, count, iterations, eta, balance), search

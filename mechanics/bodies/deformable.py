@@ -118,14 +118,15 @@ class Compliance:
     ŵ moves the stone as a whole, through its mass, and deforms it. In long steps the first part is larger by many
     orders, and rounding of one would drown the other; so they are kept apart, and momentum is exact.
 
-    Attributes
+    Parameters
     ----------
-    matrix : ŵ⁻¹, (3n, 3n), body axes [kg]
+    stone : the stone
+    step, theta : h [s] and θ
     """
 
     def __init__(self, stone: Deformable, step: float, theta: float) -> None:
         operators, h = stone.operators, step * theta
-        self.matrix = csc_array(operators.mass + h * stone.damping + h**2 * operators.stiffness)
+        self._stone, self._duration = stone, h
         self._factor = splu(
             self.matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
         )
@@ -136,19 +137,25 @@ class Compliance:
         self._nodes = np.zeros(0, dtype=np.int64)
         self._condensed = np.zeros((0, 0))
 
+    @property
+    def matrix(self) -> "csc_array[np.float64]":
+        """ŵ⁻¹ (3n, 3n), body axes, made anew for whoever asks [kg]."""
+        stone, h = self._stone, self._duration
+        return csc_array(stone.operators.mass + h * stone.damping + h**2 * stone.operators.stiffness)
+
     def respond(self, impulse: Array) -> Array:
         """Velocities ŵ p (…, n, 3) that nodal impulses p (…, n, 3) [N s] give, body axes [m/s]."""
         return self.deform(impulse) + self.shift(impulse)
 
     def deform(self, impulse: Array) -> Array:
         """The part of ŵ p that deforms the stone."""
-        columns = impulse.reshape(-1, self.matrix.shape[0]).T
+        columns = impulse.reshape(-1, len(self._modes)).T
         velocity: Array = self._deforming(columns).T.reshape(impulse.shape)
         return velocity
 
     def shift(self, impulse: Array) -> Array:
         """The part of ŵ p that moves the stone as a whole."""
-        columns = impulse.reshape(-1, self.matrix.shape[0]).T
+        columns = impulse.reshape(-1, len(self._modes)).T
         velocity: Array = (self._modes @ (self._whole @ (self._modes.T @ columns))).T.reshape(impulse.shape)
         return velocity
 
@@ -173,7 +180,7 @@ class Compliance:
 
     def _condense(self, nodes: Ints) -> None:
         dofs = _dofs(nodes)
-        unit = np.zeros((self.matrix.shape[0], len(dofs)))
+        unit = np.zeros((len(self._modes), len(dofs)))
         unit[dofs, np.arange(len(dofs))] = 1.0
         square = self._deforming(unit)[dofs] + self._modes[dofs] @ self._whole @ self._modes[dofs].T
         self._nodes, self._condensed = nodes, 0.5 * (square + square.T)

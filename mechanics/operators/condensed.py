@@ -5,12 +5,15 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import ThreadpoolController
 
 from mechanics.operators.multifrontal import Cliques, Fronts, fronts
 
 __all__ = ["CondensedForm"]
 
 Array = NDArray[np.float64]
+
+_BLAS = ThreadpoolController()
 
 
 class CondensedForm:
@@ -20,10 +23,11 @@ class CondensedForm:
     ----------
     bodies : (nc, 2) of each contact
     cliques : W as a sum of blocks
+    threads : of the dense products, at most; where others use the cores, more than one wait for one another
     """
 
-    def __init__(self, bodies: NDArray[np.int64], cliques: Cliques) -> None:
-        self._bodies, self._cliques = bodies, cliques
+    def __init__(self, bodies: NDArray[np.int64], cliques: Cliques, threads: int = 1) -> None:
+        self._bodies, self._cliques, self._threads = bodies, cliques, threads
         self._relaxed: dict[float, Callable[[Array], Array]] = {}
 
     @cached_property
@@ -37,7 +41,8 @@ class CondensedForm:
         ------
         SolverError : if W + Θ is singular
         """
-        return self._fronts.factorise(self._cliques, theta).solve
+        with _BLAS.limit(limits=self._threads, user_api="blas"):
+            return self._fronts.factorise(self._cliques, theta).solve
 
     def relaxed(self, sigma: float) -> Callable[[Array], Array]:
         """(W/σ + 1)⁻¹ as a function of b (3 nc,); its factors are kept for the next call."""

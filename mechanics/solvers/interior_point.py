@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechanics.problem import ContactProblem, ContactSolution, ContactStart, scale_of
+from mechanics.residual import residual
 from mechanics.solvers.newton import Newton
 from mechanics.solvers.second_order_cones import Scaling, divide, product, reach, scaling
 from moma.errors import SolverError
@@ -71,13 +72,18 @@ class InteriorPoint:
         if len(start.impulse) == 0:
             return ContactSolution(start.impulse, start.velocity, 0, 0.0, True)
         newton = Newton(self.tolerance, self.velocity_tolerance)
-        best = newton(problem, start) if start.impulse.any() else None
-        if best is not None and best.converged:
+        # also without impulses: where no load acts, none are needed
+        best = newton(problem, start) if start.impulse.any() else _as_it_is(problem, start, newton)
+        if best.converged:
             return best
         path, tries, stuck = _Path(problem), list(_TRIES), 0
-        count = 0 if best is None else best.iterations
+        count = best.iterations
         while tries and stuck < _STUCK and count < self.max_iterations:
-            length = path.advance()
+            try:
+                length = path.advance()
+            except SolverError:
+                # rounding has won
+                break
             count += 1
             near = path.complementarity < tries[0]
             stuck = stuck + 1 if length < _SHORT and len(tries) < len(_TRIES) else 0
@@ -86,12 +92,17 @@ class InteriorPoint:
                     del tries[0]
                 found = newton(problem, ContactStart(path.impulse, start.velocity))
                 count += found.iterations
-                if best is None or found.natural_map < best.natural_map:
+                if found.natural_map < best.natural_map:
                     best = found
                 if found.converged:
                     break
-        assert best is not None
         return replace(best, iterations=count)
+
+
+def _as_it_is(problem: ContactProblem, start: ContactStart, newton: Newton) -> ContactSolution:
+    left = residual(problem, start.impulse)
+    within = left.within(newton.tolerance, newton.velocity_tolerance)
+    return ContactSolution(start.impulse, left.dual, 0, left.natural_map, within)
 
 
 @dataclass

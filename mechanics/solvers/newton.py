@@ -13,8 +13,8 @@ __all__ = ["Newton", "projection_derivative"]
 
 Array = NDArray[np.float64]
 
-# keeps the derivative of the projection invertible: an open contact yields as one with this part of its stiffness
-_SOFT = 1e-7
+# keeps D invertible where a contact is open, and 1 - D where it sticks, as between rigid stones W is singular
+_SOFT, _GIVE = 1e-7, 1e-9
 # shortest fraction of a step, and what a step must gain over what it promises
 _SHORTEST, _GAIN = 0.02, 0.1
 # how many steps that gain nothing are taken all the same
@@ -60,7 +60,11 @@ class Newton:
         best = left, impulse
         while not left.within(*limits) and count < self.max_iterations and daring <= _DARING:
             count += 1
-            step = _step(problem, form, impulse)
+            try:
+                step = _step(problem, form, impulse)
+            except SolverError:
+                # singular, far from a solution: the best so far has to do
+                break
             found = _search(problem, impulse, left, step)
             if found is None:
                 # the natural map has kinks: beyond one, a step that gains nothing at first may still lead on
@@ -96,7 +100,7 @@ def _step(problem: ContactProblem, form: object, r: Array) -> Array:
     point = r - dual / scale
     error = r - project_on_cone(point, problem.friction, problem.cohesion)
     derivative = projection_derivative(point, problem.friction, problem.cohesion)
-    derivative = (1.0 - _SOFT) * derivative + _SOFT * np.eye(3)
+    derivative = (1.0 - _SOFT - _GIVE) * derivative + _SOFT * np.eye(3)
     turn = np.tile(np.eye(3), (len(r), 1, 1))
     turn[:, 0, 1:] = (problem.friction / np.maximum(slide, 1e-300))[:, None] * u[:, 1:]
     inverse = scale * np.linalg.inv(derivative @ turn)
