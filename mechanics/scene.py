@@ -177,8 +177,8 @@ class SolverSettings:
     velocity_tolerance : largest velocity by which a contact may still break its law, over the largest velocity that
         the contacts have to stop [-]
     max_iterations : sweeps or iterations after which a step is left as it is and reported as not converged
-    threads : that sweep rigid scenes of many contacts, at most; the results are the same to the last bit. More than
-        one pays on idle cores only: where others use them, each waits for the slowest
+    threads : that sweep rigid scenes of many contacts, or factorise deformable ones, at most; sweeps give the same to
+        the last bit. More than one pays on idle cores only: where others use them, each waits for the slowest
     """
 
     method: Method = Method.AUTO

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import ThreadpoolController
 
 from mechanics.model import Model, build_model
 from mechanics.observers.energy import EnergyBalance, kinetic_energy
@@ -30,7 +31,12 @@ def simulate(scene: Scene, progress: Callable[[Progress], None] | None = None) -
     SceneError, GeometryError, MeshError : if the scene cannot be built
     SolverError : if the motion is no longer finite
     """
-    report = progress or (lambda _: None)
+    # dense products of stones are small: threads that others use too would cost more than they gain
+    with ThreadpoolController().limit(limits=scene.solver.threads, user_api="blas"):
+        return _simulate(scene, progress or (lambda _: None))
+
+
+def _simulate(scene: Scene, report: Callable[[Progress], None]) -> Result:
     clock = Clock()
     with clock("mesh"):
         model, start = build_model(scene, lambda done, total: report(Progress("mesh", done, total)))

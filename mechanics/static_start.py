@@ -35,9 +35,11 @@ def static_start(
     """Take steps of 1 s, each from a halt, until every body is in balance under the loads of the first instant.
 
     With θ = 1 such a step is the static problem (docs/theory.md §2): M/h² is next to nothing beside K, but holds what
-    nothing else does. Driven supports stay where they are.
+    nothing else does. Rigid stones need none so long. Driven supports stay where they are.
     """
-    settings = TimeSettings(step=_STEP, theta=1.0, relaxation=True, lumped_mass=model.scene.time.lumped_mass)
+    # between rigid stones long steps would only let small errors of velocity grow into gaps
+    step = model.scene.time.step if model.rigid_only else _STEP
+    settings = TimeSettings(step=step, theta=1.0, relaxation=True, lumped_mass=model.scene.time.lumped_mass)
     still = replace(model, scene=replace(model.scene, time=settings), motions=())
     asked = model.scene.solver
     solver: Solver | None = None
@@ -49,14 +51,14 @@ def static_start(
     limit = model.scene.time.balance_tolerance
     iterations, count, balance, eta, found = 0, 0, np.inf, np.inf, False
     while count < _STEPS and not found:
-        step = search.step()
+        made = search.step()
         search.halt()
         count += 1
-        iterations += step.solution.iterations
-        eta = step.solution.natural_map
-        balance = float(imbalance(still, step.after, step.contacts, step.force, step.kick.load).max())
+        iterations += made.solution.iterations
+        eta = made.solution.natural_map
+        balance = float(imbalance(still, made.after, made.contacts, made.force, made.kick.load).max())
         report(Progress("static", count, _STEPS, f"balance {balance:.1e}, η {eta:.1e}"))
-        if not bool((displacement(still, start, step.after) < _FALLS * still.surfaces.size).all()):
+        if not bool((displacement(still, start, made.after) < _FALLS * still.surfaces.size).all()):
             break
         found = eta <= max(asked.tolerance, _ROUNDING) and balance <= limit
     return StaticStart(found, count, iterations, eta, balance), search

@@ -5,15 +5,12 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import ThreadpoolController
 
 from mechanics.operators.multifrontal import Cliques, Fronts, fronts
 
 __all__ = ["CondensedForm"]
 
 Array = NDArray[np.float64]
-
-_BLAS = ThreadpoolController()
 
 
 class CondensedForm:
@@ -23,11 +20,10 @@ class CondensedForm:
     ----------
     bodies : (nc, 2) of each contact
     cliques : W as a sum of blocks
-    threads : of the dense products, at most; where others use the cores, more than one wait for one another
     """
 
-    def __init__(self, bodies: NDArray[np.int64], cliques: Cliques, threads: int = 1) -> None:
-        self._bodies, self._cliques, self._threads = bodies, cliques, threads
+    def __init__(self, bodies: NDArray[np.int64], cliques: Cliques) -> None:
+        self._bodies, self._cliques = bodies, cliques
         self._relaxed: dict[float, Callable[[Array], Array]] = {}
 
     @cached_property
@@ -41,8 +37,7 @@ class CondensedForm:
         ------
         SolverError : if W + Θ is singular
         """
-        with _BLAS.limit(limits=self._threads, user_api="blas"):
-            return self._fronts.factorise(self._cliques, theta).solve
+        return self._fronts.factorise(self._cliques, theta).solve
 
     def relaxed(self, sigma: float) -> Callable[[Array], Array]:
         """(W/σ + 1)⁻¹ as a function of b (3 nc,); its factors are kept for the next call."""

@@ -39,7 +39,6 @@ class MixedDelassus:
     block : flat symmetric compliance blocks of the elastic bodies, between their contact sides [1/kg]
     diagonal : (nc, 3, 3) W_αα [1/kg]
     scale : what u over r is measured against [1/kg]
-    threads : that may factorise at once, at most
     """
 
     body: Ints
@@ -52,7 +51,6 @@ class MixedDelassus:
     block: Array
     diagonal: Array
     scale: float
-    threads: int = 1
 
     @property
     def _arrays(self) -> tuple[NDArray[np.generic], ...]:
@@ -94,7 +92,7 @@ class MixedDelassus:
     @cached_property
     def sparse(self) -> CondensedForm:
         """W for methods that factorise."""
-        return CondensedForm(self.body, self.cliques, self.threads)
+        return CondensedForm(self.body, self.cliques)
 
     def gauss_seidel(self, shift: Array, friction: Array, cohesion: Array) -> GaussSeidel:
         """Sweeps forth and back; running velocities are made anew on each call, so that rounding cannot pile up."""
