@@ -172,7 +172,7 @@ def _started(scene: Scene) -> tuple[Simulation, float | None]:
     if scene.time.start is not Start.EQUILIBRIUM:
         return simulation, None
     begun = time.perf_counter()
-    found, search = static_start(model, state, Clock(), lambda _: None)
+    found, search = static_start(model, state, lambda _: None)
     if not found.found:
         raise SolverError(f"no equilibrium, balance {found.balance:.1e}", where=scene.name)
     simulation.take_over(search)

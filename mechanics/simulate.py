@@ -43,7 +43,8 @@ def _simulate(scene: Scene, report: Callable[[Progress], None]) -> Result:
     simulation = Simulation(model, start, clock)
     static = None
     if scene.time.start == Start.EQUILIBRIUM:
-        static, search = static_start(model, start, clock, report)
+        with clock("start"):
+            static, search = static_start(model, start, report)
         if static.found:
             simulation.take_over(search)
     log = _Log(model, start, simulation.state)

@@ -140,12 +140,11 @@ class Simulation:
         self._kinetic = 0.0
         self._first = True
 
-    def halt(self) -> None:
-        """Bring all bodies to a halt."""
+    def halt(self, time: float) -> None:
+        """Bring all bodies to a halt, and set the clock of the scene to `time` [s]."""
         own = self.state
-        self.state = replace(
-            own, velocity=np.zeros_like(own.velocity), node_velocity=np.zeros_like(own.node_velocity)
-        )
+        still = np.zeros_like(own.velocity), np.zeros_like(own.node_velocity)
+        self.state = replace(own, time=time, velocity=still[0], node_velocity=still[1])
 
     def take_over(self, other: "Simulation") -> None:
         """Go on from where another run with the same bodies has ended, with its forces and what its laws remember."""

@@ -30,7 +30,7 @@ _FALLS = 0.2
 
 
 def static_start(
-    model: Model, start: State, clock: Clock, report: Callable[[Progress], None]
+    model: Model, start: State, report: Callable[[Progress], None]
 ) -> tuple[StaticStart, Simulation]:
     """Take steps of 1 s, each from a halt, until every body is in balance under the loads of the first instant.
 
@@ -47,18 +47,20 @@ def static_start(
         solver = InteriorPoint(
             max(_FURTHER * asked.tolerance, _FURTHER * _ROUNDING), _FURTHER * asked.velocity_tolerance
         )
-    search = Simulation(still, start, clock, solver, elastic_scale=True)
+    search = Simulation(still, start, Clock(), solver, elastic_scale=True)
     limit = model.scene.time.balance_tolerance
     iterations, count, balance, eta, found = 0, 0, np.inf, np.inf, False
     while count < _STEPS and not found:
         made = search.step()
-        search.halt()
+        # the loads stay those of the first instant
+        search.halt(start.time)
         count += 1
         iterations += made.solution.iterations
         eta = made.solution.natural_map
-        balance = float(imbalance(still, made.after, made.contacts, made.force, made.kick.load).max())
+        after = replace(made.after, time=start.time)
+        balance = float(imbalance(still, after, made.contacts, made.force, made.kick.load).max())
         report(Progress("static", count, _STEPS, f"balance {balance:.1e}, η {eta:.1e}"))
-        if not bool((displacement(still, start, made.after) < _FALLS * still.surfaces.size).all()):
+        if not bool((displacement(still, start, after) < _FALLS * still.surfaces.size).all()):
             break
         found = eta <= max(asked.tolerance, _ROUNDING) and balance <= limit
     return StaticStart(found, count, iterations, eta, balance), search

@@ -51,7 +51,7 @@ EVERY = pytest.mark.parametrize("name", COLUMNS)
 def searched(one):
     """What the search found, the model, and a run before and after it took the search over."""
     model, start = build_model(one)
-    static, search = static_start(model, start, Clock(), lambda _: None)
+    static, search = static_start(model, start, lambda _: None)
     simulation = Simulation(model, start, Clock())
     simulation.take_over(search)
     return model, start, static, search, simulation
