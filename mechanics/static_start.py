@@ -25,6 +25,8 @@ _STEPS = 10
 _FURTHER = 0.1
 # what rounding leaves of η in steps that long
 _ROUNDING = 1e-7
+# steps in which rigid stones close their last gaps
+_SETTLING = 5
 # a stone that moves by this part of its width does not settle, it falls
 _FALLS = 0.2
 
@@ -35,12 +37,9 @@ def static_start(
     """Take steps of 1 s, each from a halt, until every body is in balance under the loads of the first instant.
 
     With θ = 1 such a step is the static problem (docs/theory.md §2): M/h² is next to nothing beside K, but holds what
-    nothing else does. Rigid stones need none so long. Driven supports stay where they are.
+    nothing else does. Driven supports stay where they are.
     """
-    # between rigid stones long steps would only let small errors of velocity grow into gaps
-    step = model.scene.time.step if model.rigid_only else _STEP
-    settings = TimeSettings(step=step, theta=1.0, relaxation=True, lumped_mass=model.scene.time.lumped_mass)
-    still = replace(model, scene=replace(model.scene, time=settings), motions=())
+    still = _still(model, _STEP)
     asked = model.scene.solver
     solver: Solver | None = None
     if not model.rigid_only:
@@ -63,4 +62,23 @@ def static_start(
         if not bool((displacement(still, start, after) < _FALLS * still.surfaces.size).all()):
             break
         found = eta <= max(asked.tolerance, _ROUNDING) and balance <= limit
+    if found and model.inertia.moving.any():
+        search = _set_down(model, search)
     return StaticStart(found, count, iterations, eta, balance), search
+
+
+def _still(model: Model, step: float) -> Model:
+    """The model for steps of the search: θ = 1, no support moves."""
+    own = model.scene.time
+    time = TimeSettings(step=step, theta=1.0, relaxation=True, lumped_mass=own.lumped_mass)
+    return replace(model, scene=replace(model.scene, time=time), motions=())
+
+
+def _set_down(model: Model, search: Simulation) -> Simulation:
+    """Some steps of the run's own length: a small error of velocity has left gaps between rigid stones over 1 s."""
+    last = Simulation(_still(model, model.scene.time.step), search.start, Clock())
+    last.take_over(search)
+    for _ in range(_SETTLING):
+        last.step()
+        last.halt(search.start.time)
+    return last
