@@ -84,13 +84,18 @@ def mortar_contacts(
     face, body = faces[rows, order], surfaces.body[shapes[rows, order]]
     frame, origin = _frames(surfaces, placed, face)
     meshes = surfaces.meshes
-    arguments = (
-        meshes.of_face[face], face, body, frame, origin, thin * surfaces.face_area[face].min(axis=1),
+    least = thin * surfaces.face_area[face].min(axis=1)
+    interfaces = meshes.of_face[face], face, body, frame, origin, least
+    bodies = (
         placed.centre, placed.rotation, meshes.node_ptr, meshes.node, meshes.reference, meshes.facet_ptr,
         meshes.facet, meshes.kind, meshes.cut, placed.vertex, surfaces.cptr, surfaces.corner,
     )  # fmt: skip
-    kept = _kept(surfaces, face[:, 0], *mortar_shares(*arguments))
-    interface, node, area, middle, pointer, column, value = mortar_rows(*kept, *arguments)
+    # where a face lies on one other alone, all its nodes have contacts
+    plane = surfaces.plane[face[:, 0]]
+    several = np.flatnonzero(np.bincount(plane)[plane] > 1)
+    pointer, share = mortar_shares(*(array[several] for array in interfaces), *bodies)
+    kept = _kept(surfaces, face[:, 0], several, pointer, share)
+    interface, node, area, middle, pointer, column, value = mortar_rows(*kept, *interfaces, *bodies)
     arm = np.zeros((len(interface), 2, 3))
     rigid = np.flatnonzero(meshes.of_face[face[interface, 1]] < 0)
     on = interface[rigid]
@@ -134,21 +139,27 @@ def _first_is_candidate(surfaces: Surfaces, placed: Placed, shapes: Ints, faces:
     return chosen
 
 
-def _kept(surfaces: Surfaces, face: Ints, pointer: Ints, share: Array) -> tuple[Ints, Bools]:
+def _kept(surfaces: Surfaces, face: Ints, several: Ints, start: Ints, share: Array) -> tuple[Ints, Bools]:
     """In which interfaces each node of candidate faces (ni,) has a contact: where its share is the largest.
 
     Else a node beside the seam of two antagonists would have one with each, more contacts than nodes, whose forces are
-    not unique. Faces of parts in one plane count as one face. Shares (·,) are those of all nodes of each candidate.
+    not unique. Faces of parts in one plane count as one face. Shares are those of all nodes of each candidate in
+    `several` interfaces, which begin at `start`.
     """
     meshes = surfaces.meshes
-    own = meshes.of_face[face]
-    place = np.arange(len(share)) + np.repeat(meshes.node_ptr[own] - pointer[:-1], np.diff(pointer))
-    plane = np.repeat(surfaces.plane[face], np.diff(pointer))
-    order = np.lexsort([meshes.node[place], plane])
-    new = np.flatnonzero(np.diff(plane[order], prepend=-1) | np.diff(meshes.node[place][order], prepend=-1))
-    largest = np.maximum.reduceat(share[order], new) if len(new) else share
-    kept = np.empty(len(share), dtype=bool)
-    kept[order] = share[order] >= (1.0 - _ALIKE) * np.repeat(largest, np.diff(new, append=len(share)))
+    size = np.diff(meshes.node_ptr)[meshes.of_face[face]]
+    pointer = np.concatenate([[0], np.cumsum(size)]).astype(np.int64)
+    kept = np.ones(int(pointer[-1]), dtype=bool)
+    if len(share) == 0:
+        return pointer, kept
+    within = np.arange(len(share)) - np.repeat(start[:-1], size[several])
+    node = meshes.node[within + np.repeat(meshes.node_ptr[meshes.of_face[face[several]]], size[several])]
+    plane = np.repeat(surfaces.plane[face[several]], size[several])
+    order = np.lexsort([node, plane])
+    new = np.flatnonzero((np.diff(plane[order], prepend=-1) != 0) | (np.diff(node[order], prepend=-1) != 0))
+    largest = np.repeat(np.maximum.reduceat(share[order], new), np.diff(new, append=len(share)))
+    place = within + np.repeat(pointer[several], size[several])
+    kept[place[order]] = share[order] >= (1.0 - _ALIKE) * largest
     return pointer, kept
 
 
