@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.contact._kernels_mortar import overlap_area
+from mechanics.contact._kernels_overlap import overlap_area
 from mechanics.contact.face_meshes import FaceMesh
 from mechanics.meshing.mesh import SolidMesh
 from mechanics.polyhedra import face_plane
