@@ -222,8 +222,7 @@ def driven(monkeypatch, cells, friction, poisson, goal, state=None):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("cells", [4, 6])
-def test_a_ball_drawn_aside_slips_in_the_annulus_of_cattaneo_and_mindlin(monkeypatch, cells):
+def test_a_ball_drawn_aside_slips_in_the_annulus_of_cattaneo_and_mindlin(monkeypatch):
     """F13: c/a = (1 - Q/μP)^⅓, and q = μ p0 [√(1 - r²/a²) - c/a √(1 - r²/c²)]; c/a = 0.7937 for Q = ½ μP.
 
     They hold where pressure and traction do not act on one another, that is for ν = ½ or small friction: so the ball is
@@ -232,10 +231,10 @@ def test_a_ball_drawn_aside_slips_in_the_annulus_of_cattaneo_and_mindlin(monkeyp
     """
     friction, poisson = 0.1, 0.3
     exact = Hertz(FORCE, poisson)
-    state = driven(monkeypatch, cells, 0.0, poisson, (0.0, 0.0, -exact.approach)).after
+    state = driven(monkeypatch, 4, 0.0, poisson, (0.0, 0.0, -exact.approach)).after
     shear = YOUNG / (2 * (1 + poisson))
     mindlin = 3 * (2 - poisson) * friction * FORCE / (16 * shear * exact.radius) * (1 - 0.5 ** (2 / 3))
-    step = driven(monkeypatch, cells, friction, poisson, (1.3 * mindlin, 0.0, 0.0), state)
+    step = driven(monkeypatch, 4, friction, poisson, (1.3 * mindlin, 0.0, 0.0), state)
     c = step.contacts
     point = material_points(c, step.after).mean(axis=1)
     found = patch(c.bodies, point, c.frame[:, 0], c.area, step.force, poisson)
