@@ -106,6 +106,9 @@ def test_the_central_path_alone_leads_to_the_solution(name):
     assert path.complementarity < 1e-7
     assert_laws_hold(problem, path.impulse, 1e-3)
     assert natural_map(problem, path.impulse) < 3e-3  # some ten times the root of 1e-7
+    # where nothing rubs, nothing at all acts along the joint
+    smooth = (problem.friction == 0) & (problem.cohesion == 0)
+    np.testing.assert_array_equal(path.impulse[smooth, 1:], 0.0)
 
 
 def test_the_scenes_open_slide_and_stick():
