@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
+from mechanics.bodies.dissection import dissection
 from mechanics.elasticity import (
     ElasticOperators,
     elastic_operators,
@@ -32,6 +33,9 @@ __all__ = ["Compliance", "Deformable", "deformable"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+# from so many nodes on, nested dissection leaves less fill-in than least degree
+_LARGE = 1500
 
 
 @dataclass(frozen=True)
@@ -127,8 +131,13 @@ class Compliance:
     def __init__(self, stone: Deformable, step: float, theta: float) -> None:
         operators, h = stone.operators, step * theta
         self._stone, self._duration = stone, h
+        large = len(stone.mesh.nodes) > _LARGE
+        self._order = _dofs(dissection(stone.mesh) if large else np.arange(len(stone.mesh.nodes)))
         self._factor = splu(
-            self.matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+            csc_array(self.matrix[self._order][:, self._order]),
+            permc_spec="NATURAL" if large else "MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
         )
         self._modes, self._projector = stone.modes, stone.projector
         momentum = operators.mass @ stone.modes
@@ -161,7 +170,8 @@ class Compliance:
 
     def _deforming(self, columns: Array) -> Array:
         own = columns - self._projector.T @ (self._modes.T @ columns)
-        velocity: Array = self._factor.solve(np.ascontiguousarray(own))
+        velocity = np.empty_like(own)
+        velocity[self._order] = self._factor.solve(own[self._order])
         velocity -= self._modes @ (self._projector @ velocity)
         return velocity
 
@@ -172,18 +182,26 @@ class Compliance:
         """
         new = np.setdiff1d(nodes, self._nodes)
         if len(new):
-            self._condense(np.union1d(self._nodes, new))
+            self._condense(new)
         if len(nodes) == len(self._nodes):
             return self._condensed
         places = _dofs(np.searchsorted(self._nodes, nodes))
         return self._condensed[np.ix_(places, places)]
 
-    def _condense(self, nodes: Ints) -> None:
-        dofs = _dofs(nodes)
-        unit = np.zeros((len(self._modes), len(dofs)))
-        unit[dofs, np.arange(len(dofs))] = 1.0
-        square = self._deforming(unit)[dofs] + self._modes[dofs] @ self._whole @ self._modes[dofs].T
-        self._nodes, self._condensed = nodes, 0.5 * (square + square.T)
+    def _condense(self, new: Ints) -> None:
+        """Add the rows and columns of new nodes."""
+        nodes = np.union1d(self._nodes, new)
+        dofs, added = _dofs(nodes), _dofs(new)
+        unit = np.zeros((len(self._modes), len(added)))
+        unit[added, np.arange(len(added))] = 1.0
+        columns = self._deforming(unit)[dofs] + self._modes[dofs] @ self._whole @ self._modes[added].T
+        old, own = (np.searchsorted(dofs, _dofs(part)) for part in (self._nodes, new))
+        square = np.empty((len(dofs), len(dofs)))
+        square[np.ix_(old, old)] = self._condensed
+        square[:, own] = columns
+        square[np.ix_(own, old)] = columns[old].T
+        square[np.ix_(own, own)] = 0.5 * (columns[own] + columns[own].T)
+        self._nodes, self._condensed = nodes, square
 
 
 def _dofs(nodes: Ints) -> Ints:

@@ -60,7 +60,9 @@ def test_moments_of_a_rectangle_and_of_a_triangle():
 
 def test_polygons_apart_have_nothing_in_common():
     square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=float)
-    common, count = overlaps(*packed([square, square]), *packed([square + 2.0, square + np.array([0.5, 0.0])]))
+    common, count = overlaps(
+        *packed([square, square]), *packed([square + 2.0, square + np.array([0.5, 0.0])])
+    )
     assert count.tolist() == [0, 4]
     assert moments(common, count)[0] == pytest.approx([0.0, 0.5])
 

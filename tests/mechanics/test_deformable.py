@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from mechanics.bodies.deformable import Compliance, deformable
+from mechanics.bodies.dissection import dissection
 from mechanics.elasticity import from_voigt, von_mises
 from mechanics.meshing.gmsh_mesher import mesh_with_gmsh
 from tests.mechanics.shapes import LIMESTONE, TURN
@@ -129,3 +130,24 @@ def test_an_even_push_moves_the_stone_as_a_whole(stone, response):
     # ŵ M e = e for a translation, since K e = 0
     push = np.outer(stone.weight, [1.0, 2.0, 3.0])
     np.testing.assert_allclose(response.respond(push), np.tile([1.0, 2.0, 3.0], (len(push), 1)), rtol=1e-10)
+
+
+def test_large_stones_are_factorised_by_dissection_with_the_same_answer(mesh, stone, response, monkeypatch):
+    monkeypatch.setattr("mechanics.bodies.deformable._LARGE", 10)
+    push = np.random.default_rng(3).normal(size=(len(mesh.nodes), 3))
+    expected = response.respond(push)
+    found = Compliance(stone, STEP, THETA).respond(push)
+    np.testing.assert_allclose(found, expected, atol=1e-11 * np.abs(expected).max())
+
+
+def test_dissection_leaves_nothing_between_the_halves():
+    """The nodes that part two halves come last, and no cell has nodes in both."""
+    mesh = mesh_with_gmsh(box((0, 0, 0), (2.0, 0.6, 0.5)), BOX_FACES, 0.12, "A1")
+    order = dissection(mesh)
+    np.testing.assert_array_equal(np.sort(order), np.arange(len(order)))
+    along = mesh.nodes[:, 0]
+    half = np.median(along)
+    low = along < half
+    cut = mesh.cells[low[mesh.cells].any(axis=1) & ~low[mesh.cells].all(axis=1)]
+    parting = np.unique(cut[~low[cut]])
+    np.testing.assert_array_equal(np.sort(order[-len(parting) :]), parting)
