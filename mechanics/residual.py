@@ -57,7 +57,8 @@ def residual(problem: ContactProblem, impulse: Array) -> Residual:
     pace = float(np.abs(problem.u_free).max())
     scale = max(size, projected, _NOTHING * rho * pace)
     return Residual(
-        whole / scale if scale > 0 else 0.0,
+        # what is not a number is no solution
+        0.0 if scale == 0 else whole / scale,
         largest / rho / pace if pace > 0 else 0.0,
         error,
         u,

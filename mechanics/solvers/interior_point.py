@@ -85,6 +85,8 @@ class InteriorPoint:
                 # rounding has won
                 break
             count += 1
+            if not np.isfinite(path.complementarity):
+                break
             near = path.complementarity < tries[0]
             stuck = stuck + 1 if length < _SHORT and len(tries) < len(_TRIES) else 0
             if near or stuck == _STUCK or count == self.max_iterations:

@@ -10,6 +10,7 @@ __all__ = ["Scaling", "divide", "product", "reach", "scaling"]
 Array = NDArray[np.float64]
 
 _MIRROR = np.array([1.0, -1.0, -1.0])
+_TINY = 1e-290
 
 
 def product(x: Array, y: Array) -> Array:
@@ -80,7 +81,8 @@ class Scaling:
 
 def scaling(s: Array, z: Array) -> Scaling:
     """The scaling of s and z (nc, 3), both inside their cones."""
-    own, other = np.sqrt(_determinant(s)), np.sqrt(_determinant(z))
+    # at the very boundary rounding may take a point out
+    own, other = (np.sqrt(np.maximum(_determinant(x), _TINY)) for x in (s, z))
     unit, dual = s / own[:, None], z / other[:, None]
     gamma = np.sqrt(0.5 * (1.0 + (unit * dual).sum(axis=1)))
     return Scaling((unit + _MIRROR * dual) / (2.0 * gamma[:, None]), np.sqrt(own / other))

@@ -14,6 +14,7 @@ from mechanics.solvers.admm import ADMM
 from mechanics.solvers.alternating import Alternating
 from mechanics.solvers.anderson import Anderson
 from mechanics.solvers.choice import choose_solver
+from mechanics.solvers.elastic import Elastic
 from mechanics.solvers.nsgs import NSGS
 from moma.errors import SolverError
 from tests.mechanics.shapes import brick, ground, posed, scene
@@ -182,7 +183,7 @@ def test_solving_in_turn_does_without_a_sparse_form():
     ("method", "deformable", "expected"),
     [
         (Method.AUTO, False, Alternating),
-        (Method.AUTO, True, ADMM),
+        (Method.AUTO, True, Elastic),
         (Method.NSGS, False, NSGS),
         (Method.NSGS, True, NSGS),
         (Method.ADMM, False, ADMM),
