@@ -123,6 +123,7 @@ class ContactProblem:
     friction : (nc,) Coulomb's μ [-]
     cohesion : (nc,) k, the tangential impulse carried at r_N = 0 [N s]
     sparse : gives W once more, for methods that factorise; None where it has no such form
+    adhesion : (nc,) by which r_N is shifted, r̃ = r + s n; None where nothing is [N s]
     """
 
     delassus: Delassus
@@ -131,6 +132,7 @@ class ContactProblem:
     friction: Array
     cohesion: Array
     sparse: Callable[[], Form] | None = None
+    adhesion: Array | None = None
 
 
 @dataclass(frozen=True)

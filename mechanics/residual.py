@@ -41,9 +41,10 @@ class Residual:
 def residual(problem: ContactProblem, impulse: Array) -> Residual:
     """η = ‖e‖ / ‖r‖, e = r - P_K(r - ρ û), û = u + (bias + μ‖u_T‖) n and ρ = 1 / (mean diagonal of W).
 
-    The de Saxcé form of Signorini–Coulomb (de Saxcé & Feng 1991; docs/theory.md §4); independent of units. Zero
-    without contacts; where no impulse is given but one is needed, the size of P_K(-ρ û) replaces ‖r‖, so η is 1; where
-    none is needed, rounding counts against 10⁻⁸ of the impulse that would stop the fastest u_free.
+    The de Saxcé form of Signorini–Coulomb (de Saxcé & Feng 1991; docs/theory.md §4); independent of units. With adhesion
+    ‖r‖ is that of the real impulses, without the shift. Zero without contacts. Where no impulse is given but one is
+    needed, the size of P_K(-ρ û) replaces ‖r‖, so η is 1; where none is needed, rounding counts against 10⁻⁸ of the
+    impulse that would stop the fastest u_free.
     """
     if len(impulse) == 0:
         return Residual(0.0, 0.0, np.zeros(0), np.zeros_like(impulse))
@@ -55,6 +56,11 @@ def residual(problem: ContactProblem, impulse: Array) -> Residual:
         impulse, u, problem.bias, problem.friction, problem.cohesion, rho
     )
     pace = float(np.abs(problem.u_free).max())
+    if problem.adhesion is not None and problem.adhesion.any():
+        # a strong bond shifts r by far more than it carries
+        size = projected = float(
+            np.sqrt(((impulse[:, 0] - problem.adhesion) ** 2).sum() + (impulse[:, 1:] ** 2).sum())
+        )
     scale = max(size, projected, _NOTHING * rho * pace)
     return Residual(
         # what is not a number is no solution

@@ -93,5 +93,7 @@ def state_laws(
     if open_.any():
         never = _NEVER * (float(np.abs(u_free).max()) + 1e-300)
         terms = replace(terms, bias=np.where(open_, never, terms.bias))
-    problem = ContactProblem(operator, u_free, terms.bias, terms.friction, terms.cohesion, sparse)
+    problem = ContactProblem(
+        operator, u_free, terms.bias, terms.friction, terms.cohesion, sparse, terms.adhesion
+    )
     return Statement(problem, law, approach, terms)

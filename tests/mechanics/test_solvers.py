@@ -250,13 +250,15 @@ def scaled(problem, mass, speed):
     if isinstance(w, RigidDelassus):
         w = replace(w, inertia=w.inertia / mass)
     else:
-        w = replace(w, response=w.response / mass, block=w.block / mass, diagonal=w.diagonal / mass)
+        parts = {name: getattr(w, name) / mass for name in ("response", "block", "diagonal", "scale")}
+        w = replace(w, **parts)
     return replace(
         problem,
         delassus=w,
         u_free=problem.u_free * speed,
         bias=problem.bias * speed,
         cohesion=problem.cohesion * mass * speed,
+        adhesion=problem.adhesion * mass * speed,
     )
 
 
