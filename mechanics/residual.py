@@ -41,7 +41,7 @@ class Residual:
 def residual(problem: ContactProblem, impulse: Array) -> Residual:
     """η = ‖e‖ / ‖r‖, e = r - P_K(r - ρ û), û = u + (bias + μ‖u_T‖) n and ρ = 1 / (mean diagonal of W).
 
-    The de Saxcé form of Signorini–Coulomb (de Saxcé & Feng 1991; docs/theory.md §4); independent of units. With adhesion
+    The de Saxcé form of Signorini–Coulomb (de Saxcé & Feng 1991; docs/theory.md §4), whatever the units. With adhesion
     ‖r‖ is that of the real impulses, without the shift. Zero without contacts. Where no impulse is given but one is
     needed, the size of P_K(-ρ û) replaces ‖r‖, so η is 1; where none is needed, rounding counts against 10⁻⁸ of the
     impulse that would stop the fastest u_free.
