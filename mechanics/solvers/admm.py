@@ -68,10 +68,14 @@ class ADMM:
             raise SolverError("the problem has no sparse form", where="ADMM", remedy='use the method "nsgs"')
         if len(start.impulse) == 0:
             return ContactSolution(start.impulse, start.velocity, 0, 0.0, True)
-        run = _Run(problem, start, self.penalty * scale_of(problem.delassus), self.hold)
-        left, looks = residual(problem, run.z), [np.inf, np.inf]
-        best = left, run.z.copy(), run.velocity
         limits = self.tolerance, self.velocity_tolerance
+        impulse = project_on_cone(start.impulse, problem.friction, problem.cohesion)
+        left, looks = residual(problem, impulse), [np.inf, np.inf]
+        if left.within(*limits):
+            # where nothing is left to do, nothing is factorised
+            return ContactSolution(impulse, start.velocity, 0, left.natural_map, True)
+        run = _Run(problem, start, self.penalty * scale_of(problem.delassus), self.hold)
+        best = left, run.z.copy(), run.velocity
         while not left.within(*limits) and run.iterations < self.max_iterations:
             if looks[-2] < self.patience * left.natural_map:
                 break
