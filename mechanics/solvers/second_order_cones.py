@@ -5,12 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from moma.errors import SolverError
+
 __all__ = ["Scaling", "divide", "product", "reach", "scaling"]
 
 Array = NDArray[np.float64]
 
 _MIRROR = np.array([1.0, -1.0, -1.0])
-_TINY = 1e-290
 
 
 def product(x: Array, y: Array) -> Array:
@@ -80,9 +81,16 @@ class Scaling:
 
 
 def scaling(s: Array, z: Array) -> Scaling:
-    """The scaling of s and z (nc, 3), both inside their cones."""
-    # at the very boundary rounding may take a point out
-    own, other = (np.sqrt(np.maximum(_determinant(x), _TINY)) for x in (s, z))
+    """The scaling of s and z (nc, 3), both inside their cones.
+
+    Raises
+    ------
+    SolverError : if one is not, which near the boundary rounding may do
+    """
+    inside = _determinant(s), _determinant(z)
+    if not (np.minimum(*inside) > 0).all():
+        raise SolverError("rounding has left the cones", where="interior point", remedy="ask for less")
+    own, other = np.sqrt(inside[0]), np.sqrt(inside[1])
     unit, dual = s / own[:, None], z / other[:, None]
     gamma = np.sqrt(0.5 * (1.0 + (unit * dual).sum(axis=1)))
     return Scaling((unit + _MIRROR * dual) / (2.0 * gamma[:, None]), np.sqrt(own / other))

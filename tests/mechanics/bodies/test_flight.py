@@ -193,7 +193,7 @@ def test_what_does_not_move_stays_as_it_is_and_the_rest_goes_straight():
 
 def test_gravity_kicks_only_what_is_free():
     model, state = build_model(scene(ground(), brick("a", (0, 0, 1), (1, 1, 2))))
-    free = free_kick(model, state, state, state, {}, 0.01, 0.5)
+    free = free_kick(model, state, state, (), 0.01, 0.5)
     np.testing.assert_allclose(free.velocity, [[0] * 6, [0, 0, -0.0981, 0, 0, 0]], atol=1e-16)
     np.testing.assert_allclose(free.load, [[0] * 6, [0, 0, -9.81 * 2000, 0, 0, 0]], rtol=1e-14)
 
