@@ -46,9 +46,11 @@ def imbalance(model: Model, state: State, contacts: Contacts, force: Array, load
 
     The sum of the loads (nb, 6) on rigid bodies, weight included, and of the contact forces (nc, 3) [N], inertia left
     out: it is zero only for a body in static equilibrium. The moment, about the centre of mass, counts with the
-    smallest width as its arm. Without gravity the largest contact force replaces the weight.
+    smallest width as its arm. Forces on elastic bodies act on their undeformed shape, as small strain has it; else high
+    walls, whose lower stones carry many times their own weight, would seem out of balance by their strain. Without
+    gravity the largest contact force replaces the weight.
     """
-    points = material_points(contacts, state)
+    points = material_points(contacts, replace(state, node=_undeformed(model, state)))
     count = len(model.mass)
     resultant = _wrenches(state, contacts.bodies[:, 0], points[:, 0], force, count)
     resultant -= _wrenches(state, contacts.bodies[:, 1], points[:, 1], force, count)
@@ -62,6 +64,15 @@ def imbalance(model: Model, state: State, contacts: Contacts, force: Array, load
     parts = np.linalg.norm(resultant[:, :3], axis=1), np.linalg.norm(resultant[:, 3:], axis=1) / size
     result: Array = np.where(model.fixed, 0.0, np.maximum(*parts) / scale)
     return result
+
+
+def _undeformed(model: Model, state: State) -> Array:
+    """Where the nodes (nn, 3) would be if no body were strained [m]."""
+    place = np.empty_like(state.node)
+    for group in model.elastic_stones.groups:
+        turned = group.stone.mesh.nodes @ state.rotation[group.bodies].transpose(0, 2, 1)
+        place[group.nodes] = state.centre[group.bodies, None] + turned
+    return place
 
 
 def _wrenches(state: State, body: NDArray[np.int64], point: Array, force: Array, count: int) -> Array:
