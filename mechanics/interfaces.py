@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechanics.contact.contacts import Contacts, material_points
+from mechanics.contact.detection import FLAT
 from mechanics.convex_polygons import following
 from mechanics.model import Model
 from mechanics.state import State
@@ -18,8 +19,6 @@ __all__ = ["Faces", "Interfaces", "find_interfaces", "placed_faces"]
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# new joints are of faces whose normals differ by less than 5°, as in the search for contacts
-_FLAT = float(np.cos(np.radians(5.0)))
 # those of the start may open by as much as this before a contact at their edge is no longer theirs
 _HINGED = float(np.cos(np.radians(45.0)))
 
@@ -113,7 +112,7 @@ def find_interfaces(faces: Faces, contacts: Contacts, state: State, known: Ints 
     angle = -np.einsum("ci,ci->c", faces.normal[face[:, 0]], faces.normal[face[:, 1]])
     key, known_key = face @ [len(faces.body), 1], known @ [len(faces.body), 1]
     is_known = np.isin(key, known_key)
-    valid = (contacts.area > 0) & faces.flat[face].all(axis=1) & (angle > np.where(is_known, _HINGED, _FLAT))
+    valid = (contacts.area > 0) & faces.flat[face].all(axis=1) & (angle > np.where(is_known, _HINGED, FLAT))
     new = np.unique(key[valid & ~is_known])
     every = np.concatenate([known_key, new])
     order = np.argsort(every)

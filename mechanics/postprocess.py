@@ -4,7 +4,6 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 from mechanics.bodies.deformable import Deformable
 from mechanics.contact.contacts import material_points
@@ -13,8 +12,6 @@ from mechanics.elasticity import (
     from_voigt,
     node_volumes,
     principal,
-    recovery,
-    sampled_stress,
     stress_error,
     to_voigt,
     von_mises,
@@ -84,7 +81,6 @@ class Observer:
     def __init__(self, model: Model, start: State) -> None:
         self._model, self._start = model, start
         self._joints: StartingJoints | None = None
-        self._recovery: dict[int, csr_array[np.float64]] = {}
 
     def first_frame(self, state: State) -> Frame:
         """The instant at which the motion begins, before its first contact forces are known."""
@@ -158,12 +154,9 @@ class Observer:
 
     def _stress(self, body: int, stone: Deformable, state: State) -> tuple[Array, float]:
         """Recovered stress of the nodes (n, 6), world axes [Pa], and its estimated relative error [-]."""
-        # equal stones share their finite elements, and so the weights of the recovery
-        if id(stone) not in self._recovery:
-            self._recovery[id(stone)] = recovery(stone.mesh)
         node, turn = state.node[self._model.nodes_of(body)], state.rotation[body]
         displacement = stone.displacement(node, state.centre[body], turn)
-        local = self._recovery[id(stone)] @ sampled_stress(stone.mesh, stone.material, displacement)
+        local = stone.recovered(displacement)
         error = stress_error(stone.mesh, stone.material, displacement, local)
         return to_voigt(turn @ from_voigt(local) @ turn.T), error
 

@@ -8,12 +8,14 @@ by the largest tension, so that r_N ≥ 0 (mechanics/laws/law.py).
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
+
+from moma.errors import SolverError
 
 __all__ = [
     "ContactProblem",
@@ -22,8 +24,10 @@ __all__ = [
     "Delassus",
     "Form",
     "GaussSeidel",
+    "ShiftedForm",
     "SparseForm",
     "scale_of",
+    "shifted_form",
 ]
 
 Array = NDArray[np.float64]
@@ -80,6 +84,13 @@ class Form(Protocol):
 
     def relaxed(self, sigma: float) -> Callable[[Array], Array]:
         """(W/σ + 1)⁻¹ as a function of b (d nc,); its factors are kept for the next call."""
+
+
+class ShiftedForm(Form, Protocol):
+    """W in a form to which a block can be added for each contact."""
+
+    def shifted(self, theta: Array) -> Callable[[Array], Array]:
+        """(W + Θ)⁻¹ as a function of b (3 nc,); `theta` (nc, 3, 3), not always symmetric [1/kg]."""
 
 
 class SparseForm:
@@ -167,3 +178,16 @@ class ContactSolution:
     iterations: int
     natural_map: float
     converged: bool
+
+
+def shifted_form(problem: ContactProblem, solver: str) -> ShiftedForm:
+    """The form of a problem to which blocks can be added.
+
+    Raises
+    ------
+    SolverError : if it has none, in the name of the solver that asks
+    """
+    form = None if problem.sparse is None else problem.sparse()
+    if form is None or not hasattr(form, "shifted"):
+        raise SolverError("the problem has no sparse form", where=solver, remedy='use the method "nsgs"')
+    return cast(ShiftedForm, form)

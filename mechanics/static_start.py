@@ -44,7 +44,7 @@ def static_start(
     solver: Solver | None = None
     if not model.rigid_only:
         solver = InteriorPoint(
-            max(_FURTHER * asked.tolerance, _FURTHER * _ROUNDING), _FURTHER * asked.velocity_tolerance
+            _FURTHER * max(asked.tolerance, _ROUNDING), _FURTHER * asked.velocity_tolerance
         )
     search = Simulation(still, start, Clock(), solver, elastic_scale=True)
     limit = model.scene.time.balance_tolerance

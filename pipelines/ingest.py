@@ -91,11 +91,11 @@ def ingest(
         for one in measured:
             store_survey(
                 session,
-                one.survey.name,
-                one.survey.path,
+                one.survey.head.name,
+                one.survey.head.path,
                 one.sha256,
                 one.stones,
-                observer=one.survey.observer,
+                observer=one.survey.head.viewpoint(None),
             )
     return IngestReport(url, tuple(_report(one) for one in measured))
 
@@ -114,10 +114,12 @@ def _measure(path: Path, read: Callable[[Path], Survey], progress: Listener) -> 
 
 def _stone(record: BlockRecord, survey: Survey) -> StoneRecord:
     """From measured points to an extruded, checked stone; errors name file, line and stone."""
-    where = f"{survey.path}:{record.line}: stone {record.code}"
+    where = f"{survey.head.path}:{record.line}: stone {record.code}"
     try:
         kind_named(record.kind)
-        block = extrude(outline_face(record, survey.observer), depth_for(record, survey.depth_rules))
+        block = extrude(
+            outline_face(record, survey.head.viewpoint(None)), depth_for(record, survey.head.depth_rules)
+        )
         check_watertight(block.solid)
     except UsageError as error:
         raise SurveyError(error.what, where=where, remedy=error.remedy) from error
@@ -156,8 +158,8 @@ def _report(measured: _Measured) -> FileReport:
     kinds = sorted({stone.kind for stone in measured.stones})
     worst = max(measured.stones, key=lambda stone: stone.rms)
     return FileReport(
-        path=measured.survey.path,
-        survey=measured.survey.name,
+        path=measured.survey.head.path,
+        survey=measured.survey.head.name,
         stones={kind: sum(stone.kind == kind for stone in measured.stones) for kind in kinds},
         rejected={stone.code: len(stone.rejected) for stone in measured.stones if stone.rejected},
         rms=worst.rms,

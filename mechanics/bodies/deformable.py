@@ -11,10 +11,11 @@ factorised once, and a stone may turn as far as it likes while its strain stays 
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array
+from scipy.sparse import csc_array, csr_array
 from scipy.sparse.linalg import splu
 
 from mechanics.bodies.dissection import dissection
@@ -70,9 +71,17 @@ class Deformable:
 
     def stress(self, node: Array, centre: Array, rotation: Array) -> Array:
         """Recovered nodal stress (n, 6) in world axes [Pa]."""
-        strained = sampled_stress(self.mesh, self.material, self.displacement(node, centre, rotation))
-        local = recovery(self.mesh) @ strained
+        local = self.recovered(self.displacement(node, centre, rotation))
         return to_voigt(rotation @ from_voigt(local) @ rotation.T)
+
+    def recovered(self, displacement: Array) -> Array:
+        """Recovered nodal stress (n, 6), body axes [Pa], from displacements (n, 3) in them [m]."""
+        local: Array = self._recovery @ sampled_stress(self.mesh, self.material, displacement)
+        return local
+
+    @cached_property
+    def _recovery(self) -> "csr_array[np.float64]":
+        return recovery(self.mesh)
 
     def displacement(self, node: Array, centre: Array, rotation: Array) -> Array:
         """Displacement d of the nodes (n, 3) from the undeformed stone, body axes [m]."""

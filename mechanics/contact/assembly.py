@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from mechanics.bodies.deformable import Compliance
-from mechanics.bodies.rigid import inverse_inertia_world
+from mechanics.bodies.rigid import RigidInertia, inverse_inertia_world
 from mechanics.contact.contacts import Contacts, material_points
 from mechanics.model import Model
 from mechanics.operators.mixed import ELASTIC, NONE, RIGID, MixedDelassus
@@ -52,13 +52,10 @@ def mixed_delassus(
     """
     body = contacts.bodies
     kind = np.where(model.fixed[body], NONE, np.where(model.elastic[body], ELASTIC, RIGID)).astype(np.int64)
-    count, slot = _slots(body, kind, len(model.mass))
+    count, slot, sides = _slots(body, kind, len(model.mass))
     yptr = np.concatenate([[0], np.cumsum(3 * count)]).astype(np.int64)
     bptr = np.concatenate([[0], np.cumsum((3 * count) ** 2)]).astype(np.int64)
     block, diagonal = np.zeros(int(bptr[-1])), np.zeros((2 * len(contacts), 3, 3))
-    sides = np.argsort(np.where(kind == ELASTIC, body, -1).ravel(), kind="stable")[
-        -int(count.sum()) or 2 * len(body) :
-    ]
     first = np.concatenate([[0], np.cumsum(count)])
     for group, own in zip(model.elastic_stones.groups, compliance, strict=True):
         for b in group.bodies[count[group.bodies] > 0]:
@@ -67,7 +64,8 @@ def mixed_delassus(
             block[bptr[b] : bptr[b + 1]] = square.ravel()
             n = np.arange(len(rows))
             diagonal[rows] = square.reshape(len(rows), 3, len(rows), 3)[n, :, n]
-    jacobian, response = _rigid_sides(model, state, contacts)
+    arm = np.einsum("csij,csj->csi", state.rotation[body], contacts.arm)
+    jacobian, response = _rigid_sides(model.inertia, state, contacts, arm)
     total = (diagonal.reshape(-1, 2, 3, 3) + jacobian @ response).sum(axis=1)
     own_part = total - _rigid_share(model, state, contacts, kind) if elastic_scale else total
     scale = float(np.einsum("cii->", own_part) / max(3 * len(contacts), 1))
@@ -76,42 +74,35 @@ def mixed_delassus(
 
 def _rigid_share(model: Model, state: State, contacts: Contacts, kind: Ints) -> Array:
     """The part of W_αα (nc, 3, 3) that is the motion of elastic stones as a whole, where a side is elastic."""
-    body = contacts.bodies
     point = (contacts.weights @ state.node).reshape(-1, 2, 3)
-    arm = point - state.centre[body]
-    frame = np.broadcast_to(contacts.frame[:, None], (*body.shape, 3, 3))
-    lever = np.cross(arm[:, :, None, :], frame)
-    turned = inverse_inertia_world(model.flight, state.rotation)[body]
-    share = lever @ turned @ lever.transpose(0, 1, 3, 2)
-    share = share + model.flight.inverse_mass[body][..., None, None] * np.eye(3)
-    elastic = (kind == ELASTIC)[..., None, None]
-    result: Array = np.where(elastic, share, 0.0).sum(axis=1)
-    return result
+    jacobian, response = _rigid_sides(model.flight, state, contacts, point - state.centre[contacts.bodies])
+    share: Array = np.where((kind == ELASTIC)[..., None, None], jacobian @ response, 0.0).sum(axis=1)
+    return share
 
 
-def _rigid_sides(model: Model, state: State, contacts: Contacts) -> tuple[Array, Array]:
-    """Jacobians (nc, 2, 3, 6) and responses (nc, 2, 6, 3) of the rigid sides; other sides answer nothing."""
+def _rigid_sides(inertia: RigidInertia, state: State, contacts: Contacts, arm: Array) -> tuple[Array, Array]:
+    """Jacobians (nc, 2, 3, 6) and responses (nc, 2, 6, 3) of sides by rigid motion; without inverse mass, none.
+
+    `arm` (nc, 2, 3) from the centres of mass, world axes [m].
+    """
     body = contacts.bodies
-    arm = np.einsum("csij,csj->csi", state.rotation[body], contacts.arm)
     frame = np.broadcast_to(contacts.frame[:, None], (len(contacts), 2, 3, 3))
     # row · (ω × arm) = (arm × row) · ω
     jacobian = np.concatenate([frame, np.cross(arm[:, :, None, :], frame)], axis=-1)
-    spin = inverse_inertia_world(model.inertia, state.rotation)[body] @ jacobian[..., 3:].transpose(
-        0, 1, 3, 2
-    )
-    push = model.inertia.inverse_mass[body][..., None, None] * jacobian[..., :3].transpose(0, 1, 3, 2)
+    spin = inverse_inertia_world(inertia, state.rotation)[body] @ jacobian[..., 3:].transpose(0, 1, 3, 2)
+    push = inertia.inverse_mass[body][..., None, None] * jacobian[..., :3].transpose(0, 1, 3, 2)
     return np.ascontiguousarray(jacobian), np.ascontiguousarray(np.concatenate([push, spin], axis=2))
 
 
-def _slots(body: Ints, kind: Ints, bodies: int) -> tuple[Ints, Ints]:
-    """How many elastic sides each body has, and the place of each side among them."""
+def _slots(body: Ints, kind: Ints, bodies: int) -> tuple[Ints, Ints, Ints]:
+    """How many elastic sides each body has, the place of each side among them, and the sides body by body."""
     flat_body, elastic = body.ravel(), kind.ravel() == ELASTIC
     count = np.bincount(flat_body[elastic], minlength=bodies)
     order = np.flatnonzero(elastic)[np.argsort(flat_body[elastic], kind="stable")]
     slot = np.zeros(len(flat_body), dtype=np.int64)
     starts = np.concatenate([[0], np.cumsum(count)])[:-1]
     slot[order] = np.arange(len(order)) - np.repeat(starts, count)
-    return count.astype(np.int64), slot.reshape(body.shape)
+    return count.astype(np.int64), slot.reshape(body.shape), order
 
 
 def _compliance_block(

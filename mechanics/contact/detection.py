@@ -23,13 +23,13 @@ from mechanics.contact.surfaces import Placed, Surfaces
 from mechanics.scene import Placement
 from mechanics.state import State
 
-__all__ = ["Detector"]
+__all__ = ["FLAT", "THIN", "Detector"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 # faces whose normals differ by less than 5° lie flat on one another
-_FLAT = float(np.cos(np.radians(5.0)))
+FLAT = float(np.cos(np.radians(5.0)))
 # flat faces that overlap by less than this part of the smaller one do not touch
 THIN = 1e-6
 
@@ -150,7 +150,7 @@ class Detector:
         faces = (pairs.kind > 0) & (pairs.kind != EDGES)
         chosen: NDArray[np.bool_] = faces & meshed[np.where(faces[:, None], pairs.feature, 0)].any(axis=1)
         normal = placed.normal[pairs.feature[chosen]]
-        chosen[chosen] = -np.einsum("pi,pi->p", normal[:, 0], normal[:, 1]) > _FLAT
+        chosen[chosen] = -np.einsum("pi,pi->p", normal[:, 0], normal[:, 1]) > FLAT
         return chosen
 
     def _points(
@@ -161,7 +161,7 @@ class Detector:
         kind = np.where(but, 0, pairs.kind)
         found, frame, nearest, area = interface_points(
             pairs.shapes, kind, pairs.feature, pairs.axis, pairs.limit,
-            self.points, self.placement == Placement.INERTIA, _FLAT, THIN,
+            self.points, self.placement == Placement.INERTIA, FLAT, THIN,
             own.vptr, placed.vertex, own.fptr, own.cptr, own.corner, placed.normal,
             own.eptr, own.edge_a, own.edge_b, own.shape_size, own.face_area,
         )  # fmt: skip

@@ -79,8 +79,7 @@ class MixedDelassus:
                 continue
             sign = np.where(sides % 2 == 0, 1.0, -1.0).repeat(3)
             if self.kind.ravel()[sides[0]] == ELASTIC:
-                sides = sides[np.argsort(self.slot.ravel()[sides])]
-                sign = np.where(sides % 2 == 0, 1.0, -1.0).repeat(3)
+                # slots ascend with the sides
                 square = self.block[self.bptr[b] : self.bptr[b + 1]].reshape(len(sign), -1)
             else:
                 square = self.jacobian.reshape(-1, 3, 6)[sides].reshape(-1, 6)

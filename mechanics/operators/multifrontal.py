@@ -179,7 +179,7 @@ def _least_degree(count: int, size: Ints, around: Sequence[Ints]) -> tuple[Ints,
     for g in range(count):
         adjacent[g].discard(g)
     degree = np.array([sum(size[h] for h in adjacent[g]) for g in range(count)], dtype=float)
-    order, left = np.empty(count, dtype=np.int64), []
+    order = np.empty(count, dtype=np.int64)
     for k in range(count):
         g = int(degree.argmin())
         order[k], degree[g] = g, np.inf
@@ -187,7 +187,6 @@ def _least_degree(count: int, size: Ints, around: Sequence[Ints]) -> tuple[Ints,
             adjacent[h] |= adjacent[g]
             adjacent[h] -= {g, h}
             degree[h] = sum(size[i] for i in adjacent[h])
-        left.append(g)
     rank = np.empty(count, dtype=np.int64)
     rank[order] = np.arange(count)
     return order, [sorted(adjacent[g], key=rank.__getitem__) for g in range(count)]

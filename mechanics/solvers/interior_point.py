@@ -12,13 +12,18 @@ whatever the conditioning of W. Contacts with cohesion have r_N ≥ 0 as a secon
 one.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.problem import ContactProblem, ContactSolution, ContactStart, scale_of
+from mechanics.problem import (
+    ContactProblem,
+    ContactSolution,
+    ContactStart,
+    scale_of,
+    shifted_form,
+)
 from mechanics.residual import residual
 from mechanics.solvers.newton import Newton
 from mechanics.solvers.second_order_cones import Scaling, divide, product, reach, scaling
@@ -29,6 +34,7 @@ __all__ = ["InteriorPoint"]
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+_NAME = "interior point"
 # below this friction a contact has no cone, only a side
 _SMOOTH = 1e-9
 # what holds the tangential impulse of contacts without friction at zero, over the scale of W
@@ -67,8 +73,7 @@ class InteriorPoint:
         ------
         SolverError : if the problem has no form that can be factorised with a block for each contact
         """
-        if problem.sparse is None or not hasattr(problem.sparse(), "shifted"):
-            raise SolverError("the problem has no sparse form", where="interior point", remedy='use "nsgs"')
+        shifted_form(problem, _NAME)
         if len(start.impulse) == 0:
             return ContactSolution(start.impulse, start.velocity, 0, 0.0, True)
         newton = Newton(self.tolerance, self.velocity_tolerance)
@@ -148,8 +153,7 @@ class _Path:
     """The iterates, on their way along the central path."""
 
     def __init__(self, problem: ContactProblem) -> None:
-        assert problem.sparse is not None
-        self._problem, self._form = problem, problem.sparse()
+        self._problem, self._form = problem, shifted_form(problem, _NAME)
         scale = scale_of(problem.delassus)
         self._free = problem.u_free.copy()
         self._free[:, 0] += problem.bias
@@ -159,7 +163,7 @@ class _Path:
         self._hold = np.zeros((len(mu), 3, 3))
         self._hold[self._smooth[:, None], [1, 2], [1, 2]] = _RIGID * scale
         theta = self._hold + scale * np.eye(3)
-        self._r = self._shifted(theta)(-self._free.ravel()).reshape(-1, 3)
+        self._r = self._form.shifted(theta)(-self._free.ravel()).reshape(-1, 3)
         size = float(np.sqrt((self._r**2).mean())) or 1.0
         self._unit = size * size * scale
         slack = mu[cone, None] * self._r[cone] * [1.0, 0.0, 0.0] + self._r[cone] * [0.0, 1.0, 1.0]
@@ -187,10 +191,6 @@ class _Path:
         cone, side = self._cone, self._side
         total = float((cone.slack * cone.dual).sum() + side.slack @ side.dual)
         return total / (len(cone.rows) + len(side.rows))
-
-    def _shifted(self, theta: Array) -> Callable[[Array], Array]:
-        solve: Callable[[Array], Array] = self._form.shifted(theta)  # type: ignore[attr-defined]
-        return solve
 
     def advance(self) -> float:
         """One iteration: predictor, corrector, and a step of the length that is given back."""
@@ -246,7 +246,7 @@ class _Newton:
         theta = path._hold.copy()
         theta[cone.rows] += self._back @ self._square * cone.diagonal[:, None, :]
         theta[side.rows, 0, 0] += side.dual / side.slack
-        self._solve = path._shifted(theta)
+        self._solve = path._form.shifted(theta)
 
     def towards_boundary(self) -> tuple[Array, Array]:
         """The right side of the predictor: s ∘ z = 0."""

@@ -5,7 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.problem import ContactProblem, ContactSolution, ContactStart, scale_of
+from mechanics.problem import (
+    ContactProblem,
+    ContactSolution,
+    ContactStart,
+    ShiftedForm,
+    scale_of,
+    shifted_form,
+)
 from mechanics.residual import Residual, project_on_cone, residual
 from moma.errors import SolverError
 
@@ -49,11 +56,7 @@ class Newton:
         ------
         SolverError : if the problem has no form that can be factorised with a block for each contact
         """
-        if problem.sparse is None or not hasattr(problem.sparse(), "shifted"):
-            raise SolverError(
-                "the problem has no sparse form", where="Newton", remedy='use the method "nsgs"'
-            )
-        form, limits = problem.sparse(), (self.tolerance, self.velocity_tolerance)
+        form, limits = shifted_form(problem, "Newton"), (self.tolerance, self.velocity_tolerance)
         # not put on the cones first: that would break the balance, by which they are told apart
         impulse = start.impulse
         left, count, daring = residual(problem, impulse), 0, 0
@@ -91,7 +94,7 @@ def _search(
     return None
 
 
-def _step(problem: ContactProblem, form: object, r: Array) -> Array:
+def _step(problem: ContactProblem, form: ShiftedForm, r: Array) -> Array:
     scale = scale_of(problem.delassus)
     u = problem.delassus.apply(r) + problem.u_free
     slide = np.sqrt((u[:, 1:] ** 2).sum(axis=1))
@@ -104,7 +107,7 @@ def _step(problem: ContactProblem, form: object, r: Array) -> Array:
     turn = np.tile(np.eye(3), (len(r), 1, 1))
     turn[:, 0, 1:] = (problem.friction / np.maximum(slide, 1e-300))[:, None] * u[:, 1:]
     inverse = scale * np.linalg.inv(derivative @ turn)
-    solve = form.shifted(inverse @ (np.eye(3) - derivative))  # type: ignore[attr-defined]
+    solve = form.shifted(inverse @ (np.eye(3) - derivative))
     step: Array = solve(-np.einsum("cij,cj->ci", inverse, error).ravel()).reshape(-1, 3)
     return step
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from moma.errors import SurveyError
 from survey.formats.fields import CODE, KIND, parse_length, parse_number, read_lines
-from survey.records import BlockRecord, Survey
+from survey.records import BlockRecord, Survey, SurveyHead
 
 __all__ = ["read_csv"]
 
@@ -75,7 +75,7 @@ def read_csv(path: Path, default_sigma: float = 0.003) -> Survey:
             "the table has no points", where=f"{path}:{len(lines)}", remedy="add one line per point"
         )
     records = tuple(_record(block, default_sigma, str(path)) for block in blocks.values())
-    return Survey(path.stem, str(path), None, (), records)
+    return Survey(SurveyHead(path.stem, str(path)), records)
 
 
 def _split(line: str, where: str) -> list[str]:

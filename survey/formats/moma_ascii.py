@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from moma.errors import SurveyError
 from survey.formats.fields import CODE, KIND, parse_length, parse_number, read_lines
 from survey.formats.moma_writer import MAGIC, write_moma
-from survey.records import BlockRecord, DepthRule, Survey
+from survey.records import OBSERVER, BlockRecord, DepthRule, Station, Survey, SurveyHead
 
 __all__ = ["read_moma", "write_moma"]
 
@@ -120,13 +120,9 @@ class _Reader:
             )
         if not self.blocks:
             raise self.fail("the survey has no stones", "add 'stone CODE KIND' … 'end'")
-        return Survey(
-            name=self.name or stem,
-            path=self.path,
-            observer=self.observer,
-            depth_rules=tuple(self.rules.values()),
-            blocks=tuple(self.blocks),
-        )
+        stations = () if self.observer is None else (Station(OBSERVER, self.observer),)
+        head = SurveyHead(self.name or stem, self.path, stations, depth_rules=tuple(self.rules.values()))
+        return Survey(head, tuple(self.blocks))
 
     # --- lines of the header ---
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from moma.errors import SurveyError
-from survey.records import BlockRecord, Survey
+from survey.records import OBSERVER, BlockRecord, Survey
 
 __all__ = ["MAGIC", "write_moma"]
 
@@ -26,11 +26,11 @@ def write_moma(survey: Survey, path: Path) -> None:
     SurveyError
         if a name, note or source has characters that do not fit on a line
     """
-    lines = [MAGIC, f"name {survey.name}"]
-    if survey.observer is not None:
-        lines.append(f"observer {_row(survey.observer)}")
+    lines = [MAGIC, f"name {survey.head.name}"]
+    lines += [f"{OBSERVER} {_row(one.position)}" for one in survey.head.stations if one.name == OBSERVER]
     lines += [
-        f"depth {rule.kind} {_depth_text(rule.depth, rule.sigma, rule.source)}" for rule in survey.depth_rules
+        f"depth {rule.kind} {_depth_text(rule.depth, rule.sigma, rule.source)}"
+        for rule in survey.head.depth_rules
     ]
     sigmas = [block.sigma for block in survey.blocks]
     common = max(sorted(set(sigmas)), key=sigmas.count)

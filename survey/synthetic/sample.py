@@ -9,7 +9,7 @@ from typing import cast
 import numpy as np
 
 from survey.formats.moma_ascii import write_moma
-from survey.records import DepthRule, Survey
+from survey.records import OBSERVER, DepthRule, Station, Survey, SurveyHead
 from survey.synthetic.frame import TrueStone, WallFrame, build_stone, wall_frame
 from survey.synthetic.measure import SIGMA, Measured, add_blunders, measure_stone
 from survey.synthetic.window import plan_window
@@ -70,8 +70,10 @@ def make_sample(seed: int = SEED) -> Sample:
     rules = tuple(DepthRule(kind, depth, sigma, SOURCE) for kind, (depth, sigma) in DEPTHS.items())
     observer = np.round(frame.origin + 9.0 * frame.axes[2] + 0.8 * frame.axes[0] + [0.0, 0.0, 1.2], 4)
     records = tuple(one.record for one in measured)
-    survey = Survey("window bay (synthetic)", "window.moma", observer, rules, records)
-    return Sample(survey, frame, tuple(stones), tuple(measured))
+    head = SurveyHead(
+        "window bay (synthetic)", "window.moma", (Station(OBSERVER, observer),), depth_rules=rules
+    )
+    return Sample(Survey(head, records), frame, tuple(stones), tuple(measured))
 
 
 def _with_own_depth(measured: Measured, stone: TrueStone) -> Measured:

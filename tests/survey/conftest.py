@@ -28,7 +28,7 @@ def truth() -> dict[str, dict[str, Any]]:
 @pytest.fixture(scope="session")
 def blocks(survey: Survey) -> list[SurveyedBlock]:
     return [
-        extrude(outline_face(record, survey.observer), depth_for(record, survey.depth_rules))
+        extrude(outline_face(record, survey.head.viewpoint(None)), depth_for(record, survey.head.depth_rules))
         for record in survey.blocks
     ]
 

@@ -27,7 +27,7 @@ def test_the_sample_written_as_a_table_is_the_same_survey(tmp_path: Path, survey
             end = f"{b.depth or ''},{b.sigma}"
             lines += [f"{start},{float(z)!r},{float(y)!r},{float(x)!r},{end}" for x, y, z in places]
     table = read_csv(write(tmp_path, "\r\n".join(lines)))
-    assert table.name == "wall"
+    assert table.head.name == "wall"
     for a, b in zip(table.blocks, survey.blocks, strict=True):
         np.testing.assert_array_equal(a.vertices, b.vertices)
         np.testing.assert_array_equal(a.points, b.points)

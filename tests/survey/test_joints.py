@@ -133,7 +133,10 @@ def test_other_samples_close_as_well() -> None:
     for seed in (1, 2, 3):
         sample = make_sample(seed)
         blocks = [
-            extrude(outline_face(one.record, sample.survey.observer), Depth(true.depth, None, "", "kind", 1))
+            extrude(
+                outline_face(one.record, sample.survey.head.viewpoint(None)),
+                Depth(true.depth, None, "", "kind", 1),
+            )
             for one, true in zip(sample.measured, sample.stones, strict=True)
         ]
         closed = close_joints(blocks)

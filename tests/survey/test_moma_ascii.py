@@ -23,10 +23,7 @@ def write(tmp_path: Path, text: str) -> Path:
 
 
 def assert_same(one: Survey, other: Survey) -> None:
-    assert (one.name, one.depth_rules) == (
-        other.name,
-        tuple(rule for rule in other.depth_rules),
-    )
+    assert (one.head.name, one.head.depth_rules) == (other.head.name, other.head.depth_rules)
     for a, b in zip(one.blocks, other.blocks, strict=True):
         np.testing.assert_array_equal(a.vertices, b.vertices)
         np.testing.assert_array_equal(a.points, b.points)
@@ -53,10 +50,10 @@ def test_all_that_a_stone_can_say_is_read(tmp_path: Path) -> None:
         "stone V1 voussoir\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nend\n"
     )
     survey = read_moma(write(tmp_path, text))
-    assert survey.name == "north wall"
-    assert survey.observer is not None
-    assert survey.observer.tolist() == [1.0, -20.0, 3.5]
-    (rule,) = survey.depth_rules
+    assert survey.head.name == "north wall"
+    assert survey.head.viewpoint(None) is not None
+    assert survey.head.viewpoint(None).tolist() == [1.0, -20.0, 3.5]
+    (rule,) = survey.head.depth_rules
     assert (rule.kind, rule.depth, rule.sigma, rule.source, rule.line) == (
         *("header", 0.5, 0.02),
         "broken end at W03 # sic",
@@ -203,7 +200,7 @@ def mutate(data: bytes, how: str, rng: random.Random, extra: bytes) -> bytes:
 
 
 def test_a_note_of_two_lines_cannot_be_written(tmp_path: Path, survey: Survey) -> None:
-    two = replace(survey, name="north\nsigma 9")
+    two = replace(survey, head=replace(survey.head, name="north\nsigma 9"))
     with pytest.raises(SurveyError, match=r"cannot be written"):
         write_moma(two, tmp_path / "two.moma")
     assert not (tmp_path / "two.moma").exists()

@@ -33,10 +33,10 @@ def test_the_sample_is_what_its_readme_says(survey: Survey, truth: Truth) -> Non
     assert (len(kinds), kinds.count("jamb"), kinds.count("sill"), kinds.count("springer")) == (98, 8, 1, 4)
     assert (kinds.count("voussoir"), kinds.count("keystone")) == (6, 1)
     assert {block.course for block in survey.blocks} == {None, *range(1, 13)}
-    assert {rule.kind for rule in survey.depth_rules} == set(kinds)
+    assert {rule.kind for rule in survey.head.depth_rules} == set(kinds)
     assert all(4 <= len(block.vertices) <= 5 and 5 <= len(block.points) <= 20 for block in survey.blocks)
     assert sum(len(stone["blunders"]) for stone in truth.values()) == 12
-    assert "synthetic" in survey.name
+    assert "synthetic" in survey.head.name
     assert "No such wall exists" in (SAMPLE / "README.md").read_text(encoding="utf-8")
 
 
