@@ -2,8 +2,9 @@
 
 The plane n·x = d minimises Σ w (n·x - d)², w = 1/σ². With the weighted centroid c taken out, n is the right
 singular vector of the smallest singular value. In the axes e₁, e₂ of the other two singular vectors the normal
-equations are diagonal, so the Gauss–Markov covariance is closed form: the tilts θᵢ (δn = -Σ θᵢ eᵢ) have variance
-σ²/sᵢ², the centroid's height σ²/Σw, and δd = δ(n·c) carries both to the origin of coordinates.
+equations are diagonal, so the Gauss–Markov covariance is closed form and diagonal: the tilts θᵢ (δn = -Σ θᵢ eᵢ)
+have variance σ²/sᵢ², the height at the centroid σ²/Σw. The offset d at the origin of coordinates would say
+little of a face 10⁶ m away.
 
 Blunders: one that is as far out as a stone is wide turns a least-squares plane so much that its own residual
 looks harmless, so residuals of the first fit cannot be trusted. The search starts from planes through triples
@@ -29,6 +30,7 @@ Array = NDArray[np.float64]
 
 _CRITICAL = 3.29  # two-sided normal quantile of Baarda's α₀ = 0.1 %
 _MAX_TRIPLES = 3000  # up to 26 points all triples are tried; beyond, a seeded draw of so many
+_UNCHECKED = 1e-9  # share of the others in a point's residual below which they say nothing of it
 _COLLINEAR = 1e-9  # second singular value over the first below which there is no plane
 
 
@@ -43,14 +45,16 @@ class FaceFit:
     centroid : (3,) weighted mean of the accepted points; it lies on the plane [m]
     axes : (2, 3) unit directions in the plane, of largest and of smaller spread [-]
     singular_values : (3,) of the accepted, centred points, unweighted if all weigh the same [m]
-    covariance : (3, 3) of two tilt angles [rad] and the offset [m]; tilt i turns the normal towards -axes[i]
+    covariance : (3, 3) of two tilts [rad] and the height of the plane at `centroid` [m], diagonal; tilt i turns
+        the normal towards -axes[i]
     rms : root mean square of the accepted residuals [m]
-    sigma0 : sqrt(Σ w r² / redundancy), 1 if the points are as precise as was said; in metres if no precision
-        was
+    sigma0 : sqrt(Σ w r² / redundancy), 1 if the points are as precise as was said; in metres if no precision was
         given; nan without redundancy, because three points fit any plane
     redundancy : number of accepted points minus 3
     rejected : indices of the points left out as blunders
     residuals : (n,) signed distance of every given point from the plane, towards the observer [m]
+    standardised : (n,) residual over its own standard deviation: sqrt(1 - h) of the point's where it is part of
+        the fit, sqrt(1 + h) where it was rejected, h its leverage; nan where no other point checks it [-]
     """
 
     normal: Array
@@ -64,6 +68,23 @@ class FaceFit:
     redundancy: int
     rejected: tuple[int, ...]
     residuals: Array
+    standardised: Array
+
+    def height_sigma(self, points: ArrayLike) -> Array:
+        """Standard deviation of the plane's height at places on or near it.
+
+        Parameters
+        ----------
+        points : (n, 3) [m]
+
+        Returns
+        -------
+        (n,) sqrt(var(height at the centroid) + Σ var(tiltᵢ) uᵢ²), uᵢ the place along axes[i] [m]
+        """
+        lateral = (np.asarray(points, dtype=np.float64) - self.centroid) @ self.axes.T
+        variances = self.covariance.diagonal()
+        out: Array = np.sqrt(variances[2] + lateral**2 @ variances[:2])
+        return out
 
 
 def fit_plane(points: ArrayLike, sigma: ArrayLike | None, observer: ArrayLike | None = None) -> FaceFit:
@@ -72,8 +93,7 @@ def fit_plane(points: ArrayLike, sigma: ArrayLike | None, observer: ArrayLike | 
     Parameters
     ----------
     points : (n, 3) surveyed points, n ≥ 3 [m]
-    sigma : standard deviation of a coordinate, one for all or (n,) [m]; None if unknown: then all points
-        weigh
+    sigma : standard deviation of a coordinate, one for all or (n,) [m]; None if unknown: then all points weigh
         the same and the covariance is scaled by what the residuals say
     observer : (3,) the normal looks towards this point [m]; without it, its largest component is positive
 
@@ -269,10 +289,10 @@ def _result(
     redundancy = int(accepted.sum()) - 3
     squares = float((weights * residuals**2)[accepted].sum())
     sigma0 = math.sqrt(squares / redundancy) if redundancy else math.nan
-    levers = plane.vectors[:2] @ plane.centroid
-    tilts = 1.0 / plane.singular[:2] ** 2
-    covariance = np.diag([*tilts, 1.0 / plane.total_weight + float(tilts @ levers**2)])
-    covariance[:2, 2] = covariance[2, :2] = -tilts * levers
+    covariance = np.diag([*(1.0 / plane.singular[:2] ** 2), 1.0 / plane.total_weight])
+    lever = plane.leverages(xyz, weights)
+    share = np.where(accepted, 1.0 - lever, 1.0 + lever)
+    share[share < _UNCHECKED] = math.nan
     mean_weight = plane.total_weight / float(accepted.sum())
     return FaceFit(
         normal=normal,
@@ -286,6 +306,7 @@ def _result(
         redundancy=redundancy,
         rejected=tuple(int(i) for i in np.flatnonzero(~accepted)),
         residuals=residuals,
+        standardised=residuals * np.sqrt(weights / share) / (1.0 if known else sigma0),
     )
 
 

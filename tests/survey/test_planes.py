@@ -79,9 +79,12 @@ def test_predicted_standard_deviations_are_those_of_many_faces() -> None:
         points = flat @ turn.T + shift
         fit = fit_plane(points + rng.normal(0, sigma, points.shape), sigma, observer=shift + turn[:, 2])
         tilts = fit.axes @ turn[:, 2]
-        offset = fit.offset - turn[:, 2] @ shift
-        errors.append(np.append(tilts, offset) / np.sqrt(np.diag(fit.covariance)))
-    np.testing.assert_allclose(np.var(errors, axis=0), 1.0, atol=0.13)
+        at_centroid = (fit.centroid - shift) @ turn[:, 2]
+        elsewhere = shift + 0.4 * turn[:, 0] - 0.3 * turn[:, 1]
+        height = fit.normal @ (fit.centroid - elsewhere) / (fit.normal @ turn[:, 2])
+        parameters = np.append(tilts, at_centroid) / np.sqrt(np.diag(fit.covariance))
+        errors.append(np.append(parameters, height / fit.height_sigma(elsewhere[None])))
+    np.testing.assert_allclose(np.var(errors, axis=0), 1.0, atol=0.1)
 
 
 def test_a_fifth_of_blunders_leaves_the_normal_within_three_standard_deviations() -> None:
@@ -106,6 +109,32 @@ def test_rejected_points_keep_their_residuals() -> None:
     assert fit.rejected == (5,)
     assert fit.residuals.shape == (16,)
     assert fit.residuals[5] == pytest.approx(0.5, abs=0.03)
+
+
+def test_standardised_residuals_are_standard_normal_in_the_fit_and_out_of_it() -> None:
+    # accepted: v_i / (σ √(1 - h_i)) with h_i = 1/16 + x²/80 + y²/20 on the checkerboard; rejected: √(1 + h_i)
+    x, y, z = CHECKERBOARD.T
+    lever = 1 / 16 + x**2 / 80 + y**2 / 20
+    fit = fit_plane(CHECKERBOARD, 0.01, observer=[0, 0, 9])
+    np.testing.assert_allclose(fit.standardised, z / 0.01 / np.sqrt(1 - lever), rtol=1e-12)
+    broken = fit_plane(np.vstack([CHECKERBOARD, [[5.0, 0.0, 1.0]]]), 0.01, observer=[0, 0, 9])
+    assert broken.rejected == (16,)
+    lever_5 = 1 / 16 + 25 / 80
+    assert broken.standardised[16] == pytest.approx(1.0 / 0.01 / np.sqrt(1 + lever_5), rel=1e-12)
+
+
+def test_a_point_that_no_other_checks_has_no_standardised_residual() -> None:
+    fit = fit_plane([[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0.001], [0, 5, 0.0]], 0.003)
+    np.testing.assert_array_equal(np.isnan(fit.standardised), [False, False, False, False, True])
+    assert np.isnan(fit_plane([[0, 0, 0], [1, 0, 0], [0, 1, 0]], 0.003).standardised).all()
+
+
+def test_height_is_least_certain_far_from_the_centroid() -> None:
+    # σ √(1/16 + x²/80 + y²/20) on the checkerboard
+    fit = fit_plane(CHECKERBOARD, 0.01)
+    places = np.array([[0.0, 0, 0], [3, 0, 0], [0, 7, 0.4]])
+    expected = 0.01 * np.sqrt(np.array([1 / 16, 1 / 16 + 9 / 80, 1 / 16 + 49 / 20]))
+    np.testing.assert_allclose(fit.height_sigma(places), expected, rtol=1e-10)
 
 
 def test_weights_follow_the_precision_of_each_point() -> None:
