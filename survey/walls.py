@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from moma.errors import GeometryError
 from survey.blocky import BlockyStone
 
-__all__ = ["Sides", "WallPlane", "sides_of", "wall_plane"]
+__all__ = ["Sides", "WallPlane", "sides_of", "upright_frame", "wall_plane"]
 
 Array = NDArray[np.float64]
 
@@ -73,11 +73,21 @@ def wall_plane(stones: Sequence[BlockyStone]) -> WallPlane:
             where=f"stone {odd.code}",
             remedy="close the joints of one wall at a time",
         )
+    return upright_frame(normal, np.concatenate([stone.corners for stone in stones]).mean(axis=0))
+
+
+def upright_frame(normal: Array, origin: Array) -> WallPlane:
+    """The frame in which one stands before a wall: along it to the right, up, towards the viewer.
+
+    Parameters
+    ----------
+    normal : (3,) unit outward normal of the wall [-]
+    origin : (3,) [m]
+    """
     # up the wall where it stands; for a floor or a vault's soffit any direction in the plane serves
     upward = np.array([0.0, 0.0, 1.0]) if abs(normal[2]) < 0.9 else np.array([0.0, 1.0, 0.0])
     along = np.cross(upward, normal)
     along /= np.linalg.norm(along)
-    origin = np.concatenate([stone.corners for stone in stones]).mean(axis=0)
     return WallPlane(origin, np.array([along, np.cross(normal, along), normal]))
 
 
