@@ -99,7 +99,7 @@ def surveyed_block(record: StoneRecord) -> SurveyedBlock:
     )
     # any point on the stored side of the plane tells the fit which side is outside
     face = outline_face(measured, record.outline.mean(axis=0) + 100.0 * record.normal)
-    depth = Depth(record.depth, record.depth_sigma, record.depth_source, "database", record.line)
+    depth = Depth(record.depth, record.depth_sigma, record.depth_source, "stone", record.line)
     return extrude(face, depth)
 
 

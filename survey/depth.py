@@ -1,12 +1,21 @@
-"""How deep a stone is: the evidence, in its order."""
+"""How deep a stone is: the evidence, in its order.
+
+What was measured on the stone comes first; then the archaeologist's rule for its kind in its course or part of
+the building; then the rule for its kind; then what holds for the whole structure.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 from moma.errors import SurveyError
 from survey.records import BlockRecord, DepthRule
 
-__all__ = ["Depth", "depth_for"]
+__all__ = ["Depth", "Origin", "depth_for"]
+
+Origin = Literal["stone", "rule", "kind", "structure", "solid"]
+"""Where a depth comes from: the stone itself, a rule for course or zone, its kind, the structure; or a solid
+that another program made."""
 
 
 @dataclass(frozen=True)
@@ -18,19 +27,19 @@ class Depth:
     value : [m]
     sigma : standard deviation [m]; None if not known
     source : the evidence, in words
-    origin : "stone" if measured on this stone, "kind" if from the rule of its kind
+    origin : what kind of evidence it is
     line : line of the survey file that says so
     """
 
     value: float
     sigma: float | None
     source: str
-    origin: str
+    origin: Origin
     line: int
 
 
 def depth_for(record: BlockRecord, rules: Sequence[DepthRule]) -> Depth:
-    """Find the depth of a stone: measured on the stone itself, else the rule of its kind.
+    """Find the depth of a stone by the best evidence.
 
     Parameters
     ----------
@@ -40,16 +49,44 @@ def depth_for(record: BlockRecord, rules: Sequence[DepthRule]) -> Depth:
     Raises
     ------
     SurveyError
-        if nothing is known of the stone's depth
+        if nothing is known of the stone's depth, or two rules hold for it and neither is more particular
     """
     if record.depth is not None:
         source = record.depth_source or "measured on the stone"
         return Depth(record.depth, record.depth_sigma, source, "stone", record.line)
+    where = f"stone {record.code} (line {record.line})"
+    best: DepthRule | None = None
     for rule in rules:
-        if rule.kind == record.kind:
-            return Depth(rule.depth, rule.sigma, rule.source, "kind", rule.line)
-    raise SurveyError(
-        f"no depth is known for a {record.kind}",
-        where=f"stone {record.code} (line {record.line})",
-        remedy=f"measure the stone, or put 'depth {record.kind} D source TEXT' before the stones",
-    )
+        if _holds(rule, record) and (best is None or _rank(rule) >= _rank(best)):
+            if best is not None and _rank(rule) == _rank(best):
+                raise SurveyError(
+                    f"the depth rules of lines {best.line} and {rule.line} both hold for it",
+                    where=where,
+                    remedy="let one rule hold for each stone, or give the stone a depth of its own",
+                )
+            best = rule
+    if best is None:
+        raise SurveyError(
+            f"no depth is known for a {record.kind}",
+            where=where,
+            remedy=f"measure the stone, or put 'depth {record.kind} D source TEXT' before the stones",
+        )
+    return Depth(best.depth, best.sigma, best.source, _ORIGINS[_rank(best)], best.line)
+
+
+_ORIGINS: tuple[Origin, ...] = ("structure", "kind", "rule", "rule")
+
+
+def _holds(rule: DepthRule, record: BlockRecord) -> bool:
+    if rule.kind not in (None, record.kind) or rule.zone not in (None, record.zone):
+        return False
+    if rule.courses is None:
+        return True
+    return record.course is not None and rule.courses[0] <= record.course <= rule.courses[1]
+
+
+def _rank(rule: DepthRule) -> int:
+    """How particular a rule is: structure 0, kind 1, kind in a course or zone 2, in a course of a zone 3."""
+    if rule.kind is None:
+        return 0
+    return 1 + (rule.courses is not None) + (rule.zone is not None)

@@ -1,19 +1,37 @@
 """The visible face of a stone: its plane, and its outline on that plane."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from moma.errors import GeometryError
+from survey.outline import OutlineMeasures, level_direction, measure_outline, outline_polygon
 from survey.planes import FaceFit, fit_plane
 from survey.records import BlockRecord
+from survey.shapes import FaceShape, judge_shape
 
-__all__ = ["Face", "outline_face"]
+__all__ = ["Face", "Provenance", "face_on", "outline_face"]
 
 Array = NDArray[np.float64]
 
-_SMALLEST_EDGE = 1e-3  # metres: nearer corners are one corner measured twice
+
+@dataclass(frozen=True)
+class Provenance:
+    """How a face came to be known.
+
+    Attributes
+    ----------
+    source : from points measured in space, from a photograph, or from a solid that another program made
+    text : the same in words, with names
+    """
+
+    source: Literal["points", "photograph", "solid"]
+    text: str
+
+
+_POINTS = Provenance("points", "points measured on the face")
 
 
 @dataclass(frozen=True)
@@ -25,9 +43,15 @@ class Face:
     code, kind, course : as in the survey
     fit : the plane
     outline : (nv, 3) the measured corners moved onto the plane, counter-clockwise seen from outside [m]
+    shape : whether one plane is what the face is
+    measures : its size
+    provenance : how it came to be known
+    record : the stone as it was measured
+    corner_of : (nv,) which measured corner each corner of the outline is
     rejected_points : indices of `BlockRecord.points` that the fit left out
     rejected_vertices : indices of `outline` whose measured corners lie off the plane: broken or eroded
         corners
+    remarks : what was changed to make the outline a polygon, in words
     """
 
     code: str
@@ -35,26 +59,28 @@ class Face:
     course: int | None
     fit: FaceFit
     outline: Array
+    shape: FaceShape
+    measures: OutlineMeasures
+    provenance: Provenance
+    record: BlockRecord
+    corner_of: tuple[int, ...]
     rejected_points: tuple[int, ...] = ()
     rejected_vertices: tuple[int, ...] = ()
+    remarks: tuple[str, ...] = ()
 
 
 def outline_face(record: BlockRecord, observer: Array | None) -> Face:
     """Fit the plane of a stone's face and put its corners on it.
 
     Plane and normal come from the points *and* the corners together: corners lie farthest apart, so they hold
-    a
-    third of what is known of the tilt of a small face. An eroded or bevelled corner that fell behind the face
-    is
-    left out by the same test as any other blunder, so it does not tilt the plane. Indices of `fit.residuals`
-    and
-    `fit.rejected` count the points first, then the corners.
+    a third of what is known of the tilt of a small face. An eroded or bevelled corner that fell behind the
+    face is left out by the same test as any other blunder, so it does not tilt the plane. Indices of
+    `fit.residuals` and `fit.rejected` count the points first, then the corners.
 
     Parameters
     ----------
-    record : one stone of a survey
-    observer : (3,) where the surveyor stood [m]; None: the corners are taken as counter-clockwise from
-        outside
+    record : one stone of a survey, measured in space
+    observer : (3,) where it was seen from [m]; None: the corners are taken as counter-clockwise from outside
 
     Returns
     -------
@@ -63,74 +89,83 @@ def outline_face(record: BlockRecord, observer: Array | None) -> Face:
     Raises
     ------
     GeometryError
-        if the stone has no plane, or its outline crosses itself
+        if the stone has no plane, or its corners no outline
     """
-    where = f"stone {record.code} (line {record.line})"
-    measured = np.vstack([record.points.reshape(-1, 3), record.vertices])
     try:
-        fit = fit_plane(measured, record.sigma, _outside(record) if observer is None else observer)
+        return _measured_face(record, observer)
     except GeometryError as error:
+        where = f"stone {record.code} (line {record.line})"
         raise GeometryError(error.what, where=where, remedy=error.remedy) from error
-    outline = record.vertices - np.outer(fit.residuals[len(record.points) :], fit.normal)
+
+
+def _measured_face(record: BlockRecord, observer: Array | None) -> Face:
+    if len(record.vertices) < 3:
+        raise GeometryError(f"it has {len(record.vertices)} corners", remedy="measure 3 corners or more")
+    measured = np.concatenate([record.points.reshape(-1, 3), record.vertices])
+    sigma = record.sigma if record.sigmas is None else record.sigmas
+    fit = fit_plane(measured, sigma, _outside(record.vertices) if observer is None else observer)
+    corners = record.vertices - np.outer(fit.residuals[len(record.points) :], fit.normal)
+    shape = judge_shape(fit, measured, sigma)
+    return face_on(fit, corners, shape, _POINTS, record, keep_order=observer is None)
+
+
+def face_on(
+    fit: FaceFit,
+    corners: Array,
+    shape: FaceShape,
+    provenance: Provenance,
+    record: BlockRecord,
+    *,
+    keep_order: bool = False,
+) -> Face:
+    """The face of a stone whose plane is known, and its corners on that plane.
+
+    Parameters
+    ----------
+    fit : the plane
+    corners : (n, 3) in the order of the record, on the plane [m]
+    shape, provenance, record : as in Face
+    keep_order : the order of the corners has told which side is outside, and must not cross itself
+
+    Raises
+    ------
+    GeometryError
+        if the corners have no outline
+    """
+    axes = np.array([fit.axes[0], np.cross(fit.normal, fit.axes[0])])
+    outline = outline_polygon((corners - fit.centroid) @ axes.T, record.sigma, keep_order=keep_order)
     count = len(record.points)
-    broken = [i - count for i in fit.rejected if i >= count]
-    if _area_vector(outline) @ fit.normal < 0.0:
-        outline = outline[::-1]
-        broken = [len(outline) - 1 - i for i in broken]
-    _check_outline(outline, fit, where)
+    broken = {i - count for i in fit.rejected if i >= count}
     return Face(
         code=record.code,
         kind=record.kind,
         course=record.course,
         fit=fit,
-        outline=np.ascontiguousarray(outline),
+        outline=corners[list(outline.source)],
+        shape=shape,
+        measures=measure_outline(outline.corners, level_direction(fit.normal, axes)),
+        provenance=provenance,
+        record=record,
+        corner_of=outline.source,
         rejected_points=tuple(i for i in fit.rejected if i < count),
-        rejected_vertices=tuple(sorted(broken)),
+        rejected_vertices=tuple(k for k, i in enumerate(outline.source) if i in broken),
+        remarks=_remarks(outline.merged, outline.reordered),
     )
 
 
-def _outside(record: BlockRecord) -> Array:
+def _remarks(merged: tuple[int, ...], reordered: bool) -> tuple[str, ...]:
+    said = []
+    if merged:
+        said.append(f"corners {', '.join(str(i + 1) for i in merged)} were measured twice and are left out")
+    if reordered:
+        said.append("the corners were not listed in order around the face and have been put in order")
+    return tuple(said)
+
+
+def _outside(vertices: Array) -> Array:
     """Some point in front of the face, if its corners run counter-clockwise."""
-    out: Array = record.vertices.mean(axis=0) + _area_vector(record.vertices)
+    centre = vertices.mean(axis=0)
+    centred = vertices - centre
+    towards = np.cross(centred, np.roll(centred, -1, axis=0)).sum(axis=0)
+    out: Array = centre + towards / max(float(np.linalg.norm(towards)), 1e-300)
     return out
-
-
-def _area_vector(polygon: Array) -> Array:
-    """Area times normal of a polygon in space, counter-clockwise about the normal [m²]."""
-    centred = polygon - polygon.mean(axis=0)
-    out: Array = 0.5 * np.cross(centred, np.roll(centred, -1, axis=0)).sum(axis=0)
-    return out
-
-
-def _check_outline(outline: Array, fit: FaceFit, where: str) -> None:
-    flat = (outline - fit.centroid) @ fit.axes.T
-    edges = np.roll(flat, -1, axis=0) - flat
-    lengths = np.linalg.norm(edges, axis=1)
-    if lengths.min() < _SMALLEST_EDGE:
-        corner = int(lengths.argmin()) + 1
-        raise GeometryError(
-            f"corner {corner} and the next are {lengths.min() * 1e3:.2f} mm apart",
-            where=where,
-            remedy="list every corner once",
-        )
-    count = len(flat)
-    for i in range(count):
-        for j in range(i + 2, count - (i == 0)):
-            if _crosses(flat[i], edges[i], flat[j], edges[j]):
-                raise GeometryError(
-                    f"the outline crosses itself at edges {i + 1} and {j + 1}",
-                    where=where,
-                    remedy="list the corners in order around the face",
-                )
-
-
-def _crosses(p: Array, u: Array, q: Array, v: Array) -> bool:
-    """Whether segments p + [0, 1] u and q + [0, 1] v have a point in common; parallel ones are taken
-    apart."""
-    denominator = u[0] * v[1] - u[1] * v[0]
-    if abs(denominator) < 1e-15:
-        return False
-    w = q - p
-    s = (w[0] * v[1] - w[1] * v[0]) / denominator
-    t = (w[0] * u[1] - w[1] * u[0]) / denominator
-    return bool(0.0 <= s <= 1.0 and 0.0 <= t <= 1.0)

@@ -55,14 +55,30 @@ def test_an_eroded_corner_is_left_out_and_does_not_tilt_the_plane() -> None:
 @pytest.mark.parametrize(
     ("vertices", "words"),
     [
-        (SQUARE[[0, 2, 1, 3]], "crosses itself"),
-        (np.vstack([SQUARE, SQUARE[3] + 1e-5]), "0.01 mm apart"),
+        (np.vstack([SQUARE, [0.3, 0.1, 0.0]])[[0, 2, 1, 3, 4]], "crosses itself"),
+        (np.vstack([SQUARE[[0, 1, 1]], SQUARE[1] + 1e-5]), "2 distinct corners"),
         (SQUARE * [1, 0, 1], "one line"),
     ],
 )
 def test_an_outline_that_cannot_be_is_refused_by_name(vertices: np.ndarray, words: str) -> None:
     with pytest.raises(GeometryError, match=r"stone A \(line 12\): .*" + words):
         outline_face(record(vertices), ABOVE)
+
+
+def test_corners_out_of_order_are_put_in_order_if_one_order_alone_is_possible() -> None:
+    face = outline_face(record(SQUARE[[0, 2, 1, 3]]), ABOVE)
+    assert face.measures.area == pytest.approx(outline_face(record(SQUARE), ABOVE).measures.area)
+    assert "put in order" in face.remarks[0]
+    assert sorted(face.corner_of) == [0, 1, 2, 3]
+    # without an observer the order also tells the outside: then it cannot be wrong
+    with pytest.raises(GeometryError, match="crosses itself"):
+        outline_face(record(SQUARE[[0, 2, 1, 3]]), None)
+
+
+def test_a_corner_measured_twice_counts_once() -> None:
+    face = outline_face(record(np.vstack([SQUARE, SQUARE[3] + 1e-5])), ABOVE)
+    assert len(face.outline) == 4
+    assert face.remarks == ("corners 5 were measured twice and are left out",)
 
 
 def test_the_stone_s_own_depth_comes_before_the_rule_of_its_kind() -> None:
