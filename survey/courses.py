@@ -1,16 +1,10 @@
 """Deformation of courses: how far their bed lines are from level and from straight, and how well that is known.
 
 The bed line of a course is drawn through the lower corners of its stones: z against the distance s along the
-facade. A corner differs from it by the height of its own stone's bed, alike for the corners of one stone, and
-by an error of its own:
-
-    z_ij = a + b s_ij (+ c s_ij²) + u_i + e_ij,    var u = τ²,    var e = κ² σ_ij².
-
-The corners of one stone are therefore not independent witnesses of the course, and least squares that took
-them so would promise too much by up to √2. κ, at least 1, comes from the differences between corners of one
-stone; τ from the stones' means by the rule of Paule & Mandel (1982; DerSimonian & Kacker 2007): that value for
-which Σ residual² / variance is the redundancy. Slope and sag are tested with Student's t and the number of
-stones, not of corners. Courses of fewer than five stones borrow κ and τ from the others.
+facade. The corners of one stone are not independent witnesses of the course, since its bed lies a little high
+or low as a whole; least squares that took them so would promise too much by up to √2. So the beds' own scatter
+is estimated with the line (`survey.bed_fit`). Slope and sag are tested with Student's t and the number of
+stones, not of corners. Courses of fewer than five stones borrow the scatter of the others.
 """
 
 import math
@@ -21,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtr
 
+from survey.bed_fit import BedCorners, BedScatter, fit_bed, pool, scatter_of
 from survey.facades import Facade
 from survey.quality import StoneQuality
 from survey.walls import WallPlane
@@ -36,7 +31,6 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
-Rows = NDArray[np.intp]
 
 ENOUGH = 5
 """Stones from which the scatter of a course's beds can be estimated: with fewer, τ is uncertain by half."""
@@ -152,30 +146,15 @@ class CourseHeight:
 
 
 @dataclass(frozen=True)
-class _Bed:
-    """Lower corners of a course, sorted along the wall; `stone` numbers the stones from 0."""
+class _Course:
+    """The lower corners of one course, and whose they are."""
 
     facade: str
     zone: str | None
     course: int
     codes: tuple[str, ...]
-    stone: Rows
-    along: Array
-    height: Array
-    sigma: Array
     left_out: int
-
-    @property
-    def count(self) -> int:
-        """How many stones."""
-        return int(self.stone.max()) + 1
-
-
-@dataclass(frozen=True)
-class _Scatter:
-    tau: float
-    kappa: float
-    freedom: int
+    bed: BedCorners
 
 
 def measure_courses(stones: Sequence[StoneQuality], facades: Iterable[Facade]) -> tuple[CourseLine, ...]:
@@ -190,10 +169,11 @@ def measure_courses(stones: Sequence[StoneQuality], facades: Iterable[Facade]) -
     -------
     One line per facade, zone and course that has any sound lower corner, in that order
     """
-    beds = [bed for facade in facades if facade.azimuth is not None for bed in _beds(stones, facade)]
-    own = {k: _scatter(bed, 2) for k, bed in enumerate(beds) if bed.count >= ENOUGH}
-    pooled = _pool(list(own.values()))
-    return tuple(_line(bed, own.get(k), pooled) for k, bed in enumerate(beds))
+    standing = [facade for facade in facades if facade.azimuth is not None]
+    courses = [one for facade in standing for one in _courses(stones, facade)]
+    own = {k: scatter_of(one.bed, 2) for k, one in enumerate(courses) if one.bed.count >= ENOUGH}
+    pooled = pool(list(own.values()))
+    return tuple(_line(one, own.get(k), pooled) for k, one in enumerate(courses))
 
 
 def course_heights(lines: Sequence[CourseLine]) -> tuple[CourseHeight, ...]:
@@ -229,18 +209,18 @@ def lower_corners(outline: Array, frame: WallPlane) -> list[int]:
     return sorted({k for i in np.flatnonzero(bedded).tolist() for k in (i, (i + 1) % len(flat))})
 
 
-def _beds(stones: Sequence[StoneQuality], facade: Facade) -> list[_Bed]:
+def _courses(stones: Sequence[StoneQuality], facade: Facade) -> list[_Course]:
     """Lower corners of a facade, by zone and course."""
     groups: dict[tuple[str, int], list[StoneQuality]] = {}
     for i in facade.members.tolist():
         course = stones[i].course
         if course is not None:
             groups.setdefault((stones[i].zone or "", course), []).append(stones[i])
-    beds = [_bed(groups[key], facade) for key in sorted(groups)]
-    return [bed for bed in beds if bed is not None]
+    courses = [_course(groups[key], facade) for key in sorted(groups)]
+    return [one for one in courses if one is not None]
 
 
-def _bed(stones: Sequence[StoneQuality], facade: Facade) -> _Bed | None:
+def _course(stones: Sequence[StoneQuality], facade: Facade) -> _Course | None:
     codes: list[str] = []
     parts: list[Array] = []
     left_out = 0
@@ -261,112 +241,32 @@ def _bed(stones: Sequence[StoneQuality], facade: Facade) -> _Bed | None:
     assert course is not None
     numbers = np.array([number[code] for code in names], dtype=np.intp)
     along, height, sigma = (np.ascontiguousarray(column) for column in table[order].T)
-    return _Bed(facade.name, stones[0].zone, course, tuple(names), numbers, along, height, sigma, left_out)
+    bed = BedCorners(numbers, along, height, sigma)
+    return _Course(facade.name, stones[0].zone, course, tuple(names), left_out, bed)
 
 
-def _design(bed: _Bed, parameters: int) -> Array:
-    """Powers of the distance from the middle."""
-    return (bed.along - _middle(bed))[:, None] ** np.arange(parameters)
-
-
-def _middle(bed: _Bed) -> float:
-    return float(bed.along[0] + bed.along[-1]) / 2.0
-
-
-def _by_stone(bed: _Bed, columns: Array) -> Array:
-    """Sums over the corners of each stone, (m, k)."""
-    return np.array([np.bincount(bed.stone, column) for column in columns.T]).T
-
-
-def _scatter(bed: _Bed, parameters: int) -> _Scatter:
-    """τ and κ of one course from its own stones."""
-    weights = 1.0 / bed.sigma**2
-    design, total = _design(bed, parameters), _by_stone(bed, weights[:, None])
-    low = float(bed.height.min())
-    rows = np.column_stack([design, bed.height - low])
-    means = _by_stone(bed, weights[:, None] * rows) / total
-    within = rows - means[bed.stone]
-    freedom = len(bed.along) - bed.count
-    line = _solve(means, np.full(bed.count, 1.0))
-    squares = float(weights @ (within @ np.append(-line, 1.0)) ** 2)
-    kappa = max(1.0, math.sqrt(squares / freedom)) if freedom >= ENOUGH else 1.0
-    variances = kappa**2 / total[:, 0]
-    return _Scatter(_paule_mandel(means, variances), kappa, bed.count - parameters)
-
-
-def _solve(rows: Array, weights: Array) -> Array:
-    root = np.sqrt(weights)[:, None]
-    solution = np.linalg.lstsq(root * rows[:, :-1], root[:, 0] * rows[:, -1], rcond=None)[0]
-    return np.asarray(solution, dtype=np.float64)
-
-
-def _paule_mandel(rows: Array, variances: Array) -> float:
-    """τ for which Σ residual² / (variance + τ²) is the redundancy; 0 if the variances explain all."""
-    redundancy = rows.shape[0] - (rows.shape[1] - 1)
-
-    def excess(square: float) -> float:
-        weights = 1.0 / (variances + square)
-        residuals: Array = rows @ np.append(-_solve(rows, weights), 1.0)
-        return float(np.sum(weights * residuals**2)) - redundancy
-
-    if redundancy <= 0 or excess(0.0) <= 0.0:
-        return 0.0
-    high = float(np.ptp(rows[:, -1])) ** 2 + float(variances.max())
-    while excess(high) > 0.0:
-        high *= 4.0
-    low = 0.0
-    for _ in range(60):
-        middle = (low + high) / 2.0
-        low, high = (middle, high) if excess(middle) > 0.0 else (low, middle)
-        if high - low < 1e-6 * high:
-            break
-    return math.sqrt(high)
-
-
-def _pool(scatters: Sequence[_Scatter]) -> _Scatter | None:
-    """What courses of few stones borrow: the root mean squares of those that have enough."""
-    freedom = sum(one.freedom for one in scatters)
-    if not freedom:
-        return None
-    tau = math.sqrt(sum(one.freedom * one.tau**2 for one in scatters) / freedom)
-    kappa = math.sqrt(sum(one.freedom * one.kappa**2 for one in scatters) / freedom)
-    return _Scatter(tau, kappa, freedom)
-
-
-def _fit(bed: _Bed, scatter: _Scatter, parameters: int) -> tuple[Array, Array]:
-    """Generalised least squares, C = κ²σ² + τ² 1 1ᵀ of each stone, inverted by Sherman and Morrison."""
-    weights = 1.0 / (scatter.kappa * bed.sigma) ** 2
-    rows = np.column_stack([_design(bed, parameters), bed.height - bed.height.min()])
-    sums = _by_stone(bed, weights[:, None] * rows)
-    shared = scatter.tau**2 / (1.0 + scatter.tau**2 * _by_stone(bed, weights[:, None])[:, 0])
-    normal = rows.T @ (weights[:, None] * rows) - sums.T @ (shared[:, None] * sums)
-    covariance: Array = np.linalg.inv(normal[:-1, :-1])
-    values = covariance @ normal[:-1, -1]
-    values[0] += bed.height.min()
-    return values, covariance
-
-
-def _line(bed: _Bed, own: _Scatter | None, pooled: _Scatter | None) -> CourseLine:
+def _line(course: _Course, own: BedScatter | None, pooled: BedScatter | None) -> CourseLine:
+    bed = course.bed
     evidence = "own" if own else "other courses" if pooled else "none"
-    scatter = own or pooled or _Scatter(0.0, 1.0, 0)
+    scatter = own or pooled or BedScatter(0.0, 1.0, 0)
     sloped = bed.along[-1] > bed.along[0]
-    values, covariance = _fit(bed, scatter, 2 if sloped else 1)
+    values, covariance = fit_bed(bed, scatter, 2 if sloped else 1)
     slope = float(values[1]) if sloped else None
     if not sloped:
         covariance = np.array([[covariance[0, 0], 0.0], [0.0, math.nan]])
-    deviations = bed.height - values[0] - (slope or 0.0) * (bed.along - _middle(bed))
+    deviations = bed.height - values[0] - (slope or 0.0) * (bed.along - bed.middle)
     sag = _sag(bed) if own and sloped else (None, None, None)
     return CourseLine(
-        facade=bed.facade,
-        zone=bed.zone,
-        course=bed.course,
-        stones=tuple(dict.fromkeys(bed.codes)),
-        codes=bed.codes,
+        facade=course.facade,
+        zone=course.zone,
+        course=course.course,
+        stones=tuple(dict.fromkeys(course.codes)),
+        codes=course.codes,
         along=bed.along,
         height=bed.height,
         sigma=bed.sigma,
-        left_out=bed.left_out,
-        middle=_middle(bed),
+        left_out=course.left_out,
+        middle=bed.middle,
         level=float(values[0]),
         slope=slope,
         covariance=covariance,
@@ -384,10 +284,10 @@ def _line(bed: _Bed, own: _Scatter | None, pooled: _Scatter | None) -> CourseLin
     )
 
 
-def _sag(bed: _Bed) -> tuple[float, float, float | None]:
+def _sag(bed: BedCorners) -> tuple[float, float, float | None]:
     """Height of mid-span above the chord of the best parabola, -c (L/2)², its sigma and probability."""
-    scatter = _scatter(bed, 3)
-    values, covariance = _fit(bed, scatter, 3)
+    scatter = scatter_of(bed, 3)
+    values, covariance = fit_bed(bed, scatter, 3)
     lever = -(((bed.along[-1] - bed.along[0]) / 2.0) ** 2)
     sag, sigma = float(lever * values[2]), float(-lever * math.sqrt(covariance[2, 2]))
     return sag, sigma, _chance(sag, sigma, scatter.freedom)

@@ -1,0 +1,144 @@
+"""Least squares through the beds of stones, whose corners are not independent of each other.
+
+Corner j of stone i lies at z_ij = Σ β_k x_ij^k + u_i + e_ij, x from the middle of the course: u_i, of variance
+τ², is the height of its stone's bed, alike for all corners of the stone; e_ij, of variance κ² σ_ij², its own
+error. κ, at least 1, comes from the differences between corners of one stone; τ from the stones' means by the
+rule of Paule & Mandel (1982; DerSimonian & Kacker 2007): that value for which Σ residual² / variance is the
+redundancy.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["BedCorners", "BedScatter", "fit_bed", "pool", "scatter_of"]
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
+
+_FREEDOM = 5  # differences between corners of one stone from which κ can be told from 1
+
+
+@dataclass(frozen=True)
+class BedCorners:
+    """Lower corners of the stones of one course, sorted along the wall.
+
+    Attributes
+    ----------
+    stone : (n,) number of the stone of each, from 0
+    along : (n,) place along the wall [m]
+    height : (n,) z [m]
+    sigma : (n,) standard deviation of z as measured [m]
+    """
+
+    stone: Rows
+    along: Array
+    height: Array
+    sigma: Array
+
+    @property
+    def count(self) -> int:
+        """How many stones."""
+        return int(self.stone.max()) + 1
+
+    @property
+    def middle(self) -> float:
+        """Half-way between the first and the last corner [m]."""
+        return float(self.along[0] + self.along[-1]) / 2.0
+
+
+@dataclass(frozen=True)
+class BedScatter:
+    """How beds scatter.
+
+    Attributes
+    ----------
+    tau : standard deviation of a stone's bed about the line [m]
+    kappa : how much more than measured the corners of one stone scatter, at least 1 [-]
+    freedom : stones minus parameters, from which tau is estimated
+    """
+
+    tau: float
+    kappa: float
+    freedom: int
+
+
+def scatter_of(bed: BedCorners, parameters: int) -> BedScatter:
+    """τ and κ of one course from its own stones."""
+    weights = 1.0 / bed.sigma**2
+    design, total = _design(bed, parameters), _by_stone(bed, weights[:, None])
+    low = float(bed.height.min())
+    rows = np.column_stack([design, bed.height - low])
+    means = _by_stone(bed, weights[:, None] * rows) / total
+    within = rows - means[bed.stone]
+    freedom = len(bed.along) - bed.count
+    line = _solve(means, np.full(bed.count, 1.0))
+    squares = float(weights @ (within @ np.append(-line, 1.0)) ** 2)
+    kappa = max(1.0, math.sqrt(squares / freedom)) if freedom >= _FREEDOM else 1.0
+    variances = kappa**2 / total[:, 0]
+    return BedScatter(_paule_mandel(means, variances), kappa, bed.count - parameters)
+
+
+def pool(scatters: Sequence[BedScatter]) -> BedScatter | None:
+    """What courses of few stones borrow: the root mean squares of those that have enough."""
+    freedom = sum(one.freedom for one in scatters)
+    if not freedom:
+        return None
+    tau = math.sqrt(sum(one.freedom * one.tau**2 for one in scatters) / freedom)
+    kappa = math.sqrt(sum(one.freedom * one.kappa**2 for one in scatters) / freedom)
+    return BedScatter(tau, kappa, freedom)
+
+
+def fit_bed(bed: BedCorners, scatter: BedScatter, parameters: int) -> tuple[Array, Array]:
+    """Generalised least squares, C = κ²σ² + τ² 1 1ᵀ of each stone, inverted by Sherman and Morrison."""
+    weights = 1.0 / (scatter.kappa * bed.sigma) ** 2
+    rows = np.column_stack([_design(bed, parameters), bed.height - bed.height.min()])
+    sums = _by_stone(bed, weights[:, None] * rows)
+    shared = scatter.tau**2 / (1.0 + scatter.tau**2 * _by_stone(bed, weights[:, None])[:, 0])
+    normal = rows.T @ (weights[:, None] * rows) - sums.T @ (shared[:, None] * sums)
+    covariance: Array = np.linalg.inv(normal[:-1, :-1])
+    values = covariance @ normal[:-1, -1]
+    values[0] += bed.height.min()
+    return values, covariance
+
+
+def _design(bed: BedCorners, parameters: int) -> Array:
+    """Powers of the distance from the middle."""
+    return (bed.along - bed.middle)[:, None] ** np.arange(parameters)
+
+
+def _by_stone(bed: BedCorners, columns: Array) -> Array:
+    """Sums over the corners of each stone, (m, k)."""
+    return np.array([np.bincount(bed.stone, column) for column in columns.T]).T
+
+
+def _solve(rows: Array, weights: Array) -> Array:
+    root = np.sqrt(weights)[:, None]
+    solution = np.linalg.lstsq(root * rows[:, :-1], root[:, 0] * rows[:, -1], rcond=None)[0]
+    return np.asarray(solution, dtype=np.float64)
+
+
+def _paule_mandel(rows: Array, variances: Array) -> float:
+    """τ for which Σ residual² / (variance + τ²) is the redundancy; 0 if the variances explain all."""
+    redundancy: int = rows.shape[0] - (rows.shape[1] - 1)
+
+    def excess(square: float) -> float:
+        weights = 1.0 / (variances + square)
+        residuals: Array = rows @ np.append(-_solve(rows, weights), 1.0)
+        return float(np.sum(weights * residuals**2)) - redundancy
+
+    if redundancy <= 0 or excess(0.0) <= 0.0:
+        return 0.0
+    high = float(np.ptp(rows[:, -1])) ** 2 + float(variances.max())
+    while excess(high) > 0.0:
+        high *= 4.0
+    low = 0.0
+    for _ in range(60):
+        middle = (low + high) / 2.0
+        low, high = (middle, high) if excess(middle) > 0.0 else (low, middle)
+        if high - low < 1e-6 * high:
+            break
+    return math.sqrt(high)
