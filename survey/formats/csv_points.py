@@ -1,164 +1,203 @@
 """Surveys as a table: one measured point per line, as spreadsheets and point exports give them.
 
-The first line names the columns, in any order: ``block,kind,course,role,x,y,z`` and, if wanted, ``sigma`` and
-``depth``. ``role`` is ``vertex`` for a corner of the face, in order around it, or ``point`` for any other
-point on it. Lengths are metres with a decimal point; empty fields mean "not known". Lines of one block may
-lie anywhere.
+The first line names the columns, in any order: ``block,kind,course,role,x,y,z`` and, if wanted, ``sigma``,
+``depth``, ``depth_sigma``, ``depth_source``, ``zone`` and ``station``. They are separated by commas, semicolons or
+tabs; decimals have a point or, where columns are not separated by commas, a comma. ``role`` is ``vertex`` or
+``v`` for a corner of the face, in order around it, ``point`` or ``p`` for any other point on it. Lengths are
+metres; empty fields mean "not known". The lines of a block may lie anywhere. A line that begins with ``#`` is a
+comment.
 """
 
 import csv
-import math
-from dataclasses import dataclass, field
+from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
-
 from moma.errors import SurveyError
-from survey.formats.fields import CODE, KIND, parse_length, parse_number, read_lines
-from survey.records import BlockRecord, Survey, SurveyHead
+from survey.formats.decimals import Decimals
+from survey.formats.fields import CODE, KIND, parse_course, shown
+from survey.formats.options import ReadingOptions, whole
+from survey.formats.point_table import PointTable, TableStone, check_station
+from survey.formats.text_lines import TextLines
+from survey.records import Survey, SurveyHead, SurveyStream
 
-__all__ = ["read_csv"]
+__all__ = ["open_csv", "read_csv"]
 
 _NEEDED = ("block", "kind", "course", "role", "x", "y", "z")
-_OPTIONAL = ("sigma", "depth")
-_ROLES = ("vertex", "point")
+_OPTIONAL = ("sigma", "depth", "depth_sigma", "depth_source", "zone", "station")
+_IS_VERTEX = {"vertex": True, "v": True, "point": False, "p": False}
+_DELIMITERS = (",", ";", "\t")
+_NOTHING = float("nan")
+_LONGEST_NAME = 64
 
 
-@dataclass
-class _Block:
-    """The lines of one block that have been read."""
-
-    code: str
-    kind: str
-    course: int | None
-    line: int
-    places: dict[str, list[list[float]]] = field(default_factory=lambda: {role: [] for role in _ROLES})
-    sigmas: list[float] = field(default_factory=list)
-    depth: float | None = None
-
-
-def read_csv(path: Path, default_sigma: float = 0.003) -> Survey:
-    """Read a table of points.
+def open_csv(path: Path, options: ReadingOptions | None = None) -> SurveyStream:
+    """Read a table of points, and hand its stones out one by one.
 
     Parameters
     ----------
-    path : the file, UTF-8
-    default_sigma : standard deviation of a coordinate where no line of a block gives one [m]
+    path : the file
+    options : sigma where a line does not say it; the head of another file
 
     Returns
     -------
-    Survey without observer and depth rules: corners run counter-clockwise seen from outside. A block's
-    sigma is the root mean square of those of its points.
+    SurveyStream : without a head of another file, corners run counter-clockwise seen from outside
+
+    Raises
+    ------
+    SurveyError
+        naming file and line, if the table as a whole is wrong
+    """
+    options = options or ReadingOptions()
+    lines = TextLines(Path(path))
+    head = options.head_for(Path(path))
+    rows = _without_comments(lines)
+    number, names = next(rows, (1, ""))
+    reader = _RowReader(lines, (number, names), head, PointTable(lines.path, options.sigma))
+    for number, line in rows:
+        reader.take(line, number)
+    if reader.table.is_empty:
+        raise lines.fail(lines.end, "the table has no points", "add one line per point")
+    return SurveyStream(head, reader.table.records())
+
+
+def read_csv(path: Path, default_sigma: float = 0.003) -> Survey:
+    """Read a table of points as a whole.
+
+    Parameters
+    ----------
+    path : the file
+    default_sigma : standard deviation of a coordinate whose line does not say it [m]
 
     Raises
     ------
     SurveyError
         naming file and line, when any line is wrong
     """
-    path = Path(path)
-    lines = read_lines(path)
-    columns = _columns(_split(lines[0], f"{path}:1"), f"{path}:1")
-    blocks: dict[str, _Block] = {}
-    for number, line in enumerate(lines[1:], start=2):
-        if line.strip():
-            where = f"{path}:{number}"
-            values = _split(line, where)
-            if len(values) != len(columns):
-                raise SurveyError(
-                    f"{len(values)} fields for {len(columns)} columns",
-                    where=where,
-                    remedy="fill every column",
+    return whole(open_csv(path, ReadingOptions(sigma=default_sigma)), Path(path))
+
+
+def _without_comments(lines: TextLines) -> Iterator[tuple[int, str]]:
+    for number, line in lines:
+        if line.strip() and not line.lstrip().startswith("#"):
+            yield number, line
+
+
+class _RowReader:
+    """What reads the lines of a table into its stones."""
+
+    def __init__(self, lines: TextLines, names: tuple[int, str], head: SurveyHead, table: PointTable) -> None:
+        self._path, self._head, self.table = lines.path, head, table
+        number, line = names
+        self._delimiter = _delimiter(line)
+        where = f"{lines.path}:{number}"
+        columns = _columns([name.casefold() for name in self._split(line, where)], where)
+        self._count = len(columns)
+        self._at = {name: columns.index(name) for name in columns}
+        self._needed = tuple(self._at[name] for name in _NEEDED)
+        self._optional = [(name, self._at[name]) for name in _OPTIONAL[1:] if name in self._at]
+        self._sigma_at = self._at.get("sigma")
+        self._decimals = Decimals(lines.path, commas=self._delimiter != ",")
+        self._said: dict[str, tuple[str, str]] = {}  # kind and course of each block, as written
+
+    def take(self, line: str, number: int) -> None:
+        """Read one line."""
+        code: str | None = None
+        try:
+            values = self._split(line, f"{self._path}:{number}")
+            code = self._code(values)
+            stone = None if code is None else self.table.stones.get(code)
+            if stone is not None and stone.error is not None:
+                stone.add_line(number)
+            else:
+                self._take(values, stone, number)
+        except SurveyError as error:
+            self.table.refuse(code, error, number)
+
+    def _code(self, values: list[str]) -> str | None:
+        """The block that a line, however wrong, is of; None if that cannot be known."""
+        at = self._needed[0]
+        return values[at] if at < len(values) and CODE.fullmatch(values[at]) else None
+
+    def _take(self, values: list[str], stone: TableStone | None, number: int) -> None:
+        if len(values) != self._count:
+            raise self._fail(number, f"{len(values)} fields for {self._count} columns", "fill every column")
+        code, kind, course, role, x, y, z = (values[i] for i in self._needed)
+        is_vertex = _IS_VERTEX.get(role)
+        if is_vertex is None:
+            raise self._fail(number, f"role {shown(role)}", "write vertex or point")
+        place = self._decimals.place((x, y, z), "xyz", number)
+        sigma = _NOTHING
+        if self._sigma_at is not None and (text := values[self._sigma_at]):
+            sigma = self._decimals.length(text, "sigma", number)
+        if stone is None:
+            stone = self._new_stone(code, kind, course, number)
+        elif self._said[code] != (kind, course):
+            raise self._fail(
+                number,
+                f"kind or course of block {code} differs from line {stone.line}",
+                "give every line of a block the same kind and course",
+            )
+        for name, at in self._optional:
+            if values[at]:
+                self._say(stone, name, values[at], number)
+        self.table.stones[code] = stone
+        stone.add_place(is_vertex, place, sigma, "")
+        stone.add_line(number)
+
+    def _new_stone(self, code: str, kind: str, course: str, number: int) -> TableStone:
+        for name, text, pattern in (("block", code, CODE), ("kind", kind, KIND)):
+            if pattern.fullmatch(text) is None:
+                raise self._fail(
+                    number, f"{name} {shown(text)} is not a {name} name", "write e.g. W01-01, header"
                 )
-            _take(blocks, dict(zip(columns, values, strict=True)), number, where)
-    if not blocks:
-        raise SurveyError(
-            "the table has no points", where=f"{path}:{len(lines)}", remedy="add one line per point"
+        self._said[code] = kind, course
+        return TableStone(
+            code, kind, parse_course(course, f"{self._path}:{number}") if course else None, number
         )
-    records = tuple(_record(block, default_sigma, str(path)) for block in blocks.values())
-    return Survey(SurveyHead(path.stem, str(path)), records)
+
+    def _say(self, stone: TableStone, name: str, text: str, number: int) -> None:
+        """Take what holds for a block as a whole from one of its lines."""
+        value: float | str = text
+        if name in ("depth", "depth_sigma"):
+            value = self._decimals.length(text, name, number)
+        elif name == "station":
+            check_station(text, self._head, f"{self._path}:{number}")
+        elif not text.isprintable() or (name == "zone" and ('"' in text or len(text) > _LONGEST_NAME)):
+            raise self._fail(number, f"{name} {shown(text)} is not a name", "write printable words")
+        before = getattr(stone, name)
+        if before not in (None, value):
+            found, first = (f"{one:g} m" if isinstance(one, float) else one for one in (value, before))
+            raise self._fail(number, f"{name} {found}, but {first} before", f"give a block one {name}")
+        setattr(stone, name, value)
+
+    def _split(self, line: str, where: str) -> list[str]:
+        if '"' not in line:
+            return [value.strip() for value in line.split(self._delimiter)]
+        try:
+            (row,) = csv.reader([line], strict=True, delimiter=self._delimiter)
+        except csv.Error as error:
+            raise SurveyError(
+                f"not a table line: {error}", where=where, remedy="check quotes and separators"
+            ) from error
+        return [value.strip() for value in row]
+
+    def _fail(self, number: int, what: str, remedy: str) -> SurveyError:
+        return SurveyError(what, where=f"{self._path}:{number}", remedy=remedy)
 
 
-def _split(line: str, where: str) -> list[str]:
-    try:
-        rows = list(csv.reader([line], strict=True))
-    except csv.Error as error:
-        raise SurveyError(
-            f"not a table line: {error}", where=where, remedy="check quotes and commas"
-        ) from error
-    return [value.strip() for value in rows[0]] if rows else []
+def _delimiter(line: str) -> str:
+    """What separates the names of the columns."""
+    return max(_DELIMITERS, key=line.count)
 
 
 def _columns(names: list[str], where: str) -> list[str]:
-    expected = f"{','.join(_NEEDED)}[,sigma][,depth]"
+    expected = ",".join(_NEEDED) + "".join(f"[,{name}]" for name in _OPTIONAL)
     missing = [name for name in _NEEDED if name not in names]
     if missing:
         raise SurveyError(f"no column {missing[0]!r}", where=where, remedy=f"begin with: {expected}")
     for name in names:
         if name not in _NEEDED + _OPTIONAL or names.count(name) > 1:
             raise SurveyError(
-                f"unknown or repeated column {name[:40]!r}", where=where, remedy=f"use: {expected}"
+                f"unknown or repeated column {shown(name)}", where=where, remedy=f"use: {expected}"
             )
     return names
-
-
-def _take(blocks: dict[str, _Block], row: dict[str, str], line: int, where: str) -> None:
-    """Add one line to its block."""
-    for name, pattern in (("block", CODE), ("kind", KIND)):
-        if pattern.fullmatch(row[name]) is None:
-            raise SurveyError(
-                f"{name} {row[name][:40]!r} is not a {name} name",
-                where=where,
-                remedy="write e.g. W01-01, header",
-            )
-    course = _course(row["course"], where)
-    block = blocks.setdefault(row["block"], _Block(row["block"], row["kind"], course, line))
-    if (block.kind, block.course) != (row["kind"], course):
-        raise SurveyError(
-            f"kind or course of block {block.code} differs from line {block.line}",
-            where=where,
-            remedy="give every line of a block the same kind and course",
-        )
-    if row["role"] not in _ROLES:
-        raise SurveyError(f"role {row['role'][:40]!r}", where=where, remedy="write vertex or point")
-    block.places[row["role"]].append([parse_number(row[axis], axis, where) for axis in "xyz"])
-    if row.get("sigma"):
-        block.sigmas.append(parse_length(row["sigma"], "sigma", where))
-    if row.get("depth"):
-        depth = parse_length(row["depth"], "depth", where)
-        if block.depth not in (None, depth):
-            raise SurveyError(
-                f"depth {depth:g} m, but {block.depth:g} m before",
-                where=where,
-                remedy="give a block one depth",
-            )
-        block.depth = depth
-
-
-def _course(text: str, where: str) -> int | None:
-    if not text:
-        return None
-    if not (text.isascii() and text.isdigit() and len(text) <= 6):
-        raise SurveyError(f"course {text[:40]!r}", where=where, remedy="write a whole number, or nothing")
-    return int(text)
-
-
-def _record(block: _Block, default_sigma: float, path: str) -> BlockRecord:
-    vertices = block.places["vertex"]
-    if len(vertices) < 3:
-        raise SurveyError(
-            f"block {block.code} has {len(vertices)} vertices",
-            where=f"{path}:{block.line}",
-            remedy="a face needs 3 lines of role vertex or more",
-        )
-    squares = [sigma**2 for sigma in block.sigmas]
-    return BlockRecord(
-        code=block.code,
-        kind=block.kind,
-        course=block.course,
-        vertices=np.array(vertices),
-        points=np.array(block.places["point"]).reshape(-1, 3),
-        sigma=math.sqrt(sum(squares) / len(squares)) if squares else default_sigma,
-        depth=block.depth,
-        depth_source=None if block.depth is None else "column depth of the table",
-        line=block.line,
-    )

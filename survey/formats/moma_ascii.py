@@ -1,291 +1,223 @@
-"""The native survey format: one ASCII (UTF-8) file, one record per stone, line by line.
+"""The native survey format: one text file, one record per stone, line by line.
 
-Grammar (EBNF; one line each, words separated by blanks; ``#`` at the start of a line or after a blank
-begins a comment, except in TEXT; blank lines are free)::
+Grammar (EBNF; every production but `file` and `stone` is one line, words separated by blanks; ``#`` at the start
+of a line or after a blank begins a comment, except in TEXT; blank lines are free; "…" about a line's first word
+alone is left out)::
 
-    file    = "moma-survey" "1" , { header } , { stone } ;
+    file    = "moma-survey" "1" , { header } , stone , { stone } ;
     header  = "name" TEXT
             | "observer" X Y Z                              (* where the surveyor stood *)
-            | "sigma" S                                     (* of one coordinate, for all stones below *)
-            | "depth" KIND D [ "sigma" S ] "source" TEXT ;  (* for stones without a depth of their own *)
-    stone   = "stone" CODE KIND [ "course" N ] , { item } , "end" ;
-    item    = "vertex" X Y Z                                (* 3 or more, in order around the face *)
-            | "point" X Y Z
+            | "station" NAME X Y Z
+            | "sigma" S                                     (* of one coordinate that does not say its own *)
+            | "control" NAME X Y Z [ "sigma" S ] "site" X Y Z [ "sigma" S ]
+            | "photo" NAME [ "sigma" PIXELS ] [ "station" NAME ]
+            | "mark" PHOTO U V "at" X Y Z [ "sigma" S ]     (* four or more per photo *)
+            | "depth" ( KIND | "*" ) [ "course" N [ "-" N ] ] [ "zone" NAME ] D [ "sigma" S ] "source" TEXT
+            | "canon" KIND LENGTH HEIGHT "sigma" S "source" TEXT
+            | "extrude" [ "along" DX DY DZ ] [ "tail" T ] ;
+    stone   = "stone" CODE KIND [ "course" N ] [ "zone" NAME ] , { item } , "end" ;
+    item    = "vertex" X Y Z [ "sigma" S ]                  (* 3 or more, in order around the face *)
+            | "point" X Y Z [ "sigma" S ]
+            | "photo" NAME
+            | "pixel" U V                                   (* 3 or more, instead of vertices *)
+            | "station" NAME
+            | "extrude" [ "along" DX DY DZ ] [ "tail" T ]
             | "sigma" S
             | "depth" D [ "sigma" S ] "source" TEXT
             | "note" KEY TEXT ;
+    NAME    = CODE | '"' TEXT '"' ;
 
-All lengths are metres. TEXT runs to the end of its line. A file is accepted whole or refused whole, with the
-line that is wrong.
+All lengths are metres. TEXT runs to the end of its line. A wrong head refuses the file, a wrong stone that stone:
+reading goes on behind its ``end``, or at the next line that begins with ``stone``.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
-from re import Pattern
 
-import numpy as np
-from numpy.typing import NDArray
-
-from moma.errors import SurveyError
-from survey.formats.fields import CODE, KIND, parse_length, parse_number, read_lines
+from moma.errors import SurveyError, UsageError
+from survey.formats.cursor import Cursor
+from survey.formats.moma_head import HeadReader
+from survey.formats.moma_stone import STONE_WORDS, StoneReader
 from survey.formats.moma_writer import MAGIC, write_moma
-from survey.records import OBSERVER, BlockRecord, DepthRule, Station, Survey, SurveyHead
+from survey.formats.options import ReadingOptions, whole
+from survey.formats.text_lines import TextLines
+from survey.records import BlockRecord, Reject, Survey, SurveyHead, SurveyStream
 
-__all__ = ["read_moma", "write_moma"]
-
-_HEADER_WORDS = "name, observer, sigma, depth, stone"
-_STONE_WORDS = "vertex, point, sigma, depth, note, end"
+__all__ = ["open_moma", "read_head", "read_moma", "with_header", "write_moma"]
 
 
-def read_moma(path: Path) -> Survey:
-    """Read a native survey file.
+def open_moma(path: Path, options: ReadingOptions | None = None) -> SurveyStream:
+    """Begin to read a native survey file; its stones come one by one.
 
     Parameters
     ----------
     path : the file
+    options : a head of another file is refused, because a native survey has its own; the rest is not needed
 
-    Returns
-    -------
-    Survey with all its stones
+    Raises
+    ------
+    SurveyError
+        naming file and line, if the file as a whole or its head is wrong
+    """
+    if options is not None and options.head is not None:
+        raise UsageError(
+            "a native survey has a head of its own", where=str(path), remedy="leave out the header file"
+        )
+    lines = TextLines(Path(path))
+    numbered = iter(lines)
+    reader, first = _read_head(lines, numbered)
+    if first is None:
+        raise lines.fail(lines.end, "the survey has no stones", "add 'stone CODE KIND' … 'end'")
+    head = reader.finish(Path(path).stem, str(path))
+    return SurveyStream(head, _Stones(lines, numbered, head, reader.sigma).records(first))
+
+
+def read_moma(path: Path) -> Survey:
+    """Read a native survey file as a whole.
 
     Raises
     ------
     SurveyError
         naming file and line, when any line is wrong
     """
-    path = Path(path)
-    reader = _Reader(str(path))
-    lines = read_lines(path)
-    for number, line in enumerate(lines, start=1):
-        reader.line = number
-        if line.strip() and not line.lstrip().startswith("#"):
-            reader.take(line)
-    reader.line = len(lines)
-    return reader.finish(Path(path).stem)
+    return whole(open_moma(path), Path(path))
 
 
-@dataclass
-class _Stone:
-    """A stone record that is being read."""
+def read_head(path: Path) -> SurveyHead:
+    """Read a header file: a native survey without stones, for formats that have no head of their own.
 
-    code: str
-    kind: str
-    course: int | None
-    line: int
-    sigma: float | None
-    vertices: list[tuple[float, ...]] = field(default_factory=list)
-    points: list[tuple[float, ...]] = field(default_factory=list)
-    depth: tuple[float, float | None, str] | None = None
-    notes: dict[str, str] = field(default_factory=dict)
+    Its name is empty if the file does not say one. The sigma of the file is that of its control points and marks;
+    `with_header` takes it for the stones too.
+
+    Raises
+    ------
+    SurveyError
+        naming file and line, when any line is wrong
+    """
+    return _header_file(path)[0]
 
 
-class _Reader:
-    """The state of reading: what has been read so far, and on which line we are."""
+def with_header(options: ReadingOptions, path: Path) -> ReadingOptions:
+    """Take the head of a header file, and its sigma if it says one, into the options."""
+    head, sigma = _header_file(path)
+    return replace(options, head=head, sigma=options.sigma if sigma is None else sigma)
 
-    def __init__(self, path: str) -> None:
-        self.path, self.line = path, 0
-        self.begun = False
-        self.name: str | None = None
-        self.observer: NDArray[np.float64] | None = None
-        self.sigma: float | None = None
-        self.rules: dict[str, DepthRule] = {}
-        self.blocks: list[BlockRecord] = []
-        self.lines_of: dict[str, int] = {}
-        self.stone: _Stone | None = None
 
-    def fail(self, what: str, remedy: str) -> SurveyError:
-        return SurveyError(what, where=f"{self.path}:{self.line}", remedy=remedy)
+def _header_file(path: Path) -> tuple[SurveyHead, float | None]:
+    lines = TextLines(Path(path))
+    reader, first = _read_head(lines, iter(lines))
+    if first is not None:
+        raise lines.fail(first[0], "a stone in a header file", "keep stones in the survey")
+    return reader.finish("", str(path)), reader.sigma
 
-    def take(self, line: str) -> None:
-        """Read one line that is neither blank nor a comment."""
-        if not self.begun:
+
+def _read_head(
+    lines: TextLines, numbered: Iterator[tuple[int, str]]
+) -> tuple[HeadReader, tuple[int, str] | None]:
+    """Read up to the first stone; returns also its first line, None if there is none."""
+    reader, begun = HeadReader(), False
+    for number, line in numbered:
+        cursor = Cursor(line, f"{lines.path}:{number}")
+        word = cursor.word()
+        if not word:
+            continue
+        if not begun:
             if line.split("#", 1)[0].split() != MAGIC.split():
-                raise self.fail("this is not a MOMA survey", f"the first line must be '{MAGIC}'")
-            self.begun = True
-            return
-        word, rest = _head(line)
-        takers = self._header_takers() if self.stone is None else self._stone_takers(self.stone)
-        if word not in takers:
-            allowed = _HEADER_WORDS if self.stone is None else _STONE_WORDS
-            raise self.fail(f"unknown word {word[:40]!r}", f"a line begins with one of: {allowed}")
-        takers[word](rest)
+                raise cursor.fail("this is not a MOMA survey", f"the first line must be '{MAGIC}'")
+            begun = True
+        elif word == "stone":
+            return reader, (number, line)
+        elif word in reader.takers:
+            reader.takers[word](cursor, number)
+        else:
+            raise _unknown(word, cursor, (*reader.takers, "stone"))
+    if not begun:
+        raise lines.fail(lines.end, "the file is empty", f"the first line must be '{MAGIC}'")
+    return reader, None
 
-    def finish(self, stem: str) -> Survey:
-        if not self.begun:
-            raise self.fail("the file is empty", f"the first line must be '{MAGIC}'")
-        if self.stone is not None:
-            raise self.fail(
-                f"stone {self.stone.code} (line {self.stone.line}) has no 'end'", "the file may be cut short"
-            )
-        if not self.blocks:
-            raise self.fail("the survey has no stones", "add 'stone CODE KIND' … 'end'")
-        stations = () if self.observer is None else (Station(OBSERVER, self.observer),)
-        head = SurveyHead(self.name or stem, self.path, stations, depth_rules=tuple(self.rules.values()))
-        return Survey(head, tuple(self.blocks))
 
-    # --- lines of the header ---
+class _Stones:
+    """The stones of a file, and those that failed."""
 
-    def _header_takers(self) -> dict[str, Callable[[str], None]]:
-        takers: dict[str, Callable[[str], None]] = {"stone": self._take_stone}
-        if not self.blocks:
-            takers |= {
-                "name": self._take_name,
-                "observer": self._take_observer,
-                "sigma": self._take_sigma,
-                "depth": self._take_rule,
-            }
-        return takers
+    def __init__(
+        self, lines: TextLines, numbered: Iterator[tuple[int, str]], head: SurveyHead, sigma: float | None
+    ) -> None:
+        self._path, self._end, self._numbered = lines.path, lines.end, numbered
+        self._head, self._sigma = head, sigma
+        self._lines_of: dict[str, int] = {}
+        self._begin = 0  # line on which the stone, or what is not one, begins
+        self._error: SurveyError | None = None  # why what is being passed over is wrong
+        self._code: str | None = None
 
-    def _take_name(self, rest: str) -> None:
-        self._once(self.name, "name")
-        self.name = self._text(rest, "name")
+    def records(self, first: tuple[int, str]) -> Iterator[BlockRecord | Reject]:
+        """Go through the lines, from the first stone."""
+        stone = self._open(*first)
+        for number, line in self._numbered:
+            if stone is not None and stone.take_place(line):
+                continue
+            cursor = Cursor(line, f"{self._path}:{number}")
+            word = cursor.word()
+            if word == "stone":
+                if stone is not None:
+                    self._error = self._unfinished(number)
+                if self._error is not None:
+                    yield self._reject(self._error, number)
+                stone = self._open(number, line)
+                continue
+            if word and self._error is None:
+                done = self._take(stone, word, cursor, number)
+                if done is not None:
+                    yield done
+                if done is not None or self._error is not None:
+                    stone = None
+            if word == "end" and self._error is not None:
+                yield self._reject(self._error, number + 1)
+        if stone is not None:
+            self._error = self._unfinished(self._end)
+        if self._error is not None:
+            yield self._reject(self._error, self._end + 1)
 
-    def _take_observer(self, rest: str) -> None:
-        self._once(self.observer, "observer")
-        self.observer = np.array(self._xyz(rest, "observer"))
+    def _open(self, number: int, line: str) -> StoneReader | None:
+        """Begin a stone."""
+        self._begin, self._code = number, None
+        cursor = Cursor(line, f"{self._path}:{number}")
+        cursor.word()
+        try:
+            self._code = cursor.copy().code()
+            if (before := self._lines_of.setdefault(self._code, number)) != number:
+                raise cursor.fail(f"stone {self._code} a second time", f"the first is on line {before}")
+            return StoneReader(cursor, number, self._head, self._sigma)
+        except SurveyError as error:
+            self._error = error
+            return None
 
-    def _take_sigma(self, rest: str) -> None:
-        self._once(self.sigma, "sigma")
-        self.sigma = self._sigma(rest)
+    def _take(self, stone: StoneReader | None, word: str, cursor: Cursor, number: int) -> BlockRecord | None:
+        """Read a line of a stone; returns the stone once it is complete."""
+        try:
+            if stone is None:
+                self._begin, self._code = number, None
+                raise _unknown(word, cursor, ("stone",))
+            if word == "end":
+                return stone.finish(cursor, number)
+            if word not in STONE_WORDS:
+                raise _unknown(word, cursor, STONE_WORDS)
+            stone.take(word, cursor)
+        except SurveyError as error:
+            self._error = error
+        return None
 
-    def _take_rule(self, rest: str) -> None:
-        kind, rest = _head(rest)
-        self._match(KIND, kind, "kind", "use lower-case letters, e.g. header")
-        if kind in self.rules:
-            raise self.fail(f"a second depth for {kind!r}", f"the first is on line {self.rules[kind].line}")
-        value, sigma, source = self._depth(rest)
-        self.rules[kind] = DepthRule(kind, value, sigma, source, self.line)
-
-    def _take_stone(self, rest: str) -> None:
-        words = _uncommented(rest)
-        if not (len(words) == 2 or (len(words) == 4 and words[2] == "course")):
-            raise self.fail(f"cannot read 'stone {rest.strip()[:40]}'", "write: stone CODE KIND [course N]")
-        code, kind = words[:2]
-        self._match(CODE, code, "code", "use letters, digits and . + / : - _, at most 64")
-        self._match(KIND, kind, "kind", "use lower-case letters, e.g. header")
-        if code in self.lines_of:
-            raise self.fail(f"stone {code} a second time", f"the first is on line {self.lines_of[code]}")
-        course = self._course(words[3]) if len(words) == 4 else None
-        self.stone = _Stone(code, kind, course, self.line, self.sigma)
-        self.lines_of[code] = self.line
-
-    # --- lines of a stone ---
-
-    def _stone_takers(self, stone: _Stone) -> dict[str, Callable[[str], None]]:
-        return {
-            "vertex": lambda rest: stone.vertices.append(self._xyz(rest, "vertex")),
-            "point": lambda rest: stone.points.append(self._xyz(rest, "point")),
-            "sigma": lambda rest: setattr(stone, "sigma", self._sigma(rest)),
-            "depth": lambda rest: self._take_own_depth(stone, rest),
-            "note": lambda rest: self._take_note(stone, rest),
-            "end": lambda rest: self._take_end(stone, rest),
-        }
-
-    def _take_own_depth(self, stone: _Stone, rest: str) -> None:
-        self._once(stone.depth, "depth")
-        stone.depth = self._depth(rest)
-
-    def _take_note(self, stone: _Stone, rest: str) -> None:
-        key, text = _head(rest)
-        if not key or key in stone.notes:
-            raise self.fail(f"note {key[:40]!r} is missing or repeated", "write: note KEY TEXT, one per key")
-        stone.notes[key] = self._text(text, f"note {key}")
-
-    def _take_end(self, stone: _Stone, rest: str) -> None:
-        if _uncommented(rest):
-            raise self.fail(f"'{rest.strip()[:40]}' after 'end'", "put 'end' on a line of its own")
-        if len(stone.vertices) < 3:
-            raise self.fail(
-                f"stone {stone.code} has {len(stone.vertices)} vertices", "a face needs 3 vertices or more"
-            )
-        if stone.sigma is None:
-            raise self.fail(
-                f"stone {stone.code} has no sigma", "write 'sigma 0.003' (metres) before the stones"
-            )
-        depth, depth_sigma, source = stone.depth or (None, None, None)
-        self.blocks.append(
-            BlockRecord(
-                code=stone.code,
-                kind=stone.kind,
-                course=stone.course,
-                vertices=np.array(stone.vertices),
-                points=np.array(stone.points).reshape(-1, 3),
-                sigma=stone.sigma,
-                depth=depth,
-                depth_sigma=depth_sigma,
-                depth_source=source,
-                line=stone.line,
-                notes=stone.notes,
-            )
-        )
-        self.stone = None
-
-    # --- fields ---
-
-    @property
-    def _where(self) -> str:
-        return f"{self.path}:{self.line}"
-
-    def _once(self, value: object, word: str) -> None:
-        if value is not None:
-            raise self.fail(f"a second {word!r}", f"keep one {word!r} line")
-
-    def _text(self, rest: str, what: str) -> str:
-        text = rest.strip().replace("\t", " ")
-        if not text or not text.isprintable():
-            raise self.fail(f"{what} has no readable text", "write printable words after it")
-        return text
-
-    def _match(self, pattern: Pattern[str], text: str, what: str, remedy: str) -> None:
-        if pattern.fullmatch(text) is None:
-            raise self.fail(f"{what} {text[:40]!r} is not a {what}", remedy)
-
-    def _xyz(self, rest: str, what: str) -> tuple[float, ...]:
-        words = _uncommented(rest)
-        if len(words) != 3:
-            raise self.fail(f"{what} has {len(words)} coordinates", f"write: {what} X Y Z")
-        return tuple(
-            parse_number(w, f"{what} {axis}", self._where) for w, axis in zip(words, "xyz", strict=True)
+    def _unfinished(self, number: int) -> SurveyError:
+        return SurveyError(
+            f"stone {self._code} (line {self._begin}) has no 'end'",
+            where=f"{self._path}:{number}",
+            remedy="the file may be cut short",
         )
 
-    def _sigma(self, rest: str) -> float:
-        words = _uncommented(rest)
-        if len(words) != 1:
-            raise self.fail(f"sigma has {len(words)} values", "write: sigma 0.003")
-        return parse_length(words[0], "sigma", self._where)
-
-    def _course(self, word: str) -> int:
-        if not (word.isascii() and word.isdigit() and len(word) <= 6):
-            raise self.fail(
-                f"course {word[:40]!r} is not a whole number", "count courses from the ground: 1, 2, …"
-            )
-        return int(word)
-
-    def _depth(self, rest: str) -> tuple[float, float | None, str]:
-        """Read ``D [sigma S] source TEXT``."""
-        depth = parse_length(_head(rest)[0], "depth", self._where)
-        keyword, rest = _head(_head(rest)[1])
-        sigma: float | None = None
-        if keyword == "sigma":
-            word, rest = _head(rest)
-            sigma = parse_length(word, "depth sigma", self._where)
-            keyword, rest = _head(rest)
-        if keyword != "source":
-            raise self.fail("the depth has no source", "write: depth … D [sigma S] source TEXT")
-        return depth, sigma, self._text(rest, "source")
+    def _reject(self, error: SurveyError, stop: int) -> Reject:
+        self._error = None
+        return Reject(self._code, error, (range(self._begin, stop),))
 
 
-def _head(text: str) -> tuple[str, str]:
-    """First word of a line, and what follows it."""
-    words = text.split(maxsplit=1)
-    return (words[0] if words else "", words[1] if len(words) > 1 else "")
-
-
-def _uncommented(rest: str) -> list[str]:
-    """Words of a line up to the first one that begins a comment."""
-    words = rest.split()
-    for index, word in enumerate(words):
-        if word.startswith("#"):
-            return words[:index]
-    return words
+def _unknown(word: str, cursor: Cursor, allowed: tuple[str, ...]) -> SurveyError:
+    return cursor.fail(f"unknown word {word[:40]!r}", f"a line begins with one of: {', '.join(allowed)}")

@@ -122,9 +122,9 @@ def test_a_missing_file_and_other_encodings_are_named(tmp_path: Path) -> None:
         read_moma(tmp_path / "none.moma")
     with pytest.raises(SurveyError, match="cannot be read"):
         read_moma(tmp_path)
-    path = tmp_path / "latin.moma"
-    path.write_bytes(HEAD.encode() + "name Ségur\n".encode("latin-1"))
-    with pytest.raises(SurveyError, match=r"latin\.moma:3: byte 0xe9"):
+    path = tmp_path / "wide.moma"
+    path.write_text(HEAD + STONE, encoding="utf-16")
+    with pytest.raises(SurveyError, match=r"wide\.moma:1: the text is UTF-16"):
         read_moma(path)
 
 

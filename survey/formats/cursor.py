@@ -1,0 +1,153 @@
+"""Going through one line of the native format, word by word."""
+
+import re
+from re import Pattern
+
+from moma.errors import SurveyError
+from survey.formats.fields import CODE, KIND, parse_course, parse_length, parse_number, shown
+
+__all__ = ["NAME_REMEDY", "Cursor"]
+
+NAME_REMEDY = "use letters, digits and . + / : - _, at most 64"
+
+_WORD = re.compile(r'\s*("[^"]*"(?=\s|$)|\S+)')
+_QUOTED = re.compile(r"\S(?:.{0,62}\S)?")
+_COURSES = re.compile(r"\s*(\d{1,6})(?:\s*-\s*(\d{1,6}))?(?=\s|$)", re.ASCII)
+
+
+class Cursor:
+    """A place in a line. A word that begins with ``#`` begins a comment, unless text is asked for.
+
+    Attributes
+    ----------
+    where : "file:line", for errors
+    """
+
+    def __init__(self, line: str, where: str) -> None:
+        self._line, self._at, self.where = line, 0, where
+
+    def fail(self, what: str, remedy: str) -> SurveyError:
+        """Make an error that names this line."""
+        return SurveyError(what, where=self.where, remedy=remedy)
+
+    def peek(self) -> str:
+        """Next word as it stands; empty at the end of the line."""
+        found = _WORD.match(self._line, self._at)
+        return "" if found is None or found[1].startswith("#") else found[1]
+
+    def word(self) -> str:
+        """Next word as it stands, which is then behind us."""
+        found = _WORD.match(self._line, self._at)
+        if found is None or found[1].startswith("#"):
+            return ""
+        self._at = found.end()
+        return found[1]
+
+    def keyword(self, word: str) -> bool:
+        """Whether the next word is this one; then it is behind us."""
+        if self.peek() != word:
+            return False
+        self.word()
+        return True
+
+    def copy(self) -> "Cursor":
+        """Make another one at the same place."""
+        other = Cursor(self._line, self.where)
+        other._at = self._at
+        return other
+
+    def key(self) -> str:
+        """Next word, even if it begins with ``#`` or a quotation mark."""
+        words = self._line[self._at :].split(maxsplit=1)
+        if not words:
+            return ""
+        self._at = self._line.index(words[0], self._at) + len(words[0])
+        return words[0]
+
+    def matching(self, pattern: Pattern[str], what: str, remedy: str) -> str:
+        """Next word, which must be of a pattern."""
+        word = self.word()
+        if pattern.fullmatch(word) is None:
+            raise self.fail(f"{what} {shown(word)} is not a {what}", remedy)
+        return word
+
+    def code(self, what: str = "code") -> str:
+        """Next word, which must be the name of a stone."""
+        return self.matching(CODE, what, NAME_REMEDY)
+
+    def kind(self) -> str:
+        """Next word, which must be the name of a kind of stone."""
+        return self.matching(KIND, "kind", "use lower-case letters, e.g. header")
+
+    def name(self, what: str) -> str:
+        """Next word, or several in quotes."""
+        word = self.peek()
+        if word.startswith('"') and len(word) > 1:
+            self.word()
+            text = word[1:-1]
+            if not (word.endswith('"') and _QUOTED.fullmatch(text) and text.isprintable()):
+                raise self.fail(f"{what} {shown(word)} is not a name", 'write e.g. "north wall"')
+            return text
+        return self.code(what)
+
+    def number(self, what: str) -> float:
+        """Next word, which must be a number."""
+        word = self.word()
+        if not word:
+            raise self.fail(f"{what} is missing", "write a number")
+        return parse_number(word, what, self.where)
+
+    def length(self, what: str) -> float:
+        """Next word, which must be a number greater than 0."""
+        word = self.word()
+        if not word:
+            raise self.fail(f"{what} is missing", "write a number greater than 0")
+        return parse_length(word, what, self.where)
+
+    def row(self, what: str, axes: str = "xyz") -> tuple[float, ...]:
+        """Next words, which must be coordinates."""
+        values: list[float] = []
+        for axis in axes:
+            if self.peek() in ("", "at", "sigma", "site"):
+                need = " ".join(axes.upper())
+                raise self.fail(f"{what} has {len(values)} coordinates", f"write: {what} {need}")
+            values.append(parse_number(self.word(), f"{what} {axis}", self.where))
+        return tuple(values)
+
+    def course(self) -> int:
+        """Next word, which must be the number of a course."""
+        return parse_course(self.word(), self.where)
+
+    def courses(self) -> tuple[int, int]:
+        """Next words, which must be a course or first - last."""
+        found = _COURSES.match(self._line, self._at)
+        if found is None:
+            raise self.fail(f"courses {shown(self.peek())}", "write: course 3, or: course 3-5")
+        self._at = found.end()
+        first, last = int(found[1]), int(found[2] or found[1])
+        if first > last:
+            raise self.fail(f"courses {first}-{last}", "write the lower course first")
+        return first, last
+
+    def sigma(self, what: str) -> float | None:
+        """``sigma S``, if that comes next."""
+        return self.length(f"{what} sigma") if self.keyword("sigma") else None
+
+    def source(self, what: str) -> str:
+        """``source TEXT``, which must come next."""
+        if not self.keyword("source"):
+            raise self.fail(f"the {what} has no source", f"write: {what} … source TEXT")
+        return self.text("source")
+
+    def text(self, what: str) -> str:
+        """All that is left of the line."""
+        text = self._line[self._at :].strip().replace("\t", " ")
+        self._at = len(self._line)
+        if not text or not text.isprintable():
+            raise self.fail(f"{what} has no readable text", "write printable words after it")
+        return text
+
+    def end(self, remedy: str) -> None:
+        """Nothing but a comment may be left of the line."""
+        if word := self.peek():
+            raise self.fail(f"unexpected {shown(word)}", remedy)

@@ -1,0 +1,88 @@
+"""Decimal points and decimal commas: one mark per file, never guessed."""
+
+import re
+
+from moma.errors import SurveyError
+from survey.formats.fields import FARTHEST, parse_length, parse_number, shown
+
+__all__ = ["Decimals"]
+
+_PLAIN = re.compile(r"[-+.0-9eE]+").fullmatch  # what is a number to `float` and made of these is one here
+
+
+class Decimals:
+    """How a table writes its numbers: with the mark of the first one that has any.
+
+    Parameters
+    ----------
+    path : of the table, for errors
+    commas : whether there can be decimal commas, because columns are separated by something else
+    """
+
+    def __init__(self, path: str, commas: bool) -> None:
+        self._path, self._commas = path, commas
+        self._mark: str | None = None
+        self._line = 0  # the first one with that mark
+        self._lengths: dict[str, float] = {}
+
+    def place(self, texts: tuple[str, str, str], names: str, line: int) -> tuple[float, float, float]:
+        """Read three coordinates; `names` has a letter for each."""
+        if self._mark is not None:
+            plain = self._plain(texts)
+            if plain is not None:
+                return plain
+        a, b, c = (self.number(text, name, line) for text, name in zip(texts, names, strict=True))
+        return a, b, c
+
+    def number(self, text: str, what: str, line: int) -> float:
+        """Read one finite decimal number; `what` names it in the error."""
+        where = f"{self._path}:{line}"
+        mark = "," if "," in text else "." if "." in text else None
+        if mark == "," and not self._commas:
+            raise SurveyError(
+                f"{what} is {shown(text)}, with a decimal comma",
+                where=where,
+                remedy="write a point, or separate columns by semicolons or tabs",
+            )
+        if mark == "," and "." in text:
+            raise SurveyError(
+                f"{what} is {shown(text)}, with a comma and a point", where=where, remedy="write e.g. 1234,5"
+            )
+        if None not in (mark, self._mark) and mark != self._mark:
+            raise SurveyError(
+                f"{what} is {shown(text)}, but line {self._line} writes decimals with {self._mark!r}",
+                where=where,
+                remedy="keep to one decimal mark in a file",
+            )
+        value = parse_number(text.replace(",", "."), what, where)
+        if self._mark is None and mark is not None:
+            self._mark, self._line = mark, line
+        return value
+
+    def length(self, text: str, what: str, line: int) -> float:
+        """Read one number that must be positive."""
+        known = self._lengths.get(text)  # such as the one sigma that all lines repeat
+        if known is None:
+            value = self.number(text, what, line)
+            known = parse_length(text.replace(",", "."), what, f"{self._path}:{line}")
+            if len(self._lengths) < 1000:
+                self._lengths[text] = known
+            return value
+        return known
+
+    def _plain(self, texts: tuple[str, str, str]) -> tuple[float, float, float] | None:
+        """The short way for most of a table; None where something asks for a closer look."""
+        joined = "".join(texts)
+        if self._mark == ",":
+            if "." in joined:
+                return None
+            texts = (texts[0].replace(",", "."), texts[1].replace(",", "."), texts[2].replace(",", "."))
+            joined = "".join(texts)
+        if _PLAIN(joined) is None:
+            return None
+        try:
+            a, b, c = float(texts[0]), float(texts[1]), float(texts[2])
+        except ValueError:
+            return None
+        inside = -FARTHEST <= a <= FARTHEST and -FARTHEST <= b <= FARTHEST and -FARTHEST <= c <= FARTHEST
+        return (a, b, c) if inside else None

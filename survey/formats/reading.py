@@ -1,0 +1,69 @@
+"""One way to read every format of survey."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from moma.errors import UsageError
+from survey.formats.csv_points import open_csv
+from survey.formats.moma_ascii import open_moma, read_head, with_header
+from survey.formats.options import ReadingOptions, whole
+from survey.records import Survey, SurveyStream
+
+__all__ = [
+    "FORMATS",
+    "Reader",
+    "ReadingOptions",
+    "open_survey",
+    "read_head",
+    "read_survey",
+    "with_header",
+]
+
+Reader = Callable[[Path, ReadingOptions], SurveyStream]
+"""What begins to read a file."""
+
+FORMATS: Mapping[str, Reader] = {"moma": open_moma, "csv": open_csv}
+"""Readers by the name of their format."""
+
+
+def open_survey(path: Path, format: str, options: ReadingOptions | None = None) -> SurveyStream:
+    """Begin to read a survey file; its stones come one by one.
+
+    Parameters
+    ----------
+    path : the file
+    format : one of `FORMATS`
+    options : what the file may leave unsaid
+
+    Returns
+    -------
+    SurveyStream : the head, and the stones, of which a wrong one comes as a Reject
+
+    Raises
+    ------
+    SurveyError
+        naming file and line, if the file as a whole or its head is wrong; also while stones are read, if the rest
+        of the file is
+    UsageError
+        if there is no such format, or the options do not suit it
+    """
+    if format not in FORMATS:
+        raise UsageError(f"unknown format {format!r}", remedy=f"known formats: {', '.join(FORMATS)}")
+    return FORMATS[format](Path(path), options or ReadingOptions())
+
+
+def read_survey(path: Path, format: str, options: ReadingOptions | None = None) -> Survey:
+    """Read a survey file as a whole, or not at all.
+
+    Parameters
+    ----------
+    path, format, options : as for `open_survey`; a format of measured stones, not of solids
+
+    Raises
+    ------
+    SurveyError
+        of the first stone that is wrong, else as `open_survey`
+    UsageError
+        as `open_survey`
+    """
+    return whole(open_survey(path, format, options), Path(path))
