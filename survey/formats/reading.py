@@ -7,6 +7,7 @@ from moma.errors import UsageError
 from survey.formats.csv_points import open_csv
 from survey.formats.moma_ascii import open_moma, read_head, with_header
 from survey.formats.options import ReadingOptions, whole
+from survey.formats.point_lists import open_penzd, open_pnezd
 from survey.records import Survey, SurveyStream
 
 __all__ = [
@@ -22,7 +23,12 @@ __all__ = [
 Reader = Callable[[Path, ReadingOptions], SurveyStream]
 """What begins to read a file."""
 
-FORMATS: Mapping[str, Reader] = {"moma": open_moma, "csv": open_csv}
+FORMATS: Mapping[str, Reader] = {
+    "moma": open_moma,
+    "csv": open_csv,
+    "pnezd": open_pnezd,
+    "penzd": open_penzd,
+}
 """Readers by the name of their format."""
 
 
