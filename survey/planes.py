@@ -9,29 +9,28 @@ little of a face 10⁶ m away.
 Blunders: one that is as far out as a stone is wide turns a least-squares plane so much that its own residual
 looks harmless, so residuals of the first fit cannot be trusted. The search starts from planes through triples
 of points: the one of least median distance (Rousseeuw 1984), which tolerates almost half of the points being
-wrong, and, where the precision is known, the one of least truncated squares. From there the fit grows one
-point at a time: a point enters, or leaves again, by the test of its standardised residual (Baarda 1968,
-α₀ = 0.1 %).
+wrong, and, where the precision is known, those of least truncated squares. From each the fit grows one point at
+a time: a point enters, or leaves again, by the test of its standardised residual (Baarda 1968, α₀ = 0.1 %). The
+one with the least truncated squares is kept, where a point that lies a little in front of the face counts twice:
+stones erode and mortar recedes behind the face, and nothing grows out of it. What other estimators make of such
+faces is measured in docs/decisions/012-robust-planes.md.
 """
 
 import math
 from dataclasses import dataclass
-from itertools import combinations
-from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from moma.errors import GeometryError
+from survey._kernels_blunders import FINE, NOT_FINITE, SIGMA, fit_face
 
 __all__ = ["FaceFit", "fit_plane"]
 
 Array = NDArray[np.float64]
 
-_CRITICAL = 3.29  # two-sided normal quantile of Baarda's α₀ = 0.1 %
-_MAX_TRIPLES = 3000  # up to 26 points all triples are tried; beyond, a seeded draw of so many
-_UNCHECKED = 1e-9  # share of the others in a point's residual below which they say nothing of it
-_COLLINEAR = 1e-9  # second singular value over the first below which there is no plane
+_NOWHERE = np.full(3, math.nan)
+_LARGEST_TILT = math.radians(10.0)  # standard deviation of a tilt beyond which there is no plane to speak of
 
 
 @dataclass(frozen=True)
@@ -104,213 +103,83 @@ def fit_plane(points: ArrayLike, sigma: ArrayLike | None, observer: ArrayLike | 
     Raises
     ------
     GeometryError
-        if there are fewer than three distinct points, or all lie on a line
+        if a number is wrong, if there are fewer than three distinct points, if they lie on one line or on a strip
+        so narrow that a tilt has a standard deviation of more than 10°. A face turned so far puts the hidden side
+        of a stone 0.4 m deep 70 mm aside, and the first-order covariance no longer describes it.
     """
-    xyz, weights = _checked(points, sigma)
-    plain = _weighted_plane(xyz, weights, np.ones(len(xyz), dtype=bool))
-    if _is_clean(plain, xyz, weights, sigma is not None):
-        accepted = np.ones(len(xyz), dtype=bool)
-    else:
-        accepted = _without_blunders(xyz, weights, sigma is not None)
-    return _result(
-        _weighted_plane(xyz, weights, accepted), xyz, weights, accepted, sigma is not None, observer
-    )
-
-
-@dataclass(frozen=True)
-class _Plane:
-    """Weighted least-squares plane of a subset; rows of `vectors` are its singular vectors."""
-
-    centroid: Array
-    vectors: Array
-    singular: Array
-    total_weight: float
-
-    def distances(self, xyz: Array) -> Array:
-        out: Array = (xyz - self.centroid) @ self.vectors[2]
-        return out
-
-    def leverages(self, xyz: Array, weights: Array) -> Array:
-        """Diagonal of the hat matrix: the share of each observation in its own fit."""
-        lateral = (xyz - self.centroid) @ self.vectors[:2].T / self.singular[:2]
-        out: Array = weights * (1.0 / self.total_weight + (lateral**2).sum(axis=1))
-        return out
-
-
-def _checked(points: ArrayLike, sigma: ArrayLike | None) -> tuple[Array, Array]:
-    xyz = np.asarray(points, dtype=np.float64)
+    xyz = np.ascontiguousarray(points, dtype=np.float64)
     if xyz.ndim != 2 or xyz.shape[1] != 3 or len(xyz) < 3:
         raise GeometryError(
             f"a plane needs (n ≥ 3, 3) points, found {xyz.shape}", remedy="measure more points"
         )
-    deviations = np.broadcast_to(1.0 if sigma is None else np.asarray(sigma, dtype=np.float64), len(xyz))
-    if not (np.isfinite(xyz).all() and np.isfinite(deviations).all() and (deviations > 0.0).all()):
-        raise GeometryError("coordinates must be finite and sigma positive", remedy="correct the measurement")
-    return xyz, 1.0 / deviations**2
-
-
-def _weighted_plane(xyz: Array, weights: Array, accepted: NDArray[np.bool_]) -> _Plane:
-    some, w = xyz[accepted], weights[accepted]
-    total = float(w.sum())
-    centroid = (
-        some[0] + (w @ (some - some[0])) / total
-    )  # about a point of the face: exact at 10⁶ m from the origin
-    _, singular, vectors = np.linalg.svd((some - centroid) * np.sqrt(w)[:, None], full_matrices=len(some) < 3)
-    if not singular[1] > _COLLINEAR * singular[0]:
-        raise GeometryError("the points lie on one line or coincide", remedy="measure points across the face")
-    return _Plane(centroid, vectors, singular, total)
-
-
-def _is_clean(plane: _Plane, xyz: Array, weights: Array, known: bool) -> bool:
-    """Whether the plain fit passes every test, so that there is nothing to search for.
-
-    The sum of squares catches blunders that hide each other from the single tests, given a precision.
-    """
-    redundancy = len(xyz) - 3
-    if redundancy == 0:
-        return True
-    if not known:
-        return False
-    squares = weights * plane.distances(xyz) ** 2
-    share = np.maximum(1.0 - plane.leverages(xyz, weights), 1e-6)
-    return bool(squares.sum() <= _largest_sum(redundancy) and (squares <= _CRITICAL**2 * share).all())
-
-
-def _largest_sum(redundancy: int) -> float:
-    """Sum of squares that chance exceeds once in a thousand: chi-square after Wilson and Hilferty."""
-    spread = 2.0 / (9.0 * redundancy)
-    return redundancy * (1.0 - spread + 3.09 * math.sqrt(spread)) ** 3
-
-
-def _without_blunders(xyz: Array, weights: Array, known: bool) -> NDArray[np.bool_]:
-    """Accepted points, from the better of the starts."""
-    distances = _distances_from_triples(xyz, weights)
-    size = min(len(xyz) // 2 + 2, len(xyz))  # of p = 3 parameters: the majority that tolerates most blunders
-    medians = np.partition(distances, size - 1, axis=1)[:, size - 1]
-    grown = [_grow(_nearest(distances[np.argmin(medians)], size, xyz, weights), xyz, weights, known)]
-    if not known:
-        return grown[0]
-    # the least median sees half of the points only; with a known precision all of them can be judged
-    within = distances[np.argmin(np.minimum(distances**2, _CRITICAL**2).sum(axis=1))] <= _CRITICAL
-    if within.sum() >= size:
-        grown.append(_grow(within, xyz, weights, known))
-    return min(grown, key=lambda accepted: _truncated(accepted, xyz, weights))
-
-
-def _truncated(accepted: NDArray[np.bool_], xyz: Array, weights: Array) -> float:
-    """Sum of squares of all points in units of sigma, in which no blunder counts more than the limit."""
-    squares = weights * _weighted_plane(xyz, weights, accepted).distances(xyz) ** 2
-    return float(np.minimum(squares, _CRITICAL**2).sum())
-
-
-def _grow(start: NDArray[np.bool_], xyz: Array, weights: Array, known: bool) -> NDArray[np.bool_]:
-    """Add the best point, or drop the worst, one at a time, until the next one is a blunder."""
-    accepted, majority = start.copy(), min(len(xyz) // 2 + 2, len(xyz))
-    for _ in range(4 * len(xyz)):
-        plane = _weighted_plane(xyz, weights, accepted)
-        distances, lever = np.sqrt(weights) * np.abs(plane.distances(xyz)), plane.leverages(xyz, weights)
-        scale = _scale(distances[accepted], len(xyz), known)
-        # a point in the fit pulls the plane towards itself, one outside does not: variances 1 - h and 1 + h
-        share = np.where(accepted, np.maximum(1.0 - lever, 1e-6), 1.0 + lever)
-        tests = distances / (scale * np.sqrt(share))
-        worst = int(np.argmax(np.where(accepted, tests, 0.0)))
-        best = int(np.argmin(np.where(accepted, np.inf, tests)))
-        if tests[worst] > _CRITICAL and accepted.sum() > majority:
-            accepted[worst] = False
-        elif not accepted[best] and tests[best] <= _CRITICAL:
-            accepted[best] = True
-        else:
-            break
-    return accepted
-
-
-def _scale(distances: Array, count: int, known: bool) -> float:
-    """Standard deviation of the accepted points in units of sigma.
-
-    With a known precision it is 1, or more where the face itself is clearly rough. Without, the best part of
-    all points looks too good by a factor known for normal errors (the consistency factor of least trimmed
-    squares).
-    """
-    part = len(distances) / count
-    redundancy = max(len(distances) - 3, 1)
-    squares = float(distances @ distances)
-    raw = math.sqrt(squares / redundancy)
-    if known:
-        return raw if squares > _largest_sum(redundancy) else 1.0
-    z = NormalDist().inv_cdf(0.5 + 0.5 * min(part, 1.0 - 1e-9))
-    return max(raw / math.sqrt(1.0 - 2.0 * z * NormalDist().pdf(z) / part), 1e-300)
-
-
-def _nearest(distances: Array, size: int, xyz: Array, weights: Array) -> NDArray[np.bool_]:
-    """The `size` points nearest to a plane, and then to the plane through them, until they stay the same."""
-    accepted = np.zeros(len(xyz), dtype=bool)
-    for _ in range(20):
-        nearest = np.argsort(distances, kind="stable")[:size]
-        if accepted[nearest].all():
-            break
-        accepted[:] = False
-        accepted[nearest] = True
-        distances = np.sqrt(weights) * np.abs(_weighted_plane(xyz, weights, accepted).distances(xyz))
-    return accepted
-
-
-def _distances_from_triples(xyz: Array, weights: Array) -> Array:
-    """Distances of all points, in units of sigma, from planes through three of them, (triples, n)."""
-    triples = _triples(len(xyz))
-    a, b, c = (xyz[triples[:, k]] - xyz[0] for k in range(3))
-    normals = np.cross(b - a, c - a)
-    areas = np.linalg.norm(normals, axis=1)
-    usable = areas > 1e-3 * areas.max()
-    normals, a = normals[usable] / areas[usable, None], a[usable]
-    distances = normals @ (xyz - xyz[0]).T - (normals * a).sum(axis=1)[:, None]
-    out: Array = np.sqrt(weights) * np.abs(distances)
-    return out
-
-
-def _triples(count: int) -> NDArray[np.intp]:
-    if math.comb(count, 3) <= _MAX_TRIPLES:
-        return np.array(list(combinations(range(count), 3)), dtype=np.intp)
-    draw = np.random.default_rng(count).random((_MAX_TRIPLES, count))
-    return np.argpartition(draw, 3, axis=1)[:, :3]
-
-
-def _result(
-    plane: _Plane,
-    xyz: Array,
-    weights: Array,
-    accepted: NDArray[np.bool_],
-    known: bool,
-    observer: ArrayLike | None,
-) -> FaceFit:
-    """Orient the plane and give its precision."""
-    towards = None if observer is None else np.asarray(observer, dtype=np.float64) - plane.centroid
-    normal = plane.vectors[2] * _sign(plane.vectors[2], towards)
-    residuals = (xyz - plane.centroid) @ normal
-    redundancy = int(accepted.sum()) - 3
-    squares = float((weights * residuals**2)[accepted].sum())
-    sigma0 = math.sqrt(squares / redundancy) if redundancy else math.nan
-    covariance = np.diag([*(1.0 / plane.singular[:2] ** 2), 1.0 / plane.total_weight])
-    lever = plane.leverages(xyz, weights)
-    share = np.where(accepted, 1.0 - lever, 1.0 + lever)
-    share[share < _UNCHECKED] = math.nan
-    mean_weight = plane.total_weight / float(accepted.sum())
+    deviations = np.empty(len(xyz))
+    if sigma is not None and np.shape(sigma) not in ((), deviations.shape):
+        raise GeometryError(
+            f"{np.shape(sigma)} standard deviations for {len(xyz)} points", remedy="give one, or one of each"
+        )
+    deviations[:] = 1.0 if sigma is None else sigma
+    towards = _NOWHERE if observer is None else np.ascontiguousarray(observer, dtype=np.float64)
+    status, frame, accepted, residuals, standardised, covariance, (offset, rms, sigma0) = fit_face(
+        xyz, deviations, sigma is not None, towards
+    )
+    if status != FINE:
+        raise _refusal(status, xyz, deviations)
+    if max(covariance[0, 0], covariance[1, 1]) > _LARGEST_TILT**2:
+        raise _unknown_tilt(xyz[accepted], math.sqrt(covariance[1, 1]))
+    rejected = () if accepted.all() else tuple(np.flatnonzero(~accepted).tolist())
     return FaceFit(
-        normal=normal,
-        offset=float(normal @ plane.centroid),
-        centroid=plane.centroid,
-        axes=plane.vectors[:2],
-        singular_values=plane.singular / math.sqrt(mean_weight),
-        covariance=covariance if known else covariance * sigma0**2,
-        rms=math.sqrt(float((residuals[accepted] ** 2).mean())),
+        normal=frame[3],
+        offset=offset,
+        centroid=frame[0],
+        axes=frame[1:3],
+        singular_values=frame[4],
+        covariance=covariance,
+        rms=rms,
         sigma0=sigma0,
-        redundancy=redundancy,
-        rejected=tuple(int(i) for i in np.flatnonzero(~accepted)),
+        redundancy=len(xyz) - len(rejected) - 3,
+        rejected=rejected,
         residuals=residuals,
-        standardised=residuals * np.sqrt(weights / share) / (1.0 if known else sigma0),
+        standardised=standardised,
     )
 
 
-def _sign(normal: Array, towards: Array | None) -> float:
-    if towards is None:
-        return float(np.sign(normal[np.argmax(np.abs(normal))]))
-    return 1.0 if normal @ towards >= 0.0 else -1.0
+def _refusal(status: int, xyz: Array, deviations: Array) -> GeometryError:
+    """Say why there is no plane."""
+    if status == NOT_FINITE:
+        number = int(np.argmin(np.isfinite(xyz).all(axis=1)))
+        return GeometryError(
+            f"point {number + 1} is not finite: {xyz[number]}", remedy="correct the measurement"
+        )
+    if status == SIGMA:
+        number = int(np.argmin((deviations > 1e-100) & (deviations < 1e100)))
+        return GeometryError(
+            f"standard deviation of point {number + 1} is {deviations[number]:g} m",
+            remedy="give a positive one",
+        )
+    distinct, remedy = len(np.unique(xyz, axis=0)), "measure points across the face"
+    if distinct == 1:
+        return GeometryError(f"all {len(xyz)} points coincide", remedy=remedy)
+    length, width = _extent(xyz)
+    if distinct == 2:
+        what = f"only 2 of {len(xyz)} points are distinct: they lie on one line, {length:.3g} m long"
+    else:
+        what = f"the points lie on one line, {length:.3g} m long and {width:.2g} m wide"
+    return GeometryError(what, remedy=remedy)
+
+
+def _unknown_tilt(xyz: Array, tilt: float) -> GeometryError:
+    length, width = _extent(xyz)
+    return GeometryError(
+        f"the points lie nearly on one line, on a strip {length:.3g} m long and {width:.2g} m wide: "
+        f"its tilt is not known better than {math.degrees(min(tilt, math.pi / 2.0)):.0f}° (1 sigma)",
+        remedy="measure points across the face",
+    )
+
+
+def _extent(xyz: Array) -> tuple[float, float]:
+    """Length and width of a narrow set of points [m]."""
+    centred = xyz - xyz[0]
+    centred -= centred.mean(axis=0)
+    along = np.linalg.svd(centred, full_matrices=False)[2]
+    extents = np.ptp(centred @ along.T, axis=0)
+    return float(extents[0]), float(extents[1])
