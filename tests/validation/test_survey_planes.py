@@ -126,16 +126,17 @@ def tilt_variance(fit):
 
 
 def random_set(rng, place):
+    """Points (n, 3), their sigmas, the direction that they were seen from, and the length of the face."""
     count = int(rng.integers(4, 41))
-    length, ratio = 10 ** rng.uniform(-0.5, 0.7), rng.uniform(0.2, 0.9)
-    noise = 10 ** rng.uniform(-4, -2.2)
-    flat = np.column_stack(
-        [rng.uniform(-1, 1, (count, 2)) * [length / 2, ratio * length / 2], np.zeros(count)]
-    )
+    length, ratio, noise = 10 ** rng.uniform(-0.5, 0.7), rng.uniform(0.3, 0.9), 10 ** rng.uniform(-4, -2.5)
+    spread = [0.0, 0.0]
+    while spread[1] < max(0.1 * spread[0], 10 * noise):  # well-conditioned: not near to a line
+        lateral = rng.uniform(-0.5, 0.5, (count, 2)) * [length, ratio * length]
+        spread = np.linalg.svd(lateral - lateral.mean(axis=0), compute_uv=False)
     turn = turned(rng)
     sigmas = noise * rng.choice([1.0, 1.5, 3.0], count)
-    points = (flat + rng.normal(size=(count, 3)) * sigmas[:, None]) @ turn.T + np.array(place)
-    return points, sigmas, turn[:, 2], length
+    flat = np.column_stack([lateral, np.zeros(count)]) + rng.normal(size=(count, 3)) * sigmas[:, None]
+    return flat @ turn.T + np.array(place), sigmas, turn[:, 2], length
 
 
 @pytest.mark.parametrize("place", PLACES)
