@@ -26,7 +26,7 @@ from survey.similarity import Similarity, adjust_similarity
 __all__ = ["SiteTransform", "fit_similarity", "record_to_site", "to_site"]
 
 Array = NDArray[np.float64]
-Stone = TypeVar("Stone", BlockRecord, SolidRecord)
+Stone = TypeVar("Stone", bound=BlockRecord | SolidRecord)
 
 _WEAKEST_ANGLE = 0.1  # radians: a rotation less certain than this is not determined
 _TESTABLE = 4  # points that have to be left once blunders are out: any three nearly agree by themselves
