@@ -15,8 +15,13 @@ __all__ = ["check_replaceable", "replacing"]
 _INDEX = "summary.json"  # its "files" are those that a run wrote
 
 
-def check_replaceable(folder: Path) -> None:
+def check_replaceable(folder: Path, index: str = _INDEX) -> None:
     """Refuse a place that results must not take: a file, or a folder that holds anything but earlier results.
+
+    Parameters
+    ----------
+    folder : the place
+    index : name of the JSON file among the results whose "files" names all of them
 
     Raises
     ------
@@ -27,19 +32,19 @@ def check_replaceable(folder: Path) -> None:
         raise UsageError("is not a folder", where=place, remedy=remedy)
     if not folder.exists():
         return
-    foreign = sorted({entry.name for entry in folder.iterdir()} - _own_files(folder))
+    foreign = sorted({entry.name for entry in folder.iterdir()} - _own_files(folder, index))
     if foreign:
         shown = ", ".join(foreign[:3]) + (", …" if len(foreign) > 3 else "")
         raise UsageError(f"holds what no run of MOMA wrote ({shown})", where=place, remedy=remedy)
 
 
 @contextmanager
-def replacing(folder: Path) -> Iterator[Path]:
+def replacing(folder: Path, index: str = _INDEX) -> Iterator[Path]:
     """A fresh folder to write into; it takes the place of `folder` when the block ends without an error.
 
     If the block fails or is interrupted, `folder` stays as it was.
     """
-    check_replaceable(folder)
+    check_replaceable(folder, index)
     parent = folder.absolute().parent
     try:
         parent.mkdir(parents=True, exist_ok=True)
@@ -51,7 +56,7 @@ def replacing(folder: Path) -> Iterator[Path]:
     try:
         yield fresh
         fresh.chmod(0o777 & ~_umask())  # mkdtemp makes it private
-        check_replaceable(folder)
+        check_replaceable(folder, index)
         if folder.exists():
             shutil.rmtree(folder)
         fresh.rename(folder.absolute())
@@ -59,13 +64,13 @@ def replacing(folder: Path) -> Iterator[Path]:
         shutil.rmtree(fresh, ignore_errors=True)
 
 
-def _own_files(folder: Path) -> set[str]:
-    """Names of the files that the run whose summary lies there wrote."""
+def _own_files(folder: Path, index: str) -> set[str]:
+    """Names of the files that the run whose index lies there wrote."""
     try:
-        files = json.loads((folder / _INDEX).read_text(encoding="utf-8"))["files"]
+        files = json.loads((folder / index).read_text(encoding="utf-8"))["files"]
     except (OSError, ValueError, LookupError, TypeError):
         return set()
-    return {_INDEX, *map(str, files)} if isinstance(files, list) else set()
+    return {index, *map(str, files)} if isinstance(files, list) else set()
 
 
 def _umask() -> int:

@@ -1,6 +1,5 @@
 """report.html: one page that explains a run to whoever was not there; it needs no other file."""
 
-import base64
 from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from pathlib import Path
@@ -9,21 +8,11 @@ from typing import Any
 from archmodel.records import StoneResult
 from mechanics.result import Result
 from pipelines.history_plot import history_svg
+from pipelines.html_page import figure, page
 from pipelines.html_tables import megapascals, millimetres, percent, ratio, scientific, table
 from pipelines.joint_report import joint_sections
 
 __all__ = ["write_report"]
-
-_STYLE = """
-body { font: 16px/1.5 system-ui, sans-serif; color: #222; max-width: 60rem; }
-body { margin: 2rem auto; padding: 0 1rem; }
-h1 { margin-bottom: 0; } h2 { margin-top: 2.2rem; } .lead { font-size: 1.15rem; color: #444; }
-figure { margin: 1.5rem 0; } img, svg { max-width: 100%; height: auto; } figcaption { color: #555; }
-table { border-collapse: collapse; }
-th, td { padding: .3rem .9rem .3rem 0; text-align: left; vertical-align: top; }
-td.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
-tr + tr { border-top: 1px solid #ddd; } .warning { background: #fff3d6; padding: .6rem 1rem; }
-"""
 
 _OUTCOMES = {
     "equilibrium": "It stands: every stone came to rest, in balance.",
@@ -84,7 +73,7 @@ def write_report(
         f"<h1>{escape(result.scene.name)}</h1>",
         f'<p class="lead">{_OUTCOMES[str(result.outcome)]}</p>',
         *(f'<p class="warning">{escape(warning)}</p>' for warning in warnings),
-        *(_figure(path.parent / name) for name in pictures),
+        *(figure(path.parent / name, _CAPTIONS[name]) for name in pictures),
         "<h2>Summary</h2>",
         table(_summary_rows(summary)),
         "<h2>How far it can be trusted</h2>",
@@ -101,13 +90,7 @@ def write_report(
         table((stage, f"{seconds:.2f} s") for stage, seconds in summary["time"]["by_stage"].items()),
         f"<p>Made by MOMA {escape(str(summary['version']))}.</p>",
     ]
-    page = [
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">',
-        f"<title>{escape(result.scene.name)}</title><style>{_STYLE}</style></head><body>",
-        *body,
-        "</body></html>",
-    ]
-    path.write_text("\n".join(page) + "\n", encoding="utf-8")
+    path.write_text(page(result.scene.name, body), encoding="utf-8")
 
 
 def _summary_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -192,12 +175,3 @@ def _worst(stones: Sequence[StoneResult], value: Callable[[StoneResult], float |
     known = [(found, stone) for stone in stones if (found := value(stone)) is not None]
     known.sort(key=lambda pair: pair[0], reverse=True)
     return [stone for _, stone in known[:10]]
-
-
-def _figure(picture: Path) -> str:
-    content = base64.b64encode(picture.read_bytes()).decode("ascii")
-    caption = _CAPTIONS[picture.name]
-    return (
-        f'<figure><img alt="{escape(caption)}" src="data:image/png;base64,{content}">'
-        f"<figcaption>{escape(caption)}</figcaption></figure>"
-    )

@@ -301,4 +301,4 @@ def _chance(value: float, sigma: float, freedom: int) -> float | None:
 def _at(line: CourseLine, place: float) -> tuple[float, float]:
     """Height of a line at a place along the facade, and its variance."""
     row = np.array([1.0, place - line.middle])
-    return line.level + (line.slope or 0.0) * row[1], float(row @ line.covariance @ row)
+    return line.level + (line.slope or 0.0) * float(row[1]), float(row @ line.covariance @ row)
