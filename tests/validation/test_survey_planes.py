@@ -127,10 +127,10 @@ def tilt_variance(fit):
 
 def random_set(rng, place):
     """Points (n, 3), their sigmas, the direction that they were seen from, and the length of the face."""
-    count = int(rng.integers(4, 41))
-    length, ratio, noise = 10 ** rng.uniform(-0.5, 0.7), rng.uniform(0.3, 0.9), 10 ** rng.uniform(-4, -2.5)
+    count = int(rng.integers(5, 41))
+    length, ratio, noise = 10 ** rng.uniform(-0.5, 0.7), rng.uniform(0.3, 0.9), 10 ** rng.uniform(-4, -3)
     spread = [0.0, 0.0]
-    while spread[1] < max(0.1 * spread[0], 10 * noise):  # well-conditioned: not near to a line
+    while spread[1] < max(0.1 * spread[0], 30 * noise):  # well-conditioned: not near to a line
         lateral = rng.uniform(-0.5, 0.5, (count, 2)) * [length, ratio * length]
         spread = np.linalg.svd(lateral - lateral.mean(axis=0), compute_uv=False)
     turn = turned(rng)
