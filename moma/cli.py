@@ -10,7 +10,18 @@ import typer
 from moma.console import progress_bars, reporting, say
 from moma.errors import UsageError
 
-__all__ = ["ListFormat", "SurveyFormat", "app", "check", "ingest", "main", "query", "run", "show"]
+__all__ = [
+    "ListFormat",
+    "SurveyFormat",
+    "app",
+    "check",
+    "ingest",
+    "main",
+    "query",
+    "run",
+    "show",
+    "survey_report",
+]
 
 
 class SurveyFormat(StrEnum):
@@ -18,6 +29,9 @@ class SurveyFormat(StrEnum):
 
     MOMA = "moma"
     CSV = "csv"
+    PNEZD = "pnezd"
+    PENZD = "penzd"
+    SOLIDS = "solids"
 
 
 class ListFormat(StrEnum):
@@ -33,6 +47,29 @@ Db = Annotated[
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")]
 Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Say more; show the traceback of an error.")]
+SurveyFiles = Annotated[
+    list[Path], typer.Argument(metavar="FILE…", help="Survey files; see docs/formats.md.")
+]
+Format = Annotated[SurveyFormat, typer.Option(help="Format of the survey files.")]
+Header = Annotated[
+    Path | None,
+    typer.Option(
+        "--header", metavar="FILE", help="Head (stations, control, depths) for formats without their own."
+    ),
+]
+Codes = Annotated[
+    str | None,
+    typer.Option("--codes", metavar="TEMPLATE", help="How codes are made up, e.g. '{block}:{role}'."),
+]
+Kind = Annotated[
+    str | None, typer.Option("--kind", metavar="KIND", help="Kind of stones that do not say it; else ashlar.")
+]
+Sigma = Annotated[
+    float | None,
+    typer.Option(
+        "--sigma", metavar="S", help="Standard deviation of a coordinate, where a file does not say it [m]."
+    ),
+]
 SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene file; see docs/scene.md.")]
 
 _DEFAULT_DB = "sqlite:///moma.db"
@@ -85,6 +122,34 @@ def ingest(
     with progress_bars() as listener:
         report = take_in(files, db, format.value, listener)
     print(as_json(asdict(report)) if json else "\n".join(ingest_lines(report, verbose)))
+
+
+@app.command(name="survey-report")
+@reporting
+def survey_report(
+    files: SurveyFiles,
+    format: Format = SurveyFormat.MOMA,
+    header: Header = None,
+    codes: Codes = None,
+    kind: Kind = None,
+    sigma: Sigma = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Folder for the report; else out/survey-FILE.")
+    ] = None,
+    json: Json = False,
+    verbose: Verbose = False,
+) -> None:
+    """Judge survey files: precision, what to measure again, courses, kinds; no database is needed."""
+    from moma.listing import as_json
+    from moma.telling import survey_report_lines
+    from pipelines.reading_options import reading_options
+    from pipelines.survey_report import report_surveys
+
+    options = reading_options(header, codes, kind, sigma)
+    folder = out or Path("out") / f"survey-{files[0].stem}"
+    with progress_bars() as listener:
+        report = report_surveys(files, folder, format.value, options, listener)
+    print(as_json(report.content) if json else "\n".join(survey_report_lines(report, verbose)))
 
 
 @app.command()

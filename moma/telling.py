@@ -6,8 +6,11 @@ if TYPE_CHECKING:
     from pipelines.check import CheckReport
     from pipelines.ingest import IngestReport
     from pipelines.run import RunReport
+    from pipelines.survey_report import SurveyReport
 
-__all__ = ["check_lines", "ingest_lines", "run_lines"]
+__all__ = ["check_lines", "ingest_lines", "run_lines", "survey_report_lines"]
+
+_SHOWN = 20  # lines of a list; the report has them all
 
 
 def ingest_lines(report: "IngestReport", verbose: bool) -> list[str]:
@@ -100,6 +103,60 @@ def run_lines(report: "RunReport", verbose: bool) -> list[str]:
     pictures = [name for name in summary["files"] if name.endswith(".png")]
     shown = (*pictures, "report.html", "results.pvd", "summary.json")
     return [*lines, *(f"  {report.folder / name}" for name in shown)]
+
+
+def survey_report_lines(report: "SurveyReport", verbose: bool) -> list[str]:
+    """How well a survey was measured, what to measure again, and where the report lies."""
+    study, quality = report.study, report.study.quality
+    files = ", ".join(one.head.path for one in study.files)
+    lines = [
+        f"{files}: {len(study.stones)} stones of survey {study.name!r}"
+        + (f", {len(study.rejects)} could not be made" if study.rejects else ""),
+        f"  {quality.points} points and corners, {quality.blunders} left out as blunders, {quality.worn} worn corners",
+    ]
+    if study.stones:
+        lines.append(f"  rms {quality.rms * 1e3:.2f} mm; {quality.verdict}")
+    for file in study.files:
+        if (fit := file.transform) is not None:
+            left_out = f", left out: {', '.join(fit.rejected)}" if fit.rejected else ""
+            lines.append(
+                f"  {len(fit.names)} control points, σ₀ {fit.sigma0:.2f}, scale {fit.scale:.6f}{left_out}"
+            )
+    lines += [
+        f"  {one.name}: {len(one.members)} stones, {one.area:.1f} m²"
+        + ("" if one.azimuth is None else f", looks to {one.azimuth:.0f}°")
+        for one in study.facades
+    ]
+    lines += _course_lines(report, verbose)
+    lines += [f"  {one.code} is called a {one.kind}, but {one.text}" for one in study.contradictions[:_SHOWN]]
+    again = study.remeasures if verbose else study.remeasures[:_SHOWN]
+    lines.append("measure again:" if again else "nothing needs to be measured again")
+    lines += [f"  {one.code or '(no code)'}: {one.reason}; {one.action}" for one in again]
+    if len(again) < len(study.remeasures):
+        lines.append(f"  and {len(study.remeasures) - len(again)} more, with -v")
+    return [*lines, *(f"  {report.folder / name}" for name in report.content["files"])]
+
+
+def _course_lines(report: "SurveyReport", verbose: bool) -> list[str]:
+    """Courses that are not level and straight; with -v, all of them."""
+    from survey.courses import SIGNIFICANT
+
+    courses = report.study.courses
+    lines = []
+    deformed = 0
+    for one in courses:
+        chances = [chance for chance in (one.slope_probability, one.sag_probability) if chance is not None]
+        found = any(chance < SIGNIFICANT for chance in chances)
+        deformed += found
+        if (found or verbose) and one.slope is not None and one.slope_sigma is not None:
+            place = f"{one.facade}, course {one.course}" + (f" of {one.zone}" if one.zone else "")
+            text = f"  {place}: {one.slope * 1e3:+.2f} ± {one.slope_sigma * 1e3:.2f} mm/m"
+            if one.sag is not None and one.sag_sigma is not None:
+                text += f", mid-span {one.sag * 1e3:+.1f} ± {one.sag_sigma * 1e3:.1f} mm"
+            lines.append(f"{text}: {one.finding}")
+    if courses:
+        lines.insert(0, f"  {len(courses)} bed lines, {deformed} not level or not straight")
+    return lines if verbose else lines[: _SHOWN + 1]
 
 
 def _short(value: float | int) -> str:

@@ -8,9 +8,11 @@ import numpy as np
 
 __all__ = ["kilopascals", "megapascals", "millimetres", "percent", "ratio", "scientific", "table"]
 
+_LONGEST = 28  # characters of a number with its precision and unit; a longer cell is a sentence
+
 
 def table(rows: Iterable[Sequence[str]], head: Sequence[str] = ()) -> str:
-    """An HTML table; the first cell of each row is its heading, cells that begin with a digit are numbers."""
+    """An HTML table; the first cell of each row is its heading, short cells that begin with a digit are numbers."""
     out = io.StringIO()
     out.write("<table>")
     if head:
@@ -26,7 +28,7 @@ def table(rows: Iterable[Sequence[str]], head: Sequence[str] = ()) -> str:
 
 
 def _is_number(cell: str) -> bool:
-    return cell.removeprefix("-")[:1].isdigit()
+    return cell.lstrip("+-")[:1].isdigit() and len(cell) <= _LONGEST
 
 
 def megapascals(pascals: float | None) -> str:

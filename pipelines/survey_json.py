@@ -1,0 +1,145 @@
+"""survey.json: what a survey report says, for programs."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from pipelines.survey_study import SurveyFile, SurveyStudy
+from survey.courses import CourseHeight, CourseLine
+from survey.facades import Facade
+from survey.quality import StoneQuality, SurveyQuality
+
+__all__ = ["survey_json"]
+
+
+def survey_json(study: SurveyStudy, version: str) -> dict[str, Any]:
+    """All findings as plain values: metres, degrees where a name says so, null where not known."""
+    deviations = {one.code: one for one in study.deviations}
+    facade_of = {i: facade.name for facade in study.facades for i in facade.members.tolist()}
+    reasons: dict[str, list[str]] = {}
+    for one in study.remeasures:
+        if one.code is not None:
+            reasons.setdefault(one.code, []).append(one.reason)
+    content = {
+        "survey": study.name,
+        "version": version,
+        "inputs": [_file(one) for one in study.files],
+        "quality": _quality(study.quality, len(study.rejects)),
+        "facades": [_facade(one) for one in study.facades],
+        "kinds": [_record(one) for one in study.usual.values()],
+        "courses": [_course(one) for one in study.courses],
+        "course_heights": [_height(one) for one in study.course_heights],
+        "contradictions": [_record(one) for one in study.contradictions],
+        "remeasure": [{**_record(one), "urgency": one.urgency.name.lower()} for one in study.remeasures],
+        "rejects": [
+            {"code": one.code, "line": _line(one.spans), "reason": str(one.error)} for one in study.rejects
+        ],
+        "stones": [
+            _stone(one, facade_of.get(i), deviations.get(one.code), reasons.get(one.code, []))
+            for i, one in enumerate(study.stones)
+        ],
+    }
+    plain: dict[str, Any] = _plain(content)
+    return plain
+
+
+def _file(file: SurveyFile) -> dict[str, Any]:
+    control = None
+    if (transform := file.transform) is not None:
+        control = {
+            "scale": transform.scale,
+            "sigma0": transform.sigma0,
+            "redundancy": transform.redundancy,
+            "rejected": transform.rejected,
+            "points": [
+                {"name": name, "residual": residual, "standardised": test, "limit": limit}
+                for name, residual, test, limit in zip(
+                    transform.names,
+                    transform.residuals,
+                    transform.standardised,
+                    transform.limits,
+                    strict=True,
+                )
+            ],
+        }
+    return {
+        "path": file.head.path,
+        "survey": file.head.name,
+        "stones": file.stones,
+        "rejects": file.rejects,
+        "stations": [{"name": one.name, "position": one.position} for one in file.head.stations],
+        "control": control,
+    }
+
+
+def _quality(quality: SurveyQuality, rejects: int) -> dict[str, Any]:
+    values = _record(quality)
+    residuals = values.pop("residuals")
+    return {**values, "rejects": rejects, "residuals": _record(residuals)}
+
+
+def _facade(facade: Facade) -> dict[str, Any]:
+    along, up, outward = facade.frame.axes
+    return {
+        "name": facade.name,
+        "azimuth": facade.azimuth,
+        "area": facade.area,
+        "stones": len(facade.members),
+        "origin": facade.frame.origin,
+        "along": along,
+        "up": up,
+        "outward": outward,
+    }
+
+
+def _course(line: CourseLine) -> dict[str, Any]:
+    values = _record(line)
+    covariance = values.pop("covariance")
+    corners = [values.pop(name) for name in ("codes", "along", "height", "sigma", "deviations")]
+    values["level_sigma"] = math.sqrt(covariance[0, 0])
+    values["slope_sigma"] = line.slope_sigma
+    values["slope_degrees"] = None if line.slope is None else math.degrees(math.atan(line.slope))
+    values["span"] = line.span
+    values["worst"] = {"stone": line.worst[0], "deviation": line.worst[1]}
+    values["finding"] = line.finding
+    names = ("stone", "along", "height", "sigma", "deviation")
+    values["corners"] = [dict(zip(names, row, strict=True)) for row in zip(*corners, strict=True)]
+    return values
+
+
+def _height(height: CourseHeight) -> dict[str, Any]:
+    return _record(height)
+
+
+def _stone(stone: StoneQuality, facade: str | None, deviation: Any, reasons: list[str]) -> dict[str, Any]:
+    left = ("outline", "corner_sigma", "standardised", "worn_corners")
+    values = {name: getattr(stone, name) for name in StoneQuality.__slots__ if name not in left}
+    values["facade"] = facade
+    usual = ("length", "height", "length_score", "height_score")
+    values["deviation"] = None if deviation is None else {name: getattr(deviation, name) for name in usual}
+    values["remeasure"] = reasons
+    return values
+
+
+def _record(value: Any) -> dict[str, Any]:
+    """Fields of a frozen dataclass; not those of values in it."""
+    return {name: getattr(value, name) for name in value.__dataclass_fields__}
+
+
+def _line(spans: tuple[range, ...]) -> int | None:
+    return spans[0].start if spans else None
+
+
+def _plain(value: Any) -> Any:
+    """Numbers and lists as JSON has them; null for what is no number."""
+    if isinstance(value, Mapping):
+        return {key: _plain(one) for key, one in value.items()}
+    if isinstance(value, np.ndarray | tuple | list):
+        return [_plain(one) for one in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,165 @@
+"""Everything that a survey report says, computed: files in, findings out."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from survey.measured import survey_stones
+
+from moma.errors import UsageError
+from pipelines.progress import Listener, Progress, silent
+from survey.canon import Deviation, KindStandard, deviations, standards
+from survey.contradictions import Contradiction, contradictions
+from survey.courses import CourseHeight, CourseLine, course_heights, measure_courses
+from survey.facades import Facade, find_facades
+from survey.formats.options import ReadingOptions
+from survey.formats.reading import open_survey
+from survey.frames import SiteTransform, fit_similarity
+from survey.quality import StoneQuality, SurveyQuality, appraise, judge_survey
+from survey.records import Canon, Reject, SurveyHead
+from survey.remeasure import Remeasure, list_remeasures
+
+__all__ = ["SurveyFile", "SurveyStudy", "study_surveys"]
+
+_TOLD = 200  # stones between two words on progress
+
+
+@dataclass(frozen=True)
+class SurveyFile:
+    """One file of a report.
+
+    Attributes
+    ----------
+    head : what it says of all its stones
+    transform : into the frame of the site; None if it has no control points
+    stones, rejects : how many were made, how many not
+    """
+
+    head: SurveyHead
+    transform: SiteTransform | None
+    stones: int
+    rejects: int
+
+
+@dataclass(frozen=True)
+class SurveyStudy:
+    """What was found of a survey.
+
+    Attributes
+    ----------
+    name : of the first file
+    files : the files that it lies in
+    stones : all stones that could be made, in the order of the files
+    rejects : those that could not, with reasons
+    quality : all stones together
+    facades : stones that face one way
+    usual : the usual face of each kind
+    deviations : of the stones from it
+    contradictions : stones that are not what their kind means
+    courses : bed lines
+    course_heights : from bed to bed
+    remeasures : what to measure again, most urgent first
+    """
+
+    name: str
+    files: tuple[SurveyFile, ...]
+    stones: tuple[StoneQuality, ...]
+    rejects: tuple[Reject, ...]
+    quality: SurveyQuality
+    facades: tuple[Facade, ...]
+    usual: dict[str, KindStandard]
+    deviations: tuple[Deviation, ...]
+    contradictions: tuple[Contradiction, ...]
+    courses: tuple[CourseLine, ...]
+    course_heights: tuple[CourseHeight, ...]
+    remeasures: tuple[Remeasure, ...]
+
+
+def study_surveys(
+    paths: Sequence[str | Path], format: str, options: ReadingOptions, progress: Listener = silent
+) -> SurveyStudy:
+    """Read, fit and judge the stones of survey files.
+
+    Parameters
+    ----------
+    paths : survey files, of one format; together they are one survey
+    format : its name
+    options : what the files may leave unsaid
+    progress : told now and then
+
+    Raises
+    ------
+    UsageError : no such file or format
+    SurveyError : a file that cannot be read at all, or control points that contradict each other
+    """
+    if not paths:
+        raise UsageError("no survey file", remedy="name at least one")
+    stones: list[StoneQuality] = []
+    rejects: list[Reject] = []
+    files = []
+    for path in map(Path, paths):
+        before = len(stones), len(rejects)
+        file = _read(path, format, options, stones, rejects, progress)
+        files.append(replace(file, stones=len(stones) - before[0], rejects=len(rejects) - before[1]))
+    return _judge(tuple(files), tuple(stones), tuple(rejects))
+
+
+def _read(
+    path: Path,
+    format: str,
+    options: ReadingOptions,
+    stones: list[StoneQuality],
+    rejects: list[Reject],
+    progress: Listener,
+) -> SurveyFile:
+    if not path.is_file():
+        what = "is a folder" if path.is_dir() else "no such file"
+        raise UsageError(what, where=str(path), remedy="name a survey file")
+    stream = open_survey(path, format, options)
+    transform = fit_similarity(stream.head.control) if stream.head.control else None
+    for number, one in enumerate(survey_stones(stream), start=1):
+        if isinstance(one, Reject):
+            rejects.append(one)
+        else:
+            stones.append(appraise(one))
+        if number % _TOLD == 0:
+            progress(Progress(f"fit {path.name}", number, number + _TOLD))
+    return SurveyFile(stream.head, transform, 0, 0)
+
+
+def _judge(
+    files: tuple[SurveyFile, ...], stones: tuple[StoneQuality, ...], rejects: tuple[Reject, ...]
+) -> SurveyStudy:
+    quality = judge_survey(stones)
+    facades = find_facades(
+        np.array([one.normal for one in stones]).reshape(-1, 3),
+        np.array([one.area for one in stones]),
+        np.array([one.outline.mean(axis=0) for one in stones]).reshape(-1, 3),
+    )
+    usual = standards(stones, _canons(files))
+    odd = contradictions(stones, facades)
+    lines = measure_courses(stones, facades)
+    return SurveyStudy(
+        name=files[0].head.name,
+        files=files,
+        stones=stones,
+        rejects=rejects,
+        quality=quality,
+        facades=facades,
+        usual=usual,
+        deviations=deviations(stones, usual),
+        contradictions=odd,
+        courses=lines,
+        course_heights=course_heights(lines),
+        remeasures=list_remeasures(stones, rejects, odd, quality),
+    )
+
+
+def _canons(files: Sequence[SurveyFile]) -> list[Canon]:
+    """The canons of all files; of two for one kind the first holds."""
+    found: dict[str, Canon] = {}
+    for file in files:
+        for canon in file.head.canons:
+            found.setdefault(canon.kind, canon)
+    return list(found.values())
