@@ -30,7 +30,7 @@ _UNLIKELY = 3.29  # two-sided normal quantile of 0.1 %: one sound stone in a tho
 _FREEDOM = 8  # redundancy from which a small scatter is no accident
 
 _SHAPE_ACTIONS = {
-    ShapeKind.BEVELLED.value: "measure the main face and the bevel apart, or leave the points on the bevel out",
+    ShapeKind.BEVELLED.value: "see on site: a broken edge is left out as it should be; a cut one is a face of its own",
     ShapeKind.CURVED.value: "see on site whether the face is curved; if so, split it into flat parts",
     ShapeKind.ROUGH.value: "measure more points, on the dressed margin, and look for mortar or plants on the face",
 }
@@ -47,6 +47,7 @@ class Urgency(IntEnum):
     SCATTER = 6
     SMOOTH = 7
     KIND = 8
+    EDGE = 9
 
 
 @dataclass(frozen=True)
@@ -145,8 +146,9 @@ def _scatter_reasons(
     stone: StoneQuality, scale: float, reason: Callable[[Urgency, float, str, str], Remeasure]
 ) -> Iterator[Remeasure]:
     relative = None if stone.sigma0 is None or not stone.measured else stone.sigma0 / scale
-    if stone.shape in (ShapeKind.BEVELLED.value, ShapeKind.CURVED.value):
-        yield reason(Urgency.SHAPE, relative or 0.0, stone.shape_text, _SHAPE_ACTIONS[stone.shape])
+    sort = {ShapeKind.CURVED.value: Urgency.SHAPE, ShapeKind.BEVELLED.value: Urgency.EDGE}.get(stone.shape)
+    if sort is not None:
+        yield reason(sort, relative or 0.0, stone.shape_text, _SHAPE_ACTIONS[stone.shape])
     elif relative is not None and _is_rough(relative, stone.redundancy):
         text = (
             f"its points scatter {relative:.1f} times as far as those of the survey, {stone.rms * 1e3:.1f} mm"

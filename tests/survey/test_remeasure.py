@@ -34,7 +34,7 @@ def test_a_sound_survey_has_nothing_to_measure_again() -> None:
         ),
         ({"tilt_sigma": 0.71}, Urgency.TILT, "by 0.71°"),
         ({"shape": "curved", "shape_text": "bulges by 9 mm"}, Urgency.SHAPE, "bulges by 9 mm"),
-        ({"shape": "bevelled", "shape_text": "two planes"}, Urgency.SHAPE, "two planes"),
+        ({"shape": "bevelled", "shape_text": "two planes"}, Urgency.EDGE, "two planes"),
         ({"sigma0": 3.0, "shape": "rough", "rms": 0.006}, Urgency.SCATTER, "6.0 mm"),
         ({"sigma0": 0.2}, Urgency.SMOOTH, "only 0.2"),
     ],
