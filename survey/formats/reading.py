@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from moma.errors import UsageError
+from survey.formats.closed_solids import open_solids
 from survey.formats.csv_points import open_csv
 from survey.formats.moma_ascii import open_moma, read_head, with_header
 from survey.formats.options import ReadingOptions, whole
@@ -28,6 +29,7 @@ FORMATS: Mapping[str, Reader] = {
     "csv": open_csv,
     "pnezd": open_pnezd,
     "penzd": open_penzd,
+    "solids": open_solids,
 }
 """Readers by the name of their format."""
 

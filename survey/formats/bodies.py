@@ -1,0 +1,177 @@
+"""From the polygons of a file of solids to closed stones with planar faces.
+
+Nothing is repaired: corners are the same only where their coordinates are. What is decided is what the polygons leave
+open and their neighbours settle: which of them make one body, and which side of each is outside.
+"""
+
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from moma.errors import GeometryError, SurveyError
+from survey.formats.flat_faces import is_flat, merge_flat
+from survey.solids import Solid
+from survey.watertight import check_watertight, triangulate
+
+__all__ = ["RawBody", "closed_bodies"]
+
+Array = NDArray[np.float64]
+Polygon = tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class RawBody:
+    """What a file gives under one name.
+
+    Attributes
+    ----------
+    name : as the file has it
+    vertices : (nv, 3) [m]
+    polygons : vertex indices of each
+    line : of the file, on which it begins; 0 in a binary file
+    end : the line behind it
+    resolution : of the file's numbers: distances that it cannot tell from nothing [m]
+    error : why it cannot be read; None if it can
+    """
+
+    name: str
+    vertices: Array
+    polygons: Sequence[Polygon]
+    line: int = 0
+    end: int = 0
+    resolution: float = 0.0
+    error: SurveyError | None = None
+
+
+def closed_bodies(raw: RawBody) -> Iterator[Solid | GeometryError]:
+    """Make the closed bodies of one name, each with its planar faces counter-clockwise seen from outside.
+
+    Parameters
+    ----------
+    raw : its vertices finite, its indices valid
+
+    Returns
+    -------
+    For each body the solid, under the name of all, or why it is not one
+    """
+    try:
+        vertices, polygons = _welded(raw)
+        groups = _connected(polygons)
+        volumes = [_volume(vertices, group) for group in groups]
+        if groups and min(volumes) < 0.0 < max(volumes) and set().union(*groups) <= set(polygons):
+            raise GeometryError(
+                "some of its bodies are inside out",
+                remedy="export without cavities, all faces seen from outside",
+            )
+    except GeometryError as error:
+        yield error
+        return
+    for group, volume in zip(groups, volumes, strict=True):
+        outward = group if volume >= 0.0 else [one[::-1] for one in group]
+        try:
+            yield _closed(raw, vertices, outward)
+        except GeometryError as error:
+            yield error
+
+
+def _welded(raw: RawBody) -> tuple[Array, list[Polygon]]:
+    """Corners with the same coordinates become one; a face that is there twice counts once."""
+    if not raw.polygons:
+        raise GeometryError("it has no faces", remedy="export closed surfaces")
+    _, first, indices = np.unique(raw.vertices + 0.0, axis=0, return_index=True, return_inverse=True)
+    rank = np.argsort(np.argsort(first))  # in the order of the file
+    vertices, new = raw.vertices[np.sort(first)], rank[indices.reshape(-1)].tolist()
+    polygons: dict[Polygon, None] = {}
+    for polygon in raw.polygons:
+        renumbered = tuple(new[i] for i in polygon)
+        if len(set(renumbered)) < max(len(renumbered), 3):
+            raise GeometryError(
+                "a face has less than three corners, or one of them twice",
+                remedy="export it without such faces",
+            )
+        start = renumbered.index(min(renumbered))
+        polygons[renumbered[start:] + renumbered[:start]] = None
+    return vertices, list(polygons)
+
+
+def _edges(polygon: Polygon) -> Iterator[tuple[int, int]]:
+    return zip(polygon, polygon[1:] + polygon[:1], strict=True)
+
+
+def _connected(polygons: list[Polygon]) -> list[list[Polygon]]:
+    """Groups of polygons that share edges, each turned as the first of its group."""
+    owners: dict[tuple[int, int], list[int]] = defaultdict(list)
+    for k, polygon in enumerate(polygons):
+        for a, b in _edges(polygon):
+            owners[min(a, b), max(a, b)].append(k)
+    shared = Counter(len(one) for one in owners.values())
+    if shared[1]:
+        raise GeometryError(f"the solid is not closed: {shared[1]} edges have one face", remedy="close it")
+    if len(shared) > 1 or 2 not in shared:
+        raise GeometryError(
+            "an edge has more than two faces", remedy="give stones that touch an object of their own each"
+        )
+    turned: dict[int, Polygon] = {}
+    groups = []
+    for seed in range(len(polygons)):
+        if seed not in turned:
+            turned[seed] = polygons[seed]
+            groups.append([turned[k] for k in _grow(seed, polygons, owners, turned)])
+    return groups
+
+
+def _grow(
+    seed: int,
+    polygons: list[Polygon],
+    owners: dict[tuple[int, int], list[int]],
+    turned: dict[int, Polygon],
+) -> list[int]:
+    """Go from face to face, turning each as its neighbour."""
+    members = [seed]
+    for k in members:
+        for a, b in _edges(turned[k]):
+            first, second = owners[min(a, b), max(a, b)]
+            other = second if first == k else first
+            if other not in turned:
+                wrong = (a, b) in set(_edges(polygons[other]))
+                turned[other] = polygons[other][::-1] if wrong else polygons[other]
+                members.append(other)
+    return members
+
+
+def _volume(vertices: Array, polygons: list[Polygon]) -> float:
+    """Signed volume of a closed body: the sum over its faces, cut into fans [m³]."""
+    fans = [(one[0], one[k], one[k + 1]) for one in polygons for k in range(1, len(one) - 1)]
+    a, b, c = (vertices[list(ids)] - vertices[polygons[0][0]] for ids in zip(*fans, strict=True))
+    return float((a * np.cross(b, c)).sum()) / 6.0
+
+
+def _closed(raw: RawBody, vertices: Array, polygons: list[Polygon]) -> Solid:
+    """The solid with faces as large as planes allow, if it is closed."""
+    flat: list[Polygon] = []
+    for polygon in polygons:
+        if len(polygon) == 3 or is_flat(vertices[list(polygon)], raw.resolution):
+            flat.append(polygon)
+        else:
+            cut = triangulate(Solid(raw.name, vertices, (polygon,))).tolist()
+            flat += [(one[0], one[1], one[2]) for one in cut]
+    used = np.unique(np.concatenate([np.array(one) for one in flat]))
+    merged = _compact(raw.name, vertices, merge_flat(vertices, flat, used, raw.resolution))
+    try:
+        check_watertight(merged)
+    except (
+        GeometryError
+    ):  # outlines that cannot be cut into ears: the triangles as they came say whether it is closed
+        merged = _compact(raw.name, vertices, flat)
+        check_watertight(merged)
+    return merged
+
+
+def _compact(name: str, vertices: Array, polygons: Sequence[Polygon]) -> Solid:
+    """The solid with the corners that it uses."""
+    used = sorted({i for polygon in polygons for i in polygon})
+    new = {old: k for k, old in enumerate(used)}
+    return Solid(name, vertices[used], tuple(tuple(new[i] for i in polygon) for polygon in polygons))

@@ -1,0 +1,112 @@
+"""Closed solids that other programs made: OBJ, PLY, STL and gmsh MSH, one stone per object.
+
+An object is an ``o`` (or ``g``) of OBJ, a ``solid`` of STL, a volume of MSH, the whole of a PLY. Where one has several
+bodies that do not touch, each is a stone: NAME-1, NAME-2, … The name is taken apart by the code template,
+{block}:{kind} by default; if it does not fit, it is the code itself, blanks replaced by "_".
+"""
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+
+from moma.errors import GeometryError, SurveyError, UsageError
+from survey.formats.bodies import RawBody, closed_bodies
+from survey.formats.code_template import CodeTemplate
+from survey.formats.fields import CODE, shown
+from survey.formats.msh_bodies import msh_bodies
+from survey.formats.obj_bodies import obj_bodies
+from survey.formats.options import ReadingOptions
+from survey.formats.ply_bodies import ply_bodies
+from survey.formats.stl_bodies import stl_bodies
+from survey.records import Reject, SolidRecord, SurveyStream
+
+__all__ = ["open_solids"]
+
+_CODES = "{block}:{kind}"
+_BODIES: Mapping[str, Callable[[Path], Iterator[RawBody]]] = {
+    ".obj": obj_bodies,
+    ".ply": ply_bodies,
+    ".stl": stl_bodies,
+    ".msh": msh_bodies,
+}
+
+
+def open_solids(path: Path, options: ReadingOptions | None = None) -> SurveyStream:
+    """Begin to read a file of closed solids; its stones come one by one.
+
+    Parameters
+    ----------
+    path : the file; its ending says what it is
+    options : the code template of names; kind of stones whose names do not say it; the head of another file
+
+    Raises
+    ------
+    SurveyError
+        naming the file, and the line if it is text, if it is wrong as a whole
+    UsageError
+        if the ending is not known, or the code template has what a solid does not
+    """
+    options, path = options or ReadingOptions(), Path(path)
+    template = CodeTemplate(options.codes or _CODES)
+    for field in ("role", "zone"):
+        if field in template.fields:
+            raise UsageError(
+                f"code template {template.text!r} has a {field}, which solids have not",
+                remedy="write e.g. {block}:{kind}",
+            )
+    bodies = _BODIES.get(path.suffix.lower())
+    if bodies is None:
+        raise UsageError(
+            f"ending {path.suffix!r} is none of solids",
+            where=str(path),
+            remedy=f"endings: {', '.join(_BODIES)}",
+        )
+    raw = bodies(path)
+    first = next(raw, None)
+    if first is None:
+        raise SurveyError("the file has no solids", where=str(path), remedy="export closed surfaces")
+    return SurveyStream(options.head_for(path), _Solids(path, template, options.kind).records(first, raw))
+
+
+class _Solids:
+    """The solids of a file, and those that are none."""
+
+    def __init__(self, path: Path, template: CodeTemplate, kind: str) -> None:
+        self._path, self._template, self._kind = path, template, kind
+        self._known: set[str] = set()
+
+    def records(self, first: RawBody, others: Iterator[RawBody]) -> Iterator[SolidRecord | Reject]:
+        """Go through the bodies of a file."""
+        yield from self._stones(first)
+        for raw in others:
+            yield from self._stones(raw)
+
+    def _stones(self, raw: RawBody) -> Iterator[SolidRecord | Reject]:
+        parsed = self._template.parse(raw.name)
+        name = re.sub(r"\s+", "_", raw.name) if parsed is None else parsed.block
+        kind, course = (None, None) if parsed is None else (parsed.kind, parsed.course)
+        if raw.error is not None:
+            yield self._reject(name, raw, raw.error)
+            return
+        found = list(closed_bodies(raw))
+        for number, solid in enumerate(found, start=1):
+            code = name if len(found) == 1 else f"{name}-{number}"
+            if isinstance(solid, GeometryError):
+                yield self._reject(code, raw, self._error(code, raw, solid.what, solid.remedy))
+            elif CODE.fullmatch(code) is None:
+                remedy = "use letters, digits and . + / : - _, at most 64"
+                yield self._reject(code, raw, self._error(code, raw, "that is not a code", remedy))
+            elif code in self._known:
+                remedy = "give every stone a name of its own"
+                yield self._reject(code, raw, self._error(code, raw, "a second of that name", remedy))
+            else:
+                self._known.add(code)
+                yield SolidRecord(code, kind or self._kind, course, solid.vertices, solid.faces, raw.line)
+
+    def _error(self, code: str, raw: RawBody, what: str, remedy: str | None) -> SurveyError:
+        where = f"{self._path}:{raw.line}" if raw.line else str(self._path)
+        return SurveyError(f"solid {shown(code)}: {what}", where=where, remedy=remedy)
+
+    def _reject(self, code: str, raw: RawBody, error: SurveyError) -> Reject:
+        spans = (range(raw.line, raw.end),) if raw.line else ()
+        return Reject(code if CODE.fullmatch(code) else None, error, spans)

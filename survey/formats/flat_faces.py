@@ -1,0 +1,143 @@
+"""Planar faces of a body: which polygons are flat, and which triangles lie in one plane.
+
+Meshes have planes cut into triangles, which say nothing of the stone; its faces are the planes. Triangles that share
+edges and lie in the plane of the largest of them become one polygon where their common boundary is one loop.
+"""
+
+from collections import defaultdict
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["is_flat", "merge_flat"]
+
+Array = NDArray[np.float64]
+Polygon = tuple[int, ...]
+
+_BULGE = 1e-4  # of a polygon's size: what rounding to a few digits does to a plane one
+_SAME_PLANE = 1e-5  # of a body's size
+_SAME_SIDE = 0.9  # cosine between normals, which are poor in thin triangles: heights decide
+
+
+def is_flat(corners: Array, resolution: float) -> bool:
+    """Whether a polygon is plane, but for rounding.
+
+    Parameters
+    ----------
+    corners : (n, 3) in order [m]
+    resolution : of their coordinates [m]
+    """
+    centred = corners - corners.mean(axis=0)
+    normal = np.cross(centred, np.roll(centred, -1, axis=0)).sum(axis=0)
+    length = float(np.linalg.norm(normal))
+    if not length > 0.0:
+        return False
+    size = float(np.linalg.norm(np.ptp(corners, axis=0)))
+    return bool(np.abs(centred @ normal).max() / length <= _BULGE * size + resolution)
+
+
+def merge_flat(
+    vertices: Array, polygons: Sequence[Polygon], used: NDArray[np.intp], resolution: float
+) -> list[Polygon]:
+    """Merge triangles that share edges and lie in one plane; other polygons stay as they are.
+
+    Parameters
+    ----------
+    vertices : (nv, 3) [m]
+    polygons : of a closed body, all counter-clockwise seen from outside
+    used : the vertices that they use
+    resolution : of the coordinates [m]
+    """
+    triangles = np.array([one for one in polygons if len(one) == 3], dtype=np.intp).reshape(-1, 3)
+    kept = [one for one in polygons if len(one) != 3]
+    if not len(triangles):
+        return kept
+    tolerance = _SAME_PLANE * float(np.linalg.norm(np.ptp(vertices[used], axis=0))) + resolution
+    merged: list[Polygon] = []
+    for region in _regions(vertices, triangles, tolerance):
+        loop = _outline(triangles[region].tolist()) if len(region) > 1 else None
+        if loop is None:
+            kept += [tuple(one) for one in triangles[region].tolist()]
+        else:
+            merged.append(loop)
+    return _without_straight_corners(vertices, merged, kept, tolerance)
+
+
+def _regions(vertices: Array, triangles: NDArray[np.intp], tolerance: float) -> list[list[int]]:
+    """Triangles that lie in one plane and share edges, the largest first."""
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    areas = np.linalg.norm(normals, axis=1)
+    normals /= np.maximum(areas, 1e-300)[:, None]
+    owner = {edge: k for k, one in enumerate(triangles.tolist()) for edge in _edges(one)}
+    regions, taken = [], np.zeros(len(triangles), dtype=bool)
+    for seed in np.argsort(-areas, kind="stable").tolist():
+        if taken[seed]:
+            continue
+        taken[seed] = True
+        region, normal, origin = [seed], normals[seed], a[seed]
+        for k in region:
+            for p, q in _edges(triangles[k].tolist()):
+                other = owner.get((q, p))
+                if other is None or taken[other] or normals[other] @ normal < _SAME_SIDE:
+                    continue
+                if np.abs((vertices[triangles[other]] - origin) @ normal).max() <= tolerance:
+                    taken[other] = True
+                    region.append(other)
+        regions.append(region)
+    return regions
+
+
+def _edges(polygon: Sequence[int]) -> list[tuple[int, int]]:
+    return [(polygon[k - 1], polygon[k]) for k in range(len(polygon))]
+
+
+def _outline(triangles: list[list[int]]) -> Polygon | None:
+    """The one loop around a region; None if there are several, or it touches itself."""
+    inside = {edge for one in triangles for edge in _edges(one)}
+    after = {p: q for p, q in inside if (q, p) not in inside}
+    if len(after) != sum((q, p) not in inside for p, q in inside):
+        return None  # a corner from which two edges leave
+    start = min(after)
+    loop = [start]
+    while (following := after[loop[-1]]) != start:
+        loop.append(following)
+    return tuple(loop) if len(loop) == len(after) else None
+
+
+def _without_straight_corners(
+    vertices: Array, merged: list[Polygon], kept: list[Polygon], tolerance: float
+) -> list[Polygon]:
+    """Drop the corners that only divide an edge between two merged faces."""
+    faces_at: dict[int, int] = defaultdict(int)
+    for polygon in (*merged, *kept):
+        for i in polygon:
+            faces_at[i] += 1
+    turns: dict[int, int] = defaultdict(int)  # in how many merged faces a corner turns, or is not merged
+    for polygon in kept:
+        for i in polygon:
+            turns[i] += 1
+    for polygon in merged:
+        for i in _corners(vertices, polygon, faces_at, tolerance):
+            turns[i] += 1
+    out = [tuple(i for i in polygon if turns[i]) for polygon in merged]
+    return [*out, *kept] if all(len(one) > 2 for one in out) else [*merged, *kept]
+
+
+def _corners(vertices: Array, polygon: Polygon, faces_at: dict[int, int], tolerance: float) -> list[int]:
+    """Corners at which a polygon turns, or more than two faces meet."""
+    n = len(polygon)
+    fixed = [k for k in range(n) if faces_at[polygon[k]] != 2]
+    if not fixed:
+        return list(polygon)
+    out = []
+    for start, stop in zip(fixed, [*fixed[1:], fixed[0] + n], strict=True):
+        chain = [polygon[k % n] for k in range(start, stop + 1)]
+        line = vertices[chain[-1]] - vertices[chain[0]]
+        length = float(np.linalg.norm(line))
+        offsets = vertices[chain] - vertices[chain[0]]
+        away = np.linalg.norm(np.cross(offsets, line), axis=1)
+        straight = length > 0.0 and away.max() <= tolerance * length
+        out += chain[:-1] if not straight else chain[:1]
+    return out
