@@ -1,13 +1,8 @@
-"""gmsh MSH: the boundary of each volume, through meshio."""
+"""gmsh MSH: the boundary of each volume."""
 
-import contextlib
-import io
-import re
-import warnings
 from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,18 +10,22 @@ from numpy.typing import NDArray
 from moma.errors import SurveyError
 from survey.formats.bodies import RawBody
 from survey.formats.fields import FARTHEST
+from survey.formats.msh_file import MshFile
 
 __all__ = ["msh_bodies"]
 
-_FACES = {  # of each element, its corners counter-clockwise seen from outside, in the order of meshio
-    "tetra": ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)),
-    "hexahedron": ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
-    "wedge": ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
-    "pyramid": ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
+_TETRA = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
+_HEXA = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
+_WEDGE = ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5))
+_PYRAMID = ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4))
+_FACES = {  # of gmsh's types of the first and second order, their corners counter-clockwise seen from outside
+    **dict.fromkeys((4, 11), _TETRA),
+    **dict.fromkeys((5, 12, 17), _HEXA),
+    **dict.fromkeys((6, 13, 18), _WEDGE),
+    **dict.fromkeys((7, 14, 19), _PYRAMID),
 }
-_LINEAR = re.compile(r"(tetra|hexahedron|wedge|pyramid)\d*")
-_HUGE = re.compile(rb"(?<![\w.+-])\d{9,}(?![\w.])").search  # a number of a node that memory could not hold
-_UNCLOSED = "not closed"
+
+Cells = list[tuple[int, NDArray[np.int64]]]
 
 
 def msh_bodies(path: Path) -> Iterator[RawBody]:
@@ -37,84 +36,41 @@ def msh_bodies(path: Path) -> Iterator[RawBody]:
     SurveyError
         if the file cannot be read as a mesh
     """
-    mesh = _read(path)
-    points = np.asarray(mesh.points, dtype=np.float64)
-    if points.ndim != 2 or points.shape[1:] != (3,) or not (np.abs(points) <= FARTHEST).all():
+    mesh = MshFile(path)
+    if not (np.abs(mesh.points) <= FARTHEST).all():
         raise SurveyError(
             f"a node is not finite, or beyond {FARTHEST:g} m",
             where=str(path),
             remedy="coordinates are in metres",
         )
     for name, blocks in _volumes(mesh).items():
-        polygons: list[tuple[int, ...]] = []
-        error = None
-        for kind, cells in blocks:
-            if cells.size and not (cells.min() >= 0 and cells.max() < len(points)):
-                error = SurveyError(
-                    f"{name}: an element of a node that there is not", where=str(path), remedy="mesh it again"
-                )
-            polygons += [tuple(one[k] for k in face) for one in cells.tolist() for face in _FACES[kind]]
-        boundary = _boundary(polygons)
+        boundary = _boundary(blocks)
         used = sorted({i for polygon in boundary for i in polygon})
         new = {old: k for k, old in enumerate(used)}
-        vertices = np.empty((0, 3)) if error is not None else points[used]
-        local = [tuple(new[i] for i in polygon) for polygon in boundary]
-        yield RawBody(name, vertices, _cut(local), error=error)
+        yield RawBody(name, mesh.points[used], [tuple(new[i] for i in polygon) for polygon in boundary])
 
 
-def _read(path: Path) -> Any:
-    """Read a mesh; whatever goes wrong in meshio, and whatever it only warns of, refuses the file."""
-    import meshio
-
-    said = io.StringIO()
-    try:
-        data = path.read_bytes()
-        if b"\\0" not in data and _HUGE(data):
-            raise ValueError("the number of a node or element is beyond any mesh")
-        with warnings.catch_warnings(), contextlib.redirect_stderr(said), contextlib.redirect_stdout(said):
-            warnings.simplefilter("error")
-            mesh = meshio.gmsh.read(str(path))
-        if _UNCLOSED in said.getvalue():
-            raise ValueError("a section has no end: the file may be cut short")
-    except Exception as error:
-        text = " ".join(str(error).split())[:120] or type(error).__name__
-        raise SurveyError(
-            f"cannot be read as a gmsh mesh: {text}", where=str(path), remedy="export MSH 2.2 or 4.1"
-        ) from error
-    return mesh
-
-
-def _volumes(mesh: Any) -> dict[str, list[tuple[str, NDArray[np.int64]]]]:
-    """The elements of each volume, corner nodes only."""
-    names = {int(tag): name for name, (tag, dim) in mesh.field_data.items() if int(dim) == 3}
-    physical = mesh.cell_data.get("gmsh:physical")
-    entities = mesh.cell_data.get("gmsh:geometrical")
-    volumes: dict[str, list[tuple[str, NDArray[np.int64]]]] = defaultdict(list)
-    for k, block in enumerate(mesh.cells):
-        found = _LINEAR.fullmatch(block.type)
-        if found is None or not len(block.data):
+def _volumes(mesh: MshFile) -> dict[str, Cells]:
+    """The elements of each volume, by type."""
+    volumes: dict[str, Cells] = defaultdict(list)
+    for one in mesh.elements:
+        if one.type not in _FACES:
             continue
-        cells = np.asarray(block.data)[:, : max(max(face) for face in _FACES[found[1]]) + 1]
-        groups = np.zeros(len(cells), dtype=int) if physical is None else np.asarray(physical[k])
-        volume = np.zeros(len(cells), dtype=int) if entities is None else np.asarray(entities[k])
-        for group, entity in sorted(set(zip(groups.tolist(), volume.tolist(), strict=True))):
-            name = names.get(group) or (f"physical-{group}" if group else f"volume-{entity}")
-            volumes[name].append((found[1], cells[(groups == group) & (volume == entity)]))
+        both = np.column_stack([one.physical, one.entity])
+        for group, entity in np.unique(both, axis=0).tolist():
+            name = mesh.names.get(group) or (f"physical-{group}" if group else f"volume-{entity}")
+            volumes[name].append((one.type, one.nodes[(both == (group, entity)).all(axis=1)]))
     return volumes
 
 
-def _boundary(polygons: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
-    """Faces that belong to one element only."""
+def _boundary(blocks: Cells) -> list[tuple[int, ...]]:
+    """Faces that belong to one element only, as triangles, which merge to the planes of the stone."""
     once: dict[frozenset[int], tuple[int, ...] | None] = {}
-    for polygon in polygons:
-        key = frozenset(polygon)
-        once[key] = None if key in once else polygon
-    return [polygon for polygon in once.values() if polygon is not None]
-
-
-def _cut(polygons: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
-    """Quadrilaterals as two triangles each, which merge to the planes of the stone."""
-    out: list[tuple[int, ...]] = []
-    for polygon in polygons:
-        out += [(polygon[0], polygon[k], polygon[k + 1]) for k in range(1, len(polygon) - 1)]
-    return out
+    for kind, cells in blocks:
+        for cell in cells.tolist():
+            for face in _FACES[kind]:
+                polygon = tuple(cell[k] for k in face)
+                key = frozenset(polygon)
+                once[key] = None if key in once else polygon
+    polygons = [polygon for polygon in once.values() if polygon is not None]
+    return [(one[0], one[k], one[k + 1]) for one in polygons for k in range(1, len(one) - 1)]
