@@ -16,6 +16,7 @@ from survey.quality import Histogram, StoneQuality
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
 
 __all__ = ["draw_courses", "draw_elevation", "draw_residuals"]
@@ -26,8 +27,9 @@ _DPI = 150
 _INK, _PALE, _UNKNOWN = "#222222", "#a9a59e", "#dcd9d4"
 _FLAG, _PLAIN_LINE = "#d55e00", "#0072b2"  # vermilion and blue of Okabe and Ito: told apart by everybody
 _PALETTE = (
-    "YlGnBu"  # from light to dark, so that those who do not see all colours, and printers, see the order
+    "YlGnBu"  # from light to dark: the order is seen in print too, and by those who do not see all colours
 )
+_LIGHTER = 0.8  # part of it that is used: on its darkest part codes and outlines cannot be seen
 _CODES = 250  # stones that can be named on an elevation
 _ROBUST = 98.0  # per cent of the stones that the colour scale reaches
 _LARGEST = 0.45  # the largest deviation of a bed is drawn so large, in distances between courses
@@ -54,9 +56,8 @@ def draw_elevation(path: Path, facade: Facade, stones: Sequence[StoneQuality], f
     end, _ = nice_ceiling(float(np.nanpercentile(rms, _ROBUST)) if np.isfinite(rms).any() else 1.0)
     fine = 0.9 if len(own) <= 2000 else 0.15
     faces = PolyCollection(
-        polygons, array=rms, cmap=_PALETTE, clim=(0.0, end), edgecolors=_PALE, linewidths=fine
+        polygons, array=rms, cmap=_palette(), clim=(0.0, end), edgecolors=_PALE, linewidths=fine
     )
-    faces.get_cmap().set_bad(_UNKNOWN)
     axes.add_collection(faces)
     marked = [polygon for polygon, one in zip(polygons, own, strict=True) if one.code in flagged]
     if marked:
@@ -251,9 +252,15 @@ def _legend(axes: "Axes", marked: bool, unknown: bool) -> None:
             Patch(facecolor=_UNKNOWN, edgecolor="none", label="not known: no more points than a plane needs")
         )
     if keys:
-        axes.legend(
-            handles=keys, loc="upper left", bbox_to_anchor=(0.0, -0.09), ncols=2, frameon=False, fontsize=9
-        )
+        axes.figure.legend(handles=keys, loc="outside lower left", ncols=2, frameon=False, fontsize=9)
+
+
+def _palette() -> "Colormap":
+    """The lighter part of the colour map, on which codes and outlines are still seen."""
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap
+
+    return ListedColormap(colormaps[_PALETTE](np.linspace(0.0, _LIGHTER, 256))).with_extremes(bad=_UNKNOWN)
 
 
 def _wrapped(text: str, width: int) -> list[str]:
