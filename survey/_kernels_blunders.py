@@ -256,7 +256,7 @@ def _grow(accepted, majority, local, root, known, view, frame, work):
     truncated = np.inf
     for _ in range(4 * n):
         total = weighted_plane(local, root, accepted, frame, work)
-        if total == 0.0 or (known and frame[4, 1] * _LARGEST_TILT < 1.0):
+        if total == 0.0:
             return np.inf
         leverages(local, root, frame, total, residuals, lever)
         squares, count, truncated = 0.0, 0, 0.0
@@ -267,6 +267,8 @@ def _grow(accepted, majority, local, root, known, view, frame, work):
             squares, count = squares + square * accepted[i], count + accepted[i]
             truncated += _cost(root[i] * residuals[i], root[i], side)
         scale = _scale(squares, count, n, known)
+        if scale > frame[4, 1] * _LARGEST_TILT:
+            return np.inf
         worst, best, highest, lowest = -1, -1, 0.0, np.inf
         for i in range(n):
             # a point in the fit pulls the plane towards itself, one outside does not: variances 1 - h and 1 + h

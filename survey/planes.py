@@ -170,8 +170,8 @@ def _refusal(status: int, xyz: Array, deviations: Array) -> GeometryError:
 def _unknown_tilt(xyz: Array, tilt: float) -> GeometryError:
     length, width = _extent(xyz)
     return GeometryError(
-        f"the points lie nearly on one line, on a strip {length:.3g} m long and {width:.2g} m wide: "
-        f"its tilt is not known better than {math.degrees(min(tilt, math.pi / 2.0)):.0f}° (1 sigma)",
+        f"{len(xyz)} points, {length:.3g} m by {width:.2g} m: the tilt of their plane is not known better than "
+        f"{math.degrees(min(tilt, math.pi / 2.0)):.0f}° (1 sigma)",
         remedy="measure points across the face",
     )
 
