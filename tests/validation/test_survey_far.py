@@ -1,0 +1,103 @@
+"""The sample window in its own coordinates and in those of a national grid: the same stones.
+
+Coordinates are first rounded to 2⁻²⁰ m, so that moving the survey by whole metres is exact in 64 bits. What is left
+is the rounding of results that are themselves places 7·10⁶ m away: half of 2⁻³⁰ m, 0.5 nm, of each coordinate; a
+cross product of such coordinates taken without a local origin would be wrong by 10⁻² m² instead.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from survey.depth import depth_for
+from survey.extrusion import extrude
+from survey.faces import outline_face
+from survey.formats.moma_ascii import read_moma, write_moma
+from survey.joints import close_joints
+from survey.records import Survey
+from survey.watertight import check_watertight
+
+SAMPLE = Path(__file__).parents[2] / "data" / "samples" / "window" / "window.moma"
+LAMBERT = np.array([650_000.0, 6_860_000.0, 300.0])
+NANOMETRES = 3e-9
+
+
+def moved(survey, shift):
+    """The same survey elsewhere, on a grid of 2⁻²⁰ m."""
+
+    def place(points):
+        return np.round(points * 2.0**20) / 2.0**20 + shift
+
+    head = survey.head
+    stations = tuple(replace(one, position=place(one.position)) for one in head.stations)
+    blocks = tuple(
+        replace(one, vertices=place(one.vertices), points=place(one.points)) for one in survey.blocks
+    )
+    return Survey(replace(head, stations=stations), blocks)
+
+
+def measured(survey):
+    observer = survey.head.viewpoint(None)
+    return [
+        extrude(outline_face(one, observer), depth_for(one, survey.head.depth_rules), survey.head.extrusion)
+        for one in survey.blocks
+    ]
+
+
+@pytest.fixture(scope="module")
+def pair():
+    survey = read_moma(SAMPLE)
+    return measured(moved(survey, np.zeros(3))), measured(moved(survey, LAMBERT))
+
+
+def test_planes_are_the_same(pair):
+    for near, far in zip(*pair, strict=True):
+        a, b = near.face.fit, far.face.fit
+        assert a.rejected == b.rejected
+        np.testing.assert_allclose(b.normal, a.normal, atol=1e-12)
+        np.testing.assert_allclose(b.residuals, a.residuals, atol=1e-12)
+        np.testing.assert_allclose(b.standardised, a.standardised, rtol=1e-8, atol=1e-9)
+        np.testing.assert_allclose(b.covariance, a.covariance, rtol=1e-9, atol=1e-20)
+        np.testing.assert_allclose(b.centroid - LAMBERT, a.centroid, atol=NANOMETRES)
+        assert b.rms == pytest.approx(a.rms, rel=1e-12)
+        assert b.sigma0 == pytest.approx(a.sigma0, rel=1e-12)
+
+
+def test_outlines_their_shapes_and_sizes_are_the_same(pair):
+    for near, far in zip(*pair, strict=True):
+        a, b = near.face, far.face
+        np.testing.assert_allclose(b.outline - LAMBERT, a.outline, atol=NANOMETRES)
+        assert (b.shape.kind, b.shape.bevel_points) == (a.shape.kind, a.shape.bevel_points)
+        for name in ("area", "perimeter", "length", "height"):
+            assert getattr(b.measures, name) == pytest.approx(getattr(a.measures, name), abs=1e-8)
+        assert b.rejected_vertices == a.rejected_vertices
+
+
+def test_solids_and_their_precision_are_the_same(pair):
+    for near, far in zip(*pair, strict=True):
+        np.testing.assert_allclose(far.solid.vertices - LAMBERT, near.solid.vertices, atol=NANOMETRES)
+        np.testing.assert_allclose(far.vertex_sigma, near.vertex_sigma, rtol=1e-7)
+        check_watertight(far.solid)
+
+
+def test_closed_joints_are_the_same(pair):
+    near, far = (close_joints(blocks) for blocks in pair)
+    assert [set(one.stones) for one in far.report.joints] == [set(one.stones) for one in near.report.joints]
+    for a, b in zip(near.solids, far.solids, strict=True):
+        assert a.faces == b.faces
+        np.testing.assert_allclose(b.vertices - LAMBERT, a.vertices, atol=1e-8)
+    for code, change in near.report.volume_change.items():
+        assert far.report.volume_change[code] == pytest.approx(change, abs=1e-7)
+    for a, b in zip(near.report.joints, far.report.joints, strict=True):
+        assert (b.width, b.rms) == pytest.approx((a.width, a.rms), abs=1e-8)
+
+
+def test_a_survey_is_written_and_read_to_the_last_bit(tmp_path):
+    far = moved(read_moma(SAMPLE), LAMBERT)
+    write_moma(far, tmp_path / "far.moma")
+    again = read_moma(tmp_path / "far.moma")
+    for a, b in zip(far.blocks, again.blocks, strict=True):
+        np.testing.assert_array_equal(a.vertices, b.vertices)
+        np.testing.assert_array_equal(a.points, b.points)
