@@ -160,13 +160,14 @@ def _closed(raw: RawBody, vertices: Array, polygons: list[Polygon]) -> Solid:
             flat += [(one[0], one[1], one[2]) for one in cut]
     used = np.unique(np.concatenate([np.array(one) for one in flat]))
     merged = _compact(raw.name, vertices, merge_flat(vertices, flat, used, raw.resolution))
-    try:
-        check_watertight(merged)
-    except (
-        GeometryError
-    ):  # outlines that cannot be cut into ears: the triangles as they came say whether it is closed
-        merged = _compact(raw.name, vertices, flat)
-        check_watertight(merged)
+    with np.errstate(all="ignore"):  # a body without volume is found, and not warned of
+        try:
+            check_watertight(merged)
+        except (
+            GeometryError
+        ):  # outlines that cannot be cut into ears: the triangles as they came can say more
+            merged = _compact(raw.name, vertices, flat)
+            check_watertight(merged)
     return merged
 
 

@@ -137,11 +137,11 @@ class MshFile:
             for _ in range(numbers.plausible(count)):
                 (tag,) = numbers.integers(1).tolist()
                 numbers.reals(3 if dimension == 0 else 6)
-                groups = numbers.integers(numbers.sizes(1)[0])
+                groups = numbers.integers(numbers.size())
                 if len(groups):
                     self._physical[dimension, tag] = abs(int(groups[0]))
                 if dimension:
-                    numbers.integers(numbers.sizes(1)[0])
+                    numbers.integers(numbers.size())
 
     def _read_nodes_4(self) -> None:
         numbers = self._numbers
@@ -151,7 +151,7 @@ class MshFile:
             _, _, parametric = numbers.integers(3).tolist()
             if parametric:
                 raise numbers.fail("nodes with parametric coordinates", "save the mesh without them")
-            (count,) = numbers.sizes(1).tolist()
+            count = numbers.size()
             tags.append(numbers.sizes(count))
             points.append(numbers.reals(3 * count).reshape(-1, 3))
         self._set_nodes(
@@ -176,8 +176,9 @@ class MshFile:
         blocks, total, _, _ = numbers.sizes(4).tolist()
         for _ in range(numbers.plausible(blocks)):
             dimension, entity, kind = numbers.integers(3).tolist()
-            (count,) = numbers.sizes(1).tolist()
-            rows = numbers.sizes(count * (1 + self._node_count(kind))).reshape(count, -1)
+            count = numbers.size()
+            width = 1 + self._node_count(kind)
+            rows = numbers.sizes(count * width).reshape(count, width)
             group = self._physical.get((dimension, entity), 0)
             self._add(kind, rows[:, 1:], np.full(count, entity), np.full(count, group))
         if sum(len(one.nodes) for one in self.elements) != total:

@@ -107,6 +107,10 @@ class MshNumbers:
         """Read numbers of things."""
         return self._take(count, "i8").astype(np.int64)
 
+    def size(self) -> int:
+        """Read one number of things."""
+        return int(self.sizes(1)[0])
+
     def counts(self, count: int) -> Integers:
         """Read numbers that are text even in binary files of format 2.2."""
         if not self.binary:
