@@ -140,16 +140,16 @@ def survey_report(
     verbose: Verbose = False,
 ) -> None:
     """Judge survey files: precision, what to measure again, courses, kinds; no database is needed."""
-    from moma.listing import as_json
     from moma.telling import survey_report_lines
     from pipelines.reading_options import reading_options
-    from pipelines.survey_report import report_surveys
+    from pipelines.survey_report import INDEX, report_surveys
 
     options = reading_options(header, codes, kind, sigma)
     folder = out or Path("out") / f"survey-{files[0].stem}"
     with progress_bars() as listener:
         report = report_surveys(files, folder, format.value, options, listener)
-    print(as_json(report.content) if json else "\n".join(survey_report_lines(report, verbose)))
+    lines = survey_report_lines(report, verbose)
+    print((folder / INDEX).read_text(encoding="utf-8").rstrip() if json else "\n".join(lines))
 
 
 @app.command()

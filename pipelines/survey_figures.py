@@ -130,6 +130,8 @@ def draw_courses(path: Path, lines: Sequence[CourseLine]) -> None:
 
 
 def _draw_bed(axes: "Axes", line: CourseLine, factor: float, colour: str, small: bool) -> None:
+    from matplotlib.collections import LineCollection
+
     axes.plot(line.along[[0, -1]], [line.level] * 2, color=_PALE, linewidth=0.8, zorder=1)
     size, thick = (1.5, 0.6) if small else (3.5, 1.0)
     axes.errorbar(
@@ -138,12 +140,11 @@ def _draw_bed(axes: "Axes", line: CourseLine, factor: float, colour: str, small:
         factor * line.sigma,
         fmt="o", markersize=size, color=_INK, ecolor=_PALE, elinewidth=thick, zorder=2,
     )  # fmt: skip
-    for first, last in _stones(line):
-        axes.plot(
-            line.along[[first, last]],
-            line.level + factor * (line.height[[first, last]] - line.level),
-            color=_INK, linewidth=thick, zorder=3,
-        )  # fmt: skip
+    places = np.column_stack([line.along, line.level + factor * (line.height - line.level)])
+    strokes = LineCollection(
+        [places[list(ends)] for ends in _stones(line)], colors=_INK, linewidths=thick, zorder=3
+    )
+    axes.add_collection(strokes, autolim=False)
     if line.slope is not None:
         ends = line.along[[0, -1]]
         axes.plot(
@@ -223,7 +224,7 @@ def _write_codes(
         tall = float(np.ptp(polygon[:, 1])) * scale * 72.0
         size = min(9.0, 0.85 * room / (0.62 * max(len(stone.code), 1)), 0.6 * tall)
         if size >= 3.5:
-            colour = "white" if math.isfinite(dark) and dark > 0.6 else _INK
+            colour = "white" if math.isfinite(dark) and dark > 0.7 else _INK
             x, y = polygon.min(axis=0) / 2.0 + polygon.max(axis=0) / 2.0
             axes.text(x, y, stone.code, ha="center", va="center", fontsize=size, color=colour)
 

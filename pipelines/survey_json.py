@@ -1,27 +1,23 @@
 """survey.json: what a survey report says, for programs."""
 
+import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pipelines.survey_study import SurveyFile, SurveyStudy
-from survey.courses import CourseHeight, CourseLine
+from survey.courses import CourseLine
 from survey.facades import Facade
 from survey.quality import StoneQuality, SurveyQuality
 
-__all__ = ["survey_json"]
+__all__ = ["survey_json", "write_survey_json"]
 
 
 def survey_json(study: SurveyStudy, version: str) -> dict[str, Any]:
-    """All findings as plain values: metres, degrees where a name says so, null where not known."""
-    deviations = {one.code: one for one in study.deviations}
-    facade_of = {i: facade.name for facade in study.facades for i in facade.members.tolist()}
-    reasons: dict[str, list[str]] = {}
-    for one in study.remeasures:
-        if one.code is not None:
-            reasons.setdefault(one.code, []).append(one.reason)
+    """All findings but the single stones: metres, degrees where a name says so, null where not known."""
     content = {
         "survey": study.name,
         "version": version,
@@ -30,19 +26,44 @@ def survey_json(study: SurveyStudy, version: str) -> dict[str, Any]:
         "facades": [_facade(one) for one in study.facades],
         "kinds": [_record(one) for one in study.usual.values()],
         "courses": [_course(one) for one in study.courses],
-        "course_heights": [_height(one) for one in study.course_heights],
+        "course_heights": [_record(one) for one in study.course_heights],
         "contradictions": [_record(one) for one in study.contradictions],
         "remeasure": [{**_record(one), "urgency": one.urgency.name.lower()} for one in study.remeasures],
         "rejects": [
             {"code": one.code, "line": _line(one.spans), "reason": str(one.error)} for one in study.rejects
         ],
-        "stones": [
-            _stone(one, facade_of.get(i), deviations.get(one.code), reasons.get(one.code, []))
-            for i, one in enumerate(study.stones)
-        ],
     }
     plain: dict[str, Any] = _plain(content)
     return plain
+
+
+def write_survey_json(path: Path, study: SurveyStudy, content: Mapping[str, Any]) -> None:
+    """Write survey.json: the findings, then one stone per line, so that many stones need little memory.
+
+    Parameters
+    ----------
+    path : survey.json
+    study : with the stones
+    content : what `survey_json` gives, and more if wanted
+    """
+    head = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False).removesuffix("\n}")
+    with path.open("w", encoding="utf-8") as out:
+        out.write(f'{head},\n "stones": [')
+        for number, stone in enumerate(_stones(study)):
+            out.write(",\n  " if number else "\n  ")
+            out.write(json.dumps(_plain(stone), ensure_ascii=False, allow_nan=False))
+        out.write("\n ]\n}\n")
+
+
+def _stones(study: SurveyStudy) -> Iterator[dict[str, Any]]:
+    deviations = {one.code: one for one in study.deviations}
+    facade_of = {i: facade.name for facade in study.facades for i in facade.members.tolist()}
+    reasons: dict[str, list[str]] = {}
+    for one in study.remeasures:
+        if one.code is not None:
+            reasons.setdefault(one.code, []).append(one.reason)
+    for i, stone in enumerate(study.stones):
+        yield _stone(stone, facade_of.get(i), deviations.get(stone.code), reasons.get(stone.code, []))
 
 
 def _file(file: SurveyFile) -> dict[str, Any]:
@@ -104,13 +125,8 @@ def _course(line: CourseLine) -> dict[str, Any]:
     values["span"] = line.span
     values["worst"] = {"stone": line.worst[0], "deviation": line.worst[1]}
     values["finding"] = line.finding
-    names = ("stone", "along", "height", "sigma", "deviation")
-    values["corners"] = [dict(zip(names, row, strict=True)) for row in zip(*corners, strict=True)]
+    values["corners"] = dict(zip(("stone", "along", "height", "sigma", "deviation"), corners, strict=True))
     return values
-
-
-def _height(height: CourseHeight) -> dict[str, Any]:
-    return _record(height)
 
 
 def _stone(stone: StoneQuality, facade: str | None, deviation: Any, reasons: list[str]) -> dict[str, Any]:

@@ -8,9 +8,8 @@ from typing import Any
 
 from pipelines.folder import check_replaceable, replacing
 from pipelines.progress import Listener, Progress, silent
-from pipelines.summary import as_json
 from pipelines.survey_figures import draw_courses, draw_elevation, draw_residuals
-from pipelines.survey_json import survey_json
+from pipelines.survey_json import survey_json, write_survey_json
 from pipelines.survey_page import write_survey_page
 from pipelines.survey_study import SurveyStudy, study_surveys
 from survey.formats.options import ReadingOptions
@@ -31,7 +30,7 @@ class SurveyReport:
     ----------
     folder : where it lies
     study : what was found
-    content : the contents of survey.json
+    content : the contents of survey.json, but for the single stones
     """
 
     folder: Path
@@ -70,7 +69,7 @@ def report_surveys(
 
 
 def write_survey_report(study: SurveyStudy, folder: Path, progress: Listener = silent) -> dict[str, Any]:
-    """Write all files of a report into an empty folder; the contents of survey.json."""
+    """Write all files of a report into an empty folder; the contents of survey.json but for the stones."""
     release = version("moma-masonry")
     progress(Progress("write", 0, 3, "pictures"))
     pictures = _draw(study, folder)
@@ -79,7 +78,7 @@ def write_survey_report(study: SurveyStudy, folder: Path, progress: Listener = s
     progress(Progress("write", 2, 3, INDEX))
     content = survey_json(study, release)
     content["files"] = sorted([INDEX, *(entry.name for entry in folder.iterdir())])
-    (folder / INDEX).write_text(as_json(content), encoding="utf-8")
+    write_survey_json(folder / INDEX, study, content)
     progress(Progress("write", 3, 3))
     return content
 
