@@ -146,14 +146,28 @@ def _draw_bed(axes: "Axes", line: CourseLine, factor: float, colour: str, small:
     )
     axes.add_collection(strokes, autolim=False)
     if line.slope is not None:
-        ends = line.along[[0, -1]]
+        fine = np.linspace(line.along[0], line.along[-1], 2 if _curvature(line) == 0.0 else 50)
         axes.plot(
-            ends,
-            line.level + factor * line.slope * (ends - line.middle),
+            fine,
+            line.level + factor * (_fitted(line, fine) - line.level),
             color=colour,
             linewidth=1.6,
             zorder=4,
         )
+
+
+def _fitted(line: CourseLine, along: Array) -> Array:
+    """The straight line of a course, or, where it sags or hogs beyond chance, its parabola [m]."""
+    half = line.span / 2.0
+    bulge = float((((line.along - line.middle) / half) ** 2).mean()) - ((along - line.middle) / half) ** 2
+    fitted: Array = line.level + (line.slope or 0.0) * (along - line.middle) + _curvature(line) * bulge
+    return fitted
+
+
+def _curvature(line: CourseLine) -> float:
+    """The sag, if it is beyond chance [m]."""
+    found = line.sag_probability is not None and line.sag_probability < SIGNIFICANT
+    return line.sag if found and line.sag is not None else 0.0
 
 
 def _stones(line: CourseLine) -> list[tuple[int, int]]:
@@ -225,7 +239,7 @@ def _write_codes(
         size = min(9.0, 0.85 * room / (0.62 * max(len(stone.code), 1)), 0.6 * tall)
         if size >= 3.5:
             colour = "white" if math.isfinite(dark) and dark > 0.7 else _INK
-            x, y = polygon.min(axis=0) / 2.0 + polygon.max(axis=0) / 2.0
+            x, y = polygon.mean(axis=0)
             axes.text(x, y, stone.code, ha="center", va="center", fontsize=size, color=colour)
 
 

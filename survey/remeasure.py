@@ -108,9 +108,9 @@ def list_remeasures(
 def _missing(reject: Reject) -> Remeasure:
     line = reject.spans[0].start if reject.spans else 0
     action = reject.error.remedy or "measure the stone again"
-    return Remeasure(
-        reject.code, line, Urgency.MISSING, 0.0, f"could not be made: {reject.error.what}", action
-    )
+    where = "" if reject.error.where is None else f" ({reject.error.where})"
+    reason = f"could not be made: {reject.error.what}{where}"
+    return Remeasure(reject.code, line, Urgency.MISSING, 0.0, reason, action)
 
 
 def _reasons(stone: StoneQuality, scale: float) -> Iterator[Remeasure]:

@@ -89,7 +89,7 @@ def test_what_lies_along_the_wall_is_longer_than_high(kind: str) -> None:
 
 def test_a_stretcher_deeper_than_long_may_be_a_header() -> None:
     (one,) = found([rectangle("A", "stretcher", 0, 0, 0.35, 0.3, depth=0.55, depth_sigma=0.01)])
-    assert "0.550 m deep" in one.text
+    assert "the stone 0.550 m deep" in one.text
 
 
 @pytest.mark.parametrize(("start", "stop"), [(50.0, 130.0), (0.0, 180.0)])

@@ -54,7 +54,7 @@ def test_the_most_urgent_come_first_and_the_worst_of_a_sort_before_the_others() 
     found = listed(*weak, bare, rejects=(reject,), odd=(odd,))
     assert [one.code for one in found] == ["R", "B", "B", "T1", "T0", "ok3"]
     assert (found[0].line, found[0].reason, found[0].action) == (
-        7, "could not be made: it has 2 corners", "measure 3",
+        7, "could not be made: it has 2 corners (file:7)", "measure 3",
     )  # fmt: skip
     assert "8.0 σ" in found[-1].reason
 
