@@ -1,7 +1,7 @@
 """Stones measured on a photograph: their corners lifted to the plane of their neighbours.
 
 The homography of the photograph (`survey.marked_walls`) takes the corners to the plane of the marks. The face itself
-lies elsewhere: its plane is predicted from its neighbours' (`survey.neighbours`), else from all faces of the wall,
+lies elsewhere: its plane is predicted from its neighbours' (`survey.common_planes`), else from all faces of the wall,
 else it is that of the marks, and points measured on the face correct the prediction. From the plane of the marks
 the corners move to the face along the line of sight, so that it covers in space what it covers on the photograph;
 where the station is not known they move square to the marks' plane, which is exact for a sight that is square.
@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from moma.errors import GeometryError, MomaError, SurveyError
+from survey.common_planes import CommonPlane, PlaneEstimate, common_plane
 from survey.marked_walls import MarkedWall, wall_of_marks
-from survey.neighbours import CommonPlane, MeasuredFace, Neighbours, PlaneEstimate, plane_of_neighbours
+from survey.neighbours import MeasuredFace, Neighbours
 from survey.planes import FaceFit, fit_plane
 from survey.records import BlockRecord, Photograph, SurveyHead
 
@@ -121,8 +122,7 @@ def plane_of_wall(wall: MarkedWall, neighbours: Neighbours) -> CommonPlane | Non
     found = neighbours.on_wall(wall.fit.centroid, wall.fit.normal, wall.relief)
     if not len(found):
         return None
-    text = f"in the plane of the wall ({len(found)} faces)"
-    return plane_of_neighbours(neighbours.fits(found), wall.fit.centroid, text)
+    return common_plane(neighbours.fits(found), wall.fit.centroid)
 
 
 def _wall(
@@ -150,25 +150,18 @@ def _predicted(
     place = on_marks.mean(axis=0)
     near = neighbours.near(on_marks, wall.fit.normal)
     if len(near):
-        text = f"in the plane of {_listed([neighbours.codes[i] for i in near])}"
-        return plane_of_neighbours(neighbours.fits(near), place, text).face_at(place)
+        plane = common_plane(neighbours.fits(near), place)
+        names = [neighbours.codes[i] for i in near[list(plane.members)]]
+        return plane.face_at(place, f"in the plane of {_listed(names)}")
     if whole is not None:
-        return whole.face_at(place)
+        return whole.face_at(place, f"in the plane of the wall ({len(whole.members)} faces)")
     fit = wall.fit
     used = len(fit.residuals) - len(fit.rejected)
     scatter = fit.rms * float(np.sqrt(used / max(fit.redundancy, 1)))
     # nothing is known of tilts but that corners and middles of faces scatter alike
     reach = 0.5 * float(np.linalg.norm(on_marks[:, None] - on_marks[None], axis=2).max())
-    marks = CommonPlane(
-        fit.centroid,
-        fit.normal,
-        fit.axes,
-        fit.covariance,
-        scatter,
-        scatter / reach,
-        "in the plane of its marks",
-    )
-    return marks.face_at(place)
+    marks = CommonPlane(fit.centroid, fit.normal, fit.axes, fit.covariance, scatter, scatter / reach)
+    return marks.face_at(place, "in the plane of its marks")
 
 
 def _face_plane(
