@@ -140,9 +140,10 @@ def fit_similarity(control: Sequence[ControlPoint]) -> SiteTransform:
     site = np.array([point.site for point in control], dtype=np.float64)
     sigmas = np.array([(point.measured_sigma, point.site_sigma) for point in control]).T
     _check_values(control, measured, site, sigmas)
-    _check_spread(control, measured, sigmas, "in the survey")
-    _check_spread(control, site, sigmas, "on site")
-    fit = _without_blunders(control, measured, site, (sigmas[0], sigmas[1]))
+    least = _widths_needed(measured, site, sigmas)
+    _check_spread(control, measured, least[0], "in the survey")
+    _check_spread(control, site, least[1], "on site")
+    fit = _without_blunders(control, measured, site, (sigmas[0], sigmas[1]), least)
     verdict = fit.verdict
     return SiteTransform(
         rotation=fit.rotation,
@@ -222,11 +223,17 @@ def _check_values(control: Sequence[ControlPoint], measured: Array, site: Array,
         )
 
 
-def _check_spread(control: Sequence[ControlPoint], points: Array, sigmas: Array, frame: str) -> None:
+def _widths_needed(measured: Array, site: Array, sigmas: Array) -> tuple[float, float]:
+    """How far points have to lie off a line, in either frame, to fix the rotation about it [m]."""
+    extents = [float(np.linalg.norm(np.ptp(points, axis=0))) for points in (measured, site)]
+    ratio = extents[1] / extents[0] if min(extents) > 0.0 else 1.0  # the survey may be in millimetres
+    needed = float(np.hypot(ratio * sigmas[0], sigmas[1]).max()) / _WEAKEST_ANGLE
+    return max(needed / ratio, 1e-9 * extents[0]), max(needed, 1e-9 * extents[1])
+
+
+def _check_spread(control: Sequence[ControlPoint], points: Array, least: float, frame: str) -> None:
     """Refuse points on a line: the rotation about it would have no precision."""
-    local = points - points[0]
-    spread = np.linalg.svd(local - local.mean(axis=0), compute_uv=False)
-    least = max(float(np.hypot(*sigmas).max()) / _WEAKEST_ANGLE, 1e-9 * float(spread[0]))
+    spread = _spread(points)
     if spread[1] > least:
         return
     verdict = "coincide" if spread[0] <= least else "lie on one line"
@@ -237,8 +244,18 @@ def _check_spread(control: Sequence[ControlPoint], points: Array, sigmas: Array,
     )
 
 
+def _spread(points: Array) -> Array:
+    """Extents of a set of points along its principal directions, roots of sums of squares, (3,) [m]."""
+    local = points - points[0]
+    return np.linalg.svd(local - local.mean(axis=0), compute_uv=False)
+
+
 def _without_blunders(
-    control: Sequence[ControlPoint], measured: Array, site: Array, sigmas: tuple[Array, Array]
+    control: Sequence[ControlPoint],
+    measured: Array,
+    site: Array,
+    sigmas: tuple[Array, Array],
+    least: tuple[float, float],
 ) -> Similarity:
     everything = np.ones(len(control), dtype=bool)
     plain = adjust_similarity(measured, site, sigmas, everything)
@@ -252,8 +269,10 @@ def _without_blunders(
         )
 
     def judge(accepted: Mask) -> Verdict | None:
-        angles = _spread(measured, accepted), _spread(site, accepted)
-        if accepted.sum() < 3 or min(angles) <= float(np.hypot(*sigmas).max()) / _WEAKEST_ANGLE:
+        if accepted.sum() < 3 or any(
+            _spread(points[accepted])[1] <= width
+            for points, width in zip((measured, site), least, strict=True)
+        ):
             return None
         return adjust_similarity(measured, site, sigmas, accepted).verdict
 
@@ -263,12 +282,6 @@ def _without_blunders(
     accepted = everything.copy()
     accepted[list(found.rejected)] = False
     return adjust_similarity(measured, site, sigmas, accepted)
-
-
-def _spread(points: Array, accepted: Mask) -> float:
-    """Extent of a set of points across its longest direction, root of a sum of squares [m]."""
-    local = points[accepted] - points[accepted][0]
-    return float(np.linalg.svd(local - local.mean(axis=0), compute_uv=False)[1])
 
 
 def _contradiction(

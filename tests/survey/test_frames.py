@@ -215,6 +215,14 @@ def test_precision_is_worst_far_from_the_control() -> None:
     assert (fit.sigma_at(fit.survey_centre + 100.0) > 5 * at_centre).all()
 
 
+def test_a_survey_in_millimetres_is_brought_to_metres() -> None:
+    millimetres = WALL * 1000.0
+    fit = fit_similarity(control(millimetres, transformed(millimetres, 0.001), 3.0, 0.004))
+    np.testing.assert_allclose(fit.apply(millimetres), transformed(WALL, 1.0), atol=1e-10)
+    same = fit_similarity(control(WALL, transformed(WALL, 1.0), 0.003, 0.004))
+    np.testing.assert_allclose(fit.covariance, same.covariance, rtol=1e-9, atol=1e-18)
+
+
 def test_scale_is_told_from_one_only_where_it_differs() -> None:
     rng = np.random.default_rng(4)
     noise = rng.normal(0, 0.003, (2, 8, 3))
