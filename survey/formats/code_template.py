@@ -62,9 +62,9 @@ class CodeTemplate:
         self.text = text
         parts = _PART.split(text.strip())
         self.fields, literals = tuple(parts[1::2]), parts[::2]
-        self._check_fields()
         if any("{" in one or "}" in one for one in literals):
             raise UsageError(f"code template {text!r} has a brace without its other", remedy=_REMEDY)
+        self._check_fields()
         self._check_separation(literals[1:-1])
         pattern = _literal(literals[0])
         for name, literal in zip(self.fields, literals[1:], strict=True):

@@ -166,7 +166,7 @@ class _RowReader:
             raise self._fail(number, f"{name} {shown(text)} is not a name", "write printable words")
         before = getattr(stone, name)
         if before not in (None, value):
-            found, first = (f"{one:g} m" if isinstance(one, float) else one for one in (value, before))
+            found, first = (f"{one:g} m" if isinstance(one, float) else shown(one) for one in (value, before))
             raise self._fail(number, f"{name} {found}, but {first} before", f"give a block one {name}")
         setattr(stone, name, value)
 
