@@ -32,6 +32,7 @@ _PALETTE = (
 _LIGHTER = 0.8  # part of it that is used: on its darkest part codes and outlines cannot be seen
 _CODES = 250  # stones that can be named on an elevation
 _ROBUST = 98.0  # per cent of the stones that the colour scale reaches
+_FINEST = 0.01  # the colour scale ends here at least: smaller residuals are not worth a colour [mm]
 _LARGEST = 0.45  # the largest deviation of a bed is drawn so large, in distances between courses
 
 
@@ -53,7 +54,9 @@ def draw_elevation(path: Path, facade: Facade, stones: Sequence[StoneQuality], f
     figure = _figure(_sheet(high - low))
     axes = figure.subplots()
     rms = np.array([one.rms * 1e3 if one.measured and one.redundancy else np.nan for one in own])
-    end, _ = nice_ceiling(float(np.nanpercentile(rms, _ROBUST)) if np.isfinite(rms).any() else 1.0)
+    end, _ = nice_ceiling(
+        max(float(np.nanpercentile(rms, _ROBUST)), _FINEST) if np.isfinite(rms).any() else 1.0
+    )
     fine = 0.9 if len(own) <= 2000 else 0.15
     faces = PolyCollection(
         polygons, array=rms, cmap=_palette(), clim=(0.0, end), edgecolors=_PALE, linewidths=fine
