@@ -15,7 +15,7 @@ from survey.courses import CourseHeight, CourseLine, course_heights, measure_cou
 from survey.facades import Facade, find_facades
 from survey.formats.options import ReadingOptions
 from survey.formats.reading import open_survey
-from survey.frames import SiteTransform, fit_similarity
+from survey.frames import SiteTransform
 from survey.quality import StoneQuality, SurveyQuality, appraise, judge_survey
 from survey.records import Canon, Reject, SurveyHead
 from survey.remeasure import Remeasure, list_remeasures
@@ -116,16 +116,15 @@ def _read(
     if not path.is_file():
         what = "is a folder" if path.is_dir() else "no such file"
         raise UsageError(what, where=str(path), remedy="name a survey file")
-    stream = open_survey(path, format, options)
-    transform = fit_similarity(stream.head.control) if stream.head.control else None
-    for number, one in enumerate(survey_stones(stream), start=1):
+    survey = survey_stones(open_survey(path, format, options))
+    for number, one in enumerate(survey.stones, start=1):
         if isinstance(one, Reject):
             rejects.append(one)
         else:
             stones.append(appraise(one))
         if number % _TOLD == 0:
             progress(Progress(f"fit {path.name}", number, number + _TOLD))
-    return SurveyFile(stream.head, transform, 0, 0)
+    return SurveyFile(survey.head, survey.transform, 0, 0)
 
 
 def _judge(
