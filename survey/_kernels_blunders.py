@@ -6,20 +6,97 @@ import numpy as np
 from numba import njit
 
 from survey._kernels_planes import leverages, orient, precision, weighted_plane
+from survey._kernels_triples import STARTS, cost, search_triples, smallest
 
-__all__ = ["COLLINEAR", "FINE", "NOT_FINITE", "SIGMA", "fit_face", "search_triples"]
+__all__ = ["COLLINEAR", "FINE", "NOT_FINITE", "SIGMA", "beside_the_rest", "fit_face"]
 
 FINE, NOT_FINITE, SIGMA, COLLINEAR = 0, 1, 2, 3  # what `fit_face` found
 
 _CRITICAL = 3.29  # two-sided normal quantile of Baarda's α₀ = 0.1 %
-_ALL_TRIPLES = 26  # up to so many points all triples are tried; beyond, a fixed draw of _DRAWS
-_DRAWS = 3000
-_STARTS = 6  # planes of least truncated squares from which the fit grows
 _LARGEST_TILT = math.radians(10.0)  # standard deviation of a tilt that no plane among others may exceed
-_EROSION = 0.03  # how far behind a face its eroded edges and its mortar lie [m]
-_IN_FRONT = _CRITICAL**2  # how much more a blunder less than that in front counts, in squares of sigma
 _GRAZING = 0.17  # cosine between normal and line of sight below which a face is not measured: 80°
+_FARTHEST = 2.5  # distance from the middle of a face, over that of its third quartile, beyond which no point is its own
+_BALANCED = 0.4  # mean of directions, below which points lie all around
 _FEWEST = 4  # points that a plane is never grown from fewer than
+
+
+@njit(cache=True)
+def beside_the_rest(local):
+    """Indices of the points of a compact face: those far beside are no part of it, wherever its plane may pass them.
+
+    So far out they would outvote all others. Four or more that lie all around are corners of a face that is measured
+    in its middle.
+    """
+    n = local.shape[1]
+    everything = np.arange(n)
+    if n < 6:
+        return everything
+    centre = _spatial_median(local)
+    away, balance = np.empty(n), np.zeros(3)
+    for i in range(n):
+        away[i] = math.sqrt(
+            (local[0, i] - centre[0]) ** 2 + (local[1, i] - centre[1]) ** 2 + (local[2, i] - centre[2]) ** 2
+        )
+    limit, count = _FARTHEST * smallest(away, n - n // 4), 0
+    for i in range(n):
+        if away[i] > limit:
+            count += 1
+            for k in range(3):
+                balance[k] += (local[k, i] - centre[k]) / away[i]
+    balanced = balance[0] ** 2 + balance[1] ** 2 + balance[2] ** 2 < (_BALANCED * count) ** 2
+    if count == 0 or (count > 3 and balanced):
+        return everything
+    kept, m = np.empty(n - count, dtype=np.int64), 0
+    for i in range(n):
+        if away[i] <= limit:
+            kept[m] = i
+            m += 1
+    return kept
+
+
+@njit(cache=True)
+def _spatial_median(local):
+    """Place of least sum of distances, nearly (Weiszfeld 1937)."""
+    n = local.shape[1]
+    centre = np.zeros(3)
+    for k in range(3):
+        for i in range(n):
+            centre[k] += local[k, i] / n
+    for _ in range(15):
+        x, y, z, total = 0.0, 0.0, 0.0, 0.0
+        for i in range(n):
+            square = (
+                (local[0, i] - centre[0]) ** 2
+                + (local[1, i] - centre[1]) ** 2
+                + (local[2, i] - centre[2]) ** 2
+            )
+            weight = 1.0 / max(math.sqrt(square), 1e-9)
+            total += weight
+            x, y, z = x + weight * local[0, i], y + weight * local[1, i], z + weight * local[2, i]
+        centre[0], centre[1], centre[2] = x / total, y / total, z / total
+    return centre
+
+
+@njit(cache=True)
+def _view(local, frame, origin, observer):
+    """Direction (3,) to the observer, and the least cosine between it and the normal; nothing without an observer.
+
+    A plane that is seen edge-on holds all points of an edge of the face, however far out they are; nobody measures
+    a face so.
+    """
+    view = np.zeros(4)
+    squares, along = 0.0, 0.0
+    for k in range(3):
+        view[k] = observer[k] - origin[k] - frame[0, k]
+        squares += view[k] ** 2
+    if not (squares > 0.0 and squares < np.inf):
+        view[:] = 0.0
+        return view
+    for k in range(3):
+        view[k] /= math.sqrt(squares)
+        along += view[k] * frame[3, k]
+    view[3] = _GRAZING if abs(along) > 2.0 * _GRAZING else 0.0
+    return view
 
 
 @njit(cache=True)
@@ -71,163 +148,12 @@ def _scale(squares, count, total, known):
 
 
 @njit(cache=True)
-def _triple(number, n, i, j, k):
-    """The triple after (i, j, k): the next of all, or a drawn one, the same for every face of n points."""
-    if n <= _ALL_TRIPLES:
-        k += 1
-        if k == n:
-            j += 1
-            if j == n - 1:
-                i += 1
-                j = i + 1
-            k = j + 1
-        return i, j, k
-    # the R3 sequence of Roberts (2018) spreads evenly over the cube
-    along = 0.5 + (number + 1) * 0.8191725133961645
-    across = 0.5 + (number + 1) * 0.6710436067037893
-    up = 0.5 + (number + 1) * 0.5497004779019703
-    return int(n * (along % 1.0)), int(n * (across % 1.0)), int(n * (up % 1.0))
-
-
-@njit(cache=True)
-def _normal_of(local, i, j, k, normal):
-    """Twice the area of a triangle, and its unit normal."""
-    ax, ay, az = local[0, i], local[1, i], local[2, i]
-    bx, by, bz = local[0, j] - ax, local[1, j] - ay, local[2, j] - az
-    cx, cy, cz = local[0, k] - ax, local[1, k] - ay, local[2, k] - az
-    nx, ny, nz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
-    area = math.sqrt(nx * nx + ny * ny + nz * nz)
-    if area > 0.0:
-        normal[0], normal[1], normal[2] = nx / area, ny / area, nz / area
-    return area
-
-
-@njit(cache=True)
-def search_triples(local, root, size, known, view):
-    """Distances from planes through three points (1 + _STARTS, n), inf where there are fewer.
-
-    First the plane of least median distance, then, with a known precision, those of least truncated squares, each with
-    a different set of points within the limit, best first.
-    """
-    n = root.shape[0]
-    count = n * (n - 1) * (n - 2) // 6 if n <= _ALL_TRIPLES else _DRAWS
-    normal, distances, scores = np.empty(3), np.empty(n), np.empty(1 + _STARTS)
-    best = np.empty((1 + _STARTS, n))
-    best[:, :], scores[:] = np.inf, np.inf
-    largest = 0.0
-    for sweep in range(2):
-        i, j, k = 0, 1, 1
-        for number in range(count):
-            i, j, k = _triple(number, n, i, j, k)
-            area = _normal_of(local, i, j, k, normal)
-            if sweep == 0 or area <= 1e-3 * largest:  # thin triangles say nothing of the tilt
-                largest = max(largest, area)
-                continue
-            nx, ny, nz = normal[0], normal[1], normal[2]
-            along = nx * view[0] + ny * view[1] + nz * view[2]
-            if abs(along) < view[3]:
-                continue
-            side = 0.0 if along == 0.0 else math.copysign(1.0, along)
-            height = nx * local[0, i] + ny * local[1, i] + nz * local[2, i]
-            near, truncated = 0, 0.0
-            for m in range(n):
-                d = root[m] * (nx * local[0, m] + ny * local[1, m] + nz * local[2, m] - height)
-                truncated += _cost(d, root[m], side)
-                distances[m] = abs(d)
-                near += abs(d) < scores[0]
-            if near >= size:
-                scores[0] = _smallest(distances, size)
-                best[0, :] = distances
-            if known and truncated < scores[_STARTS]:
-                _keep(truncated, distances, scores, best)
-    return best
-
-
-@njit(cache=True)
-def _cost(test, root, side):
-    """What a point counts, in squares of sigma; `side` is 1 if the normal looks to the observer, -1 if away from him.
-
-    No blunder counts more than the limit, but one that lies a little in front of the face counts twice: there edges
-    erode and mortar recedes, so such points are a sign that the plane is tilted into what lies behind.
-    """
-    if test * test <= _CRITICAL**2:
-        return test * test
-    height = test / root * side
-    return _CRITICAL**2 + (_IN_FRONT if 0.0 < height < _EROSION else 0.0)
-
-
-@njit(cache=True)
-def _view(local, frame, origin, observer):
-    """Direction (3,) to the observer, and the least cosine between it and the normal; nothing without an observer.
-
-    A plane that is seen edge-on holds all points of an edge of the face, however far out they are; nobody measures
-    a face so.
-    """
-    view = np.zeros(4)
-    squares, along = 0.0, 0.0
-    for k in range(3):
-        view[k] = observer[k] - origin[k] - frame[0, k]
-        squares += view[k] ** 2
-    if not (squares > 0.0 and squares < np.inf):
-        view[:] = 0.0
-        return view
-    for k in range(3):
-        view[k] /= math.sqrt(squares)
-        along += view[k] * frame[3, k]
-    view[3] = _GRAZING if abs(along) > 2.0 * _GRAZING else 0.0
-    return view
-
-
-@njit(cache=True)
-def _keep(truncated, distances, scores, best):
-    """Sort a plane in among the best, and out those with the same points within the limit."""
-    n, last = distances.shape[0], _STARTS
-    for rank in range(1, 1 + _STARTS):
-        same = True
-        for m in range(n):
-            same = same and (best[rank, m] <= _CRITICAL) == (distances[m] <= _CRITICAL)
-        if same:
-            if scores[rank] <= truncated:
-                return
-            last = rank
-            break
-    while last > 1 and scores[last - 1] > truncated:
-        scores[last] = scores[last - 1]
-        best[last, :] = best[last - 1]
-        last -= 1
-    scores[last] = truncated
-    best[last, :] = distances
-
-
-@njit(cache=True)
-def _smallest(values, size):
-    """The `size`-th smallest value (Hoare 1961)."""
-    heap = values.copy()
-    low, high, k = 0, heap.shape[0] - 1, size - 1
-    while low < high:
-        pivot, i, j = heap[k], low, high
-        while i <= j:
-            while heap[i] < pivot:
-                i += 1
-            while heap[j] > pivot:
-                j -= 1
-            if i <= j:
-                heap[i], heap[j] = heap[j], heap[i]
-                i, j = i + 1, j - 1
-        if j < k:
-            low = i
-        if i > k:
-            high = j
-    return heap[k]
-
-
-@njit(cache=True)
 def _nearest(distances, size, local, root, accepted, frame, work):
     """Accept the points nearest to a plane, and then to the plane through them, until they stay the same."""
     n = root.shape[0]
     lever = np.empty(n)
     for _ in range(20):
-        limit, same, count = _smallest(distances, size), True, 0
+        limit, same, count = smallest(distances, size), True, 0
         for i in range(n):
             count += distances[i] < limit
         for i in range(n):
@@ -265,7 +191,7 @@ def _grow(accepted, majority, local, root, known, view, frame, work):
         for i in range(n):
             square = (root[i] * residuals[i]) ** 2
             squares, count = squares + square * accepted[i], count + accepted[i]
-            truncated += _cost(root[i] * residuals[i], root[i], side)
+            truncated += cost(root[i] * residuals[i], root[i], side)
         scale = _scale(squares, count, n, known)
         if scale > frame[4, 1] * _LARGEST_TILT:
             return np.inf
@@ -300,7 +226,7 @@ def without_blunders(local, root, known, view, frame, work):
     accepted, other = np.zeros(n, dtype=np.bool_), np.empty(n, dtype=np.bool_)
     _nearest(starts[0], size, local, root, accepted, frame, work)
     score = _grow(accepted, size, local, root, known, view, frame, work)
-    for rank in range(1, 1 + _STARTS):
+    for rank in range(1, 1 + STARTS):
         count = 0
         for i in range(n):
             other[i] = starts[rank, i] <= _CRITICAL
@@ -346,13 +272,25 @@ def fit_face(xyz, sigma, known, observer):
         root[i] = 1.0 / sigma[i]
         for k in range(3):
             local[k, i] = xyz[i, k] - xyz[0, k]
-    total = weighted_plane(local, root, accepted, frame, work)
-    if total > 0.0 and n > 3:
-        leverages(local, root, frame, total, residuals, lever)
-        if not (known and is_clean(root, residuals, lever)):
-            view = _view(local, frame, xyz[0], observer)
-            accepted = without_blunders(local, root, known, view, frame, work)
-            total = weighted_plane(local, root, accepted, frame, work)
+    kept = beside_the_rest(local)
+    m = kept.shape[0]
+    near, near_root, sound = local, root, np.ones(m, dtype=np.bool_)
+    if m < n:
+        near, near_root = np.empty((3, m)), np.empty(m)
+        for i in range(m):
+            near_root[i] = root[kept[i]]
+            for k in range(3):
+                near[k, i] = local[k, kept[i]]
+    total = weighted_plane(near, near_root, sound, frame, work)
+    if total > 0.0 and m > 3:
+        leverages(near, near_root, frame, total, residuals[:m], lever[:m])
+        if not (known and is_clean(near_root, residuals[:m], lever[:m])):
+            view = _view(near, frame, xyz[0], observer)
+            sound = without_blunders(near, near_root, known, view, frame, work)
+            total = weighted_plane(near, near_root, sound, frame, work)
+    accepted[:] = False
+    for i in range(m):
+        accepted[kept[i]] = sound[i]
     if total == 0.0:
         return COLLINEAR, frame, accepted, residuals, lever, covariance, (0.0, 0.0, 0.0)
     orient(frame, xyz[0], observer)

@@ -52,6 +52,11 @@ def largest_sum(redundancy: int) -> float:
 
 def accepted_points(points: Array, sigma: Array, known: bool, observer: Array | None) -> Bools:
     """What `fit_plane` does not reject, (n,)."""
+    kept = compact(points)
+    if not kept.all():
+        out = np.zeros(len(points), dtype=bool)
+        out[kept] = accepted_points(points[kept], sigma[kept], known, observer)
+        return out
     xyz, root, count = points - points[0], 1.0 / sigma, len(points)
     everything = np.ones(count, dtype=bool)
     plain = plane_of(xyz, root, everything)
@@ -71,6 +76,20 @@ def accepted_points(points: Array, sigma: Array, known: bool, observer: Array | 
         found.extend(grow(within, 4, xyz, root, known, view) for within in starts if within.sum() > 4)
     least, best = min(found, key=lambda one: one[0])
     return best if least < math.inf else everything
+
+
+def compact(points: Array) -> Bools:
+    if len(points) < 6:
+        return np.ones(len(points), dtype=bool)
+    centre = points.mean(axis=0)
+    for _ in range(15):
+        weights = 1.0 / np.maximum(np.linalg.norm(points - centre, axis=1), 1e-9)
+        centre = weights @ points / weights.sum()
+    away = np.linalg.norm(points - centre, axis=1)
+    near = away <= 2.5 * np.sort(away)[len(points) - len(points) // 4 - 1]
+    directions = (points - centre)[~near] / away[~near, None]
+    around = len(directions) > 3 and np.linalg.norm(directions.mean(axis=0)) < 0.4
+    return np.ones(len(points), dtype=bool) if around else near
 
 
 def is_clean(plane: Plane, xyz: Array, root: Array) -> bool:

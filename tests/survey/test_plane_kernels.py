@@ -5,11 +5,12 @@ import math
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from plane_twin import accepted_points, plane_of, triple_planes
+from plane_twin import accepted_points, compact, plane_of, triple_planes
 
-from survey._kernels_blunders import fit_face, search_triples
+from survey._kernels_blunders import beside_the_rest, fit_face
 from survey._kernels_planes import leverages, weighted_plane
 from survey._kernels_shapes import fit_columns, fit_two_planes, grow_columns, truncated_sum
+from survey._kernels_triples import search_triples, smallest
 
 Array = NDArray[np.float64]
 SIGMA = 0.002
@@ -50,6 +51,29 @@ def test_weighted_plane_is_that_of_the_singular_value_decomposition() -> None:
         leverages(local, root, frame, total, residuals, lever)
         np.testing.assert_allclose(np.abs(residuals), np.abs(twin.distances(points)), atol=1e-14)
         np.testing.assert_allclose(lever, twin.leverages(points, root), rtol=1e-9)
+
+
+def test_smallest_values_are_those_of_a_sorted_list() -> None:
+    rng = np.random.default_rng(7)
+    for count in range(1, 40):
+        values = rng.integers(0, 9, count).astype(float)
+        for size in range(1, count + 1):
+            assert smallest(values, size) == np.sort(values)[size - 1]
+
+
+def test_points_far_beside_a_face_are_no_part_of_it_but_corners_around_it_are() -> None:
+    rng = np.random.default_rng(8)
+    patch = np.column_stack([rng.uniform(-0.05, 0.05, (20, 2)), np.zeros(20)])
+    corners = np.array([[-0.4, -0.3, 0], [0.4, -0.3, 0], [0.4, 0.3, 0], [-0.4, 0.3, 0]])
+    for points, lost in (
+        (patch, []),
+        (np.vstack([patch, corners]), []),
+        (np.vstack([patch, corners[1:3]]), [20, 21]),
+        (np.vstack([corners, 0.5 * corners, [[3.0, 0, 0]]]), [8]),
+    ):
+        kept = beside_the_rest(np.ascontiguousarray(points.T))
+        assert sorted(set(range(len(points))) - set(kept.tolist())) == lost
+        np.testing.assert_array_equal(kept, np.flatnonzero(compact(points)))
 
 
 def test_triples_of_least_median_and_least_truncated_squares() -> None:
