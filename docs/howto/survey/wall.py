@@ -58,6 +58,8 @@ def stones(random: Random) -> list[tuple[str, str, int, float, float]]:
             if code == "G02-04":
                 kind, size = "header", 0.74
             stop = LENGTH if LENGTH - start - size < 0.2 else start + size
+            if code != "G02-04":
+                kind = "header" if stop - start < 0.45 else "stretcher"  # what closes a course as it fits
             found.append((code, kind, course, start, stop))
             start = stop + 0.01
     return found
@@ -87,12 +89,27 @@ def point_list(random: Random) -> str:
     for code, kind, course, start, stop in stones(random):
         for k, (role, (x, y, z)) in enumerate(face(code, course, start, stop, random)):
             number += 1
-            northing = f"{y:.4f}".replace("0", "O") if (code, k) == ("G05-03", 2) else f"{y:.4f}"
+            northing = f"{y:.3f}O" if (code, k) == ("G05-03", 2) else f"{y:.4f}"
             lines.append(f"{number},{northing},{x:.4f},{z:.4f},{code} {kind} {course} {role}")
     return "\n".join(lines) + "\n"
 
 
-def head(random: Random) -> str:
+def control(random: Random) -> list[str]:
+    """Six targets, known to the instrument and on the site."""
+    targets = {"C1": (-1.0, 0.2), "C2": (6.5, 0.4), "C3": (6.3, 3.4), "C4": (2.6, 3.9), "C5": (-0.8, 3.1)}
+    lines = []
+    for name, (s, t) in {**targets, "C6": (2.8, -0.3)}.items():
+        place = on_wall(s, t, 0.8 if name == "C6" else 0.0)
+        x, y, z = (random.gauss(one, SIGMA) for one in place)
+        east, north, up = (random.gauss(one, 0.003) for one in on_site(place))
+        east += 0.04 if name == "C4" else 0.0
+        lines.append(
+            f"control {name} {x:.4f} {y:.4f} {z:.4f} site {east:.3f} {north:.3f} {up:.3f} sigma 0.003"
+        )
+    return lines
+
+
+def head(targets: list[str]) -> str:
     """What the list does not say, in the native format."""
     lines = [
         "moma-survey 1",
@@ -100,20 +117,12 @@ def head(random: Random) -> str:
         "name garden wall (synthetic)",
         "observer " + " ".join(f"{one:.3f}" for one in STATION),
         f"sigma {SIGMA:g}",
+        *targets,
         "depth header 0.55 sigma 0.03 source broken end of G02-01, measured",
         "depth stretcher 0.30 sigma 0.04 source two stretchers beside a breach",
-        "depth stretcher course 1 - 2 0.42 sigma 0.03 source trench of the excavation, plinth of two courses",
+        "depth stretcher course 1-2 0.42 sigma 0.03 source trench of the excavation, plinth of two courses",
         "canon stretcher 0.61 0.30 sigma 0.03 source two feet by one, as in the north range",
     ]
-    targets = {"C1": (-1.0, 0.2), "C2": (6.5, 0.4), "C3": (6.3, 3.4), "C4": (2.6, 3.9), "C5": (-0.8, 3.1)}
-    for name, (s, t) in {**targets, "C6": (2.8, -0.3)}.items():
-        place = on_wall(s, t, 0.8 if name == "C6" else 0.0)
-        x, y, z = (random.gauss(one, SIGMA) for one in place)
-        east, north, up = on_site(place)
-        east += 0.04 if name == "C4" else 0.0
-        lines.append(
-            f"control {name} {x:.4f} {y:.4f} {z:.4f} site {east:.3f} {north:.3f} {up:.3f} sigma 0.003"
-        )
     return "\n".join(lines) + "\n"
 
 
@@ -123,7 +132,7 @@ def photographed(s: float, t: float) -> tuple[float, float]:
     return (2000.0 + 3600.0 * (s - 2.0) / depth, 1500.0 - 3600.0 * (t - 2.5 + 0.05 * s) / depth)
 
 
-def gable(random: Random) -> str:
+def gable(random: Random, targets: list[str]) -> str:
     """Two courses in the native format: every second stone was out of reach, and measured on a photograph."""
     lines = [
         "moma-survey 1",
@@ -131,6 +140,7 @@ def gable(random: Random) -> str:
         "name gable (synthetic)",
         "observer " + " ".join(f"{one:.3f}" for one in STATION),
         f"sigma {SIGMA:g}",
+        *targets,
         "depth * 0.30 sigma 0.05 source taken as below",
         "photo P1 sigma 1.5",
     ]
@@ -162,11 +172,13 @@ def gable(random: Random) -> str:
 def main(folder: Path) -> None:
     """Write the three files."""
     random = Random(1912)
-    for name, text in (
-        ("points.txt", point_list(random)),
-        ("head.moma", head(random)),
-        ("gable.moma", gable(random)),
-    ):
+    targets = control(random)
+    texts = {
+        "points.txt": point_list(random),
+        "head.moma": head(targets),
+        "gable.moma": gable(random, targets),
+    }
+    for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
 
 
