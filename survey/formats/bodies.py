@@ -21,6 +21,8 @@ __all__ = ["RawBody", "closed_bodies"]
 Array = NDArray[np.float64]
 Polygon = tuple[int, ...]
 
+_COARSEST = 1e-3  # metres: a third of what a point is measured to
+
 
 @dataclass(frozen=True)
 class RawBody:
@@ -81,6 +83,11 @@ def _welded(raw: RawBody) -> tuple[Array, list[Polygon]]:
     """Corners with the same coordinates become one; a face that is there twice counts once."""
     if not raw.polygons:
         raise GeometryError("it has no faces", remedy="export closed surfaces")
+    if raw.resolution > _COARSEST:
+        raise GeometryError(
+            f"its coordinates are rounded to {raw.resolution:.2g} m",
+            remedy="export them in double precision, or about an origin near the building",
+        )
     _, first, indices = np.unique(raw.vertices + 0.0, axis=0, return_index=True, return_inverse=True)
     rank = np.argsort(np.argsort(first))  # in the order of the file
     vertices, new = raw.vertices[np.sort(first)], rank[indices.reshape(-1)].tolist()

@@ -5,7 +5,7 @@ The first line names the columns, in any order: ``block,kind,course,role,x,y,z``
 tabs; decimals have a point or, where columns are not separated by commas, a comma. ``role`` is ``vertex`` or
 ``v`` for a corner of the face, in order around it, ``point`` or ``p`` for any other point on it. Lengths are
 metres; empty fields mean "not known". The lines of a block may lie anywhere. A line that begins with ``#`` is a
-comment.
+comment; rows of nothing but separators are passed over, and columns without a name at the right are empty.
 """
 
 import csv
@@ -77,8 +77,10 @@ def read_csv(path: Path, default_sigma: float = 0.003) -> Survey:
 
 
 def _without_comments(lines: TextLines) -> Iterator[tuple[int, str]]:
+    """Lines that say something: spreadsheets end tables in rows of nothing but separators."""
     for number, line in lines:
-        if line.strip() and not line.lstrip().startswith("#"):
+        text = line.strip(" \t,;")
+        if text and not text.startswith("#"):
             yield number, line
 
 
@@ -103,6 +105,7 @@ class _RowReader:
         """Read one line."""
         code: str | None = None
         try:
+            code = self._code(line.replace('"', "").split(self._delimiter)) if '"' in line else None
             values = self._split(line, f"{self._path}:{number}")
             code = self._code(values)
             stone = None if code is None else self.table.stones.get(code)
@@ -116,9 +119,12 @@ class _RowReader:
     def _code(self, values: list[str]) -> str | None:
         """The block that a line, however wrong, is of; None if that cannot be known."""
         at = self._needed[0]
-        return values[at] if at < len(values) and CODE.fullmatch(values[at]) else None
+        code = values[at].strip() if at < len(values) else ""
+        return code if CODE.fullmatch(code) else None
 
     def _take(self, values: list[str], stone: TableStone | None, number: int) -> None:
+        if len(values) > self._count and not any(values[self._count :]):
+            del values[self._count :]
         if len(values) != self._count:
             raise self._fail(number, f"{len(values)} fields for {self._count} columns", "fill every column")
         code, kind, course, role, x, y, z = (values[i] for i in self._needed)
@@ -191,6 +197,8 @@ def _delimiter(line: str) -> str:
 
 
 def _columns(names: list[str], where: str) -> list[str]:
+    while names and not names[-1]:
+        del names[-1]
     expected = ",".join(_NEEDED) + "".join(f"[,{name}]" for name in _OPTIONAL)
     missing = [name for name in _NEEDED if name not in names]
     if missing:

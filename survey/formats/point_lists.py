@@ -78,8 +78,8 @@ def _open(path: Path, options: ReadingOptions, axes: str) -> SurveyStream:
 
 def _rows(lines: TextLines) -> Iterator[tuple[int, str]]:
     for number, line in lines:
-        text = line.strip(" ")
-        if text and not text.isspace() and not text.startswith("#"):
+        text = line.strip(" \t,;")
+        if text and not text.startswith("#"):
             yield number, line
 
 
@@ -110,12 +110,14 @@ class _ListReader:
         try:
             parts = self._split(line)
             if len(parts) != 5:
+                block = self._likely_block(line)
                 raise self._fail(
                     number, f"{len(parts)} fields, not 5", "write point, two coordinates, elevation, code"
                 )
             name, a, b, c, description = parts
             code = self._template.parse(description)
             if code is None:
+                block = self._likely_block(line)
                 raise self._fail(
                     number,
                     f"description {shown(description)} is not of the form {self._template.text}",
@@ -150,6 +152,15 @@ class _ListReader:
             )
         stone.add_place(code.role == "vertex", place, _NOTHING, name)
         stone.add_line(number)
+
+    def _likely_block(self, line: str) -> str | None:
+        """The stone that a line with a field too many or too few is of; None if that cannot be known."""
+        rest: list[str] = [line]
+        while len(rest := rest[-1].split(self._separator, 1)) == 2:
+            code = self._template.parse(rest[1].strip())
+            if code is not None and code.role != STATION:
+                return code.block
+        return None
 
     def _check_name(self, name: str, number: int) -> None:
         if not name or not name.isprintable() or len(name) > _LONGEST_NAME:

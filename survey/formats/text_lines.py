@@ -2,8 +2,9 @@
 
 A file is gone through twice, each time in blocks of whole lines, so that memory does not grow with it: first to
 find its encoding and what no text has, then for its lines. UTF-8 is tried first, with or without its mark (BOM):
-hardly any text in another encoding is valid UTF-8 by chance. Everything else is taken as Latin-1, in which every
-byte means something; what betrays other encodings and binary files are control characters, which are refused.
+hardly any text in another encoding is valid UTF-8 by chance. Everything else is taken as Latin-1, with the quotation
+marks and dashes that Windows adds to it (code page 1252), in which nearly every byte means something; what betrays
+other encodings and binary files are control characters, which are refused.
 """
 
 from collections.abc import Iterator
@@ -17,7 +18,6 @@ _BLOCK = 1 << 18
 _LONGEST = 1 << 16  # bytes of one line: no table that people write comes near
 _MARK = b"\xef\xbb\xbf"
 _CONTROLS = bytes([*range(9), 11, 12, *range(14, 32), 127])  # all but tab, line feed and carriage return
-_LATER_CONTROLS = bytes(range(128, 160))
 _SAVE_AS = "save the file as UTF-8 text"
 
 
@@ -30,7 +30,7 @@ class TextLines:
     Attributes
     ----------
     path : as text, for messages
-    encoding : "utf-8" or "latin-1"
+    encoding : "utf-8" or "cp1252", of which Latin-1 is a part
     end : number of the line on which the file ends
     """
 
@@ -73,7 +73,7 @@ class TextLines:
                 block.decode("utf-8")
             except UnicodeDecodeError as error:
                 if not marked:
-                    return "latin-1"
+                    return "cp1252"
                 line += block.count(b"\n", 0, error.start)
                 what = f"the file begins with the mark of UTF-8, but byte 0x{block[error.start]:02x} is not UTF-8"
                 raise self.fail(line, what, _SAVE_AS) from error
@@ -94,14 +94,19 @@ class TextLines:
     def _has_controls(self, block: bytes) -> bool:
         if block.count(b"\r") != block.count(b"\r\n") or len(block.translate(None, _CONTROLS)) < len(block):
             return True
-        return not block.isascii() and any(128 <= ord(one) < 160 for one in set(block.decode(self.encoding)))
+        return not block.isascii() and any(
+            _is_control(one) for one in set(self._decoded(block)) - {"\n", "\r"}
+        )
 
     def _check_line(self, line: bytes, number: int) -> None:
-        for one in line.decode(self.encoding):
-            if one != "\t" and (ord(one) < 32 or 127 <= ord(one) < 160):
-                raise self.fail(
-                    number, f"control character 0x{ord(one):02x}: this is not plain text", _SAVE_AS
-                )
+        for one in self._decoded(line):
+            if _is_control(one):
+                code = ord(one) & 0xFF
+                raise self.fail(number, f"control character 0x{code:02x}: this is not plain text", _SAVE_AS)
+
+    def _decoded(self, data: bytes) -> str:
+        """Text in which bytes that mean nothing are halves of surrogate pairs."""
+        return data.decode(self.encoding, "surrogateescape")
 
     def _blocks(self) -> Iterator[bytes]:
         """Blocks of whole lines."""
@@ -136,3 +141,8 @@ class TextLines:
                 raise self.fail(line, f"a line of more than {_LONGEST} bytes", "this is not a survey file")
             start = found
         return block
+
+
+def _is_control(one: str) -> bool:
+    code = ord(one)
+    return (code < 32 and one != "\t") or 127 <= code < 160 or 0xDC80 <= code < 0xDD00

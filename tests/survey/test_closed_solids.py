@@ -267,6 +267,16 @@ def test_a_mesh_is_read_as_another_program_reads_it(tmp_path: Path, version: str
     assert len(found["W_3"].faces) == 6
 
 
+def test_coordinates_that_single_precision_has_spoilt_are_refused(tmp_path: Path) -> None:
+    """At 10 km single precision rounds to a millimetre, at a northing of 6,860 km to half a metre."""
+    for x, rounded in ((8.0e3, False), (9.0e3, True), (6.86e6, True)):
+        box = trimesh.creation.box((3.0, 2.0, 2.0), transform=shift(x))
+        (one,) = read(tmp_path / "far.stl", box.export(file_type="stl"))
+        assert isinstance(one, Reject) == rounded, x
+        (one,) = read(tmp_path / "far.obj", box.export(file_type="obj"))
+        assert isinstance(one, SolidRecord), x
+
+
 @pytest.mark.parametrize("ending", ["obj", "ply", "stl", "msh"])
 def test_a_missing_file_is_named(tmp_path: Path, ending: str) -> None:
     with pytest.raises(SurveyError, match="cannot be read"):

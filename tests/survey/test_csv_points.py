@@ -144,6 +144,27 @@ def test_a_wrong_line_spoils_its_block_and_no_other(tmp_path: Path) -> None:
     ]
 
 
+def test_a_line_that_is_no_row_spoils_the_block_that_it_names(tmp_path: Path) -> None:
+    for wrong in (
+        'A,header,1,"point,0,0,0',
+        "A,header",
+        'A,header,1,point,0,0,0,"',
+        " A ,header,1,point,0,0,0,7",
+    ):
+        (one,) = open_csv(write(tmp_path, HEAD + ROWS + wrong + "\n")).blocks
+        assert isinstance(one, Reject), wrong
+        assert one.spans == (range(2, 6),)
+
+
+def test_rows_and_columns_of_nothing_are_passed_over(tmp_path: Path) -> None:
+    """As spreadsheets write them at the bottom and at the right."""
+    text = (HEAD + ROWS).replace("\n", ",,\n") + ",,,,,,,,\n\n,,\n"
+    (one,) = read_csv(write(tmp_path, text)).blocks
+    assert one.vertices.shape == (3, 3)
+    with pytest.raises(SurveyError, match="9 fields for 7 columns"):
+        read_csv(write(tmp_path, text.replace("1,1,0,,", "1,1,0,,x")))
+
+
 def test_a_table_of_nothing_but_wrong_lines_is_refused_early(tmp_path: Path) -> None:
     with pytest.raises(SurveyError, match=r"wall\.csv:2: .*fields"):
         open_csv(write(tmp_path, HEAD + "?\n" * 5000))

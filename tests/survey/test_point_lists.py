@@ -238,6 +238,18 @@ def test_a_wrong_line_spoils_its_stone_and_no_other(tmp_path: Path) -> None:
     assert found[1].spans == (range(5, 6),)
 
 
+@pytest.mark.parametrize("wrong", ["5,1,2,A, 7:p", "5,A, 7:p", "5,1,2,3,4,A, 7:p"])
+def test_a_line_with_a_field_too_many_or_too_few_spoils_the_stone_that_it_names(
+    tmp_path: Path, wrong: str
+) -> None:
+    rows = ROWS.replace(",A:", ",A, 7:")
+    (one,) = open_pnezd(
+        write(tmp_path, rows + wrong), ReadingOptions(codes="{block}, {course}:{role}")
+    ).blocks
+    assert isinstance(one, Reject)
+    assert one.spans == (range(1, 6),)
+
+
 def test_kind_course_and_zone_are_the_same_for_all_points_of_a_stone(tmp_path: Path) -> None:
     options = ReadingOptions(codes="{block} {course}:{role}")
     rows = ROWS.replace("A:", "A 1:").replace("A 1:p", "A 2:p")

@@ -177,7 +177,7 @@ def check_block(one: BlockRecord, data: bytes, format: str) -> None:
     assert np.abs(measured).max(initial=0.0) <= 1e8
     assert len(one.vertices) >= 3 or (one.photograph is not None and len(one.image) >= 3)
     assert one.sigma > 0.0
-    lines = ["", *data.decode("utf-8-sig" if is_utf8(data) else "latin-1").split("\n")]
+    lines = ["", *data.decode("utf-8-sig" if is_utf8(data) else "cp1252", "replace").split("\n")]
     own = [lines[k] for span in one.spans for k in span]
     if format == "moma":
         counted = sum(bool(re.match(r"\s*(vertex|point|pixel)(\s|$)", line)) for line in own)
