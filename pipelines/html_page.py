@@ -15,6 +15,7 @@ figure { margin: 1.5rem 0; } img, svg { max-width: 100%; height: auto; } figcapt
 table { border-collapse: collapse; }
 th, td { padding: .3rem .9rem .3rem 0; text-align: left; vertical-align: top; }
 td.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+.wide { overflow-x: auto; } .wide table { font-size: .85rem; }
 tr + tr { border-top: 1px solid #ddd; } .warning { background: #fff3d6; padding: .6rem 1rem; }
 """
 

@@ -8,7 +8,7 @@ import numpy as np
 
 __all__ = ["kilopascals", "megapascals", "millimetres", "percent", "ratio", "scientific", "table"]
 
-_LONGEST = 28  # characters of a number with its precision and unit; a longer cell is a sentence
+_LONGEST = 32  # characters of a number with its precision and unit; a longer cell is a sentence
 
 
 def table(rows: Iterable[Sequence[str]], head: Sequence[str] = ()) -> str:

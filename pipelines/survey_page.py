@@ -18,11 +18,11 @@ _MOST = 300  # rows of a table; survey.json has them all
 _HEADS = {
     "remeasure": ("Stone", "Why", "What to do", "Line"),
     "stones": (
-        "Stone", "Kind", "Course", "Facade", "rms", "σ₀", "Redundancy", "Left out", "Face", "Tilt σ", "Length",
-        "Height", "Depth", "Evidence for the depth",
+        "Stone", "Kind", "Course", "Facade", "rms", "σ₀", "Redundancy", "Left out", "Face", "Tilt σ",
+        "Length × height", "Depth", "Evidence for the depth",
     ),
     "courses": (
-        "Course", "Stones", "Bed at", "Slope", "Chance", "Mid-span over chord", "Chance", "rms", "Farthest corner",
+        "Course", "Stones", "Bed at", "Slope (chance)", "Mid-span over chord (chance)", "rms", "Farthest corner",
         "Beds scatter by", "Height to next bed", "Finding",
     ),
     "kinds": ("Kind", "Length", "Height", "Evidence", "Stones beyond 3 σ"),
@@ -82,7 +82,11 @@ def _remeasures(study: SurveyStudy) -> list[str]:
         (one.code or "(no code)", one.reason, one.action, str(one.line) if one.line else "–")
         for one in study.remeasures[:_MOST]
     ]
-    return ["<p>Most urgent first.</p>", table(rows, _HEADS["remeasure"]), *_more(len(study.remeasures))]
+    return [
+        "<p>Most urgent first.</p>",
+        _wide(table(rows, _HEADS["remeasure"])),
+        *_more(len(study.remeasures)),
+    ]
 
 
 def _overall(study: SurveyStudy) -> list[tuple[str, str]]:
@@ -147,7 +151,7 @@ def _courses(study: SurveyStudy) -> list[str]:
     for facade in dict.fromkeys(line.facade for line in study.courses):
         lines = [line for line in study.courses if line.facade == facade]
         rows = [_course_row(line, heights) for line in lines[:_MOST]]
-        out += [f"<h3>{escape(facade)}</h3>", table(rows, _HEADS["courses"]), *_more(len(lines))]
+        out += [f"<h3>{escape(facade)}</h3>", _wide(table(rows, _HEADS["courses"])), *_more(len(lines))]
     return out
 
 
@@ -160,10 +164,8 @@ def _course_row(
         f"{line.course}" if line.zone is None else f"{line.zone}, {line.course}",
         str(len(line.stones)),
         f"{line.level:.3f} m",
-        _plus_minus(line.slope, line.slope_sigma, 1e3, "mm/m", 2),
-        _chance(line.slope_probability),
-        _plus_minus(line.sag, line.sag_sigma, 1e3, "mm", 1),
-        _chance(line.sag_probability),
+        _plus_minus(line.slope, line.slope_sigma, 1e3, "mm/m", 2) + _chance(line.slope_probability),
+        _plus_minus(line.sag, line.sag_sigma, 1e3, "mm", 1) + _chance(line.sag_probability),
         _mm(line.rms),
         f"{farthest * 1e3:.1f} mm, {code}",
         _mm(line.scatter) if line.evidence != "none" else "–",
@@ -212,7 +214,7 @@ def _stones(study: SurveyStudy) -> list[str]:
     if not rows:
         return ["<p>None.</p>"]
     words = "Those to measure again first, then those whose points scatter most."
-    return [f"<p>{words}</p>", table(rows, _HEADS["stones"]), *_more(len(order))]
+    return [f"<p>{words}</p>", _wide(table(rows, _HEADS["stones"])), *_more(len(order))]
 
 
 def _stone_row(stone: StoneQuality, facade: str) -> tuple[str, ...]:
@@ -227,8 +229,7 @@ def _stone_row(stone: StoneQuality, facade: str) -> tuple[str, ...]:
         ", ".join((*stone.blunders, *stone.worn)) or "none",
         stone.shape_text if stone.measured else stone.provenance,
         f"{stone.tilt_sigma:.2f}°",
-        f"{stone.length:.3f} ± {stone.dimension_sigma:.3f} m",
-        f"{stone.height:.3f} ± {stone.dimension_sigma:.3f} m",
+        f"{stone.length:.3f} × {stone.height:.3f} ± {stone.dimension_sigma:.3f} m",
         f"{stone.depth:.3f}" + (" m" if stone.depth_sigma is None else f" ± {stone.depth_sigma:.3f} m"),
         f"{stone.depth_source} ({stone.depth_origin})",
     )
@@ -236,6 +237,10 @@ def _stone_row(stone: StoneQuality, facade: str) -> tuple[str, ...]:
 
 def _more(count: int) -> list[str]:
     return [f"<p>The first {_MOST} of {count}; survey.json has them all.</p>"] if count > _MOST else []
+
+
+def _wide(text: str) -> str:
+    return f'<div class="wide">{text}</div>'
 
 
 def _counts(counts: Mapping[str, int]) -> str:
@@ -254,5 +259,5 @@ def _plus_minus(value: float | None, sigma: float | None, scale: float, unit: st
 
 def _chance(probability: float | None) -> str:
     if probability is None:
-        return "–"
-    return "< 0.1 %" if probability < 1e-3 else f"{100.0 * probability:.1f} %"
+        return ""
+    return " (< 0.1 %)" if probability < 1e-3 else f" ({100.0 * probability:.1f} %)"

@@ -16,7 +16,7 @@ from moma.cli import app
 
 ROOT = Path(__file__).resolve().parents[2]
 SAMPLE = ROOT / "data/samples/window"
-COMMANDS = ("ingest", "query", "show", "check", "run")
+COMMANDS = ("ingest", "survey-report", "query", "show", "check", "run")
 
 
 @pytest.fixture(scope="module")
