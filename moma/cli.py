@@ -67,7 +67,9 @@ Kind = Annotated[
 Sigma = Annotated[
     float | None,
     typer.Option(
-        "--sigma", metavar="S", help="Standard deviation of a coordinate, where a file does not say it [m]."
+        "--sigma",
+        metavar="S",
+        help="Standard deviation of a coordinate in metres, where a file does not say it.",
     ),
 ]
 SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene file; see docs/scene.md.")]
