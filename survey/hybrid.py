@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from moma.errors import GeometryError, MomaError, SurveyError
 from survey.common_planes import CommonPlane, PlaneEstimate, common_plane
-from survey.marked_walls import MarkedWall, wall_of_marks
+from survey.marked_walls import OFF_SQUARE, MarkedWall, wall_of_marks
 from survey.neighbours import MeasuredFace, Neighbours
 from survey.planes import FaceFit, fit_plane
 from survey.records import BlockRecord, Photograph, SurveyHead
@@ -24,7 +24,6 @@ __all__ = ["LiftedFace", "lift", "lift_faces", "plane_of_wall"]
 
 Array = NDArray[np.float64]
 
-_OFF_SQUARE = float(np.tan(np.radians(15.0)))  # standard deviation of a sight whose station is not known
 _COARSEST = 0.1  # standard deviation of a corner over the size of the stone, beyond which it is refused
 _GRAZING = float(np.sin(np.radians(10.0)))
 
@@ -210,7 +209,7 @@ def _moved(
     height = plane.height_sigma(corners) ** 2
     variance = 0.5 * (own + height * ((per_height @ plane.axes.T) ** 2).sum(axis=1))
     if wall.viewpoint is None:
-        variance = variance + (down**2 + height) * _OFF_SQUARE**2
+        variance = variance + (down**2 + height) * OFF_SQUARE**2
     return corners, np.sqrt(variance)
 
 

@@ -2,7 +2,8 @@
 
 Where the photograph's station is known, every mark is moved along the line of sight onto the common plane: there it
 appears at the same image point, however far it stands out of the wall. Where it is not known, marks can only be
-dropped square to the plane, and those that stand out of it are left out.
+dropped square to the plane: the farther one stands out, the less it tells, and those that stand out of the relief of
+the wall are left out.
 """
 
 from dataclasses import dataclass, replace
@@ -10,15 +11,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
+from scipy.special import stdtrit
 
 from moma.errors import GeometryError
 from survey.homography import Homography, fit_homography
 from survey.planes import FaceFit, fit_plane
 from survey.records import Photograph
 
-__all__ = ["MarkedWall", "wall_of_marks"]
+__all__ = ["OFF_SQUARE", "MarkedWall", "wall_of_marks"]
 
 Array = NDArray[np.float64]
+
+OFF_SQUARE = float(np.tan(np.radians(15.0)))
+"""Standard deviation of the tangent of a line of sight whose station is not known, against the wall's normal."""
 
 _GRAZING = float(np.sin(np.radians(10.0)))  # a flatter sight fixes nothing
 _FARTHEST = 0.5  # how far corners may lie outside the marks, in sizes of these
@@ -134,11 +139,14 @@ def _tied(photograph: Photograph, viewpoint: Array | None, observer: Array | Non
     sigmas = np.array([mark.sigma for mark in marks], dtype=np.float64)
     image = np.array([mark.image for mark in marks], dtype=np.float64)
     names = [f"mark at line {mark.line}" if mark.line else f"mark {i + 1}" for i, mark in enumerate(marks)]
-    fit = fit_plane(positions, sigmas, viewpoint if viewpoint is not None else observer)
+    fit = _plane(positions, sigmas, viewpoint if viewpoint is not None else observer)
     kept = np.arange(len(marks))
     if viewpoint is None:
         kept = np.setdiff1d(kept, fit.rejected)
         flat = positions - fit.centroid
+        # how far each stands out is itself known no better than the relief
+        relief = np.sqrt(np.mean(fit.residuals[kept] ** 2))
+        sigmas = np.hypot(sigmas, OFF_SQUARE * np.hypot(fit.residuals, relief))
     else:
         flat, slant = _along_sight(positions, fit, viewpoint)
         # an error along the plane's normal shifts the mark along the plane by tan of the slant
@@ -164,6 +172,29 @@ def _tied(photograph: Photograph, viewpoint: Array | None, observer: Array | Non
         hull=ConvexHull(used).equations,
         size=size,
     )
+
+
+def _plane(positions: Array, sigmas: Array, towards: Array | None) -> FaceFit:
+    """Plane of the marks. They scatter about it as the stones do that bear them, not only as they were measured."""
+    free = len(positions) - 3
+    deviation = max(_deviation(positions), 1e-12)
+    plain = fit_plane(positions, np.maximum(sigmas, deviation), towards)
+    inner = (plain.residuals / deviation) ** 2
+    # Student's test of the farthest mark against the scatter of the others
+    left = max(free - float(inner.max()), 1e-9)
+    if free < 2 or inner.max() * (free - 1) / left <= stdtrit(free - 1, 1.0 - 0.5e-3 / len(positions)) ** 2:
+        return plain
+    # the median residual, with its correction for few points (Rousseeuw & Leroy 1987)
+    rough = np.median(np.abs(fit_plane(positions, None, towards).residuals))
+    scatter = 1.4826 * (1.0 + 5.0 / free) * float(rough)
+    return fit_plane(positions, np.maximum(sigmas, scatter), towards)
+
+
+def _deviation(positions: Array) -> float:
+    """Standard deviation of points from their plane of least squares [m]."""
+    local = positions - positions[0]
+    singular = np.linalg.svd(local - local.mean(axis=0), compute_uv=False)
+    return float(singular[2]) / float(np.sqrt(len(positions) - 3))
 
 
 def _along_sight(positions: Array, fit: FaceFit, viewpoint: Array) -> tuple[Array, Array]:

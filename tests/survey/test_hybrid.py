@@ -171,6 +171,18 @@ def test_marks_out_of_the_plane_do_no_harm_where_the_station_is_known() -> None:
         np.testing.assert_allclose(face.outline, wall.corners[14], atol=1e-7)
 
 
+def test_marks_on_the_relief_of_a_wall_are_kept_without_a_station_too() -> None:
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        wall = build(rng, relief=0.01)
+        tied = wall_of_marks(photograph(wall, rng, 0.001, 0.5), None, wall.camera)
+        assert tied.fit.rejected == ()
+        assert len(tied.homography.rejected) <= 1  # this sight is some 25° off square
+        face = lift(stone(wall, 14, rng, 0.5), tied, Neighbours(measured(wall, rng, 0.001, {14})))
+        error = (face.outline - wall.corners[14]) @ face.fit.axes.T
+        assert (np.abs(error) < 4 * face.sigma[:, None]).all()
+
+
 # ------------------------------------------------------------------------------------------------------- precision
 
 
