@@ -9,6 +9,7 @@ deviations in 0.9973² = 99.46 % of faces without any blunder, so 99 % leaves 0.
 """
 
 from fractions import Fraction
+from functools import partial
 
 import numpy as np
 import pytest
@@ -293,10 +294,21 @@ def typing_errors(rng, true, count):
 KINDS = [one_side, both_sides, another_plane, anywhere, typing_errors]
 
 
-@pytest.mark.parametrize("kind", KINDS, ids=lambda f: f.__name__)
-@pytest.mark.parametrize("where", ["inside", "corners"])
-def test_a_fifth_of_gross_blunders_leaves_the_tilts_within_three_sigma(kind, where):
-    # 3 of 15 points; among the corners they weigh most, for they hold the tilt
+def gross(kind, rng, true, count):
+    """Blunders of a kind that are gross for the plane: ten standard deviations off it, or more."""
+    drawn = kind(rng, true, count)
+    while np.abs(drawn @ true.normal).min() < 10 * SIGMA:
+        again = kind(rng, true, count)
+        small = np.abs(drawn @ true.normal) < 10 * SIGMA
+        drawn[small] = again[small]
+    return drawn
+
+
+def with_a_fifth_of_blunders(kind, where):
+    """(share of faces whose tilts are both within 3 σ, good points lost per face); 3 of 15 points are wrong.
+
+    Among the corners they weigh most, for corners hold the tilt.
+    """
     rng = np.random.default_rng(31)
     errors, lost = [], 0
     for _ in range(FACES):
@@ -307,7 +319,25 @@ def test_a_fifth_of_gross_blunders_leaves_the_tilts_within_three_sigma(kind, whe
         fit = fit_plane(points, SIGMA, observer=true.observer)
         errors.append(fit.axes @ true.normal / np.sqrt(np.diag(fit.covariance)[:2]))
         lost += len(set(fit.rejected) - set(bad.tolist()))
-    inside = np.mean((np.abs(errors) <= 3).all(axis=1))
-    print(f"{kind.__name__}, {where}: {inside:.2%}, {lost / FACES:.3f} good points lost per face")
+    return np.mean((np.abs(errors) <= 3).all(axis=1)), lost / FACES
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda f: f.__name__)
+@pytest.mark.parametrize("where", ["inside", "corners"])
+def test_a_fifth_of_gross_blunders_leaves_the_tilts_within_three_sigma(kind, where):
+    inside, lost = with_a_fifth_of_blunders(partial(gross, kind), where)
+    print(f"{kind.__name__}, {where}: {inside:.2%}, {lost:.3f} good points lost per face")
     assert inside >= 0.99
-    assert lost <= 0.06 * FACES  # 12 good points at 0.1 %: 0.012, and one for the coincidences of `anywhere`
+    assert (
+        lost <= 0.05
+    )  # 12 good points tested at 0.1 %: 0.012, and more where blunders lie close to the face
+
+
+@pytest.mark.parametrize("kind", [anywhere, typing_errors], ids=lambda f: f.__name__)
+@pytest.mark.parametrize("where", ["inside", "corners"])
+def test_blunders_of_any_size_do_little_harm(kind, where):
+    # a point 0.1 m off within the face, or a wild one that happens to lie near the plane, cannot be told from a good
+    # one; what it does to the tilt is not in the prediction. Nothing is asked of these; 97 % is what is promised
+    inside, lost = with_a_fifth_of_blunders(kind, where)
+    print(f"{kind.__name__} of any size, {where}: {inside:.2%}, {lost:.3f} good points lost per face")
+    assert inside >= 0.97
