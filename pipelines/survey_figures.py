@@ -2,6 +2,7 @@
 
 import logging
 import math
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -118,7 +119,7 @@ def draw_courses(path: Path, lines: Sequence[CourseLine]) -> None:
         if not small:
             axes.annotate(
                 _label(line), (right, y), (8, 0), textcoords="offset points", va="center", fontsize=8, color=colour,
-                annotation_clip=False,
+                annotation_clip=False, parse_math=False,
             )  # fmt: skip
     axes.set_xlim(left - 0.02 * (right - left), right + 0.02 * (right - left))
     axes.set_xlabel("along the facade, to the right of the viewer [m]")
@@ -243,7 +244,9 @@ def _write_codes(
         if size >= 3.5:
             colour = "white" if math.isfinite(dark) and dark > 0.7 else _INK
             x, y = polygon.mean(axis=0)
-            axes.text(x, y, stone.code, ha="center", va="center", fontsize=size, color=colour)
+            axes.text(
+                x, y, stone.code, ha="center", va="center", fontsize=size, color=colour, parse_math=False
+            )
 
 
 def _frame_elevation(axes: "Axes", facade: Facade, low: Array, high: Array) -> None:
@@ -296,4 +299,8 @@ def _figure(size: tuple[float, float]) -> "Figure":
 
 
 def _save(figure: "Figure", path: Path) -> None:
-    figure.savefig(path, dpi=_DPI)
+    with warnings.catch_warnings():
+        warnings.filterwarnings(
+            "ignore", "Glyph"
+        )  # codes in scripts that the font does not have show as boxes
+        figure.savefig(path, dpi=_DPI)

@@ -47,6 +47,11 @@ def write_survey_page(path: Path, study: SurveyStudy, pictures: Mapping[str, str
         f"<h1>{escape(study.name)}</h1>",
         f'<p class="lead">{_lead(study)}</p>',
         *elevations,
+        *(
+            [f"<p>Pictures of the {len(elevations)} largest of {len(study.facades)} facades.</p>"]
+            if len(elevations) < len(study.facades)
+            else []
+        ),
         "<h2>What to measure again</h2>",
         *_remeasures(study),
         "<h2>How precise the points are</h2>",
@@ -228,8 +233,9 @@ def _stone_row(stone: StoneQuality, facade: str) -> tuple[str, ...]:
         str(stone.redundancy),
         ", ".join((*stone.blunders, *stone.worn)) or "none",
         stone.shape_text if stone.measured else stone.provenance,
-        f"{stone.tilt_sigma:.2f}°",
-        f"{stone.length:.3f} × {stone.height:.3f} ± {stone.dimension_sigma:.3f} m",
+        f"{stone.tilt_sigma:.2f}°" if math.isfinite(stone.tilt_sigma) else "–",
+        f"{stone.length:.3f} × {stone.height:.3f}"
+        + (f" ± {stone.dimension_sigma:.3f} m" if math.isfinite(stone.dimension_sigma) else " m"),
         f"{stone.depth:.3f}" + (" m" if stone.depth_sigma is None else f" ± {stone.depth_sigma:.3f} m"),
         f"{stone.depth_source} ({stone.depth_origin})",
     )

@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 ENOUGH = 5
 """Stones of a kind from which a median and its scatter can be had."""
 
+_EXACT = 1e-6  # metres: nothing is known better than this
 _CONSISTENT = 1.4826  # median absolute deviation to standard deviation, of a normal distribution
 
 
@@ -101,13 +102,22 @@ def _deviation(stone: StoneQuality, usual: KindStandard) -> Deviation:
         stone.kind,
         length,
         height,
-        length / math.hypot(stone.dimension_sigma, usual.length_scatter),
-        height / math.hypot(stone.dimension_sigma, usual.height_scatter),
+        _score(length, _precision(stone), usual.length_scatter),
+        _score(height, _precision(stone), usual.height_scatter),
     )
 
 
+def _precision(stone: StoneQuality) -> float:
+    """Standard deviation of its dimensions; those of a solid that was modelled are taken as they are."""
+    return stone.dimension_sigma if math.isfinite(stone.dimension_sigma) else 0.0
+
+
+def _score(deviation: float, precision: float, scatter: float) -> float:
+    return deviation / max(math.hypot(precision, scatter), _EXACT)
+
+
 def _median(kind: str, stones: Sequence[StoneQuality]) -> KindStandard:
-    precision = float(np.median([stone.dimension_sigma for stone in stones]))
+    precision = float(np.median([_precision(stone) for stone in stones]))
     length, length_scatter = _centre(np.array([stone.length for stone in stones]), precision)
     height, height_scatter = _centre(np.array([stone.height for stone in stones]), precision)
     source = f"median of {len(stones)} stones of this survey"

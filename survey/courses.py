@@ -53,7 +53,7 @@ class CourseLine:
     along : (n,) place of each corner along the facade, to the right of the viewer [m]
     height : (n,) its z [m]
     sigma : (n,) standard deviation of its z as measured [m]
-    left_out : worn corners that do not count
+    left_out : lower corners that do not count: worn, or of unknown precision
     middle : half-way between the ends, along the facade [m]
     level : z of the line there [m]; it and `slope` have the covariance
     slope : rise to the right over length [-]; None if one corner alone is left
@@ -226,7 +226,8 @@ def _course(stones: Sequence[StoneQuality], facade: Facade) -> _Course | None:
     left_out = 0
     for stone in stones:
         lower = lower_corners(stone.outline, facade.frame)
-        sound = [k for k in lower if k not in stone.worn_corners]
+        known = np.isfinite(stone.corner_sigma[:, 2])
+        sound = [k for k in lower if k not in stone.worn_corners and known[k]]
         left_out += len(lower) - len(sound)
         along = (stone.outline[sound] - facade.frame.origin) @ facade.frame.axes[0]
         parts.append(np.column_stack([along, stone.outline[sound, 2], stone.corner_sigma[sound, 2]]))
