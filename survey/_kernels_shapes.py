@@ -13,6 +13,7 @@ __all__ = ["fit_columns", "fit_two_planes", "grow_columns", "truncated_sum"]
 
 _LIMIT = 3.29**2  # square of a standardised residual beyond which a point is a blunder: α₀ = 0.1 %
 _DIRECTIONS = 24  # in which a line is looked for that parts the points
+_TILTED = 6.63  # chi-square of one parameter at 1 %
 _FLATTEST = 3.0  # spread of points across a strip over their σ below which its tilt is not asked for
 
 
@@ -140,9 +141,15 @@ def fit_two_planes(u, v, z, root):
             if count < 3 or n - count < 4:
                 continue
             rival, within, coefficients = _both_planes(along, across, z, root, beyond, count)
-            if rival < score:
+            if rival + _worth(coefficients) < score + _worth(plane):
                 score, least, far[:], way[0], way[1], plane = rival, within, beyond, c, s, coefficients
     return score, least, far, way, plane
+
+
+@njit(cache=True)
+def _worth(plane):
+    """Squares that a tilt across must explain, lest a few points of the first plane be taken for it."""
+    return 0.0 if math.isnan(plane[2]) else _TILTED
 
 
 @njit(cache=True)

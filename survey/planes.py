@@ -13,8 +13,8 @@ wrong, and, where the precision is known, those of least truncated squares. From
 a time: a point enters, or leaves again, by the test of its standardised residual (Baarda 1968, α₀ = 0.1 %). The
 one with the least truncated squares is kept, where a point that lies a little in front of the face counts twice:
 stones erode and mortar recedes behind the face, and nothing grows out of it. Points far beside the face are left
-out first: where they happen to lie near its plane prolonged, they would outvote all others. What other estimators make of such
-faces is measured in docs/decisions/012-robust-planes.md.
+out first: where they happen to lie near its plane prolonged, they would outvote all others. What other
+estimators make of such faces is measured in docs/decisions/012-robust-planes.md.
 """
 
 import math

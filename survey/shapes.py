@@ -58,13 +58,11 @@ class FaceShape:
     curvature_sigma: Array | None = None
 
 
-_LIMIT = 3.29**2  # square of a standardised residual beyond which a point is a blunder: α₀ = 0.1 %
 _CURVED = 16.27  # chi-square of the 3 parameters of a quadric at 0.1 %
 _CURVED_WITHOUT = 7.81  # the same at 5 %: what must be left of it without any one point
 _CURVED_BEYOND_TWO = 22.0  # what two blunders count that a quadric can be bent through
-_SECOND_PLANE = (
-    27.0  # squares that a second plane must explain: 3 parameters at 0.1 %, and some 200 lines tried
-)
+_STRIP = 24.4  # the same for a strip along an edge: 2 parameters
+_SECOND_PLANE = 26.9  # squares that a second plane must explain: 3 parameters at 0.1 %, 200 lines tried
 _SEARCH = 10.6  # of these, what the search of the line is worth: 2 ln 200
 _WIDER = 5.0  # by how much wider scatter must be the better explanation
 _EXACT = 1e-13  # scatter over size that is rounding
@@ -148,7 +146,8 @@ def _curved(face: _Heights) -> tuple[float, FaceShape] | None:
     if (flat - bent) / scale <= critical or least / scale <= _CURVED_WITHOUT:
         return None
     coefficients, covariance = found
-    return score, _curvature(coefficients[3:] / size**2, covariance[3:, 3:] * scale / size**4, held, count)
+    unit = size ** np.array([0, 1, 1, 2, 2, 2])
+    return score, _curvature(coefficients / unit, covariance * scale / np.outer(unit, unit), held, count)
 
 
 def _best_start(design: Array, face: _Heights) -> tuple[NDArray[np.bool_], float]:
@@ -179,13 +178,19 @@ def _squares(
 
 
 def _curvature(coefficients: Array, covariance: Array, held: int, count: int) -> FaceShape:
-    """Principal curvatures of z = a u² + b uv + c v², positive towards the observer."""
-    a, b, c = coefficients
-    values, vectors = np.linalg.eigh(np.array([[2.0 * a, b], [b, 2.0 * c]]))
+    """Principal curvatures at the centroid of z = z₀ + p u + q v + a u² + b uv + c v², positive towards the observer.
+
+    Eigenvalues of the second fundamental form in the first (do Carmo 1976, section 3.3).
+    """
+    slope, (a, b, c) = coefficients[1:3], coefficients[3:]
+    stretch = math.sqrt(1.0 + float(slope @ slope))
+    inverse = np.linalg.inv(np.linalg.cholesky(np.eye(2) + np.outer(slope, slope)))
+    values, vectors = np.linalg.eigh(inverse @ np.array([[2.0 * a, b], [b, 2.0 * c]]) @ inverse.T / stretch)
     order = np.argsort(-np.abs(values))
     curvature = -values[order]
-    change = np.array([[2.0 * e * e, 2.0 * e * f, 2.0 * f * f] for e, f in vectors[:, order].T])
-    deviation = np.sqrt(np.einsum("ki,ij,kj->k", change, covariance, change))
+    directions = (inverse.T @ vectors[:, order]).T
+    change = np.array([[2.0 * e * e, 2.0 * e * f, 2.0 * f * f] for e, f in directions]) / stretch
+    deviation = np.sqrt(np.einsum("ki,ij,kj->k", change, covariance[3:, 3:], change))
     side = "outwards" if curvature[0] > 0.0 else "inwards"
     radius = 1.0 / abs(curvature[0])
     text = (
@@ -202,7 +207,8 @@ def _bevelled(face: _Heights) -> tuple[float, FaceShape] | None:
     score, within, far, way, plane = fit_two_planes(face.u, face.v, face.z, face.root)
     redundancy = max(len(face.z) - 6, 1)
     scale = max(within / redundancy, 1.0 if face.known else 0.0)
-    if not truncated_sum(face.root, face.z) - score > _SECOND_PLANE * max(scale, 1e-300):
+    enough = _STRIP if math.isnan(plane[2]) else _SECOND_PLANE
+    if not truncated_sum(face.root, face.z) - score > enough * max(scale, 1e-300):
         return None
     score += _SEARCH
     beyond = tuple(np.flatnonzero(far).tolist())
