@@ -201,8 +201,8 @@ def _exaggeration(lines: Sequence[CourseLine], levels: Array) -> float:
     """A round factor by which the deviations fill a good part of the room between courses."""
     gaps = np.diff(np.unique(np.round(levels, 3)))
     room = float(np.median(gaps)) if len(gaps) else 0.3
-    largest = max(float(np.abs(line.height - line.level).max()) for line in lines)
-    wanted = _LARGEST * room / max(largest, 1e-4)
+    largest = max(float((np.abs(line.height - line.level) + line.sigma).max()) for line in lines)
+    wanted = _LARGEST * room / largest
     decade = 10.0 ** math.floor(math.log10(wanted))
     steps = (1.0, 2.0, 5.0, 10.0)
     return max(1.0, decade * max(step for step in steps if step * decade <= wanted))
