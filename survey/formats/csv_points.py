@@ -20,10 +20,14 @@ from survey.formats.point_table import PointTable, TableStone, check_station
 from survey.formats.text_lines import TextLines
 from survey.records import Survey, SurveyHead, SurveyStream
 
-__all__ = ["open_csv", "read_csv"]
+__all__ = ["NEEDED", "OPTIONAL", "open_csv", "read_csv"]
 
-_NEEDED = ("block", "kind", "course", "role", "x", "y", "z")
-_OPTIONAL = ("sigma", "depth", "depth_sigma", "depth_source", "zone", "station")
+NEEDED = ("block", "kind", "course", "role", "x", "y", "z")
+"""Columns that every table has."""
+
+OPTIONAL = ("sigma", "depth", "depth_sigma", "depth_source", "zone", "station")
+"""Columns that it may have besides."""
+
 _IS_VERTEX = {"vertex": True, "v": True, "point": False, "p": False}
 _DELIMITERS = (",", ";", "\t")
 _NOTHING = float("nan")
@@ -95,8 +99,8 @@ class _RowReader:
         columns = _columns([name.casefold() for name in self._split(line, where)], where)
         self._count = len(columns)
         self._at = {name: columns.index(name) for name in columns}
-        self._needed = tuple(self._at[name] for name in _NEEDED)
-        self._optional = [(name, self._at[name]) for name in _OPTIONAL[1:] if name in self._at]
+        self._needed = tuple(self._at[name] for name in NEEDED)
+        self._optional = [(name, self._at[name]) for name in OPTIONAL[1:] if name in self._at]
         self._sigma_at = self._at.get("sigma")
         self._decimals = Decimals(lines.path, commas=self._delimiter != ",")
         self._said: dict[str, tuple[str, str]] = {}  # kind and course of each block, as written
@@ -199,12 +203,12 @@ def _delimiter(line: str) -> str:
 def _columns(names: list[str], where: str) -> list[str]:
     while names and not names[-1]:
         del names[-1]
-    expected = ",".join(_NEEDED) + "".join(f"[,{name}]" for name in _OPTIONAL)
-    missing = [name for name in _NEEDED if name not in names]
+    expected = ",".join(NEEDED) + "".join(f"[,{name}]" for name in OPTIONAL)
+    missing = [name for name in NEEDED if name not in names]
     if missing:
         raise SurveyError(f"no column {missing[0]!r}", where=where, remedy=f"begin with: {expected}")
     for name in names:
-        if name not in _NEEDED + _OPTIONAL or names.count(name) > 1:
+        if name not in NEEDED + OPTIONAL or names.count(name) > 1:
             raise SurveyError(
                 f"unknown or repeated column {shown(name)}", where=where, remedy=f"use: {expected}"
             )

@@ -1,8 +1,7 @@
 """The native survey format: one text file, one record per stone, line by line.
 
 Grammar (EBNF; every production but `file` and `stone` is one line, words separated by blanks; ``#`` at the start
-of a line or after a blank begins a comment, except in TEXT; blank lines are free; "…" about a line's first word
-alone is left out)::
+of a line or after a blank begins a comment, except in TEXT; blank lines are free)::
 
     file    = "moma-survey" "1" , { header } , stone , { stone } ;
     header  = "name" TEXT
