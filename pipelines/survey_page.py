@@ -8,6 +8,7 @@ from pathlib import Path
 from pipelines.html_page import figure, page
 from pipelines.html_tables import table
 from pipelines.survey_study import SurveyFile, SurveyStudy
+from survey.canon import Deviation
 from survey.courses import CourseHeight, CourseLine
 from survey.quality import StoneQuality
 
@@ -19,7 +20,7 @@ _HEADS = {
     "remeasure": ("Stone", "Why", "What to do", "Line"),
     "stones": (
         "Stone", "Kind", "Course", "Facade", "rms", "σ₀", "Redundancy", "Left out", "Face", "Tilt σ",
-        "Length × height", "Depth", "Evidence for the depth",
+        "Length × height", "Off the usual", "Depth", "Evidence for the depth",
     ),
     "courses": (
         "Course", "Stones", "Bed at", "Slope (chance)", "Mid-span over chord (chance)", "rms", "Farthest corner",
@@ -215,14 +216,18 @@ def _stones(study: SurveyStudy) -> list[str]:
     order = sorted(
         range(len(study.stones)), key=lambda i: (study.stones[i].code not in flagged, -study.stones[i].rms)
     )
-    rows = [_stone_row(study.stones[i], facade_of.get(i, "–")) for i in order[:_MOST]]
+    off = {one.code: one for one in study.deviations}
+    rows = [
+        _stone_row(study.stones[i], facade_of.get(i, "–"), off.get(study.stones[i].code))
+        for i in order[:_MOST]
+    ]
     if not rows:
         return ["<p>None.</p>"]
     words = "Those to measure again first, then those whose points scatter most."
     return [f"<p>{words}</p>", _wide(table(rows, _HEADS["stones"])), *_more(len(order))]
 
 
-def _stone_row(stone: StoneQuality, facade: str) -> tuple[str, ...]:
+def _stone_row(stone: StoneQuality, facade: str, off: Deviation | None) -> tuple[str, ...]:
     return (
         stone.code,
         stone.kind,
@@ -236,6 +241,7 @@ def _stone_row(stone: StoneQuality, facade: str) -> tuple[str, ...]:
         f"{stone.tilt_sigma:.2f}°" if math.isfinite(stone.tilt_sigma) else "–",
         f"{stone.length:.3f} × {stone.height:.3f}"
         + (f" ± {stone.dimension_sigma:.3f} m" if math.isfinite(stone.dimension_sigma) else " m"),
+        "–" if off is None else f"{off.length * 1e3:+.0f} × {off.height * 1e3:+.0f} mm ({off.worst:.1f} σ)",
         f"{stone.depth:.3f}" + (" m" if stone.depth_sigma is None else f" ± {stone.depth_sigma:.3f} m"),
         f"{stone.depth_source} ({stone.depth_origin})",
     )
