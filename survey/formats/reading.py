@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from moma.errors import UsageError
-from survey.formats.closed_solids import open_solids
 from survey.formats.csv_points import open_csv
 from survey.formats.moma_ascii import open_moma, read_head, with_header
 from survey.formats.options import ReadingOptions, whole
@@ -24,12 +23,21 @@ __all__ = [
 Reader = Callable[[Path, ReadingOptions], SurveyStream]
 """What begins to read a file."""
 
+
+def _open_solids(path: Path, options: ReadingOptions) -> SurveyStream:
+    from survey.formats.closed_solids import (
+        open_solids,
+    )  # which needs trimesh: half a second that others are spared
+
+    return open_solids(path, options)
+
+
 FORMATS: Mapping[str, Reader] = {
     "moma": open_moma,
     "csv": open_csv,
     "pnezd": open_pnezd,
     "penzd": open_penzd,
-    "solids": open_solids,
+    "solids": _open_solids,
 }
 """Readers by the name of their format."""
 

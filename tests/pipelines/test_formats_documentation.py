@@ -32,7 +32,7 @@ def result():
 
 def rows(heading, columns):
     """Cells of the table under a heading."""
-    section = re.split(r"\n##? ", PAGE.split(f"\n## {heading}")[1])[0]
+    section = re.split(r"\n## |\n# (?=[A-Z])", PAGE.split(f"\n## {heading}")[1])[0]
     found = [[cell.strip() for cell in line.strip().strip("|").split("|")] for line in section.splitlines()]
     return [row for row in found if len(row) == columns and row[0].startswith("`")]
 
