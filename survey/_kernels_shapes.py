@@ -111,6 +111,9 @@ def grow_columns(design, z, root, start, fewest):
 def fit_two_planes(u, v, z, root):
     """Part the points by a line so that a plane through each part explains them best.
 
+    Before the line the plane is z = 0, or one fitted there, whichever is better: z = 0 has left blunders out, but may
+    be tilted into the second plane. Points in a row along the line say nothing of the tilt across it.
+
     Returns
     -------
     truncated sum of squares of both planes, that of the points that are no blunders, points beyond the line (n,),
@@ -118,81 +121,87 @@ def fit_two_planes(u, v, z, root):
     across it; nan where its tilt across is not known
     """
     n = z.shape[0]
-    score, least, far, way, plane = (
+    score, worth, least, far, way, plane = (
+        np.inf,
         np.inf,
         np.inf,
         np.zeros(n, dtype=np.bool_),
         np.zeros(2),
-        np.full(3, np.nan),
+        np.zeros(3),
     )
-    beyond, across, along = np.empty(n, dtype=np.bool_), np.empty(n), np.empty(n)
+    across, along, moved = np.empty(n), np.empty(n), np.empty(n, dtype=np.bool_)
+    first, second, zero = np.zeros(3), np.zeros(3), np.zeros(3)
     for direction in range(_DIRECTIONS):
         angle = 2.0 * math.pi * direction / _DIRECTIONS
         c, s = math.cos(angle), math.sin(angle)
+        here, there = np.zeros((3, 4)), np.zeros((3, 4))
         for i in range(n):
-            across[i], along[i] = c * u[i] + s * v[i], c * v[i] - s * u[i]
-            beyond[i] = False
+            across[i], along[i], moved[i] = c * u[i] + s * v[i], c * v[i] - s * u[i], False
+            _add(here, 1.0, along[i], across[i], z[i], root[i])
         for count in range(1, n // 2 + 1):
             last = -1
             for i in range(n):
-                if not beyond[i] and (last < 0 or across[i] > across[last]):
+                if not moved[i] and (last < 0 or across[i] > across[last]):
                     last = i
-            beyond[last] = True
+            moved[last] = True
+            _add(here, -1.0, along[last], across[last], z[last], root[last])
+            _add(there, 1.0, along[last], across[last], z[last], root[last])
             if count < 3 or n - count < 4:
                 continue
-            rival, within, coefficients = _both_planes(along, across, z, root, beyond, count)
-            if rival + _worth(coefficients) < score + _worth(plane):
-                score, least, far[:], way[0], way[1], plane = rival, within, beyond, c, s, coefficients
+            spread = there[2, 2] - there[0, 2] ** 2 / there[0, 0]
+            size = 3 if count > 3 and spread > _FLATTEST**2 * count else 2
+            if not (_solve(there, size, second) and _solve(here, 3, first)):
+                continue
+            rival, within = _leave(along, across, z, root, moved, zero, second)
+            other, inner = _leave(along, across, z, root, moved, first, second)
+            base = zero
+            if other < rival:
+                rival, within, base = other, inner, first
+            if rival + (_TILTED if size == 3 else 0.0) < worth:
+                score, least, worth = rival, within, rival + (_TILTED if size == 3 else 0.0)
+                far[:], way[0], way[1] = moved, c, s
+                for k in range(3):
+                    plane[k] = second[k] - base[k] if k < size else np.nan
     return score, least, far, way, plane
 
 
 @njit(cache=True)
-def _worth(plane):
-    """Squares that a tilt across must explain, lest a few points of the first plane be taken for it."""
-    return 0.0 if math.isnan(plane[2]) else _TILTED
+def _add(sums, sign, along, across, z, root):
+    """Normal equations (3, 4) of a plane on 1, along, across, with or without one more point."""
+    weight = sign * root**2
+    row = (1.0, along, across, z)
+    for a in range(3):
+        for b in range(4):
+            sums[a, b] += weight * row[a] * row[b]
 
 
 @njit(cache=True)
-def _both_planes(along, across, z, root, beyond, count):
-    """Truncated sum of squares with a plane through the points beyond a line, and that plane.
+def _solve(sums, size, out):
+    """Coefficients of a plane, the leading two or all three; False if the points do not determine them."""
+    work = sums.copy()
+    for a in range(size):
+        if not work[a, a] > 1e-10 * sums[a, a]:
+            return False
+        for b in range(a + 1, size):
+            factor = work[b, a] / work[a, a]
+            for k in range(4):
+                work[b, k] -= factor * work[a, k]
+    out[2] = 0.0
+    for a in range(size - 1, -1, -1):
+        out[a] = work[a, 3]
+        for b in range(a + 1, size):
+            out[a] -= work[a, b] * out[b]
+        out[a] /= work[a, a]
+    return True
 
-    Before the line the plane is z = 0, or one fitted there, whichever is better: z = 0 has left blunders out, but may
-    be tilted into the second plane. Points in a row along the line say nothing of the tilt across it.
-    """
-    n = z.shape[0]
-    mean, spread, weight = 0.0, 0.0, 0.0
-    for i in range(n):
-        if beyond[i]:
-            mean, weight = mean + root[i] ** 2 * across[i], weight + root[i] ** 2
-    for i in range(n):
-        if beyond[i]:
-            spread += (root[i] * (across[i] - mean / weight)) ** 2
-    p = 3 if count > 3 and spread > _FLATTEST**2 * count else 2
-    out, residuals, first = np.full(3, np.nan), z.copy(), z.copy()
-    found = _plane_of(along, across, z, root, beyond, p, residuals)
-    ours = _plane_of(along, across, z, root, ~beyond, 3, first)
-    given, fitted = 0.0, 0.0
-    for i in range(n):
-        if not beyond[i]:
-            given += min((root[i] * z[i]) ** 2, _LIMIT)
-            fitted += min((root[i] * first[i]) ** 2, _LIMIT)
-    within, better = 0.0, fitted < given
-    for i in range(n):
-        if not beyond[i]:
-            residuals[i] = first[i] if better else z[i]
-        square = (root[i] * residuals[i]) ** 2
+
+@njit(cache=True)
+def _leave(along, across, z, root, beyond, first, second):
+    """Truncated sum of squares that two planes leave, and that of the points that are no blunders."""
+    out, within = 0.0, 0.0
+    for i in range(z.shape[0]):
+        plane = second if beyond[i] else first
+        square = (root[i] * (z[i] - plane[0] - plane[1] * along[i] - plane[2] * across[i])) ** 2
+        out += min(square, _LIMIT)
         within += square if square <= _LIMIT else 0.0
-    for a in range(p):
-        out[a] = found[a] - (ours[a] if better else 0.0)
-    return truncated_sum(root, residuals), within, out
-
-
-@njit(cache=True)
-def _plane_of(along, across, z, root, chosen, p, residuals):
-    n = z.shape[0]
-    design, inverse, lever = np.ones((n, p)), np.empty((p, p)), np.empty(n)
-    for i in range(n):
-        design[i, 1] = along[i]
-        if p == 3:
-            design[i, 2] = across[i]
-    return fit_columns(design, z, root, chosen, inverse, residuals, lever)
+    return out, within

@@ -124,6 +124,9 @@ def _curved(face: _Heights) -> tuple[float, FaceShape] | None:
     count = len(face.z)
     if count < 7:
         return None
+    flatness = truncated_sum(face.root, face.z)
+    if face.known and flatness <= _CURVED:
+        return None
     size = max(float(np.abs(face.u).max()), float(np.abs(face.v).max()))
     u, v = face.u / size, face.v / size
     design = np.column_stack([np.ones(count), u, v, u * u, u * v, v * v])
@@ -140,7 +143,7 @@ def _curved(face: _Heights) -> tuple[float, FaceShape] | None:
     rough = not face.known or excess > _ratio(held - 6, 3.0902)
     scale = max(excess, 1e-300) if rough else 1.0
     critical = 3.0 * fdtri(3, held - 6, 0.999) if rough else _CURVED
-    if not (truncated_sum(face.root, face.z) - score) / scale > enough:
+    if not (flatness - score) / scale > enough:
         return None
     least = (flat_without - bent_without)[chosen].min()  # one blunder at a corner bends a quadric by itself
     if (flat - bent) / scale <= critical or least / scale <= _CURVED_WITHOUT:
@@ -202,13 +205,14 @@ def _curvature(coefficients: Array, covariance: Array, held: int, count: int) ->
 
 def _bevelled(face: _Heights) -> tuple[float, FaceShape] | None:
     """A second plane beyond a line, with what both leave unexplained, if it says enough more than one."""
-    if face.off.sum() < 3:
+    flat = truncated_sum(face.root, face.z)
+    if face.off.sum() < 3 or flat <= _STRIP:
         return None
     score, within, far, way, plane = fit_two_planes(face.u, face.v, face.z, face.root)
     redundancy = max(len(face.z) - 6, 1)
     scale = max(within / redundancy, 1.0 if face.known else 0.0)
     enough = _STRIP if math.isnan(plane[2]) else _SECOND_PLANE
-    if not truncated_sum(face.root, face.z) - score > enough * max(scale, 1e-300):
+    if not flat - score > enough * max(scale, 1e-300):
         return None
     score += _SEARCH
     beyond = tuple(np.flatnonzero(far).tolist())
