@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipelines.check import check_scene
+from pipelines.ingest import ingest
 from survey.depth import depth_for
 from survey.extrusion import extrude
 from survey.faces import outline_face
@@ -101,3 +103,21 @@ def test_a_survey_is_written_and_read_to_the_last_bit(tmp_path):
     for a, b in zip(far.blocks, again.blocks, strict=True):
         np.testing.assert_array_equal(a.vertices, b.vertices)
         np.testing.assert_array_equal(a.points, b.points)
+
+
+@pytest.mark.slow
+def test_the_database_and_the_check_of_a_scene_are_the_same(tmp_path):
+    # through `moma ingest` and `moma check`: numbers of joints, contacts and unknowns, displacements of corners
+    survey, reports = read_moma(SAMPLE), []
+    for name, shift in (("near", np.zeros(3)), ("far", LAMBERT)):
+        write_moma(moved(survey, shift), tmp_path / f"{name}.moma")
+        url = f"sqlite:///{tmp_path / name}.db"
+        ingest([tmp_path / f"{name}.moma"], url)
+        reports.append(check_scene(SAMPLE.with_name("window.toml"), url))
+    near, far = reports
+    assert far.problems == near.problems == ()
+    assert (far.bodies, far.kinds) == (near.bodies, near.kinds)
+    assert far.cost == near.cost
+    assert far.joints is not None
+    assert far.joints.max_displacement == pytest.approx(near.joints.max_displacement, abs=1e-7)
+    assert far.joints.displacement == pytest.approx(near.joints.displacement, abs=1e-7)
