@@ -341,3 +341,21 @@ def test_blunders_of_any_size_do_little_harm(kind, where):
     inside, lost = with_a_fifth_of_blunders(kind, where)
     print(f"{kind.__name__} of any size, {where}: {inside:.2%}, {lost:.3f} good points lost per face")
     assert inside >= 0.97
+
+
+@pytest.mark.parametrize("count", [10, 14, 40])
+def test_the_order_of_points_and_the_frame_do_not_matter(count):
+    rng = np.random.default_rng(33)
+    for kind in (one_side, both_sides, anywhere):
+        for _ in range(20):
+            true = face(rng, inner=count - 4)
+            points = true.points + rng.normal(0, SIGMA, true.points.shape)
+            bad = rng.choice(count, count // 5, replace=False)
+            points[bad] += kind(rng, true, count // 5)
+            order, turn = rng.permutation(count), turned(rng)
+            first = fit_plane(points, SIGMA, observer=true.observer)
+            again = fit_plane(points[order], SIGMA, observer=true.observer)
+            elsewhere = fit_plane(points @ turn.T + 100, SIGMA, observer=turn @ true.observer + 100)
+            assert set(order[list(again.rejected)]) == set(first.rejected) == set(elsewhere.rejected)
+            np.testing.assert_allclose(again.normal, first.normal, atol=1e-12)
+            np.testing.assert_allclose(elsewhere.normal, turn @ first.normal, atol=1e-11)
