@@ -10,6 +10,7 @@ comment; rows of nothing but separators are passed over, and columns without a n
 
 import csv
 from collections.abc import Iterator
+from operator import itemgetter
 from pathlib import Path
 
 from moma.errors import SurveyError
@@ -99,7 +100,8 @@ class _RowReader:
         columns = _columns([name.casefold() for name in self._split(line, where)], where)
         self._count = len(columns)
         self._at = {name: columns.index(name) for name in columns}
-        self._needed = tuple(self._at[name] for name in NEEDED)
+        self._block_at = self._at["block"]
+        self._pick = itemgetter(*(self._at[name] for name in NEEDED))
         self._optional = [(name, self._at[name]) for name in OPTIONAL[1:] if name in self._at]
         self._sigma_at = self._at.get("sigma")
         self._decimals = Decimals(lines.path, commas=self._delimiter != ",")
@@ -122,16 +124,15 @@ class _RowReader:
 
     def _code(self, values: list[str]) -> str | None:
         """The block that a line, however wrong, is of; None if that cannot be known."""
-        at = self._needed[0]
-        code = values[at].strip() if at < len(values) else ""
-        return code if CODE.fullmatch(code) else None
+        code = values[self._block_at].strip() if self._block_at < len(values) else ""
+        return code if code in self.table.stones or CODE.fullmatch(code) else None
 
     def _take(self, values: list[str], stone: TableStone | None, number: int) -> None:
         if len(values) > self._count and not any(values[self._count :]):
             del values[self._count :]
         if len(values) != self._count:
             raise self._fail(number, f"{len(values)} fields for {self._count} columns", "fill every column")
-        code, kind, course, role, x, y, z = (values[i] for i in self._needed)
+        code, kind, course, role, x, y, z = self._pick(values)
         is_vertex = _IS_VERTEX.get(role)
         if is_vertex is None:
             raise self._fail(number, f"role {shown(role)}", "write vertex or point")

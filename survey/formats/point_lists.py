@@ -96,6 +96,7 @@ class _ListReader:
     ) -> None:
         self._path, self._template, self._kind = lines.path, template, options.kind
         self.table = PointTable(lines.path, options.sigma)
+        self._description, self._code = "", template.parse("")
         self._axes = axes
         self._x, self._y = axes.index("x"), axes.index("y")
         self._separator = self._find_separator(ahead)
@@ -115,7 +116,9 @@ class _ListReader:
                     number, f"{len(parts)} fields, not 5", "write point, two coordinates, elevation, code"
                 )
             name, a, b, c, description = parts
-            code = self._template.parse(description)
+            if description != self._description:  # neighbours mostly have the same
+                self._description, self._code = description, self._template.parse(description)
+            code = self._code
             if code is None:
                 block = self._likely_block(line)
                 raise self._fail(
