@@ -6,75 +6,17 @@ import numpy as np
 from numba import njit
 
 from survey._kernels_planes import leverages, orient, precision, weighted_plane
-from survey._kernels_triples import STARTS, cost, search_triples, smallest
+from survey._kernels_triples import STARTS, beside_the_rest, cost, search_triples, smallest
 
-__all__ = ["COLLINEAR", "FINE", "NOT_FINITE", "SIGMA", "beside_the_rest", "fit_face"]
+__all__ = ["COLLINEAR", "FINE", "NOT_FINITE", "SIGMA", "fit_face"]
 
 FINE, NOT_FINITE, SIGMA, COLLINEAR = 0, 1, 2, 3  # what `fit_face` found
 
 _CRITICAL = 3.29  # two-sided normal quantile of Baarda's α₀ = 0.1 %
 _LARGEST_TILT = math.radians(10.0)  # standard deviation of a tilt that no plane among others may exceed
 _GRAZING = 0.17  # cosine between normal and line of sight below which a face is not measured: 80°
-_FARTHEST = 2.5  # distance from the middle of a face, over that of its third quartile, beyond which no point is its own
-_BALANCED = 0.4  # mean of directions, below which points lie all around
+_MANY = 50  # points of which none has much to say alone
 _FEWEST = 4  # points that a plane is never grown from fewer than
-
-
-@njit(cache=True)
-def beside_the_rest(local):
-    """Indices of the points of a compact face: those far beside are no part of it, wherever its plane may pass them.
-
-    So far out they would outvote all others. Four or more that lie all around are corners of a face that is measured
-    in its middle.
-    """
-    n = local.shape[1]
-    everything = np.arange(n)
-    if n < 6:
-        return everything
-    centre = _spatial_median(local)
-    away, balance = np.empty(n), np.zeros(3)
-    for i in range(n):
-        away[i] = math.sqrt(
-            (local[0, i] - centre[0]) ** 2 + (local[1, i] - centre[1]) ** 2 + (local[2, i] - centre[2]) ** 2
-        )
-    limit, count = _FARTHEST * smallest(away, n - n // 4), 0
-    for i in range(n):
-        if away[i] > limit:
-            count += 1
-            for k in range(3):
-                balance[k] += (local[k, i] - centre[k]) / away[i]
-    balanced = balance[0] ** 2 + balance[1] ** 2 + balance[2] ** 2 < (_BALANCED * count) ** 2
-    if count == 0 or (count > 3 and balanced):
-        return everything
-    kept, m = np.empty(n - count, dtype=np.int64), 0
-    for i in range(n):
-        if away[i] <= limit:
-            kept[m] = i
-            m += 1
-    return kept
-
-
-@njit(cache=True)
-def _spatial_median(local):
-    """Place of least sum of distances, nearly (Weiszfeld 1937)."""
-    n = local.shape[1]
-    centre = np.zeros(3)
-    for k in range(3):
-        for i in range(n):
-            centre[k] += local[k, i] / n
-    for _ in range(15):
-        x, y, z, total = 0.0, 0.0, 0.0, 0.0
-        for i in range(n):
-            square = (
-                (local[0, i] - centre[0]) ** 2
-                + (local[1, i] - centre[1]) ** 2
-                + (local[2, i] - centre[2]) ** 2
-            )
-            weight = 1.0 / max(math.sqrt(square), 1e-9)
-            total += weight
-            x, y, z = x + weight * local[0, i], y + weight * local[1, i], z + weight * local[2, i]
-        centre[0], centre[1], centre[2] = x / total, y / total, z / total
-    return centre
 
 
 @njit(cache=True)
@@ -175,12 +117,14 @@ def _nearest(distances, size, local, root, accepted, frame, work):
 def _grow(accepted, majority, local, root, known, view, frame, work):
     """Add the best point, or drop the worst, one at a time, until the next one is a blunder.
 
+    Of many points none has much to say alone, so at first all are sorted at once.
+
     Returns the sum of squares of all points in units of sigma in which no blunder counts more than the limit.
     """
     n = root.shape[0]
-    residuals, lever = np.empty(n), np.empty(n)
+    residuals, lever, tests = np.empty(n), np.empty(n), np.empty(n)
     truncated = np.inf
-    for _ in range(4 * n):
+    for step in range(4 * n):
         total = weighted_plane(local, root, accepted, frame, work)
         if total == 0.0:
             return np.inf
@@ -195,16 +139,22 @@ def _grow(accepted, majority, local, root, known, view, frame, work):
         scale = _scale(squares, count, n, known)
         if scale > frame[4, 1] * _LARGEST_TILT:
             return np.inf
-        worst, best, highest, lowest = -1, -1, 0.0, np.inf
+        worst, best, highest, lowest, fitting, changed = -1, -1, 0.0, np.inf, 0, False
         for i in range(n):
             # a point in the fit pulls the plane towards itself, one outside does not: variances 1 - h and 1 + h
             share = max(1.0 - lever[i], 1e-6) if accepted[i] else 1.0 + lever[i]
             test = root[i] * abs(residuals[i]) / (scale * math.sqrt(share))
+            tests[i] = test
+            fitting += test <= _CRITICAL
+            changed = changed or (test <= _CRITICAL) != accepted[i]
             if accepted[i] and test > highest:
                 worst, highest = i, test
             elif not accepted[i] and test < lowest:
                 best, lowest = i, test
-        if highest > _CRITICAL and count > majority:
+        if n > _MANY and step < 10 and changed and fitting > majority:
+            for i in range(n):
+                accepted[i] = tests[i] <= _CRITICAL
+        elif highest > _CRITICAL and count > majority:
             accepted[worst] = False
         elif best >= 0 and lowest <= _CRITICAL:
             accepted[best] = True

@@ -1,11 +1,14 @@
-"""Numba kernels of the planes through three points of a face; arrays as in `_kernels_planes`."""
+"""Numba kernels that start the search for a face: its compact part, and the planes through three of its points.
+
+Arrays are as in `_kernels_planes`.
+"""
 
 import math
 
 import numpy as np
 from numba import njit
 
-__all__ = ["STARTS", "cost", "search_triples", "smallest"]
+__all__ = ["STARTS", "beside_the_rest", "cost", "search_triples", "smallest"]
 
 STARTS = 6  # planes of least truncated squares that are kept
 
@@ -14,6 +17,8 @@ _ALL_TRIPLES = 26  # up to so many points all triples are tried; beyond, a fixed
 _DRAWS = 3000
 _EROSION = 0.03  # how far behind a face its eroded edges and its mortar lie [m]
 _IN_FRONT = _CRITICAL**2  # how much more a blunder less than that in front counts, in squares of sigma
+_FARTHEST = 2.5  # distance from the middle of a face, over that of its third quartile, beyond which no point is its own
+_BALANCED = 0.4  # mean of directions, below which points lie all around
 
 
 @njit(cache=True)
@@ -143,3 +148,60 @@ def search_triples(local, root, size, known, view):
             if known and truncated < scores[STARTS]:
                 _keep(truncated, distances, scores, best)
     return best
+
+
+@njit(cache=True)
+def beside_the_rest(local):
+    """Indices of the points of a compact face: those far beside are no part of it, wherever its plane may pass them.
+
+    So far out they would outvote all others. Four or more that lie all around are corners of a face that is measured
+    in its middle.
+    """
+    n = local.shape[1]
+    everything = np.arange(n)
+    if n < 6:
+        return everything
+    centre = _spatial_median(local)
+    away, balance = np.empty(n), np.zeros(3)
+    for i in range(n):
+        away[i] = math.sqrt(
+            (local[0, i] - centre[0]) ** 2 + (local[1, i] - centre[1]) ** 2 + (local[2, i] - centre[2]) ** 2
+        )
+    limit, count = _FARTHEST * smallest(away, n - n // 4), 0
+    for i in range(n):
+        if away[i] > limit:
+            count += 1
+            for k in range(3):
+                balance[k] += (local[k, i] - centre[k]) / away[i]
+    balanced = balance[0] ** 2 + balance[1] ** 2 + balance[2] ** 2 < (_BALANCED * count) ** 2
+    if count == 0 or (count > 3 and balanced):
+        return everything
+    kept, m = np.empty(n - count, dtype=np.int64), 0
+    for i in range(n):
+        if away[i] <= limit:
+            kept[m] = i
+            m += 1
+    return kept
+
+
+@njit(cache=True)
+def _spatial_median(local):
+    """Place of least sum of distances, nearly (Weiszfeld 1937)."""
+    n = local.shape[1]
+    centre = np.zeros(3)
+    for k in range(3):
+        for i in range(n):
+            centre[k] += local[k, i] / n
+    for _ in range(15):
+        x, y, z, total = 0.0, 0.0, 0.0, 0.0
+        for i in range(n):
+            square = (
+                (local[0, i] - centre[0]) ** 2
+                + (local[1, i] - centre[1]) ** 2
+                + (local[2, i] - centre[2]) ** 2
+            )
+            weight = 1.0 / max(math.sqrt(square), 1e-9)
+            total += weight
+            x, y, z = x + weight * local[0, i], y + weight * local[1, i], z + weight * local[2, i]
+        centre[0], centre[1], centre[2] = x / total, y / total, z / total
+    return centre
