@@ -126,7 +126,9 @@ def similarity_error(found, rotation, scale, shift):
     return np.array([*moved, *turn, np.log(found.scale / scale)])
 
 
-@pytest.mark.parametrize("away", [np.zeros(3), LAMBERT], ids=["near", "lambert"])
+@pytest.mark.parametrize(
+    "away", [pytest.param(np.zeros(3), marks=pytest.mark.slow), LAMBERT], ids=["near", "lambert"]
+)
 def test_similarity_is_unbiased_and_as_precise_as_it_says(away):
     rng = np.random.default_rng(53)
     rotation, scale = turned(rng), 1.05

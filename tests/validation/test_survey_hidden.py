@@ -74,7 +74,7 @@ WAYS = {
 
 
 @pytest.mark.parametrize("way", WAYS)
-@pytest.mark.parametrize("sigmas", [0.003, EACH], ids=["equal", "each"])
+@pytest.mark.parametrize("sigmas", [pytest.param(0.003, marks=pytest.mark.slow), EACH], ids=["equal", "each"])
 def test_corners_scatter_as_predicted(way, sigmas):
     # in the wall's own axes: x along, y into it, z up
     turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
