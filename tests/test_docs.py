@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = ("README.md", "docs/howto/first-run.md")
+PAGES = ("README.md", "docs/howto/first-run.md", "docs/howto/survey.md")
 SCENE = "data/samples/window/window.toml"
 
 
@@ -31,6 +31,8 @@ def place(tmp_path):
     sample = tmp_path / "data/samples/window"
     sample.mkdir(parents=True)
     (sample / "window.moma").symlink_to(ROOT / "data/samples/window/window.moma")
+    (tmp_path / "docs/howto").mkdir(parents=True)
+    (tmp_path / "docs/howto/survey").symlink_to(ROOT / "docs/howto/survey")
     text = (ROOT / SCENE).read_text(encoding="utf-8")
     assert 'default = "deformable"' in text
     quick = text.replace('default = "deformable"', 'default = "rigid"').replace(
