@@ -53,6 +53,8 @@ def triangulate(solid: Solid) -> NDArray[np.intp]:
 
 
 def _ears(vertices: NDArray[np.float64], face: tuple[int, ...]) -> list[tuple[int, int, int]]:
+    if len(face) == 3:
+        return [(face[0], face[1], face[2])]
     rest, triangles = list(face), []
     polygon = vertices[rest]
     normal = np.cross(polygon - polygon[0], np.roll(polygon, -1, axis=0) - polygon[0]).sum(axis=0)
