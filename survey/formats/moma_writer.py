@@ -25,6 +25,8 @@ MAGIC = "moma-survey 1"
 def write_moma(survey: Survey, path: Path) -> None:
     """Write a survey in the native format; what is read back is equal to the last bit.
 
+    The numbers that an instrument gave to points are left out: the format has no place for them.
+
     Parameters
     ----------
     survey : what to write, with one stone or more
