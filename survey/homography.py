@@ -168,7 +168,12 @@ def _without_blunders(marks: _Marks, names: list[str]) -> Homography:
     def judge(accepted: Mask) -> Verdict | None:
         if _aligned(marks, accepted) is not None:
             return None
-        fit = _adjust(marks, accepted)
+        try:
+            # a mark that is left out may lie on the horizon
+            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+                fit = _adjust(marks, accepted)
+        except np.linalg.LinAlgError:  # far from any homography a step may lose its footing
+            return None
         if fit is None:
             return None
         fits[accepted.tobytes()] = fit

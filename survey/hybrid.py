@@ -25,6 +25,7 @@ __all__ = ["LiftedFace", "lift", "lift_faces", "plane_of_wall"]
 Array = NDArray[np.float64]
 
 _COARSEST = 0.1  # standard deviation of a corner over the size of the stone, beyond which it is refused
+_SMALLEST = 1e-3  # metres between the farthest corners
 _GRAZING = float(np.sin(np.radians(10.0)))
 
 
@@ -104,9 +105,11 @@ def lift(
             f"it has {len(record.image)} corners on the photograph", remedy="measure 3 or more"
         )
     on_marks, covariances = wall.on_plane(record.image)
+    if _size(on_marks) < _SMALLEST:
+        raise GeometryError("its corners on the photograph coincide", remedy="measure them again")
     fit, plane = _face_plane(record, _predicted(on_marks, wall, neighbours, whole), on_marks, wall)
     outline, sigma = _moved(on_marks, covariances, wall, plane)
-    size = float(np.linalg.norm(outline[:, None] - outline[None], axis=2).max())
+    size = _size(outline)
     if not sigma.max() <= _COARSEST * size:
         raise GeometryError(
             f"corner {int(np.argmax(sigma)) + 1} is known to {sigma.max():.3f} m only, of a stone of {size:.2f} m",
@@ -158,7 +161,7 @@ def _predicted(
     used = len(fit.residuals) - len(fit.rejected)
     scatter = fit.rms * float(np.sqrt(used / max(fit.redundancy, 1)))
     # nothing is known of tilts but that corners and middles of faces scatter alike
-    reach = 0.5 * float(np.linalg.norm(on_marks[:, None] - on_marks[None], axis=2).max())
+    reach = 0.5 * _size(on_marks)
     marks = CommonPlane(fit.centroid, fit.normal, fit.axes, fit.covariance, scatter, scatter / reach)
     return marks.face_at(place, "in the plane of its marks")
 
@@ -235,6 +238,11 @@ def _as_fit(plane: PlaneEstimate, outline: Array) -> FaceFit:
         residuals=np.empty(0),
         standardised=np.empty(0),
     )
+
+
+def _size(outline: Array) -> float:
+    """Largest distance between two corners [m]."""
+    return float(np.linalg.norm(outline[:, None] - outline[None], axis=2).max())
 
 
 def _listed(words: Sequence[str]) -> str:

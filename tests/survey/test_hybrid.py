@@ -400,3 +400,10 @@ def test_a_stone_without_corners_on_the_photograph_is_refused() -> None:
     empty = replace(stone(wall, 14, np.random.default_rng(0), 0), image=np.empty((2, 2)))
     with pytest.raises(GeometryError, match="2 corners on the photograph"):
         lift(empty, tied, Neighbours(faces))
+
+
+def test_corners_that_coincide_are_refused() -> None:
+    wall, tied, _, _ = tied_and_faces(17)
+    spot = replace(stone(wall, 14, np.random.default_rng(0), 0), image=np.tile(tied.marks[0], (4, 1)))
+    with pytest.raises(GeometryError, match="corners on the photograph coincide"):
+        lift(spot, tied, Neighbours([]))
