@@ -156,8 +156,11 @@ def _courses(study: SurveyStudy) -> list[str]:
     ]
     for facade in dict.fromkeys(line.facade for line in study.courses):
         lines = [line for line in study.courses if line.facade == facade]
+        tilted = lines[0].frame_sigma
+        words = f"Control points hold the frame level to ± {tilted * 1e3:.2f} mm/m along it, which is part of each ±."
+        out += [f"<h3>{escape(facade)}</h3>", f"<p>{words}</p>" if tilted else ""]
         rows = [_course_row(line, heights) for line in lines[:_MOST]]
-        out += [f"<h3>{escape(facade)}</h3>", _wide(table(rows, _HEADS["courses"])), *_more(len(lines))]
+        out += [_wide(table(rows, _HEADS["courses"])), *_more(len(lines))]
     return out
 
 

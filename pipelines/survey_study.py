@@ -138,7 +138,8 @@ def _judge(
     )
     usual = standards(stones, _canons(files))
     odd = contradictions(stones, facades)
-    lines = measure_courses(stones, facades)
+    tilts = [one.transform.covariance[3:6, 3:6] for one in files if one.transform is not None]
+    lines = measure_courses(stones, facades, tilts)
     return SurveyStudy(
         name=files[0].head.name,
         files=files,

@@ -57,7 +57,8 @@ class CourseLine:
     middle : half-way between the ends, along the facade [m]
     level : z of the line there [m]; it and `slope` have the covariance
     slope : rise to the right over length [-]; None if one corner alone is left
-    covariance : (2, 2) of level [m] and slope [-]
+    covariance : (2, 2) of level [m] and slope [-], in the frame of the survey
+    frame_sigma : standard deviation of a slope that comes from the frame itself, common to all courses [-]
     slope_probability : that chance alone makes such a slope in a level course; None if the scatter of beds is
         not known
     sag : height of mid-span above the chord of the best parabola, negative where it sags [m]; None with fewer
@@ -84,6 +85,7 @@ class CourseLine:
     level: float
     slope: float | None
     covariance: Array
+    frame_sigma: float
     slope_probability: float | None
     sag: float | None
     sag_sigma: float | None
@@ -96,8 +98,8 @@ class CourseLine:
 
     @property
     def slope_sigma(self) -> float | None:
-        """Standard deviation of the slope [-]."""
-        return None if self.slope is None else math.sqrt(self.covariance[1, 1])
+        """Standard deviation of the slope against level, that of the frame included [-]."""
+        return None if self.slope is None else math.hypot(math.sqrt(self.covariance[1, 1]), self.frame_sigma)
 
     @property
     def span(self) -> float:
@@ -155,22 +157,27 @@ class _Course:
     codes: tuple[str, ...]
     left_out: int
     bed: BedCorners
+    frame_sigma: float
 
 
-def measure_courses(stones: Sequence[StoneQuality], facades: Iterable[Facade]) -> tuple[CourseLine, ...]:
+def measure_courses(
+    stones: Sequence[StoneQuality], facades: Iterable[Facade], tilts: Sequence[Array] = ()
+) -> tuple[CourseLine, ...]:
     """Fit the bed line of every course of every standing facade.
 
     Parameters
     ----------
     stones : all stones of the survey
     facades : which stones face one way; level ones have no bed lines
+    tilts : (3, 3) covariances of small rotations about x, y and z with which the frames of the survey were
+        levelled by control points [rad²], of which the worst holds; none: the instrument levelled itself
 
     Returns
     -------
     One line per facade, zone and course that has any sound lower corner, in that order
     """
     standing = [facade for facade in facades if facade.azimuth is not None]
-    courses = [one for facade in standing for one in _courses(stones, facade)]
+    courses = [one for facade in standing for one in _courses(stones, facade, _tilt(facade, tilts))]
     own = {k: scatter_of(one.bed, 2) for k, one in enumerate(courses) if one.bed.count >= ENOUGH}
     pooled = pool(list(own.values()))
     return tuple(_line(one, own.get(k), pooled) for k, one in enumerate(courses))
@@ -209,18 +216,25 @@ def lower_corners(outline: Array, frame: WallPlane) -> list[int]:
     return sorted({k for i in np.flatnonzero(bedded).tolist() for k in (i, (i + 1) % len(flat))})
 
 
-def _courses(stones: Sequence[StoneQuality], facade: Facade) -> list[_Course]:
+def _tilt(facade: Facade, tilts: Sequence[Array]) -> float:
+    """Standard deviation of a slope along a facade: the rotation ω raises s·u by (ω × u)_z s."""
+    along = facade.frame.axes[0]
+    lever = np.array([along[1], -along[0], 0.0])
+    return max((math.sqrt(float(lever @ one @ lever)) for one in tilts), default=0.0)
+
+
+def _courses(stones: Sequence[StoneQuality], facade: Facade, frame_sigma: float) -> list[_Course]:
     """Lower corners of a facade, by zone and course."""
     groups: dict[tuple[str, int], list[StoneQuality]] = {}
     for i in facade.members.tolist():
         course = stones[i].course
         if course is not None:
             groups.setdefault((stones[i].zone or "", course), []).append(stones[i])
-    courses = [_course(groups[key], facade) for key in sorted(groups)]
+    courses = [_course(groups[key], facade, frame_sigma) for key in sorted(groups)]
     return [one for one in courses if one is not None]
 
 
-def _course(stones: Sequence[StoneQuality], facade: Facade) -> _Course | None:
+def _course(stones: Sequence[StoneQuality], facade: Facade, frame_sigma: float) -> _Course | None:
     codes: list[str] = []
     parts: list[Array] = []
     left_out = 0
@@ -243,7 +257,7 @@ def _course(stones: Sequence[StoneQuality], facade: Facade) -> _Course | None:
     numbers = np.array([number[code] for code in names], dtype=np.intp)
     along, height, sigma = (np.ascontiguousarray(column) for column in table[order].T)
     bed = BedCorners(numbers, along, height, sigma)
-    return _Course(facade.name, stones[0].zone, course, tuple(names), left_out, bed)
+    return _Course(facade.name, stones[0].zone, course, tuple(names), left_out, bed, frame_sigma)
 
 
 def _line(course: _Course, own: BedScatter | None, pooled: BedScatter | None) -> CourseLine:
@@ -271,9 +285,10 @@ def _line(course: _Course, own: BedScatter | None, pooled: BedScatter | None) ->
         level=float(values[0]),
         slope=slope,
         covariance=covariance,
-        slope_probability=_chance(slope, math.sqrt(covariance[1, 1]), scatter.freedom)
-        if slope is not None
-        else None,
+        frame_sigma=course.frame_sigma,
+        slope_probability=None
+        if slope is None
+        else _chance(slope, math.hypot(math.sqrt(covariance[1, 1]), course.frame_sigma), scatter.freedom),
         sag=sag[0],
         sag_sigma=sag[1],
         sag_probability=sag[2],

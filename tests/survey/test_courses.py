@@ -61,6 +61,21 @@ def test_the_right_of_the_viewer_is_right_on_every_side_of_a_building() -> None:
     assert line.slope == pytest.approx(-0.004, abs=1e-12)
 
 
+def test_a_frame_that_may_be_tilted_makes_slopes_uncertain_and_nothing_else() -> None:
+    """The wall runs along x: a rotation about y tilts it, one about x or z does not."""
+    stones = course(2.0 + 0.004 * places(8))
+    (level,) = lines_of(stones)
+    for axis, sigma in ((0, 0.0), (1, 0.003), (2, 0.0)):
+        tilt = np.zeros((3, 3))
+        tilt[axis, axis] = 0.003**2
+        (line,) = measure_courses(stones, facades_of(stones), [tilt])
+        assert line.frame_sigma == pytest.approx(sigma, abs=1e-12)
+        assert level.slope_sigma is not None
+        assert line.slope_sigma == pytest.approx(math.hypot(level.slope_sigma, sigma))
+        assert line.sag_sigma == level.sag_sigma
+        assert line.finding == ("level and straight" if axis == 1 else "rises to the right")
+
+
 def test_a_parabola_sags_by_its_rise() -> None:
     x = places(9)
     middle, span = (x.min() + x.max()) / 2, x.max() - x.min()
