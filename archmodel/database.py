@@ -22,7 +22,7 @@ from moma.errors import DatabaseError
 
 __all__ = ["SCHEMA_VERSION", "Database", "open_database"]
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 """Layout of the tables that this version of MOMA reads and writes."""
 
 

@@ -49,12 +49,14 @@ def describe(session: Session, code: str) -> dict[str, object]:
         "definition": definition_of(type(entity)),
         "kinds": [{"kind": kind_of(cls), "definition": definition_of(cls)} for cls in chain],
         "course": entity.course,
+        "zone": entity.zone,
         "face": {"length": entity.length, "height": entity.height, "area": entity.area},
         "solid": {"volume": entity.volume, "centroid": [entity.x, entity.y, entity.z]},
         "depth": {
             "value": entity.depth,
             "sigma": entity.depth_sigma,
             "source": entity.depth_source,
+            "origin": entity.depth_origin,
         },
         "survey": _survey(entity),
         "measured": _measured(entity.measurement),
@@ -81,17 +83,28 @@ def _measured(measurement: Measurement) -> dict[str, object]:
     return {
         "vertices": len(measurement.vertices),
         "points": measurement.point_count,
-        "rejected": list(measurement.rejected),
+        "rejected": _names(measurement),
+        "rejected_corners": [index + 1 for index in measurement.rejected_vertices],
         "sigma": measurement.sigma,
         "plane": {
             "normal": measurement.normal.tolist(),
             "offset": measurement.offset,
+            "centroid": measurement.centroid.tolist(),
             "tilt_sigma": deviations[:2],
-            "offset_sigma": deviations[2],
+            "height_sigma": deviations[2],
         },
+        "shape": measurement.shape_text,
+        "provenance": measurement.provenance_text,
+        "station": measurement.station,
+        "remarks": list(measurement.remarks),
         "rms": measurement.rms,
         "redundancy": measurement.redundancy,
     }
+
+
+def _names(measurement: Measurement) -> list[str | int]:
+    """The points left out: by the names that the instrument gave them, else by their numbers from 1."""
+    return [measurement.names[i] if measurement.names else i + 1 for i in measurement.rejected]
 
 
 def _result(result: EntityResult) -> dict[str, object]:

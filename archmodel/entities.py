@@ -65,7 +65,9 @@ class Entity(Base):
     code : the name that the survey gave it, unique in the database
     kind : name of its class in lower case
     course : number of its course, counted from the ground; None if it belongs to none
-    depth : how far it reaches into the wall [m], with its standard deviation and evidence
+    zone : part of the building, as the survey names it; None if it does not
+    depth : how far it reaches into the wall [m], with its standard deviation, its evidence, and what kind of
+        evidence that is
     length, height : of its face, horizontally and upwards in the face's plane [m]
     area : of its face [m²]
     volume : of its solid [m³]
@@ -80,9 +82,11 @@ class Entity(Base):
     code: Mapped[str] = mapped_column(String, unique=True)
     survey_id: Mapped[int] = mapped_column(ForeignKey("survey.id"), index=True)
     course: Mapped[int | None]
+    zone: Mapped[str | None] = mapped_column(String)
     depth: Mapped[float]
     depth_sigma: Mapped[float | None]
     depth_source: Mapped[str] = mapped_column(String)
+    depth_origin: Mapped[str] = mapped_column(String)
     length: Mapped[float]
     height: Mapped[float]
     area: Mapped[float]

@@ -1,12 +1,10 @@
 """Into the database and out again: surveyed stones, simulation runs."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from itertools import islice
 from typing import TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
 from sqlalchemy import insert, select
 from sqlalchemy.orm import Session
 
@@ -31,7 +29,8 @@ def store_survey(
     sha256: str,
     stones: Iterable[StoneRecord],
     *,
-    observer: NDArray[np.float64] | None = None,
+    stations: Mapping[str, Sequence[float]] | None = None,
+    frame: Mapping[str, object] | None = None,
 ) -> int:
     """Take in one survey file: all of it, or, if anything is wrong, nothing.
 
@@ -42,7 +41,8 @@ def store_survey(
     source_path : the file, as the user wrote it
     sha256 : of the file's bytes, in hexadecimal
     stones : its stones, at least one; read once, never all in memory
-    observer : (3,) where the instrument stood [m]
+    stations : where instruments and observers stood, by name, (x, y, z) [m]
+    frame : how the survey was carried into the frame of the site, in values that JSON can say
 
     Returns
     -------
@@ -63,7 +63,8 @@ def store_survey(
             path=storable(source_path),
             sha256=sha256,
             stored_at=datetime.now(UTC),
-            observer=observer,
+            stations={name: [float(value) for value in place] for name, place in (stations or {}).items()},
+            frame=None if frame is None else dict(frame),
         )
         session.add(survey)
         session.flush()

@@ -38,7 +38,8 @@ class Survey(Base):
     path : of the file, as the user wrote it
     sha256 : of the file's bytes, in hexadecimal; a file is taken in once
     stored_at : when (UTC)
-    observer : (3,) where the instrument stood [m]; None if the survey does not say
+    stations : where instruments and observers stood, by name, (x, y, z) [m]
+    frame : how the survey was carried into the frame of the site, with its precision; None if it was there
     """
 
     __tablename__ = "survey"
@@ -48,7 +49,8 @@ class Survey(Base):
     path: Mapped[str] = mapped_column(String)
     sha256: Mapped[str] = mapped_column(String(64), unique=True)
     stored_at: Mapped[datetime] = mapped_column(UtcDateTime)
-    observer: Mapped[Array | None] = mapped_column(ArrayType(3))
+    stations: Mapped[dict[str, list[float]]] = mapped_column(JSON)
+    frame: Mapped[dict[str, object] | None] = mapped_column(JSON(none_as_null=True))
 
     entities: Mapped[list["Entity"]] = relationship(back_populates="survey")
 
@@ -62,13 +64,18 @@ class Measurement(Base):
     vertices, points : (n, 3) as measured [m]
     sigma : standard deviation of a measured coordinate [m]
     normal, offset : the fitted plane n·x = d [-], [m]
-    covariance : (3, 3) of two tilt angles [rad] and the offset [m]
+    centroid, axes : point of the plane [m], directions in it
+    covariance : (3, 3) of two tilts [rad] and the height at the centroid [m]
     rms : root mean square of the residuals [m]
     redundancy : number of accepted points minus 3
     point_count, rejected_count : sizes of `points` and `rejected`, for queries
     rejected : indices into `points` of the blunders
+    rejected_vertices : indices into `outline` of broken or eroded corners
     outline : (nv, 3) corners on the plane [m]
     solid_vertices, solid_faces : the extruded stone [m]
+    vertex_sigma : standard deviations of `solid_vertices` [m]; NaN where not known
+    provenance, provenance_text, shape, shape_text, station, photograph, image, sigmas, names, direction, tail,
+        remarks : as in ``records.StoneRecord``
     notes : the surveyor's observations
     """
 
@@ -83,13 +90,29 @@ class Measurement(Base):
     point_count: Mapped[int]
     rejected_count: Mapped[int]
     rejected: Mapped[list[int]] = mapped_column(JSON)
+    rejected_vertices: Mapped[list[int]] = mapped_column(JSON)
+    provenance: Mapped[str] = mapped_column(String)
+    provenance_text: Mapped[str] = mapped_column(String)
+    shape: Mapped[str] = mapped_column(String)
+    shape_text: Mapped[str] = mapped_column(String)
+    station: Mapped[str | None] = mapped_column(String)
+    photograph: Mapped[str | None] = mapped_column(String)
+    tail: Mapped[float]
+    direction: Mapped[Array | None] = mapped_column(ArrayType(3))
     normal: Mapped[Array] = mapped_column(ArrayType(3))
+    centroid: Mapped[Array] = mapped_column(ArrayType(3))
+    axes: Mapped[Array] = mapped_column(ArrayType(2, 3))
     covariance: Mapped[Array] = mapped_column(ArrayType(3, 3))
     vertices: Mapped[Array] = mapped_column(ArrayType(-1, 3))
     points: Mapped[Array] = mapped_column(ArrayType(-1, 3))
     outline: Mapped[Array] = mapped_column(ArrayType(-1, 3))
     solid_vertices: Mapped[Array] = mapped_column(ArrayType(-1, 3))
     solid_faces: Mapped[list[list[int]]] = mapped_column(JSON)
+    vertex_sigma: Mapped[Array] = mapped_column(ArrayType(-1, 3))
+    image: Mapped[Array] = mapped_column(ArrayType(-1, 2))
+    sigmas: Mapped[Array | None] = mapped_column(ArrayType(-1))
+    names: Mapped[list[str]] = mapped_column(JSON)
+    remarks: Mapped[list[str]] = mapped_column(JSON)
     notes: Mapped[dict[str, str]] = mapped_column(JSON)
 
     entity: Mapped["Entity"] = relationship(back_populates="measurement")

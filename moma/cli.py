@@ -110,8 +110,22 @@ def _common(
 @app.command()
 @reporting
 def ingest(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE…", help="Survey files.")],
-    format: Annotated[SurveyFormat, typer.Option(help="Format of the files.")] = SurveyFormat.MOMA,
+    files: SurveyFiles,
+    format: Format = SurveyFormat.MOMA,
+    header: Header = None,
+    codes: Codes = None,
+    kind: Kind = None,
+    sigma: Sigma = None,
+    keep_going: Annotated[
+        bool,
+        typer.Option("--keep-going", help="Take the good stones, write the others to a file of rejects."),
+    ] = False,
+    rejects: Annotated[
+        Path | None,
+        typer.Option(
+            "--rejects", metavar="FILE", help="That file; else NAME.rejects beside the survey file."
+        ),
+    ] = None,
     db: Db = _DEFAULT_DB,
     json: Json = False,
     verbose: Verbose = False,
@@ -120,9 +134,15 @@ def ingest(
     from moma.listing import as_json
     from moma.telling import ingest_lines
     from pipelines.ingest import ingest as take_in
+    from pipelines.reading_options import reading_options
 
+    if rejects is not None and not keep_going:
+        raise UsageError("--rejects without --keep-going", remedy="give --keep-going too")
+    options = reading_options(header, codes, kind, sigma)
     with progress_bars() as listener:
-        report = take_in(files, db, format.value, listener)
+        report = take_in(
+            files, db, format.value, listener, options=options, keep_going=keep_going, rejects=rejects
+        )
     print(as_json(asdict(report)) if json else "\n".join(ingest_lines(report, verbose)))
 
 

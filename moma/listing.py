@@ -36,7 +36,7 @@ _UNITS = {
     "value": "m",
     "sigma": "m",
     "offset": "m",
-    "offset_sigma": "m",
+    "height_sigma": "m",
     "tilt_sigma": "rad",
     "rms": "m",
     "von_mises_max": "Pa",

@@ -1,6 +1,6 @@
 """What a command has done, in a few lines for a person."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pipelines.check import CheckReport
@@ -23,9 +23,40 @@ def ingest_lines(report: "IngestReport", verbose: bool) -> list[str]:
             f"  {sum(file.rejected.values())} points left out as blunders on {len(file.rejected)} stones; "
             f"worst plane: {file.worst}, rms {file.rms * 1e3:.1f} mm",
         ]
+        if file.frame is not None:
+            lines.append(f"  {_frame_line(file.frame)}")
+        if file.shapes:
+            lines.append(f"  {len(file.shapes)} faces are not one plane: {_some(list(file.shapes))}")
         if verbose:
             lines += [f"  {code}: {count} left out" for code, count in file.rejected.items()]
+            lines += [f"  {code}: {text}" for code, text in file.shapes.items()]
+        if file.refused:
+            lines.append(f"  {len(file.refused)} stones not taken in, to be corrected in {file.rejects}:")
+            shown = file.refused if verbose else file.refused[:5]
+            lines += [f"    {one.reason}" for one in shown]
+            if len(shown) < len(file.refused):
+                lines.append(f"    and {len(file.refused) - len(shown)} more")
     return lines
+
+
+def _frame_line(frame: dict[str, Any]) -> str:
+    """How well the control points tie the survey to the site."""
+    left_out = [point["name"] for point in frame["control"] if point["rejected"]]
+    residuals = [
+        sum(value**2 for value in point["residual"]) ** 0.5
+        for point in frame["control"]
+        if not point["rejected"]
+    ]
+    sigma0 = "" if frame["sigma0"] is None else f", σ₀ {frame['sigma0']:.2f}"
+    return (
+        f"in the frame of the site by {len(residuals)} control points: scale {frame['scale']:.6f}, largest "
+        f"residual {max(residuals) * 1e3:.1f} mm{sigma0}"
+        + (f"; left out as blunders: {', '.join(left_out)}" if left_out else "")
+    )
+
+
+def _some(names: list[str]) -> str:
+    return ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")
 
 
 def check_lines(report: "CheckReport", verbose: bool) -> list[str]:

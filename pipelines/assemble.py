@@ -7,22 +7,19 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy.orm import Session
 
-from archmodel.records import StoneRecord
 from mechanics.meshing.elements import Element
 from mechanics.scene import Block, Fidelity, Scene
 from pipelines.joint_laws import law_rules
+from pipelines.local_frame import entry_about, local_origin, stone_about
 from pipelines.scene_loads import build_loads, thrown
 from pipelines.scenefile import MeshSettings, SceneFile
 from pipelines.selection import Groups, StoneModel, select_groups, select_stones
+from pipelines.stone_records import surveyed_block
 from survey.blocky import BlockyStone, simplify
-from survey.depth import Depth
-from survey.extrusion import SurveyedBlock, extrude
-from survey.faces import outline_face
 from survey.joints import ClosingReport, close_joints
-from survey.records import BlockRecord
 from survey.solids import Solid
 
-__all__ = ["Assembly", "assemble", "assemble_stones", "surveyed_block"]
+__all__ = ["Assembly", "assemble", "assemble_stones"]
 
 Array = NDArray[np.float64]
 
@@ -33,11 +30,12 @@ class Assembly:
 
     Attributes
     ----------
-    scene : for `mechanics.simulate`
+    scene : for `mechanics.simulate`, with places counted from `origin`
     models : the stones as surveyed, in the order of the scene's blocks
     simplified : the same as hexahedra, before the joints were closed
     closing : what closing the joints has changed; None if they stay open
     towards : (3,) mean normal of the faces, from the wall to the observer [-]
+    origin : (3,) of the scene, in the frame of the site [m]
     """
 
     scene: Scene
@@ -45,6 +43,7 @@ class Assembly:
     simplified: tuple[BlockyStone, ...]
     closing: ClosingReport | None
     towards: Array
+    origin: Array
 
 
 def assemble(scene: SceneFile, session: Session) -> Assembly:
@@ -61,7 +60,8 @@ def assemble(scene: SceneFile, session: Session) -> Assembly:
 
 def assemble_stones(scene: SceneFile, models: tuple[StoneModel, ...], groups: Groups) -> Assembly:
     """As `assemble`, of stones that have been selected; the database is not needed."""
-    simplified = tuple(simplify(surveyed_block(model.record)) for model in models)
+    origin = local_origin([model.record for model in models])
+    simplified = tuple(simplify(surveyed_block(stone_about(model.record, origin))) for model in models)
     solids: Sequence[Solid] = [stone.solid for stone in simplified]
     closing = None
     if scene.joints is not None:
@@ -73,40 +73,20 @@ def assemble_stones(scene: SceneFile, models: tuple[StoneModel, ...], groups: Gr
         for model, solid in zip(models, solids, strict=True)
     )
     return Assembly(
-        scene=_scene(scene, blocks, groups),
+        scene=_scene(scene, blocks, groups, origin),
         models=models,
         simplified=simplified,
         closing=closing,
         towards=_facing(simplified),
+        origin=origin,
     )
 
 
-def surveyed_block(record: StoneRecord) -> SurveyedBlock:
-    """The stone as the survey pillar knows it, from what the database keeps of it.
-
-    The face is fitted anew: from the same measurements it is the same face, and the database need not keep
-    what follows from others of its columns.
-    """
-    measured = BlockRecord(
-        code=record.code,
-        kind=record.kind,
-        course=record.course,
-        vertices=record.vertices,
-        points=record.points,
-        sigma=record.sigma,
-        line=record.line,
-        notes=record.notes,
-    )
-    # any point on the stored side of the plane tells the fit which side is outside
-    face = outline_face(measured, record.outline.mean(axis=0) + 100.0 * record.normal)
-    depth = Depth(record.depth, record.depth_sigma, record.depth_source, "stone", record.line)
-    return extrude(face, depth)
-
-
-def _scene(scene: SceneFile, blocks: Sequence[Block], groups: Groups) -> Scene:
+def _scene(scene: SceneFile, blocks: Sequence[Block], groups: Groups, origin: Array) -> Scene:
     """The scene of the blocks, with the laws and loads that the file gives them."""
     document, by_code = scene.document, {block.code: block for block in blocks}
     materials = {block.code: block.material.name for block in blocks}
+    loads = [entry_about(entry, origin) for entry in scene.loads]
     velocity = thrown(document, scene.throws, groups, by_code)
     return Scene(
         name=scene.name,
@@ -118,7 +98,7 @@ def _scene(scene: SceneFile, blocks: Sequence[Block], groups: Groups) -> Scene:
         contact=replace(scene.contact, rules=law_rules(document, scene.laws, groups, materials)),
         time=scene.time,
         solver=scene.solver,
-        loads=build_loads(document, scene.loads, groups, by_code),
+        loads=build_loads(document, loads, groups, by_code),
         frame_every=scene.output.frame_every,
     )
 

@@ -1,28 +1,40 @@
-"""Survey files into the database: read, fit, outline, find the depth, extrude, check, store."""
+"""Survey files into the database: read, fit, outline, find the depth, extrude, store; one stone at a time."""
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+import os
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
+
+from sqlalchemy.orm import Session
 
 from archmodel.database import open_database
 from archmodel.entities import kind_named
 from archmodel.records import StoneRecord
 from archmodel.store import store_survey
-from moma.errors import GeometryError, SurveyError, UsageError
+from moma.errors import SurveyError, UsageError
+from pipelines.frame_records import frame_record
 from pipelines.progress import Listener, Progress, silent
-from survey.depth import depth_for
-from survey.extrusion import SurveyedBlock, extrude
-from survey.faces import outline_face
-from survey.formats.csv_points import read_csv
-from survey.formats.moma_ascii import read_moma
-from survey.records import BlockRecord, Survey
-from survey.watertight import check_watertight
+from pipelines.rejects import default_path, rejects_text, replaceable
+from pipelines.spool import Spool
+from pipelines.stone_records import stone_record
+from survey.extrusion import SurveyedBlock
+from survey.formats.reading import ReadingOptions, open_survey
+from survey.measured import SurveyedStream, survey_stones
+from survey.records import Reject
 
-__all__ = ["FORMATS", "FileReport", "IngestReport", "ingest"]
+__all__ = ["FileReport", "IngestReport", "Refusal", "ingest"]
 
-FORMATS: Mapping[str, Callable[[Path], Survey]] = {"moma": read_moma, "csv": read_csv}
-"""Readers of survey files by the name of their format."""
+
+@dataclass(frozen=True)
+class Refusal:
+    """A stone that was not taken in, and why."""
+
+    code: str | None
+    reason: str
 
 
 @dataclass(frozen=True)
@@ -37,35 +49,41 @@ class FileReport:
     rejected : measured points left out as blunders, by stone code
     rms : root mean square distance of the accepted points from their planes, worst stone [m]
     worst : code of that stone
+    shapes : faces that are not one plane, in words, by stone code
+    refused : stones that were not taken in
+    rejects : the file that holds them; None if there are none
+    frame : how the survey was carried into the frame of the site; None if it was there
     """
 
     path: str
     survey: str
-    stones: Mapping[str, int]
-    rejected: Mapping[str, int]
+    stones: dict[str, int]
+    rejected: dict[str, int]
     rms: float
     worst: str
+    shapes: dict[str, str]
+    refused: tuple[Refusal, ...] = ()
+    rejects: str | None = None
+    frame: dict[str, Any] | None = None
 
 
 @dataclass(frozen=True)
 class IngestReport:
-    """What became of all files: every one is in the database."""
+    """What became of all files."""
 
     url: str
     files: tuple[FileReport, ...]
 
 
-@dataclass(frozen=True)
-class _Measured:
-    """A survey file, computed but not stored."""
-
-    survey: Survey
-    sha256: str
-    stones: tuple[StoneRecord, ...]
-
-
 def ingest(
-    paths: Sequence[str | Path], url: str, format: str = "moma", progress: Listener = silent
+    paths: Sequence[str | Path],
+    url: str,
+    format: str = "moma",
+    progress: Listener = silent,
+    *,
+    options: ReadingOptions | None = None,
+    keep_going: bool = False,
+    rejects: str | Path | None = None,
 ) -> IngestReport:
     """Take survey files into the database: all of them, or, if anything is wrong in any, none.
 
@@ -75,93 +93,171 @@ def ingest(
     url : of the database, made if it does not exist
     format : name of their format
     progress : told after every stone
+    options : what the files leave unsaid
+    keep_going : take the good stones of each file, and write the others to a file of rejects with the reasons
+    rejects : that file, if there is one survey file; by default ``NAME.rejects.SUFFIX`` beside each survey file
 
     Raises
     ------
-    UsageError : no such file, no such format
+    UsageError : no such file, no such format, a file of rejects that would replace one of the user's
     SurveyError, GeometryError : at the line or stone that is wrong; the database is not touched
     DatabaseError : a stone or a file is in the database already; the database is unchanged
     """
-    if format not in FORMATS:
-        raise UsageError(f"unknown format {format!r}", remedy=f"known formats: {', '.join(FORMATS)}")
-    if not paths:
+    surveys = [Path(path) for path in paths]
+    if not surveys:
         raise UsageError("no survey file", remedy="name at least one")
-    measured = [_measure(Path(path), FORMATS[format], progress) for path in paths]
-    with open_database(url) as database, database.session() as session:
-        for one in measured:
-            store_survey(
-                session,
-                one.survey.head.name,
-                one.survey.head.path,
-                one.sha256,
-                one.stones,
-                observer=one.survey.head.viewpoint(None),
-            )
-    return IngestReport(url, tuple(_report(one) for one in measured))
+    if rejects is not None and len(surveys) > 1:
+        raise UsageError(
+            f"one file of rejects for {len(surveys)} survey files", remedy="take in one file at a time"
+        )
+    for survey in surveys:
+        _check_file(survey)
+    targets = [Path(rejects) if rejects is not None else default_path(survey) for survey in surveys]
+    if keep_going:
+        for target in targets:
+            replaceable(target)
+    with ExitStack() as held:
+        spools = [held.enter_context(Spool()) for _ in surveys]
+        tallies = [
+            _measure(path, spool, format, options, keep_going, progress)
+            for path, spool in zip(surveys, spools, strict=True)
+        ]
+        for path, target, tally in zip(surveys, targets, tallies, strict=True):
+            if tally.refused:
+                held.enter_context(_published(target, rejects_text(path, format, tally.refused)))
+        with open_database(url) as database, database.session() as session:
+            for tally, spool in zip(tallies, spools, strict=True):
+                _store(session, tally, _told(spool, tally, progress))
+        reports = tuple(
+            _report(tally, target if tally.refused else None)
+            for tally, target in zip(tallies, targets, strict=True)
+        )
+    return IngestReport(url, reports)
 
 
-def _measure(path: Path, read: Callable[[Path], Survey], progress: Listener) -> _Measured:
+@dataclass
+class _Tally:
+    """What is counted while the stones of a file go by."""
+
+    path: Path
+    stream: SurveyedStream
+    stones: Counter[str] = field(default_factory=Counter)
+    rejected: dict[str, int] = field(default_factory=dict)
+    shapes: dict[str, str] = field(default_factory=dict)
+    rms: float = 0.0
+    worst: str = ""
+    refused: list[Reject] = field(default_factory=list)
+
+    def count(self, block: SurveyedBlock) -> None:
+        face = block.face
+        self.stones[block.kind] += 1
+        if face.rejected_points:
+            self.rejected[block.code] = len(face.rejected_points)
+        if str(face.shape.kind) not in ("plane", "untested"):
+            self.shapes[block.code] = face.shape.text
+        if face.fit.rms >= self.rms:
+            self.rms, self.worst = face.fit.rms, block.code
+
+
+def _check_file(path: Path) -> None:
     if not path.is_file():
         what = "is a folder" if path.is_dir() else "no such file"
         raise UsageError(what, where=str(path), remedy="name a survey file")
-    survey = read(path)
-    stones = []
-    for number, record in enumerate(survey.blocks, start=1):
-        stones.append(_stone(record, survey))
-        progress(Progress(f"fit {path.name}", number, len(survey.blocks), record.code))
-    return _Measured(survey, hashlib.sha256(path.read_bytes()).hexdigest(), tuple(stones))
 
 
-def _stone(record: BlockRecord, survey: Survey) -> StoneRecord:
-    """From measured points to an extruded, checked stone; errors name file, line and stone."""
-    where = f"{survey.head.path}:{record.line}: stone {record.code}"
-    try:
-        kind_named(record.kind)
-        block = extrude(
-            outline_face(record, survey.head.viewpoint(None)), depth_for(record, survey.head.depth_rules)
-        )
-        check_watertight(block.solid)
-    except UsageError as error:
-        raise SurveyError(error.what, where=where, remedy=error.remedy) from error
-    except (SurveyError, GeometryError) as error:
-        raise type(error)(error.what, where=where, remedy=error.remedy) from error
-    return _stone_record(record, block)
+def _measure(
+    path: Path,
+    spool: Spool,
+    format: str,
+    options: ReadingOptions | None,
+    keep_going: bool,
+    progress: Listener,
+) -> _Tally:
+    """The good stones of one file into a spool; the first bad one ends it, or is kept for the rejects."""
+    tally = _Tally(path, survey_stones(open_survey(path, format, options)))
+    stage, head = f"fit {path.name}", tally.stream.head
+    for one in tally.stream.stones:
+        made = one if isinstance(one, Reject) else _of_known_kind(one, head.path)
+        if not isinstance(made, Reject):
+            tally.count(made)
+            spool.append(stone_record(made))
+            progress(Progress(stage, tally.stones.total(), None, made.code))
+        elif keep_going:
+            tally.refused.append(made)
+        else:
+            raise made.error
+    if not tally.stones:
+        first = f"; the first: {tally.refused[0].error}" if tally.refused else ""
+        what = f"none of its {len(tally.refused)} stones can be taken in{first}"
+        raise SurveyError(what, where=str(path), remedy="correct the file")
+    return tally
 
 
-def _stone_record(record: BlockRecord, block: SurveyedBlock) -> StoneRecord:
-    fit = block.face.fit
-    return StoneRecord(
-        code=record.code,
-        kind=record.kind,
-        course=record.course,
-        line=record.line,
-        vertices=record.vertices,
-        points=record.points,
-        sigma=record.sigma,
-        normal=fit.normal,
-        offset=fit.offset,
-        covariance=fit.covariance,
-        rms=fit.rms,
-        redundancy=fit.redundancy,
-        rejected=block.face.rejected_points,
-        outline=block.face.outline,
-        depth=block.depth.value,
-        depth_sigma=block.depth.sigma,
-        depth_source=block.depth.source,
-        solid_vertices=block.solid.vertices,
-        solid_faces=block.solid.faces,
-        notes=record.notes,
+def _store(session: Session, tally: _Tally, stones: Iterator[StoneRecord]) -> None:
+    head = tally.stream.head
+    store_survey(
+        session,
+        head.name,
+        head.path,
+        _sha256(tally.path),
+        stones,
+        stations={one.name: one.position.tolist() for one in head.stations},
+        frame=frame_record(tally.stream.transform),
     )
 
 
-def _report(measured: _Measured) -> FileReport:
-    kinds = sorted({stone.kind for stone in measured.stones})
-    worst = max(measured.stones, key=lambda stone: stone.rms)
+def _told(stones: Iterable[StoneRecord], tally: _Tally, progress: Listener) -> Iterator[StoneRecord]:
+    total = tally.stones.total()
+    for number, stone in enumerate(stones, start=1):
+        progress(Progress(f"store {tally.path.name}", number, total, stone.code))
+        yield stone
+
+
+def _of_known_kind(block: SurveyedBlock, path: str) -> SurveyedBlock | Reject:
+    try:
+        kind_named(block.kind)
+    except UsageError as error:
+        record = block.face.record
+        where = f"{path}:{record.line}: stone {block.code}"
+        return Reject(block.code, SurveyError(error.what, where=where, remedy=error.remedy), record.spans)
+    return block
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+@contextmanager
+def _published(path: Path, text: bytes) -> Iterator[None]:
+    """A file that appears whole, and only if nothing fails until the end of the block."""
+    part = path.with_name(f"{path.name}.part")
+    try:
+        part.write_bytes(text)
+    except OSError as error:
+        raise UsageError(
+            f"the rejects cannot be written: {error.strerror or error}",
+            where=str(path),
+            remedy="name a file that can be written with --rejects",
+        ) from error
+    try:
+        yield
+        os.replace(part, path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+
+
+def _report(tally: _Tally, rejects: Path | None) -> FileReport:
     return FileReport(
-        path=measured.survey.head.path,
-        survey=measured.survey.head.name,
-        stones={kind: sum(stone.kind == kind for stone in measured.stones) for kind in kinds},
-        rejected={stone.code: len(stone.rejected) for stone in measured.stones if stone.rejected},
-        rms=worst.rms,
-        worst=worst.code,
+        path=tally.stream.head.path,
+        survey=tally.stream.head.name,
+        stones=dict(sorted(tally.stones.items())),
+        rejected=tally.rejected,
+        rms=tally.rms,
+        worst=tally.worst,
+        shapes=tally.shapes,
+        refused=tuple(Refusal(one.code, str(one.error)) for one in tally.refused),
+        rejects=None if rejects is None else str(rejects),
+        frame=frame_record(tally.stream.transform),
     )

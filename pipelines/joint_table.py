@@ -37,9 +37,16 @@ JOINT_COLUMNS: Mapping[str, str] = {
 """Columns, and what they hold."""
 
 
-def write_joints(path: Path, result: Result) -> None:
-    """Write the table, joints in the order of `Result.joints`."""
-    columns = _columns(result.joints)
+def write_joints(path: Path, result: Result, origin: NDArray[np.float64]) -> None:
+    """Write the table, joints in the order of `Result.joints`, with places in the frame of the site.
+
+    Parameters
+    ----------
+    path : the file
+    result : of the simulation
+    origin : (3,) of the scene, in the frame of the site [m]
+    """
+    columns = _columns(result.joints) | dict(zip("xyz", (result.joints.centroid + origin).T, strict=True))
     codes = [body.code for body in result.bodies]
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -59,7 +66,6 @@ def _columns(joints: JointResult) -> dict[str, NDArray[np.float64]]:
         if hasattr(joints, name) and name not in ("eccentricity", "parted")
     }
     return values | {
-        **{axis: joints.centroid[:, k] for k, axis in enumerate("xyz")},
         "force_normal": normal,
         "force_shear": np.linalg.norm(shear, axis=1),
         "eccentricity": np.linalg.norm(joints.eccentricity, axis=1),
@@ -68,4 +74,4 @@ def _columns(joints: JointResult) -> dict[str, NDArray[np.float64]]:
 
 
 def _cell(value: float) -> str:
-    return f"{value:.9g}" if np.isfinite(value) else ""
+    return f"{value:.12g}" if np.isfinite(value) else ""

@@ -121,7 +121,7 @@ def write_results(
     with _timed(seconds, "files"):
         progress(Progress("write", 0, 3, "results.pvd"))
         write_frames(result, folder)
-        write_joints(folder / "joints.csv", result)
+        write_joints(folder / "joints.csv", result, assembly.origin)
     with _timed(seconds, "pictures"):
         progress(Progress("write", 1, 3, "pictures"))
         pictures, omitted = _pictures(scene, result)
@@ -134,6 +134,7 @@ def write_results(
     summary = summarise(result, version=version("moma-masonry"), seconds=seconds)
     write_report(folder / "report.html", result, summary, stones, warnings)
     (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
+    summary["origin"] = assembly.origin.tolist()
     summary["warnings"] = warnings
     summary["files"] = sorted(["summary.json", *(entry.name for entry in folder.iterdir())])
     (folder / "summary.json").write_text(as_json(summary), encoding="utf-8")

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from survey.measured import survey_stones
 
 from moma.errors import UsageError
 from pipelines.progress import Listener, Progress, silent
@@ -16,6 +15,7 @@ from survey.facades import Facade, find_facades
 from survey.formats.options import ReadingOptions
 from survey.formats.reading import open_survey
 from survey.frames import SiteTransform
+from survey.measured import survey_stones
 from survey.quality import StoneQuality, SurveyQuality, appraise, judge_survey
 from survey.records import Canon, Reject, SurveyHead
 from survey.remeasure import Remeasure, list_remeasures

@@ -17,8 +17,9 @@ from scipy.spatial import ConvexHull
 
 from moma.errors import GeometryError
 from survey.depth import Depth
-from survey.extrusion import SurveyedBlock, prism
+from survey.extrusion import SurveyedBlock, hidden_side, prism
 from survey.faces import Face
+from survey.records import Extrusion
 from survey.solids import Solid
 
 __all__ = ["BlockyStone", "simplify"]
@@ -35,6 +36,7 @@ class BlockyStone:
     code, kind, course : as in the survey
     face : the measured face it comes from
     depth : its depth, with the evidence
+    extrusion : how its hidden side lies
     corners : (4, 3) of the face, on its plane, counter-clockwise seen from outside [m]
     sound : (4,) whether each corner is known from measurement on the face; False for a worn corner
     solid : hexahedron; the four visible corners first, then the four hidden ones in the same order
@@ -47,6 +49,7 @@ class BlockyStone:
     course: int | None
     face: Face
     depth: Depth
+    extrusion: Extrusion
     corners: Array
     sound: tuple[bool, ...]
     solid: Solid
@@ -75,7 +78,8 @@ def simplify(block: SurveyedBlock) -> BlockyStone:
     flat = np.column_stack([(block.face.outline - fit.centroid) @ axis for axis in (fit.axes[0], across)])
     quad = _quadrilateral(flat, block.code)
     corners = fit.centroid + quad @ np.array([fit.axes[0], across])
-    solid = prism(block.code, corners, corners - block.depth.value * fit.normal)
+    hidden = hidden_side(corners, fit.normal, block.depth.value, block.extrusion)
+    solid = prism(block.code, corners, hidden)
     worn = flat[list(block.face.rejected_vertices)]
     return BlockyStone(
         code=block.code,
@@ -83,6 +87,7 @@ def simplify(block: SurveyedBlock) -> BlockyStone:
         course=block.course,
         face=block.face,
         depth=block.depth,
+        extrusion=block.extrusion,
         corners=corners,
         sound=tuple(not bool((np.linalg.norm(worn - corner, axis=1) < 1e-9).any()) for corner in quad),
         solid=solid,

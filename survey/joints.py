@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from moma.errors import GeometryError
 from survey.blocky import BlockyStone, simplify
-from survey.extrusion import SurveyedBlock, prism
+from survey.extrusion import SurveyedBlock, hidden_side, prism
 from survey.free_sides import free_lines
 from survey.joint_lines import JointLine, JointSettings, joint_lines
 from survey.solids import Solid
@@ -172,13 +172,18 @@ def _crossings(point: Array, direction: Array, codes: Sequence[str]) -> Array:
 
 
 def _cut(stone: BlockyStone, flat: Array, wall: WallPlane) -> Solid:
-    """Cut the stone out along lines square to the wall, between its face and the face moved back."""
+    """Cut the stone out along lines square to the wall, between its face and the face moved back.
+
+    A stone with a direction or a tail of its own keeps it, behind the closed edges of its face.
+    """
     normal, offset = stone.face.fit.normal, stone.face.fit.offset
     placed = wall.origin + flat @ wall.axes[:2]
     square = float(wall.axes[2] @ normal)
     lift = (offset - placed @ normal) / square
     front = placed + np.outer(lift, wall.axes[2])
-    back = placed + np.outer(lift - stone.depth.value / square, wall.axes[2])
+    back = front - stone.depth.value / square * wall.axes[2]
+    if stone.extrusion.direction is not None or stone.extrusion.tail != 1.0:
+        back = hidden_side(front, normal, stone.depth.value, stone.extrusion)
     return prism(stone.code, front, back)
 
 

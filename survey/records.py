@@ -270,6 +270,7 @@ class SolidRecord:
     vertices : (nv, 3) [m]
     faces : vertex indices of each planar face, counter-clockwise seen from outside
     line : line of the file on which it begins, counted from 1; 0 in a binary file
+    spans : lines of the file that it was read from
     """
 
     code: str
@@ -278,6 +279,7 @@ class SolidRecord:
     vertices: Array
     faces: tuple[tuple[int, ...], ...]
     line: int = 0
+    spans: tuple[range, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -191,8 +191,10 @@ def _result(
     residuals, weights, arms = _linearised(x, y, variances, rotation, scale, shift)
     design = _design(arms)
     units = np.array([1.0, 1.0, 1.0, 1.0 / size, 1.0 / size, 1.0 / size, 1.0 / size])
-    inverse = np.linalg.inv(_normal_matrix(design[accepted] * units, weights[accepted]))
-    covariance = inverse * np.outer(units, units)
+    inverse: Array = np.asarray(
+        np.linalg.inv(_normal_matrix(design[accepted] * units, weights[accepted])), dtype=np.float64
+    )
+    covariance: Array = inverse * np.outer(units, units)
     tests, limits = point_tests(residuals, np.eye(3) / weights[:, None, None], design, covariance, accepted)
     squares = float((weights[:, None] * residuals**2)[accepted].sum())
     verdict = Verdict(squares, 3 * int(accepted.sum()) - 7, tests, limits, accepted)

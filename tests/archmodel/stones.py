@@ -43,6 +43,8 @@ def box_stone(
         sigma=0.003,
         normal=np.array([0.0, -1.0, 0.0]),
         offset=-at[1],
+        centroid=face.mean(axis=0),
+        axes=np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
         covariance=np.diag([4e-6, 9e-6, 1e-6]),
         rms=0.0025,
         redundancy=6 - len(rejected),
@@ -53,6 +55,7 @@ def box_stone(
         depth_source="measured in the breach of the tower",
         solid_vertices=np.vstack([face, back]),
         solid_faces=BOX_FACES,
+        vertex_sigma=np.full((8, 3), 0.003),
         notes={"edge": "eroded", "remark": "façade · 2nd campaign"},
     )
 

@@ -185,19 +185,26 @@ def test_all_that_is_known_of_a_stone(filled: Database) -> None:
     assert known["kind"] == "keystone"
     assert known["definition"] == "The voussoir at the crown of an arch, set last."
     assert [level["kind"] for level in known["kinds"]] == ["entity", "ashlar", "voussoir", "keystone"]  # type: ignore[attr-defined]
-    assert known["depth"] == {"value": 0.42, "sigma": 0.03, "source": "measured in the breach of the tower"}
+    source = "measured in the breach of the tower"
+    assert known["depth"] == {"value": 0.42, "sigma": 0.03, "source": source, "origin": "stone"}
     assert known["survey"]["file"] == "window.moma"  # type: ignore[index]
     assert known["measured"] == {
         "vertices": 4,
         "points": 9,
-        "rejected": [2, 5],
+        "rejected": [3, 6],
+        "rejected_corners": [],
         "sigma": 0.003,
         "plane": {
             "normal": [0.0, -1.0, 0.0],
             "offset": 0.0,
+            "centroid": pytest.approx([1.7, 0.0, 1.36]),
             "tilt_sigma": pytest.approx([2e-3, 3e-3]),
-            "offset_sigma": pytest.approx(1e-3),
+            "height_sigma": pytest.approx(1e-3),
         },
+        "shape": "",
+        "provenance": "",
+        "station": None,
+        "remarks": [],
         "rms": 0.0025,
         "redundancy": 4,
     }

@@ -73,14 +73,22 @@ def test_a_survey_is_found_by_the_hash_of_its_file(filled: Database) -> None:
         assert survey_with_hash(session, OTHER) is None
 
 
-def test_the_observer_is_kept(empty: Database) -> None:
+def test_stations_and_frame_are_kept(empty: Database) -> None:
     with empty.session() as session:
-        store_survey(session, "a", "a.moma", SHA, [box_stone("A")], observer=np.array([1.0, 2.0, 3.0]))
+        store_survey(
+            session,
+            "a",
+            "a.moma",
+            SHA,
+            [box_stone("A")],
+            stations={"T1": [1.0, 2.0, 3.0]},
+            frame={"scale": 1.5},
+        )
     with empty.session(read_only=True) as session:
         survey = survey_with_hash(session, SHA)
         assert survey is not None
-        assert survey.observer is not None
-        assert survey.observer.tolist() == [1.0, 2.0, 3.0]
+        assert survey.stations == {"T1": [1.0, 2.0, 3.0]}
+        assert survey.frame == {"scale": 1.5}
 
 
 NAN = float("nan")

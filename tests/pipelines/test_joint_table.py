@@ -2,6 +2,7 @@
 
 import csv
 
+import numpy as np
 import pytest
 
 from mechanics.materials import Material
@@ -31,7 +32,7 @@ def column():
 
 
 def test_every_joint_has_its_line(column, tmp_path):
-    write_joints(tmp_path / "joints.csv", column)
+    write_joints(tmp_path / "joints.csv", column, np.zeros(3))
     with (tmp_path / "joints.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert list(rows[0]) == list(JOINT_COLUMNS)

@@ -14,11 +14,12 @@ from mechanics.result import Outcome
 from mechanics.scene import Fidelity
 from moma.errors import MissingLibraryError, SceneError, UsageError
 from pipelines import run as run_module
-from pipelines.assemble import assemble, surveyed_block
+from pipelines.assemble import assemble
 from pipelines.ingest import ingest
 from pipelines.run import run_scene, write_results
 from pipelines.scenefile import parse_scene
 from pipelines.selection import select_stones
+from pipelines.stone_records import surveyed_block
 from pipelines.stone_values import stone_results
 from tests.pipelines.handmade import result_of, rigid_body
 

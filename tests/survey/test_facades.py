@@ -50,7 +50,9 @@ def test_every_face_of_a_round_tower_has_one_facade_and_is_within_its_limit():
     for one in found:
         turned = np.degrees(np.arccos(np.clip(normals[one.members] @ one.frame.axes[2], -1, 1)))
         assert turned.max() <= WIDEST + 1.0
-    assert 6 <= len(found) <= 11  # six arcs of 60° at best; gaps narrower than 60° between up to five at worst
+    assert (
+        6 <= len(found) <= 11
+    )  # six arcs of 60° at best; gaps narrower than 60° between up to five at worst
 
 
 def test_the_mean_is_weighted_by_area():

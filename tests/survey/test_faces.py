@@ -56,7 +56,6 @@ def test_an_eroded_corner_is_left_out_and_does_not_tilt_the_plane() -> None:
     ("vertices", "words"),
     [
         (np.vstack([SQUARE, [0.3, 0.1, 0.0]])[[0, 2, 1, 3, 4]], "crosses itself"),
-        (np.vstack([SQUARE[[0, 1, 1]], SQUARE[1] + 1e-5]), "2 distinct corners"),
         (SQUARE * [1, 0, 1], "one line"),
     ],
 )
@@ -73,6 +72,12 @@ def test_corners_out_of_order_are_put_in_order_if_one_order_alone_is_possible() 
     # without an observer the order also tells the outside: then it cannot be wrong
     with pytest.raises(GeometryError, match="crosses itself"):
         outline_face(record(SQUARE[[0, 2, 1, 3]]), None)
+
+
+def test_corners_that_are_one_corner_are_not_an_outline() -> None:
+    corners = np.vstack([SQUARE[[0, 1, 1]], SQUARE[1] + 1e-5])
+    with pytest.raises(GeometryError, match="2 distinct corners"):
+        outline_face(record(corners, [(0.1, 0.2, 0.0), (0.4, 0.2, 0.0), (0.3, 0.1, 0.0)]), ABOVE)
 
 
 def test_a_corner_measured_twice_counts_once() -> None:

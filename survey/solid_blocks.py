@@ -1,0 +1,104 @@
+"""Stones that another program made: which side of the solid is the face, and how deep the stone is behind it."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from survey.depth import Depth
+from survey.extrusion import SurveyedBlock
+from survey.faces import Provenance, face_on
+from survey.planes import FaceFit
+from survey.records import BlockRecord, Extrusion, SolidRecord
+from survey.shapes import FaceShape, ShapeKind
+from survey.solids import Solid
+
+__all__ = ["block_of_solid"]
+
+Array = NDArray[np.float64]
+
+_UPRIGHT = 0.9  # a side whose normal rises more steeply (sine) is a bed or a top, not a face
+
+
+def block_of_solid(record: SolidRecord, viewpoint: Array | None, path: str) -> SurveyedBlock:
+    """The stone of a closed solid, with the side that is seen as its face.
+
+    That is the side with the largest area as seen from the viewpoint; without one, the largest upright side.
+    The depth is how far the solid reaches behind it.
+
+    Parameters
+    ----------
+    record : the solid
+    viewpoint : (3,) where the observer stood [m]; None if not known
+    path : of the file that it comes from, for the provenance
+
+    Returns
+    -------
+    SurveyedBlock whose precision is not known
+    """
+    sides = [record.vertices[list(face)] for face in record.faces]
+    vectors = np.array([_area_vector(side) for side in sides])
+    seen = int(np.argmax(_worth(vectors, sides, viewpoint)))
+    normal = vectors[seen] / np.linalg.norm(vectors[seen])
+    fit = _plane(sides[seen], normal)
+    depth = float(((fit.centroid - record.vertices) @ normal).max())
+    measured = BlockRecord(
+        code=record.code,
+        kind=record.kind,
+        course=record.course,
+        vertices=sides[seen],
+        points=np.empty((0, 3)),
+        sigma=0.0,
+        line=record.line,
+    )
+    shape = FaceShape(ShapeKind.UNTESTED, "the side of a solid")
+    provenance = Provenance("solid", f"solid of {path}")
+    corners = sides[seen] - np.outer(fit.residuals, normal)
+    return SurveyedBlock(
+        code=record.code,
+        kind=record.kind,
+        course=record.course,
+        face=face_on(fit, corners, shape, provenance, measured),
+        depth=Depth(depth, None, f"extent of the solid behind its face, {path}", "solid", record.line),
+        extrusion=Extrusion(),
+        solid=Solid(record.code, record.vertices, record.faces),
+        vertex_sigma=np.full(record.vertices.shape, np.nan),
+    )
+
+
+def _worth(vectors: Array, sides: list[Array], viewpoint: Array | None) -> Array:
+    """How much each side is the face, by its area as it is seen."""
+    areas: Array = np.linalg.norm(vectors, axis=1)
+    if viewpoint is None:
+        upright = np.abs(vectors[:, 2]) <= _UPRIGHT * areas
+        return np.where(upright, areas, 0.0) if upright.any() else areas
+    sight = viewpoint - np.array([side.mean(axis=0) for side in sides])
+    out: Array = (vectors * sight).sum(axis=1) / np.linalg.norm(sight, axis=1)
+    return out
+
+
+def _area_vector(polygon: Array) -> Array:
+    """Area times outward normal of a side [m²]."""
+    corners = polygon - polygon[0]
+    out: Array = 0.5 * np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
+    return out
+
+
+def _plane(polygon: Array, normal: Array) -> FaceFit:
+    """The plane of a side, without any precision."""
+    centroid = polygon.mean(axis=0)
+    residuals = (polygon - centroid) @ normal
+    flat = polygon - centroid - np.outer(residuals, normal)
+    _, singular, vectors = np.linalg.svd(flat, full_matrices=False)
+    return FaceFit(
+        normal=normal,
+        offset=float(normal @ centroid),
+        centroid=centroid,
+        axes=vectors[:2],
+        singular_values=singular,
+        covariance=np.zeros((3, 3)),
+        rms=float(np.sqrt((residuals**2).mean())),
+        sigma0=float("nan"),
+        redundancy=0,
+        rejected=(),
+        residuals=residuals,
+        standardised=np.zeros(len(polygon)),
+    )
