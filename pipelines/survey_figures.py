@@ -270,7 +270,11 @@ def _legend(axes: "Axes", marked: bool, unknown: bool) -> None:
         keys.append(Patch(facecolor="none", edgecolor=_FLAG, linewidth=1.8, label="measure again"))
     if unknown:
         keys.append(
-            Patch(facecolor=_UNKNOWN, edgecolor="none", label="not known: no more points than a plane needs")
+            Patch(
+                facecolor=_UNKNOWN,
+                edgecolor="none",
+                label="not known: on a photograph, modelled, or no more points than a plane needs",
+            )
         )
     if keys:
         axes.figure.legend(handles=keys, loc="outside lower left", ncols=2, frameon=False, fontsize=9)

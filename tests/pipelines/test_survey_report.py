@@ -129,7 +129,7 @@ def test_what_is_wrong_with_the_synthetic_wall_is_found(wall):
     content = contents(wall)
     (rejected,) = content["rejects"]
     assert rejected["code"] == "G05-03"
-    assert "112.4O74" in rejected["reason"]
+    assert "112.423O" in rejected["reason"]
     assert {one["code"] for one in content["remeasure"]} == {"G05-03", "G06-05", "G02-04"}
     assert [one["urgency"] for one in content["remeasure"][:2]] == ["missing", "unchecked"]
     assert {one["code"] for one in content["contradictions"]} == {"G02-04"}
