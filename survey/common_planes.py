@@ -65,12 +65,13 @@ class PlaneEstimate:
         arms = self._arms(points)
         gain = self.covariance @ arms.T @ np.linalg.inv(arms @ self.covariance @ arms.T + np.diag(sigmas**2))
         step = gain @ ((points - self.centroid) @ self.normal)
+        keep = np.eye(3) - gain @ arms  # in this form rounding leaves no variance negative (Joseph)
         normal, axes = _turned(self.normal, self.axes, step)
         return PlaneEstimate(
             centroid=self.centroid + step[2] * self.normal,
             normal=normal,
             axes=axes,
-            covariance=self.covariance - gain @ arms @ self.covariance,
+            covariance=keep @ self.covariance @ keep.T + (gain * sigmas**2) @ gain.T,
             scatter=self.scatter,
             text=text,
         )

@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 
 _COARSEST = 0.1  # standard deviation of a corner over the size of the stone, beyond which it is refused
 _SMALLEST = 1e-3  # metres between the farthest corners
+_ROUNDING = 1e-9  # radians, metres: standard deviations below are none
 _GRAZING = float(np.sin(np.radians(10.0)))
 
 
@@ -219,11 +220,13 @@ def _moved(
 def _as_fit(plane: PlaneEstimate, outline: Array) -> FaceFit:
     """A predicted plane as a fit, about the place where its height does not depend on its tilts."""
     tilts, directions = np.linalg.eigh(plane.covariance[:2, :2])
-    axes, tilts = directions.T @ plane.axes, np.maximum(tilts, 1e-300)
-    across = directions.T @ plane.covariance[:2, 2]
+    axes, tilts = directions.T @ plane.axes, np.maximum(tilts, _ROUNDING**2)
+    # no correlation beyond 1, where rounding is all that is left of a variance
+    most = np.sqrt(tilts * plane.covariance[2, 2])
+    across = np.clip(directions.T @ plane.covariance[:2, 2], -most, most)
     # smallest spread of the tilts first, as the axis along which a measured face is longest
     centroid = plane.centroid - (across / tilts) @ axes
-    height = plane.covariance[2, 2] - float((across**2 / tilts).sum())
+    height = max(plane.covariance[2, 2] - float((across**2 / tilts).sum()), _ROUNDING**2)
     return FaceFit(
         normal=plane.normal,
         offset=float(plane.normal @ centroid),
