@@ -134,7 +134,7 @@ def _vertex_sigma(face: Face, depth: Depth, extrusion: Extrusion, hidden: Array)
     variance = np.concatenate([measured, tails])
     variance += fit.covariance[2, 2] * fit.normal**2
     for k in range(2):
-        moved = np.outer(places[:, k], fit.normal) + np.outer(turned, fit.axes[k])
+        moved = places[:, k, None] * fit.normal + turned[:, None] * fit.axes[k]
         variance += fit.covariance[k, k] * moved**2
     depth_variance = np.nan if depth.sigma is None else depth.sigma**2
     variance[count:] += depth_variance * _direction(fit.normal, extrusion) ** 2

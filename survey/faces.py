@@ -132,7 +132,7 @@ def face_on(
     GeometryError
         if the corners have no outline
     """
-    axes = np.array([fit.axes[0], np.cross(fit.normal, fit.axes[0])])
+    axes = fit.axes * [[1.0], [_handedness(fit)]]
     outline = outline_polygon((corners - fit.centroid) @ axes.T, record.sigma, keep_order=keep_order)
     count = len(record.points)
     broken = {i - count for i in fit.rejected if i >= count}
@@ -151,6 +151,13 @@ def face_on(
         rejected_vertices=tuple(k for k, i in enumerate(outline.source) if i in broken),
         remarks=_remarks(outline.merged, outline.reordered),
     )
+
+
+def _handedness(fit: FaceFit) -> float:
+    """1 if the axes and the normal of a plane are right-handed, else -1."""
+    (ax, ay, az), (bx, by, bz), (nx, ny, nz) = *fit.axes.tolist(), fit.normal.tolist()
+    turn = nx * (ay * bz - az * by) + ny * (az * bx - ax * bz) + nz * (ax * by - ay * bx)
+    return 1.0 if turn > 0.0 else -1.0
 
 
 def _remarks(merged: tuple[int, ...], reordered: bool) -> tuple[str, ...]:

@@ -113,17 +113,16 @@ def measure_outline(flat: Array, level: Array | None) -> OutlineMeasures:
     flat : (nv, 2) corners, counter-clockwise [m]
     level : (2,) unit vector of the level direction in the plane; None if the face itself is level
     """
-    corners = flat - flat[0]
     if level is None:
-        level = np.linalg.svd(corners - corners.mean(axis=0), full_matrices=False)[2][0]
-    along, across = corners @ level, corners @ np.array([-level[1], level[0]])
-    length, height = float(along.max() - along.min()), float(across.max() - across.min())
-    points = [(x, y) for x, y in corners.tolist()]
+        level = np.linalg.svd(flat - flat.mean(axis=0), full_matrices=False)[2][0]
+    c, s = level.tolist()
+    points = [(x, y) for x, y in (flat - flat[0]).tolist()]
+    along, across = [c * x + s * y for x, y in points], [c * y - s * x for x, y in points]
     return OutlineMeasures(
         area=_signed_area(points),
-        perimeter=sum(math.dist(points[i - 1], points[i]) for i in range(len(points))),
-        length=length,
-        height=height,
+        perimeter=sum(map(math.dist, points, points[1:] + points[:1])),
+        length=max(along) - min(along),
+        height=max(across) - min(across),
         skew=_skew(points) if len(points) == 4 else None,
     )
 
