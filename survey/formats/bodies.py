@@ -4,7 +4,6 @@ Nothing is repaired: corners are the same only where their coordinates are. What
 open and their neighbours settle: which of them make one body, and which side of each is outside.
 """
 
-from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from moma.errors import GeometryError, SurveyError
+from survey.formats.body_groups import body_groups, signed_volume
 from survey.formats.flat_faces import is_flat, merge_flat
 from survey.solids import Solid
 from survey.watertight import check_watertight, triangulate
@@ -61,8 +61,8 @@ def closed_bodies(raw: RawBody) -> Iterator[Solid | GeometryError]:
     """
     try:
         vertices, polygons = _welded(raw)
-        groups = _connected(polygons)
-        volumes = [_volume(vertices, group) for group in groups]
+        groups = body_groups(vertices, polygons)
+        volumes = [signed_volume(vertices, group) for group in groups]
         if groups and min(volumes) < 0.0 < max(volumes) and set().union(*groups) <= set(polygons):
             raise GeometryError(
                 "some of its bodies are inside out",
@@ -104,58 +104,6 @@ def _welded(raw: RawBody) -> tuple[Array, list[Polygon]]:
     return vertices, list(polygons)
 
 
-def _edges(polygon: Polygon) -> Iterator[tuple[int, int]]:
-    return zip(polygon, polygon[1:] + polygon[:1], strict=True)
-
-
-def _connected(polygons: list[Polygon]) -> list[list[Polygon]]:
-    """Groups of polygons that share edges, each turned as the first of its group."""
-    owners: dict[tuple[int, int], list[int]] = defaultdict(list)
-    for k, polygon in enumerate(polygons):
-        for a, b in _edges(polygon):
-            owners[min(a, b), max(a, b)].append(k)
-    shared = Counter(len(one) for one in owners.values())
-    if shared[1]:
-        raise GeometryError(f"the solid is not closed: {shared[1]} edges have one face", remedy="close it")
-    if len(shared) > 1 or 2 not in shared:
-        raise GeometryError(
-            "an edge has more than two faces", remedy="give stones that touch an object of their own each"
-        )
-    turned: dict[int, Polygon] = {}
-    groups = []
-    for seed in range(len(polygons)):
-        if seed not in turned:
-            turned[seed] = polygons[seed]
-            groups.append([turned[k] for k in _grow(seed, polygons, owners, turned)])
-    return groups
-
-
-def _grow(
-    seed: int,
-    polygons: list[Polygon],
-    owners: dict[tuple[int, int], list[int]],
-    turned: dict[int, Polygon],
-) -> list[int]:
-    """Go from face to face, turning each as its neighbour."""
-    members = [seed]
-    for k in members:
-        for a, b in _edges(turned[k]):
-            first, second = owners[min(a, b), max(a, b)]
-            other = second if first == k else first
-            if other not in turned:
-                wrong = (a, b) in set(_edges(polygons[other]))
-                turned[other] = polygons[other][::-1] if wrong else polygons[other]
-                members.append(other)
-    return members
-
-
-def _volume(vertices: Array, polygons: list[Polygon]) -> float:
-    """Signed volume of a closed body: the sum over its faces, cut into fans [m³]."""
-    fans = [(one[0], one[k], one[k + 1]) for one in polygons for k in range(1, len(one) - 1)]
-    a, b, c = (vertices[list(ids)] - vertices[polygons[0][0]] for ids in zip(*fans, strict=True))
-    return float((a * np.cross(b, c)).sum()) / 6.0
-
-
 def _closed(raw: RawBody, vertices: Array, polygons: list[Polygon]) -> Solid:
     """The solid with faces as large as planes allow, if it is closed."""
     flat: list[Polygon] = []
@@ -172,7 +120,7 @@ def _closed(raw: RawBody, vertices: Array, polygons: list[Polygon]) -> Solid:
             check_watertight(merged)
         except (
             GeometryError
-        ):  # outlines that cannot be cut into ears: the triangles as they came can say more
+        ):  # an outline that cannot be cut into ears; the triangles as they came can say more
             merged = _compact(raw.name, vertices, flat)
             check_watertight(merged)
     return merged

@@ -1,7 +1,7 @@
 """Closed solids that other programs made: OBJ, PLY, STL and gmsh MSH, one stone per object.
 
 An object is an ``o`` (or ``g``) of OBJ, a ``solid`` of STL, a volume of MSH, the whole of a PLY. Where one has several
-bodies that do not touch, each is a stone: NAME-1, NAME-2, … The name is taken apart by the code template,
+bodies, each is a stone: NAME-1, NAME-2, … The name is taken apart by the code template,
 {block}:{kind} by default; if it does not fit, it is the code itself, blanks replaced by "_".
 """
 

@@ -200,17 +200,65 @@ def shift(x: float) -> np.ndarray:
     return np.array(trimesh.transformations.translation_matrix((x, 0, 0)))
 
 
-def test_a_cavity_and_a_touching_stone_are_refused(tmp_path: Path) -> None:
+def test_a_cavity_is_refused(tmp_path: Path) -> None:
     outer, inner = trimesh.creation.box((3, 3, 3)), trimesh.creation.box()
     inner.invert()
     both = trimesh.util.concatenate([outer, inner])
     (one,) = read(tmp_path / "c.ply", both.export(file_type="ply"))
     assert isinstance(one, Reject)
     assert "inside out" in str(one.error)
-    touching = trimesh.util.concatenate([trimesh.creation.box(), trimesh.creation.box(transform=shift(1.0))])
-    (one,) = read(tmp_path / "t.stl", touching.export(file_type="stl"))
+
+
+WALL = [(x, y, z) for z in range(3) for y in range(2) for x in range(3)]
+
+
+@pytest.mark.parametrize("inverted", [False, True])
+@pytest.mark.parametrize("ending", ["stl", "ply"])
+def test_bodies_that_touch_are_told_apart_by_their_insides(
+    tmp_path: Path, ending: str, inverted: bool
+) -> None:
+    """A wall of 18 bricks without gaps in one mesh: faces on faces, up to eight bricks around a corner."""
+    bricks = [
+        trimesh.creation.box((1.0, 0.5, 0.25), trimesh.transformations.translation_matrix((x, y / 2, z / 4)))
+        for x, y, z in WALL
+    ]
+    wall = trimesh.util.concatenate(bricks)
+    if inverted:
+        wall.invert()
+    turn = trimesh.transformations.rotation_matrix(0.7, (1, 2, 3))
+    wall.vertices = np.round(trimesh.transform_points(wall.vertices, turn), 9)
+    found = solids(tmp_path / f"w.{ending}", wall.export(file_type=ending))
+    assert len(found) == len(WALL)
+    for one in found:
+        assert volume(one) == pytest.approx(0.125, rel=1e-6)
+        assert (len(one.vertices), len(one.faces)) == (8, 6)
+    centres = {tuple(np.round(turn[:3, :3].T @ one.vertices.mean(axis=0), 4) + 0.0) for one in found}
+    assert centres == {(float(x), y / 2, z / 4) for x, y, z in WALL}
+
+
+def test_bodies_that_touch_along_an_edge_are_two(tmp_path: Path) -> None:
+    """Two cubes, corner to corner across an edge; and two wedges that stand on one edge, one within the other's bay."""
+    shifted = trimesh.creation.box(transform=trimesh.transformations.translation_matrix((1, 1, 0)))
+    both = trimesh.util.concatenate([trimesh.creation.box(), shifted])
+    found = solids(tmp_path / "e.stl", both.export(file_type="stl"))
+    assert [volume(one) for one in found] == pytest.approx([1.0, 1.0], rel=1e-6)
+    outline = np.array([(0, 0), (3, -2), (4, 0), (3, 2)], dtype=float)  # about the edge at the origin
+    inner = np.array([(0, 0), (-1, 0.5), (-2, 0), (-1, -0.5)])
+    parts = [
+        trimesh.creation.extrude_triangulation(one, np.array([(0, 1, 2), (0, 2, 3)]), 1.0)
+        for one in (outline, inner)
+    ]
+    found = solids(tmp_path / "w.ply", trimesh.util.concatenate(parts).export(file_type="ply"))
+    assert sorted(volume(one) for one in found) == pytest.approx([1.0, 8.0], rel=1e-6)
+
+
+def test_touching_faces_that_do_not_agree_on_outside_are_refused(tmp_path: Path) -> None:
+    cube, other = trimesh.creation.box(), trimesh.creation.box(transform=shift(1.0))
+    other.faces[0] = other.faces[0][::-1]
+    both = trimesh.util.concatenate([cube, other])
+    (one,) = read(tmp_path / "t.stl", both.export(file_type="stl"))
     assert isinstance(one, Reject)
-    assert "more than two faces" in str(one.error)
+    assert "an object of their own" in str(one.error)
 
 
 def elements_of(gmsh: Any, volume: int) -> np.ndarray:
