@@ -76,6 +76,22 @@ def test_the_python_of_the_how_to_on_rigid_blocks_prints_what_it_says(place):
     assert printed == said
 
 
+def test_what_the_how_to_on_surveys_shows_is_what_the_files_and_commands_say(place):
+    page = "docs/howto/survey.md"
+    said = [
+        path.read_text(encoding="utf-8") for path in (ROOT / "docs/howto/survey").iterdir() if path.is_file()
+    ]
+    shown_whole = [
+        one for one in commands(page) if "data/samples/window/window.moma" in one or "--keep-going" in one
+    ]
+    said += [execute([sys.executable, "-m", *command], place).stdout for command in shown_whole]
+    said.append((place / "rejects.txt").read_text(encoding="utf-8"))
+    known = set("\n".join(said).splitlines())
+    shown = [line for block in blocks(page, "text") for line in block.splitlines()]
+    assert len(shown) > 20
+    assert [line for line in shown if line not in known] == []
+
+
 def test_the_links_of_the_pages_lead_somewhere():
     for page in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]:
         for link in re.findall(r"\]\(([^)#]+)", page.read_text(encoding="utf-8")):
