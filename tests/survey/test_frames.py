@@ -329,6 +329,39 @@ def test_values_that_are_no_numbers_are_refused() -> None:
         fit_similarity(control(bad, transformed(WALL)))
 
 
+def test_spoilt_control_points_are_fitted_or_refused_and_nothing_else() -> None:
+    # warnings are errors here; coordinates are copied, exchanged, scaled, shifted and flattened
+    rng = np.random.default_rng(6)
+    fitted, refused = 0, []
+    for _ in range(80):
+        sets = [WALL[: rng.integers(3, 9)].copy()]
+        sets.append(transformed(sets[0]))
+        for points in sets:
+            for _ in range(rng.integers(0, 3)):
+                i, j, axis = *rng.integers(len(points), size=2), rng.integers(3)
+                match rng.integers(5):
+                    case 0:
+                        points[i] = points[j]
+                    case 1:
+                        points[[i, j]] = points[[j, i]]
+                    case 2:
+                        points[i] *= 10.0 ** rng.integers(-6, 7)
+                    case 3:
+                        points[i] += rng.normal(size=3) * 10.0 ** rng.integers(-3, 4)
+                    case _:
+                        points[:, axis] = points[0, axis]
+        try:
+            fit = fit_similarity(control(*sets))
+        except SurveyError as error:
+            refused.append(error)
+        else:
+            assert np.linalg.det(fit.rotation) == pytest.approx(1.0)
+            assert np.isfinite(fit.covariance).all()
+            fitted += 1
+    assert min(fitted, len(refused)) > 10
+    assert all(error.where and error.remedy for error in refused)
+
+
 # ---------------------------------------------------------------------------------------------- moving a survey
 
 

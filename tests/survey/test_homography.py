@@ -177,3 +177,33 @@ def test_a_mark_inside_the_triangle_of_others_on_one_side_only_is_refused() -> N
 def test_marks_that_are_too_few_or_no_numbers_are_refused(image: Array, sigma: float) -> None:
     with pytest.raises(GeometryError):
         fit_homography(image, sigma, mapped(CAMERA, IMAGE[: len(image)]), 0.003)
+
+
+def test_spoilt_marks_are_fitted_or_refused_and_nothing_else() -> None:
+    # warnings are errors here; coordinates are copied, exchanged, scaled and shifted
+    rng = np.random.default_rng(6)
+    fitted, refused = 0, []
+    for _ in range(80):
+        image = IMAGE[: rng.integers(4, 9)].copy()
+        plane = mapped(CAMERA, image)
+        for points in (image, plane):
+            for _ in range(rng.integers(0, 3)):
+                i, j = rng.integers(len(points), size=2)
+                match rng.integers(4):
+                    case 0:
+                        points[i] = points[j]
+                    case 1:
+                        points[[i, j]] = points[[j, i]]
+                    case 2:
+                        points[i] *= 10.0 ** rng.integers(-6, 7)
+                    case _:
+                        points[i] += rng.normal(size=2) * 10.0 ** rng.integers(-3, 4)
+        try:
+            fit = fit_homography(image, 1.0, plane, 0.003)
+        except GeometryError as error:
+            refused.append(error)
+        else:
+            assert np.isfinite(fit.covariance).all()
+            fitted += 1
+    assert min(fitted, len(refused)) > 10
+    assert all(error.where and error.remedy for error in refused)
