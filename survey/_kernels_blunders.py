@@ -15,6 +15,7 @@ FINE, NOT_FINITE, SIGMA, COLLINEAR = 0, 1, 2, 3  # what `fit_face` found
 _CRITICAL = 3.29  # two-sided normal quantile of Baarda's α₀ = 0.1 %
 _LARGEST_TILT = math.radians(10.0)  # standard deviation of a tilt that no plane among others may exceed
 _GRAZING = 0.17  # cosine between normal and line of sight below which a face is not measured: 80°
+_NARROW = 0.15  # width over length of a part of the points that is not the whole face
 _MANY = 50  # points of which none has much to say alone
 _FEWEST = 4  # points that a plane is never grown from fewer than
 
@@ -202,6 +203,20 @@ def _check(xyz, sigma):
 
 
 @njit(cache=True)
+def _part(local, root, kept):
+    """The points of a compact face, their 1/σ, and that all are accepted."""
+    m = kept.shape[0]
+    if m == root.shape[0]:
+        return local, root, np.ones(m, dtype=np.bool_)
+    near, near_root = np.empty((3, m)), np.empty(m)
+    for i in range(m):
+        near_root[i] = root[kept[i]]
+        for k in range(3):
+            near[k, i] = local[k, kept[i]]
+    return near, near_root, np.ones(m, dtype=np.bool_)
+
+
+@njit(cache=True)
 def fit_face(xyz, sigma, known, observer):
     """Plane of a face (n, 3) without its blunders.
 
@@ -223,15 +238,13 @@ def fit_face(xyz, sigma, known, observer):
         for k in range(3):
             local[k, i] = xyz[i, k] - xyz[0, k]
     kept = beside_the_rest(local)
-    m = kept.shape[0]
-    near, near_root, sound = local, root, np.ones(m, dtype=np.bool_)
-    if m < n:
-        near, near_root = np.empty((3, m)), np.empty(m)
-        for i in range(m):
-            near_root[i] = root[kept[i]]
-            for k in range(3):
-                near[k, i] = local[k, kept[i]]
+    near, near_root, sound = _part(local, root, kept)
     total = weighted_plane(near, near_root, sound, frame, work)
+    if kept.shape[0] < n and not frame[4, 1] > _NARROW * frame[4, 0]:  # most points lie along one edge
+        kept = np.arange(n)
+        near, near_root, sound = _part(local, root, kept)
+        total = weighted_plane(near, near_root, sound, frame, work)
+    m = kept.shape[0]
     if total > 0.0 and m > 3:
         leverages(near, near_root, frame, total, residuals[:m], lever[:m])
         if not (known and is_clean(near_root, residuals[:m], lever[:m])):

@@ -18,6 +18,7 @@ _DRAWS = 3000
 _EROSION = 0.03  # how far behind a face its eroded edges and its mortar lie [m]
 _IN_FRONT = _CRITICAL**2  # how much more a blunder less than that in front counts, in squares of sigma
 _FARTHEST = 2.5  # distance from the middle of a face, over that of its third quartile, beyond which no point is its own
+_ALONE = 0.7  # distance from the nearest other point, over that limit, that such a point has at least
 _BALANCED = 0.4  # mean of directions, below which points lie all around
 
 
@@ -168,8 +169,10 @@ def beside_the_rest(local):
             (local[0, i] - centre[0]) ** 2 + (local[1, i] - centre[1]) ** 2 + (local[2, i] - centre[2]) ** 2
         )
     limit, count = _FARTHEST * smallest(away, n - n // 4), 0
+    beside = np.zeros(n, dtype=np.bool_)
     for i in range(n):
-        if away[i] > limit:
+        if away[i] > limit and _nearest_of(local, i, away, limit) > _ALONE * limit:
+            beside[i] = True
             count += 1
             for k in range(3):
                 balance[k] += (local[k, i] - centre[k]) / away[i]
@@ -178,10 +181,21 @@ def beside_the_rest(local):
         return everything
     kept, m = np.empty(n - count, dtype=np.int64), 0
     for i in range(n):
-        if away[i] <= limit:
+        if not beside[i]:
             kept[m] = i
             m += 1
     return kept
+
+
+@njit(cache=True)
+def _nearest_of(local, i, away, limit):
+    """Distance of a point from the nearest that is not far away."""
+    least = np.inf
+    for j in range(local.shape[1]):
+        if away[j] <= limit:
+            x, y, z = local[0, i] - local[0, j], local[1, i] - local[1, j], local[2, i] - local[2, j]
+            least = min(least, x * x + y * y + z * z)
+    return math.sqrt(least)
 
 
 @njit(cache=True)

@@ -53,10 +53,15 @@ def largest_sum(redundancy: int) -> float:
 def accepted_points(points: Array, sigma: Array, known: bool, observer: Array | None) -> Bools:
     """What `fit_plane` does not reject, (n,)."""
     kept = compact(points)
-    if not kept.all():
+    part = plane_of(points - points[0], 1.0 / sigma, kept)
+    if not kept.all() and part is not None and part.singular[1] > 0.15 * part.singular[0]:
         out = np.zeros(len(points), dtype=bool)
-        out[kept] = accepted_points(points[kept], sigma[kept], known, observer)
+        out[kept] = accepted_of_the_compact(points[kept], sigma[kept], known, observer)
         return out
+    return accepted_of_the_compact(points, sigma, known, observer)
+
+
+def accepted_of_the_compact(points: Array, sigma: Array, known: bool, observer: Array | None) -> Bools:
     xyz, root, count = points - points[0], 1.0 / sigma, len(points)
     everything = np.ones(count, dtype=bool)
     plain = plane_of(xyz, root, everything)
@@ -86,7 +91,9 @@ def compact(points: Array) -> Bools:
         weights = 1.0 / np.maximum(np.linalg.norm(points - centre, axis=1), 1e-9)
         centre = weights @ points / weights.sum()
     away = np.linalg.norm(points - centre, axis=1)
-    near = away <= 2.5 * np.sort(away)[len(points) - len(points) // 4 - 1]
+    limit = 2.5 * np.sort(away)[len(points) - len(points) // 4 - 1]
+    gaps = np.linalg.norm(points[:, None] - points[None, away <= limit], axis=2).min(axis=1)
+    near = (away <= limit) | (gaps <= 0.7 * limit)
     directions = (points - centre)[~near] / away[~near, None]
     around = len(directions) > 3 and np.linalg.norm(directions.mean(axis=0)) < 0.4
     return np.ones(len(points), dtype=bool) if around else near
