@@ -55,21 +55,20 @@ def depth_for(record: BlockRecord, rules: Sequence[DepthRule]) -> Depth:
         source = record.depth_source or "measured on the stone"
         return Depth(record.depth, record.depth_sigma, source, "stone", record.line)
     where = f"stone {record.code} (line {record.line})"
-    best: DepthRule | None = None
-    for rule in rules:
-        if _holds(rule, record) and (best is None or _rank(rule) >= _rank(best)):
-            if best is not None and _rank(rule) == _rank(best):
-                raise SurveyError(
-                    f"the depth rules of lines {best.line} and {rule.line} both hold for it",
-                    where=where,
-                    remedy="let one rule hold for each stone, or give the stone a depth of its own",
-                )
-            best = rule
-    if best is None:
+    holding = [rule for rule in rules if _holds(rule, record)]
+    if not holding:
         raise SurveyError(
             f"no depth is known for a {record.kind}",
             where=where,
             remedy=f"measure the stone, or put 'depth {record.kind} D source TEXT' before the stones",
+        )
+    best = max(holding, key=_rank)
+    alike = sorted(rule.line for rule in holding if _rank(rule) == _rank(best))
+    if len(alike) > 1:
+        raise SurveyError(
+            f"the depth rules of lines {alike[0]} and {alike[1]} both hold for it",
+            where=where,
+            remedy="let one rule hold for each stone, or give the stone a depth of its own",
         )
     return Depth(best.depth, best.sigma, best.source, _ORIGINS[_rank(best)], best.line)
 

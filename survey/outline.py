@@ -26,7 +26,7 @@ class Outline:
     ----------
     corners : (nv, 2) in the plane of the face, counter-clockwise [m]
     source : which of the given corners each one is; of corners that were merged, the first
-    merged : given corners that were taken as one with the corner before them
+    merged : given corners that were taken as one with a corner before them
     reordered : whether the corners were given in an order in which the outline crosses itself
     """
 
@@ -47,7 +47,7 @@ class OutlineMeasures:
     length, height : extents along the level direction of the face and square to it [m]; of a level face, the
         larger and the smaller principal extent
     skew : by how much the angle between the two middle lines of a face of four corners differs from a right
-        one [rad]; None for other faces
+        one, either way [rad]; None for other faces
     """
 
     area: float
@@ -79,21 +79,25 @@ def outline_polygon(flat: Array, sigma: float, *, keep_order: bool = False) -> O
         if fewer than three corners are left, they enclose nothing, or the order cannot be known
     """
     points: list[Point] = [(x, y) for x, y in flat.tolist()]
-    order, merged = _distinct(points, max(_NEAREST, _NOISE * sigma))
+    nearest = max(_NEAREST, _NOISE * sigma)
+    order, merged = _distinct(points, nearest)
     if len(order) < 3:
         raise GeometryError(
             f"its outline has {len(order)} distinct corners", remedy="measure 3 corners or more, each once"
         )
     reordered = False
     if (crossing := _first_crossing([points[i] for i in order])) is not None:
-        around = None if keep_order else _around(points, order)
+        unique = [] if keep_order else _unique(points, order, nearest)
+        around = _around(points, unique) if len(unique) > 2 else None
         if around is None:
             first, second = (order[side] + 1 for side in crossing)
             raise GeometryError(
                 f"the outline crosses itself after corners {first} and {second}",
                 remedy="list the corners in order around the face",
             )
-        order, reordered = around, True
+        merged += [i for i in order if i not in unique]
+        reordered = _first_crossing([points[i] for i in unique]) is not None
+        order = around
     area = _signed_area([points[i] for i in order])
     if abs(area) <= (3.0 * sigma) ** 2:
         raise GeometryError(
@@ -102,7 +106,7 @@ def outline_polygon(flat: Array, sigma: float, *, keep_order: bool = False) -> O
         )
     if area < 0.0:
         order.reverse()
-    return Outline(flat[order], tuple(order), tuple(merged), reordered)
+    return Outline(flat[order], tuple(order), tuple(sorted(merged)), reordered)
 
 
 def measure_outline(flat: Array, level: Array | None) -> OutlineMeasures:
@@ -113,16 +117,20 @@ def measure_outline(flat: Array, level: Array | None) -> OutlineMeasures:
     flat : (nv, 2) corners, counter-clockwise [m]
     level : (2,) unit vector of the level direction in the plane; None if the face itself is level
     """
+    lies = level is None
     if level is None:
         level = np.linalg.svd(flat - flat.mean(axis=0), full_matrices=False)[2][0]
     c, s = level.tolist()
     points = [(x, y) for x, y in (flat - flat[0]).tolist()]
     along, across = [c * x + s * y for x, y in points], [c * y - s * x for x, y in points]
+    length, height = max(along) - min(along), max(across) - min(across)
+    if lies and length < height:  # corners that crowd spread most along the shorter one
+        length, height = height, length
     return OutlineMeasures(
         area=_signed_area(points),
         perimeter=sum(map(math.dist, points, points[1:] + points[:1])),
-        length=max(along) - min(along),
-        height=max(across) - min(across),
+        length=length,
+        height=height,
         skew=_skew(points) if len(points) == 4 else None,
     )
 
@@ -146,6 +154,15 @@ def _distinct(points: list[Point], nearest: float) -> tuple[list[int], list[int]
     while len(order) > 1 and math.dist(points[order[-1]], points[order[0]]) < nearest:
         merged.append(order.pop())
     return order, merged
+
+
+def _unique(points: list[Point], order: list[int], nearest: float) -> list[int]:
+    """Corners that are none of those before them measured again, be it much later."""
+    unique: list[int] = []
+    for i in order:
+        if all(math.dist(points[i], points[k]) >= nearest for k in unique):
+            unique.append(i)
+    return unique
 
 
 def _first_crossing(points: list[Point]) -> tuple[int, int] | None:
@@ -211,4 +228,4 @@ def _signed_area(points: list[Point]) -> float:
 def _skew(points: list[Point]) -> float:
     (ax, ay), (bx, by), (cx, cy), (dx, dy) = points
     ux, uy, vx, vy = bx + cx - ax - dx, by + cy - ay - dy, cx + dx - ax - bx, cy + dy - ay - by
-    return math.atan2(ux * vy - uy * vx, ux * vx + uy * vy) - 0.5 * math.pi
+    return abs(math.atan2(ux * vy - uy * vx, ux * vx + uy * vy) - 0.5 * math.pi)
