@@ -43,14 +43,14 @@ def _view(local, frame, origin, observer):
 
 
 @njit(cache=True)
-def largest_sum(redundancy):
+def _largest_sum(redundancy):
     """Sum of squares that chance exceeds once in a thousand: chi-square after Wilson and Hilferty."""
     spread = 2.0 / (9.0 * redundancy)
     return redundancy * (1.0 - spread + 3.09 * math.sqrt(spread)) ** 3
 
 
 @njit(cache=True)
-def is_clean(root, residuals, lever):
+def _is_clean(root, residuals, lever):
     """Whether the plain fit passes every test; the sum catches blunders that hide each other."""
     total = 0.0
     for i in range(root.shape[0]):
@@ -58,7 +58,7 @@ def is_clean(root, residuals, lever):
         total += square
         if square > _CRITICAL**2 * max(1.0 - lever[i], 1e-6):
             return False
-    return total <= largest_sum(root.shape[0] - 3)
+    return total <= _largest_sum(root.shape[0] - 3)
 
 
 @njit(cache=True)
@@ -86,7 +86,7 @@ def _scale(squares, count, total, known):
     redundancy = max(count - 3, 1)
     raw = math.sqrt(squares / redundancy)
     if known:
-        return raw if squares > largest_sum(redundancy) else 1.0
+        return raw if squares > _largest_sum(redundancy) else 1.0
     return max(raw if count == total else raw / _consistency(count / total), 1e-300)
 
 
@@ -165,7 +165,7 @@ def _grow(accepted, majority, local, root, known, view, frame, work):
 
 
 @njit(cache=True)
-def without_blunders(local, root, known, view, frame, work):
+def _without_blunders(local, root, known, view, frame, work):
     """Accepted points, from the best of the starts.
 
     The least median sees half of the points only; with a known precision all of them can be judged, and less than half
@@ -247,9 +247,9 @@ def fit_face(xyz, sigma, known, observer):
     m = kept.shape[0]
     if total > 0.0 and m > 3:
         leverages(near, near_root, frame, total, residuals[:m], lever[:m])
-        if not (known and is_clean(near_root, residuals[:m], lever[:m])):
+        if not (known and _is_clean(near_root, residuals[:m], lever[:m])):
             view = _view(near, frame, xyz[0], observer)
-            sound = without_blunders(near, near_root, known, view, frame, work)
+            sound = _without_blunders(near, near_root, known, view, frame, work)
             total = weighted_plane(near, near_root, sound, frame, work)
     accepted[:] = False
     for i in range(m):

@@ -24,7 +24,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from moma.errors import GeometryError
-from survey._kernels_blunders import FINE, NOT_FINITE, SIGMA, fit_face
 
 __all__ = ["FaceFit", "fit_plane"]
 
@@ -108,6 +107,8 @@ def fit_plane(points: ArrayLike, sigma: ArrayLike | None, observer: ArrayLike | 
         so narrow that a tilt has a standard deviation of more than 10°. A face turned so far puts the hidden side
         of a stone 0.4 m deep 70 mm aside, and the first-order covariance no longer describes it.
     """
+    from survey._kernels_blunders import FINE, fit_face  # with numba, which readers of fits do without
+
     xyz = np.ascontiguousarray(points, dtype=np.float64)
     if xyz.ndim != 2 or xyz.shape[1] != 3 or len(xyz) < 3:
         raise GeometryError(
@@ -146,6 +147,8 @@ def fit_plane(points: ArrayLike, sigma: ArrayLike | None, observer: ArrayLike | 
 
 def _refusal(status: int, xyz: Array, deviations: Array) -> GeometryError:
     """Say why there is no plane."""
+    from survey._kernels_blunders import NOT_FINITE, SIGMA
+
     if status == NOT_FINITE:
         number = int(np.argmin(np.isfinite(xyz).all(axis=1)))
         return GeometryError(
