@@ -155,7 +155,8 @@ def face_on(
 
 def _handedness(fit: FaceFit) -> float:
     """1 if the axes and the normal of a plane are right-handed, else -1."""
-    (ax, ay, az), (bx, by, bz), (nx, ny, nz) = *fit.axes.tolist(), fit.normal.tolist()
+    (ax, ay, az), (bx, by, bz) = fit.axes.tolist()
+    nx, ny, nz = fit.normal.tolist()
     turn = nx * (ay * bz - az * by) + ny * (az * bx - ax * bz) + nz * (ax * by - ay * bx)
     return 1.0 if turn > 0.0 else -1.0
 
