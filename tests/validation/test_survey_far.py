@@ -14,11 +14,13 @@ import pytest
 from pipelines.check import check_scene
 from pipelines.ingest import ingest
 from survey.depth import depth_for
-from survey.extrusion import extrude
+from survey.extrusion import SurveyedBlock, extrude
 from survey.faces import outline_face
 from survey.formats.moma_ascii import read_moma, write_moma
+from survey.formats.reading import open_survey
 from survey.joints import close_joints
-from survey.records import Survey
+from survey.measured import survey_stones
+from survey.records import ControlPoint, Survey
 from survey.watertight import check_watertight
 
 SAMPLE = Path(__file__).parents[2] / "data" / "samples" / "window" / "window.moma"
@@ -103,6 +105,39 @@ def test_a_survey_is_written_and_read_to_the_last_bit(tmp_path):
     for a, b in zip(far.blocks, again.blocks, strict=True):
         np.testing.assert_array_equal(a.vertices, b.vertices)
         np.testing.assert_array_equal(a.points, b.points)
+
+
+def test_control_points_carry_stones_and_their_precision_to_the_site(tmp_path, pair):
+    """A survey in the frame of its instrument, turned by 40° and 100 m off, with exact control points."""
+    near, _ = pair
+    angle = np.radians(40.0)
+    turn = np.array(
+        [[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]]
+    )
+    own = moved(read_moma(SAMPLE), np.zeros(3))
+    middle = own.blocks[0].vertices[0]
+
+    def measured_at(points):
+        return (points - middle) @ turn.T + [100.0, 0.0, 5.0]
+
+    corners = middle + np.array([[0, 0, 0], [6, 1, 0], [5, -2, 4], [-3, 2, 3], [1, 4, 6.0]])
+    control = tuple(
+        ControlPoint(f"C{k}", measured_at(one), 0.001, one + LAMBERT, 0.001) for k, one in enumerate(corners)
+    )
+    stations = tuple(replace(one, position=measured_at(one.position)) for one in own.head.stations)
+    blocks = tuple(
+        replace(one, vertices=measured_at(one.vertices), points=measured_at(one.points)) for one in own.blocks
+    )
+    write_moma(Survey(replace(own.head, stations=stations, control=control), blocks), tmp_path / "own.moma")
+    surveyed = survey_stones(open_survey(tmp_path / "own.moma", "moma"))
+    assert surveyed.transform is not None
+    assert surveyed.transform.scale == pytest.approx(1.0, abs=1e-9)
+    for expected, found in zip(near, surveyed.stones, strict=True):
+        assert isinstance(found, SurveyedBlock)
+        assert found.face.fit.rejected == expected.face.fit.rejected
+        # five control points that are themselves rounded to 0.5 nm
+        np.testing.assert_allclose(found.solid.vertices - LAMBERT, expected.solid.vertices, atol=2e-8)
+        np.testing.assert_allclose(found.vertex_sigma, expected.vertex_sigma, rtol=1e-6)
 
 
 @pytest.mark.slow

@@ -289,14 +289,20 @@ def test_homography_is_the_maximum_of_the_likelihood():
         assert found.sigma0**2 * found.redundancy == pytest.approx(2 * best.cost, rel=1e-6)
 
 
-@pytest.mark.parametrize("each", [pytest.param(False, marks=pytest.mark.slow), True], ids=["equal", "each"])
-def test_homography_is_unbiased_and_as_precise_as_it_says(each):
+MANY = pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    ("each", "trials"),
+    [(True, 700), pytest.param(False, TRIALS, marks=MANY), pytest.param(True, TRIALS, marks=MANY)],
+)
+def test_homography_is_unbiased_and_as_precise_as_it_says(each, trials):
     rng = np.random.default_rng(63)
     su = np.array([1, 1, 2, 1, 1, 3, 1.0]) if each else np.ones(7)
     sy = (np.array([2, 4, 2, 2, 6, 2, 2]) if each else np.full(7, 3)) * 1e-3
     places = np.array([[500.0, 500], [2000, 2600], [3700, 1500]])
     true, squares, errors = mapped(CAMERA, places), [], []
-    for _ in range(TRIALS):
+    for _ in range(trials):
         image = MARKS + rng.normal(size=(7, 2)) * su[:, None]
         plane = mapped(CAMERA, MARKS) + rng.normal(size=(7, 2)) * sy[:, None]
         found = fit_homography(image, su, plane, sy)
@@ -306,9 +312,11 @@ def test_homography_is_unbiased_and_as_precise_as_it_says(each):
         error, variance = found.apply(seen) - true, found.covariance_at(seen, 1.0)
         errors.append(error / np.sqrt(np.einsum("kii->ki", variance)))
         squares.append(found.sigma0**2)
-    assert len(errors) > 0.98 * TRIALS
+    assert len(errors) > 0.98 * trials
     print(f"variances {np.mean(np.square(errors), axis=0).round(3).ravel()}, sigma0² {np.mean(squares):.3f}")
-    np.testing.assert_allclose(np.mean(np.square(errors), axis=0), 1.0, atol=0.1)
+    np.testing.assert_allclose(
+        np.mean(np.square(errors), axis=0), 1.0, atol=max(0.1, 3 * np.sqrt(2 / trials))
+    )
     assert np.abs(np.mean(errors, axis=0)).max() < 4 / np.sqrt(len(errors))
     assert np.mean(squares) == pytest.approx(
         1.0, abs=0.06
