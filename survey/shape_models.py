@@ -155,7 +155,7 @@ def _curvature(coefficients: Array, covariance: Array, held: int, count: int) ->
 def _bevelled(face: _Heights) -> tuple[float, FaceShape] | None:
     """A second plane beyond a line, with what both leave unexplained, if it says enough more than one."""
     flat = truncated_sum(face.root, face.z)
-    if face.off.sum() < 3 or flat <= _STRIP:
+    if face.off.sum() < 2 or flat <= _STRIP:
         return None
     score, within, far, way, plane = fit_two_planes(face.u, face.v, face.z, face.root)
     redundancy = max(len(face.z) - 6, 1)

@@ -76,10 +76,10 @@ def test_a_cylinder_of_3_m_radius_is_curved_in_more_than_90_percent(layout: Call
     assert found["curved"] > 360, found
 
 
-def test_a_bevel_of_20_degrees_over_a_quarter_is_found_in_90_percent() -> None:
+def test_a_bevel_of_20_degrees_over_a_quarter_is_found_in_more_than_90_percent() -> None:
     # of 20 points 5 lie beyond the edge; where these lie near it, the bevel is no deeper than the noise
     found = verdicts(inside, bevel, 1000, 20)
-    assert found["bevelled"] > 900 - 3 * np.sqrt(1000 * 0.9 * 0.1), found
+    assert found["bevelled"] > 900, found
 
 
 def test_curvatures_have_the_precision_that_they_say() -> None:
