@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ __all__ = ["survey_json", "write_survey_json"]
 
 
 def survey_json(study: SurveyStudy, version: str) -> dict[str, Any]:
-    """All findings but the single stones: metres, degrees where a name says so, null where not known."""
+    """What is said of the survey as a whole: metres, degrees where a name says so, null where not known."""
     content = {
         "survey": study.name,
         "version": version,
@@ -25,34 +25,39 @@ def survey_json(study: SurveyStudy, version: str) -> dict[str, Any]:
         "quality": _quality(study.quality, len(study.rejects)),
         "facades": [_facade(one) for one in study.facades],
         "kinds": [_record(one) for one in study.usual.values()],
-        "courses": [_course(one) for one in study.courses],
-        "course_heights": [_record(one) for one in study.course_heights],
-        "contradictions": [_record(one) for one in study.contradictions],
-        "remeasure": [{**_record(one), "urgency": one.urgency.name.lower()} for one in study.remeasures],
-        "rejects": [
-            {"code": one.code, "line": _line(one.spans), "reason": str(one.error)} for one in study.rejects
-        ],
     }
     plain: dict[str, Any] = _plain(content)
     return plain
 
 
 def write_survey_json(path: Path, study: SurveyStudy, content: Mapping[str, Any]) -> None:
-    """Write survey.json: the findings, then one stone per line, so that many stones need little memory.
+    """Write survey.json: the survey as a whole, then its parts one per line, so that many need little memory.
 
     Parameters
     ----------
     path : survey.json
-    study : with the stones
+    study : with the parts
     content : what `survey_json` gives, and more if wanted
     """
-    head = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False).removesuffix("\n}")
+    parts: dict[str, Iterable[dict[str, Any]]] = {
+        "courses": map(_course, study.courses),
+        "course_heights": map(_record, study.course_heights),
+        "contradictions": map(_record, study.contradictions),
+        "remeasure": ({**_record(one), "urgency": one.urgency.name.lower()} for one in study.remeasures),
+        "rejects": (
+            {"code": one.code, "line": _line(one.spans), "reason": str(one.error)} for one in study.rejects
+        ),
+        "stones": _stones(study),
+    }
     with path.open("w", encoding="utf-8") as out:
-        out.write(f'{head},\n "stones": [')
-        for number, stone in enumerate(_stones(study)):
-            out.write(",\n  " if number else "\n  ")
-            out.write(json.dumps(_plain(stone), ensure_ascii=False, allow_nan=False))
-        out.write("\n ]\n}\n")
+        out.write(json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False).removesuffix("\n}"))
+        for name, rows in parts.items():
+            out.write(f',\n "{name}": [')
+            for number, row in enumerate(rows):
+                out.write(",\n  " if number else "\n  ")
+                out.write(json.dumps(_plain(row), ensure_ascii=False, allow_nan=False))
+            out.write("\n ]")
+        out.write("\n}\n")
 
 
 def _stones(study: SurveyStudy) -> Iterator[dict[str, Any]]:
@@ -152,6 +157,8 @@ def _plain(value: Any) -> Any:
     """Numbers and lists as JSON has them; null for what is no number."""
     if isinstance(value, Mapping):
         return {key: _plain(one) for key, one in value.items()}
+    if isinstance(value, np.ndarray) and value.dtype.kind == "f" and np.isfinite(value).all():
+        return value.tolist()
     if isinstance(value, np.ndarray | tuple | list):
         return [_plain(one) for one in value]
     if isinstance(value, np.generic):

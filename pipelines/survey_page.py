@@ -150,8 +150,8 @@ def _courses(study: SurveyStudy) -> list[str]:
     out = [
         "<p>Of the lower corners of each course: how the straight line through them rises to the right of the "
         "viewer, and how high the best parabola stands over its chord at mid-span, negative where it sags. The "
-        "chance is that of so much in a level, straight course whose beds scatter as these do; below 1 % it is "
-        "called a finding. Corners off their plane are left out. Where a wall is round, distances are those on "
+        "chance is that of so much in a level, straight course whose beds scatter as these do; below 1 % it "
+        "is called a finding. Corners off their plane are left out. Where a wall is round, distances are those on "
         "the mean plane of the facade.</p>"
     ]
     for facade in dict.fromkeys(line.facade for line in study.courses):

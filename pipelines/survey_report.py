@@ -30,7 +30,7 @@ class SurveyReport:
     ----------
     folder : where it lies
     study : what was found
-    content : the contents of survey.json, but for the single stones
+    content : what survey.json says of the survey as a whole
     """
 
     folder: Path
@@ -69,7 +69,7 @@ def report_surveys(
 
 
 def write_survey_report(study: SurveyStudy, folder: Path, progress: Listener = silent) -> dict[str, Any]:
-    """Write all files of a report into an empty folder; the contents of survey.json but for the stones."""
+    """Write all files of a report into an empty folder; what survey.json says of the survey as a whole."""
     release = version("moma-masonry")
     progress(Progress("write", 0, 3, "pictures"))
     pictures = _draw(study, folder)

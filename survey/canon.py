@@ -44,7 +44,7 @@ class KindStandard:
     stones: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Deviation:
     """How far one stone is from the usual ones of its kind.
 

@@ -148,7 +148,7 @@ def appraise(block: SurveyedBlock) -> StoneQuality:
     face, fit, record = block.face, block.face.fit, block.face.record
     measured = face.provenance.source == "points"
     corners = len(face.outline)
-    corner_sigma = np.asarray(block.vertex_sigma[:corners], dtype=np.float64)
+    corner_sigma = block.vertex_sigma[:corners].copy()  # alone: the rest need not be kept
     accepted = np.ones(len(fit.residuals), dtype=bool)
     accepted[list(fit.rejected)] = False
     standardised = fit.standardised[accepted & np.isfinite(fit.standardised)] if measured else np.empty(0)
@@ -181,7 +181,7 @@ def appraise(block: SurveyedBlock) -> StoneQuality:
         dimension_sigma=_dimension_sigma(block, corner_sigma),
         area=face.measures.area,
         skew=face.measures.skew,
-        normal=fit.normal,
+        normal=fit.normal.copy(),
         outline=face.outline,
         corner_sigma=corner_sigma,
         worn_corners=face.rejected_vertices,
