@@ -1,4 +1,7 @@
-"""From the database to a scene: selected stones → hexahedra → closed joints → blocks."""
+"""From the database to a scene: selected stones → hexahedra → closed joints → blocks.
+
+A stone that came as a closed solid stays that solid where joints are left open; only their closing needs hexahedra.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,7 +18,8 @@ from pipelines.scene_loads import build_loads, thrown
 from pipelines.scenefile import MeshSettings, SceneFile
 from pipelines.selection import Groups, StoneModel, select_groups, select_stones
 from pipelines.stone_records import surveyed_block
-from survey.blocky import BlockyStone, simplify
+from survey.blocky import simplify
+from survey.extrusion import SurveyedBlock
 from survey.joints import ClosingReport, close_joints
 from survey.solids import Solid
 
@@ -32,7 +36,6 @@ class Assembly:
     ----------
     scene : for `mechanics.simulate`, with places counted from `origin`
     models : the stones as surveyed, in the order of the scene's blocks
-    simplified : the same as hexahedra, before the joints were closed
     closing : what closing the joints has changed; None if they stay open
     towards : (3,) mean normal of the faces, from the wall to the observer [-]
     origin : (3,) of the scene, in the frame of the site [m]
@@ -40,7 +43,6 @@ class Assembly:
 
     scene: Scene
     models: tuple[StoneModel, ...]
-    simplified: tuple[BlockyStone, ...]
     closing: ClosingReport | None
     towards: Array
     origin: Array
@@ -52,7 +54,7 @@ def assemble(scene: SceneFile, session: Session) -> Assembly:
     Raises
     ------
     SceneError : a key names no stone, a stone has no material, or a load does not suit its stones
-    GeometryError : a stone cannot be made a hexahedron, or its joints cannot be closed
+    GeometryError : a stone cannot be made a hexahedron where it has to be, or its joints cannot be closed
     """
     models = select_stones(scene, session)
     return assemble_stones(scene, models, select_groups(scene, session, models))
@@ -61,11 +63,12 @@ def assemble(scene: SceneFile, session: Session) -> Assembly:
 def assemble_stones(scene: SceneFile, models: tuple[StoneModel, ...], groups: Groups) -> Assembly:
     """As `assemble`, of stones that have been selected; the database is not needed."""
     origin = local_origin([model.record for model in models])
-    simplified = tuple(simplify(surveyed_block(stone_about(model.record, origin))) for model in models)
-    solids: Sequence[Solid] = [stone.solid for stone in simplified]
-    closing = None
-    if scene.joints is not None:
-        closed = close_joints(simplified, scene.joints)
+    stones = [surveyed_block(stone_about(model.record, origin)) for model in models]
+    solids: Sequence[Solid]
+    if scene.joints is None:
+        solids, closing = [_open(stone) for stone in stones], None
+    else:
+        closed = close_joints(stones, scene.joints)
         solids, closing = closed.solids, closed.report
     meshes = _meshes(scene, groups)
     blocks = tuple(
@@ -75,9 +78,8 @@ def assemble_stones(scene: SceneFile, models: tuple[StoneModel, ...], groups: Gr
     return Assembly(
         scene=_scene(scene, blocks, groups, origin),
         models=models,
-        simplified=simplified,
         closing=closing,
-        towards=_facing(simplified),
+        towards=_facing(stones),
         origin=origin,
     )
 
@@ -128,11 +130,15 @@ def _block(model: StoneModel, solid: Solid, mesh: MeshSettings) -> Block:
     )
 
 
-def _facing(stones: Sequence[BlockyStone]) -> Array:
+def _open(stone: SurveyedBlock) -> Solid:
+    """What a stone is where its joints stay open."""
+    return stone.solid if stone.face.provenance.source == "solid" else simplify(stone).solid
+
+
+def _facing(stones: Sequence[SurveyedBlock]) -> Array:
     """(3,) mean normal of the faces, weighted by area."""
     total = np.zeros(3)
     for stone in stones:
-        a, b, c, d = stone.corners
-        total += np.cross(c - a, d - b)
+        total += stone.face.measures.area * stone.face.fit.normal
     length = float(np.linalg.norm(total))
     return total / length if length > 0.0 else stones[0].face.fit.normal

@@ -1,16 +1,18 @@
 """Between the survey pillar's stones and the records that the database keeps of them."""
 
+from typing import get_args
+
 import numpy as np
 from numpy.typing import NDArray
 
 from archmodel.records import StoneRecord
-from survey.depth import Depth
+from survey.depth import Depth, Origin
 from survey.extrusion import SurveyedBlock, extrude
 from survey.faces import Face, Provenance, face_on, outline_face
 from survey.planes import FaceFit
-from survey.records import BlockRecord, Extrusion, SolidRecord
+from survey.records import BlockRecord, Extrusion
 from survey.shapes import FaceShape, ShapeKind
-from survey.solid_blocks import block_of_solid
+from survey.solids import Solid
 
 __all__ = ["stone_record", "surveyed_block"]
 
@@ -68,17 +70,26 @@ def surveyed_block(stone: StoneRecord) -> SurveyedBlock:
     A face that was measured in space is fitted anew: from the same measurements it is the same face, and the
     database need not keep what follows from others of its columns.
     """
-    # any point on the stored side of the plane tells which side is outside
-    outside = stone.outline.mean(axis=0) + 100.0 * stone.normal
-    if stone.provenance == "solid":
-        solid = SolidRecord(
-            stone.code, stone.kind, stone.course, stone.solid_vertices, stone.solid_faces, stone.line
-        )
-        return block_of_solid(solid, outside, "")
     measured = _block_record(stone)
-    face = outline_face(measured, outside) if stone.provenance == "points" else _lifted_face(stone, measured)
-    depth = Depth(stone.depth, stone.depth_sigma, stone.depth_source, "stone", stone.line)
-    return extrude(face, depth, Extrusion(stone.direction, stone.tail))
+    depth = Depth(stone.depth, stone.depth_sigma, stone.depth_source, _origin(stone), stone.line)
+    extrusion = Extrusion(stone.direction, stone.tail)
+    if stone.provenance == "points":
+        # any point on the stored side of the plane tells which side is outside
+        outside = stone.outline.mean(axis=0) + 100.0 * stone.normal
+        return extrude(outline_face(measured, outside), depth, extrusion)
+    face = _kept_face(stone, measured)
+    if stone.provenance == "photograph":
+        return extrude(face, depth, extrusion)
+    return SurveyedBlock(
+        code=stone.code,
+        kind=stone.kind,
+        course=stone.course,
+        face=face,
+        depth=depth,
+        extrusion=extrusion,
+        solid=Solid(stone.code, stone.solid_vertices, stone.solid_faces),
+        vertex_sigma=stone.vertex_sigma,
+    )
 
 
 def _block_record(stone: StoneRecord) -> BlockRecord:
@@ -100,21 +111,34 @@ def _block_record(stone: StoneRecord) -> BlockRecord:
     )
 
 
-def _lifted_face(stone: StoneRecord, measured: BlockRecord) -> Face:
-    """A face whose plane was found elsewhere: its corners lie on it, and nothing was measured twice."""
+def _origin(stone: StoneRecord) -> Origin:
+    return next(one for one in get_args(Origin) if one == stone.depth_origin)
+
+
+def _kept_face(stone: StoneRecord, measured: BlockRecord) -> Face:
+    """A face whose plane was not fitted to its corners: that of its neighbours, or the side of a solid."""
+    residuals = (stone.vertices - stone.centroid) @ stone.normal
+    on_solid = stone.provenance == "solid"
     fit = FaceFit(
         normal=stone.normal,
         offset=stone.offset,
         centroid=stone.centroid,
         axes=stone.axes,
-        singular_values=np.zeros(3),
+        singular_values=np.full(3, np.nan),
         covariance=stone.covariance,
         rms=stone.rms,
         sigma0=float("nan"),
-        redundancy=0,
-        rejected=(),
-        residuals=np.empty(0),
-        standardised=np.empty(0),
+        redundancy=stone.redundancy,
+        rejected=stone.rejected,
+        residuals=residuals if on_solid else np.empty(0),
+        standardised=np.zeros(len(residuals)) if on_solid else np.empty(0),
     )
-    shape = FaceShape(ShapeKind.UNTESTED, stone.shape_text)
-    return face_on(fit, stone.vertices, shape, Provenance("photograph", stone.provenance_text), measured)
+    # a lifted corner is on the plane but for rounding, and stays where it is
+    corners = stone.vertices - np.outer(residuals, stone.normal) if on_solid else stone.vertices
+    return face_on(
+        fit,
+        corners,
+        FaceShape(ShapeKind(stone.shape), stone.shape_text),
+        Provenance("solid" if on_solid else "photograph", stone.provenance_text),
+        measured,
+    )

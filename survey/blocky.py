@@ -62,17 +62,19 @@ def simplify(block: SurveyedBlock) -> BlockyStone:
 
     Parameters
     ----------
-    block : a stone with its measured face of three or more corners
+    block : a stone with its measured face of three or more corners, or with the solid that another program made
 
     Returns
     -------
-    BlockyStone, with what was changed
+    BlockyStone, with what was changed; a solid of six faces is taken as it is, be it a prism or not
 
     Raises
     ------
     GeometryError
-        for a triangular face, which has no quadrilateral of its own
+        for a triangular face, which has no quadrilateral of its own, and for a solid that is no hexahedron
     """
+    if block.face.provenance.source == "solid":
+        return _hexahedron(block)
     fit = block.face.fit
     across = np.cross(fit.normal, fit.axes[0])
     flat = np.column_stack([(block.face.outline - fit.centroid) @ axis for axis in (fit.axes[0], across)])
@@ -93,6 +95,35 @@ def simplify(block: SurveyedBlock) -> BlockyStone:
         solid=solid,
         displacement=np.array([_distance_to_outline(corner, quad) for corner in flat]),
         volume_change=_area(quad) / _area(flat) - 1.0,
+    )
+
+
+def _hexahedron(block: SurveyedBlock) -> BlockyStone:
+    """A solid of six faces of four corners, with its corners in the order of a BlockyStone's."""
+    solid, outline = block.solid, block.face.outline
+    if len(solid.vertices) != 8 or any(len(face) != 4 for face in solid.faces):
+        raise GeometryError(
+            f"its solid has {len(solid.faces)} faces and {len(solid.vertices)} corners, not 6 faces of 4 corners",
+            where=f"stone {block.code}",
+            remedy='leave joints open (mode = "open" in [joints]), or make a solid of six faces of it',
+        )
+    visible = [int(np.linalg.norm(solid.vertices - corner, axis=1).argmin()) for corner in outline]
+    edges = [{face[k - 1], face[k]} for face in solid.faces for k in range(4)]
+    hidden = [
+        next(iter(edge - {i})) for i in visible for edge in edges if i in edge and not edge <= set(visible)
+    ][::2]  # each edge belongs to two faces
+    return BlockyStone(
+        code=block.code,
+        kind=block.kind,
+        course=block.course,
+        face=block.face,
+        depth=block.depth,
+        extrusion=block.extrusion,
+        corners=outline,
+        sound=(True,) * 4,
+        solid=prism(block.code, solid.vertices[visible], solid.vertices[hidden]),
+        displacement=np.zeros(4),
+        volume_change=0.0,
     )
 
 

@@ -50,7 +50,7 @@ def behind(block):
 def test_square_to_the_face_the_volume_is_area_times_depth():
     block = extrude(face_of(), deep())
     assert volume(block.solid) == pytest.approx(AREA * 0.5)
-    np.testing.assert_allclose(behind(block)[0], CORNERS + [0.0, 0.5, 0.0], atol=1e-12)
+    np.testing.assert_allclose(behind(block)[0], CORNERS + np.array([0.0, 0.5, 0.0]), atol=1e-12)
     check_watertight(block.solid, convex=True)
 
 
@@ -108,7 +108,7 @@ def hand_made(x, z, turn, sigma):
 def test_visible_corners_are_as_precise_as_measured_along_the_face_and_as_the_plane_across():
     _, visible, _ = behind(extrude(face_of(), deep()))
     for (x, _, z), sigma in zip(CORNERS, visible, strict=True):
-        expected = hand_made(x, z, 0.0, S) + [S**2, 0.0, S**2]
+        expected = hand_made(x, z, 0.0, S) + np.array([S**2, 0.0, S**2])
         np.testing.assert_allclose(sigma**2, expected, rtol=1e-9)
     # of four corners, each is 3/4 checked by the plane: σ² (1/4 + 1/4 + 1/4)
     np.testing.assert_allclose(visible[:, 1], S * np.sqrt(0.75), rtol=1e-9)
@@ -118,7 +118,7 @@ def test_visible_corners_are_as_precise_as_measured_along_the_face_and_as_the_pl
 def test_hidden_corners_have_the_errors_of_corner_tilt_and_depth(depth_sigma):
     _, _, hidden = behind(extrude(face_of(), deep(0.5, depth_sigma)))
     for (x, _, z), sigma in zip(CORNERS, hidden, strict=True):
-        expected = hand_made(x, z, 0.5, S) + [S**2, depth_sigma**2, S**2]
+        expected = hand_made(x, z, 0.5, S) + np.array([S**2, depth_sigma**2, S**2])
         np.testing.assert_allclose(sigma**2, expected, rtol=1e-9)
 
 
@@ -126,7 +126,7 @@ def test_a_given_direction_does_not_turn_with_the_face():
     towards = np.array([0.6, 0.8, 0.0])
     _, _, hidden = behind(extrude(face_of(), deep(0.5, 0.02), Extrusion(towards)))
     for (x, _, z), sigma in zip(CORNERS, hidden, strict=True):
-        expected = hand_made(x, z, 0.0, S) + [S**2, 0.0, S**2] + 0.02**2 * towards**2
+        expected = hand_made(x, z, 0.0, S) + np.array([S**2, 0.0, S**2]) + 0.02**2 * towards**2
         np.testing.assert_allclose(sigma**2, expected, rtol=1e-9)
 
 
@@ -139,7 +139,9 @@ def test_corners_of_a_tail_also_move_with_the_mean_of_all():
     for corner, sigma in zip(CORNERS, hidden, strict=True):
         x, _, z = middle + tail * (corner - middle)
         shaken = S**2 * (own**2 + 3 * others**2)
-        np.testing.assert_allclose(sigma**2, hand_made(x, z, 0.5, S) + [shaken, 0.0, shaken], rtol=1e-9)
+        np.testing.assert_allclose(
+            sigma**2, hand_made(x, z, 0.5, S) + np.array([shaken, 0.0, shaken]), rtol=1e-9
+        )
 
 
 def test_each_corner_has_the_precision_that_it_was_measured_with():
