@@ -240,7 +240,8 @@ def fit_face(xyz, sigma, known, observer):
     kept = beside_the_rest(local)
     near, near_root, sound = _part(local, root, kept)
     total = weighted_plane(near, near_root, sound, frame, work)
-    if kept.shape[0] < n and not frame[4, 1] > _NARROW * frame[4, 0]:  # most points lie along one edge
+    narrow = max(_NARROW * frame[4, 0], 3.0 / _LARGEST_TILT if known else 0.0)
+    if kept.shape[0] < n and not frame[4, 1] > narrow:  # most points lie along one edge, or close together
         kept = np.arange(n)
         near, near_root, sound = _part(local, root, kept)
         total = weighted_plane(near, near_root, sound, frame, work)

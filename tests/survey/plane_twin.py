@@ -54,7 +54,8 @@ def accepted_points(points: Array, sigma: Array, known: bool, observer: Array | 
     """What `fit_plane` does not reject, (n,)."""
     kept = compact(points)
     part = plane_of(points - points[0], 1.0 / sigma, kept)
-    if not kept.all() and part is not None and part.singular[1] > 0.15 * part.singular[0]:
+    wide = part is not None and part.singular[1] > max(0.15 * part.singular[0], 3.0 / TILT if known else 0.0)
+    if wide and not kept.all():
         out = np.zeros(len(points), dtype=bool)
         out[kept] = accepted_of_the_compact(points[kept], sigma[kept], known, observer)
         return out

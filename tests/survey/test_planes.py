@@ -173,6 +173,15 @@ def test_points_far_beside_the_face_do_not_turn_it() -> None:
     np.testing.assert_allclose(fit.normal, [0, 0, 1], atol=1e-12)
 
 
+def test_points_close_together_do_not_make_the_rest_of_a_face_lie_beside_it() -> None:
+    # six points within 70 mm by 16 mm know little of a tilt; the seventh, alone 0.4 m away, is then no wild shot
+    close = np.array(
+        [[0, 0, 0], [0.07, 0, 0], [0.07, 0.016, 0], [0, 0.016, 0], [0.03, 0.008, 0], [0.05, 0, 0]]
+    )
+    fit = fit_plane(np.vstack([close, [[0.1, 0.4, 0.0]]]), 0.003)
+    assert fit.rejected == ()
+
+
 def test_the_tests_honour_the_precision_of_each_point() -> None:
     # 20 mm off is a blunder of a point of 2 mm, and nothing for one of 10 mm
     points = 0.1 * CHECKERBOARD
@@ -337,6 +346,7 @@ def test_planes_agree_with_fifty_digits_a_thousand_kilometres_away() -> None:
 def _face(rng: np.random.Generator, count: int, wrong: float) -> Array:
     """Points of 2 mm on a face of 0.6 m by 0.4 m, a part of them 30 to 300 mm off."""
     points = np.column_stack([rng.uniform(-0.3, 0.3, count), rng.uniform(-0.2, 0.2, count), np.zeros(count)])
+    points[-4:, :2] = [[-0.3, -0.2], [0.3, -0.2], [0.3, 0.2], [-0.3, 0.2]]
     points += rng.normal(0, 0.002, points.shape)
     off = int(wrong * count)
     points[:off, 2] += rng.choice([-1, 1], off) * rng.uniform(0.03, 0.3, off)
