@@ -5,12 +5,15 @@ is the rounding of results that are themselves places 7·10⁶ m away: half of 2
 cross product of such coordinates taken without a local origin would be wrong by 10⁻² m² instead.
 """
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from moma.cli import app
 from pipelines.check import check_scene
 from pipelines.ingest import ingest
 from survey.depth import depth_for
@@ -138,6 +141,21 @@ def test_control_points_carry_stones_and_their_precision_to_the_site(tmp_path, p
         # five control points that are themselves rounded to 0.5 nm
         np.testing.assert_allclose(found.solid.vertices - LAMBERT, expected.solid.vertices, atol=2e-8)
         np.testing.assert_allclose(found.vertex_sigma, expected.vertex_sigma, rtol=1e-6)
+
+
+def test_what_the_database_says_of_the_stones_is_the_same(tmp_path):
+    survey, said = read_moma(SAMPLE), {}
+    for name, shift in (("near", np.zeros(3)), ("far", LAMBERT)):
+        write_moma(moved(survey, shift), tmp_path / f"{name}.moma")
+        url = f"sqlite:///{tmp_path / name}.db"
+        ingest([tmp_path / f"{name}.moma"], url)
+        answer = CliRunner().invoke(app, ["query", "ashlar", "--db", url, "--format", "json"])
+        said[name] = {row["code"]: row for row in json.loads(answer.stdout)}
+    assert set(said["near"]) == set(said["far"])
+    for code, near in said["near"].items():
+        far = said["far"][code]
+        places = {axis: far[axis] - shift for axis, shift in zip("xyz", LAMBERT, strict=True)}
+        assert far | places == pytest.approx(near, abs=NANOMETRES)
 
 
 @pytest.mark.slow
