@@ -146,7 +146,8 @@ def survey_report_lines(report: "SurveyReport", verbose: bool) -> list[str]:
         f"  {quality.points} points and corners, {quality.blunders} left out as blunders, {quality.worn} worn corners",
     ]
     if study.stones:
-        lines.append(f"  rms {quality.rms * 1e3:.2f} mm; {quality.verdict}")
+        known = "" if quality.sigma0 is None else f"rms {quality.rms * 1e3:.2f} mm; "
+        lines.append(f"  {known}{quality.verdict}")
     for file in study.files:
         if (fit := file.transform) is not None:
             left_out = f", left out: {', '.join(fit.rejected)}" if fit.rejected else ""

@@ -242,7 +242,7 @@ def judge_survey(stones: Sequence[StoneQuality]) -> SurveyQuality:
 
 def _verdict(sigma0: float | None, error: float | None, sigma: float) -> str:
     if sigma0 is None or error is None:
-        return "no face has more than three points: nothing says how precise the points are"
+        return "no face was measured by more than three points: nothing says how precise they are"
     found = f"the points scatter {sigma0:.2f} ± {error:.2f} times as far as stated"
     if abs(sigma0 - 1.0) <= max(_TOLERANCE, _SIGNIFICANT * error):
         return f"the stated sigma is right: {found}"

@@ -256,6 +256,49 @@ def test_several_files_are_one_survey_with_a_picture_per_facade(tmp_path):
     assert [one["stones"] for one in content["inputs"]] == [1, 1]
 
 
+def test_stones_on_a_photograph_say_where_their_plane_is_from(tmp_path):
+    report = report_surveys([WALL / "gable.moma"], tmp_path / "gable")
+    content = contents(report)
+    lifted = [one for one in content["stones"] if one["source"] == "photograph"]
+    assert (len(lifted), len(content["stones"])) == (7, 14)
+    assert all(one["provenance"].startswith("photograph P1, in the plane of ") for one in lifted)
+    assert all(one["sigma0"] is None for one in lifted)
+    measured = max(one["dimension_sigma"] for one in content["stones"] if one["source"] == "points")
+    assert (
+        min(one["dimension_sigma"] for one in lifted) > measured
+    )  # 1.5 px are 4 mm on this wall, a point is 2 mm
+    for one in lifted:  # stones 0.63 m by 0.30 m
+        for value, truth in ((one["length"], 0.63), (one["height"], 0.30)):
+            assert (
+                abs(value / content["inputs"][0]["control"]["scale"] - truth) < 4.0 * one["dimension_sigma"]
+            )
+    assert "photograph P1" in (report.folder / "report.html").read_text(encoding="utf-8")
+
+
+def test_solids_have_an_elevation_and_no_residuals(tmp_path):
+    """A cube of 0.4 m, modelled: nothing of it was measured."""
+    corners = [(x, y, z) for z in (0, 0.4) for y in (0, 0.4) for x in (0, 0.4)]
+    sides = [(1, 3, 4, 2), (5, 6, 8, 7), (1, 2, 6, 5), (2, 4, 8, 6), (4, 3, 7, 8), (3, 1, 5, 7)]
+    lines = [
+        "o A1:header",
+        *(f"v {x} {y} {z}" for x, y, z in corners),
+        *(f"f {' '.join(map(str, side))}" for side in sides),
+    ]
+    (tmp_path / "cube.obj").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    (tmp_path / "head.moma").write_text("moma-survey 1\nobserver 0.2 -9 0.2\n", encoding="utf-8")
+    options = reading_options(tmp_path / "head.moma")
+    report = report_surveys([tmp_path / "cube.obj"], tmp_path / "out", "solids", options)
+    content = contents(report)
+    (stone,) = content["stones"]
+    assert (stone["source"], stone["depth_origin"], stone["kind"]) == ("solid", "solid", "header")
+    assert (stone["length"], stone["depth"]) == pytest.approx((0.4, 0.4))
+    assert stone["dimension_sigma"] is None
+    assert content["quality"]["sigma0"] is None
+    text = "\n".join(survey_report_lines(report, True))
+    assert "nan" not in text
+    assert "nan" not in " ".join(content["quality"]["verdict"].split())
+
+
 def test_the_files_of_the_how_to_are_what_its_script_makes(tmp_path):
     subprocess.run([sys.executable, WALL / "wall.py", tmp_path], check=True)
     for path in tmp_path.iterdir():
