@@ -47,6 +47,8 @@ _UNITS = {
     **{name: unit for name, (unit, _) in STONE_VALUES.items() if unit != "-"},
 }
 
+_PLACES = frozenset({"x", "y", "z", "centroid", "offset"})
+
 
 def shown_columns(
     names: Iterable[str], rows: Sequence[Mapping[str, object]], where: Sequence[str]
@@ -64,7 +66,7 @@ def shown_columns(
 def as_table(columns: Mapping[str, str | None], rows: Sequence[Mapping[str, object]]) -> str:
     """Aligned text; `columns` gives the unit of each column, None or "-" for none."""
     heads = [name if unit in (None, "-") else f"{name} [{unit}]" for name, unit in columns.items()]
-    cells = [[_cell(row[name]) for name in columns] for row in rows]
+    cells = [[_cell(row[name], name) for name in columns] for row in rows]
     numeric = [
         all(isinstance(row[name], int | float | None) for row in rows) and bool(rows) for name in columns
     ]
@@ -108,13 +110,15 @@ def as_lines(value: Mapping[str, Any], indent: int = 0) -> str:
             lines.append(f"{margin}{label}")
             lines += [f"{margin}  - {as_lines(one, indent + 2).lstrip()}" for one in content]
         elif isinstance(content, list):
-            lines.append(f"{margin}{label:<18} {'  '.join(_cell(one) for one in content)}{unit}")
+            lines.append(f"{margin}{label:<18} {'  '.join(_cell(one, name) for one in content)}{unit}")
         else:
-            lines.append(f"{margin}{label:<18} {_cell(content)}{unit}")
+            lines.append(f"{margin}{label:<18} {_cell(content, name)}{unit}")
     return "\n".join(lines)
 
 
-def _cell(value: object) -> str:
+def _cell(value: object, name: str) -> str:
     if value is None:
         return ""
+    if name in _PLACES and isinstance(value, float):
+        return f"{value:.3f}"  # to the millimetre, however far the origin is
     return f"{value:.4g}" if isinstance(value, float) else str(value)
