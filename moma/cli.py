@@ -170,6 +170,8 @@ def survey_report(
     folder = out or Path("out") / f"survey-{files[0].stem}"
     with progress_bars() as listener:
         report = report_surveys(files, folder, format.value, options, listener)
+    for warning in report.study.warnings:
+        say(f"warning: {warning}")
     lines = survey_report_lines(report, verbose)
     print((folder / INDEX).read_text(encoding="utf-8").rstrip() if json else "\n".join(lines))
 

@@ -21,6 +21,7 @@ def survey_json(study: SurveyStudy, version: str) -> dict[str, Any]:
     content = {
         "survey": study.name,
         "version": version,
+        "warnings": study.warnings,
         "inputs": [_file(one) for one in study.files],
         "quality": _quality(study.quality, len(study.rejects)),
         "facades": [_facade(one) for one in study.facades],

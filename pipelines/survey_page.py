@@ -47,6 +47,7 @@ def write_survey_page(path: Path, study: SurveyStudy, pictures: Mapping[str, str
     body = [
         f"<h1>{escape(study.name)}</h1>",
         f'<p class="lead">{_lead(study)}</p>',
+        *(f'<p class="warning">{escape(warning)}</p>' for warning in study.warnings),
         *elevations,
         *(
             [f"<p>Pictures of the {len(elevations)} largest of {len(study.facades)} facades.</p>"]

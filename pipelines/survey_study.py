@@ -1,11 +1,12 @@
 """Everything that a survey report says, computed: files in, findings out."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from archmodel.entities import kind_named
 from moma.errors import UsageError
 from pipelines.progress import Listener, Progress, silent
 from survey.canon import Deviation, KindStandard, deviations, standards
@@ -60,6 +61,7 @@ class SurveyStudy:
     courses : bed lines
     course_heights : from bed to bed
     remeasures : what to measure again, most urgent first
+    warnings : what stands in the way of taking the survey into the database
     """
 
     name: str
@@ -74,6 +76,7 @@ class SurveyStudy:
     courses: tuple[CourseLine, ...]
     course_heights: tuple[CourseHeight, ...]
     remeasures: tuple[Remeasure, ...]
+    warnings: tuple[str, ...]
 
 
 def study_surveys(
@@ -153,6 +156,7 @@ def _judge(
         courses=lines,
         course_heights=course_heights(lines),
         remeasures=list_remeasures(stones, rejects, odd, quality),
+        warnings=tuple(_unknown_kinds(quality.kinds)),
     )
 
 
@@ -163,3 +167,12 @@ def _canons(files: Sequence[SurveyFile]) -> list[Canon]:
         for canon in file.head.canons:
             found.setdefault(canon.kind, canon)
     return list(found.values())
+
+
+def _unknown_kinds(kinds: Mapping[str, int]) -> Iterator[str]:
+    """Kinds that are mistyped, or that nobody has declared; `moma ingest` does not take them."""
+    for kind, count in kinds.items():
+        try:
+            kind_named(kind)
+        except UsageError as error:
+            yield f"{count} stone{'s' if count > 1 else ''} of an {error}"

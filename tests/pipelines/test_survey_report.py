@@ -189,6 +189,14 @@ def test_a_bad_stone_is_in_the_report_and_does_not_stop_it(tmp_path):
     assert "line" in reasons["C"]
 
 
+def test_a_mistyped_kind_is_told_before_the_database_refuses_it(tmp_path):
+    path = survey_file(tmp_path, f"stone A heder course 1\n  depth 0.4 source measured\n{SQUARE}end\n")
+    report = report_surveys([path], tmp_path / "out")
+    (warning,) = contents(report)["warnings"]
+    assert warning == "1 stone of an unknown kind 'heder'; did you mean header?"
+    assert "did you mean header?" in (report.folder / "report.html").read_text(encoding="utf-8")
+
+
 def test_a_survey_without_a_single_good_stone_is_still_reported(tmp_path):
     report = report_surveys([survey_file(tmp_path, f"stone B pillar\n{SQUARE}end\n")], tmp_path / "out")
     content = contents(report)
