@@ -18,7 +18,7 @@ from archmodel.store import store_survey
 from moma.errors import SurveyError, UsageError
 from pipelines.frame_records import frame_record
 from pipelines.progress import Listener, Progress, silent
-from pipelines.rejects import default_path, rejects_text, replaceable
+from pipelines.rejects import check_targets, default_path, rejects_text
 from pipelines.spool import Spool
 from pipelines.stone_records import stone_record
 from survey.extrusion import SurveyedBlock
@@ -99,8 +99,9 @@ def ingest(
 
     Raises
     ------
-    UsageError : no such file, no such format, a file of rejects that would replace one of the user's
-    SurveyError, GeometryError : at the line or stone that is wrong; the database is not touched
+    UsageError : no such file, one named twice, no such format, a file of rejects that would replace one of the user's
+    SurveyError, GeometryError : at the line or stone that is wrong, or has the code of one in another of the files;
+        the database is not touched
     DatabaseError : a stone or a file is in the database already; the database is unchanged
     """
     surveys = [Path(path) for path in paths]
@@ -110,21 +111,23 @@ def ingest(
         raise UsageError(
             f"one file of rejects for {len(surveys)} survey files", remedy="take in one file at a time"
         )
-    for survey in surveys:
-        _check_file(survey)
+    _check_files(surveys)
     targets = [Path(rejects) if rejects is not None else default_path(survey) for survey in surveys]
     if keep_going:
-        for target in targets:
-            replaceable(target)
+        check_targets(targets, surveys)
     with ExitStack() as held:
         spools = [held.enter_context(Spool()) for _ in surveys]
         tallies = [
             _measure(path, spool, format, options, keep_going, progress)
             for path, spool in zip(surveys, spools, strict=True)
         ]
+        if len(surveys) > 1:
+            _check_codes(tallies, spools)
         for path, target, tally in zip(surveys, targets, tallies, strict=True):
             if tally.refused:
-                held.enter_context(_published(target, rejects_text(path, format, tally.refused)))
+                stations = _listed_stations(tally, options) if format in _LISTS else []
+                text = rejects_text(path, format, tally.refused, stations)
+                held.enter_context(_published(target, text))
         with open_database(url) as database, database.session() as session:
             for tally, spool in zip(tallies, spools, strict=True):
                 _store(session, tally, _told(spool, tally, progress))
@@ -159,10 +162,36 @@ class _Tally:
             self.rms, self.worst = face.fit.rms, block.code
 
 
-def _check_file(path: Path) -> None:
-    if not path.is_file():
-        what = "is a folder" if path.is_dir() else "no such file"
-        raise UsageError(what, where=str(path), remedy="name a survey file")
+def _check_files(surveys: Sequence[Path]) -> None:
+    seen: set[Path] = set()
+    for path in surveys:
+        if not path.is_file():
+            what = "is a folder" if path.is_dir() else "no such file"
+            raise UsageError(what, where=str(path), remedy="name a survey file")
+        if path.resolve() in seen:
+            raise UsageError("is named twice", where=str(path), remedy="name each survey file once")
+        seen.add(path.resolve())
+
+
+def _check_codes(tallies: Sequence["_Tally"], spools: Sequence[Spool]) -> None:
+    """Refuse files that contradict each other before a database is made for them."""
+    places: dict[str, str] = {}
+    for tally, spool in zip(tallies, spools, strict=True):
+        for stone in spool:
+            place = f"{tally.stream.head.path}:{stone.line}"
+            if (first := places.setdefault(stone.code, place)) != place:
+                what = f"the code {stone.code} is taken by the stone at {first}"
+                raise SurveyError(what, where=place, remedy="give each stone a code of its own")
+
+
+_LISTS = ("pnezd", "penzd")
+
+
+def _listed_stations(tally: "_Tally", options: ReadingOptions | None) -> list[int]:
+    """Lines of the stations that stand among the points of a list, not in its header file."""
+    elsewhere = () if options is None or options.head is None else options.head.stations
+    known = {one.name for one in elsewhere}
+    return [one.line for one in tally.stream.head.stations if one.name not in known]
 
 
 def _measure(

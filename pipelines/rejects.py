@@ -4,15 +4,16 @@ What is written is itself a file of the survey's format, with the head of the su
 taken in by itself.
 """
 
+import hashlib
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
 from moma.errors import UsageError
 from survey.records import Reject
 
-__all__ = ["MARK", "default_path", "rejects_text", "replaceable"]
+__all__ = ["MARK", "check_targets", "default_path", "rejects_text"]
 
 MARK = b"# rejected by moma"
 """What the files begin with, or have as their second line, by which they are known again."""
@@ -29,27 +30,31 @@ def default_path(survey: Path) -> Path:
 _SOLIDS = frozenset({".obj", ".ply", ".stl", ".msh"})
 
 
-def replaceable(path: Path) -> None:
-    """Check that writing the file loses nothing of the user's.
+def check_targets(targets: Sequence[Path], surveys: Sequence[Path]) -> None:
+    """Check that files of rejects replace no survey, nor each other, nor anything else of the user's.
+
+    Parameters
+    ----------
+    targets : the files, that of each survey
+    surveys : the survey files
 
     Raises
     ------
     UsageError
-        if there is a file that this program has not written
+        naming what would be lost
     """
-    if path.is_dir():
-        raise UsageError("is a folder", where=str(path), remedy="name a file with --rejects")
-    if path.exists():
-        with path.open("rb") as file:
-            if MARK not in file.read(4096):
-                raise UsageError(
-                    "is there already, and is not a file of rejects",
-                    where=str(path),
-                    remedy="move it away, or name another file with --rejects",
-                )
+    read = {survey.resolve() for survey in surveys}
+    for number, target in enumerate(targets):
+        if target.resolve() in read:
+            remedy = "name another file with --rejects"
+            raise UsageError("is the survey file itself", where=str(target), remedy=remedy)
+        if target in targets[:number]:
+            what = f"would hold the rejects of {surveys[targets.index(target)]} and of {surveys[number]}"
+            raise UsageError(what, where=str(target), remedy="take in one file at a time")
+        _check_replaceable(target)
 
 
-def rejects_text(survey: Path, format: str, rejects: Sequence[Reject]) -> bytes:
+def rejects_text(survey: Path, format: str, rejects: Sequence[Reject], kept: Iterable[int] = ()) -> bytes:
     """The rejected stones of a survey file in its own format.
 
     Parameters
@@ -57,18 +62,42 @@ def rejects_text(survey: Path, format: str, rejects: Sequence[Reject]) -> bytes:
     survey : the file
     format : name of its format
     rejects : what could not be taken in
+    kept : lines of the survey that its stones cannot do without, such as stations in a list of points
     """
     head = [] if format == "solids" else _head_lines(survey, format)
-    mark = MARK + f": {len(rejects)} of {survey.name}\n".encode("ascii", "backslashreplace")
-    text = [*head[:1], mark, *head[1:]] if format == "moma" else [mark, *head]
     ordered = sorted(rejects, key=lambda one: one.spans[0].start if one.spans else 0)
     wanted = {line for one in ordered for span in one.spans for line in span} if format != "solids" else set()
-    lines = dict(_picked(survey, wanted)) if wanted else {}
+    lines = dict(_picked(survey, wanted.union(kept))) if wanted else {}
+    text = head + [lines[line] for line in sorted(kept) if line in lines]
     for one in ordered:
         reason = " ".join(str(one.error).split())
-        text.append(b"\n# " + reason.encode("ascii", "backslashreplace") + b"\n")
+        text += [b"\n", b"# " + reason.encode("ascii", "backslashreplace") + b"\n"]
         text += [lines[line] for span in one.spans for line in span if line in lines]
+    count = f": {len(rejects)} of {survey.name}, as written {_digest(text)}\n"
+    text.insert(1 if format == "moma" else 0, MARK + count.encode("ascii", "backslashreplace"))
     return b"".join(text)
+
+
+def _digest(lines: Sequence[bytes]) -> str:
+    """By which a file of rejects is known to be as it was written, but for the line that says it."""
+    return hashlib.sha256(b"".join(lines)).hexdigest()[:16]
+
+
+def _check_replaceable(path: Path) -> None:
+    """Refuse a file that this program has not written, or that was changed since."""
+    if path.is_dir():
+        raise UsageError("is a folder", where=str(path), remedy="name a file with --rejects")
+    if not path.exists():
+        return
+    lines = path.read_bytes().splitlines(keepends=True)
+    mark = next((line for line in lines[:2] if line.startswith(MARK)), None)
+    if mark is None:
+        what = "is there already, and is not a file of rejects"
+    elif mark.split()[-1].decode("ascii", "replace") != _digest([line for line in lines if line is not mark]):
+        what = "is there already, and was changed since it was written"
+    else:
+        return
+    raise UsageError(what, where=str(path), remedy="move it away, or name another file with --rejects")
 
 
 def _head_lines(survey: Path, format: str) -> list[bytes]:
