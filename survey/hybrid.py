@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 _COARSEST = 0.1  # standard deviation of a corner over the size of the stone, beyond which it is refused
 _SMALLEST = 1e-3  # metres between the farthest corners
 _ROUNDING = 1e-9  # radians, metres: standard deviations below are none
+_CRITICAL = 3.29  # two-sided normal quantile of Baarda's α₀ = 0.1 %
 _GRAZING = float(np.sin(np.radians(10.0)))
 
 
@@ -176,6 +177,7 @@ def _face_plane(
         return None, plane
     words = f"{count} point{'s' if count > 1 else ''} measured on it"
     sigmas = np.full(count, record.sigma) if record.sigmas is None else record.sigmas[:count]
+    sound = np.ones(count, dtype=bool)
     if count >= 3:
         try:
             fit = fit_plane(record.points, sigmas, record.points[0] + 1e3 * wall.fit.normal)
@@ -186,7 +188,19 @@ def _face_plane(
                 return fit, PlaneEstimate(
                     fit.centroid, fit.normal, fit.axes, fit.covariance, fit.rms, f"in the plane of {words}"
                 )
-    return None, plane.corrected(record.points, sigmas, f"{plane.text}, corrected by {words}")
+            sound[list(fit.rejected)] = False
+    points, sigmas = record.points[sound], sigmas[sound]
+    said = [f"{plane.text}, corrected by {words}"]
+    if not sound.all():
+        said.append(f"{count - len(points)} of them left out")
+    # the stone may well stand out: what was measured on it counts for more than what is around it
+    heights = (points - plane.centroid) @ plane.normal
+    tests = np.abs(heights) / np.hypot(plane.height_sigma(points), sigmas)
+    if tests.max() > _CRITICAL:
+        said.append(
+            f"which lie up to {np.abs(heights).max() * 1e3:.0f} mm off ({tests.max():.1f} standard deviations)"
+        )
+    return None, plane.corrected(points, sigmas, ", ".join(said))
 
 
 def _moved(

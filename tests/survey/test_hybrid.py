@@ -407,3 +407,16 @@ def test_corners_that_coincide_are_refused() -> None:
     spot = replace(stone(wall, 14, np.random.default_rng(0), 0), image=np.tile(tied.marks[0], (4, 1)))
     with pytest.raises(GeometryError, match="corners on the photograph coincide"):
         lift(spot, tied, Neighbours([]))
+
+
+def test_a_blunder_among_points_measured_on_the_face_is_left_out_and_told() -> None:
+    rng = np.random.default_rng(10)
+    wall = build(rng)
+    faces = Neighbours(measured(wall, rng, 0.001, {14}))
+    tied = wall_of_marks(photograph(wall, rng, 0.0, 0.0), wall.camera)
+    points = rng.dirichlet(np.ones(4), 8) @ wall.corners[14]
+    points[3] += 0.29 * wall.normal
+    # so imprecise that they correct the prediction and do not replace it
+    lifted = lift(replace(stone(wall, 14, rng, 0.0), points=points, sigma=0.02), tied, faces)
+    assert "corrected by 8 points measured on it, 1 of them left out" in lifted.text
+    assert np.abs((lifted.outline - wall.corners[14]) @ wall.normal).max() < 0.01
