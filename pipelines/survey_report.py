@@ -6,9 +6,10 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from pipelines.bed_figures import draw_courses
 from pipelines.folder import check_replaceable, replacing
 from pipelines.progress import Listener, Progress, silent
-from pipelines.survey_figures import draw_courses, draw_elevation, draw_residuals
+from pipelines.survey_figures import draw_elevation, draw_residuals
 from pipelines.survey_json import survey_json, write_survey_json
 from pipelines.survey_page import write_survey_page
 from pipelines.survey_study import SurveyStudy, study_surveys

@@ -149,9 +149,6 @@ def appraise(block: SurveyedBlock) -> StoneQuality:
     measured = face.provenance.source == "points"
     corners = len(face.outline)
     corner_sigma = block.vertex_sigma[:corners].copy()  # alone: the rest need not be kept
-    accepted = np.ones(len(fit.residuals), dtype=bool)
-    accepted[list(fit.rejected)] = False
-    standardised = fit.standardised[accepted & np.isfinite(fit.standardised)] if measured else np.empty(0)
     blunders, worn = _left_out(block) if measured else ((), ())
     return StoneQuality(
         code=block.code,
@@ -185,9 +182,17 @@ def appraise(block: SurveyedBlock) -> StoneQuality:
         outline=face.outline,
         corner_sigma=corner_sigma,
         worn_corners=face.rejected_vertices,
-        standardised=standardised.astype(np.float32),
+        standardised=_standardised(block) if measured else np.empty(0, np.float32),
         remarks=face.remarks,
     )
+
+
+def _standardised(block: SurveyedBlock) -> NDArray[np.float32]:
+    """Standardised residuals of what the fit accepted and other points check."""
+    fit = block.face.fit
+    accepted = np.isfinite(fit.standardised)
+    accepted[list(fit.rejected)] = False
+    return fit.standardised[accepted].astype(np.float32)
 
 
 def _dimension_sigma(block: SurveyedBlock, corner_sigma: Array) -> float:
