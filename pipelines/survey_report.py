@@ -103,9 +103,10 @@ def _draw(study: SurveyStudy, folder: Path) -> dict[str, str]:
             captions[name] = (
                 f"The beds of {facade.name}. Each black stroke is the bed of one stone, between its lower corners."
             )
-    draw_residuals(folder / "residuals.png", study.quality.residuals, study.quality.verdict)
-    captions["residuals.png"] = (
-        "Residuals of the accepted points and corners, each over its own standard deviation. A wider heap than the "
-        "curve: the points are less precise than stated. Long tails: blunders that were not found."
-    )
+    if study.quality.residuals.counts.any():
+        draw_residuals(folder / "residuals.png", study.quality.residuals, study.quality.verdict)
+        captions["residuals.png"] = (
+            "Residuals of the accepted points and corners, each over its own standard deviation. A wider heap than "
+            "the curve: the points are less precise than stated. Long tails: blunders that were not found."
+        )
     return captions

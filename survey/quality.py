@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 
 _SIGNIFICANT = 3.0  # standard deviations beyond which sigma0 is not 1 by chance
 _TOLERANCE = 0.1  # relative: nobody states a sigma better than this, so a smaller error of it is none
+_NOTHING = "no stone has points of its own on its face: nothing was measured that could be judged"
 _REACH, _BIN = 5.0, 0.25  # of the histogram [standard deviations]; the end bins hold all beyond
 
 
@@ -235,7 +236,7 @@ def judge_survey(stones: Sequence[StoneQuality]) -> SurveyQuality:
         sigma0=sigma0,
         sigma0_sigma=error,
         sigma=sigma,
-        verdict=_verdict(sigma0, error, sigma),
+        verdict=_verdict(sigma0, error, sigma) if own or not stones else _NOTHING,
         rms=math.sqrt(total / sum(counts)) if own else math.nan,
         residuals=_histogram(residuals),
         kinds=_count(one.kind for one in stones),

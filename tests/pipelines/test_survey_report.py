@@ -202,7 +202,7 @@ def test_a_survey_without_a_single_good_stone_is_still_reported(tmp_path):
     content = contents(report)
     assert (content["stones"], len(content["rejects"])) == ([], 1)
     assert content["quality"]["sigma0"] is None
-    assert set(content["files"]) == {"survey.json", "report.html", "residuals.png"}
+    assert set(content["files"]) == {"survey.json", "report.html"}
 
 
 def test_a_file_that_cannot_be_read_leaves_no_folder(tmp_path):
@@ -304,6 +304,8 @@ def test_solids_have_an_elevation_and_no_residuals(tmp_path):
     assert content["quality"]["sigma0"] is None
     text = "\n".join(survey_report_lines(report, True))
     assert "nan" not in text
+    assert "nothing was measured" in text
+    assert set(content["files"]) == {"survey.json", "report.html", "elevation.png"}
     assert "nan" not in " ".join(content["quality"]["verdict"].split())
 
 
