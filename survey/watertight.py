@@ -18,7 +18,7 @@ def check_watertight(solid: Solid, *, convex: bool = False) -> None:
     Parameters
     ----------
     solid : what to check
-    convex : check also that it is convex, within 1e-9 m
+    convex : check also that it is convex, within 1e-9 m and what rounding leaves of its coordinates
 
     Raises
     ------
@@ -37,7 +37,8 @@ def check_watertight(solid: Solid, *, convex: bool = False) -> None:
         raise GeometryError(
             f"its volume is {mesh.volume:.3g} m³: inside out or flat", where=where, remedy=remedy
         )
-    if convex and (height := _highest_corner(solid)) > _CONVEX_TOLERANCE:
+    tolerance = _CONVEX_TOLERANCE + 4.0 * np.spacing(np.abs(solid.vertices).max())
+    if convex and (height := _highest_corner(solid)) > tolerance:
         raise GeometryError(f"it is not convex: a corner is {height:.3g} m out", where=where, remedy=remedy)
 
 
