@@ -17,12 +17,18 @@ Array = NDArray[np.float64]
 
 _UPRIGHT = 0.9  # a side whose normal rises more steeply (sine) is a bed or a top, not a face
 
+_ALIKE = 0.01  # sides whose areas differ by less may be the front and the back of one stone
+_HAND = np.array([-0.11, -1.0, 0.013])  # where the front is then: square to as few walls as can be
+    [-0.11, -1.0, 0.013]
+)  # the hand on which the front is then, on no wall's plane if one can help it
+
 
 def block_of_solid(record: SolidRecord, viewpoint: Array | None, path: str) -> SurveyedBlock:
     """The stone of a closed solid, with the side that is seen as its face.
 
-    That is the side with the largest area as seen from the viewpoint; without one, the largest upright side.
-    The depth is how far the solid reaches behind it.
+    That is the side with the largest area as seen from the viewpoint; without one, the largest upright side. Of
+    a front and a back that are as large it is, for all stones of a wall, the one on the same hand. The depth is
+    how far the solid reaches behind it.
 
     Parameters
     ----------
@@ -36,7 +42,9 @@ def block_of_solid(record: SolidRecord, viewpoint: Array | None, path: str) -> S
     """
     sides = [record.vertices[list(face)] for face in record.faces]
     vectors = np.array([_area_vector(side) for side in sides])
-    seen = int(np.argmax(_worth(vectors, sides, viewpoint)))
+    worth = _worth(vectors, sides, viewpoint)
+    alike = np.flatnonzero(worth >= worth.max() - _ALIKE * abs(worth.max()))
+    seen = int(alike[np.argmax(vectors[alike] @ _HAND)]) if viewpoint is None else int(worth.argmax())
     normal = vectors[seen] / np.linalg.norm(vectors[seen])
     fit = _plane(sides[seen], normal)
     depth = float(((fit.centroid - record.vertices) @ normal).max())
