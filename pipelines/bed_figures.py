@@ -44,7 +44,8 @@ def draw_courses(path: Path, lines: Sequence[CourseLine]) -> None:
                 _label(line), (right, y), (8, 0), textcoords="offset points", va="center", fontsize=8, color=colour,
                 annotation_clip=False, parse_math=False,
             )  # fmt: skip
-    axes.set_xlim(left - 0.02 * (right - left), right + 0.02 * (right - left))
+    margin = max(0.02 * (right - left), 0.01)  # a single corner has a place but no width
+    axes.set_xlim(left - margin, right + margin)
     axes.set_xlabel("along the facade, to the right of the viewer [m]")
     axes.set_ylabel("height of the bed [m]")
     axes.set_title(

@@ -205,6 +205,28 @@ def test_a_survey_without_a_single_good_stone_is_still_reported(tmp_path):
     assert set(content["files"]) == {"survey.json", "report.html"}
 
 
+def test_a_course_of_one_corner_is_drawn_where_it_is(tmp_path):
+    """The face is a triangle that stands on its side, and one of its two lower corners is worn."""
+    places = (
+        (0.05, 0.02),
+        (0.15, 0.02),
+        (0.25, 0.02),
+        (0.3, 0.03),
+        (0.2, 0.15),
+        (0.15, 0.2),
+        (0.25, 0.2),
+        (0.2, 0.25),
+    )
+    rows = "".join(f"  point {x} 0 {z}\n" for x, z in places)
+    text = f"  vertex 0 0 0\n  vertex 0.4 0.03 0\n  vertex 0.2 0 0.3\n{rows}"
+    report = report_surveys(
+        [survey_file(tmp_path, f"stone A header course 1\n{text}end\n")], tmp_path / "out"
+    )
+    (line,) = contents(report)["courses"]
+    assert (line["slope"], line["left_out"]) == (None, 1)
+    assert "courses.png" in contents(report)["files"]
+
+
 def test_a_file_that_cannot_be_read_leaves_no_folder(tmp_path):
     bad = tmp_path / "bad.moma"
     bad.write_text("not a survey\n", encoding="utf-8")
