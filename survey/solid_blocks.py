@@ -16,11 +16,8 @@ __all__ = ["block_of_solid"]
 Array = NDArray[np.float64]
 
 _UPRIGHT = 0.9  # a side whose normal rises more steeply (sine) is a bed or a top, not a face
-
 _ALIKE = 0.01  # sides whose areas differ by less may be the front and the back of one stone
 _HAND = np.array([-0.11, -1.0, 0.013])  # where the front is then: square to as few walls as can be
-    [-0.11, -1.0, 0.013]
-)  # the hand on which the front is then, on no wall's plane if one can help it
 
 
 def block_of_solid(record: SolidRecord, viewpoint: Array | None, path: str) -> SurveyedBlock:
