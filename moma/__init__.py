@@ -4,6 +4,7 @@ What scripts need, each loaded when it is first used::
 
     import moma
 
+    moma.report_surveys(["window.moma"], "out/survey-window")
     moma.ingest(["window.moma"], "sqlite:///moma.db")
     with moma.open_database("sqlite:///moma.db") as database, database.session(read_only=True) as session:
         deep = moma.find(session, "header", ["depth > 0.4"])
@@ -26,10 +27,14 @@ if TYPE_CHECKING:
     from pipelines.ingest import ingest
     from pipelines.run import run_scene
     from pipelines.scenefile import read_scene
+    from pipelines.survey_report import report_surveys
+    from survey.formats.reading import ReadingOptions, open_survey
+    from survey.measured import survey_stones
 
 __all__ = [
     "Block",
     "MomaError",
+    "ReadingOptions",
     "Result",
     "Scene",
     "__version__",
@@ -37,22 +42,29 @@ __all__ = [
     "find",
     "ingest",
     "open_database",
+    "open_survey",
     "read_scene",
+    "report_surveys",
     "run_scene",
     "simulate",
+    "survey_stones",
 ]
 
 _HOMES = {
     "Block": "mechanics.scene",
+    "ReadingOptions": "survey.formats.reading",
     "Result": "mechanics.result",
     "Scene": "mechanics.scene",
     "assemble": "pipelines.assemble",
     "find": "archmodel.query",
     "ingest": "pipelines.ingest",
     "open_database": "archmodel.database",
+    "open_survey": "survey.formats.reading",
     "read_scene": "pipelines.scenefile",
+    "report_surveys": "pipelines.survey_report",
     "run_scene": "pipelines.run",
     "simulate": "mechanics.simulate",
+    "survey_stones": "survey.measured",
 }
 
 __version__: str
