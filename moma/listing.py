@@ -121,4 +121,4 @@ def _cell(value: object, name: str) -> str:
         return ""
     if name in _PLACES and isinstance(value, float):
         return f"{value:.3f}"  # to the millimetre, however far the origin is
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    return f"{value + 0.0:.4g}" if isinstance(value, float) else str(value)  # -0.0 is 0

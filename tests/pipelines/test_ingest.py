@@ -446,12 +446,20 @@ def test_show_says_sensible_things_of_a_stone_of_each_provenance(desk):
     ):
         text = desk.show(code)
         assert not [word for word in words if word not in text], text
-        assert "nan" not in text.lower().split()
+        assert not {"nan", "-0"} & set(text.lower().split()), text
         about = finite_only(desk.show(code, "--json"))
         assert about["depth"]["origin"] == origin
         assert about["solid"]["volume"] > 0.0
     assert finite_only(desk.show("W0", "--json"))["measured"]["rejected"] == [2]
     assert finite_only(desk.show("P", "--json"))["face"]["length"] == pytest.approx(0.5, abs=1e-6)
+
+
+def test_blunders_are_told_by_the_names_that_the_instrument_gave_them(desk):
+    inside = [(10.1, 0.001, 0.6), (10.3, 0.09, 0.7), (10.5, -0.001, 0.6), (10.2, 0.0, 0.75)]
+    rows = [f"7{k},{y},{x},{z},W0 HEADER 1 p" for k, (x, y, z) in enumerate(inside)]
+    report = desk.ingest(desk.write(pnezd(0) + "\n".join(rows) + "\n", "wall.txt"), "pnezd")
+    assert report.files[0].rejected == {"W0": 1}
+    assert finite_only(desk.show("W0", "--json"))["measured"]["rejected"] == ["71"]
 
 
 def test_nothing_is_logged_or_printed_by_the_library(desk, capsys, caplog):
