@@ -18,11 +18,12 @@ def ingest_lines(report: "IngestReport", verbose: bool) -> list[str]:
     lines = []
     for file in report.files:
         kinds = ", ".join(f"{count} {kind}" for kind, count in file.stones.items())
-        lines += [
-            f"{file.path}: {sum(file.stones.values())} stones of survey {file.survey!r} ({kinds})",
-            f"  {sum(file.rejected.values())} points left out as blunders on {len(file.rejected)} stones; "
-            f"worst plane: {file.worst}, rms {file.rms * 1e3:.1f} mm",
-        ]
+        lines.append(f"{file.path}: {sum(file.stones.values())} stones of survey {file.survey!r} ({kinds})")
+        if file.worst:
+            lines.append(
+                f"  {sum(file.rejected.values())} points left out as blunders on {len(file.rejected)} stones; "
+                f"worst plane: {file.worst}, rms {file.rms * 1e3:.1f} mm"
+            )
         if file.frame is not None:
             lines.append(f"  {_frame_line(file.frame)}")
         if file.shapes:

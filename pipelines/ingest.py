@@ -48,7 +48,7 @@ class FileReport:
     stones : how many it holds, by kind
     rejected : measured points left out as blunders, by stone code
     rms : root mean square distance of the accepted points from their planes, worst stone [m]
-    worst : code of that stone
+    worst : code of that stone; empty if none was measured in space
     shapes : faces that are not one plane, in words, by stone code
     refused : stones that were not taken in
     rejects : the file that holds them; None if there are none
@@ -158,7 +158,7 @@ class _Tally:
             self.rejected[block.code] = len(face.rejected_points)
         if str(face.shape.kind) not in ("plane", "untested"):
             self.shapes[block.code] = face.shape.text
-        if face.fit.rms >= self.rms:
+        if face.provenance.source == "points" and face.fit.rms >= self.rms:
             self.rms, self.worst = face.fit.rms, block.code
 
 

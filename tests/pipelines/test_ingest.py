@@ -393,6 +393,7 @@ def test_the_command_says_what_became_of_the_stones(desk, format):
     assert "1 stones not taken in, to be corrected in" in said
     assert "unknown kind 'heder'" in said
     assert "nan" not in said.split()
+    assert ("worst plane: W" in said) == (format != "solids")
     done = invoke(*words, "--db", desk.url("json"), "--json")
     (file,) = finite_only(done.stdout)["files"]
     assert file["stones"] == {"header": 4}
