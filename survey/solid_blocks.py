@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from moma.errors import GeometryError
 from survey.depth import Depth
 from survey.extrusion import SurveyedBlock
 from survey.faces import Provenance, face_on
@@ -17,6 +18,7 @@ Array = NDArray[np.float64]
 
 _UPRIGHT = 0.9  # a side whose normal rises more steeply (sine) is a bed or a top, not a face
 _ALIKE = 0.01  # sides whose areas differ by less may be the front and the back of one stone
+_SHALLOWEST = 1e-6  # metres behind the face
 _HAND = np.array([-0.11, -1.0, 0.013])  # where the front is then: square to as few walls as can be
 
 
@@ -36,6 +38,11 @@ def block_of_solid(record: SolidRecord, viewpoint: Array | None, path: str) -> S
     Returns
     -------
     SurveyedBlock whose precision is not known
+
+    Raises
+    ------
+    GeometryError
+        if nothing of the solid lies behind its face
     """
     sides = [record.vertices[list(face)] for face in record.faces]
     vectors = np.array([_area_vector(side) for side in sides])
@@ -45,6 +52,11 @@ def block_of_solid(record: SolidRecord, viewpoint: Array | None, path: str) -> S
     normal = vectors[seen] / np.linalg.norm(vectors[seen])
     fit = _plane(sides[seen], normal)
     depth = float(((fit.centroid - record.vertices) @ normal).max())
+    if not depth > _SHALLOWEST:
+        raise GeometryError(
+            f"it reaches {depth * 1e3:.2g} mm behind its largest side",
+            remedy="look at the solid, or say where it is seen from",
+        )
     measured = BlockRecord(
         code=record.code,
         kind=record.kind,

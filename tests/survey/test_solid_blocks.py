@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from moma.errors import GeometryError
 from survey.records import SolidRecord
 from survey.solid_blocks import block_of_solid
 
@@ -135,3 +136,14 @@ def test_without_a_viewpoint_stones_of_a_wall_show_the_same_side(degrees):
             corners[[2, 6], 0] -= rng.uniform(-0.002, 0.002)
         normals.append(block_of_solid(solid(corners @ turn.T), None, "").face.fit.normal)
     np.testing.assert_allclose(normals @ normals[0], 1.0, atol=1e-12)
+
+
+def test_a_solid_that_lies_wholly_in_front_of_its_largest_side_is_refused():
+    # a pyramid, and the same with its sides seen from inside
+    outer = [(-1, 0.0, -1), (1, 0.0, -1), (1, 0.0, 1), (-1, 0.0, 1)]
+    peak = (0, -0.5, 0)
+    made = solid([*outer, peak], ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)))
+    assert block_of_solid(made, None, "").depth.value == pytest.approx(0.5)
+    inside_out = solid(made.vertices, tuple(face[::-1] for face in made.faces))
+    with pytest.raises(GeometryError, match="mm behind its largest side"):
+        block_of_solid(inside_out, None, "")
