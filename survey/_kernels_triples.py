@@ -20,6 +20,7 @@ _IN_FRONT = _CRITICAL**2  # how much more a blunder less than that in front coun
 _FARTHEST = 2.5  # distance from the middle of a face, over that of its third quartile, beyond which no point is its own
 _ALONE = 0.7  # distance from the nearest other point, over that limit, that such a point has at least
 _BALANCED = 0.4  # mean of directions, below which points lie all around
+_ALIKE = 2.0  # largest over smallest distance of corners from the middle of their face
 
 
 @njit(cache=True)
@@ -155,8 +156,8 @@ def search_triples(local, root, size, known, view):
 def beside_the_rest(local):
     """Indices of the points of a compact face: those far beside are no part of it, wherever its plane may pass them.
 
-    So far out they would outvote all others. Four or more that lie all around are corners of a face that is measured
-    in its middle.
+    So far out they would outvote all others. Four or more that lie all around, alike in distance, are corners of a face
+    that is measured in its middle.
     """
     n = local.shape[1]
     everything = np.arange(n)
@@ -169,15 +170,18 @@ def beside_the_rest(local):
             (local[0, i] - centre[0]) ** 2 + (local[1, i] - centre[1]) ** 2 + (local[2, i] - centre[2]) ** 2
         )
     limit, count = _FARTHEST * smallest(away, n - n // 4), 0
+    nearest, farthest = np.inf, 0.0
     beside = np.zeros(n, dtype=np.bool_)
     for i in range(n):
         if away[i] > limit and _nearest_of(local, i, away, limit) > _ALONE * limit:
             beside[i] = True
             count += 1
+            nearest, farthest = min(nearest, away[i]), max(farthest, away[i])
             for k in range(3):
                 balance[k] += (local[k, i] - centre[k]) / away[i]
     balanced = balance[0] ** 2 + balance[1] ** 2 + balance[2] ** 2 < (_BALANCED * count) ** 2
-    if count == 0 or (count > 3 and balanced):
+    alike = farthest <= _ALIKE * nearest and farthest <= 2.0 * _ALIKE * limit
+    if count == 0 or (count > 3 and balanced and alike):
         return everything
     kept, m = np.empty(n - count, dtype=np.int64), 0
     for i in range(n):

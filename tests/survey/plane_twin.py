@@ -97,7 +97,8 @@ def compact(points: Array) -> Bools:
     near = (away <= limit) | (gaps <= 0.7 * limit)
     directions = (points - centre)[~near] / away[~near, None]
     around = len(directions) > 3 and np.linalg.norm(directions.mean(axis=0)) < 0.4
-    return np.ones(len(points), dtype=bool) if around else near
+    alike = around and away[~near].max() <= min(2.0 * away[~near].min(), 4.0 * limit)
+    return np.ones(len(points), dtype=bool) if alike else near
 
 
 def is_clean(plane: Plane, xyz: Array, root: Array) -> bool:
