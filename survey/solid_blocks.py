@@ -42,15 +42,10 @@ def block_of_solid(record: SolidRecord, viewpoint: Array | None, path: str) -> S
     Raises
     ------
     GeometryError
-        if nothing of the solid lies behind its face
+        if the sides are seen from inside, or nothing of the solid lies behind its face
     """
-    sides = [record.vertices[list(face)] for face in record.faces]
-    vectors = np.array([_area_vector(side) for side in sides])
-    worth = _worth(vectors, sides, viewpoint)
-    alike = np.flatnonzero(worth >= worth.max() - _ALIKE * abs(worth.max()))
-    seen = int(alike[np.argmax(vectors[alike] @ _HAND)]) if viewpoint is None else int(worth.argmax())
-    normal = vectors[seen] / np.linalg.norm(vectors[seen])
-    fit = _plane(sides[seen], normal)
+    side, normal = _visible_side(record, viewpoint)
+    fit = _plane(side, normal)
     depth = float(((fit.centroid - record.vertices) @ normal).max())
     if not depth > _SHALLOWEST:
         raise GeometryError(
@@ -61,14 +56,14 @@ def block_of_solid(record: SolidRecord, viewpoint: Array | None, path: str) -> S
         code=record.code,
         kind=record.kind,
         course=record.course,
-        vertices=sides[seen],
+        vertices=side,
         points=np.empty((0, 3)),
         sigma=0.0,
         line=record.line,
     )
     shape = FaceShape(ShapeKind.UNTESTED, "the side of a solid")
     provenance = Provenance("solid", f"solid of {path}")
-    corners = sides[seen] - np.outer(fit.residuals, normal)
+    corners = side - np.outer(fit.residuals, normal)
     return SurveyedBlock(
         code=record.code,
         kind=record.kind,
@@ -79,6 +74,25 @@ def block_of_solid(record: SolidRecord, viewpoint: Array | None, path: str) -> S
         solid=Solid(record.code, record.vertices, record.faces),
         vertex_sigma=np.full(record.vertices.shape, np.nan),
     )
+
+
+def _visible_side(record: SolidRecord, viewpoint: Array | None) -> tuple[Array, Array]:
+    """Corners (nv, 3) and outward normal (3,) of the side that is the face."""
+    sides = [record.vertices[list(face)] for face in record.faces]
+    vectors = np.array([_area_vector(side) for side in sides])
+    origin = record.vertices.mean(axis=0)
+    volume = (
+        sum(float((side[0] - origin) @ vector) for side, vector in zip(sides, vectors, strict=True)) / 3.0
+    )
+    if not volume > 0.0:
+        raise GeometryError(
+            f"its sides enclose {volume:.3g} m³",
+            remedy="look for corners out of place, or sides seen from inside",
+        )
+    worth = _worth(vectors, sides, viewpoint)
+    alike = np.flatnonzero(worth >= worth.max() - _ALIKE * abs(worth.max()))
+    seen = int(alike[np.argmax(vectors[alike] @ _HAND)]) if viewpoint is None else int(worth.argmax())
+    return sides[seen], vectors[seen] / np.linalg.norm(vectors[seen])
 
 
 def _worth(vectors: Array, sides: list[Array], viewpoint: Array | None) -> Array:

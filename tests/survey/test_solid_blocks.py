@@ -138,12 +138,12 @@ def test_without_a_viewpoint_stones_of_a_wall_show_the_same_side(degrees):
     np.testing.assert_allclose(normals @ normals[0], 1.0, atol=1e-12)
 
 
-def test_a_solid_that_lies_wholly_in_front_of_its_largest_side_is_refused():
-    # a pyramid, and the same with its sides seen from inside
-    outer = [(-1, 0.0, -1), (1, 0.0, -1), (1, 0.0, 1), (-1, 0.0, 1)]
-    peak = (0, -0.5, 0)
-    made = solid([*outer, peak], ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)))
-    assert block_of_solid(made, None, "").depth.value == pytest.approx(0.5)
-    inside_out = solid(made.vertices, tuple(face[::-1] for face in made.faces))
-    with pytest.raises(GeometryError, match="mm behind its largest side"):
-        block_of_solid(inside_out, None, "")
+def test_a_solid_that_is_seen_from_inside_or_has_no_depth_is_refused():
+    corners = [(-1, 0.0, -1), (1, 0.0, -1), (1, 0.0, 1), (-1, 0.0, 1), (0, -0.5, 0)]
+    sides = ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4))
+    assert block_of_solid(solid(corners, sides), None, "").depth.value == pytest.approx(0.5)
+    with pytest.raises(GeometryError, match=r"its sides enclose -0\.667 m³"):
+        block_of_solid(solid(corners, tuple(face[::-1] for face in sides)), None, "")
+    flat = solid(BOX * [1.0, 5e-7, 1.0])
+    with pytest.raises(GeometryError, match=r"reaches 0\.0005 mm behind its largest side"):
+        block_of_solid(flat, None, "")
