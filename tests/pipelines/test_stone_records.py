@@ -59,7 +59,8 @@ STONES = "".join(
         stone("BLUNDER", "jamb", 12.4, 0.5, extra=["point 12.5 0.09 0.6", "point 12.6 -0.2 0.7"]),
         "stone SEEN header course 3\nphoto P1\npixel 200 900\npixel 800 905\npixel 795 1200\npixel 205 1195\nend\n",
         "stone UP header course 3\nphoto P1\npixel 905 1195\npixel 1495 1200\npixel 1500 905\npixel 900 900\n"
-        "point 10.5 0.012 1.0 sigma 0.0005\npoint 10.9 0.011 1.1 sigma 0.0005\npoint 10.6 0.009 1.15 sigma 0.0005\npoint 10.7 0.30 1.0 sigma 0.0005\n"
+        "point 10.5 0.012 1.0 sigma 0.0005\npoint 10.9 0.011 1.1 sigma 0.0005\n"
+        "point 10.6 0.009 1.15 sigma 0.0005\npoint 10.7 0.30 1.0 sigma 0.0005\n"
         "point 10.8 0.011 0.95 sigma 0.0005\n"
         "point 10.55 0.0105 1.12 sigma 0.0005\nextrude tail 0.5\nend\n",
     ]
