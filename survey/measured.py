@@ -89,7 +89,7 @@ def _made(item: BlockRecord | SolidRecord, head: SurveyHead) -> SurveyedBlock | 
 def _behind(record: BlockRecord, head: SurveyHead, lifted: LiftedFace) -> SurveyedBlock | Reject:
     """The stone of a face that was lifted from a photograph."""
     corners = replace(record, vertices=lifted.outline, sigmas=_sigmas(record, lifted))
-    shape = FaceShape(ShapeKind.UNTESTED, "taken over from the faces around it")
+    shape = FaceShape(ShapeKind.UNTESTED, "not tested: its plane was taken over from others")
     try:
         face = face_on(lifted.fit, lifted.outline, shape, Provenance("photograph", lifted.text), corners)
         return _extruded(face, head)
