@@ -43,7 +43,10 @@ def test_the_import_rule_holds():
         ),
         ("mechanics.simulate", ("sqlalchemy", "typer", "vtkmodules")),
         ("archmodel.query", ("numba", "typer", "vtkmodules", "scipy")),
-        ("survey.formats.reading", ("sqlalchemy", "numba", "typer", "vtkmodules", "trimesh", "meshio", "scipy")),
+        (
+            "survey.formats.reading",
+            ("sqlalchemy", "numba", "typer", "vtkmodules", "trimesh", "meshio", "scipy"),
+        ),
         ("survey.joints", ("sqlalchemy", "typer", "vtkmodules")),
         ("pipelines.run", ("typer", "vtkmodules", "matplotlib")),
     ],
