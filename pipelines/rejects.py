@@ -4,6 +4,7 @@ What is written is itself a file of the survey's format, with the head of the su
 taken in by itself.
 """
 
+import codecs
 import hashlib
 import re
 from collections.abc import Iterable, Iterator, Sequence
@@ -108,7 +109,7 @@ def _head_lines(survey: Path, format: str) -> list[bytes]:
             if format == "moma" and _STONE.match(line):
                 break
             head.append(line)
-            if format == "csv" and line.strip() and not line.lstrip(b"\xef\xbb\xbf \t").startswith(b"#"):
+            if format == "csv" and line.strip() and not line.lstrip().startswith(b"#"):
                 break
             if format not in ("moma", "csv"):
                 return []
@@ -123,6 +124,7 @@ def _picked(survey: Path, wanted: set[int]) -> Iterator[tuple[int, bytes]]:
 
 
 def _ended(file: BinaryIO) -> Iterator[bytes]:
-    """Lines, each with a line feed at its end."""
-    for line in file:
-        yield line if line.endswith(b"\n") else line + b"\n"
+    """Lines, each with a line feed at its end, without a byte order mark: other lines will come before them."""
+    for number, line in enumerate(file):
+        plain = line.removeprefix(codecs.BOM_UTF8) if number == 0 else line
+        yield plain if plain.endswith(b"\n") else plain + b"\n"

@@ -193,6 +193,18 @@ def test_rejects_that_are_corrected_are_taken_in_with_the_head_in_effect(desk, f
     assert desk.stones()["W2"].depth_origin == origin
 
 
+@pytest.mark.parametrize("format", ["moma", "csv", "pnezd"])
+def test_a_byte_order_mark_does_not_end_up_amid_the_rejects(desk, format):
+    text, (right, wrong) = spoiled(format, "kind")
+    path = desk.write(b"\xef\xbb\xbf" + text.encode(), f"wall.{SUFFIX[format]}")
+    desk.ingest(path, format, keep_going=True)
+    rejects = desk.folder / f"wall.rejects.{SUFFIX[format]}"
+    assert b"\xef" not in rejects.read_bytes()
+    rejects.write_text(rejects.read_text().replace(wrong, right))
+    desk.ingest(rejects, format)
+    same_wall(desk.stones(), ["W0", "W1", "W2", "W3"])
+
+
 def test_stations_among_the_points_of_a_list_stay_with_its_rejects(desk):
     # clockwise for its station: without it the face would look the other way
     turned = "".join(reversed(pnezd(2, "HEDER").splitlines(keepends=True)))
