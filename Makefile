@@ -9,6 +9,7 @@ VENV := .venv
 MOMA := $(VENV)/bin/moma
 SAMPLE := data/samples/window
 OUT := out
+KERNELS := $(shell find survey mechanics -name "_kernels*.py")
 
 .DEFAULT_GOAL := help
 .PHONY: help demo test clean
@@ -16,7 +17,7 @@ OUT := out
 help:
 	@sed -n 's/^# \{0,1\}//p' Makefile | head -5
 
-demo: $(VENV)/.installed
+demo: $(VENV)/.installed $(VENV)/.kernels
 	@mkdir -p $(OUT)
 	@rm -f $(OUT)/window.db $(OUT)/window.db-wal $(OUT)/window.db-shm
 	$(MOMA) ingest $(SAMPLE)/window.moma --db sqlite:///$(OUT)/window.db
@@ -26,7 +27,7 @@ demo: $(VENV)/.installed
 	  else echo "No picture could be drawn on this machine; the warning above says what to install."; fi
 	@echo "The report:  $(OUT)/window/report.html"
 
-test: $(VENV)/.tests
+test: $(VENV)/.tests $(VENV)/.kernels
 	$(VENV)/bin/python -m pytest
 
 # A mark is newer than pyproject.toml as long as what it stands for is installed.
@@ -39,6 +40,11 @@ $(VENV)/.tests: pyproject.toml | $(VENV)/bin/python
 	@echo "Installing into $(VENV) with what the tests need; the first time this takes some minutes."
 	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
 	@touch $@ $(VENV)/.installed
+
+# numba keeps compiled kernels, and does not see that one in another file which they call has changed.
+$(VENV)/.kernels: $(KERNELS) | $(VENV)/bin/python
+	@find survey mechanics -name '*.nb[ic]' -delete
+	@touch $@
 
 $(VENV)/bin/python:
 	@command -v $(PYTHON) >/dev/null || { echo "make: there is no $(PYTHON):" \
