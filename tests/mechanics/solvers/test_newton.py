@@ -97,7 +97,7 @@ def test_it_is_so_everywhere_but_at_kinks(point, mu, k):
     # kinks: r_N = 0 inside the disc, the cone's surface, and where the foot reaches r_N = 0; the axis has no direction
     kinks = n, t - k[0], t - mu[0] * n - k[0], n + mu[0] * (t - k[0])
     assume(min(map(abs, kinks)) > 1e-3)
-    assume(t > 1e-3)
+    assume(t > 1e-2)  # the difference itself is wrong by (1e-5 / t)² near the axis
     exact = projection_derivative(point, mu, k)[0]
     np.testing.assert_allclose(exact, difference(point, mu, k, 1e-5), atol=1e-6)
 
