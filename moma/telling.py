@@ -149,6 +149,11 @@ def survey_report_lines(report: "SurveyReport", verbose: bool) -> list[str]:
     if study.stones:
         known = "" if quality.sigma0 is None else f"rms {quality.rms * 1e3:.2f} mm; "
         lines.append(f"  {known}{quality.verdict}")
+    if without := quality.depths.get("none"):
+        lines.append(
+            f"  {without} stones without a depth, which ingest will want: measure it, or give a rule in the "
+            "head of the survey"
+        )
     for file in study.files:
         if (fit := file.transform) is not None:
             left_out = f", left out: {', '.join(fit.rejected)}" if fit.rejected else ""

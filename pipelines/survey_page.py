@@ -246,9 +246,15 @@ def _stone_row(stone: StoneQuality, facade: str, off: Deviation | None) -> tuple
         f"{stone.length:.3f} × {stone.height:.3f}"
         + (f" ± {stone.dimension_sigma:.3f} m" if math.isfinite(stone.dimension_sigma) else " m"),
         "–" if off is None else f"{off.length * 1e3:+.0f} × {off.height * 1e3:+.0f} mm ({off.worst:.1f} σ)",
-        f"{stone.depth:.3f}" + (" m" if stone.depth_sigma is None else f" ± {stone.depth_sigma:.3f} m"),
+        _depth(stone),
         f"{stone.depth_source} ({stone.depth_origin})",
     )
+
+
+def _depth(stone: StoneQuality) -> str:
+    if stone.depth is None:
+        return "–"
+    return f"{stone.depth:.3f}" + (" m" if stone.depth_sigma is None else f" ± {stone.depth_sigma:.3f} m")
 
 
 def _more(count: int) -> list[str]:

@@ -12,17 +12,19 @@ from pipelines.progress import Listener, Progress, silent
 from survey.canon import Deviation, KindStandard, deviations, standards
 from survey.contradictions import Contradiction, contradictions
 from survey.courses import CourseHeight, CourseLine, course_heights, measure_courses
+from survey.extrusion import SurveyedBlock
 from survey.facades import Facade, find_facades
 from survey.formats.options import ReadingOptions
 from survey.formats.reading import open_survey
 from survey.frames import SiteTransform
 from survey.measured import survey_stones
 from survey.quality import StoneQuality, SurveyQuality, appraise, judge_survey
-from survey.records import Canon, Reject, SurveyHead
+from survey.records import Canon, DepthRule, Reject, SurveyHead
 from survey.remeasure import Remeasure, list_remeasures
 
 __all__ = ["SurveyFile", "SurveyStudy", "study_surveys"]
 
+_SOME_DEPTH = DepthRule(None, 0.3, None, "\0")  # a source that no file can say
 _TOLD = 200  # stones between two words on progress
 
 
@@ -119,15 +121,31 @@ def _read(
     if not path.is_file():
         what = "is a folder" if path.is_dir() else "no such file"
         raise UsageError(what, where=str(path), remedy="name a survey file")
-    survey = survey_stones(open_survey(path, format, options))
+    stream = open_survey(path, format, options)
+    survey = survey_stones(replace(stream, head=_with_some_depth(stream.head)))
     for number, one in enumerate(survey.stones, start=1):
         if isinstance(one, Reject):
             rejects.append(one)
         else:
-            stones.append(appraise(one))
+            stones.append(_appraised(one))
         if number % _TOLD == 0:
             progress(Progress(f"fit {path.name}", number, number + _TOLD))
-    return SurveyFile(survey.head, survey.transform, 0, 0)
+    head = replace(survey.head, depth_rules=stream.head.depth_rules)
+    return SurveyFile(head, survey.transform, 0, 0)
+
+
+def _with_some_depth(head: SurveyHead) -> SurveyHead:
+    """The head with a depth for stones of which none is known: their faces can be judged without one."""
+    if any(rule.kind is None for rule in head.depth_rules):
+        return head
+    return replace(head, depth_rules=(*head.depth_rules, _SOME_DEPTH))
+
+
+def _appraised(block: SurveyedBlock) -> StoneQuality:
+    stone = appraise(block)
+    if block.depth.source != _SOME_DEPTH.source:
+        return stone
+    return replace(stone, depth=None, depth_source="not known", depth_origin="none")
 
 
 def _judge(

@@ -127,7 +127,7 @@ def _longer_than_stretchers(index: int, stone: StoneQuality, around: _Around) ->
 
 
 def _longer_than_deep(_: int, stone: StoneQuality, __: _Around) -> _Finding | None:
-    if stone.depth_sigma is None:
+    if stone.depth is None or stone.depth_sigma is None:
         return None
     text = f"its face is {_metres(stone.length)} long, the stone {_metres(stone.depth)} deep"
     return _Finding(stone.length - stone.depth, math.hypot(stone.dimension_sigma, stone.depth_sigma), text)

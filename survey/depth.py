@@ -60,7 +60,7 @@ def depth_for(record: BlockRecord, rules: Sequence[DepthRule]) -> Depth:
         raise SurveyError(
             f"no depth is known for a {record.kind}",
             where=where,
-            remedy=f"measure the stone, or put 'depth {record.kind} D source TEXT' before the stones",
+            remedy=f"measure it, or say 'depth {record.kind} D source TEXT' in the head of the survey or a header file",
         )
     best = max(holding, key=_rank)
     alike = sorted(rule.line for rule in holding if _rank(rule) == _rank(best))

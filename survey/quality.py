@@ -39,8 +39,8 @@ class StoneQuality:
     shape, shape_text : verdict on one plane as its shape, in a word and in a sentence with numbers
     tilt_sigma : of the less certain tilt of its plane [degrees]
     offset_sigma : of its plane's height at its centroid [m]
-    depth, depth_sigma : [m]; the latter None if not known
-    depth_source, depth_origin : the evidence in words, and its rank: "stone", "rule", "kind" or "structure"
+    depth, depth_sigma : [m]; None if not known
+    depth_source, depth_origin : the evidence in words, and its rank: "stone", "rule", "kind", "structure", or "none"
     length, height : of its face, level and upwards [m]
     dimension_sigma : standard deviation of each, as a difference of two corners [m]
     area : of its face [m²]
@@ -71,7 +71,7 @@ class StoneQuality:
     shape_text: str
     tilt_sigma: float
     offset_sigma: float
-    depth: float
+    depth: float | None
     depth_sigma: float | None
     depth_source: str
     depth_origin: str

@@ -123,7 +123,10 @@ def _read_head(
             continue
         if not begun:
             if line.split("#", 1)[0].split() != MAGIC.split():
-                raise cursor.fail("this is not a MOMA survey", f"the first line must be '{MAGIC}'")
+                raise cursor.fail(
+                    "this is not a MOMA survey",
+                    f"the first line must be '{MAGIC}'; of another format say which (--format csv, pnezd, …)",
+                )
             begun = True
         elif word == "stone":
             return reader, (number, line)

@@ -176,7 +176,7 @@ def test_a_survey_says_the_same_in_the_frame_of_the_site(wall, tmp_path):
 def test_a_bad_stone_is_in_the_report_and_does_not_stop_it(tmp_path):
     text = (
         f"stone A header course 1\n{SQUARE}end\n"
-        f"stone B pillar course 1\n{SQUARE}end\n"
+        f"stone B header course 1\n  station T9\n{SQUARE}end\n"
         "stone C header course 1\n  vertex 0 0 0\n  vertex 1 0 0\n  vertex 2 0 0\nend\n"
         "stone D header course 1\n  vertex 0 0 0\n  vertex 1 0\nend\n"
     )
@@ -185,7 +185,7 @@ def test_a_bad_stone_is_in_the_report_and_does_not_stop_it(tmp_path):
     assert [one["code"] for one in content["stones"]] == ["A"]
     reasons = {one["code"]: one["reason"] for one in content["rejects"]}
     assert set(reasons) == {"B", "C", "D"}
-    assert "depth" in reasons["B"]
+    assert "T9" in reasons["B"]
     assert "line" in reasons["C"]
 
 
@@ -198,7 +198,9 @@ def test_a_mistyped_kind_is_told_before_the_database_refuses_it(tmp_path):
 
 
 def test_a_survey_without_a_single_good_stone_is_still_reported(tmp_path):
-    report = report_surveys([survey_file(tmp_path, f"stone B pillar\n{SQUARE}end\n")], tmp_path / "out")
+    report = report_surveys(
+        [survey_file(tmp_path, "stone B header\n  vertex 0 0 0\nend\n")], tmp_path / "out"
+    )
     content = contents(report)
     assert (content["stones"], len(content["rejects"])) == ([], 1)
     assert content["quality"]["sigma0"] is None
@@ -383,3 +385,16 @@ def test_wrong_use_is_told_in_one_line(place, arguments, words):
     assert words in done.stderr
     assert len(done.stderr.splitlines()) == 1
     assert list(place.iterdir()) == []
+
+
+def test_faces_are_judged_before_any_depth_is_known(tmp_path):
+    path = survey_file(tmp_path, f"stone A stretcher\n{SQUARE}end\nstone B header\n{SQUARE}end\n")
+    report = report_surveys([path], tmp_path / "report")
+    assert not report.study.rejects
+    a, b = report.study.stones
+    assert (a.depth, a.depth_sigma, a.depth_origin) == (None, None, "none")
+    assert (b.depth, b.depth_origin) == (0.4, "kind")
+    assert a.rms == b.rms
+    assert any("1 stones without a depth" in line for line in survey_report_lines(report, False))
+    (stone,) = [one for one in contents(report)["stones"] if one["code"] == "A"]
+    assert stone["depth"] is None
