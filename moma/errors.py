@@ -16,6 +16,8 @@
 Each error says what is wrong, where, and what to do: ``where: what; remedy``.
 """
 
+from typing import Self
+
 __all__ = [
     "DatabaseError",
     "GeometryError",
@@ -46,6 +48,10 @@ class MomaError(Exception):
         self.what, self.where, self.remedy = what, where, remedy
         text = what if where is None else f"{where}: {what}"
         super().__init__(text if remedy is None else f"{text}; {remedy}")
+
+    def at(self, where: str) -> Self:
+        """The same failure at another place, as only the caller knows it."""
+        return type(self)(self.what, where=where, remedy=self.remedy)
 
 
 class UsageError(MomaError):

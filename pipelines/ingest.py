@@ -18,6 +18,7 @@ from archmodel.store import store_survey
 from moma.errors import SurveyError, UsageError
 from pipelines.frame_records import frame_record
 from pipelines.progress import Listener, Progress, silent
+from pipelines.reading_options import check_survey_file
 from pipelines.rejects import check_targets, default_path, rejects_text
 from pipelines.spool import Spool
 from pipelines.stone_records import stone_record
@@ -165,9 +166,7 @@ class _Tally:
 def _check_files(surveys: Sequence[Path]) -> None:
     seen: set[Path] = set()
     for path in surveys:
-        if not path.is_file():
-            what = "is a folder" if path.is_dir() else "no such file"
-            raise UsageError(what, where=str(path), remedy="name a survey file")
+        check_survey_file(path)
         if path.resolve() in seen:
             raise UsageError("is named twice", where=str(path), remedy="name each survey file once")
         seen.add(path.resolve())

@@ -7,7 +7,14 @@ from moma.errors import UsageError
 from survey.formats.options import ReadingOptions
 from survey.formats.reading import with_header
 
-__all__ = ["reading_options"]
+__all__ = ["check_survey_file", "reading_options"]
+
+
+def check_survey_file(path: Path) -> None:
+    """Refuse what is no file, before anything is read."""
+    if not path.is_file():
+        what = "is a folder" if path.is_dir() else "no such file"
+        raise UsageError(what, where=str(path), remedy="name a survey file")
 
 
 def reading_options(

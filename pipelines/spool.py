@@ -48,7 +48,8 @@ class Spool:
             self._flush()
 
     def __iter__(self) -> Iterator[StoneRecord]:
-        self._flush()
+        if self._waiting:
+            self._flush()
         self._file.seek(0)
         for _ in range(self._batches):
             yield from pickle.load(self._file)

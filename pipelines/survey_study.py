@@ -9,6 +9,7 @@ import numpy as np
 from archmodel.entities import kind_named
 from moma.errors import UsageError
 from pipelines.progress import Listener, Progress, silent
+from pipelines.reading_options import check_survey_file
 from survey.canon import Deviation, KindStandard, deviations, standards
 from survey.contradictions import Contradiction, contradictions
 from survey.courses import CourseHeight, CourseLine, course_heights, measure_courses
@@ -118,9 +119,7 @@ def _read(
     rejects: list[Reject],
     progress: Listener,
 ) -> SurveyFile:
-    if not path.is_file():
-        what = "is a folder" if path.is_dir() else "no such file"
-        raise UsageError(what, where=str(path), remedy="name a survey file")
+    check_survey_file(path)
     stream = open_survey(path, format, options)
     survey = survey_stones(replace(stream, head=_with_some_depth(stream.head)))
     for number, one in enumerate(survey.stones, start=1):

@@ -73,16 +73,14 @@ def simplify(block: SurveyedBlock) -> BlockyStone:
     GeometryError
         for a triangular face, which has no quadrilateral of its own, and for a solid that is no hexahedron
     """
+    sound: tuple[bool, ...]
     if block.face.provenance.source == "solid":
-        return _hexahedron(block)
-    fit = block.face.fit
-    across = np.cross(fit.normal, fit.axes[0])
-    flat = np.column_stack([(block.face.outline - fit.centroid) @ axis for axis in (fit.axes[0], across)])
-    quad = _quadrilateral(flat, block.code)
-    corners = fit.centroid + quad @ np.array([fit.axes[0], across])
-    hidden = hidden_side(corners, fit.normal, block.depth.value, block.extrusion)
-    solid = prism(block.code, corners, hidden)
-    worn = flat[list(block.face.rejected_vertices)]
+        corners, solid = block.face.outline, _hexahedron(block)
+        sound, displacement, change = (True,) * 4, np.zeros(4), 0.0
+    else:
+        corners, sound, displacement, change = _squared(block)
+        hidden = hidden_side(corners, block.face.fit.normal, block.depth.value, block.extrusion)
+        solid = prism(block.code, corners, hidden)
     return BlockyStone(
         code=block.code,
         kind=block.kind,
@@ -91,14 +89,29 @@ def simplify(block: SurveyedBlock) -> BlockyStone:
         depth=block.depth,
         extrusion=block.extrusion,
         corners=corners,
-        sound=tuple(not bool((np.linalg.norm(worn - corner, axis=1) < 1e-9).any()) for corner in quad),
+        sound=sound,
         solid=solid,
-        displacement=np.array([_distance_to_outline(corner, quad) for corner in flat]),
-        volume_change=_area(quad) / _area(flat) - 1.0,
+        displacement=displacement,
+        volume_change=change,
     )
 
 
-def _hexahedron(block: SurveyedBlock) -> BlockyStone:
+def _squared(block: SurveyedBlock) -> tuple[Array, tuple[bool, ...], Array, float]:
+    """Corners of a measured face's own quadrilateral; which are sound, how far the outline moved, change of area."""
+    fit = block.face.fit
+    axes = np.array([fit.axes[0], np.cross(fit.normal, fit.axes[0])])
+    flat = np.column_stack([(block.face.outline - fit.centroid) @ axis for axis in axes])
+    quad = _quadrilateral(flat, block.code)
+    worn = flat[list(block.face.rejected_vertices)]
+    return (
+        fit.centroid + quad @ axes,
+        tuple(not bool((np.linalg.norm(worn - corner, axis=1) < 1e-9).any()) for corner in quad),
+        np.array([_distance_to_outline(corner, quad) for corner in flat]),
+        _area(quad) / _area(flat) - 1.0,
+    )
+
+
+def _hexahedron(block: SurveyedBlock) -> Solid:
     """A solid of six faces of four corners, with its corners in the order of a BlockyStone's."""
     solid, outline = block.solid, block.face.outline
     if len(solid.vertices) != 8 or any(len(face) != 4 for face in solid.faces):
@@ -112,19 +125,7 @@ def _hexahedron(block: SurveyedBlock) -> BlockyStone:
     hidden = [
         next(iter(edge - {i})) for i in visible for edge in edges if i in edge and not edge <= set(visible)
     ][::2]  # each edge belongs to two faces
-    return BlockyStone(
-        code=block.code,
-        kind=block.kind,
-        course=block.course,
-        face=block.face,
-        depth=block.depth,
-        extrusion=block.extrusion,
-        corners=outline,
-        sound=(True,) * 4,
-        solid=prism(block.code, solid.vertices[visible], solid.vertices[hidden]),
-        displacement=np.zeros(4),
-        volume_change=0.0,
-    )
+    return prism(block.code, solid.vertices[visible], solid.vertices[hidden])
 
 
 def _quadrilateral(flat: Array, code: str) -> Array:

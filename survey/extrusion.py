@@ -119,7 +119,8 @@ def _vertex_sigma(face: Face, depth: Depth, extrusion: Extrusion, hidden: Array)
     """
     fit, tail, count = face.fit, extrusion.tail, len(face.outline)
     square = fit.axes**2
-    measured = _corner_sigma(face)[:, None] ** 2 * square.sum(axis=0)
+    corners = face.record.vertex_sigmas[list(face.corner_of)]
+    measured = corners[:, None] ** 2 * square.sum(axis=0)
     # the tail of a corner also moves with the mean of all of them
     own, others = tail + (1.0 - tail) / count, (1.0 - tail) / count
     tails = own**2 * measured + others**2 * (measured.sum(axis=0) - measured)
@@ -140,11 +141,3 @@ def _vertex_sigma(face: Face, depth: Depth, extrusion: Extrusion, hidden: Array)
     variance[count:] += depth_variance * _direction(fit.normal, extrusion) ** 2
     out: Array = np.sqrt(variance)
     return out
-
-
-def _corner_sigma(face: Face) -> Array:
-    """Standard deviation of each corner of the outline in the plane of the face, (nv,) [m]."""
-    record = face.record
-    if record.sigmas is None:
-        return np.full(len(face.outline), record.sigma)
-    return record.sigmas[len(record.points) :][list(face.corner_of)]

@@ -11,6 +11,7 @@ from survey.outline import OutlineMeasures, level_direction, measure_outline, ou
 from survey.planes import FaceFit, fit_plane
 from survey.records import BlockRecord
 from survey.shapes import FaceShape, judge_shape
+from survey.solids import area_vector
 
 __all__ = ["Face", "Provenance", "face_on", "outline_face"]
 
@@ -94,8 +95,7 @@ def outline_face(record: BlockRecord, observer: Array | None) -> Face:
     try:
         return _measured_face(record, observer)
     except GeometryError as error:
-        where = f"stone {record.code} (line {record.line})"
-        raise GeometryError(error.what, where=where, remedy=error.remedy) from error
+        raise error.at(f"stone {record.code} (line {record.line})") from error
 
 
 def _measured_face(record: BlockRecord, observer: Array | None) -> Face:
@@ -172,8 +172,6 @@ def _remarks(merged: tuple[int, ...], reordered: bool) -> tuple[str, ...]:
 
 def _outside(vertices: Array) -> Array:
     """Some point in front of the face, if its corners run counter-clockwise."""
-    centre = vertices.mean(axis=0)
-    centred = vertices - centre
-    towards = np.cross(centred, np.roll(centred, -1, axis=0)).sum(axis=0)
-    out: Array = centre + towards / max(float(np.linalg.norm(towards)), 1e-300)
+    towards = area_vector(vertices)
+    out: Array = vertices.mean(axis=0) + towards / max(float(np.linalg.norm(towards)), 1e-300)
     return out

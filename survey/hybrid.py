@@ -80,8 +80,7 @@ def lift_faces(
             yield record, lift(record, wall[0], neighbours, wall[1])
         except MomaError as error:
             place = f"stone {record.code} (line {record.line})"
-            where = place if error.where is None else f"{place}, {error.where}"
-            yield record, type(error)(error.what, where=where, remedy=error.remedy)
+            yield record, error.at(place if error.where is None else f"{place}, {error.where}")
 
 
 def lift(
@@ -176,7 +175,7 @@ def _face_plane(
     if count == 0:
         return None, plane
     words = f"{count} point{'s' if count > 1 else ''} measured on it"
-    sigmas = np.full(count, record.sigma) if record.sigmas is None else record.sigmas[:count]
+    sigmas = record.point_sigmas
     sound = np.ones(count, dtype=bool)
     if count >= 3:
         try:

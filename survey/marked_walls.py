@@ -129,8 +129,7 @@ def wall_of_marks(
             )
         return _tied(photograph, viewpoint, observer)
     except GeometryError as error:
-        place = where if error.where is None else f"{where}, {error.where}"
-        raise GeometryError(error.what, where=place, remedy=error.remedy) from error
+        raise error.at(where if error.where is None else f"{where}, {error.where}") from error
 
 
 def _tied(photograph: Photograph, viewpoint: Array | None, observer: Array | None) -> MarkedWall:

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from moma.errors import MomaError
 from survey.depth import depth_for
@@ -17,8 +16,6 @@ from survey.shapes import FaceShape, ShapeKind
 from survey.solid_blocks import block_of_solid
 
 __all__ = ["SurveyedStream", "survey_stones"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -88,7 +85,8 @@ def _made(item: BlockRecord | SolidRecord, head: SurveyHead) -> SurveyedBlock | 
 
 def _behind(record: BlockRecord, head: SurveyHead, lifted: LiftedFace) -> SurveyedBlock | Reject:
     """The stone of a face that was lifted from a photograph."""
-    corners = replace(record, vertices=lifted.outline, sigmas=_sigmas(record, lifted))
+    sigmas = np.concatenate([record.point_sigmas, lifted.sigma])
+    corners = replace(record, vertices=lifted.outline, sigmas=sigmas)
     shape = FaceShape(ShapeKind.UNTESTED, "not tested: its plane was taken over from others")
     try:
         face = face_on(lifted.fit, lifted.outline, shape, Provenance("photograph", lifted.text), corners)
@@ -97,16 +95,9 @@ def _behind(record: BlockRecord, head: SurveyHead, lifted: LiftedFace) -> Survey
         return _reject(record, head, error)
 
 
-def _sigmas(record: BlockRecord, lifted: LiftedFace) -> Array:
-    points = np.full(len(record.points), record.sigma) if record.sigmas is None else record.sigmas
-    out: Array = np.concatenate([points[: len(record.points)], lifted.sigma])
-    return out
-
-
 def _extruded(face: Face, head: SurveyHead) -> SurveyedBlock:
     return extrude(face, depth_for(face.record, head.depth_rules), face.record.extrusion or head.extrusion)
 
 
 def _reject(item: BlockRecord | SolidRecord, head: SurveyHead, error: MomaError) -> Reject:
-    where = f"{head.path}:{item.line}: stone {item.code}"
-    return Reject(item.code, type(error)(error.what, where=where, remedy=error.remedy), item.spans)
+    return Reject(item.code, error.at(f"{head.path}:{item.line}: stone {item.code}"), item.spans)

@@ -257,6 +257,19 @@ class BlockRecord:
     extrusion: Extrusion | None = None
     spans: tuple[range, ...] = ()
 
+    @property
+    def point_sigmas(self) -> Array:
+        """Standard deviation of a coordinate of each point, (np,) [m]."""
+        count = len(self.points)
+        return np.full(count, self.sigma) if self.sigmas is None else self.sigmas[:count]
+
+    @property
+    def vertex_sigmas(self) -> Array:
+        """Standard deviation of a coordinate of each corner, (nv,) [m]."""
+        if self.sigmas is None:
+            return np.full(len(self.vertices), self.sigma)
+        return self.sigmas[len(self.points) :]
+
 
 @dataclass(frozen=True)
 class SolidRecord:

@@ -10,7 +10,7 @@ from survey.faces import Provenance, face_on
 from survey.planes import FaceFit
 from survey.records import BlockRecord, Extrusion, SolidRecord
 from survey.shapes import FaceShape, ShapeKind
-from survey.solids import Solid
+from survey.solids import Solid, area_vector
 
 __all__ = ["block_of_solid"]
 
@@ -79,7 +79,7 @@ def block_of_solid(record: SolidRecord, viewpoint: Array | None, path: str) -> S
 def _visible_side(record: SolidRecord, viewpoint: Array | None) -> tuple[Array, Array]:
     """Corners (nv, 3) and outward normal (3,) of the side that is the face."""
     sides = [record.vertices[list(face)] for face in record.faces]
-    vectors = np.array([_area_vector(side) for side in sides])
+    vectors = np.array([area_vector(side) for side in sides])
     origin = record.vertices.mean(axis=0)
     volume = (
         sum(float((side[0] - origin) @ vector) for side, vector in zip(sides, vectors, strict=True)) / 3.0
@@ -103,13 +103,6 @@ def _worth(vectors: Array, sides: list[Array], viewpoint: Array | None) -> Array
         return np.where(upright, areas, 0.0) if upright.any() else areas
     sight = viewpoint - np.array([side.mean(axis=0) for side in sides])
     out: Array = (vectors * sight).sum(axis=1) / np.linalg.norm(sight, axis=1)
-    return out
-
-
-def _area_vector(polygon: Array) -> Array:
-    """Area times outward normal of a side [m²]."""
-    corners = polygon - polygon[0]
-    out: Array = 0.5 * np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
     return out
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Solid"]
+__all__ = ["Solid", "area_vector"]
 
 
 @dataclass(frozen=True)
@@ -22,3 +22,10 @@ class Solid:
     code: str
     vertices: NDArray[np.float64]
     faces: tuple[tuple[int, ...], ...]
+
+
+def area_vector(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Area times normal of a polygon (n, 3) in space, counter-clockwise about it [m²]."""
+    corners = polygon - polygon[0]
+    out: NDArray[np.float64] = 0.5 * np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
+    return out

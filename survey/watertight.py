@@ -5,7 +5,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from moma.errors import GeometryError
-from survey.solids import Solid
+from survey.solids import Solid, area_vector
 
 __all__ = ["check_watertight", "triangulate"]
 
@@ -58,7 +58,7 @@ def _ears(vertices: NDArray[np.float64], face: tuple[int, ...]) -> list[tuple[in
         return [(face[0], face[1], face[2])]
     rest, triangles = list(face), []
     polygon = vertices[rest]
-    normal = np.cross(polygon - polygon[0], np.roll(polygon, -1, axis=0) - polygon[0]).sum(axis=0)
+    normal = area_vector(polygon)
     while len(rest) > 3:
         ear = next((k for k in range(len(rest)) if _is_ear(vertices, rest, k, normal)), 0)
         triangles.append((rest[ear - 1], rest[ear], rest[(ear + 1) % len(rest)]))
@@ -83,7 +83,7 @@ def _highest_corner(solid: Solid) -> float:
     highest = 0.0
     for face in solid.faces:
         polygon = solid.vertices[list(face)]
-        normal = np.cross(polygon - polygon[0], np.roll(polygon, -1, axis=0) - polygon[0]).sum(axis=0)
+        normal = area_vector(polygon)
         heights = (solid.vertices - polygon.mean(axis=0)) @ (normal / np.linalg.norm(normal))
         highest = max(highest, float(heights.max()))
     return highest

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from moma.errors import GeometryError
+from survey.solids import area_vector
 
 __all__ = ["body_groups", "signed_volume"]
 
@@ -132,7 +133,6 @@ def _pairs(
 
 def _angle(vertices: Array, polygon: Polygon, direction: Array, frame: Array) -> float:
     """Angle about the edge at which a face leaves it, which runs along the edge in this direction."""
-    corners = vertices[list(polygon)] - vertices[polygon[0]]
-    normal = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
+    normal = area_vector(vertices[list(polygon)])
     u, v = frame @ np.cross(normal, direction)
     return math.atan2(float(v), float(u))

@@ -48,7 +48,7 @@ def write_moma(survey: Survey, path: Path) -> None:
         for block in survey.blocks:
             lines += ["", *_stone_lines(block, common)]
     except SurveyError as error:
-        raise SurveyError(error.what, where=str(path), remedy=error.remedy) from error
+        raise error.at(str(path)) from error
     Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
 
 
