@@ -9,7 +9,8 @@ from sqlalchemy.orm import InstrumentedAttribute, aliased
 
 from archmodel.entities import Entity
 from archmodel.records import STONE_VALUES
-from archmodel.tables import EntityResult, Measurement, Survey
+from archmodel.runs import EntityResult
+from archmodel.surveys import Measurement, Survey
 
 __all__ = ["ATTRIBUTES", "Attribute", "with_attributes"]
 
@@ -90,7 +91,9 @@ def with_attributes(statement: S) -> S:
         .scalar_subquery()
     )
     return (
-        statement.join(Survey, Survey.id == Entity.survey_id)
-        .outerjoin(Measurement, Measurement.entity_id == Entity.id)
+        statement.outerjoin(
+            Measurement, and_(Measurement.entity_id == Entity.id, Measurement.superseded_id.is_(None))
+        )
+        .outerjoin(Survey, Survey.id == Measurement.survey_id)
         .outerjoin(EntityResult, and_(EntityResult.entity_id == Entity.id, EntityResult.run_id == latest))
     )

@@ -4,16 +4,18 @@ from datetime import UTC, datetime
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import DateTime, LargeBinary
+from sqlalchemy import JSON, DateTime, LargeBinary, String
 from sqlalchemy.engine import Dialect
 from sqlalchemy.orm import DeclarativeBase
 from sqlalchemy.types import TypeDecorator
 
-__all__ = ["ArrayType", "Base", "UtcDateTime"]
+__all__ = ["JSON_TYPE", "TEXT", "ArrayType", "Base", "UtcDateTime"]
 
+TEXT = String().with_variant(String(collation="C"), "postgresql")
+"""Texts compare by their characters' code points on every database, whatever its locale."""
 
-class Base(DeclarativeBase):
-    """Base of every table of the entity database."""
+JSON_TYPE = JSON(none_as_null=True)
+"""Not JSONB on PostgreSQL: what comes out is what went in, to the order of the keys."""
 
 
 class ArrayType(TypeDecorator[NDArray[np.float64]]):
@@ -59,3 +61,13 @@ class UtcDateTime(TypeDecorator[datetime]):
     def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:
         """Stored instant to one in UTC."""
         return None if value is None else value.replace(tzinfo=UTC)
+
+
+class Base(DeclarativeBase):
+    """Base of every table of the entity database."""
+
+    type_annotation_map = {  # noqa: RUF012  (SQLAlchemy's own way)
+        str: TEXT,
+        datetime: UtcDateTime(),
+        dict[str, object]: JSON_TYPE,
+    }

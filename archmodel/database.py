@@ -15,15 +15,10 @@ from sqlalchemy.exc import ArgumentError, DBAPIError
 from sqlalchemy.orm import Session
 from sqlalchemy.pool import ConnectionPoolEntry
 
-from archmodel import entities  # noqa: F401  (declares its tables on the base)
-from archmodel.base import Base
-from archmodel.tables import SchemaVersion
+from archmodel.layout import SCHEMA_VERSION, SchemaVersion, metadata
 from moma.errors import DatabaseError
 
-__all__ = ["SCHEMA_VERSION", "Database", "open_database"]
-
-SCHEMA_VERSION = 2
-"""Layout of the tables that this version of MOMA reads and writes."""
+__all__ = ["Database", "open_database"]
 
 
 @dataclass(frozen=True)
@@ -167,7 +162,7 @@ def _prepare(connection: Connection, place: str, create: bool) -> None:
     with writing.begin():
         # Another program may have laid it out since we looked; now nobody else can.
         if not _is_ours(writing, set(inspect(writing).get_table_names()), place):
-            Base.metadata.create_all(writing)
+            metadata.create_all(writing)
             writing.execute(insert(SchemaVersion).values(version=SCHEMA_VERSION))
 
 

@@ -7,7 +7,8 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session, joinedload, selectinload
 
 from archmodel.entities import Entity, definition_of, kind_chain, kind_of, refuse_unknown_kinds
-from archmodel.tables import EntityResult, Measurement
+from archmodel.runs import EntityResult, Run
+from archmodel.surveys import Measurement, Survey
 from moma.errors import UsageError
 
 __all__ = ["describe"]
@@ -35,14 +36,13 @@ def describe(session: Session, code: str) -> dict[str, object]:
         select(Entity)
         .where(Entity.code == _plain(code))
         .options(
-            joinedload(Entity.survey),
-            joinedload(Entity.measurement),
-            selectinload(Entity.results).joinedload(EntityResult.run),
+            joinedload(Entity.measurement).joinedload(Measurement.survey).joinedload(Survey.entry),
+            selectinload(Entity.results).joinedload(EntityResult.run).joinedload(Run.entry),
         )
     )
     if entity is None:
         raise _no_such(session, code)
-    chain = kind_chain(type(entity))
+    chain, measured = kind_chain(type(entity)), entity.measurement
     return {
         "code": entity.code,
         "kind": entity.kind,
@@ -58,22 +58,22 @@ def describe(session: Session, code: str) -> dict[str, object]:
             "source": entity.depth_source,
             "origin": entity.depth_origin,
         },
-        "survey": _survey(entity),
-        "measured": _measured(entity.measurement),
-        "notes": dict(entity.measurement.notes),
+        "survey": None if measured is None else _survey(measured),
+        "measured": None if measured is None else _measured(measured),
+        "notes": {} if measured is None else dict(measured.notes),
         "runs": [_result(result) for result in reversed(entity.results)],
     }
 
 
-def _survey(entity: Entity) -> dict[str, object]:
+def _survey(measured: Measurement) -> dict[str, object]:
     """Where the measurement comes from."""
-    survey = entity.survey
+    survey = measured.survey
     return {
         "name": survey.name,
         "file": survey.path,
-        "line": entity.measurement.line,
+        "line": measured.line,
         "sha256": survey.sha256,
-        "stored_at": survey.stored_at.isoformat(timespec="seconds"),
+        "stored_at": survey.entry.recorded_at.isoformat(timespec="seconds"),
     }
 
 
@@ -113,8 +113,8 @@ def _result(result: EntityResult) -> dict[str, object]:
         "run": result.run.id,
         "scene": result.run.scene,
         "outcome": result.run.outcome,
-        "version": result.run.version,
-        "stored_at": result.run.stored_at.isoformat(timespec="seconds"),
+        "version": result.run.versions["moma"],
+        "stored_at": result.run.entry.recorded_at.isoformat(timespec="seconds"),
         "fidelity": result.fidelity,
         "von_mises_max": result.von_mises_max,
         "von_mises_mean": result.von_mises_mean,

@@ -25,7 +25,7 @@ from archmodel.grammar import (
     Not,
     parse,
 )
-from archmodel.tables import FIDELITIES
+from archmodel.runs import FIDELITIES
 from archmodel.tokens import Token, complaint
 from moma.errors import UsageError
 

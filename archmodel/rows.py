@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from archmodel.entities import Entity, kind_named, kind_of
 from archmodel.measures import face_area, face_extent, solid_volume
 from archmodel.records import RunRecord, StoneRecord, StoneResult
-from archmodel.tables import FIDELITIES, Measurement
+from archmodel.runs import FIDELITIES
+from archmodel.surveys import Measurement
 from moma.errors import DatabaseError, GeometryError, SurveyError, UsageError
 
 __all__ = ["entity_row", "measurement_row", "result_row", "stone_record", "storable", "summary_of"]
@@ -111,15 +112,15 @@ def stone_record(entity: Entity, measured: Measurement) -> StoneRecord:
         redundancy=measured.redundancy,
         rejected=tuple(measured.rejected),
         outline=measured.outline.copy(),
-        depth=entity.depth,
+        depth=_known(entity.depth, entity),
         depth_sigma=entity.depth_sigma,
-        depth_source=entity.depth_source,
+        depth_source=entity.depth_source or "",
         solid_vertices=measured.solid_vertices.copy(),
         solid_faces=tuple(tuple(face) for face in measured.solid_faces),
         vertex_sigma=measured.vertex_sigma.copy(),
         notes=dict(measured.notes),
         zone=entity.zone,
-        depth_origin=entity.depth_origin,
+        depth_origin=entity.depth_origin or "stone",
         provenance=measured.provenance,
         provenance_text=measured.provenance_text,
         station=measured.station,
@@ -134,6 +135,12 @@ def stone_record(entity: Entity, measured: Measurement) -> StoneRecord:
         tail=measured.tail,
         remarks=tuple(measured.remarks),
     )
+
+
+def _known(depth: float | None, entity: Entity) -> float:
+    if depth is None:
+        raise DatabaseError(f"the depth of {entity.code} is not known", where=f"entity {entity.id}")
+    return depth
 
 
 def result_row(result: StoneResult, place: str) -> dict[str, object]:

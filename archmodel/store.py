@@ -1,7 +1,6 @@
 """Into the database and out again: surveyed stones, simulation runs."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from datetime import UTC, datetime
 from itertools import islice
 from typing import TypeVar
 
@@ -9,9 +8,11 @@ from sqlalchemy import insert, select
 from sqlalchemy.orm import Session
 
 from archmodel.entities import Entity
+from archmodel.entries import new_entry
 from archmodel.records import RunRecord, StoneRecord
 from archmodel.rows import entity_row, measurement_row, result_row, stone_record, storable, summary_of
-from archmodel.tables import EntityResult, Measurement, Run, Survey
+from archmodel.runs import EntityResult, Run
+from archmodel.surveys import Measurement, Survey
 from moma.errors import DatabaseError
 
 __all__ = ["load_stones", "store_run", "store_survey", "survey_with_hash"]
@@ -58,11 +59,12 @@ def store_survey(
     """
     with session.begin_nested():
         _refuse_again(session, source_path, sha256)
+        entry = new_entry(session, "ingest", storable(source_path))
         survey = Survey(
             name=storable(name),
             path=storable(source_path),
             sha256=sha256,
-            stored_at=datetime.now(UTC),
+            entry_id=entry.id,
             stations={name: [float(value) for value in place] for name, place in (stations or {}).items()},
             frame=None if frame is None else dict(frame),
         )
@@ -71,7 +73,7 @@ def store_survey(
         lines: dict[str, int] = {}
         for batch in _batches(stones):
             _refuse_known_codes(session, batch, lines, source_path)
-            _insert_stones(session, batch, survey.id, source_path)
+            _insert_stones(session, batch, survey, source_path)
         if not lines:
             remedy = "give it at least one stone record"
             raise DatabaseError("the survey has no stones", where=source_path, remedy=remedy)
@@ -119,13 +121,14 @@ def store_run(session: Session, run: RunRecord) -> int:
         twice = next(code for code in codes if codes.count(code) > 1)
         raise DatabaseError(f"two results for stone {twice}", where=place)
     with session.begin_nested():
+        entry = new_entry(session, "run", storable(run.scene))
         stored = Run(
+            entry_id=entry.id,
             scene=storable(run.scene),
             scene_text=storable(run.scene_text),
             outcome=str(run.outcome),
             summary=dict(summary_of(run)),
-            version=run.version,
-            stored_at=datetime.now(UTC),
+            versions={"moma": run.version},
         )
         session.add(stored)
         session.flush()
@@ -158,8 +161,8 @@ def _refuse_known_codes(
     """A code names one stone of the database. `lines` holds this file's codes so far, and is added to."""
     known = session.execute(
         select(Entity.code, Survey.path, Measurement.line)
-        .join(Entity.survey)
         .join(Entity.measurement)
+        .join(Measurement.survey)
         .where(Entity.code.in_([stone.code for stone in batch]))
     )
     elsewhere = {code: f"{other}:{line}" for code, other, line in known}
@@ -176,14 +179,17 @@ def _refuse_known_codes(
         raise DatabaseError(what, where=f"{path}:{stone.line}", remedy=remedy)
 
 
-def _insert_stones(session: Session, batch: Sequence[StoneRecord], survey_id: int, path: str) -> None:
+def _insert_stones(session: Session, batch: Sequence[StoneRecord], survey: Survey, path: str) -> None:
     """The rows of one batch of stones, checked."""
     places = [f"{path}:{stone.line} stone {stone.code}" for stone in batch]
     entities = [
-        entity_row(stone, place) | {"survey_id": survey_id}
+        entity_row(stone, place) | {"entry_id": survey.entry_id}
         for stone, place in zip(batch, places, strict=True)
     ]
-    measurements = [measurement_row(stone, place) for stone, place in zip(batch, places, strict=True)]
+    shared = {"survey_id": survey.id, "entry_id": survey.entry_id, "superseded_id": None}
+    measurements = [
+        measurement_row(stone, place) | shared for stone, place in zip(batch, places, strict=True)
+    ]
     # The table, not the class: rows of many kinds go into one statement.
     table = Entity.metadata.tables[Entity.__tablename__]
     numbers = session.scalars(insert(table).returning(table.c.id, sort_by_parameter_order=True), entities)

@@ -11,8 +11,9 @@ from sqlalchemy import func, select
 
 from archmodel.database import Database, open_database
 from archmodel.entities import Entity
+from archmodel.entries import Entry
+from archmodel.layout import SchemaVersion
 from archmodel.store import store_survey
-from archmodel.tables import Run, SchemaVersion
 from moma.errors import DatabaseError
 from tests.archmodel.stones import SHA, box_stone, contents
 
@@ -73,7 +74,7 @@ def test_another_programs_database_is_refused_and_untouched(tmp_path: Path, crea
 def test_a_database_of_another_schema_version_is_refused(empty: Database) -> None:
     with empty.session() as session:
         session.scalars(select(SchemaVersion)).one().version = 99
-    with pytest.raises(DatabaseError, match="schema version 99, this program reads version 2"):
+    with pytest.raises(DatabaseError, match="schema version 99, this program reads version 3"):
         open_database(empty.url)
 
 
@@ -137,7 +138,7 @@ def test_a_reading_session_cannot_write(filled: Database) -> None:
         session.connection().exec_driver_sql("DELETE FROM measurement")
     assert contents(filled) == before
     with filled.session() as session:  # the same connection can write again afterwards
-        session.add(Run(scene="", scene_text="", outcome="", summary={}, version="", stored_at=_now()))
+        session.add(Entry(action="run", source="", settings={}, version="", recorded_at=_now()))
     assert contents(filled) != before
 
 
@@ -146,7 +147,7 @@ def test_an_error_of_the_program_undoes_the_session(filled: Database) -> None:
 
     def write_and_fail() -> None:
         with filled.session() as session:
-            session.add(Run(scene="", scene_text="", outcome="", summary={}, version="", stored_at=_now()))
+            session.add(Entry(action="run", source="", settings={}, version="", recorded_at=_now()))
             session.flush()
             raise ZeroDivisionError
 

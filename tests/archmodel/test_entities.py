@@ -6,25 +6,30 @@ import pytest
 from archmodel.entities import (
     Ashlar,
     Entity,
+    Header,
     Keystone,
+    RibSegment,
     Rubble,
     Springer,
+    Stone,
     Voussoir,
+    canon_of,
     definition_of,
     kind_chain,
     kind_named,
     kind_of,
     kinds,
+    own_attributes,
 )
 from moma.errors import UsageError
 
 
 def test_a_keystone_is_a_voussoir_is_an_ashlar_is_an_entity() -> None:
-    assert kind_chain(Keystone) == (Entity, Ashlar, Voussoir, Keystone)
+    assert kind_chain(Keystone) == (Entity, Stone, Ashlar, Voussoir, Keystone)
 
 
 def test_rubble_is_no_ashlar() -> None:
-    assert kind_chain(Rubble) == (Entity, Rubble)
+    assert kind_chain(Rubble) == (Entity, Stone, Rubble)
 
 
 def test_every_kind_is_found_by_its_name_and_has_a_definition_of_its_own() -> None:
@@ -32,6 +37,26 @@ def test_every_kind_is_found_by_its_name_and_has_a_definition_of_its_own() -> No
     assert all(text.startswith(("A", "The")) and text.endswith(".") for text in definitions)
     assert len(set(definitions)) == len(definitions)
     assert all(kind_named(name) is cls and kind_of(cls) == name for name, cls in kinds().items())
+
+
+def test_every_attribute_of_a_kind_is_a_column_with_a_definition() -> None:
+    for cls in kinds().values():
+        for name, own in own_attributes(cls).items():
+            assert name in cls.__mapper__.columns
+            assert own.definition
+            assert own.unit in ("m", "rad", "-", None)
+
+
+def test_a_kind_inherits_attributes_and_proportions() -> None:
+    assert list(own_attributes(Keystone)) == ["ring", "rank", "intrados_angle"]
+    assert own_attributes(Rubble) == {}
+    assert canon_of(Header) == "depth >= length"
+    assert canon_of(Keystone) is None
+
+
+@pytest.mark.parametrize("typed", ["rib_segment", "rib segment", "Rib-Segment"])
+def test_words_of_a_kind_are_joined_in_any_way(typed: str) -> None:
+    assert kind_named(typed) is RibSegment
 
 
 def test_kinds_of_the_sample_are_there() -> None:
@@ -52,7 +77,7 @@ def test_an_unknown_kind_names_the_nearest(typed: str, meant: str) -> None:
 
 
 def test_a_kind_like_no_other_lists_them_all() -> None:
-    with pytest.raises(UsageError, match="the kinds are entity, ashlar, header"):
+    with pytest.raises(UsageError, match="the kinds are entity, stone, ashlar, header"):
         kind_named("☃")
 
 

@@ -184,7 +184,13 @@ def test_all_that_is_known_of_a_stone(filled: Database) -> None:
     assert json.loads(json.dumps(known, allow_nan=False)) == known
     assert known["kind"] == "keystone"
     assert known["definition"] == "The voussoir at the crown of an arch, set last."
-    assert [level["kind"] for level in known["kinds"]] == ["entity", "ashlar", "voussoir", "keystone"]  # type: ignore[attr-defined]
+    assert [level["kind"] for level in known["kinds"]] == [
+        "entity",
+        "stone",
+        "ashlar",
+        "voussoir",
+        "keystone",
+    ]  # type: ignore[attr-defined]
     source = "measured in the breach of the tower"
     assert known["depth"] == {"value": 0.42, "sigma": 0.03, "source": source, "origin": "stone"}
     assert known["survey"]["file"] == "window.moma"  # type: ignore[index]

@@ -7,8 +7,8 @@ import pytest
 from archmodel.database import Database
 from archmodel.query import find
 from archmodel.records import RunRecord, StoneRecord
+from archmodel.runs import EntityResult, Run
 from archmodel.store import load_stones, store_run, store_survey, survey_with_hash
-from archmodel.tables import EntityResult, Run
 from moma.errors import DatabaseError, GeometryError, MomaError, SurveyError
 from tests.archmodel.stones import SHA, box_stone, contents, run_record
 

@@ -1,0 +1,46 @@
+"""The command ``moma``. Everything heavy is imported by the command that needs it, so that help is fast."""
+
+from typing import Annotated
+
+import typer
+
+from moma.cli.entities import query, show
+from moma.cli.scenes import check, run
+from moma.cli.surveys import ingest, survey_report
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    name="moma",
+    help="From a stone-by-stone survey of a historic building to a mechanical simulation of it.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+
+def main() -> None:
+    """Run the command line; exit code 0 done, 1 failed, 2 wrong use."""
+    app(prog_name="moma")
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        import moma
+
+        print(f"moma {moma.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _common(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    pass
+
+
+# in the order in which they are mostly used
+for _command in (ingest, survey_report, query, show, check, run):
+    app.command()(_command)

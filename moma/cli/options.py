@@ -1,0 +1,76 @@
+"""Options and arguments that several commands share."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+__all__ = [
+    "DEFAULT_DB",
+    "Codes",
+    "Db",
+    "Format",
+    "Header",
+    "Json",
+    "Kind",
+    "ListFormat",
+    "SceneArgument",
+    "Sigma",
+    "SurveyFiles",
+    "SurveyFormat",
+    "Verbose",
+]
+
+DEFAULT_DB = "sqlite:///moma.db"
+
+
+class SurveyFormat(StrEnum):
+    """Formats of survey files."""
+
+    MOMA = "moma"
+    CSV = "csv"
+    PNEZD = "pnezd"
+    PENZD = "penzd"
+    SOLIDS = "solids"
+
+
+class ListFormat(StrEnum):
+    """Formats of a list of entities."""
+
+    TABLE = "table"
+    CSV = "csv"
+    JSON = "json"
+
+
+Db = Annotated[
+    str, typer.Option("--db", metavar="URL", envvar="MOMA_DB", help="Entity database, as sqlite:///FILE.")
+]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")]
+Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Say more; show the traceback of an error.")]
+SurveyFiles = Annotated[
+    list[Path], typer.Argument(metavar="FILE…", help="Survey files; see docs/formats.md.")
+]
+Format = Annotated[SurveyFormat, typer.Option(help="Format of the survey files.")]
+Header = Annotated[
+    Path | None,
+    typer.Option(
+        "--header", metavar="FILE", help="Head (stations, control, depths) for formats without their own."
+    ),
+]
+Codes = Annotated[
+    str | None,
+    typer.Option("--codes", metavar="TEMPLATE", help="How codes are made up, e.g. '{block}:{role}'."),
+]
+Kind = Annotated[
+    str | None, typer.Option("--kind", metavar="KIND", help="Kind of stones that do not say it; else ashlar.")
+]
+Sigma = Annotated[
+    float | None,
+    typer.Option(
+        "--sigma",
+        metavar="S",
+        help="Standard deviation of a coordinate in metres, where a file does not say it.",
+    ),
+]
+SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene file; see docs/scene.md.")]

@@ -1,0 +1,47 @@
+"""The commands that simulate."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from moma.cli.options import DEFAULT_DB, Db, Json, SceneArgument, Verbose
+from moma.console import progress_bars, reporting, say
+
+__all__ = ["check", "run"]
+
+
+@reporting
+def check(scene: SceneArgument, db: Db = DEFAULT_DB, json: Json = False, verbose: Verbose = False) -> None:
+    """Say whether a scene is sound and what it will cost; run nothing."""
+    from moma.listing import as_json
+    from moma.telling import check_lines
+    from pipelines.check import check_scene
+
+    report = check_scene(scene, db)
+    print(as_json(asdict(report)) if json else "\n".join(check_lines(report, verbose)))
+    if report.problems:
+        raise typer.Exit(1)
+
+
+@reporting
+def run(
+    scene: SceneArgument,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results; else out/SCENE.")
+    ] = None,
+    db: Db = DEFAULT_DB,
+    json: Json = False,
+    verbose: Verbose = False,
+) -> None:
+    """Simulate a scene; write tables, pictures and a report, and keep the results in the database."""
+    from moma.listing import as_json
+    from moma.telling import run_lines
+    from pipelines.run import run_scene
+
+    with progress_bars() as listener:
+        done = run_scene(scene, db, out or Path("out") / scene.stem, listener)
+    for warning in done.warnings:
+        say(f"warning: {warning}")
+    print(as_json(done.summary) if json else "\n".join(run_lines(done, verbose)))

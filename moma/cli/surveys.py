@@ -1,0 +1,92 @@
+"""The commands that read survey files."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from moma.cli.options import (
+    DEFAULT_DB,
+    Codes,
+    Db,
+    Format,
+    Header,
+    Json,
+    Kind,
+    Sigma,
+    SurveyFiles,
+    SurveyFormat,
+    Verbose,
+)
+from moma.console import progress_bars, reporting, say
+from moma.errors import UsageError
+
+__all__ = ["ingest", "survey_report"]
+
+
+@reporting
+def ingest(
+    files: SurveyFiles,
+    format: Format = SurveyFormat.MOMA,
+    header: Header = None,
+    codes: Codes = None,
+    kind: Kind = None,
+    sigma: Sigma = None,
+    keep_going: Annotated[
+        bool,
+        typer.Option("--keep-going", help="Take the good stones, write the others to a file of rejects."),
+    ] = False,
+    rejects: Annotated[
+        Path | None,
+        typer.Option(
+            "--rejects", metavar="FILE", help="That file; else NAME.rejects beside the survey file."
+        ),
+    ] = None,
+    db: Db = DEFAULT_DB,
+    json: Json = False,
+    verbose: Verbose = False,
+) -> None:
+    """Take survey files into the database: all of them, or none if anything is wrong."""
+    from moma.listing import as_json
+    from moma.telling import ingest_lines
+    from pipelines.ingest import ingest as take_in
+    from pipelines.reading_options import reading_options
+
+    if rejects is not None and not keep_going:
+        raise UsageError("--rejects without --keep-going", remedy="give --keep-going too")
+    options = reading_options(header, codes, kind, sigma)
+    with progress_bars() as listener:
+        report = take_in(
+            files, db, format.value, listener, options=options, keep_going=keep_going, rejects=rejects
+        )
+    print(as_json(asdict(report)) if json else "\n".join(ingest_lines(report, verbose)))
+
+
+@reporting
+def survey_report(
+    files: SurveyFiles,
+    format: Format = SurveyFormat.MOMA,
+    header: Header = None,
+    codes: Codes = None,
+    kind: Kind = None,
+    sigma: Sigma = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Folder for the report; else out/survey-FILE.")
+    ] = None,
+    json: Json = False,
+    verbose: Verbose = False,
+) -> None:
+    """Judge survey files: precision, what to measure again, courses, kinds; no database is needed."""
+    from moma.telling import survey_report_lines
+    from pipelines.reading_options import reading_options
+    from pipelines.survey_report import INDEX, report_surveys
+
+    options = reading_options(header, codes, kind, sigma)
+    folder = out or Path("out") / f"survey-{files[0].stem}"
+    with progress_bars() as listener:
+        report = report_surveys(files, folder, format.value, options, listener)
+    for warning in report.study.warnings:
+        say(f"warning: {warning}")
+    lines = survey_report_lines(report, verbose)
+    print((folder / INDEX).read_text(encoding="utf-8").rstrip() if json else "\n".join(lines))
