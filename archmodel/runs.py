@@ -29,13 +29,15 @@ class Run(Base):
     natural_map, penetration, balance, reaction, energy : the error measures of docs/theory.md §4 [-]
     versions : of the programs and libraries, by name
     summary : the contents of summary.json
-    entry : the act of recording that it came with
+    entry : the act of recording that it came with; its settings are those of the simulation, as run
+    as_of : the last act of recording before its stones were read: what was held then is what was simulated
     """
 
     __tablename__ = "run"
 
     id: Mapped[int] = mapped_column(primary_key=True)
     entry_id: Mapped[int] = mapped_column(ForeignKey("entry.id"))
+    as_of_id: Mapped[int | None] = mapped_column(ForeignKey("entry.id"))
     scene: Mapped[str]
     scene_text: Mapped[str]
     outcome: Mapped[str]
@@ -51,12 +53,13 @@ class Run(Base):
     versions: Mapped[dict[str, str]] = mapped_column(JSON_TYPE)
     summary: Mapped[dict[str, object]]
 
-    entry: Mapped[Entry] = relationship()
+    entry: Mapped[Entry] = relationship(foreign_keys=[entry_id])
+    as_of: Mapped[Entry | None] = relationship(foreign_keys=[as_of_id])
     results: Mapped[list["EntityResult"]] = relationship(back_populates="run")
 
 
 class EntityResult(Base):
-    """What one run computed for one entity; units and meaning as in ``records.StoneResult``.
+    """What one run computed for one entity; units and meaning as in ``run_records.StoneResult``.
 
     The primary key begins with the entity: "its latest run" is one step in that index.
     """
@@ -78,7 +81,7 @@ class EntityResult(Base):
 
 
 class JointResult(Base):
-    """What one run computed for the joint of two entities; meaning as in ``mechanics.contact_result.JointResult``.
+    """What one run computed for the joint of two entities; meaning as in ``run_records.JointArrays``.
 
     Attributes
     ----------
@@ -87,6 +90,7 @@ class JointResult(Base):
     x, y, z : centroid [m]
     nx, ny, nz : unit normal from the second to the first
     area : [m²]
+    parted : it was closed at the start and is now wide open
     force_normal, force_shear : compression positive, and the size of the rest [N]
     pressure_mean, pressure_max : [Pa]
     kern, friction_use, slipping, open : [-]; None where there is nothing to say
@@ -110,6 +114,7 @@ class JointResult(Base):
     ny: Mapped[float]
     nz: Mapped[float]
     area: Mapped[float]
+    parted: Mapped[bool]
     force_normal: Mapped[float]
     force_shear: Mapped[float]
     pressure_mean: Mapped[float | None]
@@ -128,7 +133,7 @@ class JointResult(Base):
 
 
 class ContactPoint(Base):
-    """One contact point at the end of a run; meaning as in ``mechanics.contact_result.ContactResult``.
+    """One contact point at the end of a run; meaning as in ``run_records.ContactArrays``.
 
     Attributes
     ----------
