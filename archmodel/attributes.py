@@ -8,7 +8,7 @@ from sqlalchemy import ColumnElement, Select, and_, func, select
 from sqlalchemy.orm import InstrumentedAttribute, aliased
 
 from archmodel.entities import Entity
-from archmodel.records import STONE_VALUES
+from archmodel.run_records import STONE_VALUES
 from archmodel.runs import EntityResult
 from archmodel.surveys import Measurement, Survey
 

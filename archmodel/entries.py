@@ -9,12 +9,12 @@ from collections.abc import Mapping
 from datetime import UTC, datetime
 from importlib.metadata import version
 
-from sqlalchemy import ColumnElement, ForeignKey, or_
+from sqlalchemy import ColumnElement, ForeignKey, func, or_, select
 from sqlalchemy.orm import Mapped, Session, declared_attr, mapped_column, relationship
 
 from archmodel.base import Base
 
-__all__ = ["ACTIONS", "Entry", "Recorded", "held_at", "new_entry"]
+__all__ = ["ACTIONS", "Entry", "Recorded", "held_at", "latest_entry", "new_entry"]
 
 ACTIONS = ("ingest", "geometry", "declaration", "correction", "run", "migration")
 """What an entry can be: a survey file taken in, relations computed, knowledge declared, attributes corrected, a
@@ -95,6 +95,11 @@ def new_entry(
     session.add(entry)
     session.flush()
     return entry
+
+
+def latest_entry(session: Session) -> int | None:
+    """Number of the last act of recording; None if nothing was recorded yet."""
+    return session.scalar(select(func.max(Entry.id)))
 
 
 def held_at(table: type[Recorded], entry: int | None = None) -> ColumnElement[bool]:

@@ -6,28 +6,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["STONE_VALUES", "RunRecord", "StoneRecord", "StoneResult"]
+__all__ = ["StoneRecord"]
 
 Array = NDArray[np.float64]
-
-STONE_VALUES: Mapping[str, tuple[str, str]] = {
-    "von_mises_p99": ("Pa", "Von Mises stress that 1 % of its volume exceeds"),
-    "principal_tension": ("Pa", "largest principal stress, positive in tension"),
-    "principal_compression": ("Pa", "smallest principal stress, negative in compression"),
-    "mean_pressure": ("Pa", "mean pressure over its volume"),
-    "tension_zone": ("-", "part of its volume in tension, beyond what the error of the stress explains"),
-    "overstressed_zone": ("-", "part of its volume with tension above the tensile strength"),
-    "utilisation": ("-", "largest stress over strength, in tension or compression"),
-    "utilisation_tension": ("-", "largest tension over the tensile strength"),
-    "utilisation_compression": ("-", "largest compression over the compressive strength"),
-    "stress_error": ("-", "estimated relative error of its stress"),
-    "joint_pressure": ("Pa", "largest pressure in its joints"),
-    "joint_kern": ("-", "largest of its joints: up to 1, the resultant is within the kern"),
-    "joint_opening": ("m", "largest opening of its joints"),
-    "joint_sliding": ("m", "largest sliding in its joints since the start"),
-    "joint_friction_use": ("-", "largest part of friction and cohesion that a joint of it uses"),
-}
-"""Unit and meaning of the named values of a stone's result that can be asked for."""
 
 
 @dataclass(frozen=True)
@@ -109,48 +90,3 @@ class StoneRecord:
     direction: Array | None = None
     tail: float = 1.0
     remarks: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class StoneResult:
-    """What a run computed for one stone.
-
-    Attributes
-    ----------
-    code : the stone
-    fidelity : fixed, rigid or deformable
-    von_mises_max, von_mises_mean : [Pa]; None if the stone was rigid
-    displacement_max : [m]
-    contact_force_max : largest force of one contact point [N]
-    values : further named numbers; those of STONE_VALUES can be asked for
-    """
-
-    code: str
-    fidelity: str
-    von_mises_max: float | None
-    von_mises_mean: float | None
-    displacement_max: float
-    contact_force_max: float | None
-    values: Mapping[str, float] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class RunRecord:
-    """One simulation run.
-
-    Attributes
-    ----------
-    scene : its name
-    scene_text : the scene file as it was run
-    outcome : equilibrium, moving or collapsed
-    summary : the contents of summary.json
-    version : version of MOMA
-    results : one per stone of the scene
-    """
-
-    scene: str
-    scene_text: str
-    outcome: str
-    summary: Mapping[str, object]
-    version: str
-    results: tuple[StoneResult, ...]

@@ -1,20 +1,18 @@
 """From plain records to rows of the tables and back, with every value checked on the way in."""
 
-import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from archmodel.entities import Entity, kind_named, kind_of
 from archmodel.measures import face_area, face_extent, solid_volume
-from archmodel.records import RunRecord, StoneRecord, StoneResult
-from archmodel.runs import FIDELITIES
+from archmodel.records import StoneRecord
 from archmodel.surveys import Measurement
 from moma.errors import DatabaseError, GeometryError, SurveyError, UsageError
 
-__all__ = ["entity_row", "measurement_row", "result_row", "stone_record", "storable", "summary_of"]
+__all__ = ["entity_row", "measurement_row", "stone_record", "storable"]
 
 Array = NDArray[np.float64]
 
@@ -141,40 +139,6 @@ def _known(depth: float | None, entity: Entity) -> float:
     if depth is None:
         raise DatabaseError(f"the depth of {entity.code} is not known", where=f"entity {entity.id}")
     return depth
-
-
-def result_row(result: StoneResult, place: str) -> dict[str, object]:
-    """Row of the `entity_result` table, without its keys."""
-    if result.fidelity not in FIDELITIES:
-        what = f"fidelity {result.fidelity!r} is none of {', '.join(FIDELITIES)}"
-        raise DatabaseError(what, where=place)
-    numbers = {
-        "von_mises_max": result.von_mises_max,
-        "von_mises_mean": result.von_mises_mean,
-        "displacement_max": result.displacement_max,
-        "contact_force_max": result.contact_force_max,
-    }
-    for name, value in [*numbers.items(), *result.values.items()]:
-        if value is not None and not math.isfinite(value):
-            raise DatabaseError(f"{name} is {value}, not a finite number", where=place)
-    values = {str(name): float(value) for name, value in result.values.items()}
-    finite = {name: None if value is None else float(value) for name, value in numbers.items()}
-    return {"fidelity": str(result.fidelity), "values": values, **finite}
-
-
-def summary_of(run: RunRecord) -> Mapping[str, object]:
-    """The run's summary as JSON will give it back.
-
-    Raises
-    ------
-    DatabaseError
-        if JSON cannot say it
-    """
-    try:
-        plain: Mapping[str, object] = json.loads(json.dumps(dict(run.summary), allow_nan=False))
-    except (TypeError, ValueError) as error:
-        raise DatabaseError(f"the summary cannot be stored: {error}", where=f"run of {run.scene}") from error
-    return plain
 
 
 def storable(text: str) -> str:

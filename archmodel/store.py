@@ -1,4 +1,4 @@
-"""Into the database and out again: surveyed stones, simulation runs."""
+"""Surveyed stones into the database and out again."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice
@@ -9,13 +9,12 @@ from sqlalchemy.orm import Session
 
 from archmodel.entities import Entity
 from archmodel.entries import new_entry
-from archmodel.records import RunRecord, StoneRecord
-from archmodel.rows import entity_row, measurement_row, result_row, stone_record, storable, summary_of
-from archmodel.runs import EntityResult, Run
+from archmodel.records import StoneRecord
+from archmodel.rows import entity_row, measurement_row, stone_record, storable
 from archmodel.surveys import Measurement, Survey
 from moma.errors import DatabaseError
 
-__all__ = ["load_stones", "store_run", "store_survey", "survey_with_hash"]
+__all__ = ["load_stones", "store_survey", "survey_with_hash"]
 
 BATCH = 500
 """Rows per statement: fewer than SQLite's limit of parameters, and memory does not grow with the file."""
@@ -102,50 +101,6 @@ def load_stones(session: Session, entities: Iterable[Entity]) -> list[StoneRecor
     return [found[number] for number in wanted]
 
 
-def store_run(session: Session, run: RunRecord) -> int:
-    """Keep a run and its result for each stone: all of it or nothing.
-
-    Returns
-    -------
-    int
-        number of the run, larger than that of every earlier one
-
-    Raises
-    ------
-    DatabaseError
-        if a stone of the run is not in the database or comes twice, or a number is not finite
-    """
-    place = f"run of {run.scene}"
-    codes = [result.code for result in run.results]
-    if len(set(codes)) < len(codes):
-        twice = next(code for code in codes if codes.count(code) > 1)
-        raise DatabaseError(f"two results for stone {twice}", where=place)
-    with session.begin_nested():
-        entry = new_entry(session, "run", storable(run.scene))
-        stored = Run(
-            entry_id=entry.id,
-            scene=storable(run.scene),
-            scene_text=storable(run.scene_text),
-            outcome=str(run.outcome),
-            summary=dict(summary_of(run)),
-            versions={"moma": run.version},
-        )
-        session.add(stored)
-        session.flush()
-        for batch in _batches(run.results):
-            numbers = _entity_numbers(session, [result.code for result in batch], place)
-            rows = [
-                {
-                    "run_id": stored.id,
-                    "entity_id": numbers[result.code],
-                    **result_row(result, f"{place}, stone {result.code}"),
-                }
-                for result in batch
-            ]
-            session.execute(insert(EntityResult), rows)
-        return stored.id
-
-
 def _refuse_again(session: Session, source_path: str, sha256: str) -> None:
     """A file is taken in once."""
     if (known := survey_with_hash(session, sha256)) is not None:
@@ -195,17 +150,6 @@ def _insert_stones(session: Session, batch: Sequence[StoneRecord], survey: Surve
     numbers = session.scalars(insert(table).returning(table.c.id, sort_by_parameter_order=True), entities)
     rows = [{"entity_id": number, **row} for number, row in zip(numbers, measurements, strict=True)]
     session.execute(insert(Measurement), rows)
-
-
-def _entity_numbers(session: Session, codes: Sequence[str], place: str) -> dict[str, int]:
-    """Primary keys by code; every code must be there."""
-    rows = session.execute(select(Entity.code, Entity.id).where(Entity.code.in_(codes)))
-    numbers = {row.code: row.id for row in rows}
-    for code in codes:
-        if code not in numbers:
-            remedy = "keep the run in the database that its stones were taken from (--db)"
-            raise DatabaseError(f"stone {code} is not in the database", where=place, remedy=remedy)
-    return numbers
 
 
 def _batches(items: Iterable[T]) -> Iterator[list[T]]:

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from archmodel.records import STONE_VALUES
+from archmodel.run_records import STONE_VALUES
 
 __all__ = ["as_csv", "as_json", "as_lines", "as_table", "shown_columns"]
 

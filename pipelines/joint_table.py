@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from mechanics.contact_result import JointResult
 from mechanics.result import Result
 
-__all__ = ["JOINT_COLUMNS", "write_joints"]
+__all__ = ["JOINT_COLUMNS", "normal_and_shear", "write_joints"]
 
 JOINT_COLUMNS: Mapping[str, str] = {
     "first": "code of one stone",
@@ -56,10 +56,15 @@ def write_joints(path: Path, result: Result, origin: NDArray[np.float64]) -> Non
             writer.writerow([codes[first], codes[second], *map(_cell, numbers)])
 
 
-def _columns(joints: JointResult) -> dict[str, NDArray[np.float64]]:
+def normal_and_shear(joints: JointResult) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Resultants across the joints (nj,), compression positive, and the size of what acts along them (nj,) [N]."""
     n = joints.frame[:, 0]
     normal = np.einsum("ji,ji->j", joints.force, n)
-    shear = joints.force - normal[:, None] * n
+    return normal, np.linalg.norm(joints.force - normal[:, None] * n, axis=1)
+
+
+def _columns(joints: JointResult) -> dict[str, NDArray[np.float64]]:
+    normal, shear = normal_and_shear(joints)
     values = {
         name: getattr(joints, name)
         for name in JOINT_COLUMNS
@@ -67,7 +72,7 @@ def _columns(joints: JointResult) -> dict[str, NDArray[np.float64]]:
     }
     return values | {
         "force_normal": normal,
-        "force_shear": np.linalg.norm(shear, axis=1),
+        "force_shear": shear,
         "eccentricity": np.linalg.norm(joints.eccentricity, axis=1),
         "parted": joints.parted.astype(np.float64),
     }

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from archmodel.database import open_database
-from archmodel.records import RunRecord, StoneResult
-from archmodel.store import store_run
+from archmodel.entries import latest_entry
+from archmodel.run_records import StoneResult
+from archmodel.store_runs import store_run
 from mechanics.result import Outcome, Result
 from mechanics.simulate import simulate
 from moma.errors import DatabaseError, MissingLibraryError
@@ -20,6 +21,7 @@ from pipelines.joint_table import write_joints
 from pipelines.pictures import draw_pictures, missing
 from pipelines.progress import Listener, Progress, silent
 from pipelines.report import write_report
+from pipelines.run_records import run_record
 from pipelines.scenefile import SceneFile, read_scene
 from pipelines.stone_values import stone_results
 from pipelines.summary import as_json, summarise
@@ -69,20 +71,13 @@ def run_scene(path: str | Path, url: str, folder: str | Path, progress: Listener
     check_replaceable(folder)
     with open_database(url, create=False) as database:
         with _timed(seconds, "blocks"), database.session(read_only=True) as session:
-            assembly = assemble(scene, session)
+            as_of, assembly = latest_entry(session), assemble(scene, session)
         result = simulate(assembly.scene, progress)
         seconds |= result.wall_time
         stones = stone_results(result)
         with replacing(folder) as fresh:
             summary, warnings = write_results(result, stones, scene, assembly, fresh, seconds, progress)
-        record = RunRecord(
-            scene=scene.name,
-            scene_text=scene.text,
-            outcome=str(result.outcome),
-            summary=summary,
-            version=summary["version"],
-            results=stones,
-        )
+        record = run_record(result, stones, scene, assembly, summary, as_of)
         try:
             with database.session() as session:
                 run = store_run(session, record)

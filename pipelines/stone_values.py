@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from archmodel.records import StoneResult
+from archmodel.run_records import StoneResult
 from mechanics.contact_result import JointResult
 from mechanics.result import BodyResult, Result
 from mechanics.stress_values import StressValues, volume_quantile
@@ -70,7 +70,7 @@ def stone_results(result: Result) -> tuple[StoneResult, ...]:
 
 
 def _values(body: BodyResult, of_joints: Mapping[str, float]) -> dict[str, float]:
-    """The named values of a stone, those that are known; archmodel.records.STONE_VALUES says what they are."""
+    """The named values of a stone, those that are known; archmodel.run_records.STONE_VALUES says what they are."""
     values: dict[str, float | None] = {"volume": body.volume, "mass": body.mass, **of_joints}
     if body.values is not None:
         values |= _stresses(body.values)

@@ -1,13 +1,13 @@
 """Stones whose every number is known in closed form, and the contents of a database as text."""
 
-import sqlite3
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
+from sqlalchemy import MetaData, select
 
 from archmodel.database import Database
-from archmodel.records import RunRecord, StoneRecord, StoneResult
+from archmodel.records import StoneRecord
+from archmodel.run_records import RunRecord, StoneResult
 
 SHA = "ab" * 32
 
@@ -76,7 +76,7 @@ def run_record(
         scene_text=f'name = "{scene}"\n',
         outcome="equilibrium",
         summary={"scene": scene, "contacts": 12, "von_mises": None},
-        version="0.1.0",
+        versions={"moma": "0.1.0"},
         results=tuple(
             StoneResult(
                 code=code,
@@ -93,8 +93,13 @@ def run_record(
 
 
 def contents(database: Database) -> str:
-    """Everything in the database, as SQL."""
-    with sqlite3.connect(Path(str(database.engine.url.database))) as connection:
-        dump = "\n".join(connection.iterdump())
-    connection.close()
-    return dump
+    """Everything in the database: of each table every row, in the order of the keys."""
+    lines = []
+    with database.session(read_only=True) as session:
+        connection = session.connection()
+        found = MetaData()
+        found.reflect(connection)
+        for table in found.sorted_tables:
+            lines.append(f"-- {table.name}: {', '.join(column.name for column in table.columns)}")
+            lines += sorted(repr(tuple(row)) for row in connection.execute(select(table)))
+    return "\n".join(lines)

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from archmodel.attributes import ATTRIBUTES
 from archmodel.database import Database, open_database
 from archmodel.query import find, find_rows
-from archmodel.store import store_run, store_survey
+from archmodel.store import store_survey
+from archmodel.store_runs import store_run
 from moma.errors import QueryError
 from tests.archmodel.conftest import WALL
 from tests.archmodel.stones import SHA, box_stone, contents, run_record

@@ -6,7 +6,7 @@ from archmodel.attributes import ATTRIBUTES
 from archmodel.database import Database
 from archmodel.entities import Header, Keystone, Voussoir
 from archmodel.query import attributes, describe, find, find_rows, row_of, rows_of
-from archmodel.store import store_run
+from archmodel.store_runs import store_run
 from moma.errors import DatabaseError, QueryError, UsageError
 from tests.archmodel.stones import run_record
 

@@ -9,7 +9,7 @@ import pytest
 from archmodel.database import Database
 from archmodel.entities import definition_of, kinds
 from archmodel.query import attributes, find, find_rows
-from archmodel.store import store_run
+from archmodel.store_runs import store_run
 from moma.errors import QueryError
 from tests.archmodel.stones import run_record
 

@@ -9,7 +9,7 @@ import pytest
 
 from archmodel.database import open_database
 from archmodel.query import describe, find_rows
-from archmodel.records import STONE_VALUES
+from archmodel.run_records import STONE_VALUES
 from mechanics.result import Outcome
 from mechanics.scene import Fidelity
 from moma.errors import MissingLibraryError, SceneError, UsageError
@@ -94,7 +94,7 @@ def test_every_stone_has_the_material_of_its_rule(session):
     [
         ('"course <= 2"', '"course > 99"', 4, "no stone is selected"),
         ('"course <= 2"', '"curse <= 2"', 5, "unknown attribute 'curse'"),
-        ("where", 'kind = "vossoir"\nwhere', 5, "unknown kind 'vossoir'; did you mean voussoir?"),
+        ("where", 'kind = "vossoir"\nwhere', 5, "unknown kind 'vossoir'; did you mean voussoir"),
         ('"W02-02"', '"W02-20"', 12, "'W02-20' is not the code of a selected stone; did you mean 'W02-0"),
         ('"W02-02"', '"V4"', 12, "'V4' is not the code of a selected stone"),
         ('"course = 1"', '"course = 7"', 13, "fixed: no selected stone satisfies 'course = 7'"),

@@ -1,0 +1,213 @@
+"""Plain values of a simulation run that go into the database; no SQLAlchemy here.
+
+Joints and contact points, of which a run can have a million, are structures of arrays; in them, NaN says that there
+is nothing to say, and becomes null.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "STONE_VALUES",
+    "ContactArrays",
+    "ErrorMeasures",
+    "JointArrays",
+    "RunRecord",
+    "SimplificationRecord",
+    "StoneResult",
+]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+STONE_VALUES: Mapping[str, tuple[str, str]] = {
+    "von_mises_p99": ("Pa", "Von Mises stress that 1 % of its volume exceeds"),
+    "principal_tension": ("Pa", "largest principal stress, positive in tension"),
+    "principal_compression": ("Pa", "smallest principal stress, negative in compression"),
+    "mean_pressure": ("Pa", "mean pressure over its volume"),
+    "tension_zone": ("-", "part of its volume in tension, beyond what the error of the stress explains"),
+    "overstressed_zone": ("-", "part of its volume with tension above the tensile strength"),
+    "utilisation": ("-", "largest stress over strength, in tension or compression"),
+    "utilisation_tension": ("-", "largest tension over the tensile strength"),
+    "utilisation_compression": ("-", "largest compression over the compressive strength"),
+    "stress_error": ("-", "estimated relative error of its stress"),
+    "joint_pressure": ("Pa", "largest pressure in its joints"),
+    "joint_kern": ("-", "largest of its joints: up to 1, the resultant is within the kern"),
+    "joint_opening": ("m", "largest opening of its joints"),
+    "joint_sliding": ("m", "largest sliding in its joints since the start"),
+    "joint_friction_use": ("-", "largest part of friction and cohesion that a joint of it uses"),
+}
+"""Unit and meaning of the named values of a stone's result that can be asked for."""
+
+
+@dataclass(frozen=True)
+class StoneResult:
+    """What a run computed for one stone.
+
+    Attributes
+    ----------
+    code : the stone
+    fidelity : fixed, rigid or deformable
+    von_mises_max, von_mises_mean : [Pa]; None if the stone was rigid
+    displacement_max : [m]
+    contact_force_max : largest force of one contact point [N]
+    values : further named numbers; those of STONE_VALUES can be asked for
+    """
+
+    code: str
+    fidelity: str
+    von_mises_max: float | None
+    von_mises_mean: float | None
+    displacement_max: float
+    contact_force_max: float | None
+    values: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class ErrorMeasures:
+    """How far a run can be trusted, by the measures of docs/theory.md §4 [-]; None where it was not measured.
+
+    Attributes
+    ----------
+    natural_map : η, how far the contact forces are from their laws
+    penetration : deepest overlap over the smallest block's size
+    balance : unbalanced force of a block over its weight, largest
+    reaction : |vertical support reaction - weight| over weight
+    energy : energy that no term of the balance explains, over the reference energy
+    """
+
+    natural_map: float | None = None
+    penetration: float | None = None
+    balance: float | None = None
+    reaction: float | None = None
+    energy: float | None = None
+
+
+@dataclass(frozen=True)
+class JointArrays:
+    """The joints at the end of a run, in the frame of the site.
+
+    Attributes
+    ----------
+    stones : (nj, 2) indices into `RunRecord.results`; forces act on the first
+    centroid : (nj, 3) [m]
+    normal : (nj, 3) unit normal from the second to the first
+    area : (nj,) [m²]
+    parted : (nj,) it was closed at the start and is now wide open
+    force_normal, force_shear : (nj,) across it, compression positive, and the size of the rest [N]
+    pressure_mean, pressure_max : (nj,) [Pa]; NaN where it has no area, as all that may be NaN
+    kern : (nj,) up to 1: the resultant is within the kern; NaN without compression [-]
+    friction_use : (nj,) shear over what friction and cohesion can bear; NaN where that is nothing [-]
+    slipping, open : (nj,) parts of its contact area that slip, that bear nothing; NaN where it has none [-]
+    gap : (nj,) largest [m]
+    opening, sliding : (nj,) largest since the start [m]
+    """
+
+    stones: Ints
+    centroid: Array
+    normal: Array
+    area: Array
+    parted: NDArray[np.bool_]
+    force_normal: Array
+    force_shear: Array
+    pressure_mean: Array
+    pressure_max: Array
+    kern: Array
+    friction_use: Array
+    slipping: Array
+    open: Array
+    gap: Array
+    opening: Array
+    sliding: Array
+
+
+@dataclass(frozen=True)
+class ContactArrays:
+    """The contact points at the end of a run, in the frame of the site.
+
+    Attributes
+    ----------
+    stones : (nc, 2) indices into `RunRecord.results`: candidate, antagonist; the force acts on the candidate
+    joint : (nc,) number of its joint; -1: none
+    point : (nc, 3) [m]
+    normal : (nc, 3) unit normal from the antagonist to the candidate
+    force : (nc, 3) mean force over the last step, world axes [N]
+    area : (nc,) that the point stands for; zero between edges [m²]
+    gap : (nc,) [m]
+    opening, slide : (nc,) since the start [m]
+    status : (nc,) open, stick, slip, bonded or broken
+    """
+
+    stones: Ints
+    joint: Ints
+    point: Array
+    normal: Array
+    force: Array
+    area: Array
+    gap: Array
+    opening: Array
+    slide: Array
+    status: NDArray[np.str_]
+
+
+@dataclass(frozen=True)
+class SimplificationRecord:
+    """The solid that stood for a stone, in the frame of the site, and how far it is from the surveyed one.
+
+    Attributes
+    ----------
+    code : the stone
+    mode : how joints were treated: open or close
+    displacement_max : largest distance of a corner from the nearest surveyed one [m]
+    volume_change : volume over that of the surveyed solid, minus 1 [-]
+    vertices : (nv, 3) [m]
+    faces : vertex indices of each face, counter-clockwise seen from outside
+    """
+
+    code: str
+    mode: str
+    displacement_max: float
+    volume_change: float
+    vertices: Array
+    faces: tuple[tuple[int, ...], ...]
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """One simulation run.
+
+    Attributes
+    ----------
+    scene : its name
+    scene_text : the scene file as it was run
+    outcome : equilibrium, moving or collapsed
+    summary : the contents of summary.json
+    versions : of the programs and libraries, by name; at least of "moma"
+    results : one per stone of the scene
+    settings : of time, solver and contacts as they were used, defaults filled in, in values that JSON can say
+    as_of : the last entry in the database when its stones were read; None if that is not known
+    steps : how many were done
+    simulated, wall : simulated time and time of work [s]
+    errors : how far it can be trusted
+    joints, contacts : at its end; None if they are not kept
+    simplifications : of its stones; () if they are not kept
+    """
+
+    scene: str
+    scene_text: str
+    outcome: str
+    summary: Mapping[str, object]
+    versions: Mapping[str, str]
+    results: tuple[StoneResult, ...]
+    settings: Mapping[str, object] = field(default_factory=dict)
+    as_of: int | None = None
+    steps: int | None = None
+    simulated: float | None = None
+    wall: float | None = None
+    errors: ErrorMeasures = field(default_factory=ErrorMeasures)
+    joints: JointArrays | None = None
+    contacts: ContactArrays | None = None
+    simplifications: tuple[SimplificationRecord, ...] = ()
