@@ -1,7 +1,7 @@
 """A small wall with known numbers, and databases to put it in."""
 
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 
 import pytest
 
@@ -27,9 +27,15 @@ def wall() -> tuple[StoneRecord, ...]:
 
 
 @pytest.fixture
-def empty(tmp_path: Path) -> Iterator[Database]:
-    with open_database(f"sqlite:///{tmp_path / 'moma.db'}") as database:
-        yield database
+def new_database(new_url: Callable[[], str]) -> Iterator[Callable[[], Database]]:
+    """Further databases, laid out and empty, beside the fixture `empty` and of the same kind."""
+    with ExitStack() as held:
+        yield lambda: held.enter_context(open_database(new_url()))
+
+
+@pytest.fixture
+def empty(new_database: Callable[[], Database]) -> Database:
+    return new_database()
 
 
 @pytest.fixture
