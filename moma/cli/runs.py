@@ -1,0 +1,109 @@
+"""The command that lists and tells simulation runs."""
+
+from typing import Annotated, Any
+
+import typer
+
+from moma.cli.options import DEFAULT_DB, Db, Json, Verbose
+from moma.console import reporting, say
+from moma.errors import UsageError
+
+__all__ = ["runs"]
+
+_LIST = {
+    "run": None,
+    "scene": None,
+    "stored_at": None,
+    "outcome": None,
+    "stones": "-",
+    "contacts": "-",
+    "natural_map": "-",
+    "balance": "-",
+    "reaction": "-",
+    "wall": "s",
+}
+_MORE = {"penetration": "-", "energy": "-"}
+_STRESSES = {"code": None, "kind": None, "von_mises_max": "Pa", "von_mises_mean": "Pa"}
+_JOINTS = {
+    "first": None,
+    "second": None,
+    "force_normal": "N",
+    "force_shear": "N",
+    "pressure_max": "Pa",
+    "kern": "-",
+    "friction_use": "-",
+    "opening": "m",
+    "sliding": "m",
+}
+_TABLES = {
+    "largest_stresses": ("largest Von Mises stresses", _STRESSES),
+    "largest_openings": ("joints that have opened most", _JOINTS),
+    "least_centred": ("joints with the resultant farthest out of the kern", _JOINTS),
+    "most_used_friction": ("joints that use most of their friction", _JOINTS),
+}
+
+
+@reporting
+def runs(
+    number: Annotated[
+        int | None,
+        typer.Argument(metavar="[N]", help="Number of a run, to see it in full; else all are listed."),
+    ] = None,
+    against: Annotated[
+        int | None, typer.Option("--against", metavar="M", help="Say what is different from run M.")
+    ] = None,
+    db: Db = DEFAULT_DB,
+    json: Json = False,
+    verbose: Verbose = False,
+) -> None:
+    """List the simulation runs, or show one in full, or compare two."""
+    from archmodel.database import open_database
+    from archmodel.run_description import compare_runs, describe_run, list_runs
+    from moma.listing import as_json, as_table
+
+    if number is None and against is not None:
+        raise UsageError("--against needs a run to compare", remedy=f"moma runs N --against {against}")
+    with open_database(db, create=False) as database, database.session(read_only=True) as session:
+        if number is not None and against is not None:
+            told: Any = compare_runs(session, number, against)
+        else:
+            told = list_runs(session) if number is None else describe_run(session, number)
+    if json:
+        print(as_json(told))
+    elif number is None and told:
+        print(as_table(_LIST | _MORE if verbose else _LIST, told))
+        say(f"{len(told)} found")
+    elif number is None:
+        say("no run found; simulate with moma run SCENE.toml")
+    else:
+        print(_comparison(told) if against is not None else _full(told, verbose))
+
+
+def _full(told: dict[str, Any], verbose: bool) -> str:
+    """One run as lines and tables; the scene file only if asked for more."""
+    from moma.listing import as_lines, as_table
+
+    scene_text = told.pop("scene_text")
+    tables = {name: told.pop(name) for name in _TABLES}
+    parts = [as_lines(told)]
+    for name, rows in tables.items():
+        heading, columns = _TABLES[name]
+        if rows:
+            parts.append(f"{heading}\n{as_table(columns, rows)}")
+    return "\n\n".join([*parts, *([f"scene file\n{scene_text.rstrip()}"] if verbose else [])])
+
+
+def _comparison(told: dict[str, Any]) -> str:
+    """Two runs beside each other."""
+    from moma.listing import as_lines, as_table
+
+    names = {"stresses": ("largest changes of Von Mises stress", "Pa")}
+    names["displacements"] = ("largest changes of displacement", "m")
+    tables = {name: told.pop(name) for name in names}
+    parts = [as_lines(told)]
+    for name, rows in tables.items():
+        heading, unit = names[name]
+        if rows:
+            columns = {"code": None, "run": unit, "against": unit, "change": unit}
+            parts.append(f"{heading}\n{as_table(columns, rows)}")
+    return "\n\n".join(parts)
