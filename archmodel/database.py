@@ -14,6 +14,7 @@ from sqlalchemy.orm import Session
 from archmodel import postgresql, sqlite
 from archmodel.layout import SCHEMA_VERSION, SchemaVersion, metadata
 from archmodel.postgresql import PostgresqlServer
+from archmodel.registered import declare_registered, release_registered
 from archmodel.sqlite import SqliteFile
 from moma.errors import DatabaseError
 
@@ -77,7 +78,8 @@ class Database:
             raise self.home.refusal(error) from error
 
     def close(self) -> None:
-        """Give the connections back; the database can be opened again."""
+        """Give the connections back, and let go of the kinds it registers; the database can be opened again."""
+        release_registered(self.engine)
         self.engine.dispose()
 
     def __enter__(self) -> Self:
@@ -113,6 +115,8 @@ def open_database(url: str, create: bool = True, *, lock_timeout: float = 10.0) 
         with engine.connect() as connection:
             _prepare(connection, home.place, create)
         home.settle(engine)
+        with Session(engine.execution_options(moma_read_only=True)) as session:
+            declare_registered(session)
     except DatabaseError:
         engine.dispose()
         raise

@@ -40,7 +40,8 @@ import difflib
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
+from weakref import WeakSet
 
 from sqlalchemy import ForeignKey, Index, select
 from sqlalchemy.orm import Mapped, Session, declared_attr, mapped_column, relationship
@@ -135,6 +136,7 @@ class Entity(Base):
     __kind__ : the name, if it is not that of the class
     __own__ : the attributes that the kind has and its parents have not
     __canon__ : canonical proportions, as a query expression; None: those of the parent
+    __users__ : the open databases that register the kind; None: it is built in
     """
 
     __tablename__ = "entity"
@@ -146,6 +148,7 @@ class Entity(Base):
     )
     __own__: ClassVar[tuple[OwnAttribute, ...]] = ()
     __canon__: ClassVar[str | None] = None
+    __users__: ClassVar["WeakSet[Any] | None"] = None
 
     id: Mapped[int] = mapped_column(primary_key=True)
     kind: Mapped[str]
@@ -338,6 +341,8 @@ def kinds() -> Mapping[str, type[Entity]]:
 def _descend(cls: type[Entity]) -> Iterator[type[Entity]]:
     yield cls
     for child in cls.__subclasses__():
+        if child.__users__ is not None and not child.__users__:
+            continue  # registered in no database that is open
         yield from _descend(child)
 
 

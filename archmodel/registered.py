@@ -1,11 +1,17 @@
 """Kinds that a user registers: kept in the database, and classes of the hierarchy while it is open."""
 
-from sqlalchemy import ForeignKey
-from sqlalchemy.orm import Mapped, mapped_column
+import re
+from typing import Any
+from weakref import WeakSet
+
+from sqlalchemy import Engine, ForeignKey, inspect, select
+from sqlalchemy.orm import Mapped, Session, mapped_column
 
 from archmodel.base import JSON_TYPE, Base
+from archmodel.entities import Entity, OwnAttribute, kinds
+from moma.errors import DatabaseError
 
-__all__ = ["RegisteredKind"]
+__all__ = ["RegisteredKind", "declare_registered", "release_registered"]
 
 
 class RegisteredKind(Base):
@@ -28,3 +34,79 @@ class RegisteredKind(Base):
     canon: Mapped[str | None]
     attributes: Mapped[dict[str, tuple[str | None, str]]] = mapped_column(JSON_TYPE)
     entry_id: Mapped[int] = mapped_column(ForeignKey("entry.id"))
+
+    def says(self) -> tuple[object, ...]:
+        """All that defines it; two kinds of one name that say the same are one."""
+        own = {name: tuple(one) for name, one in self.attributes.items()}
+        return self.name, self.parent, self.definition, self.canon, tuple(own.items())
+
+
+_CLASSES: dict[tuple[object, ...], type[Entity]] = {}
+"""Every class that was made in this process, by its parent and what defines it: a class cannot be unmade, but found again."""
+
+
+def declare_registered(session: Session) -> None:
+    """Make the kinds that this database registers known; until `release_registered`, if no other one does.
+
+    Raises
+    ------
+    DatabaseError
+        if another open database gives one of the names to something else, or a parent is not known
+    """
+    user = session.get_bind().dialect
+    waiting = list(session.scalars(select(RegisteredKind).order_by(RegisteredKind.entry_id)))
+    while waiting:
+        ready = [one for one in waiting if one.parent in kinds()]
+        if not ready:
+            one = waiting[0]
+            what = f"the kind {one.name} is a case of {one.parent}, which is not known"
+            raise DatabaseError(what, remedy="use the version of MOMA that registered it")
+        for kind in ready:
+            _declared(kind).add(user)
+        waiting = [one for one in waiting if one not in ready]
+    if (engine := session.get_bind().engine) is not None:
+        # statements that were compiled before do not know the new kinds
+        engine.clear_compiled_cache()
+
+
+def release_registered(engine: Engine) -> None:
+    """Say that a database is closed: kinds that no open database registers are known no longer."""
+    for cls in _CLASSES.values():
+        if cls.__users__ is not None:
+            cls.__users__.discard(engine.dialect)
+
+
+def _declared(kind: RegisteredKind) -> "WeakSet[Any]":
+    """The open databases that register the kind, after its class was made or found."""
+    held = kinds().get(kind.name)
+    parent = kinds()[kind.parent]
+    key = (parent, *kind.says())
+    cls = _CLASSES.get(key)
+    if held is not None and held is not cls:
+        what = f"the kind {kind.name} means something else here than in this database"
+        raise DatabaseError(what, remedy="close the other database first, or rename one of the two kinds")
+    identities: Any = inspect(Entity).polymorphic_map
+    if cls is None:
+        identities.pop(kind.name, None)
+        cls = _CLASSES[key] = _made(kind, parent)
+    identities[kind.name] = inspect(cls)
+    assert cls.__users__ is not None
+    return cls.__users__
+
+
+def _made(kind: RegisteredKind, parent: Any) -> type[Entity]:
+    """The class of a kind; its attributes are in ``Entity.own``."""
+    own = tuple(OwnAttribute(name, unit, meaning) for name, (unit, meaning) in kind.attributes.items())
+    contents: dict[str, object] = {
+        "__doc__": kind.definition,
+        # two definitions of one name are two classes
+        "__module__": f"{__name__}.definition{len(_CLASSES)}",
+        "__kind__": kind.name,
+        "__own__": own,
+        "__users__": WeakSet(),
+    }
+    if kind.canon is not None:
+        contents["__canon__"] = kind.canon
+    name = re.sub(r"(?:^|_)(.)", lambda found: found[1].upper(), kind.name)
+    made: type[Entity] = type(parent)(name, (parent,), contents)
+    return made

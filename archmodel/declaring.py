@@ -1,0 +1,330 @@
+"""Declaring materials, phases, documents, structures with their members, and relations.
+
+What is declared again as it is changes nothing; what is declared otherwise supersedes what was held; what is left
+out (None) stays as it was.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from sqlalchemy import insert, select
+from sqlalchemy.orm import Session
+
+from archmodel.bulk import batches
+from archmodel.entries import Entry
+from archmodel.finding import held_named, held_or_none
+from archmodel.knowledge import Document, Material, MaterialProperty, Phase
+from archmodel.recording import NOTHING, Outcome, end_rows, revise, supersede, table_of
+from archmodel.relations import INVERSE, RELATIONS, SYMMETRIC, Membership, Relation
+from archmodel.structures import Structure, structure_kind_named, structure_kind_of
+from archmodel.values import (
+    checked_choice,
+    checked_label,
+    checked_number,
+    checked_text,
+    checked_whole,
+    checked_years,
+)
+from moma.errors import UsageError
+
+__all__ = [
+    "DOCUMENT_TYPES",
+    "PROPERTIES",
+    "PropertyValue",
+    "declare_document",
+    "declare_material",
+    "declare_members",
+    "declare_phase",
+    "declare_property",
+    "declare_relation",
+    "declare_structure",
+]
+
+DOCUMENT_TYPES = ("document", "drawing", "photograph")
+
+PROPERTIES: Mapping[str, tuple[str, str]] = {
+    "density": ("kg/m³", "mass by volume"),
+    "young": ("Pa", "Young's modulus"),
+    "poisson": ("-", "Poisson's ratio"),
+    "tensile_strength": ("Pa", "tension that it bears"),
+    "compressive_strength": ("Pa", "compression that it bears, positive"),
+    "friction": ("-", "Coulomb's coefficient of its joints"),
+    "cohesion": ("Pa", "shear that its joints bear without pressure"),
+    "porosity": ("-", "part of its volume that is pores"),
+}
+"""Unit and meaning of the properties that every material can have; others need a unit."""
+
+_BELOW = {"poisson": 0.5, "porosity": 1.0}
+_ABOVE_ZERO = frozenset({"density", "young", "tensile_strength", "compressive_strength"})
+
+
+@dataclass(frozen=True)
+class PropertyValue:
+    """One number of a material.
+
+    Attributes
+    ----------
+    value, sigma : in `unit`; sigma is None if not known
+    unit : SI; None: the one of PROPERTIES
+    source : a test, a document, a table; None: that of the entry
+    """
+
+    value: float
+    sigma: float | None = None
+    unit: str | None = None
+    source: str | None = None
+
+
+def declare_material(
+    session: Session,
+    entry: Entry,
+    name: str,
+    description: str | None = None,
+    properties: Mapping[str, PropertyValue] | None = None,
+) -> Outcome:
+    """A stone or a mortar under one name, with its properties; properties that are not named stay as they are."""
+    values = {"description": checked_text("description", description)}
+    outcome = _declare(session, entry, Material, {"name": checked_label("name", name)}, values)
+    for key, given in (properties or {}).items():
+        outcome += declare_property(session, entry, name, key, given)
+    return outcome
+
+
+def declare_property(
+    session: Session, entry: Entry, material: str, name: str, given: PropertyValue
+) -> Outcome:
+    """One property of a material that was declared.
+
+    Raises
+    ------
+    UsageError
+        if there is no such material, the number cannot be, or the unit is missing or not the one of PROPERTIES
+    """
+    owner = held_named(session, Material, material)
+    unit = _unit(name, given.unit)
+    bounds: dict[str, float] = {"above": 0.0} if name in _ABOVE_ZERO else {}
+    if name in PROPERTIES and name not in _ABOVE_ZERO:
+        bounds["at_least"] = 0.0
+    if name in _BELOW:
+        bounds["below"] = _BELOW[name]
+    values = {
+        "value": checked_number(name, given.value, unit, **bounds),
+        "sigma": checked_number(f"sigma of {name}", given.sigma, unit, at_least=0.0),
+        "unit": unit,
+        "source": checked_text("source", given.source) or entry.source,
+    }
+    held = session.scalar(
+        select(MaterialProperty).where(
+            MaterialProperty.material_id == owner.id,
+            MaterialProperty.name == name,
+            MaterialProperty.superseded_id.is_(None),
+        )
+    )
+    new = MaterialProperty(material_id=owner.id, name=checked_label("property", name), **values)
+    if held is None:
+        new.entry_id = entry.id
+        session.add(new)
+        session.flush()
+        return Outcome(new=1)
+    if all(getattr(held, key) == value for key, value in values.items()):
+        return Outcome(unchanged=1)
+    supersede(session, entry, held, new)
+    return Outcome(replaced=1)
+
+
+def declare_phase(
+    session: Session,
+    entry: Entry,
+    name: str,
+    begins: int | None = None,
+    ends: int | None = None,
+    description: str | None = None,
+) -> Outcome:
+    """A time of building or repair; years at the earliest and at the latest."""
+    held = held_or_none(session, Phase, name)
+    if held is not None:
+        begins = held.begins if begins is None else begins
+        ends = held.ends if ends is None else ends
+    checked_years(begins, ends)
+    values = {"begins": begins, "ends": ends, "description": checked_text("description", description)}
+    return _declare(session, entry, Phase, {"name": checked_label("name", name)}, values)
+
+
+def declare_document(
+    session: Session,
+    entry: Entry,
+    code: str,
+    type: str,
+    title: str,
+    *,
+    place: str | None = None,
+    author: str | None = None,
+    dated: str | None = None,
+) -> Outcome:
+    """A document, drawing or photograph, by reference: `place` is where it can be found."""
+    values = {
+        "type": checked_choice("type of document", type, DOCUMENT_TYPES),
+        "title": checked_text("title", title),
+        "place": checked_text("place", place),
+        "author": checked_text("author", author),
+        "dated": checked_text("dated", dated),
+    }
+    return _declare(session, entry, Document, {"code": checked_label("code", code)}, values)
+
+
+def declare_structure(
+    session: Session,
+    entry: Entry,
+    kind: str,
+    code: str,
+    *,
+    title: str | None = None,
+    parent: str | None = None,
+    number: int | None = None,
+    side: str | None = None,
+) -> Outcome:
+    """A part of the building, within another one perhaps; its members are declared by `declare_members`."""
+    cls = structure_kind_named(kind)
+    if side is not None:
+        checked_choice("side", side, ("outer", "inner"))
+    above = None if parent is None else held_named(session, Structure, parent)
+    _refuse_circle(code, above)
+    values = {
+        "kind": structure_kind_of(cls),
+        "title": checked_text("title", title),
+        "parent_id": None if above is None else above.id,
+        "number": checked_whole("number", number, 0),
+        "side": side,
+    }
+    return _declare(session, entry, Structure, {"code": checked_label("code", code)}, values, cls)
+
+
+def declare_members(
+    session: Session, entry: Entry, code: str, entities: Sequence[int], *, ordered: bool = False
+) -> Outcome:
+    """Entities, by their numbers, are members of a structure; those that are so already stay.
+
+    Parameters
+    ----------
+    ordered : their ranks are their places in `entities`, from 1
+    """
+    structure = held_named(session, Structure, code)
+    outcome = NOTHING
+    for batch in batches(enumerate(entities, start=1)):
+        ranks = {number: rank if ordered else None for rank, number in batch}
+        outcome += _declare_members(session, entry, structure.id, ranks)
+    return outcome
+
+
+def declare_relation(
+    session: Session, entry: Entry, kind: str, of: Sequence[int], to: Sequence[int]
+) -> Outcome:
+    """Each of some entities, by their numbers, is in a relation to each of others.
+
+    A relation that was computed from the geometry stays beside the declared one.
+
+    Raises
+    ------
+    UsageError
+        for an unknown relation, or an entity in relation to itself
+    """
+    checked_choice("relation", kind, (*RELATIONS, "supports"))
+    both = set(of) & set(to)
+    if both:
+        raise UsageError(
+            f"{len(both)} stones would be in relation to themselves", remedy="leave them out of one"
+        )
+    pairs = [(one, other) for one in of for other in to]
+    if kind not in RELATIONS:
+        kind, pairs = INVERSE[kind], [(other, one) for one, other in pairs]
+    if kind in SYMMETRIC:
+        pairs = [(min(pair), max(pair)) for pair in pairs]
+    outcome = NOTHING
+    for batch in batches(dict.fromkeys(pairs)):
+        outcome += _declare_relations(session, entry, kind, batch)
+    return outcome
+
+
+def _declare(
+    session: Session,
+    entry: Entry,
+    cls: type[Material] | type[Phase] | type[Document] | type[Structure],
+    key: Mapping[str, str],
+    values: Mapping[str, object],
+    made: type[Structure] | None = None,
+) -> Outcome:
+    """A row under a name: new, as it is, or with new contents."""
+    (name,) = key.values()
+    held = held_or_none(session, cls, name)  # type: ignore[type-var]
+    if held is not None:
+        return revise(session, entry, held, {key: one for key, one in values.items() if one is not None})
+    own = {column: value for column, value in values.items() if column != "kind"}
+    session.add((made or cls)(**key, **own, entry_id=entry.id))
+    session.flush()
+    return Outcome(new=1)
+
+
+def _unit(name: str, given: str | None) -> str:
+    usual = PROPERTIES[name][0] if name in PROPERTIES else None
+    if given is None and usual is None:
+        remedy = f"give its unit; without one come {', '.join(PROPERTIES)}"
+        raise UsageError(f"the property {name[:40]!r} has no unit", remedy=remedy)
+    if usual is not None and given not in (None, usual):
+        raise UsageError(f"{name} in {given}", remedy=f"give it in {usual}")
+    return checked_label("unit", given or usual or "-")
+
+
+def _refuse_circle(code: str, above: Structure | None) -> None:
+    """A structure cannot be a part of itself, however many levels up."""
+    while above is not None:
+        if above.code == code:
+            raise UsageError(f"{code} would be a part of itself", remedy="give it another parent")
+        above = above.parent
+
+
+def _declare_members(
+    session: Session, entry: Entry, structure: int, ranks: Mapping[int, int | None]
+) -> Outcome:
+    table = table_of(Membership)
+    held = select(table).where(
+        table.c.structure_id == structure, table.c.entity_id.in_(ranks), table.c.superseded_id.is_(None)
+    )
+    same: set[int] = set()
+    other: dict[int, int] = {}
+    for row in session.execute(held).mappings():
+        number = row["entity_id"]
+        if ranks[number] is None or row["rank"] == ranks[number]:
+            same.add(number)
+        else:
+            other[number] = row["id"]
+    if other:
+        end_rows(session, entry, Membership, list(other.values()))
+    rows = [
+        {"entry_id": entry.id, "entity_id": number, "structure_id": structure, "rank": rank, "declared": True}
+        for number, rank in ranks.items()
+        if number not in same
+    ]
+    if rows:
+        session.execute(insert(table), rows)
+    return Outcome(new=len(rows) - len(other), replaced=len(other), unchanged=len(same))
+
+
+def _declare_relations(
+    session: Session, entry: Entry, kind: str, pairs: Sequence[tuple[int, int]]
+) -> Outcome:
+    table = table_of(Relation)
+    held = select(table.c.subject_id, table.c.object_id).where(
+        table.c.kind == kind,
+        table.c.declared,
+        table.c.superseded_id.is_(None),
+        table.c.subject_id.in_({subject for subject, _ in pairs}),
+    )
+    same = {(subject, target) for subject, target in session.execute(held)} & set(pairs)
+    rows = [
+        {"entry_id": entry.id, "kind": kind, "subject_id": subject, "object_id": target, "declared": True}
+        for subject, target in pairs
+        if (subject, target) not in same
+    ]
+    if rows:
+        session.execute(insert(table), rows)
+    return Outcome(new=len(rows), unchanged=len(same))

@@ -1,0 +1,100 @@
+"""Registering a kind of a user's own in a database."""
+
+import re
+from collections.abc import Mapping
+
+from sqlalchemy.orm import Session
+
+from archmodel.attributes import ATTRIBUTES
+from archmodel.entities import OwnAttribute, kind_named, kind_of, kinds, own_attributes
+from archmodel.entries import Entry
+from archmodel.grammar import parse
+from archmodel.recording import Outcome
+from archmodel.registered import RegisteredKind, declare_registered
+from archmodel.tokens import KEYWORDS
+from archmodel.values import checked_label, checked_text
+from moma.errors import UsageError
+
+__all__ = ["register_kind"]
+
+_NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
+
+
+def register_kind(
+    session: Session,
+    entry: Entry,
+    name: str,
+    parent: str,
+    definition: str,
+    *,
+    canon: str | None = None,
+    attributes: Mapping[str, tuple[str | None, str]] | None = None,
+) -> Outcome:
+    """Make a kind known to this database; it is a class of the hierarchy from now on.
+
+    Parameters
+    ----------
+    name : in lower case, with _ between words
+    parent : the kind that it is a case of
+    definition : one sentence: one word, one role
+    canon : canonical proportions, as a query expression; None: those of the parent
+    attributes : of its own, by name: unit ("-" for numbers without one, None for texts) and definition
+
+    Raises
+    ------
+    UsageError
+        if the name is taken, the parent unknown, or an attribute is named like another one
+    QueryError
+        if the canon is no expression
+    """
+    above = kind_named(parent)
+    given = {key: (unit, definition.strip()) for key, (unit, definition) in (attributes or {}).items()}
+    row = RegisteredKind(
+        name=_checked_name("kind", name),
+        parent=kind_of(above),
+        definition=" ".join(str(checked_text("definition", definition)).split()),
+        canon=canon,
+        attributes=given,
+        entry_id=entry.id,
+    )
+    known = session.get(RegisteredKind, name)
+    if known is not None:
+        if known.says() == row.says():
+            return Outcome(unchanged=1)
+        remedy = "give the new one another name; definitions of kinds do not change"
+        raise UsageError(f"the kind {name} is registered already, with another definition", remedy=remedy)
+    if name in kinds():
+        raise UsageError(f"there is a kind {name} already", remedy="give yours another name")
+    _check_attributes(given, own_attributes(above))
+    if canon is not None:
+        parse(canon)
+    session.add(row)
+    session.flush()
+    declare_registered(session)
+    return Outcome(new=1)
+
+
+def _check_attributes(
+    given: Mapping[str, tuple[str | None, str]], inherited: Mapping[str, OwnAttribute]
+) -> None:
+    """An attribute has a name of its own, so that a query can ask for it."""
+    built_in = {one.name for cls in kinds().values() if cls.__users__ is None for one in cls.__own__}
+    units = {one.name: one.unit for cls in kinds().values() for one in cls.__own__}
+    for name, (unit, definition) in given.items():
+        _checked_name("attribute", name)
+        checked_text(f"definition of {name}", definition)
+        if unit is not None:
+            checked_label(f"unit of {name}", unit)
+        if name in ATTRIBUTES or name in built_in or name in inherited or name in KEYWORDS:
+            remedy = "give it another name"
+            raise UsageError(f"{name} means something in queries already", remedy=remedy)
+        if name in units and units[name] != unit:
+            what = f"{name} [{unit or 'text'}] is an attribute of another kind, in {units[name] or 'text'}"
+            raise UsageError(what, remedy="give it the same unit, or another name")
+
+
+def _checked_name(thing: str, name: str) -> str:
+    if not _NAME.fullmatch(name) or len(name) > 40:
+        remedy = "write it in small letters a–z and digits, with _ between words, e.g. corner_merlon"
+        raise UsageError(f"{name[:40]!a} is not the name of a {thing}", remedy=remedy)
+    return name
