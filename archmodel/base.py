@@ -1,6 +1,8 @@
 """The declarative base, and the column types that SQL does not have: arrays and instants."""
 
 from datetime import UTC, datetime
+from functools import lru_cache
+from json import JSONEncoder
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,13 +11,33 @@ from sqlalchemy.engine import Dialect
 from sqlalchemy.orm import DeclarativeBase
 from sqlalchemy.types import TypeDecorator
 
-__all__ = ["JSON_TYPE", "TEXT", "ArrayType", "Base", "UtcDateTime"]
+__all__ = ["JSON_TYPE", "TEXT", "ArrayType", "Base", "UtcDateTime", "json_text"]
 
 TEXT = String().with_variant(String(collation="C"), "postgresql")
 """Texts compare by their characters' code points on every database, whatever its locale."""
 
 JSON_TYPE = JSON(none_as_null=True)
 """Not JSONB on PostgreSQL: what comes out is what went in, to the order of the keys."""
+
+
+def json_text(value: object) -> str:
+    """JSON of a column's value, for ``create_engine``; what JSON cannot say (NaN) is an error.
+
+    Tuples are of what does not change, like the faces of a solid, and mostly alike: their text is kept.
+    """
+    if type(value) is tuple:
+        return _text_of_tuple(value)
+    if type(value) is dict and not value:
+        return "{}"
+    return _ENCODER.encode(value)
+
+
+@lru_cache(maxsize=256)
+def _text_of_tuple(value: tuple[object, ...]) -> str:
+    return _ENCODER.encode(value)
+
+
+_ENCODER = JSONEncoder(allow_nan=False, separators=(",", ":"))
 
 
 class ArrayType(TypeDecorator[NDArray[np.float64]]):

@@ -17,7 +17,7 @@ from archmodel.finding import no_such_code
 from archmodel.knowledge import Correction
 from archmodel.recording import Outcome, table_of
 from archmodel.records import StoneRecord
-from archmodel.rows import entity_row, measurement_row
+from archmodel.rows import entity_rows, measurement_row
 from archmodel.surveys import Measurement
 from archmodel.values import checked_choice, checked_label, checked_number, checked_text, checked_whole
 from moma.errors import DatabaseError, UsageError
@@ -80,7 +80,7 @@ def replace_measurement(session: Session, entry: Entry, stone: StoneRecord, plac
     )
     if held is None:
         raise DatabaseError(f"{stone.code} was not measured", where=place)
-    made = entity_row(stone, place)
+    made = entity_rows([stone], [place])[0]
     changes = {name: (row[name], made[name]) for name in _GEOMETRY if row[name] != made[name]}
     if not changes:
         return Outcome(unchanged=1)

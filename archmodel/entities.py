@@ -40,6 +40,7 @@ import difflib
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, ClassVar
 from weakref import WeakSet
 
@@ -107,6 +108,7 @@ class OwnAttribute:
     definition: str
 
 
+@cache
 def kind_of(cls: type["Entity"]) -> str:
     """Name of a kind as users write it: its ``__kind__``, else the class's name as rib_segment of RibSegment."""
     own = cls.__dict__.get("__kind__")

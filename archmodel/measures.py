@@ -1,45 +1,17 @@
-"""Sizes of a stone that can be asked for: of its face and of its solid."""
+"""Volumes and centroids of solids, many at once."""
 
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["face_area", "face_extent", "solid_volume"]
+__all__ = ["solid_volume", "solid_volumes"]
 
 Array = NDArray[np.float64]
-
-LEVEL = 0.05
-"""A face whose normal is nearer to the vertical than this (sine) has no horizontal direction of its own."""
+Faces = Sequence[Sequence[int]]
 
 
-def face_area(outline: Array) -> float:
-    """Area of a plane polygon [m²], outline (nv, 3) in order [m]: half of |Σ pᵢ × pᵢ₊₁|."""
-    corners = outline - outline[0]
-    return 0.5 * float(np.linalg.norm(np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)))
-
-
-def face_extent(outline: Array, normal: Array) -> tuple[float, float]:
-    """Length and height of a face [m]: its extents along the horizontal and upwards, both in its plane.
-
-    A level face (a paving, the top of a wall) has its larger and smaller principal extents instead.
-
-    Parameters
-    ----------
-    outline : (nv, 3) corners [m]
-    normal : (3,) unit normal of the face
-    """
-    along = np.array([-normal[1], normal[0], 0.0])
-    if float(np.linalg.norm(along)) > LEVEL:
-        along /= np.linalg.norm(along)
-        extents = [float(np.ptp(outline @ axis)) for axis in (along, np.cross(normal, along))]
-    else:
-        axes = np.linalg.svd(outline - outline.mean(axis=0), full_matrices=False)[2][:2]
-        extents = sorted((float(np.ptp(outline @ axis)) for axis in axes), reverse=True)
-    return extents[0], extents[1]
-
-
-def solid_volume(vertices: Array, faces: Sequence[Sequence[int]]) -> tuple[float, Array]:
+def solid_volume(vertices: Array, faces: Faces) -> tuple[float, Array]:
     """Volume [m³] and centroid (3,) [m] of a closed polyhedron, by the divergence theorem.
 
     The volume is negative if the faces are clockwise seen from outside.
@@ -49,11 +21,39 @@ def solid_volume(vertices: Array, faces: Sequence[Sequence[int]]) -> tuple[float
     vertices : (nv, 3) [m]
     faces : vertex indices of each planar face, counter-clockwise seen from outside
     """
-    origin = vertices.mean(axis=0)  # sums of small numbers, wherever the site's frame has its origin
-    fans = [(face[0], face[i], face[i + 1]) for face in faces for i in range(1, len(face) - 1)]
-    a, b, c = np.moveaxis((vertices - origin)[np.array(fans)], 1, 0)
-    signed = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
-    volume = float(signed.sum())
-    if volume == 0.0:
-        return 0.0, origin
-    return volume, origin + (signed @ (a + b + c)) / (4.0 * volume)
+    volumes, centroids = _alike(vertices[None], faces)
+    return float(volumes[0]), centroids[0]
+
+
+def solid_volumes(solids: Sequence[tuple[Array, tuple[tuple[int, ...], ...]]]) -> tuple[Array, Array]:
+    """As `solid_volume` of many solids, (n,) and (n, 3); those with the same faces are computed together.
+
+    Parameters
+    ----------
+    solids : (vertices, faces) of each
+    """
+    groups: dict[tuple[int, tuple[tuple[int, ...], ...]], list[int]] = {}
+    for number, (vertices, faces) in enumerate(solids):
+        groups.setdefault((len(vertices), faces), []).append(number)
+    volumes, centroids = np.empty(len(solids)), np.empty((len(solids), 3))
+    for (_, faces), members in groups.items():
+        volumes[members], centroids[members] = _alike(np.stack([solids[i][0] for i in members]), faces)
+    return volumes, centroids
+
+
+def _alike(vertices: Array, faces: Faces) -> tuple[Array, Array]:
+    """Volumes (n,) and centroids (n, 3) of solids that differ in their vertices (n, nv, 3) only."""
+    origin = vertices.mean(axis=1)  # sums of small numbers, wherever the site's frame has its origin
+    fans = np.array([(face[0], face[i], face[i + 1]) for face in faces for i in range(1, len(face) - 1)])
+    local = vertices - origin[:, None]
+    a, b, c = (local[:, fans[:, k]] for k in range(3))
+    ux, uy, uz = np.moveaxis(b, 2, 0)
+    vx, vy, vz = np.moveaxis(c, 2, 0)
+    signed = a[..., 0] * (uy * vz - uz * vy)
+    signed += a[..., 1] * (uz * vx - ux * vz)
+    signed += a[..., 2] * (ux * vy - uy * vx)
+    volume = signed.sum(axis=1) / 6.0
+    moment = np.einsum("ij,ijk->ik", signed, a + b + c) / 24.0
+    with np.errstate(invalid="ignore", divide="ignore"):
+        offset = np.where(volume[:, None] != 0.0, moment / volume[:, None], 0.0)
+    return volume, origin + offset

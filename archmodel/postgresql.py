@@ -6,6 +6,7 @@ from typing import Any, Self
 from sqlalchemy import URL, Connection, Engine, create_engine, event
 from sqlalchemy.exc import DBAPIError
 
+from archmodel.base import json_text
 from moma.errors import DatabaseError, MissingLibraryError
 
 __all__ = ["HOW_TO_WRITE", "WRITE_LOCK", "PostgresqlServer"]
@@ -61,7 +62,10 @@ class PostgresqlServer:
         arguments = {name: value for name, value in ours.items() if name not in self.url.query}
         try:
             engine = create_engine(
-                self.url, connect_args={**arguments, "client_encoding": "utf8"}, pool_pre_ping=True
+                self.url,
+                connect_args={**arguments, "client_encoding": "utf8"},
+                pool_pre_ping=True,
+                json_serializer=json_text,
             )
         except ImportError as error:
             raise MissingLibraryError(

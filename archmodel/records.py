@@ -34,6 +34,8 @@ class StoneRecord:
     redundancy : number of accepted points minus 3
     rejected : indices into `points` of those left out as blunders
     outline : (nv, 3) the corners moved onto the plane, counter-clockwise seen from outside [m]
+    length, height : extents of the outline along its level direction and square to it [m]
+    area : of the outline [m²]
     depth, depth_sigma, depth_source : how deep the stone is [m], how sure, and by what evidence
     solid_vertices, solid_faces : the extruded stone [m]
     vertex_sigma : (nv, 3) standard deviations of `solid_vertices` [m]; NaN where not known
@@ -68,6 +70,9 @@ class StoneRecord:
     redundancy: int
     rejected: tuple[int, ...]
     outline: Array
+    length: float
+    height: float
+    area: float
     depth: float
     depth_sigma: float | None
     depth_source: str

@@ -2,36 +2,51 @@
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from archmodel.entities import Entity, kind_named, kind_of
-from archmodel.measures import face_area, face_extent, solid_volume
+from archmodel.measures import solid_volumes
 from archmodel.records import StoneRecord
 from archmodel.surveys import Measurement
 from moma.errors import DatabaseError, GeometryError, SurveyError, UsageError
 
-__all__ = ["entity_row", "measurement_row", "stone_record", "storable"]
+__all__ = ["entity_rows", "measurement_row", "stone_record", "storable"]
 
 Array = NDArray[np.float64]
 
 
-def entity_row(stone: StoneRecord, place: str) -> dict[str, object]:
-    """Row of the `entity` table, without its keys.
+def entity_rows(stones: Sequence[StoneRecord], places: Sequence[str]) -> list[dict[str, object]]:
+    """Rows of the `entity` table, without their keys.
 
     Parameters
     ----------
-    stone : the record
-    place : ``file:line stone CODE``, for errors
+    stones : the records
+    places : ``file:line stone CODE`` of each, for errors
     """
-    vertices = _array(stone.solid_vertices, (-1, 3), "solid_vertices", place)
-    volume, centroid = _solid(vertices, stone.solid_faces, place)
-    outline = _array(stone.outline, (-1, 3), "outline", place)
-    length, height = face_extent(outline, _array(stone.normal, (3,), "normal", place))
+    kinds: dict[str, str] = {}
+    for stone, place in zip(stones, places, strict=True):
+        _check_solid(stone, place)
+        if stone.kind not in kinds:
+            kinds[stone.kind] = _kind(stone.kind, place)
+    volumes, centroids = solid_volumes([(stone.solid_vertices, stone.solid_faces) for stone in stones])
+    return [
+        {"kind": kinds[stone.kind], **_entity_row(stone, place, volume, centroid)}
+        for stone, place, volume, centroid in zip(
+            stones, places, volumes.tolist(), centroids.tolist(), strict=True
+        )
+    ]
+
+
+def _entity_row(stone: StoneRecord, place: str, volume: float, centroid: list[float]) -> dict[str, object]:
+    if not volume > 0.0:
+        remedy = "its faces must be counter-clockwise seen from outside, and its depth above zero"
+        raise GeometryError(f"the volume of the solid is {volume:g} m³", where=place, remedy=remedy)
     depth_sigma = None if stone.depth_sigma is None else _number(stone.depth_sigma, "depth_sigma", place)
+    x, y, z = centroid
     return {
-        "kind": _kind(stone.kind, place),
         "code": _text(stone.code, "code", place),
         "course": None if stone.course is None else int(stone.course),
         "depth": _number(stone.depth, "depth", place),
@@ -39,13 +54,13 @@ def entity_row(stone: StoneRecord, place: str) -> dict[str, object]:
         "depth_source": storable(stone.depth_source),
         "depth_origin": stone.depth_origin,
         "zone": None if stone.zone is None else _text(stone.zone, "zone", place),
-        "length": length,
-        "height": height,
-        "area": face_area(outline),
+        "length": _number(stone.length, "length", place),
+        "height": _number(stone.height, "height", place),
+        "area": _number(stone.area, "area", place),
         "volume": volume,
-        "x": float(centroid[0]),
-        "y": float(centroid[1]),
-        "z": float(centroid[2]),
+        "x": x,
+        "y": y,
+        "z": z,
     }
 
 
@@ -63,8 +78,8 @@ def measurement_row(stone: StoneRecord, place: str) -> dict[str, object]:
         "redundancy": int(stone.redundancy),
         "point_count": len(points),
         "rejected_count": len(rejected),
-        "rejected": rejected,
-        "rejected_vertices": [int(index) for index in stone.rejected_vertices],
+        "rejected": tuple(rejected),
+        "rejected_vertices": tuple(int(index) for index in stone.rejected_vertices),
         "provenance": stone.provenance,
         "provenance_text": storable(stone.provenance_text),
         "shape": stone.shape,
@@ -78,15 +93,15 @@ def measurement_row(stone: StoneRecord, place: str) -> dict[str, object]:
         "vertex_sigma": np.asarray(stone.vertex_sigma, dtype=np.float64).reshape(-1, 3),
         "image": _array(stone.image, (-1, 2), "image", place),
         "sigmas": None if stone.sigmas is None else _array(stone.sigmas, (-1,), "sigmas", place),
-        "names": list(stone.names),
-        "remarks": list(stone.remarks),
+        "names": stone.names,
+        "remarks": stone.remarks,
         "normal": _array(stone.normal, (3,), "normal", place),
         "covariance": _array(stone.covariance, (3, 3), "covariance", place),
         "vertices": _array(stone.vertices, (-1, 3), "vertices", place),
         "points": points,
         "outline": _array(stone.outline, (-1, 3), "outline", place),
         "solid_vertices": _array(stone.solid_vertices, (-1, 3), "solid_vertices", place),
-        "solid_faces": [[int(index) for index in face] for face in stone.solid_faces],
+        "solid_faces": _plain_faces(stone.solid_faces),
         "notes": {str(key): str(value) for key, value in stone.notes.items()},
     }
 
@@ -110,7 +125,10 @@ def stone_record(entity: Entity, measured: Measurement) -> StoneRecord:
         redundancy=measured.redundancy,
         rejected=tuple(measured.rejected),
         outline=measured.outline.copy(),
-        depth=_known(entity.depth, entity),
+        length=_known("length", entity),
+        height=_known("height", entity),
+        area=_known("area", entity),
+        depth=_known("depth", entity),
         depth_sigma=entity.depth_sigma,
         depth_source=entity.depth_source or "",
         solid_vertices=measured.solid_vertices.copy(),
@@ -135,10 +153,12 @@ def stone_record(entity: Entity, measured: Measurement) -> StoneRecord:
     )
 
 
-def _known(depth: float | None, entity: Entity) -> float:
-    if depth is None:
-        raise DatabaseError(f"the depth of {entity.code} is not known", where=f"entity {entity.id}")
-    return depth
+def _known(name: str, entity: Entity) -> float:
+    """A number that every measured entity has."""
+    value: float | None = getattr(entity, name)
+    if value is None:
+        raise DatabaseError(f"the {name} of {entity.code} is not known", where=f"entity {entity.id}")
+    return value
 
 
 def storable(text: str) -> str:
@@ -168,25 +188,29 @@ def _number(value: float, name: str, place: str) -> float:
 
 
 def _array(value: Array, shape: tuple[int, ...], name: str, place: str) -> Array:
-    """`value` as floats; an error unless it has the shape (-1: any length) and only finite numbers."""
+    """`value` as floats; an error unless it has the shape (first -1: any length) and only finite numbers."""
     array = np.asarray(value, dtype=np.float64)
-    fits = array.ndim == len(shape) and all(
-        want in (-1, got) for want, got in zip(shape, array.shape, strict=True)
-    )
-    if not fits:
+    found = array.shape
+    if found != shape and (shape[0] != -1 or len(found) != len(shape) or found[1:] != shape[1:]):
         raise SurveyError(f"{name} has shape {array.shape}, expected {shape}", where=place)
-    if not np.isfinite(array).all():
+    # a sum that is finite has finite terms; the other way round it need not be so
+    if not math.isfinite(array.sum()) and not np.isfinite(array).all():
         raise SurveyError(f"{name} has a coordinate that is not a finite number", where=place)
     return array
 
 
-def _solid(vertices: Array, faces: Sequence[Sequence[int]], place: str) -> tuple[float, Array]:
-    """Volume and centroid of the stone's solid, which must be the right way out."""
-    if any(len(face) < 3 or not all(0 <= index < len(vertices) for index in face) for face in faces):
-        what = f"a face of the solid is not a polygon on its {len(vertices)} vertices"
+@lru_cache(maxsize=256)
+def _plain_faces(faces: tuple[tuple[int, ...], ...]) -> tuple[tuple[int, ...], ...]:
+    """The faces in Python's own integers; those of most stones are alike."""
+    return tuple(tuple(int(index) for index in face) for face in faces)
+
+
+def _check_solid(stone: StoneRecord, place: str) -> None:
+    """The solid is made of polygons on its vertices."""
+    vertices = _array(stone.solid_vertices, (-1, 3), "solid_vertices", place)
+    count = len(vertices)
+    if not stone.solid_faces:
+        raise GeometryError("the volume of the solid is 0 m³", where=place, remedy="give it faces")
+    if any(len(face) < 3 or min(face) < 0 or max(face) >= count for face in stone.solid_faces):
+        what = f"a face of the solid is not a polygon on its {count} vertices"
         raise GeometryError(what, where=place)
-    volume, centroid = solid_volume(vertices, faces) if faces else (0.0, vertices.sum(axis=0))
-    if not volume > 0.0:
-        remedy = "its faces must be counter-clockwise seen from outside, and its depth above zero"
-        raise GeometryError(f"the volume of the solid is {volume:g} m³", where=place, remedy=remedy)
-    return volume, centroid

@@ -11,6 +11,7 @@ from sqlalchemy.engine.interfaces import DBAPIConnection
 from sqlalchemy.exc import DBAPIError
 from sqlalchemy.pool import ConnectionPoolEntry
 
+from archmodel.base import json_text
 from moma.errors import DatabaseError
 
 __all__ = ["HOW_TO_WRITE", "SqliteFile"]
@@ -63,7 +64,9 @@ class SqliteFile:
         """An engine on the file, which may be missing if `create` allows it."""
         if self.file is not None:
             _check_file(self.file, create)
-        engine = create_engine(self.url, connect_args={"timeout": self.lock_timeout})
+        engine = create_engine(
+            self.url, connect_args={"timeout": self.lock_timeout}, json_serializer=json_text
+        )
         event.listen(engine, "connect", _on_connect)
         event.listen(engine, "begin", _on_begin)
         return engine

@@ -1,25 +1,19 @@
 """Surveyed stones into the database and out again."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import islice
-from typing import TypeVar
+from collections.abc import Iterable, Mapping, Sequence
 
-from sqlalchemy import insert, select
+from sqlalchemy import select
 from sqlalchemy.orm import Session
 
+from archmodel.bulk import batches, first_free_id, insert_rows
 from archmodel.entities import Entity
 from archmodel.entries import new_entry
 from archmodel.records import StoneRecord
-from archmodel.rows import entity_row, measurement_row, stone_record, storable
+from archmodel.rows import entity_rows, measurement_row, stone_record, storable
 from archmodel.surveys import Measurement, Survey
 from moma.errors import DatabaseError
 
 __all__ = ["load_stones", "store_survey", "survey_with_hash"]
-
-BATCH = 500
-"""Rows per statement: fewer than SQLite's limit of parameters, and memory does not grow with the file."""
-
-T = TypeVar("T")
 
 
 def store_survey(
@@ -70,7 +64,7 @@ def store_survey(
         session.add(survey)
         session.flush()
         lines: dict[str, int] = {}
-        for batch in _batches(stones):
+        for batch in batches(stones):
             _refuse_known_codes(session, batch, lines, source_path)
             _insert_stones(session, batch, survey, source_path)
         if not lines:
@@ -88,7 +82,7 @@ def load_stones(session: Session, entities: Iterable[Entity]) -> list[StoneRecor
     """The survey's records of these entities, in the same order, exactly as they were stored."""
     wanted = [entity.id for entity in entities]
     found: dict[int, StoneRecord] = {}
-    for batch in _batches(dict.fromkeys(wanted)):
+    for batch in batches(dict.fromkeys(wanted)):
         rows = session.execute(
             select(Entity, Measurement).join(Entity.measurement).where(Entity.id.in_(batch))
         )
@@ -137,23 +131,16 @@ def _refuse_known_codes(
 def _insert_stones(session: Session, batch: Sequence[StoneRecord], survey: Survey, path: str) -> None:
     """The rows of one batch of stones, checked."""
     places = [f"{path}:{stone.line} stone {stone.code}" for stone in batch]
+    first = first_free_id(session, Entity)
     entities = [
-        entity_row(stone, place) | {"entry_id": survey.entry_id}
-        for stone, place in zip(batch, places, strict=True)
+        {"id": number, "entry_id": survey.entry_id, **row}
+        for number, row in enumerate(entity_rows(batch, places), start=first)
     ]
     shared = {"survey_id": survey.id, "entry_id": survey.entry_id, "superseded_id": None}
+    measured = first_free_id(session, Measurement) - first
     measurements = [
-        measurement_row(stone, place) | shared for stone, place in zip(batch, places, strict=True)
+        {"id": number + measured, "entity_id": number, **shared, **measurement_row(stone, place)}
+        for number, (stone, place) in enumerate(zip(batch, places, strict=True), start=first)
     ]
-    # The table, not the class: rows of many kinds go into one statement.
-    table = Entity.metadata.tables[Entity.__tablename__]
-    numbers = session.scalars(insert(table).returning(table.c.id, sort_by_parameter_order=True), entities)
-    rows = [{"entity_id": number, **row} for number, row in zip(numbers, measurements, strict=True)]
-    session.execute(insert(Measurement), rows)
-
-
-def _batches(items: Iterable[T]) -> Iterator[list[T]]:
-    """The items in lists of `BATCH`."""
-    source = iter(items)
-    while batch := list(islice(source, BATCH)):
-        yield batch
+    insert_rows(session, Entity, entities)
+    insert_rows(session, Measurement, measurements)

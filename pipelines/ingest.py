@@ -30,6 +30,11 @@ from survey.records import Reject
 __all__ = ["FileReport", "IngestReport", "Refusal", "ingest"]
 
 
+_PATIENCE = 300.0
+"""How long to wait for another program that writes [s]: not less than a large survey takes, since waiting is cheaper
+than fitting it anew."""
+
+
 @dataclass(frozen=True)
 class Refusal:
     """A stone that was not taken in, and why."""
@@ -129,14 +134,14 @@ def ingest(
                 stations = _listed_stations(tally, options) if format in _LISTS else []
                 text = rejects_text(path, format, tally.refused, stations)
                 held.enter_context(_published(target, text))
-        with open_database(url) as database, database.session() as session:
+        with open_database(url, lock_timeout=_PATIENCE) as database, database.session() as session:
             for tally, spool in zip(tallies, spools, strict=True):
                 _store(session, tally, _told(spool, tally, progress))
         reports = tuple(
             _report(tally, target if tally.refused else None)
             for tally, target in zip(tallies, targets, strict=True)
         )
-    return IngestReport(url, reports)
+    return IngestReport(database.url, reports)
 
 
 @dataclass
@@ -203,9 +208,9 @@ def _measure(
 ) -> _Tally:
     """The good stones of one file into a spool; the first bad one ends it, or is kept for the rejects."""
     tally = _Tally(path, survey_stones(open_survey(path, format, options)))
-    stage, head = f"fit {path.name}", tally.stream.head
+    stage, head, kinds = f"fit {path.name}", tally.stream.head, set[str]()
     for one in tally.stream.stones:
-        made = one if isinstance(one, Reject) else _of_known_kind(one, head.path)
+        made = one if isinstance(one, Reject) else _of_known_kind(one, head.path, kinds)
         if not isinstance(made, Reject):
             tally.count(made)
             spool.append(stone_record(made))
@@ -241,13 +246,17 @@ def _told(stones: Iterable[StoneRecord], tally: _Tally, progress: Listener) -> I
         yield stone
 
 
-def _of_known_kind(block: SurveyedBlock, path: str) -> SurveyedBlock | Reject:
+def _of_known_kind(block: SurveyedBlock, path: str, known: set[str]) -> SurveyedBlock | Reject:
+    """The stone, if the hierarchy has its kind; `known` holds kinds that were found there, and is added to."""
+    if block.kind in known:
+        return block
     try:
         kind_named(block.kind)
     except UsageError as error:
         record = block.face.record
         where = f"{path}:{record.line}: stone {block.code}"
         return Reject(block.code, SurveyError(error.what, where=where, remedy=error.remedy), record.spans)
+    known.add(block.kind)
     return block
 
 

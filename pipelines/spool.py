@@ -4,11 +4,16 @@ So a bad survey leaves the database as it was, and makes none; the database is l
 not while planes are fitted; and memory does not grow with the survey.
 """
 
+import math
 import pickle
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
 
 from archmodel.records import StoneRecord
 from moma.errors import SurveyError
@@ -52,11 +57,11 @@ class Spool:
             self._flush()
         self._file.seek(0)
         for _ in range(self._batches):
-            yield from pickle.load(self._file)
+            yield from _unpacked(*pickle.load(self._file))
 
     def _flush(self) -> None:
         try:
-            pickle.dump(self._waiting, self._file, pickle.HIGHEST_PROTOCOL)
+            pickle.dump(_packed(self._waiting), self._file, pickle.HIGHEST_PROTOCOL)
         except OSError as error:
             raise SurveyError(
                 f"a temporary file cannot be written: {error.strerror or error}",
@@ -65,3 +70,36 @@ class Spool:
             ) from error
         self._waiting.clear()
         self._batches += 1
+
+
+@dataclass(frozen=True)
+class _Numbers:
+    """Stands for an array of this shape, whose numbers are kept elsewhere."""
+
+    shape: tuple[int, ...]
+
+
+def _packed(stones: Sequence[StoneRecord]) -> tuple[list[dict[str, Any]], NDArray[np.float64]]:
+    """The stones without their arrays, and all of these in one: a dozen small ones each would take much longer."""
+    numbers: list[NDArray[np.float64]] = []
+    states = []
+    for stone in stones:
+        state = dict(vars(stone))
+        for name, value in state.items():
+            if isinstance(value, np.ndarray) and value.dtype == np.float64:
+                numbers.append(value.ravel())
+                state[name] = _Numbers(value.shape)
+        states.append(state)
+    return states, np.concatenate(numbers)
+
+
+def _unpacked(states: Sequence[dict[str, Any]], numbers: NDArray[np.float64]) -> Iterator[StoneRecord]:
+    """The stones again; their arrays are views."""
+    start = 0
+    for state in states:
+        for name, value in state.items():
+            if isinstance(value, _Numbers):
+                end = start + math.prod(value.shape)
+                state[name] = numbers[start:end].reshape(value.shape)
+                start = end
+        yield StoneRecord(**state)

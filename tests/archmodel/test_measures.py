@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from archmodel.measures import face_area, face_extent, solid_volume
+from archmodel.measures import solid_volume, solid_volumes
 from tests.archmodel.stones import BOX_FACES, box_stone
 
 sizes = st.tuples(*[st.floats(0.05, 5.0)] * 3)
@@ -11,7 +11,7 @@ places = st.tuples(*[st.floats(-1e3, 1e3)] * 3)
 
 
 @given(size=sizes, at=places)
-def test_a_box_has_the_volume_centroid_and_area_of_a_box(
+def test_a_box_has_the_volume_and_centroid_of_a_box(
     size: tuple[float, float, float], at: tuple[float, float, float]
 ) -> None:
     stone = box_stone("B", size=size, at=at)
@@ -20,8 +20,6 @@ def test_a_box_has_the_volume_centroid_and_area_of_a_box(
     # Coordinates of 1e3 m leave about 1e-13 m of a size; divided by the smallest size 0.05 m.
     assert volume == pytest.approx(length * depth * height, rel=2e-11)
     np.testing.assert_allclose(centroid, np.add(at, np.array(size) / 2), atol=1e-11)
-    assert face_area(stone.outline) == pytest.approx(length * height, rel=2e-11)
-    assert face_extent(stone.outline, stone.normal) == pytest.approx((length, height), rel=2e-11)
 
 
 def test_faces_seen_from_inside_make_a_negative_volume() -> None:
@@ -37,19 +35,19 @@ def test_a_tetrahedron_has_a_sixth_of_the_box_and_the_mean_of_its_corners() -> N
     np.testing.assert_allclose(centroid, [0.25, 0.25, 0.25])
 
 
-def test_the_height_of_a_leaning_face_is_measured_along_the_face() -> None:
-    # A face 2 m × 1 m that leans back by 30°.
-    up = np.array([0.0, np.sin(np.pi / 6), np.cos(np.pi / 6)])
-    outline = np.array([[0.0, 0, 0], [2, 0, 0], np.add(up, [2, 0, 0]), up])
-    normal = np.cross([1.0, 0, 0], up)
-    assert face_extent(outline, normal) == pytest.approx((2.0, 1.0))
+def test_many_solids_of_different_faces_are_as_each_alone() -> None:
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    wedge = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
+    boxes = [box_stone(f"B{k}", size=(1.0 + k, 2.0, 3.0), at=(float(k), 7e6, 0.0)) for k in range(3)]
+    solids = [(box.solid_vertices, BOX_FACES) for box in boxes]
+    volumes, centroids = solid_volumes([solids[0], (corners, wedge), *solids[1:]])
+    np.testing.assert_allclose(volumes, [6.0, 1 / 6, 12.0, 18.0], rtol=1e-8)
+    np.testing.assert_allclose(centroids[1], [0.25, 0.25, 0.25])
+    np.testing.assert_allclose(centroids[3], [2.0 + 1.5, 7e6 + 1.0, 1.5], rtol=1e-12)
 
 
-def test_a_level_face_has_its_longer_side_as_length() -> None:
-    outline = np.array([[0.0, 0, 0], [0, 2, 0], [-1, 2, 0], [-1, 0, 0]])
-    assert face_extent(outline, np.array([0.0, 0.0, 1.0])) == pytest.approx((2.0, 1.0))
-
-
-def test_a_concave_outline_counts_only_what_is_inside() -> None:
-    outline = np.array([[0.0, 0, 0], [2, 0, 0], [2, 0, 2], [1, 0, 2], [1, 0, 1], [0, 0, 1]])
-    assert face_area(outline) == pytest.approx(3.0)
+def test_a_solid_without_thickness_has_no_volume() -> None:
+    stone = box_stone("B", size=(1.0, 0.0, 3.0))
+    volume, centroid = solid_volume(stone.solid_vertices, BOX_FACES)
+    assert volume == 0.0
+    assert np.isfinite(centroid).all()
