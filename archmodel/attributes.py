@@ -1,38 +1,50 @@
-"""What can be asked of an entity, and where in the tables it is found."""
+"""What can be asked of every entity, and where in the tables it is found."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any
 
-from sqlalchemy import ColumnElement, Select, and_, func, select
-from sqlalchemy.orm import InstrumentedAttribute, aliased
+from sqlalchemy import ColumnElement, FromClause, distinct, func, select
+from sqlalchemy.orm import Session
 
-from archmodel.entities import Entity
+from archmodel.entities import Entity, OwnAttribute, kinds, own_attributes
+from archmodel.knowledge import Correction, Statement
+from archmodel.registered import RegisteredKind
+from archmodel.relations import Membership, Relation
 from archmodel.run_records import STONE_VALUES
-from archmodel.runs import EntityResult
-from archmodel.surveys import Measurement, Survey
+from archmodel.runs import FIDELITIES, EntityResult
+from archmodel.said import alias_of, held, observations_of, statements_of
+from archmodel.scope import Scope
+from archmodel.surveys import Measurement
 
-__all__ = ["ATTRIBUTES", "Attribute", "with_attributes"]
+__all__ = ["ATTRIBUTES", "DOCUMENTING", "Attribute", "attributes_of", "own_attributes_of"]
 
-S = TypeVar("S", bound=Select[Any])
+Value = Callable[[Scope, int | None], ColumnElement[Any]]
+
+DOCUMENTING = ("made_of", "of_phase", "mason_mark", "observation", "depth", "reference", "note")
+"""Kinds of statements that can name a document: all."""
 
 
 @dataclass(frozen=True)
 class Attribute:
-    """One thing that can be asked of every entity.
+    """One thing that can be asked of an entity.
 
     Attributes
     ----------
     name : as users write it
     unit : "m", "Pa", …; "-" for counts and numbers without a unit; None for texts
     definition : what it is, in a few words
-    column : where it is stored
+    value : where it is found: of a scope and, if it is one of a run, of the number of that run
+    of_run : a run computed it, so that ``name@12`` asks for that of run 12
+    words : all texts that it can be; None if it can be any
     """
 
     name: str
     unit: str | None
     definition: str
-    column: InstrumentedAttribute[Any] | ColumnElement[Any]
+    value: Value
+    of_run: bool = False
+    words: tuple[str, ...] | None = None
 
     @property
     def is_number(self) -> bool:
@@ -40,60 +52,270 @@ class Attribute:
         return self.unit is not None
 
 
-_ALL = (
-    Attribute("code", None, "name of the stone in the survey", Entity.code),
-    Attribute("kind", None, "its own kind, e.g. keystone", Entity.kind),
-    Attribute("course", "-", "number of its course, from the ground", Entity.course),
-    Attribute("zone", None, "part of the building", Entity.zone),
-    Attribute("depth", "m", "how far it reaches into the wall", Entity.depth),
-    Attribute("depth_sigma", "m", "standard deviation of the depth", Entity.depth_sigma),
-    Attribute("depth_origin", None, "evidence: stone, rule, kind, structure or solid", Entity.depth_origin),
-    Attribute("length", "m", "horizontal extent of its face", Entity.length),
-    Attribute("height", "m", "extent of its face upwards", Entity.height),
-    Attribute("area", "m²", "area of its face", Entity.area),
-    Attribute("volume", "m³", "volume of its solid", Entity.volume),
-    Attribute("x", "m", "centroid of its solid", Entity.x),
-    Attribute("y", "m", "centroid of its solid", Entity.y),
-    Attribute("z", "m", "centroid of its solid", Entity.z),
-    Attribute("rms", "m", "root mean square distance of its points from the fitted plane", Measurement.rms),
-    Attribute("redundancy", "-", "accepted points minus 3", Measurement.redundancy),
-    Attribute("points", "-", "measured points on its face", Measurement.point_count),
-    Attribute("rejected", "-", "points left out as blunders", Measurement.rejected_count),
-    Attribute("shape", None, "of its face: plane, bevelled, curved, rough, untested", Measurement.shape),
-    Attribute("provenance", None, "of its face: points, photograph or solid", Measurement.provenance),
-    Attribute("von_mises_max", "Pa", "largest Von Mises stress, latest run", EntityResult.von_mises_max),
-    Attribute("von_mises_mean", "Pa", "mean Von Mises stress, latest run", EntityResult.von_mises_mean),
-    Attribute("displacement_max", "m", "largest displacement, latest run", EntityResult.displacement_max),
-    Attribute("contact_force_max", "N", "largest contact force, latest run", EntityResult.contact_force_max),
-    *(
-        Attribute(name, unit, f"{meaning}, latest run", EntityResult.values[name].as_float())
-        for name, (unit, meaning) in STONE_VALUES.items()
+def _of_entity(name: str) -> Value:
+    return lambda scope, run: scope.entity.c[name]
+
+
+def _of_measurement(name: str) -> Value:
+    return lambda scope, run: scope.measurement().c[name]
+
+
+def _of_result(name: str) -> Value:
+    return lambda scope, run: scope.result(run).c[name]
+
+
+def _of_values(name: str) -> Value:
+    return lambda scope, run: scope.result(run).c["values"][name].as_float()
+
+
+def _of_material(name: str) -> Value:
+    return lambda scope, run: scope.material_property(name).c.value
+
+
+def _rows(table: type[Any], column: str, *, now: bool = True) -> Value:
+    """How many rows of a table name the entity in this column."""
+
+    def value(scope: Scope, run: int | None) -> ColumnElement[int]:
+        rows = alias_of(table)
+        count = select(func.count()).select_from(rows).where(rows.c[column] == scope.entity.c.id)
+        return (count.where(held(rows)) if now else count).correlate(scope.entity).scalar_subquery()
+
+    return value
+
+
+def _of_relations(what: Callable[[FromClause], ColumnElement[Any]], *sides: str, kind: str) -> Value:
+    """Something of all relations of a kind in which the entity stands on one of the sides."""
+
+    def value(scope: Scope, run: int | None) -> ColumnElement[Any]:
+        parts: list[ColumnElement[Any]] = []
+        for side in sides:
+            rows = alias_of(Relation)
+            chosen = select(what(rows)).where(
+                rows.c[side] == scope.entity.c.id, rows.c.kind == kind, held(rows)
+            )
+            parts.append(chosen.correlate(scope.entity).scalar_subquery())
+        total = parts[0]
+        for part in parts[1:]:
+            total = total + part
+        return total
+
+    return value
+
+
+def _count(rows: FromClause) -> ColumnElement[int]:
+    return func.count(rows.c.id)
+
+
+def _of_marks(what: Callable[[FromClause], ColumnElement[Any]]) -> Value:
+    """Something of the mason marks that the entity itself bears."""
+
+    def value(scope: Scope, run: int | None) -> ColumnElement[Any]:
+        said = alias_of(Statement)
+        marks = select(what(said)).where(
+            said.c.entity_id == scope.entity.c.id, said.c.kind == "mason_mark", held(said)
+        )
+        return marks.correlate(scope.entity).scalar_subquery()
+
+    return value
+
+
+def _of_observations(what: Callable[[FromClause], ColumnElement[Any]]) -> Value:
+    def value(scope: Scope, run: int | None) -> ColumnElement[Any]:
+        said, seen = observations_of(scope.entity, scope.context.said_of_structures("observation"))
+        return select(what(said)).where(seen).correlate(scope.entity).scalar_subquery()
+
+    return value
+
+
+def _documents(scope: Scope, run: int | None) -> ColumnElement[int]:
+    said = alias_of(Statement)
+    told = statements_of(scope.entity, said, scope.context.said_of_structures(*DOCUMENTING))
+    count = select(func.count(distinct(said.c.document_id))).where(told)
+    return count.correlate(scope.entity).scalar_subquery()
+
+
+def _result(
+    name: str, unit: str | None, definition: str, value: Value, words: tuple[str, ...] | None = None
+) -> Attribute:
+    return Attribute(name, unit, definition, value, of_run=True, words=words)
+
+
+_BUILT = (
+    Attribute("code", None, "name of the stone in the survey", _of_entity("code")),
+    Attribute("kind", None, "its own kind, e.g. keystone", _of_entity("kind")),
+    Attribute("course", "-", "number of its course, from the ground", _of_entity("course")),
+    Attribute("zone", None, "part of the building", _of_entity("zone")),
+    Attribute("depth", "m", "how far it reaches into the wall", _of_entity("depth")),
+    Attribute("depth_sigma", "m", "standard deviation of the depth", _of_entity("depth_sigma")),
+    Attribute(
+        "depth_origin", None, "evidence: stone, rule, kind, structure or solid", _of_entity("depth_origin")
     ),
-    Attribute("fidelity", None, "fixed, rigid or deformable, latest run", EntityResult.fidelity),
-    Attribute("survey", None, "name of the survey that measured it", Survey.name),
+    Attribute("depth_source", None, "that evidence in words", _of_entity("depth_source")),
+    Attribute("length", "m", "horizontal extent of its face", _of_entity("length")),
+    Attribute("height", "m", "extent of its face upwards", _of_entity("height")),
+    Attribute("area", "m²", "area of its face", _of_entity("area")),
+    Attribute("volume", "m³", "volume of its solid", _of_entity("volume")),
+    Attribute("x", "m", "centroid of its solid", _of_entity("x")),
+    Attribute("y", "m", "centroid of its solid", _of_entity("y")),
+    Attribute("z", "m", "centroid of its solid", _of_entity("z")),
 )
 
-ATTRIBUTES: Mapping[str, Attribute] = {attribute.name: attribute for attribute in _ALL}
-"""Every attribute by name. "Latest run" is the latest one that holds the entity."""
+_MEASURED = (
+    Attribute(
+        "rms", "m", "root mean square distance of its points from the fitted plane", _of_measurement("rms")
+    ),
+    Attribute("redundancy", "-", "accepted points minus 3", _of_measurement("redundancy")),
+    Attribute("points", "-", "measured points on its face", _of_measurement("point_count")),
+    Attribute("rejected", "-", "points left out as blunders", _of_measurement("rejected_count")),
+    Attribute(
+        "shape", None, "of its face: plane, bevelled, curved, rough, untested", _of_measurement("shape")
+    ),
+    Attribute("provenance", None, "of its face: points, photograph or solid", _of_measurement("provenance")),
+    Attribute("station", None, "where the instrument stood", _of_measurement("station")),
+    Attribute("photograph", None, "on which its face was drawn", _of_measurement("photograph")),
+    Attribute(
+        "survey", None, "name of the survey that measured it", lambda scope, run: scope.survey().c.name
+    ),
+    Attribute(
+        "measurements",
+        "-",
+        "how often it was measured, or its solid made anew",
+        _rows(Measurement, "entity_id", now=False),
+    ),
+)
+
+_KNOWN = (
+    Attribute("phase", None, "name of the phase that it is of", lambda scope, run: scope.phase().c.name),
+    Attribute(
+        "phase_begins",
+        "year",
+        "of that phase, at the earliest",
+        lambda scope, run: scope.phase().c.begins,
+    ),
+    Attribute("phase_ends", "year", "of that phase, at the latest", lambda scope, run: scope.phase().c.ends),
+    Attribute("material", None, "name of its material", lambda scope, run: scope.material().c.name),
+    Attribute("density", "kg/m³", "of its material", _of_material("density")),
+    Attribute("tensile_strength", "Pa", "of its material", _of_material("tensile_strength")),
+    Attribute("compressive_strength", "Pa", "of its material", _of_material("compressive_strength")),
+    Attribute("marks", "-", "mason marks on it", _of_marks(_count)),
+    Attribute(
+        "mark",
+        None,
+        "name of its mason mark; of several, the first by the alphabet",
+        _of_marks(lambda said: func.min(said.c.sign)),
+    ),
+    Attribute("observations", "-", "observations of damage and change", _of_observations(_count)),
+    Attribute(
+        "severity",
+        "-",
+        "largest severity observed, from 0 (traces) to 4 (lost, or about to be)",
+        _of_observations(lambda said: func.max(said.c.severity)),
+    ),
+    Attribute("documents", "-", "documents, drawings and photographs that treat it", _documents),
+    Attribute(
+        "corrections", "-", "attributes of it that were corrected", _rows(Correction, "entity_id", now=False)
+    ),
+    Attribute("structures", "-", "structures that it is a member of", _rows(Membership, "entity_id")),
+)
+
+_RELATED = (
+    Attribute(
+        "bearers", "-", "stones that it rests on", _of_relations(_count, "subject_id", kind="rests_on")
+    ),
+    Attribute("borne", "-", "stones that rest on it", _of_relations(_count, "object_id", kind="rests_on")),
+    Attribute(
+        "neighbours", "-", "stones beside it", _of_relations(_count, "subject_id", "object_id", kind="beside")
+    ),
+    Attribute(
+        "bearing_area",
+        "m²",
+        "area on which it rests",
+        _of_relations(lambda rows: func.sum(rows.c.area), "subject_id", kind="rests_on"),
+    ),
+)
+
+_COMPUTED = (
+    _result("von_mises_max", "Pa", "largest Von Mises stress", _of_result("von_mises_max")),
+    _result("von_mises_mean", "Pa", "mean Von Mises stress", _of_result("von_mises_mean")),
+    _result("displacement_max", "m", "largest displacement", _of_result("displacement_max")),
+    _result("contact_force_max", "N", "largest contact force", _of_result("contact_force_max")),
+    *(_result(name, unit, meaning, _of_values(name)) for name, (unit, meaning) in STONE_VALUES.items()),
+    _result("fidelity", None, "fixed, rigid or deformable", _of_result("fidelity"), FIDELITIES),
+    _result(
+        "simplified_by",
+        "m",
+        "farthest that a corner of its solid was moved for the run",
+        lambda scope, run: scope.simplification(run).c.displacement_max,
+    ),
+    _result("outcome", None, "equilibrium, moving or collapsed", lambda scope, run: scope.run(run).c.outcome),
+    _result("scene", None, "name of the scene", lambda scope, run: scope.run(run).c.scene),
+    Attribute("run", "-", "number of the run that these are of", _of_result("run_id")),
+    Attribute("runs", "-", "runs that hold it", _rows(EntityResult, "entity_id", now=False)),
+)
+
+ATTRIBUTES: Mapping[str, Attribute] = {
+    one.name: one for one in (*_BUILT, *_MEASURED, *_KNOWN, *_RELATED, *_COMPUTED)
+}
+"""The attributes of every entity by name."""
 
 
-def with_attributes(statement: S) -> S:
-    """The select on entities, joined to the tables that the attributes' columns are in.
+def attributes_of(session: Session | None = None, kind: type[Entity] | None = None) -> dict[str, Attribute]:
+    """The attributes of every entity, and those that some kinds have of their own.
 
-    Each join finds at most one row by a primary key, so that it adds no rows, and SQLite leaves out those
-    that the rest of the statement does not use.
+    Parameters
+    ----------
+    session : of a database whose registered kinds count too
+    kind : only own attributes that an entity of this kind can have; None: those of all kinds
     """
-    result = aliased(EntityResult)
-    latest = (
-        select(func.max(result.run_id))
-        .where(result.entity_id == Entity.id)
-        .correlate(Entity)
-        .scalar_subquery()
-    )
-    return (
-        statement.outerjoin(
-            Measurement, and_(Measurement.entity_id == Entity.id, Measurement.superseded_id.is_(None))
-        )
-        .outerjoin(Survey, Survey.id == Measurement.survey_id)
-        .outerjoin(EntityResult, and_(EntityResult.entity_id == Entity.id, EntityResult.run_id == latest))
-    )
+    known = dict(ATTRIBUTES)
+    for name, attribute in own_attributes_of(session, kind).items():
+        known.setdefault(name, attribute)
+    return known
+
+
+def own_attributes_of(
+    session: Session | None = None, kind: type[Entity] | None = None
+) -> dict[str, Attribute]:
+    """The attributes that some kinds have of their own, by name; null for entities of other kinds."""
+    declared: dict[str, OwnAttribute] = {}
+    registered = _registered(session)
+    for cls in kinds().values():
+        if kind is None or issubclass(cls, kind):
+            for own in own_attributes(cls).values():
+                declared.setdefault(own.name, own)
+    stored: set[str] = set()
+    for name, attributes in registered.items():
+        stored.update(own.name for own in attributes)
+        if kind is None or issubclass(kinds().get(name, Entity), kind):
+            for own in attributes:
+                declared.setdefault(own.name, own)
+    found = (_own(own, name in stored) for name, own in declared.items())
+    return {attribute.name: attribute for attribute in found if attribute is not None}
+
+
+def _registered(session: Session | None) -> dict[str, list[OwnAttribute]]:
+    """What the registered kinds of a database have of their own, by the kind."""
+    if session is None:
+        return {}
+    rows = session.execute(select(RegisteredKind.name, RegisteredKind.attributes))
+    return {
+        kind: [OwnAttribute(name, unit, definition) for name, (unit, definition) in attributes.items()]
+        for kind, attributes in rows
+    }
+
+
+def _own(own: OwnAttribute, stored: bool) -> Attribute | None:
+    """The attribute, in its column, in the JSON of registered kinds, or in either; None: not of this database."""
+    column = own.name in Entity.__table__.c
+    if not (column or stored):
+        return None
+
+    def value(scope: Scope, run: int | None) -> ColumnElement[Any]:
+        told = scope.entity.c.own[own.name]
+        said: ColumnElement[Any] = told.as_string() if own.unit is None else told.as_float()
+        if not column:
+            return said
+        typed: ColumnElement[Any] = scope.entity.c[own.name]
+        return func.coalesce(typed, said) if stored else typed
+
+    return Attribute(own.name, own.unit, own.definition, value)

@@ -2,14 +2,17 @@
 
 ::
 
-    expression = conjunction { "or" conjunction }
+    expression  = conjunction { "or" conjunction }
     conjunction = negation { "and" negation }
-    negation   = "not" negation | "(" expression ")" | test
-    test       = attribute ( "=" | "==" | "!=" | "<" | "<=" | ">" | ">=" ) value
-               | attribute [ "not" ] "in" "(" value { "," value } ")"
-               | attribute [ "not" ] "like" value
-               | attribute "is" [ "not" ] "null"
-    value      = number | word | 'quoted' | "quoted"
+    negation    = "not" negation | "(" expression ")" | test
+    test        = attribute ( "=" | "==" | "!=" | "<" | "<=" | ">" | ">=" ) value
+                | attribute [ "not" ] "in" "(" value { "," value } ")"
+                | attribute [ "not" ] "like" value
+                | attribute "is" [ "not" ] "null"
+                | function "(" [ argument { "," argument } ] ")" [ "is" [ "not" ] "null" ]
+    argument    = value | expression
+    attribute   = name [ "@" run ]
+    value       = number | word | 'quoted' | "quoted"
 
 A word is anything without blanks, quotes, commas, parentheses and comparison signs, such as ``W05-03``. A
 quote within quotes is doubled. The words of the grammar (and, or, not, in, like, is, null) are the same in
@@ -20,12 +23,30 @@ from dataclasses import dataclass
 
 from archmodel.tokens import Token, complaint, named, tokenise
 
-__all__ = ["MAX_DEPTH", "All", "AnyOf", "Comparison", "IsNull", "Like", "Membership", "Node", "Not", "parse"]
+__all__ = [
+    "MAX_CALLS",
+    "MAX_DEPTH",
+    "All",
+    "AnyOf",
+    "Call",
+    "Comparison",
+    "IsNull",
+    "Like",
+    "Membership",
+    "Node",
+    "Not",
+    "parse",
+]
 
 MAX_DEPTH = 30
-"""Deepest nesting of parentheses and nots."""
+"""Deepest nesting of parentheses, nots and functions."""
+
+MAX_CALLS = 8
+"""Deepest nesting of functions alone: each is a select within a select."""
 
 OPERATORS = frozenset({"=", "==", "!=", "<", "<=", ">", ">="})
+
+VALUES = frozenset({"quoted", "word", "number"})
 
 
 @dataclass(frozen=True)
@@ -54,10 +75,18 @@ class Like:
 
 
 @dataclass(frozen=True)
-class IsNull:
-    """attribute is null."""
+class Call:
+    """function(arguments)."""
 
-    attribute: Token
+    function: Token
+    arguments: "tuple[Token | Node, ...]"
+
+
+@dataclass(frozen=True)
+class IsNull:
+    """attribute is null, or function(…) is null: it is neither true nor false."""
+
+    operand: Token | Call
 
 
 @dataclass(frozen=True)
@@ -81,7 +110,7 @@ class AnyOf:
     operands: "tuple[Node, ...]"
 
 
-Node = Comparison | Membership | Like | IsNull | Not | All | AnyOf
+Node = Comparison | Membership | Like | Call | IsNull | Not | All | AnyOf
 
 
 def parse(text: str) -> Node:
@@ -96,11 +125,12 @@ def parse(text: str) -> Node:
 
 
 class _Parser:
-    """Recursive descent over the tokens; `depth` counts parentheses and nots."""
+    """Recursive descent over the tokens; `depth` counts parentheses, nots and functions, `calls` functions."""
 
     def __init__(self, tokens: list[Token]) -> None:
         self.tokens = tokens
         self.index = 0
+        self.calls = 0
 
     @property
     def token(self) -> Token:
@@ -147,13 +177,16 @@ class _Parser:
             node = self.expression(depth + 1)
             self.close()
             return node
-        return self.test()
+        return self.test(depth)
 
-    def test(self) -> Node:
+    def test(self, depth: int) -> Node:
         attribute = self.take()
         if attribute.role != "word":
             example = "begin a test with an attribute, e.g. depth > 0.4"
             raise complaint(attribute, f"{named(attribute)} is not an attribute", example)
+        if self.taken("sign", "("):
+            call = self.call(attribute, depth)
+            return self.null(call) if self.taken("keyword", "is") else call
         if self.token.role == "sign" and self.token.text in OPERATORS:
             operator = self.take().text
             return Comparison(attribute, "=" if operator == "==" else operator, self.value())
@@ -163,17 +196,44 @@ class _Parser:
         node = self.membership_or_pattern(attribute)
         return Not(node) if negated else node
 
-    def null(self, attribute: Token) -> Node:
+    def call(self, function: Token, depth: int) -> Call:
+        """The arguments; the parenthesis has been taken."""
+        self.calls += 1
+        if self.calls > MAX_CALLS:
+            what = f"functions are nested more than {MAX_CALLS} deep"
+            raise complaint(function, what, "ask in several steps, e.g. by above(…)")
+        arguments: list[Token | Node] = []
+        if not self.taken("sign", ")"):
+            arguments.append(self.argument(depth))
+            while self.taken("sign", ","):
+                arguments.append(self.argument(depth))
+            self.close()
+        self.calls -= 1
+        return Call(function, tuple(arguments))
+
+    def argument(self, depth: int) -> Token | Node:
+        """A value if nothing but the next argument or the end follows it, else an expression."""
+        if self.token.role in VALUES and self.following in ((",", "sign"), (")", "sign")):
+            return self.take()
+        return self.expression(depth + 1)
+
+    @property
+    def following(self) -> tuple[str, str]:
+        """Text and role of the token after this one."""
+        token = self.tokens[min(self.index + 1, len(self.tokens) - 1)]
+        return token.text, token.role
+
+    def null(self, operand: Token | Call) -> Node:
         negated = self.taken("keyword", "not")
         if not self.taken("keyword", "null"):
             raise complaint(self.token, f"{named(self.token)} after is", "write is null or is not null")
-        return Not(IsNull(attribute)) if negated else IsNull(attribute)
+        return Not(IsNull(operand)) if negated else IsNull(operand)
 
     def membership_or_pattern(self, attribute: Token) -> Node:
         if self.taken("keyword", "like"):
             return Like(attribute, self.value())
         if not self.taken("keyword", "in"):
-            remedy = "write one of = != < <= > >=, in (…), like '…', is null"
+            remedy = "write one of = != < <= > >=, in (…), like '…', is null; or, of a function, (…)"
             raise complaint(self.token, f"{named(self.token)} after {attribute.text[:40]}", remedy)
         if not self.taken("sign", "("):
             raise complaint(self.token, f"{named(self.token)} after in", "write in (a, b, …)")
@@ -185,7 +245,7 @@ class _Parser:
 
     def value(self) -> Token:
         token = self.take()
-        if token.role not in ("quoted", "word", "number"):
+        if token.role not in VALUES:
             remedy = "write a number, a word, or a 'quoted text'"
             raise complaint(token, f"{named(token)} is not a value", remedy)
         return token

@@ -1,0 +1,130 @@
+"""What is said of an entity: by statements about it, else about the structures that it is a member of.
+
+Statements about a structure hold for its members and for the members of its parts, unless the entity, or a structure
+nearer to it, has a statement of its own.
+"""
+
+from sqlalchemy import (
+    CTE,
+    ColumnElement,
+    FromClause,
+    and_,
+    func,
+    literal,
+    not_,
+    or_,
+    select,
+)
+
+from archmodel.base import Base
+from archmodel.knowledge import Statement
+from archmodel.relations import Membership
+from archmodel.structures import Structure
+
+__all__ = ["alias_of", "held", "observations_of", "said_of", "said_of_structures", "statements_of"]
+
+MAX_LEVELS = 40
+"""Deepest structure within structures; ends the search where structures contain one another in a circle."""
+
+_SUBJECT = {"of_phase": "phase_id", "made_of": "material_id"}
+
+
+def alias_of(cls: type[Base]) -> FromClause:
+    """An alias of the table of a class: a query can need the same table at many places."""
+    return cls.__table__.alias()
+
+
+def held(rows: FromClause) -> ColumnElement[bool]:
+    """Only what is held to be true now."""
+    return rows.c.superseded_id.is_(None)
+
+
+def said_of_structures(*kinds: str) -> CTE:
+    """Held statements of some kinds about structures, for each structure and all parts of it.
+
+    Returns
+    -------
+    CTE
+        of structure_id, statement_id, distance (0: said of the structure itself)
+    """
+    said, part = alias_of(Statement), alias_of(Structure)
+    seeds = select(
+        said.c.structure_id.label("structure_id"),
+        said.c.id.label("statement_id"),
+        literal(0).label("distance"),
+    ).where(said.c.structure_id.is_not(None), said.c.kind.in_(kinds), held(said))
+    reach = seeds.cte(recursive=True)
+    return reach.union_all(
+        select(part.c.id, reach.c.statement_id, reach.c.distance + 1)
+        .join_from(reach, part, part.c.parent_id == reach.c.structure_id)
+        .where(held(part), reach.c.distance < MAX_LEVELS)
+    )
+
+
+def said_of(entity: FromClause, kind: str, of_structures: CTE) -> ColumnElement[int]:
+    """Number of the phase or the material that an entity is held to be of; the latest statement decides.
+
+    Parameters
+    ----------
+    kind : of statement: of_phase or made_of
+    of_structures : `said_of_structures` of that kind
+    """
+    own, inherited, member = alias_of(Statement), alias_of(Statement), alias_of(Membership)
+    subject = _SUBJECT[kind]
+    by_itself = (
+        select(own.c[subject])
+        .where(own.c.entity_id == entity.c.id, own.c.kind == kind, held(own))
+        .order_by(own.c.id.desc())
+        .limit(1)
+    )
+    by_structure = (
+        select(inherited.c[subject])
+        .select_from(member)
+        .join(of_structures, of_structures.c.structure_id == member.c.structure_id)
+        .join(inherited, inherited.c.id == of_structures.c.statement_id)
+        .where(member.c.entity_id == entity.c.id, held(member))
+        .order_by(of_structures.c.distance, inherited.c.id.desc())
+        .limit(1)
+    )
+    return func.coalesce(
+        by_itself.correlate(entity).scalar_subquery(), by_structure.correlate(entity).scalar_subquery()
+    )
+
+
+def statements_of(entity: FromClause, said: FromClause, of_structures: CTE) -> ColumnElement[bool]:
+    """The condition that a statement `said` is one of the entity, or of a structure that it is a member of."""
+    member = alias_of(Membership)
+    inherited = (
+        select(of_structures.c.statement_id)
+        .join(member, member.c.structure_id == of_structures.c.structure_id)
+        .where(member.c.entity_id == entity.c.id, held(member))
+    )
+    return and_(held(said), or_(said.c.entity_id == entity.c.id, said.c.id.in_(inherited.correlate(entity))))
+
+
+def observations_of(entity: FromClause, of_structures: CTE) -> tuple[FromClause, ColumnElement[bool]]:
+    """Observations that hold for an entity: its own, and those of its structures of types that it has none of.
+
+    Returns
+    -------
+    tuple
+        an alias of the statements, and the condition on it, which speaks of the `entity` around it
+    """
+    said, own = alias_of(Statement), alias_of(Statement)
+    same = (
+        select(own.c.id)
+        .where(
+            own.c.entity_id == entity.c.id,
+            own.c.kind == "observation",
+            own.c.type == said.c.type,
+            held(own),
+        )
+        .correlate(entity, said)
+        .exists()
+    )
+    seen = and_(
+        said.c.kind == "observation",
+        statements_of(entity, said, of_structures),
+        or_(said.c.entity_id.is_not(None), not_(same)),
+    )
+    return said, seen

@@ -1,0 +1,175 @@
+"""Where the names of a query are found: a table of entities, and tables joined to it only as they are asked for."""
+
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+from sqlalchemy import CTE, ColumnElement, FromClause, Select, and_, func, select
+from sqlalchemy.orm import Session
+
+from archmodel.base import Base
+from archmodel.entities import Entity
+from archmodel.knowledge import Material, MaterialProperty, Phase
+from archmodel.runs import EntityResult, Run
+from archmodel.said import alias_of, held, said_of, said_of_structures
+from archmodel.surveys import Measurement, Simplification, Survey
+from archmodel.tokens import Token, complaint
+
+__all__ = ["MAX_FUNCTIONS", "MAX_RUNS", "Context", "Scope", "StructureScope"]
+
+MAX_FUNCTIONS = 40
+"""Most functions in one query, those within functions and within canonical proportions included."""
+
+MAX_RUNS = 12
+"""Most runs in one query, each a table joined (SQLite joins at most 64)."""
+
+S = TypeVar("S", bound=Select[Any])
+
+
+@dataclass
+class Context:
+    """What the parts of one query share.
+
+    Attributes
+    ----------
+    session : of the database that is asked
+    run : the run of results whose run is not named; None: the latest that holds the entity
+    """
+
+    session: Session
+    run: int | None = None
+    _functions: int = field(default=0, init=False)
+    _shared: dict[Hashable, Any] = field(default_factory=dict, init=False)
+
+    def count_function(self, token: Token) -> None:
+        """Refuse one function too many."""
+        self._functions += 1
+        if self._functions > MAX_FUNCTIONS:
+            raise complaint(token, f"more than {MAX_FUNCTIONS} functions", "ask in several queries")
+
+    def once(self, key: Hashable, make: Callable[[], Any]) -> Any:
+        """What is looked up, or put together, at most once in a query."""
+        if key not in self._shared:
+            self._shared[key] = make()
+        return self._shared[key]
+
+    def said_of_structures(self, *kinds: str) -> CTE:
+        """Statements of some kinds about structures, for every structure that is a part of theirs."""
+        cte: CTE = self.once(("structures", kinds), lambda: said_of_structures(*kinds))
+        return cte
+
+
+@dataclass
+class Scope:
+    """The entities that an expression speaks of.
+
+    Every join finds at most one row for each entity, so that it adds no rows.
+
+    Attributes
+    ----------
+    context : of the whole query
+    entity : the table of entities, or an alias of it
+    """
+
+    context: Context
+    entity: FromClause = field(default_factory=lambda: Entity.__table__)
+    _joins: dict[Hashable, tuple[FromClause, ColumnElement[bool]]] = field(default_factory=dict, init=False)
+
+    @classmethod
+    def elsewhere(cls, context: Context) -> "Scope":
+        """Other entities than those that are spoken of."""
+        return cls(context, alias_of(Entity))
+
+    @property
+    def is_bare(self) -> bool:
+        """Whether nothing was joined."""
+        return not self._joins
+
+    def joined(self, statement: S) -> S:
+        """The select on entities with the joins that were asked for."""
+        for target, condition in self._joins.values():
+            statement = statement.outerjoin(target, condition)
+        return statement
+
+    def measurement(self) -> FromClause:
+        """The measurement that is held now."""
+        return self._join(
+            "measurement", Measurement, lambda rows: and_(rows.c.entity_id == self.entity.c.id, held(rows))
+        )
+
+    def survey(self) -> FromClause:
+        """The survey of that measurement."""
+        number = self.measurement().c.survey_id
+        return self._join("survey", Survey, lambda rows: rows.c.id == number)
+
+    def result(self, run: int | None = None) -> FromClause:
+        """What a run computed: that of this number, or of the query, or the latest that holds the entity."""
+        number = self.context.run if run is None else run
+        wanted = self._latest_run() if number is None else number
+        return self._join(
+            ("result", number),
+            EntityResult,
+            lambda rows: and_(rows.c.entity_id == self.entity.c.id, rows.c.run_id == wanted),
+        )
+
+    def run(self, run: int | None = None) -> FromClause:
+        """The run of that result."""
+        result = self.result(run)
+        return self._join(("run", id(result)), Run, lambda rows: rows.c.id == result.c.run_id)
+
+    def simplification(self, run: int | None = None) -> FromClause:
+        """The solid that stood for the entity in that run."""
+        result = self.result(run)
+        return self._join(
+            ("simplification", id(result)),
+            Simplification,
+            lambda rows: and_(rows.c.entity_id == self.entity.c.id, rows.c.run_id == result.c.run_id),
+        )
+
+    def phase(self) -> FromClause:
+        """The phase that it is held to be of."""
+        number = said_of(self.entity, "of_phase", self.context.said_of_structures("of_phase"))
+        return self._join("phase", Phase, lambda rows: rows.c.id == number)
+
+    def material(self) -> FromClause:
+        """The material that it is held to be of."""
+        number = said_of(self.entity, "made_of", self.context.said_of_structures("made_of"))
+        return self._join("material", Material, lambda rows: rows.c.id == number)
+
+    def material_property(self, name: str) -> FromClause:
+        """A property of that material."""
+        number = self.material().c.id
+        return self._join(
+            ("property", name),
+            MaterialProperty,
+            lambda rows: and_(rows.c.material_id == number, rows.c.name == name, held(rows)),
+        )
+
+    def _latest_run(self) -> ColumnElement[int]:
+        """Number of the latest run that holds the entity: one step in the primary key."""
+        result = alias_of(EntityResult)
+        latest = select(func.max(result.c.run_id)).where(result.c.entity_id == self.entity.c.id)
+        return latest.correlate(self.entity).scalar_subquery()
+
+    def _join(
+        self, key: Hashable, cls: type[Base], condition: Callable[[FromClause], ColumnElement[bool]]
+    ) -> FromClause:
+        """The alias that is joined under this key, joined now if it was not."""
+        if key not in self._joins:
+            rows = alias_of(cls)
+            self._joins[key] = rows, condition(rows)
+        return self._joins[key][0]
+
+
+@dataclass
+class StructureScope:
+    """The structures that an expression within ``member_of(…)`` speaks of.
+
+    Attributes
+    ----------
+    context : of the whole query
+    structure : an alias of the table of structures
+    """
+
+    context: Context
+    structure: FromClause
