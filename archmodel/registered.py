@@ -42,7 +42,8 @@ class RegisteredKind(Base):
 
 
 _CLASSES: dict[tuple[object, ...], type[Entity]] = {}
-"""Every class that was made in this process, by its parent and what defines it: a class cannot be unmade, but found again."""
+"""Every class that was made in this process, by its parent and what defines it: a class cannot be unmade, but it can be
+found again."""
 
 
 def declare_registered(session: Session) -> None:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from datetime import date
 from difflib import get_close_matches
 from enum import Enum
 from math import isfinite
@@ -39,6 +40,8 @@ class Kind(Enum):
     ROWS = "a list of lists of three numbers"
     HISTORY = "a number or a table { time = […], value = […] }"
     VECTOR_HISTORY = "a list of three numbers or a table { time = […], value = [[…], …] }"
+    DATE = "a date without quotes, e.g. 2024-05-31"
+    TABLE = "a table { name = value, … }"
 
 
 @dataclass(frozen=True)
@@ -180,6 +183,10 @@ def _typed(value: object, kind: Kind) -> object | None:
         case Kind.HISTORY | Kind.VECTOR_HISTORY:
             constant = Kind.NUMBER if kind is Kind.HISTORY else Kind.VECTOR
             return value if isinstance(value, dict) else _typed(value, constant)
+        case Kind.DATE:
+            return value if type(value) is date else None
+        case Kind.TABLE:
+            return value if isinstance(value, dict) else None
 
 
 def _list_of(value: object, typed: Callable[[object], object | None]) -> tuple[object, ...] | None:

@@ -5,6 +5,7 @@ from typing import Annotated
 import typer
 
 from moma.cli.entities import query, show
+from moma.cli.knowledge import record
 from moma.cli.runs import runs
 from moma.cli.scenes import check, run
 from moma.cli.surveys import ingest, survey_report
@@ -43,5 +44,5 @@ def _common(
 
 
 # in the order in which they are mostly used
-for _command in (ingest, survey_report, query, show, check, run, runs):
+for _command in (ingest, survey_report, record, query, show, check, run, runs):
     app.command()(_command)

@@ -1,0 +1,36 @@
+"""The command that puts knowledge into the database."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from moma.cli.options import DEFAULT_DB, Db, Json, Verbose
+from moma.console import reporting
+
+__all__ = ["record"]
+
+
+@reporting
+def record(
+    files: Annotated[
+        list[Path], typer.Argument(metavar="FILE.toml…", help="Files of knowledge; see docs/knowledge.md.")
+    ],
+    author: Annotated[
+        str | None, typer.Option("--author", metavar="NAME", help="Who says it; else the files say so.")
+    ] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Say what would be recorded, and change nothing.")
+    ] = False,
+    db: Db = DEFAULT_DB,
+    json: Json = False,
+    verbose: Verbose = False,
+) -> None:
+    """Record knowledge of a building: materials, phases, structures, marks, observations, corrections, …"""
+    from moma.listing import as_json
+    from moma.telling_records import record_lines
+    from pipelines.record import record as put_in
+
+    report = put_in(files, db, author=author, dry_run=dry_run)
+    print(as_json(asdict(report)) if json else "\n".join(record_lines(report, verbose)))

@@ -1,0 +1,39 @@
+"""What recording knowledge has done, in a few lines for a person."""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from archmodel.recording import Outcome
+    from pipelines.record import RecordReport
+
+__all__ = ["record_lines"]
+
+
+def record_lines(report: "RecordReport", verbose: bool) -> list[str]:
+    """What became of each file; with `verbose`, of each of its arrays of tables."""
+    lines = []
+    would = " (dry run: nothing was kept)" if report.dry_run else ""
+    for file in report.files:
+        if file.recorded_before is not None:
+            lines.append(f"{file.path}: recorded before, as entry {file.recorded_before}; nothing changed")
+            continue
+        if not file.entries:
+            lines.append(f"{file.path}: all of it was known; nothing changed")
+            continue
+        numbers = ", ".join(map(str, file.entries))
+        noun = "entry" if len(file.entries) == 1 else "entries"
+        lines.append(f"{file.path}: {_counts(file.outcome)}, as {noun} {numbers}{would}")
+        if verbose or report.dry_run:
+            lines += [f"  {name}: {_counts(outcome)}" for name, outcome in file.tables.items()]
+    return lines
+
+
+def _counts(outcome: "Outcome") -> str:
+    """The counts that are not zero."""
+    counts = {
+        "new": outcome.new,
+        "replaced": outcome.replaced,
+        "withdrawn": outcome.withdrawn,
+        "unchanged": outcome.unchanged,
+    }
+    return ", ".join(f"{count} {name}" for name, count in counts.items() if count) or "nothing"
