@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from moma.errors import GeometryError
+from survey._kernels_extrusion import corner_deviations
 from survey.depth import Depth
 from survey.faces import Face
 from survey.records import Extrusion
@@ -118,26 +119,24 @@ def _vertex_sigma(face: Face, depth: Depth, extrusion: Extrusion, hidden: Array)
     depth · θ as the normal turns.
     """
     fit, tail, count = face.fit, extrusion.tail, len(face.outline)
-    square = fit.axes**2
-    corners = face.record.vertex_sigmas[list(face.corner_of)]
-    measured = corners[:, None] ** 2 * square.sum(axis=0)
-    # the tail of a corner also moves with the mean of all of them
-    own, others = tail + (1.0 - tail) / count, (1.0 - tail) / count
-    tails = own**2 * measured + others**2 * (measured.sum(axis=0) - measured)
-    places = (np.concatenate([face.outline, hidden]) - fit.centroid) @ fit.axes.T
-    turned = np.zeros(2 * count)
-    if extrusion.direction is None:
-        turned[count:] = depth.value
-    else:  # the height of a tail is that of the visible place it lies behind
-        places[count:] = (
-            hidden - depth.value * _direction(fit.normal, extrusion) - fit.centroid
-        ) @ fit.axes.T
-    variance = np.concatenate([measured, tails])
-    variance += fit.covariance[2, 2] * fit.normal**2
-    for k in range(2):
-        moved = places[:, k, None] * fit.normal + turned[:, None] * fit.axes[k]
-        variance += fit.covariance[k, k] * moved**2
-    depth_variance = np.nan if depth.sigma is None else depth.sigma**2
-    variance[count:] += depth_variance * _direction(fit.normal, extrusion) ** 2
-    out: Array = np.sqrt(variance)
+    direction = _direction(fit.normal, extrusion)
+    square_to_face = extrusion.direction is None
+    out: Array = corner_deviations(
+        face.outline,
+        hidden,
+        # the height of a slanting tail is that of the visible place it lies behind
+        np.zeros(3) if square_to_face else depth.value * direction,
+        square_to_face,
+        face.record.vertex_sigmas[list(face.corner_of)],
+        fit.normal,
+        fit.centroid,
+        fit.axes,
+        fit.covariance,
+        # the tail of a corner also moves with the mean of all of them
+        tail + (1.0 - tail) / count,
+        (1.0 - tail) / count,
+        np.nan if depth.sigma is None else depth.sigma**2,
+        depth.value,
+        direction,
+    )
     return out

@@ -183,3 +183,37 @@ def test_far_from_the_origin_nothing_is_lost():
     near, moved = extrude(face_of(), deep()), extrude(outline_face(record, OBSERVER + far), deep())
     np.testing.assert_allclose(moved.solid.vertices - far, near.solid.vertices, atol=3e-9)
     np.testing.assert_allclose(moved.vertex_sigma, near.vertex_sigma, rtol=1e-7)
+
+
+def twin_of(block):
+    """What the kernel computes, in matrices."""
+    face, fit, tail, count = block.face, block.face.fit, block.extrusion.tail, len(block.face.outline)
+    hidden, direction = block.solid.vertices[count:], block.extrusion.direction
+    into = -fit.normal if direction is None else direction / np.linalg.norm(direction)
+    corners = face.record.vertex_sigmas[list(face.corner_of)]
+    measured = corners[:, None] ** 2 * (fit.axes**2).sum(axis=0)
+    own, others = tail + (1.0 - tail) / count, (1.0 - tail) / count
+    tails = own**2 * measured + others**2 * (measured.sum(axis=0) - measured)
+    behind = hidden if direction is None else hidden - block.depth.value * into
+    places = (np.concatenate([face.outline, behind]) - fit.centroid) @ fit.axes.T
+    turned = np.zeros(2 * count)
+    turned[count:] = block.depth.value if direction is None else 0.0
+    variance = np.concatenate([measured, tails]) + fit.covariance[2, 2] * fit.normal**2
+    for k in range(2):
+        moved = places[:, k, None] * fit.normal + turned[:, None] * fit.axes[k]
+        variance += fit.covariance[k, k] * moved**2
+    variance[count:] += block.depth.sigma**2 * into**2
+    return np.sqrt(variance)
+
+
+@pytest.mark.parametrize("tail", [1.0, 0.6])
+@pytest.mark.parametrize("direction", [None, (0.3, 1.0, -0.2), (-0.1, 2.0, 0.4)])
+@given(seed=st.integers(0, 2**32 - 1))
+@settings(deadline=None, max_examples=20)
+def test_the_kernel_of_deviations_is_its_twin(direction, tail, seed):
+    rng = np.random.default_rng(seed)
+    corners = CORNERS + rng.normal(0.0, 0.02, CORNERS.shape) * [1.0, 0.1, 1.0]
+    sigmas = rng.uniform(1e-3, 5e-3, len(corners))
+    towards = None if direction is None else np.array(direction)
+    block = extrude(face_of(corners, sigmas=sigmas), deep(), Extrusion(towards, tail))
+    np.testing.assert_allclose(block.vertex_sigma, twin_of(block), rtol=1e-12)
