@@ -9,6 +9,7 @@
     ├── SurveyError                exit 1   the contents of a survey file
     ├── GeometryError              exit 1   stones that cannot be built or closed
     ├── DatabaseError              exit 1   the entity database
+    ├── ExchangeError              exit 1   a building as one document
     ├── MeshError                  exit 1   a stone that cannot be meshed
     ├── SolverError                exit 1   a step that was not solved
     └── MissingLibraryError        exit 1   a shared library of the system is absent
@@ -20,6 +21,7 @@ from typing import Self
 
 __all__ = [
     "DatabaseError",
+    "ExchangeError",
     "GeometryError",
     "MeshError",
     "MissingLibraryError",
@@ -78,6 +80,10 @@ class GeometryError(MomaError):
 
 class DatabaseError(MomaError):
     """The entity database cannot be opened, read or written."""
+
+
+class ExchangeError(MomaError):
+    """A document that holds a whole building cannot be written, or is not what it should be."""
 
 
 class MeshError(MomaError):
