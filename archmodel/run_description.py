@@ -63,16 +63,13 @@ def describe_run(session: Session, number: int, count: int = 5) -> dict[str, Any
         if there is no such run; names those that there are
     """
     run = _run(session, number)
-    stones: dict[str, int] = dict(
-        session.execute(
-            select(EntityResult.fidelity, func.count())
-            .where(EntityResult.run_id == number)
-            .group_by(EntityResult.fidelity)
-            .order_by(EntityResult.fidelity)
-        )
-        .tuples()
-        .all()
+    counted = session.execute(
+        select(EntityResult.fidelity, func.count().label("stones"))
+        .where(EntityResult.run_id == number)
+        .group_by(EntityResult.fidelity)
+        .order_by(EntityResult.fidelity)
     )
+    stones = {row.fidelity: row.stones for row in counted}
     return {
         "run": run.id,
         "scene": run.scene,

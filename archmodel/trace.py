@@ -15,6 +15,8 @@ from moma.errors import UsageError
 
 __all__ = ["Trace", "trace"]
 
+_TOO_LARGE = 2**31
+
 
 @dataclass(frozen=True)
 class Trace:
@@ -65,7 +67,8 @@ def trace(session: Session, code: str, run: int | None = None) -> Trace:
     if entity is None:
         raise no_such_code(session, code, Entity.code)
     own = select(EntityResult).where(EntityResult.entity_id == entity.id)
-    wanted = own if run is None else own.where(EntityResult.run_id == run)
+    # no run has a number that the column cannot hold
+    wanted = own if run is None else own.where(EntityResult.run_id == (run if abs(run) < _TOO_LARGE else 0))
     result = session.scalar(
         wanted.options(joinedload(EntityResult.run).joinedload(Run.entry))
         .order_by(EntityResult.run_id.desc())

@@ -1,0 +1,117 @@
+"""Runs in a list, in full and beside each other."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from sqlalchemy.orm import Session
+
+from archmodel.database import Database
+from archmodel.run_description import compare_runs, describe_run, list_runs
+from archmodel.run_records import ErrorMeasures, JointArrays
+from archmodel.store_runs import store_run
+from moma.errors import UsageError
+from tests.archmodel.stones import run_record
+
+NAN = float("nan")
+
+
+def joints(opening: list[float], kern: list[float], friction_use: list[float]) -> JointArrays:
+    """Joints in the order V1 on V2, V2 on V3, V1 on V3, equal but for what is given."""
+    ones = np.ones(3)
+    return JointArrays(
+        stones=np.array([[0, 1], [1, 2], [0, 2]]),
+        centroid=np.zeros((3, 3)),
+        normal=np.tile([0.0, 0.0, 1.0], (3, 1)),
+        area=ones,
+        parted=ones < 0,
+        force_normal=ones,
+        force_shear=ones,
+        pressure_mean=ones,
+        pressure_max=ones,
+        kern=np.array(kern),
+        friction_use=np.array(friction_use),
+        slipping=ones,
+        open=ones,
+        gap=ones,
+        opening=np.array(opening),
+        sliding=ones,
+    )
+
+
+@pytest.fixture
+def session(filled: Database) -> Iterator[Session]:
+    """Two runs: in the second, V1 is stressed twice as much, V3 is rigid, and R1 takes part instead of W01-01."""
+    first = replace(
+        run_record({"V1": 1e5, "V2": 3e5, "V3": 2e5, "W01-01": 5e4}),
+        settings={"time": {"step": 0.01, "theta": 1.0}},
+        errors=ErrorMeasures(natural_map=1e-7),
+        joints=joints([1e-3, 0.0, 2e-3], [0.5, 1.5, NAN], [0.2, NAN, 0.9]),
+        wall=12.5,
+    )
+    second = replace(
+        run_record({"V1": 2e5, "V2": 3.1e5, "V3": None, "R1": None}, scene="again"),
+        outcome="moving",
+        settings={"time": {"step": 0.02, "theta": 1.0}},
+    )
+    with filled.session() as writing:
+        store_run(writing, first)
+        store_run(writing, second)
+    with filled.session(read_only=True) as reading:
+        yield reading
+
+
+def test_the_list_has_every_run_with_its_errors_and_its_stones(session: Session) -> None:
+    one, two = list_runs(session)
+    assert (one["run"], one["scene"], one["outcome"], one["stones"]) == (1, "window", "equilibrium", 4)
+    assert (one["natural_map"], one["balance"], one["wall"]) == (1e-7, None, 12.5)
+    assert (two["run"], two["scene"], two["outcome"], two["stones"]) == (2, "again", "moving", 4)
+
+
+def test_a_run_in_full_names_the_worst_stones_and_joints(session: Session) -> None:
+    told = describe_run(session, 1)
+    assert [row["code"] for row in told["largest_stresses"]] == ["V2", "V3", "V1", "W01-01"]
+    pairs = {
+        name: [(row["first"], row["second"]) for row in told[name]]
+        for name in ("largest_openings", "least_centred", "most_used_friction")
+    }
+    assert pairs == {
+        "largest_openings": [("V1", "V3"), ("V1", "V2")],
+        "least_centred": [("V2", "V3")],
+        "most_used_friction": [("V1", "V3"), ("V1", "V2")],
+    }
+    assert told["fidelities"] == {"deformable": 4}
+    assert describe_run(session, 2)["fidelities"] == {"deformable": 2, "rigid": 2}
+    assert told["settings"]["time"]["step"] == 0.01
+    assert told["errors"]["natural_map"] == 1e-7
+    assert [row["code"] for row in describe_run(session, 1, count=1)["largest_stresses"]] == ["V2"]
+
+
+def test_two_runs_differ_by_settings_stones_and_values(session: Session) -> None:
+    told = compare_runs(session, 2, 1)
+    assert told["settings"] == {"time.step": [0.02, 0.01]}
+    assert told["outcomes"] == ["moving", "equilibrium"]
+    assert (told["only_in_run"], told["only_against"]) == (1, 1)
+    # V3 has no stress in one of them, so that there is nothing to compare
+    changes = [(row["code"], row["run"], row["against"]) for row in told["stresses"]]
+    assert changes == [("V1", 2e5, 1e5), ("V2", 3.1e5, 3e5)]
+    assert [row["change"] for row in told["stresses"]] == [2e5 - 1e5, 3.1e5 - 3e5]
+    assert [row["change"] for row in compare_runs(session, 1, 2)["stresses"]] == [1e5 - 2e5, 3e5 - 3.1e5]
+    assert told["displacements"] == []
+    assert compare_runs(session, 1, 1)["stresses"] == []
+
+
+@pytest.mark.parametrize("number", [3, 0, -1, 10**30])
+def test_a_run_that_is_not_there_is_an_error_that_names_those_that_are(session: Session, number: int) -> None:
+    with pytest.raises(UsageError, match=f"there is no run {number}; there are 1, 2$"):
+        describe_run(session, number)
+    with pytest.raises(UsageError, match=f"there is no run {number}"):
+        compare_runs(session, 1, number)
+
+
+def test_before_the_first_run_there_is_none(filled: Database) -> None:
+    with filled.session(read_only=True) as reading:
+        assert list_runs(reading) == []
+        with pytest.raises(UsageError, match="there is no run 1; there is none yet"):
+            describe_run(reading, 1)
