@@ -1,0 +1,179 @@
+"""Stones out of the database as columns: what a search among a hundred thousand of them needs, and no objects."""
+
+import json
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import ColumnElement, Executable, LargeBinary, Text, cast, func, or_, select, type_coerce
+from sqlalchemy.orm import InstrumentedAttribute, Session
+
+from archmodel.bulk import batches
+from archmodel.entities import Entity
+from archmodel.surveys import Measurement
+
+__all__ = ["StoneColumns", "id_conditions", "joined", "near_box", "stone_columns", "stone_shapes"]
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Faces = tuple[tuple[int, ...], ...]
+
+_AT_ONCE = 2000  # rows that are fetched together
+_RANGES = 200  # ranges of numbers in one condition, far below SQLite's limit of parameters
+
+
+@dataclass(frozen=True)
+class StoneColumns:
+    """What is known of many stones, in the order of their numbers.
+
+    Attributes
+    ----------
+    ids : (n,) their primary keys, growing
+    kinds, zones, courses : (n,) as in Entity
+    centres : (n, 3) centroids of their solids; NaN where not known [m]
+    normals : (n, 3) outward unit normals of their faces; NaN where nothing was measured [-]
+    """
+
+    ids: Indices
+    kinds: Sequence[str]
+    zones: Sequence[str | None]
+    courses: Sequence[int | None]
+    centres: Array
+    normals: Array
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+
+def stone_columns(session: Session, *conditions: ColumnElement[bool]) -> StoneColumns:
+    """The stones for which the conditions on Entity hold."""
+    statement = (
+        select(
+            Entity.id,
+            Entity.kind,
+            Entity.zone,
+            Entity.course,
+            Entity.x,
+            Entity.y,
+            Entity.z,
+            type_coerce(Measurement.normal, LargeBinary),
+        )
+        .outerjoin(Measurement, (Measurement.entity_id == Entity.id) & Measurement.superseded_id.is_(None))
+        .where(*conditions)
+        .order_by(Entity.id)
+    )
+    rows = list(_rows(session, statement))
+    ids, kinds, zones, courses, x, y, z, normals = zip(*rows, strict=True) if rows else ((),) * 8
+    unknown = np.full(3, np.nan).tobytes()
+    packed = b"".join(unknown if one is None else one for one in normals)
+    return StoneColumns(
+        ids=np.array(ids, dtype=np.int64),
+        kinds=kinds,
+        zones=zones,
+        courses=courses,
+        centres=np.array([x, y, z], dtype=np.float64).T.reshape(-1, 3),
+        normals=np.frombuffer(packed, dtype="<f8").reshape(-1, 3),
+    )
+
+
+def joined(parts: Sequence[StoneColumns]) -> StoneColumns:
+    """Stones of several columns, each once, in the order of their numbers."""
+    ids = np.concatenate([np.zeros(0, np.int64), *(part.ids for part in parts)])
+    ids, order = np.unique(ids, return_index=True)
+    kinds = [kind for part in parts for kind in part.kinds]
+    zones = [zone for part in parts for zone in part.zones]
+    courses = [course for part in parts for course in part.courses]
+    return StoneColumns(
+        ids,
+        [kinds[i] for i in order.tolist()],
+        [zones[i] for i in order.tolist()],
+        [courses[i] for i in order.tolist()],
+        np.concatenate([np.zeros((0, 3)), *(part.centres for part in parts)])[order],
+        np.concatenate([np.zeros((0, 3)), *(part.normals for part in parts)])[order],
+    )
+
+
+def stone_shapes(session: Session, *conditions: ColumnElement[bool]) -> Iterator[tuple[int, Array, Faces]]:
+    """Number, vertices (nv, 3) [m] and faces of the solid of each measured stone for which the conditions hold."""
+    statement = (
+        select(
+            Entity.id,
+            type_coerce(Measurement.solid_vertices, LargeBinary),
+            cast(Measurement.solid_faces, Text),
+        )
+        .join(Measurement, (Measurement.entity_id == Entity.id) & Measurement.superseded_id.is_(None))
+        .where(*conditions)
+        .order_by(Entity.id)
+    )
+    for number, vertices, faces in _rows(session, statement):
+        yield number, np.frombuffer(vertices, dtype="<f8").reshape(-1, 3), _faces(faces)
+
+
+@lru_cache(maxsize=1024)
+def _faces(text: str) -> Faces:
+    """The faces that a JSON text says; most solids have the same."""
+    return tuple(tuple(face) for face in json.loads(text))
+
+
+def _rows(session: Session, statement: Executable) -> Iterator[Any]:
+    result = session.execute(statement, execution_options={"yield_per": _AT_ONCE})
+    for part in result.partitions():
+        yield from part
+
+
+def id_conditions(
+    column: InstrumentedAttribute[int], numbers: Collection[int]
+) -> Iterator[ColumnElement[bool]]:
+    """Conditions that together hold for these numbers, each number in one: few where they follow one another."""
+    for some in _chunks(_runs(sorted(set(numbers)))):
+        yield or_(*(column.between(low, high) for low, high in some))
+
+
+def _runs(numbers: Sequence[int]) -> Iterator[tuple[int, int]]:
+    """First and last of numbers without a gap between them."""
+    if not numbers:
+        return
+    first = last = numbers[0]
+    for number in numbers[1:]:
+        if number != last + 1:
+            yield first, last
+            first = number
+        last = number
+    yield first, last
+
+
+def _chunks(runs: Iterable[tuple[int, int]]) -> Iterator[list[tuple[int, int]]]:
+    waiting: list[tuple[int, int]] = []
+    for batch in batches(runs):
+        for one in batch:
+            waiting.append(one)
+            if len(waiting) == _RANGES:
+                yield waiting
+                waiting = []
+    if waiting:
+        yield waiting
+
+
+def near_box(low: Array, high: Array, reach: float) -> ColumnElement[bool]:
+    """The condition that a stone may come within a distance of a box.
+
+    No corner of a solid is farther from its centroid than its length, height and depth together.
+
+    Parameters
+    ----------
+    low, high : (3,) corners of the box [m]
+    reach : the distance [m]
+    """
+    size = (
+        func.coalesce(Entity.length, 0.0)
+        + func.coalesce(Entity.height, 0.0)
+        + func.coalesce(Entity.depth, 0.0)
+        + reach
+    )
+    out: ColumnElement[bool] = Entity.x.is_not(None)
+    for place, bottom, top in zip((Entity.x, Entity.y, Entity.z), low.tolist(), high.tolist(), strict=True):
+        out = out & (place + size >= bottom) & (place - size <= top)
+    return out

@@ -1,0 +1,201 @@
+"""How stones stand to one another: from the solids in the database to relations, courses and arches in it."""
+
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import asdict, dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import ColumnElement, and_, func, or_, select
+from sqlalchemy.orm import Session
+
+from archmodel.arches import arch_parts, find_arches
+from archmodel.bulk import batches
+from archmodel.composing import parts_of_survey, store_parts
+from archmodel.computed_values import arch_values, give_values, tail_lengths
+from archmodel.entities import Entity
+from archmodel.relating import Contacts, FoundRelations, RelationSettings, StonesOf, relations_between
+from archmodel.relation_store import Act, Changes, store_relations
+from archmodel.stone_columns import StoneColumns, id_conditions, joined, near_box, stone_columns, stone_shapes
+from survey.adjacency import Polyhedra, PolyhedraBuilder, find_touching
+
+__all__ = ["KnownSolids", "RelationReport", "relate"]
+
+Array = NDArray[np.float64]
+Faces = tuple[tuple[int, ...], ...]
+
+
+@dataclass
+class KnownSolids:
+    """Solids that the caller has at hand, so that they are not read back; to be filled stone by stone."""
+
+    ids: list[int] = field(default_factory=list)
+    _builder: PolyhedraBuilder = field(default_factory=PolyhedraBuilder)
+
+    def add(self, entity: int, vertices: Array, faces: Faces) -> None:
+        """The solid of one entity, by its number: vertices (nv, 3) [m] and faces."""
+        self.ids.append(entity)
+        self._builder.add(vertices, faces)
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    def build(self) -> Polyhedra:
+        """All solids, in the order of `ids`."""
+        return self._builder.build()
+
+    def box(self, entities: Collection[int]) -> tuple[Array, Array] | None:
+        """Lower and upper corner (3,) of the box around some of the solids; None if none of them is here [m]."""
+        shapes, wanted = self.build(), np.isin(np.array(self.ids, dtype=np.int64), list(entities))
+        if not wanted.any():
+            return None
+        counts = np.diff(shapes.solid_starts)
+        faces = np.repeat(wanted, counts)
+        corners = shapes.corners[np.repeat(faces, np.diff(shapes.face_starts))]
+        return shapes.vertices[corners].min(axis=0), shapes.vertices[corners].max(axis=0)
+
+
+@dataclass(frozen=True)
+class RelationReport:
+    """What became of the computed relations of a database.
+
+    Attributes
+    ----------
+    stones : how many were looked at
+    relations : changes by kind of relation
+    structures, memberships : changes of zones, courses and arches, and of who belongs to them
+    values : how many attributes of stones were filled in or corrected
+    entry : number of the act of recording; None if nothing changed
+    """
+
+    stones: int
+    relations: Mapping[str, Changes]
+    structures: Changes
+    memberships: Changes
+    values: int
+    entry: int | None
+
+
+def relate(
+    session: Session,
+    settings: RelationSettings | None = None,
+    only: Collection[int] | None = None,
+    solids: KnownSolids | None = None,
+) -> RelationReport:
+    """Compute how stones stand to one another, and keep what follows: relations, courses, arches, tails of headers.
+
+    What is found again stays as it is; what is no longer found is superseded; what was declared is left alone.
+    A second time, nothing changes.
+
+    Parameters
+    ----------
+    session : a writing session
+    settings : tolerances; None: RelationSettings()
+    only : numbers of entities; their relations alone are computed, with all stones near them. None: of all
+    solids : that are at hand; those that are missing are read from the database, and added
+    """
+    settings = settings or RelationSettings()
+    act = Act(session, "the solids of the stones", asdict(settings))
+    session.flush()
+    chosen = None if only is None else _chosen(session, only)
+    stones, shapes = _stones(session, settings, chosen, solids or KnownSolids())
+    found, ids = _relations(stones, shapes, settings, chosen)
+    relations = store_relations(session, ids, found, act, chosen)
+    courses = stones if chosen is None else _whole_courses(session, stones, chosen)
+    changes = [
+        store_parts(session, parts_of_survey(courses), act, kinds=("structure", "course"), among=chosen)
+    ]
+    near = None if chosen is None else chosen.union(ids[found.subject].tolist(), ids[found.object].tolist())
+    tails = {number: {"tail_length": tail} for number, tail in tail_lengths(session, near).items()}
+    values = give_values(session, tails, act)
+    arches = find_arches(session)
+    changes.append(store_parts(session, arch_parts(session, arches), act, kinds=("arch",)))
+    values += give_values(session, arch_values(arches), act)
+    session.expire_all()  # objects that were loaded before have the values of before
+    return RelationReport(
+        stones=len(ids),
+        relations=relations,
+        structures=changes[0][0] + changes[1][0],
+        memberships=changes[0][1] + changes[1][1],
+        values=values,
+        entry=act.made,
+    )
+
+
+def _chosen(session: Session, only: Collection[int]) -> set[int] | None:
+    """The entities of which the relations are computed; None if they are all that there are."""
+    chosen = set(only)
+    count = session.scalar(select(func.count()).select_from(Entity))
+    return None if count == len(chosen) else chosen
+
+
+def _stones(
+    session: Session, settings: RelationSettings, only: set[int] | None, solids: KnownSolids
+) -> tuple[StoneColumns, KnownSolids]:
+    """All stones, or those that come near the chosen ones, and their solids."""
+    if only is None:
+        stones = stone_columns(session)
+    else:
+        _read_missing(session, only, solids)
+        box = solids.box(only)
+        if box is None:
+            return stone_columns(session, Entity.id.is_(None)), solids
+        stones = stone_columns(session, near_box(*box, settings.width))
+    _read_missing(session, None if only is None and not len(solids) else set(stones.ids.tolist()), solids)
+    return stones, solids
+
+
+def _read_missing(session: Session, wanted: set[int] | None, solids: KnownSolids) -> None:
+    """Add the solids of some entities, or of all, that are not at hand."""
+    conditions: Iterable[ColumnElement[bool]] = [Entity.id.is_not(None)]
+    if wanted is not None:
+        conditions = id_conditions(Entity.id, wanted.difference(solids.ids))
+    for condition in conditions:
+        for number, vertices, faces in stone_shapes(session, condition):
+            solids.add(number, vertices, faces)
+
+
+def _relations(
+    stones: StoneColumns, solids: KnownSolids, settings: RelationSettings, only: set[int] | None
+) -> tuple[FoundRelations, NDArray[np.int64]]:
+    """Relations among the stones, and the numbers of the entities that they speak of, growing."""
+    ids = np.array(solids.ids, dtype=np.int64)
+    wanted = np.isin(ids, stones.ids)
+    among = wanted if only is None else wanted & np.isin(ids, list(only))
+    touching = find_touching(
+        solids.build(),
+        settings.width,
+        settings.angle,
+        overlap=settings.overlap,
+        share=settings.share,
+        among=among,
+    )
+    order = np.argsort(ids)
+    rank = np.empty(len(ids), np.int64)
+    rank[order] = np.arange(len(ids))
+    ids = ids[order]
+    held = wanted[touching.pairs].all(axis=1)
+    contacts = Contacts(
+        rank[touching.pairs[held]],
+        touching.area[held],
+        touching.gap[held],
+        touching.normal[held],
+        touching.centroid[held],
+    )
+    place = np.minimum(np.searchsorted(stones.ids, ids), max(len(stones) - 1, 0))
+    kinds = [stones.kinds[i] for i in place.tolist()]
+    facts = StonesOf(kinds, stones.normals[place])
+    return relations_between(contacts, facts, settings), ids
+
+
+def _whole_courses(session: Session, stones: StoneColumns, only: set[int]) -> StoneColumns:
+    """All stones of the zones and courses that the chosen ones belong to."""
+    chosen = np.isin(stones.ids, list(only))
+    places = {(stones.zones[i], stones.courses[i]) for i in np.flatnonzero(chosen).tolist()}
+    places.discard((None, None))
+    parts = [
+        stone_columns(
+            session, or_(*(and_(Entity.zone == zone, Entity.course == course) for zone, course in some))
+        )
+        for some in batches(sorted(places, key=lambda place: (place[0] or "", place[1] or 0)))
+    ]
+    return joined(parts)

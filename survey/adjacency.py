@@ -1,0 +1,207 @@
+"""Which solids touch: faces of two stones that face each other across an open joint and overlap.
+
+Two faces touch if their normals are opposite but for `angle`, if what they share, seen square to the joint
+between them, is more than `share` of the smaller face, and if the mean distance of their planes over that shared
+area is at most `width`; surveyed stones may also overlap a little. The joint's normal is the mean of
+the two faces' normals; nothing is assumed of a wall or of what is up.
+
+Between two planes the distance is linear along the joint, so that its mean over an area is its value at the
+area's centroid: area and centroid of what two polygons share say all.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import chain
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from survey._kernels_adjacency import (
+    GROUPS,
+    count_near,
+    face_planes,
+    list_near,
+    morton_codes,
+    touching_faces,
+)
+
+__all__ = ["Polyhedra", "PolyhedraBuilder", "Touching", "find_touching"]
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+_PAIRS = 1 << 17  # neighbours that are looked at in one go, so that memory does not grow with the crowd
+
+
+@dataclass(frozen=True)
+class Polyhedra:
+    """Many closed solids with planar faces, one after the other.
+
+    Attributes
+    ----------
+    vertices : (nv, 3) of all solids [m]
+    corners : (nc,) indices into `vertices`, face by face, counter-clockwise seen from outside
+    face_starts : (nf + 1,) where the corners of each face begin, and where those of the last one end
+    solid_starts : (n + 1,) where the faces of each solid begin, and where those of the last one end
+    """
+
+    vertices: Array
+    corners: Indices
+    face_starts: Indices
+    solid_starts: Indices
+
+    def __len__(self) -> int:
+        return len(self.solid_starts) - 1
+
+    @classmethod
+    def gather(cls, solids: Iterable[tuple[Array, Sequence[Sequence[int]]]]) -> Self:
+        """Put solids, each as its vertices (nv, 3) and its faces, one after the other."""
+        builder = PolyhedraBuilder()
+        for vertices, faces in solids:
+            builder.add(vertices, tuple(tuple(face) for face in faces))
+        return cls(*builder.arrays())
+
+
+@dataclass
+class PolyhedraBuilder:
+    """Solids as they come by; what is kept of each is its numbers."""
+
+    _vertices: bytearray = field(default_factory=bytearray)
+    _corners: list[Indices] = field(default_factory=list)
+    _face_counts: list[Indices] = field(default_factory=list)
+    _known: dict[tuple[tuple[int, ...], ...], tuple[Indices, Indices]] = field(default_factory=dict)
+
+    def add(self, vertices: Array, faces: tuple[tuple[int, ...], ...]) -> None:
+        """One more solid: vertices (nv, 3), and faces counter-clockwise seen from outside."""
+        if (ring := self._known.get(faces)) is None:
+            corners = np.fromiter(chain.from_iterable(faces), dtype=np.int64)
+            ring = corners, np.array([len(face) for face in faces], dtype=np.int64)
+            self._known[faces] = ring
+        start = len(self._vertices) // 24
+        self._vertices += np.ascontiguousarray(vertices, dtype=np.float64).tobytes()
+        self._corners.append(ring[0] + start)
+        self._face_counts.append(ring[1])
+
+    def arrays(self) -> tuple[Array, Indices, Indices, Indices]:
+        """The fields of `Polyhedra`."""
+        none = [np.zeros(0, dtype=np.int64)]
+        counts = np.concatenate(self._face_counts or none)
+        return (
+            np.frombuffer(bytes(self._vertices)).reshape(-1, 3),
+            np.concatenate(self._corners or none),
+            np.concatenate([[0], np.cumsum(counts)]),
+            np.cumsum([0, *(len(one) for one in self._face_counts)], dtype=np.int64),
+        )
+
+    def build(self) -> Polyhedra:
+        """All solids so far."""
+        return Polyhedra(*self.arrays())
+
+
+@dataclass(frozen=True)
+class Touching:
+    """Contacts of solids, in the order of their pairs; a pair that touches in two directions comes twice.
+
+    Attributes
+    ----------
+    pairs : (m, 2) indices of the solids, smaller first
+    area : (m,) that they share, seen square to the joint [m²]
+    gap : (m,) mean width of the joint, negative where they overlap [m]
+    normal : (m, 3) unit normal of the joint, from the second to the first [-]
+    centroid : (m, 3) of the shared area, half-way between the two faces [m]
+    """
+
+    pairs: Indices
+    area: Array
+    gap: Array
+    normal: Array
+    centroid: Array
+
+    def __len__(self) -> int:
+        return len(self.pairs)
+
+
+def find_touching(
+    solids: Polyhedra,
+    width: float = 0.04,
+    angle: float = 12.0,
+    *,
+    overlap: float = 0.02,
+    share: float = 0.03,
+    among: NDArray[np.bool_] | None = None,
+) -> Touching:
+    """Find the solids that face each other across a joint.
+
+    Parameters
+    ----------
+    solids : closed, with planar faces of any number of corners, convex or not
+    width : of the widest open joint [m]; a stone thinner than that does not hide what lies behind it
+    angle : by which the two faces may be out of parallel [degrees]
+    overlap : by which solids may lie in each other [m]
+    share : least part of the smaller face that the other covers [-]; below, they meet at an edge but for noise
+    among : (n,) solids of which one at least must be in a pair; None: all
+
+    Returns
+    -------
+    Touching, the same for the same solids wherever they stand, but for rounding
+    """
+    wanted = np.ones(len(solids), np.bool_) if among is None else np.asarray(among, np.bool_)
+    if len(solids) == 0 or not wanted.any():
+        return _touching(np.zeros((0, 2), np.int64), np.zeros((0, 8)), np.zeros(3))
+    origin = solids.vertices.min(axis=0)
+    local = np.ascontiguousarray(solids.vertices - origin)
+    planes = face_planes(local, solids.corners, solids.face_starts)
+    solid = (local, solids.corners, solids.face_starts, solids.solid_starts)
+    limits = (width, overlap, float(np.cos(np.radians(angle))), share)
+    pairs, rows = [np.zeros((0, 2), np.int64)], [np.zeros((0, 8))]
+    for near in _near(_boxes(planes[2], solids.solid_starts, width), wanted):
+        room = GROUPS * len(near)
+        found, values = np.empty((room, 2), np.int64), np.empty((room, 8))
+        count = touching_faces(near, solid, planes, limits, found, values)
+        pairs.append(found[:count].copy())
+        rows.append(values[:count].copy())
+    return _touching(np.concatenate(pairs), np.concatenate(rows), origin)
+
+
+def _touching(pairs: Indices, rows: Array, origin: Array) -> Touching:
+    order = np.lexsort((pairs[:, 1], pairs[:, 0]))
+    pairs, rows = pairs[order], rows[order]
+    return Touching(pairs, rows[:, 0].copy(), rows[:, 1].copy(), rows[:, 5:8].copy(), rows[:, 2:5] + origin)
+
+
+def _boxes(faces: Array, starts: Indices, width: float) -> Array:
+    """Boxes (n, 6) of solids from those of their faces, wider by half a joint on all sides."""
+    out = np.empty((len(starts) - 1, 6))
+    out[:, :3] = np.minimum.reduceat(faces[:, :3], starts[:-1]) - 0.5 * width
+    out[:, 3:] = np.maximum.reduceat(faces[:, 3:], starts[:-1]) + 0.5 * width
+    return out
+
+
+def _near(boxes: Array, wanted: NDArray[np.bool_]) -> Iterator[Indices]:
+    """Pairs of overlapping boxes, about `_PAIRS` at a time."""
+    centres = boxes[:, :3] + boxes[:, 3:]
+    low, extent = centres.min(axis=0), np.ptp(centres, axis=0)
+    # one scale for all axes: a flat wall is not stretched into a cube
+    scale = np.full(3, (2.0**21 - 1.0) / max(float(extent.max()), 1e-300))
+    order = np.argsort(morton_codes(centres, low, scale), kind="stable")
+    size = 1 << max(len(boxes) - 1, 0).bit_length()
+    tree = np.empty((2 * size, 6))
+    tree[:, :3], tree[:, 3:] = np.inf, -np.inf
+    tree[size : size + len(boxes)] = boxes[order]
+    level = size
+    while level > 1:
+        level //= 2
+        below = tree[2 * level : 4 * level].reshape(level, 2, 6)
+        tree[level : 2 * level, :3] = below[:, :, :3].min(axis=1)
+        tree[level : 2 * level, 3:] = below[:, :, 3:].max(axis=1)
+    counts = count_near(tree, size, order, wanted)
+    before = np.concatenate([[0], np.cumsum(counts)])
+    start = 0
+    while start < len(order):
+        stop = int(np.searchsorted(before, before[start] + _PAIRS, side="right")) - 1
+        stop = min(max(stop, start + 1), len(order))
+        found = np.empty((int(before[stop] - before[start]), 2), np.int64)
+        list_near(tree, size, order, wanted, start, stop, found)
+        yield found
+        start = stop
