@@ -54,11 +54,9 @@ def read_building(session: Session, stream: BinaryIO, name: str) -> dict[str, in
 def _refuse_filled(session: Session) -> None:
     for section in sections():
         if session.execute(select(section.fields[0].column).limit(1)).first() is not None:
-            raise ExchangeError(
-                "a document can only be taken into an empty database",
-                where=f"the table {section.name} has rows",
-                remedy="name a new database with --db",
-            )
+            what = f"it is not empty, its table {section.name} has rows"
+            remedy = "a document makes a database of its own; name a new one with --db"
+            raise ExchangeError(what, where="database", remedy=remedy)
 
 
 def _read_head(text: JsonText, name: str) -> None:

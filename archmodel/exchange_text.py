@@ -101,10 +101,9 @@ class JsonText:
             except JSONDecodeError as error:
                 if self._cut(error) and self._more():
                     continue
-                self._at = error.pos
-                self.refuse(
-                    f"this is no JSON: {error.msg}" if self.peek() else "it ends in the middle of a value"
-                )
+                cut = self._done and self._cut(error)
+                self._at = len(self._text) if cut else error.pos
+                self.refuse("it ends in the middle of a value" if cut else f"this is no JSON: {error.msg}")
             except RecursionError:
                 self.refuse("lists or objects are nested too deeply")
             except ValueError as error:

@@ -1,0 +1,97 @@
+"""A whole building out of a database into one document, and back."""
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+from sqlalchemy import URL
+
+from archmodel.database import home_of, open_database
+from archmodel.exchange import export_building, import_building
+from archmodel.exchange_writing import write_building
+from archmodel.sqlite import SqliteFile
+from moma.errors import DatabaseError, ExchangeError
+
+__all__ = ["ExchangeReport", "export_database", "export_to_stream", "import_database"]
+
+
+@dataclass(frozen=True)
+class ExchangeReport:
+    """What was carried.
+
+    Attributes
+    ----------
+    path : of the document
+    database : its URL, without a password
+    bytes : of the document
+    rows : how many, by section
+    """
+
+    path: str
+    database: str
+    bytes: int
+    rows: dict[str, int]
+
+
+def export_database(url: str, path: Path) -> ExchangeReport:
+    """Write all that a database holds into one document; see `export_building`."""
+    with open_database(url, create=False) as database:
+        with database.session(read_only=True) as session:
+            rows = export_building(session, path)
+        return ExchangeReport(str(path), database.url, path.stat().st_size, rows)
+
+
+def export_to_stream(url: str, stream: BinaryIO) -> None:
+    """The same into a stream of bytes, which may have got a part of it when there is an error."""
+    with open_database(url, create=False) as database, database.session(read_only=True) as session:
+        write_building(session, stream)
+
+
+def import_database(path: Path, url: str) -> ExchangeReport:
+    """Make a database of a document, all of it or nothing.
+
+    A file that is not there yet is made under another name and appears when it is complete.
+
+    Raises
+    ------
+    ExchangeError
+        if the database is not empty, or anything in the document is wrong
+    DatabaseError
+        if the database cannot be opened or written
+    """
+    home = home_of(url)
+    file = home.file if isinstance(home, SqliteFile) else None
+    if file is None or file.exists():
+        with open_database(url) as database:
+            rows = import_building(path, database)
+    else:
+        rows = _import_new(path, file)
+    return ExchangeReport(str(path), home.shown, path.stat().st_size, rows)
+
+
+def _import_new(path: Path, file: Path) -> dict[str, int]:
+    part = file.with_name(f".{file.name}.{os.getpid()}.part")
+    try:
+        with open_database(URL.create("sqlite", database=str(part)).render_as_string()) as database:
+            rows = import_building(path, database)
+        _publish(part, file)
+    except DatabaseError as error:
+        if error.where == str(part):
+            raise error.at(str(file)) from error
+        raise
+    finally:
+        for end in ("", "-wal", "-shm"):
+            part.with_name(part.name + end).unlink(missing_ok=True)
+    return rows
+
+
+def _publish(part: Path, file: Path) -> None:
+    """Give the complete database its name, unless somebody else was faster."""
+    try:
+        os.link(part, file)
+    except FileExistsError:
+        what = "another program has made this database meanwhile"
+        raise ExchangeError(what, where=str(file), remedy="name a new database with --db") from None
+    except OSError:
+        part.rename(file)  # a file system without links
