@@ -18,7 +18,7 @@ from archmodel.registered import declare_registered, release_registered
 from archmodel.sqlite import SqliteFile
 from moma.errors import DatabaseError
 
-__all__ = ["Database", "Home", "home_of", "open_database"]
+__all__ = ["Database", "Home", "home_of", "open_database", "version_of"]
 
 
 class Home(Protocol):
@@ -113,7 +113,7 @@ def open_database(url: str, create: bool = True, *, lock_timeout: float = 10.0) 
     engine = home.engine(create)
     try:
         with engine.connect() as connection:
-            _prepare(connection, home.place, create)
+            _prepare(connection, home, create)
         home.settle(engine)
         with Session(engine.execution_options(moma_read_only=True)) as session:
             declare_registered(session)
@@ -149,35 +149,49 @@ def home_of(url: str, lock_timeout: float = 10.0) -> Home:
     raise DatabaseError(f"databases of type {parsed.drivername!r} cannot be opened", remedy=remedy)
 
 
-def _prepare(connection: Connection, place: str, create: bool) -> None:
+def version_of(connection: Connection, place: str) -> int | None:
+    """Version of the layout of a database; None if it has no tables.
+
+    Raises
+    ------
+    DatabaseError
+        if there are tables, but not MOMA's
+    """
+    tables = inspect(connection).get_table_names()
+    if not tables:
+        return None
+    if SchemaVersion.__tablename__ not in tables:
+        raise DatabaseError("is not a MOMA database", where=place, remedy="name another database with --db")
+    return connection.scalar(select(SchemaVersion.version)) or 0
+
+
+def _prepare(connection: Connection, home: Home, create: bool) -> None:
     """Check that this is a MOMA database of our version; lay out an empty one."""
     read_only = connection.execution_options(moma_read_only=True)
     with read_only.begin():
-        tables = set(inspect(read_only).get_table_names())
-        if _is_ours(read_only, tables, place):
+        if _is_ours(read_only, home):
             return
     if not create:
         remedy = "take in a survey first: moma ingest FILE"
-        raise DatabaseError("the database is empty", where=place, remedy=remedy)
+        raise DatabaseError("the database is empty", where=home.place, remedy=remedy)
     writing = connection.execution_options(moma_read_only=False)
     with writing.begin():
         # Another program may have laid it out since we looked; now nobody else can.
-        if not _is_ours(writing, set(inspect(writing).get_table_names()), place):
+        if not _is_ours(writing, home):
             metadata.create_all(writing, checkfirst=False)
             writing.execute(insert(SchemaVersion).values(version=SCHEMA_VERSION))
 
 
-def _is_ours(connection: Connection, tables: set[str], place: str) -> bool:
-    """Whether the tables are MOMA's; False if there are none; an error if they are another program's."""
-    if not tables:
+def _is_ours(connection: Connection, home: Home) -> bool:
+    """Whether the database has our layout; False if it is empty; an error if it has another."""
+    version = version_of(connection, home.place)
+    if version is None:
         return False
-    remedy = "name another database with --db"
-    if SchemaVersion.__tablename__ not in tables:
-        raise DatabaseError("is not a MOMA database", where=place, remedy=remedy)
-    version = connection.scalar(select(SchemaVersion.version))
     if version != SCHEMA_VERSION:
-        what = f"has schema version {version}, this program reads version {SCHEMA_VERSION}"
+        older = version < SCHEMA_VERSION
         raise DatabaseError(
-            what, where=place, remedy="use the version of MOMA that made it, or a new database"
+            f"has schema version {version}, this program reads version {SCHEMA_VERSION}",
+            where=home.place,
+            remedy=f"moma migrate --db {home.shown}" if older else "install the version of MOMA that made it",
         )
     return True

@@ -4,6 +4,7 @@ from typing import Annotated
 
 import typer
 
+from moma.cli.database import migrate
 from moma.cli.entities import query, show
 from moma.cli.exchange import export, import_
 from moma.cli.knowledge import record
@@ -45,6 +46,6 @@ def _common(
 
 
 # in the order in which they are mostly used
-for _command in (ingest, survey_report, record, query, show, check, run, runs, export, import_):
+for _command in (ingest, survey_report, record, query, show, check, run, runs, export, import_, migrate):
     # import is a word of the language, import_ is not
     app.command(_command.__name__.strip("_").replace("_", "-"))(_command)

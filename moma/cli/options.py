@@ -44,7 +44,13 @@ class ListFormat(StrEnum):
 
 
 Db = Annotated[
-    str, typer.Option("--db", metavar="URL", envvar="MOMA_DB", help="Entity database, as sqlite:///FILE.")
+    str,
+    typer.Option(
+        "--db",
+        metavar="URL",
+        envvar="MOMA_DB",
+        help="Entity database: sqlite:///FILE, or postgresql://USER@HOST/NAME.",
+    ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")]
 Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Say more; show the traceback of an error.")]

@@ -1,0 +1,3 @@
+"""The steps between versions, in order."""
+
+__all__: list[str] = []
