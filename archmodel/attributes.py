@@ -9,15 +9,15 @@ from sqlalchemy.orm import Session
 
 from archmodel.entities import Entity, OwnAttribute, kinds, own_attributes
 from archmodel.knowledge import Correction, Statement
-from archmodel.registered import RegisteredKind
 from archmodel.relations import Membership, Relation
 from archmodel.run_records import STONE_VALUES
 from archmodel.runs import FIDELITIES, EntityResult
 from archmodel.said import alias_of, held, observations_of, statements_of
 from archmodel.scope import Scope
+from archmodel.structures import Structure
 from archmodel.surveys import Measurement
 
-__all__ = ["ATTRIBUTES", "DOCUMENTING", "Attribute", "attributes_of", "own_attributes_of"]
+__all__ = ["ATTRIBUTES", "DOCUMENTING", "Attribute", "attributes_of", "kinds_of", "own_attributes_of"]
 
 Value = Callable[[Scope, int | None], ColumnElement[Any]]
 
@@ -134,6 +134,16 @@ def _documents(scope: Scope, run: int | None) -> ColumnElement[int]:
     return count.correlate(scope.entity).scalar_subquery()
 
 
+def _structures(scope: Scope, run: int | None) -> ColumnElement[int]:
+    rows, structure = alias_of(Membership), alias_of(Structure)
+    count = (
+        select(func.count())
+        .select_from(rows.join(structure, structure.c.id == rows.c.structure_id))
+        .where(rows.c.entity_id == scope.entity.c.id, held(rows), held(structure))
+    )
+    return count.correlate(scope.entity).scalar_subquery()
+
+
 def _result(
     name: str, unit: str | None, definition: str, value: Value, words: tuple[str, ...] | None = None
 ) -> Attribute:
@@ -215,7 +225,7 @@ _KNOWN = (
     Attribute(
         "corrections", "-", "attributes of it that were corrected", _rows(Correction, "entity_id", now=False)
     ),
-    Attribute("structures", "-", "structures that it is a member of", _rows(Membership, "entity_id")),
+    Attribute("structures", "-", "structures that it is a member of", _structures),
 )
 
 _RELATED = (
@@ -273,49 +283,38 @@ def attributes_of(session: Session | None = None, kind: type[Entity] | None = No
     return known
 
 
+def kinds_of(session: Session | None = None) -> dict[str, type[Entity]]:
+    """The kinds that can be in a database: those built in, and those that it registers itself."""
+    user = None if session is None else session.get_bind().dialect
+    return {
+        name: cls
+        for name, cls in kinds().items()
+        if cls.__users__ is None or (user is not None and user in cls.__users__)
+    }
+
+
 def own_attributes_of(
     session: Session | None = None, kind: type[Entity] | None = None
 ) -> dict[str, Attribute]:
     """The attributes that some kinds have of their own, by name; null for entities of other kinds."""
-    declared: dict[str, OwnAttribute] = {}
-    registered = _registered(session)
-    for cls in kinds().values():
+    known = kinds_of(session).values()
+    found: dict[str, Attribute] = {}
+    for cls in known:
         if kind is None or issubclass(cls, kind):
             for own in own_attributes(cls).values():
-                declared.setdefault(own.name, own)
-    stored: set[str] = set()
-    for name, attributes in registered.items():
-        stored.update(own.name for own in attributes)
-        if kind is None or issubclass(kinds().get(name, Entity), kind):
-            for own in attributes:
-                declared.setdefault(own.name, own)
-    found = (_own(own, name in stored) for name, own in declared.items())
-    return {attribute.name: attribute for attribute in found if attribute is not None}
+                found.setdefault(own.name, _own(own))
+    return found
 
 
-def _registered(session: Session | None) -> dict[str, list[OwnAttribute]]:
-    """What the registered kinds of a database have of their own, by the kind."""
-    if session is None:
-        return {}
-    rows = session.execute(select(RegisteredKind.name, RegisteredKind.attributes))
-    return {
-        kind: [OwnAttribute(name, unit, definition) for name, (unit, definition) in attributes.items()]
-        for kind, attributes in rows
-    }
-
-
-def _own(own: OwnAttribute, stored: bool) -> Attribute | None:
-    """The attribute, in its column, in the JSON of registered kinds, or in either; None: not of this database."""
-    column = own.name in Entity.__table__.c
-    if not (column or stored):
-        return None
+def _own(own: OwnAttribute) -> Attribute:
+    """An attribute of a kind: in a column, or, of a registered kind, in the entity's JSON."""
 
     def value(scope: Scope, run: int | None) -> ColumnElement[Any]:
+        if own.name in Entity.__table__.c:
+            typed: ColumnElement[Any] = scope.entity.c[own.name]
+            return typed
         told = scope.entity.c.own[own.name]
         said: ColumnElement[Any] = told.as_string() if own.unit is None else told.as_float()
-        if not column:
-            return said
-        typed: ColumnElement[Any] = scope.entity.c[own.name]
-        return func.coalesce(typed, said) if stored else typed
+        return said
 
     return Attribute(own.name, own.unit, own.definition, value)

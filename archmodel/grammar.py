@@ -213,7 +213,7 @@ class _Parser:
 
     def argument(self, depth: int) -> Token | Node:
         """A value if nothing but the next argument or the end follows it, else an expression."""
-        if self.token.role in VALUES and self.following in ((",", "sign"), (")", "sign")):
+        if self.token.role in VALUES and self.following in ((",", "sign"), (")", "sign"), ("", "end")):
             return self.take()
         return self.expression(depth + 1)
 

@@ -80,7 +80,7 @@ def find_rows(
     subkinds = [name for name, sub in kinds().items() if issubclass(sub, cls)]
     kind_of_it = scope.entity.c.kind
     chosen = _columns(scope, names)
-    statement = scope.joined(select(*chosen).select_from(scope.entity))
+    statement = scope.joined(select(*chosen))
     statement = statement.where(
         kind_of_it == subkinds[0] if len(subkinds) == 1 else kind_of_it.in_(subkinds), *conditions
     )
@@ -105,7 +105,7 @@ def rows_of(entities: Iterable[Entity]) -> list[dict[str, object]]:
             raise DatabaseError("the entity's session is closed", where=batch[0].code, remedy=remedy)
         scope = Scope(Context(session))
         chosen = _columns(scope, names)
-        statement = scope.joined(select(*chosen).select_from(scope.entity))
+        statement = scope.joined(select(*chosen))
         statement = statement.where(scope.entity.c.id.in_([entity.id for entity in batch]))
         found.update((row["code"], row) for row in _rows(session, statement, names))
     return [found[entity.code] for entity in wanted]

@@ -34,10 +34,12 @@ class Context:
     ----------
     session : of the database that is asked
     run : the run of results whose run is not named; None: the latest that holds the entity
+    within_canon : the part that is being understood is the canonical proportions of a kind
     """
 
     session: Session
     run: int | None = None
+    within_canon: bool = field(default=False, init=False)
     _functions: int = field(default=0, init=False)
     _shared: dict[Hashable, Any] = field(default_factory=dict, init=False)
 
@@ -87,9 +89,10 @@ class Scope:
 
     def joined(self, statement: S) -> S:
         """The select on entities with the joins that were asked for."""
+        source = self.entity
         for target, condition in self._joins.values():
-            statement = statement.outerjoin(target, condition)
-        return statement
+            source = source.outerjoin(target, condition)
+        return statement.select_from(source)
 
     def measurement(self) -> FromClause:
         """The measurement that is held now."""

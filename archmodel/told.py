@@ -1,0 +1,113 @@
+"""Functions of query expressions that ask what is said of a stone, and whether it is as its kind should be."""
+
+from sqlalchemy import case, exists, null
+
+from archmodel.attributes import DOCUMENTING, attributes_of, kinds_of
+from archmodel.entities import canon_of, kind_named, kinds
+from archmodel.grammar import Call, parse
+from archmodel.knowledge import OBSERVATIONS, Correction, Statement
+from archmodel.lookups import document_named, mark_named, meant
+from archmodel.said import alias_of, held, observations_of, statements_of
+from archmodel.scope import Scope
+from archmodel.tokens import Token, complaint
+from archmodel.usages import Ask, Condition, tokens
+from moma.errors import QueryError, UsageError
+
+__all__ = ["canonical", "corrected", "documented", "has_mark", "is_a", "observed"]
+
+MAX_SEVERITY = 4
+
+
+def has_mark(scope: Scope, call: Call, ask: Ask) -> Condition:
+    """Mason marks. One that is said of a structure is somewhere on it, on no stone in particular."""
+    said = alias_of(Statement)
+    conditions: list[Condition] = [
+        held(said),
+        said.c.entity_id == scope.entity.c.id,
+        said.c.kind == "mason_mark",
+    ]
+    conditions += [said.c.sign == mark_named(scope.context, sign) for sign in tokens(call, 0, 1)]
+    return _any_row(scope, *conditions)
+
+
+def observed(scope: Scope, call: Call, ask: Ask) -> Condition:
+    """Observations of the stone, and of its structures if it has none of their type."""
+    values = tokens(call, 0, 1, 2)
+    said, seen = observations_of(scope.entity, scope.context.said_of_structures("observation"))
+    conditions = [seen]
+    if values:
+        type_ = values[0].text.lower()
+        if type_ not in OBSERVATIONS:
+            remedy = meant(type_, OBSERVATIONS, "the types")
+            raise complaint(values[0], f"unknown type of observation {values[0].text[:40]!r}", remedy)
+        conditions.append(said.c.type == type_)
+    if len(values) == 2:
+        conditions.append(said.c.severity >= _severity(values[1]))
+    return _any_row(scope, *conditions)
+
+
+def _severity(token: Token) -> int:
+    if token.text not in map(str, range(MAX_SEVERITY + 1)):
+        remedy = "write a number from 0 (traces) to 4 (lost, or about to be)"
+        raise complaint(token, f"{token.text[:40]!r} is not a severity", remedy)
+    return int(token.text)
+
+
+def documented(scope: Scope, call: Call, ask: Ask) -> Condition:
+    """Documents that any statement about the stone, or its structures, names."""
+    said = alias_of(Statement)
+    conditions: list[Condition] = [said.c.document_id.is_not(None)]
+    conditions += [said.c.document_id == document_named(scope.context, code) for code in tokens(call, 0, 1)]
+    told = statements_of(scope.entity, said, scope.context.said_of_structures(*DOCUMENTING))
+    return _any_row(scope, told, *conditions)
+
+
+def corrected(scope: Scope, call: Call, ask: Ask) -> Condition:
+    """Corrections of its attributes."""
+    rows = alias_of(Correction)
+    conditions: list[Condition] = [rows.c.entity_id == scope.entity.c.id]
+    for token in tokens(call, 0, 1):
+        known = attributes_of(scope.context.session)
+        if (name := token.text.lower()) not in known:
+            raise complaint(
+                token, f"unknown attribute {token.text[:40]!r}", meant(name, known, "the attributes")
+            )
+        conditions.append(rows.c.attribute == name)
+    return _any_row(scope, *conditions)
+
+
+def _any_row(scope: Scope, *conditions: Condition) -> Condition:
+    """Whether there is a row that satisfies the conditions, for each entity."""
+    return exists().where(*conditions).correlate(scope.entity)
+
+
+def is_a(scope: Scope, call: Call, ask: Ask) -> Condition:
+    """Its kind, or one that its kind is a case of."""
+    (name,) = tokens(call, 1)
+    try:
+        cls = kind_named(name.text)
+    except UsageError as error:
+        raise complaint(name, error.what, error.remedy) from None
+    return scope.entity.c.kind.in_([kind for kind, sub in kinds().items() if issubclass(sub, cls)])
+
+
+def canonical(scope: Scope, call: Call, ask: Ask) -> Condition:
+    """The proportions that theory asks of its kind, in the very language of queries."""
+    tokens(call, 0)
+    with_canon: dict[str, list[str]] = {}
+    for kind, cls in kinds_of(scope.context.session).items():
+        if (canon := canon_of(cls)) is not None:
+            with_canon.setdefault(canon, []).append(kind)
+    if scope.context.within_canon:
+        raise complaint(call.function, "canonical proportions cannot refer to canonical()")
+    scope.context.within_canon = True
+    cases = []
+    for canon, names in with_canon.items():
+        try:
+            cases.append((scope.entity.c.kind.in_(names), ask(scope, parse(canon))))
+        except QueryError as error:
+            what = f"the canonical proportions of {' and '.join(names)} cannot be understood: {error}"
+            raise complaint(call.function, what) from None
+    scope.context.within_canon = False
+    # Neither true nor false for kinds that have none.
+    return case(*cases, else_=null())
