@@ -12,7 +12,6 @@ area's centroid: area and centroid of what two polygons share say all.
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,12 +54,12 @@ class Polyhedra:
         return len(self.solid_starts) - 1
 
     @classmethod
-    def gather(cls, solids: Iterable[tuple[Array, Sequence[Sequence[int]]]]) -> Self:
+    def gather(cls, solids: Iterable[tuple[Array, Sequence[Sequence[int]]]]) -> "Polyhedra":
         """Put solids, each as its vertices (nv, 3) and its faces, one after the other."""
         builder = PolyhedraBuilder()
         for vertices, faces in solids:
             builder.add(vertices, tuple(tuple(face) for face in faces))
-        return cls(*builder.arrays())
+        return builder.build()
 
 
 @dataclass
@@ -68,35 +67,32 @@ class PolyhedraBuilder:
     """Solids as they come by; what is kept of each is its numbers."""
 
     _vertices: bytearray = field(default_factory=bytearray)
-    _corners: list[Indices] = field(default_factory=list)
-    _face_counts: list[Indices] = field(default_factory=list)
-    _known: dict[tuple[tuple[int, ...], ...], tuple[Indices, Indices]] = field(default_factory=dict)
+    _corners: bytearray = field(default_factory=bytearray)
+    _face_counts: bytearray = field(default_factory=bytearray)
+    _solid_counts: list[int] = field(default_factory=list)
+    _known: dict[tuple[tuple[int, ...], ...], tuple[Indices, bytes]] = field(default_factory=dict)
 
     def add(self, vertices: Array, faces: tuple[tuple[int, ...], ...]) -> None:
         """One more solid: vertices (nv, 3), and faces counter-clockwise seen from outside."""
-        if (ring := self._known.get(faces)) is None:
+        if (known := self._known.get(faces)) is None:
             corners = np.fromiter(chain.from_iterable(faces), dtype=np.int64)
-            ring = corners, np.array([len(face) for face in faces], dtype=np.int64)
-            self._known[faces] = ring
+            known = corners, np.array([len(face) for face in faces], dtype=np.int64).tobytes()
+            self._known[faces] = known
         start = len(self._vertices) // 24
         self._vertices += np.ascontiguousarray(vertices, dtype=np.float64).tobytes()
-        self._corners.append(ring[0] + start)
-        self._face_counts.append(ring[1])
-
-    def arrays(self) -> tuple[Array, Indices, Indices, Indices]:
-        """The fields of `Polyhedra`."""
-        none = [np.zeros(0, dtype=np.int64)]
-        counts = np.concatenate(self._face_counts or none)
-        return (
-            np.frombuffer(bytes(self._vertices)).reshape(-1, 3),
-            np.concatenate(self._corners or none),
-            np.concatenate([[0], np.cumsum(counts)]),
-            np.cumsum([0, *(len(one) for one in self._face_counts)], dtype=np.int64),
-        )
+        self._corners += (known[0] + start).tobytes()
+        self._face_counts += known[1]
+        self._solid_counts.append(len(faces))
 
     def build(self) -> Polyhedra:
         """All solids so far."""
-        return Polyhedra(*self.arrays())
+        counts = np.frombuffer(bytes(self._face_counts), dtype=np.int64)
+        return Polyhedra(
+            np.frombuffer(bytes(self._vertices)).reshape(-1, 3),
+            np.frombuffer(bytes(self._corners), dtype=np.int64),
+            np.concatenate([[0], np.cumsum(counts)]),
+            np.cumsum([0, *self._solid_counts], dtype=np.int64),
+        )
 
 
 @dataclass(frozen=True)
