@@ -4,7 +4,7 @@ import difflib
 from collections.abc import Sequence
 from typing import Any, BinaryIO
 
-from sqlalchemy import func, select
+from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from archmodel.exchange_head import HEAD, TABLES, check_head
@@ -47,7 +47,6 @@ def read_building(session: Session, stream: BinaryIO, name: str) -> dict[str, in
     except BaseException:
         release_registered(session.get_bind().engine)
         raise
-    _continue_numbering(session)
     return counts
 
 
@@ -141,17 +140,3 @@ def _declare(session: Session, name: str) -> None:
         declare_registered(session)
     except DatabaseError as error:
         raise ExchangeError(error.what, where=f"{name} $.{TABLES}.kind", remedy=error.remedy) from error
-
-
-def _continue_numbering(session: Session) -> None:
-    """New rows get numbers after those that were taken in; SQLite does that by itself."""
-    if session.get_bind().dialect.name != "postgresql":
-        return
-    for section in sections():
-        column = section.table.autoincrement_column
-        if column is None:
-            continue
-        last = session.scalar(select(func.max(column)))
-        if last is not None:
-            quoted = session.get_bind().dialect.identifier_preparer.format_table(section.table)
-            session.execute(select(func.setval(func.pg_get_serial_sequence(quoted, column.name), last)))

@@ -1,13 +1,13 @@
 """Rows of one section into the database, many at a time, each refusal brought back to its row."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from sqlalchemy import Column, UniqueConstraint, bindparam, insert, select, update
+from sqlalchemy import Column, UniqueConstraint, bindparam, select, update
 from sqlalchemy.exc import DataError, DBAPIError, IntegrityError, StatementError
 from sqlalchemy.orm import Session
 
-from archmodel.bulk import BATCH
+from archmodel.bulk import BATCH, insert_rows
 from archmodel.exchange_rows import Row, said_key
 from archmodel.exchange_sections import Label, Section
 from archmodel.exchange_values import said
@@ -64,8 +64,10 @@ class SectionStore:
             return
         for label in self._section.labels:
             self._check_label(label, rows)
-        values = [row.values for row in rows]
-        self._run(insert(self._section.table), rows, values, values)
+        self._run(self._insert, rows, [row.values for row in rows])
+
+    def _insert(self, rows: Sequence[Row]) -> None:
+        insert_rows(self._session, self._section.mapper.class_, [row.values for row in rows])
 
     def _check_label(self, label: Label, rows: Sequence[Row]) -> None:
         """What a reference is said to be to is what it is to."""
@@ -89,35 +91,42 @@ class SectionStore:
     def _refer(self, rows: Sequence[Row]) -> None:
         """Set the references that were left out."""
         table, (key, *_) = self._section.table, self._section.key
-        for name in dict.fromkeys(name for row in rows for name in row.later):
-            those = [row for row in rows if name in row.later]
-            statement = update(table).where(table.c[key] == bindparam("moma_key"))
-            statement = statement.values({name: bindparam("moma_target")})
-            targets = [{name: row.later[name]} for row in those]
-            values = [{"moma_key": row.values[key], "moma_target": row.later[name]} for row in those]
-            self._run(statement, those, values, targets)
 
-    def _run(self, statement: Any, rows: Sequence[Row], values: list[Values], told: list[Values]) -> None:
+        def execute(rows: Sequence[Row]) -> None:
+            for name in dict.fromkeys(name for row in rows for name in row.later):
+                statement = update(table).where(table.c[key] == bindparam("moma_key"))
+                targets = [
+                    {"moma_key": row.values[key], "moma_target": row.later[name]}
+                    for row in rows
+                    if name in row.later
+                ]
+                self._session.execute(statement.values({name: bindparam("moma_target")}), targets)
+
+        self._run(execute, rows, [row.later for row in rows])
+
+    def _run(
+        self, execute: Callable[[Sequence[Row]], None], rows: Sequence[Row], values: list[Values]
+    ) -> None:
         """All at once; if the database refuses, one by one to find out which row it is."""
-        if self._try(statement, values) is None:
+        if self._try(execute, rows) is None:
             return
-        for row, one, columns in zip(rows, values, told, strict=True):
-            if (error := self._try(statement, [one])) is not None:
+        for row, columns in zip(rows, values, strict=True):
+            if (error := self._try(execute, [row])) is not None:
                 raise self._refusal(row, columns, error) from error
         raise rows[0].wrong("the database refuses this row together with those after it")
 
-    def _try(self, statement: Any, values: list[Values]) -> StatementError | None:
-        """Execute it, or undo it and say why the values are refused."""
+    def _try(self, execute: Callable[[Sequence[Row]], None], rows: Sequence[Row]) -> Exception | None:
+        """Execute it, or undo it and say why the rows are refused."""
         try:
             with self._session.begin_nested():
-                self._session.execute(statement, values)
-        except StatementError as error:
+                execute(rows)
+        except (StatementError, ValueError, RecursionError) as error:
             if isinstance(error, DBAPIError) and not isinstance(error, IntegrityError | DataError):
                 raise
             return error
         return None
 
-    def _refusal(self, row: Row, values: Values, error: StatementError) -> ExchangeError:
+    def _refusal(self, row: Row, values: Values, error: Exception) -> ExchangeError:
         """Why the database refuses the values of a row, at its place."""
         for field in self._section.fields:
             target = values.get(field.name)
@@ -130,7 +139,8 @@ class SectionStore:
                 mine = said_key(tuple(row.values[column.name] for column in columns))
                 what = f"{names} {mine} is also that of {', '.join(self._section.key)} {said_key(other)}"
                 return row.wrong(what, remedy="each may be there once")
-        lines = str(error.orig or error).strip().splitlines() or [type(error).__name__]
+        cause = error.orig if isinstance(error, StatementError) else error
+        lines = str(cause).strip().splitlines() or [type(cause).__name__]
         return row.wrong(f"the database refuses this row: {lines[0]}")
 
     def _unique(self) -> Iterator[tuple[list[Column[Any]], Any]]:
