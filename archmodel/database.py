@@ -16,7 +16,7 @@ from archmodel.layout import SCHEMA_VERSION, SchemaVersion, metadata
 from archmodel.postgresql import PostgresqlServer
 from archmodel.registered import declare_registered, release_registered
 from archmodel.sqlite import SqliteFile
-from moma.errors import DatabaseError
+from moma.errors import DatabaseError, NoDatabaseError
 
 __all__ = ["Database", "Home", "home_of", "open_database", "version_of"]
 
@@ -173,7 +173,7 @@ def _prepare(connection: Connection, home: Home, create: bool) -> None:
             return
     if not create:
         remedy = "take in a survey first: moma ingest FILE"
-        raise DatabaseError("the database is empty", where=home.place, remedy=remedy)
+        raise NoDatabaseError("the database is empty", where=home.place, remedy=remedy)
     writing = connection.execution_options(moma_read_only=False)
     with writing.begin():
         # Another program may have laid it out since we looked; now nobody else can.

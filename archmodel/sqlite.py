@@ -12,7 +12,7 @@ from sqlalchemy.exc import DBAPIError
 from sqlalchemy.pool import ConnectionPoolEntry
 
 from archmodel.base import json_text
-from moma.errors import DatabaseError
+from moma.errors import DatabaseError, NoDatabaseError
 
 __all__ = ["HOW_TO_WRITE", "SqliteFile"]
 
@@ -127,7 +127,7 @@ def _check_file(file: Path, create: bool) -> None:
         raise DatabaseError("is a folder, not a database", where=str(file), remedy="name a file in it")
     if not file.exists() and not create:
         remedy = "take in a survey first (moma ingest FILE), or name another database with --db"
-        raise DatabaseError("there is no database", where=str(file), remedy=remedy)
+        raise NoDatabaseError("there is no database", where=str(file), remedy=remedy)
     if not file.parent.is_dir():
         raise DatabaseError(f"there is no folder {file.parent}", where=str(file), remedy="make it first")
 

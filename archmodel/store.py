@@ -1,6 +1,7 @@
 """Surveyed stones into the database and out again."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 from sqlalchemy import select
 from sqlalchemy.orm import Session
@@ -9,11 +10,29 @@ from archmodel.bulk import batches, first_free_id, insert_rows
 from archmodel.entities import Entity
 from archmodel.entries import new_entry
 from archmodel.records import StoneRecord
+from archmodel.remeasuring import supersede_measurements
 from archmodel.rows import entity_rows, measurement_row, stone_record, storable
 from archmodel.surveys import Measurement, Survey
 from moma.errors import DatabaseError
 
-__all__ = ["load_stones", "store_survey", "survey_with_hash"]
+__all__ = ["StoredSurvey", "load_stones", "store_survey", "survey_with_hash"]
+
+
+@dataclass(frozen=True)
+class StoredSurvey:
+    """What became of a survey.
+
+    Attributes
+    ----------
+    survey, entry : their numbers in the database
+    new : primary keys of the entities that it brought, in the order of the file
+    again : of those that it measured again
+    """
+
+    survey: int
+    entry: int
+    new: range
+    again: tuple[int, ...]
 
 
 def store_survey(
@@ -25,7 +44,8 @@ def store_survey(
     *,
     stations: Mapping[str, Sequence[float]] | None = None,
     frame: Mapping[str, object] | None = None,
-) -> int:
+    again: bool = False,
+) -> StoredSurvey:
     """Take in one survey file: all of it, or, if anything is wrong, nothing.
 
     Parameters
@@ -37,16 +57,12 @@ def store_survey(
     stones : its stones, at least one; read once, never all in memory
     stations : where instruments and observers stood, by name, (x, y, z) [m]
     frame : how the survey was carried into the frame of the site, in values that JSON can say
-
-    Returns
-    -------
-    int
-        number of the survey in the database
+    again : stones whose code is there already were measured again; otherwise they are an error
 
     Raises
     ------
     DatabaseError
-        if the file was taken in before, or a code is there already
+        if the file was taken in before, or a code is there already or twice in the file
     SurveyError, GeometryError
         if a stone cannot be stored, at its ``file:line``
     """
@@ -64,13 +80,22 @@ def store_survey(
         session.add(survey)
         session.flush()
         lines: dict[str, int] = {}
+        start, measured_again = first_free_id(session, Entity), list[int]()
         for batch in batches(stones):
-            _refuse_known_codes(session, batch, lines, source_path)
-            _insert_stones(session, batch, survey, source_path)
+            known = _known_codes(session, batch)
+            _refuse_codes(batch, {} if again else known, lines, source_path)
+            _insert_stones(session, [one for one in batch if one.code not in known], survey)
+            old = [one for one in batch if one.code in known]
+            numbers = [known[one.code][0] for one in old]
+            supersede_measurements(
+                session, survey.entry_id, survey.id, numbers, old, _places(old, source_path)
+            )
+            measured_again += numbers
         if not lines:
             remedy = "give it at least one stone record"
             raise DatabaseError("the survey has no stones", where=source_path, remedy=remedy)
-        return survey.id
+        new = range(start, start + len(lines) - len(measured_again))
+        return StoredSurvey(survey.id, survey.entry_id, new, tuple(measured_again))
 
 
 def survey_with_hash(session: Session, sha256: str) -> Survey | None:
@@ -104,33 +129,49 @@ def _refuse_again(session: Session, source_path: str, sha256: str) -> None:
         )
 
 
-def _refuse_known_codes(
-    session: Session, batch: Sequence[StoneRecord], lines: dict[str, int], path: str
-) -> None:
-    """A code names one stone of the database. `lines` holds this file's codes so far, and is added to."""
-    known = session.execute(
-        select(Entity.code, Survey.path, Measurement.line)
-        .join(Entity.measurement)
-        .join(Measurement.survey)
+def _known_codes(session: Session, batch: Sequence[StoneRecord]) -> dict[str, tuple[int, str]]:
+    """Which of the codes are in the database before this file: primary key, and where it was measured."""
+    found = session.execute(
+        select(Entity.code, Entity.id, Survey.path, Measurement.line)
+        .outerjoin(Entity.measurement)
+        .outerjoin(Measurement.survey)
         .where(Entity.code.in_([stone.code for stone in batch]))
     )
-    elsewhere = {code: f"{other}:{line}" for code, other, line in known}
+    return {
+        code: (number, "the database, not measured" if path is None else f"{path}:{line}")
+        for code, number, path, line in found
+    }
+
+
+def _refuse_codes(
+    batch: Sequence[StoneRecord],
+    known: Mapping[str, tuple[int, str]],
+    lines: dict[str, int],
+    path: str,
+) -> None:
+    """A code names one stone of the database. `lines` holds this file's codes so far, and is added to."""
     for stone in batch:
+        remedy = "give each stone a code of its own"
         if stone.code in lines:
             first = f"{path}:{lines[stone.code]}"
-        elif stone.code in elsewhere:
-            first = elsewhere[stone.code]
+        elif stone.code in known:
+            first = known[stone.code][1]
+            remedy += "; if it was measured again, give --again"
         else:
             lines[stone.code] = stone.line
             continue
-        remedy = "give each stone a code of its own, or take this file into another database (--db)"
         what = f"the code {stone.code} is taken by the stone at {first}"
         raise DatabaseError(what, where=f"{path}:{stone.line}", remedy=remedy)
 
 
-def _insert_stones(session: Session, batch: Sequence[StoneRecord], survey: Survey, path: str) -> None:
-    """The rows of one batch of stones, checked."""
-    places = [f"{path}:{stone.line} stone {stone.code}" for stone in batch]
+def _places(batch: Sequence[StoneRecord], path: str) -> list[str]:
+    """Where errors find the stones."""
+    return [f"{path}:{stone.line} stone {stone.code}" for stone in batch]
+
+
+def _insert_stones(session: Session, batch: Sequence[StoneRecord], survey: Survey) -> None:
+    """The rows of one batch of new stones, checked."""
+    places = _places(batch, survey.path)
     first = first_free_id(session, Entity)
     entities = [
         {"id": number, "entry_id": survey.entry_id, **row}

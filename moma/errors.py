@@ -9,6 +9,7 @@
     ├── SurveyError                exit 1   the contents of a survey file
     ├── GeometryError              exit 1   stones that cannot be built or closed
     ├── DatabaseError              exit 1   the entity database
+    │   └── NoDatabaseError        exit 1   ... of which there is none at that place
     ├── ExchangeError              exit 1   a building as one document
     ├── MeshError                  exit 1   a stone that cannot be meshed
     ├── SolverError                exit 1   a step that was not solved
@@ -26,6 +27,7 @@ __all__ = [
     "MeshError",
     "MissingLibraryError",
     "MomaError",
+    "NoDatabaseError",
     "QueryError",
     "SceneError",
     "SolverError",
@@ -80,6 +82,10 @@ class GeometryError(MomaError):
 
 class DatabaseError(MomaError):
     """The entity database cannot be opened, read or written."""
+
+
+class NoDatabaseError(DatabaseError):
+    """There is no database at the place that was named, or an empty one."""
 
 
 class ExchangeError(MomaError):

@@ -19,6 +19,8 @@ def ingest_lines(report: "IngestReport", verbose: bool) -> list[str]:
     for file in report.files:
         kinds = ", ".join(f"{count} {kind}" for kind, count in file.stones.items())
         lines.append(f"{file.path}: {sum(file.stones.values())} stones of survey {file.survey!r} ({kinds})")
+        if file.again:
+            lines.append(f"  {file.again} of them were there already and are measured again")
         if file.worst:
             lines.append(
                 f"  {sum(file.rejected.values())} points left out as blunders on {len(file.rejected)} stones; "

@@ -11,11 +11,11 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
-from archmodel.database import open_database
+from archmodel.database import home_of, open_database
 from archmodel.entities import kind_named
 from archmodel.records import StoneRecord
 from archmodel.store import store_survey
-from moma.errors import SurveyError, UsageError
+from moma.errors import NoDatabaseError, SurveyError, UsageError
 from pipelines.frame_records import frame_record
 from pipelines.progress import Listener, Progress, silent
 from pipelines.reading_options import check_survey_file
@@ -59,6 +59,7 @@ class FileReport:
     refused : stones that were not taken in
     rejects : the file that holds them; None if there are none
     frame : how the survey was carried into the frame of the site; None if it was there
+    again : how many of the stones were in the database already, and have a new measurement now
     """
 
     path: str
@@ -71,6 +72,7 @@ class FileReport:
     refused: tuple[Refusal, ...] = ()
     rejects: str | None = None
     frame: dict[str, Any] | None = None
+    again: int = 0
 
 
 @dataclass(frozen=True)
@@ -90,6 +92,7 @@ def ingest(
     options: ReadingOptions | None = None,
     keep_going: bool = False,
     rejects: str | Path | None = None,
+    again: bool = False,
 ) -> IngestReport:
     """Take survey files into the database: all of them, or, if anything is wrong in any, none.
 
@@ -102,6 +105,8 @@ def ingest(
     options : what the files leave unsaid
     keep_going : take the good stones of each file, and write the others to a file of rejects with the reasons
     rejects : that file, if there is one survey file; by default ``NAME.rejects.SUFFIX`` beside each survey file
+    again : stones that are in the database already were measured again: their old measurements are kept as superseded;
+        otherwise they are an error
 
     Raises
     ------
@@ -122,6 +127,7 @@ def ingest(
     if keep_going:
         check_targets(targets, surveys)
     with ExitStack() as held:
+        _open_if_there(url, held)
         spools = [held.enter_context(Spool()) for _ in surveys]
         tallies = [
             _measure(path, spool, format, options, keep_going, progress)
@@ -136,7 +142,7 @@ def ingest(
                 held.enter_context(_published(target, text))
         with open_database(url, lock_timeout=_PATIENCE) as database, database.session() as session:
             for tally, spool in zip(tallies, spools, strict=True):
-                _store(session, tally, _told(spool, tally, progress))
+                _store(session, tally, _told(spool, tally, progress), again)
         reports = tuple(
             _report(tally, target if tally.refused else None)
             for tally, target in zip(tallies, targets, strict=True)
@@ -156,6 +162,7 @@ class _Tally:
     rms: float = 0.0
     worst: str = ""
     refused: list[Reject] = field(default_factory=list)
+    again: int = 0
 
     def count(self, block: SurveyedBlock) -> None:
         face = block.face
@@ -166,6 +173,14 @@ class _Tally:
             self.shapes[block.code] = face.shape.text
         if face.provenance.source == "points" and face.fit.rms >= self.rms:
             self.rms, self.worst = face.fit.rms, block.code
+
+
+def _open_if_there(url: str, held: ExitStack) -> None:
+    """Open the database early: the kinds that it registers are known then, and what is wrong with it is said first."""
+    try:
+        held.enter_context(open_database(url, create=False))
+    except NoDatabaseError:
+        home_of(url).engine(create=True).dispose()  # whether one could be made
 
 
 def _check_files(surveys: Sequence[Path]) -> None:
@@ -226,9 +241,9 @@ def _measure(
     return tally
 
 
-def _store(session: Session, tally: _Tally, stones: Iterator[StoneRecord]) -> None:
+def _store(session: Session, tally: _Tally, stones: Iterator[StoneRecord], again: bool) -> None:
     head = tally.stream.head
-    store_survey(
+    stored = store_survey(
         session,
         head.name,
         head.path,
@@ -236,7 +251,9 @@ def _store(session: Session, tally: _Tally, stones: Iterator[StoneRecord]) -> No
         stones,
         stations={one.name: one.position.tolist() for one in head.stations},
         frame=frame_record(tally.stream.transform),
+        again=again,
     )
+    tally.again = len(stored.again)
 
 
 def _told(stones: Iterable[StoneRecord], tally: _Tally, progress: Listener) -> Iterator[StoneRecord]:
@@ -297,4 +314,5 @@ def _report(tally: _Tally, rejects: Path | None) -> FileReport:
         refused=tuple(Refusal(one.code, str(one.error)) for one in tally.refused),
         rejects=None if rejects is None else str(rejects),
         frame=frame_record(tally.stream.transform),
+        again=tally.again,
     )

@@ -43,6 +43,13 @@ def ingest(
             "--rejects", metavar="FILE", help="That file; else NAME.rejects beside the survey file."
         ),
     ] = None,
+    again: Annotated[
+        bool,
+        typer.Option(
+            "--again",
+            help="Stones that are there already were measured again; what was measured before is kept.",
+        ),
+    ] = False,
     db: Db = DEFAULT_DB,
     json: Json = False,
     verbose: Verbose = False,
@@ -58,7 +65,14 @@ def ingest(
     options = reading_options(header, codes, kind, sigma)
     with progress_bars() as listener:
         report = take_in(
-            files, db, format.value, listener, options=options, keep_going=keep_going, rejects=rejects
+            files,
+            db,
+            format.value,
+            listener,
+            options=options,
+            keep_going=keep_going,
+            rejects=rejects,
+            again=again,
         )
     print(as_json(asdict(report)) if json else "\n".join(ingest_lines(report, verbose)))
 

@@ -43,7 +43,11 @@ FACES = {"LEFT": (1, 0.0, 0.0, 0.5), "RIGHT": (1, 0.51, 0.0, 0.5), "TOP": (2, 0.
 
 
 def survey(shift):
-    lines = ["moma-survey 1", "observer " + " ".join(map(str, np.add(shift, [0.5, -9.0, 1.0]))), "sigma 0.002"]
+    lines = [
+        "moma-survey 1",
+        "observer " + " ".join(map(str, np.add(shift, [0.5, -9.0, 1.0]))),
+        "sigma 0.002",
+    ]
     lines.append("depth * 0.4 sigma 0.02 source thickness")
     for code, (course, x, z, length) in FACES.items():
         rng = np.random.default_rng(course)
