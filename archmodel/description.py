@@ -1,68 +1,200 @@
-"""All that is known of one entity: what it is, what was measured, what was computed."""
+"""All that is known of one entity or structure, now or at an earlier entry."""
 
-import difflib
 import math
+from typing import Any
 
 from sqlalchemy import select
-from sqlalchemy.orm import Session, joinedload, selectinload
+from sqlalchemy.orm import Session, joinedload
 
-from archmodel.entities import Entity, definition_of, kind_chain, kind_of, refuse_unknown_kinds
+from archmodel.description_knowledge import knowledge, memberships, owners_of, owners_of_structure
+from archmodel.description_relations import joints, relations
+from archmodel.entities import (
+    Entity,
+    canon_of,
+    definition_of,
+    kind_chain,
+    kind_named,
+    kind_of,
+    own_attributes,
+    refuse_unknown_kinds,
+)
+from archmodel.entries import Entry, held_at
+from archmodel.finding import no_such_code
+from archmodel.knowledge import Correction
+from archmodel.relations import Membership
 from archmodel.runs import EntityResult, Run
+from archmodel.structures import Structure
 from archmodel.surveys import Measurement, Survey
+from archmodel.versions import entity_at, version_at
+from archmodel.wording import entry_values
 from moma.errors import UsageError
 
 __all__ = ["describe"]
 
-MAX_CANDIDATES = 1000
-"""Codes that are looked through for one that is like a mistyped code."""
+Values = dict[str, Any]
 
 
-def describe(session: Session, code: str) -> dict[str, object]:
-    """Everything about the stone of this code, in plain values that JSON can say.
+def describe(session: Session, code: str, at: int | None = None) -> dict[str, object]:
+    """Everything about the stone or structure of this code, in plain values that JSON can say.
+
+    Parameters
+    ----------
+    code : that it has now
+    at : number of an entry: as it was known when that had just been made; None: now
 
     Returns
     -------
     dict
-        code, kind, definition, kinds (general to particular, each with its definition), course, face, solid,
-        depth, survey, measured, notes, runs (latest first); SI units
+        of a stone: code, kind, definition, kinds (general to particular, each with its definition), canon,
+        course, zone, own (attributes of its kind: value, unit, definition), face, solid, depth, structures, relations, knowledge,
+        survey, measured, notes, runs (latest first), joints (of the latest run), corrections; of a structure:
+        code, kind, definition, title, number, side, part_of, parts, members, knowledge; SI units
 
     Raises
     ------
     UsageError
-        if there is no such stone; names the nearest codes
+        if there is no such stone or structure, or was not; names the nearest codes
     """
     refuse_unknown_kinds(session)
-    entity = session.scalar(
-        select(Entity)
-        .where(Entity.code == _plain(code))
-        .options(
-            joinedload(Entity.measurement).joinedload(Measurement.survey).joinedload(Survey.entry),
-            selectinload(Entity.results).joinedload(EntityResult.run).joinedload(Run.entry),
-        )
+    if not code.isprintable():
+        raise no_such_code(session, code, Entity.code, Structure.code)
+    if at is not None and session.get(Entry, at) is None:
+        raise UsageError(f"there is no entry {at}", remedy="list them by: moma show CODE --history")
+    number = session.scalar(select(Entity.id).where(Entity.code == code))
+    if number is not None:
+        return _entity(session, number, code, at)
+    structure = session.scalar(
+        select(Structure).where(Structure.code == code).order_by(Structure.superseded_id.is_not(None))
     )
-    if entity is None:
-        raise _no_such(session, code)
-    chain, measured = kind_chain(type(entity)), entity.measurement
+    if structure is None:
+        raise no_such_code(session, code, Entity.code, Structure.code)
+    return _structure(session, structure, at)
+
+
+def _entity(session: Session, number: int, code: str, at: int | None) -> Values:
+    row = entity_at(session, number, at)
+    if row is None:
+        raise UsageError(f"{code} was not known at entry {at}", remedy="ask for a later one")
+    cls = kind_named(row["kind"])
+    measured = _measurement(session, number, at)
+    members = memberships(session, number, at)
+    results = _results(session, number, at)
     return {
-        "code": entity.code,
-        "kind": entity.kind,
-        "definition": definition_of(type(entity)),
-        "kinds": [{"kind": kind_of(cls), "definition": definition_of(cls)} for cls in chain],
-        "course": entity.course,
-        "zone": entity.zone,
-        "face": {"length": entity.length, "height": entity.height, "area": entity.area},
-        "solid": {"volume": entity.volume, "centroid": [entity.x, entity.y, entity.z]},
+        "code": row["code"],
+        "kind": row["kind"],
+        "definition": definition_of(cls),
+        "kinds": [{"kind": kind_of(one), "definition": definition_of(one)} for one in kind_chain(cls)],
+        "canon": canon_of(cls),
+        "course": row["course"],
+        "zone": row["zone"],
+        "own": _own(cls, row),
+        "face": {"length": row["length"], "height": row["height"], "area": row["area"]},
+        "solid": {"volume": row["volume"], "centroid": [row["x"], row["y"], row["z"]]},
         "depth": {
-            "value": entity.depth,
-            "sigma": entity.depth_sigma,
-            "source": entity.depth_source,
-            "origin": entity.depth_origin,
+            "value": row["depth"],
+            "sigma": row["depth_sigma"],
+            "source": row["depth_source"],
+            "origin": row["depth_origin"],
         },
+        "structures": [_membership(session, one, at) for one in members],
+        "relations": relations(session, number, at),
+        "knowledge": knowledge(session, "entity_id", number, owners_of(session, members, at), at),
         "survey": None if measured is None else _survey(measured),
         "measured": None if measured is None else _measured(measured),
         "notes": {} if measured is None else dict(measured.notes),
-        "runs": [_result(result) for result in reversed(entity.results)],
+        "runs": [_result(result) for result in results],
+        "joints": joints(session, number, results[0].run_id) if results else [],
+        "corrections": _corrections(session, number, at),
     }
+
+
+def _structure(session: Session, held: Structure, at: int | None) -> Values:
+    number, row = held.id, version_at(session, held, at)
+    if at is not None and row.entry_id > at:
+        raise UsageError(f"{held.code} was not known at entry {at}", remedy="ask for a later one")
+    owners = owners_of_structure(session, row.parent_id, at)
+    parts = select(Structure.code).where(Structure.parent_id == number, held_at(Structure, at))
+    members = (
+        select(Membership)
+        .where(Membership.structure_id == number, held_at(Membership, at))
+        .options(joinedload(Membership.entity))
+        .order_by(Membership.rank, Membership.id)
+    )
+    ended = row.superseded_by if held.superseded_id is not None else None
+    withdrawn = ended is not None and (at is None or ended.id <= at)
+    return {
+        "code": row.code,
+        "kind": row.kind,
+        "definition": _definition(type(row)),
+        "title": row.title,
+        "number": row.number,
+        "side": row.side,
+        "part_of": [owner.structure.code for owner in owners],
+        "parts": sorted(session.scalars(parts)),
+        "members": [one.entity.code for one in session.scalars(members)],
+        "knowledge": knowledge(session, "structure_id", number, owners, at),
+        "recorded": entry_values(row.entry),
+        "withdrawn": entry_values(ended) if withdrawn and ended is not None else None,
+    }
+
+
+def _own(cls: type[Entity], row: Values) -> Values:
+    """The attributes of its kind that are known, each with its unit (None for a text) and definition."""
+    kept = row["own"] or {}
+    values = {name: row[name] if name in row else kept.get(name) for name in own_attributes(cls)}
+    return {
+        name: {"value": values[name], "unit": one.unit, "definition": one.definition}
+        for name, one in own_attributes(cls).items()
+        if values[name] is not None
+    }
+
+
+def _measurement(session: Session, number: int, at: int | None) -> Measurement | None:
+    return session.scalar(
+        select(Measurement)
+        .where(Measurement.entity_id == number, held_at(Measurement, at))
+        .options(joinedload(Measurement.survey).joinedload(Survey.entry))
+    )
+
+
+def _results(session: Session, number: int, at: int | None) -> list[EntityResult]:
+    """What runs computed, latest first."""
+    statement = (
+        select(EntityResult)
+        .join(EntityResult.run)
+        .where(EntityResult.entity_id == number)
+        .options(joinedload(EntityResult.run).joinedload(Run.entry))
+        .order_by(EntityResult.run_id.desc())
+    )
+    return list(session.scalars(statement if at is None else statement.where(Run.entry_id <= at)))
+
+
+def _membership(session: Session, one: Membership, at: int | None) -> Values:
+    """A structure that it is a member of, and what that is a part of."""
+    structure = version_at(session, one.structure, at)
+    return {
+        "code": structure.code,
+        "kind": structure.kind,
+        "title": structure.title,
+        "rank": one.rank,
+        "part_of": [owner.structure.code for owner in owners_of_structure(session, structure.parent_id, at)],
+        "declared": one.declared,
+        "entry": one.entry_id,
+    }
+
+
+def _corrections(session: Session, number: int, at: int | None) -> list[Values]:
+    statement = (
+        select(Correction)
+        .where(Correction.entity_id == number)
+        .options(joinedload(Correction.entry))
+        .order_by(Correction.id)
+    )
+    made = session.scalars(statement if at is None else statement.where(Correction.entry_id <= at))
+    return [
+        {"attribute": one.attribute, "before": one.before, "after": one.after} | entry_values(one.entry)
+        for one in made
+    ]
 
 
 def _survey(measured: Measurement) -> dict[str, object]:
@@ -124,20 +256,6 @@ def _result(result: EntityResult) -> dict[str, object]:
     }
 
 
-def _plain(code: str) -> str:
-    """The code, if it can be one: what cannot be printed can be in no database."""
-    if not code.isprintable():
-        raise UsageError(
-            f"{code[:40]!a} is not a stone's code", remedy="list the codes by: moma query entity"
-        )
-    return code
-
-
-def _no_such(session: Session, code: str) -> UsageError:
-    """The error for a code that is not there, with the nearest that are."""
-    alike = (
-        select(Entity.code).where(Entity.code.istartswith(code[:1], autoescape=True)).limit(MAX_CANDIDATES)
-    )
-    near = difflib.get_close_matches(code[:40], session.scalars(alike).all(), n=3, cutoff=0.5)
-    remedy = f"did you mean {' or '.join(near)}?" if near else "list the codes by: moma query entity"
-    return UsageError(f"there is no stone {code[:40]!r} in the database", remedy=remedy)
+def _definition(cls: type[Structure]) -> str:
+    """The one sentence that defines a kind of structure."""
+    return (cls.__doc__ or "").strip().split("\n", 1)[0]

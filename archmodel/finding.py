@@ -90,12 +90,11 @@ def structure_numbers(session: Session, codes: Sequence[str]) -> dict[str, int]:
 
 
 def no_such_code(session: Session, code: str, *columns: InstrumentedAttribute[str]) -> UsageError:
-    """The error for a code that is in none of the columns, with the nearest that are."""
-    things = " or ".join("stone" if column.class_ is Entity else "structure" for column in columns)
+    """The error for a code that is in none of the columns, with the nearest that are; the first says what it is of."""
+    things = "stone" if columns[0].class_ is Entity else "structure"
     if not code.isprintable():
-        return UsageError(
-            f"{code[:40]!a} is not the code of a {things}", remedy="list them by: moma query entity"
-        )
+        remedy = "list the codes by: moma query entity"
+        return UsageError(f"{code[:40]!a} is not a {things}'s code", remedy=remedy)
     what = f"there is no {things} {code[:40]!r} in the database"
     if Entity.code in columns and (renamed := _renamed(session, code)) is not None:
         return UsageError(what, remedy=f"it is called {renamed} now")

@@ -50,16 +50,32 @@ def query(
 
 @reporting
 def show(
-    code: Annotated[str, typer.Argument(metavar="CODE", help="Code of a stone.")],
+    code: Annotated[str, typer.Argument(metavar="CODE", help="Code of a stone or of a structure.")],
+    history: Annotated[
+        bool, typer.Option("--history", help="All that was ever said of it, in the order of the records.")
+    ] = False,
+    at: Annotated[
+        int | None, typer.Option("--at", metavar="ENTRY", help="As it was known when this entry was made.")
+    ] = None,
     db: Db = DEFAULT_DB,
     json: Json = False,
     verbose: Verbose = False,
 ) -> None:
-    """Show one entity: what it is, what was measured, what was computed."""
+    """Show one stone or structure: what it is, what is known of it, what was measured and computed."""
+    from dataclasses import asdict
+
+    from archmodel import history as past
     from archmodel.database import open_database
     from archmodel.query import describe
-    from moma.listing import as_json, as_lines
+    from moma.listing import as_json
+    from moma.telling_entities import entity_lines, history_lines
 
+    if history and at is not None:
+        raise UsageError("--history and --at ask for two things", remedy="give one of them")
     with open_database(db, create=False) as database, database.session(read_only=True) as session:
-        description = describe(session, code)
-    print(as_json(description) if json else as_lines(description))
+        if history:
+            events = [asdict(event) for event in past.history(session, code)]
+            print(as_json(events) if json else history_lines(code, events))
+            return
+        description = describe(session, code, at) if at is not None else describe(session, code)
+    print(as_json(description) if json else entity_lines(description))
