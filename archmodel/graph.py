@@ -5,7 +5,7 @@ earlier entry (`as_of`). A relation that is both computed and declared counts on
 """
 
 import math
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import groupby
@@ -65,7 +65,7 @@ class LoadPathStone:
     ----------
     code, kind : of the stone
     course, zone : where it is
-    level : the fewest joints through which the load comes to it, from 1
+    level : the most joints through which the load comes to it, from 1, so that it comes after all stones of `through`
     through : codes of the stones of the path from which the load comes to it directly
     last : the load goes no further: nothing is known that it rests on, or that rests on it on the way up
     """
@@ -96,7 +96,7 @@ class LoadPath:
 
     @property
     def levels(self) -> int:
-        """How many joints lead to the stone that is farthest in this sense."""
+        """How many joints lead to the farthest stone."""
         return max((stone.level for stone in self.stones), default=0)
 
     @property
@@ -244,14 +244,37 @@ def _steps(
 
 
 def _levels(me: int, steps: dict[int, list[int]]) -> dict[int, int]:
-    """Fewest steps to every stone that can be reached."""
-    levels, front, level = {me: 0}, [me], 0
-    while front:
-        level += 1
-        following = (after for one in front for after in steps.get(one, ()) if after not in levels)
-        front = list(dict.fromkeys(following))
-        levels.update(dict.fromkeys(front, level))
+    """Most steps to every stone that can be reached, so that each comes after all through which the load comes.
+
+    Where stones bear one another in a circle, the one that the fewest steps lead to is taken to be the first.
+    """
+    fewest = _fewest_steps(me, steps)
+    waiting = Counter(after for one in fewest for after in steps.get(one, ()) if after != me)
+    levels, ready = {me: 0}, [me]
+    left = {number: far for number, far in fewest.items() if number != me}
+    while left or ready:
+        if not ready:
+            first = min(left, key=lambda number: (left[number], number))
+            ready, waiting[first] = [first], 0
+        one = ready.pop()
+        left.pop(one, None)
+        for after in steps.get(one, ()):
+            if after in left:
+                levels[after] = max(levels.get(after, 0), levels[one] + 1)
+                waiting[after] -= 1
+                if waiting[after] == 0:
+                    ready.append(after)
     return levels
+
+
+def _fewest_steps(me: int, steps: dict[int, list[int]]) -> dict[int, int]:
+    found, front, level = {me: 0}, [me], 0
+    while front:
+        following = (after for one in front for after in steps.get(one, ()) if after not in found)
+        front = list(dict.fromkeys(following))
+        level += 1
+        found.update(dict.fromkeys(front, level))
+    return found
 
 
 def courses_in_order(

@@ -5,7 +5,7 @@ kinds the stones are and which way their faces look. The definitions are in ``do
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from scipy.sparse.csgraph import connected_components
 
 from archmodel.entities import Header, Quoin, RibSegment, Voussoir, kind_of, kinds
 from archmodel.relations import RELATIONS
+from moma.errors import UsageError
 
 __all__ = ["Contacts", "FoundRelations", "RelationSettings", "StonesOf", "relations_between"]
 
@@ -50,6 +51,13 @@ class RelationSettings:
     arch: float = 1.0
     skewback: float = 20.0
     along: float = 45.0
+
+    def __post_init__(self) -> None:
+        limits = {"width": 1.0, "overlap": 1.0, "share": 1.0}
+        for name, value in asdict(self).items():
+            largest = limits.get(name, 90.0)
+            if not 0.0 <= value <= largest:
+                raise UsageError(f"{name} is {value:g}", remedy=f"give it between 0 and {largest:g}")
 
 
 @dataclass(frozen=True)

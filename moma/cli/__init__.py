@@ -5,9 +5,10 @@ from typing import Annotated
 import typer
 
 from moma.cli.database import migrate
-from moma.cli.entities import query, show
+from moma.cli.entities import query, schema, show
 from moma.cli.exchange import export, import_
 from moma.cli.knowledge import record
+from moma.cli.relations import load_path, relate
 from moma.cli.runs import runs
 from moma.cli.scenes import check, run
 from moma.cli.surveys import ingest, survey_report
@@ -45,7 +46,22 @@ def _common(
     pass
 
 
-# in the order in which they are mostly used
-for _command in (ingest, survey_report, record, query, show, check, run, runs, export, import_, migrate):
-    # import is a word of the language, import_ is not
+# in the order in which they are mostly used; import is a word of the language, import_ is not
+_COMMANDS = (
+    ingest,
+    survey_report,
+    record,
+    relate,
+    query,
+    schema,
+    show,
+    load_path,
+    check,
+    run,
+    runs,
+    export,
+    import_,
+    migrate,
+)
+for _command in _COMMANDS:
     app.command(_command.__name__.strip("_").replace("_", "-"))(_command)

@@ -1,0 +1,92 @@
+"""The commands of how stones stand to one another."""
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from moma.cli.options import DEFAULT_DB, Db, Json, Verbose
+from moma.console import reporting, say
+
+if TYPE_CHECKING:
+    from pipelines.relate import RelationReport
+
+__all__ = ["load_path", "relate"]
+
+_SHOWN = 6  # codes that are named where a path ends
+
+
+@reporting
+def relate(
+    width: Annotated[float, typer.Option("--width", metavar="M", help="Widest open joint in metres.")] = 0.04,
+    angle: Annotated[
+        float, typer.Option("--angle", metavar="DEG", help="Largest angle between the two faces of a joint.")
+    ] = 12.0,
+    db: Db = DEFAULT_DB,
+    json: Json = False,
+    verbose: Verbose = False,
+) -> None:
+    """Compute again what rests on what, and which courses and arches there are; see docs/relations.md."""
+    from archmodel.database import open_database
+    from archmodel.relating import RelationSettings
+    from moma.listing import as_json, as_table
+    from pipelines.relate import relate as compute
+
+    settings = RelationSettings(width=width, angle=angle)
+    with open_database(db, create=False) as database, database.session() as session:
+        report = compute(session, settings)
+    if json:
+        print(as_json(asdict(report)))
+        return
+    columns = dict.fromkeys(("what", "new", "as before", "no longer"))
+    print(as_table(columns, _changes(report)))
+    if report.entry is None:
+        say(f"{report.stones} stones; nothing changed")
+    else:
+        say(f"{report.stones} stones; {report.values} values of theirs are new; entry {report.entry}")
+
+
+def _changes(report: "RelationReport") -> list[dict[str, object]]:
+    """What became of the rows of each sort."""
+    sorts = {**report.relations, "structures": report.structures, "memberships": report.memberships}
+    return [
+        {"what": name, "new": one.added, "as before": one.kept, "no longer": one.superseded}
+        for name, one in sorts.items()
+    ]
+
+
+@reporting
+def load_path(
+    code: Annotated[str, typer.Argument(metavar="CODE", help="Code of a stone.")],
+    up: Annotated[bool, typer.Option("--up", help="What it carries, instead of what carries it.")] = False,
+    as_of: Annotated[
+        int | None, typer.Option("--as-of", metavar="ENTRY", help="As it was known at this entry.")
+    ] = None,
+    db: Db = DEFAULT_DB,
+    json: Json = False,
+    verbose: Verbose = False,
+) -> None:
+    """Show all stones on which one rests, directly or through others; with --up, all that rest on it."""
+    from archmodel.database import open_database
+    from archmodel.graph import load_path as follow
+    from moma.listing import as_json, as_table
+
+    with open_database(db, create=False) as database, database.session(read_only=True) as session:
+        path = follow(session, code, up=up, as_of=as_of)
+    if json:
+        print(as_json(asdict(path)))
+        return
+    if not path.stones:
+        say(f"nothing rests on {code}" if up else f"{code} rests on nothing that is known")
+        return
+    columns = dict.fromkeys(("level", "code", "kind", "course", "zone", "through"))
+    rows = [{**asdict(stone), "through": ", ".join(stone.through)} for stone in path.stones]
+    shown = {name: None for name in columns if any(row[name] is not None for row in rows)}
+    print(as_table(shown, rows))
+    last = [stone.code for stone in path.last]
+    more = f" and {len(last) - _SHOWN} more" if len(last) > _SHOWN else ""
+    say(
+        f"{len(path.stones)} stones on {path.levels} levels; it ends at {', '.join(last[:_SHOWN])}{more}"
+        if last
+        else f"{len(path.stones)} stones on {path.levels} levels, in a circle"
+    )
