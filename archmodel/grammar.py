@@ -19,6 +19,7 @@ quote within quotes is doubled. The words of the grammar (and, or, not, in, like
 upper and lower case, and must be quoted to be values.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from archmodel.tokens import Token, complaint, named, tokenise
@@ -35,6 +36,7 @@ __all__ = [
     "Membership",
     "Node",
     "Not",
+    "attributes_in",
     "parse",
 ]
 
@@ -122,6 +124,22 @@ def parse(text: str) -> Node:
         with the place in the expression, if it does not follow the grammar or exceeds its limits
     """
     return _Parser(tokenise(text)).whole()
+
+
+def attributes_in(node: Node) -> Iterator[Token]:
+    """The tokens that are, or may be, attributes of what the expression speaks of; not those within functions."""
+    match node:
+        case All(operands) | AnyOf(operands):
+            for operand in operands:
+                yield from attributes_in(operand)
+        case Not(operand):
+            yield from attributes_in(operand)
+        case Comparison(attribute, _, value):
+            yield attribute
+            if value.role == "word":
+                yield value
+        case IsNull(Token() as attribute) | Like(attribute, _) | Membership(attribute, _):
+            yield attribute
 
 
 class _Parser:

@@ -1,27 +1,59 @@
 """Asking the database: which entities, with which attributes, and all that is known of one."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import ColumnElement, Select, select
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import ColumnElement, select
 from sqlalchemy.orm import Session, object_session
 
 from archmodel.attributes import ATTRIBUTES, Attribute, attributes_of
 from archmodel.description import describe
 from archmodel.entities import Entity, kind_named, kinds, refuse_unknown_kinds
 from archmodel.expressions import column_named, condition, condition_in
-from archmodel.grammar import parse
+from archmodel.grammar import attributes_in, parse
 from archmodel.lookups import refuse_unknown_run
 from archmodel.scope import Context, Scope
 from moma.errors import DatabaseError, QueryError
 
-__all__ = ["attributes", "condition", "describe", "find", "find_rows", "row_of", "rows_of"]
+__all__ = [
+    "Face",
+    "asked_columns",
+    "attributes",
+    "condition",
+    "describe",
+    "find",
+    "find_faces",
+    "find_rows",
+    "row_of",
+    "rows_of",
+]
+
+Array = NDArray[np.float64]
 
 MAX_EXPRESSIONS = 20
 """Most expressions in one query: together they stay below the number of parameters that SQLite takes."""
 
 BATCH = 500
 """Entities per statement in `rows_of`, below SQLite's limit of parameters."""
+
+
+@dataclass(frozen=True)
+class Face:
+    """The face of an entity that was found.
+
+    Attributes
+    ----------
+    outline : (nv, 3) corners, counter-clockwise seen from outside [m]; None if it was not measured
+    normal : (3,) unit normal towards the observer; None if it was not measured
+    row : attributes by name
+    """
+
+    outline: Array | None
+    normal: Array | None
+    row: dict[str, object]
 
 
 def attributes(session: Session | None = None, kind: str | None = None) -> tuple[Attribute, ...]:
@@ -74,17 +106,34 @@ def find_rows(
     ----------
     columns : names of the attributes that are wanted, also ``von_mises_max@12``; None: those of ``attributes``
     """
-    cls = kind_named(kind)
-    scope, conditions = _asked(session, where, run)
-    names = columns if columns is not None else list(ATTRIBUTES)
-    subkinds = [name for name, sub in kinds().items() if issubclass(sub, cls)]
-    kind_of_it = scope.entity.c.kind
-    chosen = _columns(scope, names)
-    statement = scope.joined(select(*chosen))
-    statement = statement.where(
-        kind_of_it == subkinds[0] if len(subkinds) == 1 else kind_of_it.in_(subkinds), *conditions
-    )
-    return _rows(session, statement.order_by(scope.entity.c.id), names)
+    names = list(ATTRIBUTES) if columns is None else columns
+    found = _select(session, kind, where, run, lambda scope: _columns(scope, names))
+    return [dict(zip(names, row, strict=True)) for row in found]
+
+
+def find_faces(
+    session: Session,
+    kind: str,
+    where: Sequence[str] = (),
+    run: int | None = None,
+    columns: Sequence[str] = ("code",),
+) -> list[Face]:
+    """As `find_rows`, with the face of each entity."""
+
+    def chosen(scope: Scope) -> list[ColumnElement[Any]]:
+        measurement = scope.measurement()
+        return [measurement.c.outline, measurement.c.normal, *_columns(scope, columns)]
+
+    found = _select(session, kind, where, run, chosen)
+    return [Face(outline, normal, dict(zip(columns, row, strict=True))) for outline, normal, *row in found]
+
+
+def asked_columns(where: Sequence[str], session: Session | None = None, kind: str = "entity") -> list[str]:
+    """The attributes that expressions name, but for those of other entities: ``depth``, ``von_mises_max@12``."""
+    known = attributes_of(session, kind_named(kind))
+    expressions = [where] if isinstance(where, str) else where
+    named = [token.text.lower() for one in expressions for token in attributes_in(parse(one))]
+    return [name for name in dict.fromkeys(named) if name.partition("@")[0] in known]
 
 
 def row_of(entity: Entity) -> dict[str, object]:
@@ -104,10 +153,10 @@ def rows_of(entities: Iterable[Entity]) -> list[dict[str, object]]:
             remedy = "ask for its row before the session is closed"
             raise DatabaseError("the entity's session is closed", where=batch[0].code, remedy=remedy)
         scope = Scope(Context(session))
-        chosen = _columns(scope, names)
-        statement = scope.joined(select(*chosen))
+        statement = scope.joined(select(*_columns(scope, names)))
         statement = statement.where(scope.entity.c.id.in_([entity.id for entity in batch]))
-        found.update((row["code"], row) for row in _rows(session, statement, names))
+        rows = (dict(zip(names, row, strict=True)) for row in session.execute(statement))
+        found.update((row["code"], row) for row in rows)
     return [found[entity.code] for entity in wanted]
 
 
@@ -133,5 +182,17 @@ def _columns(scope: Scope, names: Sequence[str]) -> list[ColumnElement[Any]]:
     return [column_named(scope, name).label(f"column_{number}") for number, name in enumerate(names)]
 
 
-def _rows(session: Session, statement: Select[Any], names: Sequence[str]) -> list[dict[str, object]]:
-    return [dict(zip(names, row, strict=True)) for row in session.execute(statement)]
+def _select(
+    session: Session,
+    kind: str,
+    where: Sequence[str],
+    run: int | None,
+    chosen: Callable[[Scope], list[ColumnElement[Any]]],
+) -> Iterable[Sequence[Any]]:
+    """The chosen columns of the entities of a kind that satisfy all expressions, in the order of the survey."""
+    cls = kind_named(kind)
+    scope, conditions = _asked(session, where, run)
+    subkinds = [name for name, sub in kinds().items() if issubclass(sub, cls)]
+    columns = chosen(scope)
+    statement = scope.joined(select(*columns)).where(scope.entity.c.kind.in_(subkinds), *conditions)
+    return session.execute(statement.order_by(scope.entity.c.id))

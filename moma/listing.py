@@ -3,16 +3,14 @@
 import csv
 import io
 import json
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from archmodel.run_records import STONE_VALUES
 
-__all__ = ["as_csv", "as_json", "as_lines", "as_table", "shown_columns"]
+__all__ = ["USUAL_COLUMNS", "as_csv", "as_json", "as_lines", "as_table", "shown_columns"]
 
-# what a table shows, and what --where asks for; CSV and JSON give every attribute
-_USUAL = (
+USUAL_COLUMNS = (
     "code",
     "kind",
     "course",
@@ -26,6 +24,7 @@ _USUAL = (
     "von_mises_max",
     "displacement_max",
 )
+"""What a table shows besides what is asked for; CSV and JSON give every attribute."""
 
 _UNITS = {
     "length": "m",
@@ -51,16 +50,11 @@ _PLACES = frozenset({"x", "y", "z", "centroid", "offset"})
 
 
 def shown_columns(
-    names: Iterable[str], rows: Sequence[Mapping[str, object]], where: Sequence[str]
+    names: Iterable[str], rows: Sequence[Mapping[str, object]], asked: Iterable[str] = ()
 ) -> list[str]:
-    """Columns of a table: the usual ones and those named in an expression, if any row has a value there."""
-    asked = set(re.findall(r"\w+", " ".join(where)))
-    return [
-        name
-        for name in names
-        if (name in _USUAL or name in asked)
-        and (name == "code" or any(row[name] is not None for row in rows))
-    ]
+    """Columns of a table: of the usual ones those in which any row has a value, and those that are asked for."""
+    wanted = {"code", *asked}
+    return [name for name in names if name in wanted or any(row[name] is not None for row in rows)]
 
 
 def as_table(columns: Mapping[str, str | None], rows: Sequence[Mapping[str, object]]) -> str:

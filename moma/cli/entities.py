@@ -8,7 +8,7 @@ from moma.cli.options import DEFAULT_DB, Db, Json, ListFormat, Verbose
 from moma.console import reporting, say
 from moma.errors import UsageError
 
-__all__ = ["query", "show"]
+__all__ = ["query", "schema", "show"]
 
 
 @reporting
@@ -20,32 +20,79 @@ def query(
         list[str] | None,
         typer.Option("--where", metavar="EXPR", help="Condition, e.g. 'depth > 0.4'; all given ones hold."),
     ] = None,
+    run: Annotated[
+        int | None,
+        typer.Option("--run", metavar="N", help="Run whose results are meant; else each stone's latest."),
+    ] = None,
+    columns: Annotated[
+        str | None,
+        typer.Option(
+            "--columns", metavar="NAMES", help="Attributes to show, e.g. code,phase,von_mises_max@12."
+        ),
+    ] = None,
     format: Annotated[ListFormat | None, typer.Option(help="Format of the list; else table.")] = None,
+    flat: Annotated[
+        bool, typer.Option("--flat", help="GeoJSON in the plane of the wall: along it, and upwards.")
+    ] = False,
     db: Db = DEFAULT_DB,
     json: Json = False,
     verbose: Verbose = False,
 ) -> None:
     """List the entities of a kind that satisfy conditions."""
     from archmodel.database import open_database
-    from archmodel.query import attributes, find_rows
-    from moma.listing import as_csv, as_json, as_table, shown_columns
+    from moma.answers import Question, answer
 
     if json and format not in (None, ListFormat.JSON):
         raise UsageError(f"--json and --format {format} ask for two formats", remedy="give one of them")
-    conditions = where or []
+    wanted = ListFormat.JSON if json else format or ListFormat.TABLE
+    if flat and wanted is not ListFormat.GEOJSON:
+        raise UsageError("--flat is for faces", remedy="give --format geojson too")
+    names = None if columns is None else [name.strip() for name in columns.split(",")]
+    question = Question(kind, tuple(where or ()), run, names, everything=verbose, flat=flat)
     with open_database(db, create=False) as database, database.session(read_only=True) as session:
-        rows = find_rows(session, kind, conditions)
-    units = {attribute.name: attribute.unit for attribute in attributes()}
-    if json or format is ListFormat.JSON:
-        print(as_json(rows))
-    elif format is ListFormat.CSV:
-        print(as_csv(units, rows))
-    elif rows:
-        columns = units if verbose else {name: units[name] for name in shown_columns(units, rows, conditions)}
-        print(as_table(columns, rows))
-        say(f"{len(rows)} found")
+        text, note = answer(session, question, str(wanted))
+    if text:
+        print(text)
+    if note:
+        say(note)
+
+
+@reporting
+def schema(
+    kind: Annotated[
+        str | None,
+        typer.Argument(metavar="KIND", help="Only this kind and its subkinds.", show_default=False),
+    ] = None,
+    db: Annotated[
+        str | None,
+        typer.Option(
+            "--db",
+            metavar="URL",
+            envvar="MOMA_DB",
+            help="Entity database whose own kinds are shown too; else moma.db, if there is one.",
+        ),
+    ] = None,
+    json: Json = False,
+    verbose: Verbose = False,
+) -> None:
+    """Show what there can be: kinds with their attributes, structures, relations."""
+    from pathlib import Path
+
+    from archmodel.database import open_database
+    from archmodel.schema_tree import schema as tree_of
+    from moma.listing import as_json
+    from moma.schema_text import print_schema
+
+    url = db if db is not None or not Path("moma.db").exists() else DEFAULT_DB
+    if url is None:
+        tree = tree_of(kind=kind)
     else:
-        say(f"no {kind} found" + "".join(f", where {one}" for one in conditions))
+        with open_database(url, create=False) as database, database.session(read_only=True) as session:
+            tree = tree_of(session, kind)
+    if json:
+        print(as_json(tree))
+    else:
+        print_schema(tree)
 
 
 @reporting

@@ -41,6 +41,7 @@ class ListFormat(StrEnum):
     TABLE = "table"
     CSV = "csv"
     JSON = "json"
+    GEOJSON = "geojson"
 
 
 Db = Annotated[

@@ -1,0 +1,69 @@
+"""The answer to ``moma query``, in each of its formats."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from archmodel.attributes import Attribute
+from archmodel.geojson import feature_collection, flattened
+from archmodel.query import asked_columns, attributes, find_faces, find_rows
+from moma.listing import USUAL_COLUMNS, as_csv, as_json, as_table, shown_columns
+
+if TYPE_CHECKING:
+    from sqlalchemy.orm import Session
+
+__all__ = ["Question", "answer"]
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked of a database.
+
+    Attributes
+    ----------
+    kind : of the entities, with its subkinds
+    where : expressions, all of which hold
+    run : whose results are meant where no run is named; None: each stone's latest
+    columns : attributes to show; None: what the format usually gives
+    everything : a table of every attribute
+    flat : faces in the plane of the wall
+    """
+
+    kind: str
+    where: tuple[str, ...] = ()
+    run: int | None = None
+    columns: Sequence[str] | None = None
+    everything: bool = False
+    flat: bool = False
+
+
+def answer(session: "Session", question: Question, format: str) -> tuple[str, str]:
+    """The list in a format (table, csv, json, geojson), and a note for the person at the terminal."""
+    known = {one.name: one for one in attributes(session, question.kind)}
+    names = _names(session, question, known, format)
+    asked = (question.kind, question.where, question.run, names)
+    if format == "geojson":
+        faces = find_faces(session, *asked)
+        return as_json(feature_collection(flattened(faces) if question.flat else faces)), ""
+    rows = find_rows(session, *asked)
+    if format == "json":
+        return as_json(rows), ""
+    if format == "csv":
+        return as_csv(names, rows), ""
+    if not rows:
+        return "", f"no {question.kind} found" + "".join(f", where {one}" for one in question.where)
+    if not question.everything and question.columns is None:
+        names = shown_columns(names, rows, asked_columns(question.where, session, question.kind))
+    units = {name: known[name.partition("@")[0]].unit for name in names}
+    return as_table(units, rows), f"{len(rows)} found"
+
+
+def _names(session: "Session", question: Question, known: Mapping[str, Attribute], format: str) -> list[str]:
+    """The columns that are asked of the database: no more, since some take a search of their own."""
+    if question.columns is not None:
+        return list(dict.fromkeys(question.columns))
+    if format != "table" or question.everything:
+        return list(known)
+    named = asked_columns(question.where, session, question.kind)
+    usual = [name for name in known if name in USUAL_COLUMNS or name in named]
+    return [*usual, *(name for name in named if name not in usual)]

@@ -1,0 +1,62 @@
+"""``moma schema`` as text: a tree of kinds with their attributes, then structures and relations."""
+
+import sys
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+__all__ = ["print_schema", "schema_lines"]
+
+Branch = Mapping[str, Any]
+
+
+def print_schema(schema: Branch) -> None:
+    """Print the tree, in colours on a terminal."""
+    if not sys.stdout.isatty():
+        print("\n".join(schema_lines(schema)))
+        return
+    from rich.console import Console
+    from rich.text import Text
+
+    console = Console(highlight=False)
+    for line in schema_lines(schema):
+        text = Text(line)
+        text.highlight_regex(r"^[│├└─ ]*(?P<kind>[a-z_]+)(?=  )", style_prefix="")
+        text.highlight_words(["canonical:", "registered:"], style="italic")
+        text.highlight_regex(r"^[│├└─ ]+", style="dim")
+        text.highlight_regex(r"· [a-z_0-9]+( \[[^\]]+\])?", style="cyan")
+        console.print(text, soft_wrap=True)
+
+
+def schema_lines(schema: Branch) -> Iterator[str]:
+    """The lines, without colours."""
+    for root in schema["kinds"]:
+        yield from _kind_lines(root, "", "")
+    for title, key, name in (("Structures", "structures", "kind"), ("Relations", "relations", "relation")):
+        if key in schema:
+            yield ""
+            yield title
+            width = max(len(one[name]) for one in schema[key])
+            yield from (f"  {one[name]:<{width}}  {one['definition']}" for one in schema[key])
+    if "attributes" in schema:
+        yield ""
+        yield "Attributes of every entity"
+        yield from (f"  {_attribute(one)}" for one in schema["attributes"])
+
+
+def _kind_lines(branch: Branch, first: str, rest: str) -> Iterator[str]:
+    """A kind, its attributes and its subkinds; `first` and `rest` lead the first line and those below."""
+    origin = "registered: " if branch["registered"] else ""
+    yield f"{first}{branch['kind']}  {origin}{branch['definition']}"
+    below = rest + ("│   " if branch["kinds"] else "    ")
+    if branch["canonical"] is not None:
+        yield f"{below}canonical: {branch['canonical']}"
+    for one in branch["attributes"]:
+        yield f"{below}· {_attribute(one)}"
+    for number, sub in enumerate(branch["kinds"], start=1):
+        last = number == len(branch["kinds"])
+        yield from _kind_lines(sub, rest + ("└── " if last else "├── "), rest + ("    " if last else "│   "))
+
+
+def _attribute(one: Branch) -> str:
+    unit = "" if one["unit"] in (None, "-") else f" [{one['unit']}]"
+    return f"{one['name']}{unit}: {one['definition']}"
