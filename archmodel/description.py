@@ -46,9 +46,10 @@ def describe(session: Session, code: str, at: int | None = None) -> dict[str, ob
     -------
     dict
         of a stone: code, kind, definition, kinds (general to particular, each with its definition), canon,
-        course, zone, own (attributes of its kind: value, unit, definition), face, solid, depth, structures, relations, knowledge,
-        survey, measured, notes, runs (latest first), joints (of the latest run), corrections; of a structure:
-        code, kind, definition, title, number, side, part_of, parts, members, knowledge; SI units
+        course, zone, own (attributes of its kind: value, unit, definition), face, solid, depth, structures,
+        relations, knowledge, survey, measured, notes, runs (latest first), joints (of the latest run),
+        corrections; of a structure: code, kind, definition, title, number, side, part_of, parts, members,
+        knowledge, recorded, withdrawn; SI units
 
     Raises
     ------

@@ -139,8 +139,7 @@ def end_rows(session: Session, entry: Entry, cls: type[Base], numbers: list[int]
     """Mark rows as held no longer; at most as many as fit into one statement."""
     table = table_of(cls)
     session.execute(update(table).where(table.c.id.in_(numbers)).values(superseded_id=entry.id))
-    for row in [one for one in session.identity_map.values() if isinstance(one, cls)]:
-        session.expire(row, ["superseded_id"])
+    _read_again(session, cls)
 
 
 def _end_where(session: Session, entry: Entry, cls: type[Base], **owner: int) -> int:
@@ -152,8 +151,14 @@ def _end_where(session: Session, entry: Entry, cls: type[Base], **owner: int) ->
     session.execute(
         update(table).where(table.c.superseded_id.is_(None), *conditions).values(superseded_id=entry.id)
     )
-    session.expire_all()
+    _read_again(session, cls)
     return count
+
+
+def _read_again(session: Session, cls: type[Base]) -> None:
+    """Loaded rows of a class may have ended behind the session's back."""
+    for row in [one for one in session.identity_map.values() if isinstance(one, cls)]:
+        session.expire(row, ["superseded_id"])
 
 
 def _refuse_ended(row: Recorded) -> None:
