@@ -19,6 +19,7 @@ from moma.errors import NoDatabaseError, SurveyError, UsageError
 from pipelines.frame_records import frame_record
 from pipelines.progress import Listener, Progress, silent
 from pipelines.reading_options import check_survey_file
+from pipelines.relate import relate
 from pipelines.rejects import check_targets, default_path, rejects_text
 from pipelines.spool import Spool
 from pipelines.stone_records import stone_record
@@ -143,6 +144,8 @@ def ingest(
         with open_database(url, lock_timeout=_PATIENCE) as database, database.session() as session:
             for tally, spool in zip(tallies, spools, strict=True):
                 _store(session, tally, _told(spool, tally, progress), again)
+            progress(Progress("relate", 0, None))
+            relate(session, only=[number for tally in tallies for number in tally.stored])
         reports = tuple(
             _report(tally, target if tally.refused else None)
             for tally, target in zip(tallies, targets, strict=True)
@@ -163,6 +166,7 @@ class _Tally:
     worst: str = ""
     refused: list[Reject] = field(default_factory=list)
     again: int = 0
+    stored: Sequence[int] = ()
 
     def count(self, block: SurveyedBlock) -> None:
         face = block.face
@@ -253,6 +257,7 @@ def _store(session: Session, tally: _Tally, stones: Iterator[StoneRecord], again
         frame=frame_record(tally.stream.transform),
         again=again,
     )
+    tally.stored = (*stored.new, *stored.again)
     tally.again = len(stored.again)
 
 
