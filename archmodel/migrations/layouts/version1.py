@@ -1,6 +1,6 @@
 """Tables of version 1, the first release: surveys, entities with one measurement each, runs and their results."""
 
-from sqlalchemy import Column, DateTime, Float, ForeignKey, Index, Integer, MetaData, String, Table
+from sqlalchemy import Column, DateTime, Double, ForeignKey, Index, Integer, MetaData, String, Table
 
 from archmodel.migrations.layouts.columns import BYTES, JSON_TEXT, TEXT
 
@@ -38,16 +38,16 @@ Table(
     Column("code", TEXT, nullable=False, unique=True),
     Column("survey_id", Integer(), ForeignKey("survey.id"), nullable=False),
     Column("course", Integer()),
-    Column("depth", Float(), nullable=False),
-    Column("depth_sigma", Float()),
+    Column("depth", Double(), nullable=False),
+    Column("depth_sigma", Double()),
     Column("depth_source", TEXT, nullable=False),
-    Column("length", Float(), nullable=False),
-    Column("height", Float(), nullable=False),
-    Column("area", Float(), nullable=False),
-    Column("volume", Float(), nullable=False),
-    Column("x", Float(), nullable=False),
-    Column("y", Float(), nullable=False),
-    Column("z", Float(), nullable=False),
+    Column("length", Double(), nullable=False),
+    Column("height", Double(), nullable=False),
+    Column("area", Double(), nullable=False),
+    Column("volume", Double(), nullable=False),
+    Column("x", Double(), nullable=False),
+    Column("y", Double(), nullable=False),
+    Column("z", Double(), nullable=False),
     Index("ix_entity_kind_course", "kind", "course"),
     Index("ix_entity_survey_id", "survey_id"),
 )
@@ -57,10 +57,10 @@ Table(
     Column("entity_id", Integer(), ForeignKey("entity.id"), primary_key=True),
     Column("run_id", Integer(), ForeignKey("run.id"), primary_key=True),
     Column("fidelity", TEXT, nullable=False),
-    Column("von_mises_max", Float()),
-    Column("von_mises_mean", Float()),
-    Column("displacement_max", Float(), nullable=False),
-    Column("contact_force_max", Float()),
+    Column("von_mises_max", Double()),
+    Column("von_mises_mean", Double()),
+    Column("displacement_max", Double(), nullable=False),
+    Column("contact_force_max", Double()),
     Column("values", JSON_TEXT, nullable=False),
     Index("ix_entity_result_run_id", "run_id"),
 )
@@ -69,9 +69,9 @@ Table(
     metadata,
     Column("entity_id", Integer(), ForeignKey("entity.id"), primary_key=True),
     Column("line", Integer(), nullable=False),
-    Column("sigma", Float(), nullable=False),
-    Column("offset", Float(), nullable=False),
-    Column("rms", Float(), nullable=False),
+    Column("sigma", Double(), nullable=False),
+    Column("offset", Double(), nullable=False),
+    Column("rms", Double(), nullable=False),
     Column("redundancy", Integer(), nullable=False),
     Column("point_count", Integer(), nullable=False),
     Column("rejected_count", Integer(), nullable=False),

@@ -1,6 +1,6 @@
 """Tables of version 2: frames and stations of surveys, shapes of faces, precision of hidden sides."""
 
-from sqlalchemy import Column, DateTime, Float, ForeignKey, Index, Integer, MetaData, String, Table
+from sqlalchemy import Column, DateTime, Double, ForeignKey, Index, Integer, MetaData, String, Table
 
 from archmodel.migrations.layouts.columns import BYTES, JSON_TEXT, TEXT
 
@@ -40,17 +40,17 @@ Table(
     Column("survey_id", Integer(), ForeignKey("survey.id"), nullable=False),
     Column("course", Integer()),
     Column("zone", TEXT),
-    Column("depth", Float(), nullable=False),
-    Column("depth_sigma", Float()),
+    Column("depth", Double(), nullable=False),
+    Column("depth_sigma", Double()),
     Column("depth_source", TEXT, nullable=False),
     Column("depth_origin", TEXT, nullable=False),
-    Column("length", Float(), nullable=False),
-    Column("height", Float(), nullable=False),
-    Column("area", Float(), nullable=False),
-    Column("volume", Float(), nullable=False),
-    Column("x", Float(), nullable=False),
-    Column("y", Float(), nullable=False),
-    Column("z", Float(), nullable=False),
+    Column("length", Double(), nullable=False),
+    Column("height", Double(), nullable=False),
+    Column("area", Double(), nullable=False),
+    Column("volume", Double(), nullable=False),
+    Column("x", Double(), nullable=False),
+    Column("y", Double(), nullable=False),
+    Column("z", Double(), nullable=False),
     Index("ix_entity_kind_course", "kind", "course"),
     Index("ix_entity_survey_id", "survey_id"),
 )
@@ -60,10 +60,10 @@ Table(
     Column("entity_id", Integer(), ForeignKey("entity.id"), primary_key=True),
     Column("run_id", Integer(), ForeignKey("run.id"), primary_key=True),
     Column("fidelity", TEXT, nullable=False),
-    Column("von_mises_max", Float()),
-    Column("von_mises_mean", Float()),
-    Column("displacement_max", Float(), nullable=False),
-    Column("contact_force_max", Float()),
+    Column("von_mises_max", Double()),
+    Column("von_mises_mean", Double()),
+    Column("displacement_max", Double(), nullable=False),
+    Column("contact_force_max", Double()),
     Column("values", JSON_TEXT, nullable=False),
     Index("ix_entity_result_run_id", "run_id"),
 )
@@ -72,9 +72,9 @@ Table(
     metadata,
     Column("entity_id", Integer(), ForeignKey("entity.id"), primary_key=True),
     Column("line", Integer(), nullable=False),
-    Column("sigma", Float(), nullable=False),
-    Column("offset", Float(), nullable=False),
-    Column("rms", Float(), nullable=False),
+    Column("sigma", Double(), nullable=False),
+    Column("offset", Double(), nullable=False),
+    Column("rms", Double(), nullable=False),
     Column("redundancy", Integer(), nullable=False),
     Column("point_count", Integer(), nullable=False),
     Column("rejected_count", Integer(), nullable=False),
@@ -86,7 +86,7 @@ Table(
     Column("shape_text", TEXT, nullable=False),
     Column("station", TEXT),
     Column("photograph", TEXT),
-    Column("tail", Float(), nullable=False),
+    Column("tail", Double(), nullable=False),
     Column("direction", BYTES),
     Column("normal", BYTES, nullable=False),
     Column("centroid", BYTES, nullable=False),
