@@ -19,8 +19,8 @@ from moma.errors import NoDatabaseError, SurveyError, UsageError
 from pipelines.frame_records import frame_record
 from pipelines.progress import Listener, Progress, silent
 from pipelines.reading_options import check_survey_file
-from pipelines.relate import relate
 from pipelines.rejects import check_targets, default_path, rejects_text
+from pipelines.relate import relate
 from pipelines.spool import Spool
 from pipelines.stone_records import stone_record
 from survey.extrusion import SurveyedBlock

@@ -143,7 +143,9 @@ def test_a_wall_is_the_same_in_the_database_whatever_format_it_came_in(desk, for
     assert [(one.done, one.total, one.text) for one in told] == [
         *((k + 1, None, f"W{k}") for k in range(4)),
         *((k + 1, 4, f"W{k}") for k in range(4)),
+        (0, None, ""),
     ]
+    assert told[-1].stage == "relate"
     origin = {"moma": "rule", "csv": "stone", "pnezd": "rule", "solids": "solid"}[format]
     assert {one.depth_origin for one in desk.stones().values()} == {origin}
 
