@@ -25,7 +25,7 @@ from archmodel.relations import Membership
 from archmodel.runs import EntityResult, Run
 from archmodel.structures import Structure
 from archmodel.surveys import Measurement, Survey
-from archmodel.versions import entity_at, version_at
+from archmodel.versions import entity_at, structures_named, version_at
 from archmodel.wording import entry_values
 from moma.errors import UsageError
 
@@ -64,12 +64,12 @@ def describe(session: Session, code: str, at: int | None = None) -> dict[str, ob
     number = session.scalar(select(Entity.id).where(Entity.code == code))
     if number is not None:
         return _entity(session, number, code, at)
-    structure = session.scalar(
-        select(Structure).where(Structure.code == code).order_by(Structure.superseded_id.is_not(None))
-    )
-    if structure is None:
+    structures = structures_named(session, code)
+    if not structures:
         raise no_such_code(session, code, Entity.code, Structure.code)
-    return _structure(session, structure, at)
+    # a code that was given up can have been given to another structure since
+    then = [one for one in structures if at is None or version_at(session, one, at).entry_id <= at]
+    return _structure(session, (then or structures)[0], at)
 
 
 def _entity(session: Session, number: int, code: str, at: int | None) -> Values:

@@ -20,7 +20,7 @@ from archmodel.relations import INVERSE, Membership, Relation
 from archmodel.runs import EntityResult, Run
 from archmodel.structures import Structure
 from archmodel.surveys import Measurement
-from archmodel.versions import entity_at
+from archmodel.versions import entity_at, structures_named
 from archmodel.wording import entry_values, statement_values
 
 __all__ = ["Event", "history", "known_at"]
@@ -65,12 +65,10 @@ def history(session: Session, code: str) -> tuple[Event, ...]:
     if number is not None:
         events = [*_of_entity(session, number), *_statements(session, "entity_id", number)]
         return _ordered(events)
-    structures = (
-        session.scalars(select(Structure).where(Structure.code == code)).all() if code.isprintable() else []
-    )
+    structures = structures_named(session, code) if code.isprintable() else []
     if not structures:
         raise no_such_code(session, code, Entity.code, Structure.code)
-    return _ordered([event for one in _roots(structures) for event in _of_structure(session, one)])
+    return _ordered([event for one in structures for event in _of_structure(session, one)])
 
 
 def known_at(session: Session, code: str, entry: int) -> dict[str, object]:
@@ -176,12 +174,6 @@ def _of_structure(session: Session, held: Structure) -> Iterator[Event]:
     yield from _statements(session, "structure_id", held.id)
     if held.superseded_by is not None:
         yield _event(held.superseded_by, "withdrawn", "structure", before or {})
-
-
-def _roots(structures: Sequence[Structure]) -> list[Structure]:
-    """The rows that other rows refer to: not those that only keep what a revised row was before."""
-    kept = {one.supersedes_id for one in structures}
-    return [one for one in structures if one.id not in kept]
 
 
 def _statements(session: Session, column: str, number: int) -> Iterator[Event]:

@@ -10,7 +10,7 @@ from archmodel.knowledge import Correction, Document, Material, Phase
 from archmodel.recording import table_of
 from archmodel.structures import Structure
 
-__all__ = ["entity_at", "version_at"]
+__all__ = ["entity_at", "structures_named", "version_at"]
 
 T = TypeVar("T", Material, Phase, Document, Structure)
 
@@ -50,3 +50,11 @@ def entity_at(session: Session, number: int, at: int | None) -> dict[str, Any] |
             own[one.attribute] = one.before
     row["own"] = own or None
     return row
+
+
+def structures_named(session: Session, code: str) -> list[Structure]:
+    """Structures that have or had a code, latest first; those that only keep what a revised one was before are not."""
+    rows = session.scalars(select(Structure).where(Structure.code == code)).all()
+    kept = {one.supersedes_id for one in rows}
+    found = [one for one in rows if one.id not in kept]
+    return sorted(found, key=lambda one: (one.superseded_id is None, one.superseded_id or 0), reverse=True)

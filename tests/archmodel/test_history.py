@@ -241,8 +241,8 @@ def play(database: Database, actions: list[Action]) -> None:
         assert session.scalars(select(Entry)).all()[-1].id == max(states)
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-@given(st.lists(ACTIONS, max_size=25))
+@settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(st.lists(ACTIONS, max_size=16))
 def test_every_earlier_state_is_read_back(actions: list[Action]) -> None:
     with open_database("sqlite://") as database:
         play(database, actions)
