@@ -24,6 +24,9 @@ OPTIONS = {
 }
 """No network, and nothing that only helps after a power failure."""
 
+ACCESS = "local all guarded scram-sha-256\nlocal all all trust\n"
+"""Who may enter: `guarded` with the password "open sesame", everybody else without one."""
+
 KEEPER = '"$@" >"$LOG" 2>&1 & server=$!; cat >/dev/null; kill -INT $server; wait $server; rm -rf "$FOLDER"'
 """A shell that stops the server and removes its folder when our end of its input is closed: also when we are killed."""
 
@@ -39,7 +42,7 @@ class Server:
     Attributes
     ----------
     folder : of its data and its socket
-    user : who may do everything in it
+    user : who may do everything in it; `guest` may connect, `guarded` needs the password "open sesame"
     """
 
     folder: Path
@@ -98,6 +101,8 @@ def running_server() -> Iterator[Server]:
         try:
             server = Server(folder, "moma")
             _wait_until_ready(server, keeper)
+            server.execute("CREATE ROLE guest LOGIN")
+            server.execute("CREATE ROLE guarded SUPERUSER LOGIN PASSWORD 'open sesame'")
             yield server
         finally:
             keeper.communicate(timeout=30)
@@ -140,6 +145,7 @@ def _make_cluster(programs: Path, folder: Path, user: str | None) -> None:
         command = [str(programs / "initdb"), f"--pgdata={folder / 'data'}", *plain, *locale]
         made = subprocess.run(command, capture_output=True, text=True, check=False, user=user, cwd=folder)
         if made.returncode == 0:
+            (folder / "data" / "pg_hba.conf").write_text(ACCESS)
             return
         shutil.rmtree(folder / "data", ignore_errors=True)
     raise Unavailable(f"initdb failed for user {user or getpass.getuser()}: {made.stderr.strip()[-200:]}")
