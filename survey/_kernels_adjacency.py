@@ -15,9 +15,11 @@ __all__ = ["GROUPS", "count_near", "face_planes", "list_near", "morton_codes", "
 GROUPS = 4
 """Directions in which one solid can touch another; more are counted with the nearest of these."""
 
-_ONE_WAY = (
-    0.866  # cosine of 30°: overlaps that look so much alike are one contact, however many faces make it
-)
+_ONE_WAY = 0.866
+"""Cosine of 30°: overlaps that look so much alike are one contact, however many faces make it."""
+
+_OF_STONE = 0.5
+"""A joint is at most so wide, against the thinner of its stones: across a course of thin bricks lies no joint."""
 
 
 @njit(cache=True)
@@ -246,6 +248,18 @@ def _boxes_apart(boxes, i, j, width):
 
 
 @njit(cache=True)
+def _thickness(solid, vertices, corners, face_starts, solid_starts, n):
+    """Extent of a solid along n."""
+    low, high = math.inf, -math.inf
+    for c in range(face_starts[solid_starts[solid]], face_starts[solid_starts[solid + 1]]):
+        along = 0.0
+        for k in range(3):
+            along += vertices[corners[c], k] * n[k]
+        low, high = min(low, along), max(high, along)
+    return high - low
+
+
+@njit(cache=True)
 def _add(groups, count, row):
     """Count an overlap (8,): area, gap, place, normal, with the group that looks the same way, or as a new one."""
     best, nearest = -1, -2.0
@@ -317,6 +331,12 @@ def touching_faces(pairs, solid, planes, limits, out_pairs, out):
                 high = _height(vertices, one, normals[i], n, place)
                 low = _height(vertices, two, normals[j], n, place)
                 if not -overlap <= high - low <= width:
+                    continue
+                thin = min(
+                    _thickness(pairs[pair, 0], vertices, corners, face_starts, solid_starts, n),
+                    _thickness(pairs[pair, 1], vertices, corners, face_starts, solid_starts, n),
+                )
+                if abs(high - low) > _OF_STONE * thin:
                     continue
                 row[0], row[1] = area, high - low
                 for k in range(3):

@@ -132,7 +132,8 @@ def find_touching(
     Parameters
     ----------
     solids : closed, with planar faces of any number of corners, convex or not
-    width : of the widest open joint [m]; a stone thinner than that does not hide what lies behind it
+    width : of the widest open joint [m]; at most half the thickness of either stone. A slab that is thinner than
+        `width` does not hide two thicker stones from each other
     angle : by which the two faces may be out of parallel [degrees]
     overlap : by which solids may lie in each other [m]
     share : least part of the smaller face that the other covers [-]; below, they meet at an edge but for noise
