@@ -8,7 +8,7 @@ from archmodel.relations import RELATIONS
 from archmodel.structures import structure_kinds
 from pipelines.schema import Key, Kind
 
-__all__ = ["ARRAYS", "ATTRIBUTE", "PROPERTY", "RECORD", "WITHDRAWN"]
+__all__ = ["ABOUT", "ARRAYS", "ATTRIBUTE", "CITED", "PROPERTY", "RECORD", "WHO", "WITHDRAWN"]
 
 WITHDRAWN = (
     "made_of",
@@ -33,23 +33,28 @@ RECORD = (
     Key("date", Kind.DATE, "Date of all observations that do not give their own.", default=None),
 )
 
-_WHO = (
+WHO = (
     Key("author", Kind.TEXT, "Who says so; else that of `[record]`.", default=None),
     Key("source", Kind.TEXT, "On what grounds; else that of `[record]`.", default=None),
 )
+"""Keys of every table."""
 
 _STONES = Key("stones", Kind.STONES, "Codes or expressions of the stones.")
 _STONES_OR_NONE = Key("stones", Kind.TEXTS, "Codes or expressions of the stones.", default=())
 _STRUCTURES = Key("structures", Kind.TEXTS, "Codes of structures.", default=())
 
-_CITED = (
+ABOUT = (_STONES_OR_NONE, _STRUCTURES)
+"""What a statement is about; at least one of them is given."""
+
+CITED = (
     Key("text", Kind.TEXT, "In words.", default=None),
     Key("document", Kind.TEXT, "Code of the document that says so.", default=None),
     Key("locator", Kind.TEXT, "Where in the document: page, number of the figure.", default=None),
     Key("date", Kind.DATE, "Date on which it was seen.", default=None),
-    *_WHO,
 )
-_SAID = (_STONES_OR_NONE, _STRUCTURES, *_CITED)
+"""What every statement can say."""
+
+_SAID = (*ABOUT, *CITED, *WHO)
 
 _KIND = (
     Key("name", Kind.TEXT, "In small letters, with _ between words."),
@@ -62,7 +67,7 @@ _KIND = (
         default=None,
     ),
     Key("attributes", Kind.TABLE, "Its own: `{ name = { unit, definition } }`.", default={}),
-    *_WHO,
+    *WHO,
 )
 
 ATTRIBUTE = (
@@ -80,7 +85,7 @@ _MATERIAL = (
         "Numbers `{ density = 2350 }`, or tables `{ density = { value, sigma, unit, source } }`.",
         default={},
     ),
-    *_WHO,
+    *WHO,
 )
 
 PROPERTY = (
@@ -96,7 +101,7 @@ _PHASE = (
     Key("begins", Kind.INTEGER, "Year, at the earliest; negative before our era.", default=None),
     Key("ends", Kind.INTEGER, "Year, at the latest.", default=None),
     Key("description", Kind.TEXT, "In words.", default=None),
-    *_WHO,
+    *WHO,
 )
 
 _DOCUMENT = (
@@ -106,7 +111,7 @@ _DOCUMENT = (
     Key("place", Kind.TEXT, "Where it can be found: a path, a URL, an archive's number.", default=None),
     Key("by", Kind.TEXT, "Author of the document itself.", default=None),
     Key("dated", Kind.TEXT, "Date of the document itself, as it gives it.", default=None),
-    *_WHO,
+    *WHO,
 )
 
 _STRUCTURE = (
@@ -120,14 +125,14 @@ _STRUCTURE = (
     Key(
         "ordered", Kind.BOOLEAN, "The members are given in their order; they get ranks from 1.", default=False
     ),
-    *_WHO,
+    *WHO,
 )
 
 _RELATION = (
     Key("kind", Kind.TEXT, "What it is.", choices=(*RELATIONS, "supports")),
     Key("of", Kind.STONES, "Codes or expressions of the stones that are in relation."),
     Key("to", Kind.STONES, "Codes or expressions of the stones that each of them is in relation to."),
-    *_WHO,
+    *WHO,
 )
 
 _CORRECTION = (
@@ -135,14 +140,15 @@ _CORRECTION = (
     Key("set", Kind.TABLE, 'New values by attribute: `{ kind = "quoin" }`.', default={}),
     Key("unset", Kind.TEXTS, "Attributes that are not known after all.", default=()),
     Key("reason", Kind.TEXT, "On what grounds; else the source.", default=None),
-    *_WHO,
+    *WHO,
 )
 
 _DEPTH = (
     _STONES,
     Key("value", Kind.NUMBER, "How far they reach into the wall.", "m", above=0),
     Key("sigma", Kind.NUMBER, "Its standard deviation.", "m", None, at_least=0),
-    *_CITED,
+    *CITED,
+    *WHO,
 )
 
 _OBSERVATION = (
@@ -169,12 +175,11 @@ _WITHDRAW = (
         default=None,
     ),
     Key("property", Kind.TEXT, "Name of the property.", default=None),
-    _STONES_OR_NONE,
-    _STRUCTURES,
+    *ABOUT,
     Key("kind", Kind.TEXT, "Of the relation.", default=None, choices=(*RELATIONS, "supports")),
     Key("to", Kind.TEXTS, "The other stones of the relation.", default=()),
     Key("match", Kind.TABLE, 'Only what says this: `{ sign = "A" }`.', default={}),
-    *_WHO,
+    *WHO,
 )
 
 ARRAYS: Mapping[str, tuple[Key, ...]] = {
