@@ -44,6 +44,16 @@ def _refuse_constant(word: str) -> NoReturn:
     raise _Unreadable(f"{word} is no JSON; what is not known is null")
 
 
+def _ended(error: JSONDecodeError) -> bool:
+    """Whether the end of the document is the mistake."""
+    rest = error.doc[error.pos :]
+    if error.msg.startswith("Unterminated string") or (
+        error.msg.startswith("Invalid \\") and '"' not in rest
+    ):
+        return True
+    return any(word.startswith(rest.strip()) for word in ("true", "false", "null", "-"))
+
+
 class JsonText:
     """A document, with a place in it.
 
@@ -101,7 +111,7 @@ class JsonText:
             except JSONDecodeError as error:
                 if self._cut(error) and self._more():
                     continue
-                cut = self._done and self._cut(error)
+                cut = _ended(error)
                 self._at = len(self._text) if cut else error.pos
                 self.refuse("it ends in the middle of a value" if cut else f"this is no JSON: {error.msg}")
             except RecursionError:

@@ -18,7 +18,7 @@ from sqlalchemy import JSON, Boolean, Column, Date, Float, Integer, String
 from archmodel.base import ArrayType, UtcDateTime
 from archmodel.exchange_shapes import JsonShape, Mismatch
 
-__all__ = ["Schema", "Value", "value_of"]
+__all__ = ["INSTANT", "NUMBER", "Schema", "Value", "said", "value_of"]
 
 Schema = dict[str, Any]
 
@@ -31,6 +31,7 @@ DATE = r"^\d{4}-\d{2}-\d{2}$"
 INSTANT = r"^\d{4}-\d{2}-\d{2}T\d{2}:\d{2}:\d{2}(\.\d{6})?Z$"
 
 NUMBER: Schema = {"anyOf": [{"type": "number"}, {"enum": list(INFINITIES)}]}
+_REFERENCE: Schema = {"$ref": "#/$defs/number"}
 
 
 @dataclass(frozen=True)
@@ -144,7 +145,7 @@ def _instant(given: Any) -> datetime:
 _SIMPLE: tuple[tuple[type[Any], Value], ...] = (
     (Boolean, Value(_same, _boolean, {"type": "boolean"})),
     (Integer, Value(_same, _integer, {"type": "integer", "minimum": INTEGERS[0], "maximum": INTEGERS[1]})),
-    (Float, Value(_written_number, _number, NUMBER)),
+    (Float, Value(_written_number, _number, _REFERENCE)),
     (String, Value(_same, _text, {"type": "string"})),
     (UtcDateTime, Value(_written_instant, _instant, {"type": "string", "pattern": INSTANT})),
     (Date, Value(date.isoformat, _date, {"type": "string", "pattern": DATE})),
@@ -210,7 +211,7 @@ def _read_one_by_one(given: Any, flat: list[Any], shape: tuple[int, ...]) -> NDA
 
 def _array_schema(shape: tuple[int, ...]) -> Schema:
     if not shape:
-        return {"anyOf": [*NUMBER["anyOf"], {"type": "null"}]}
+        return {"anyOf": [_REFERENCE, {"type": "null"}]}
     schema: Schema = {"type": "array", "items": _array_schema(shape[1:])}
     return schema if shape[0] == -1 else schema | {"minItems": shape[0], "maxItems": shape[0]}
 

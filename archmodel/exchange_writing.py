@@ -68,16 +68,18 @@ def _lines(session: Session, section: Section) -> Iterator[bytes]:
     columns = _columns(section)
     heavy = any(isinstance(field.column.type, ArrayType) for field in section.fields)
     options = {"yield_per": ROWS_WITH_ARRAYS if heavy else ROWS}
-    for row in session.execute(_statement(section), execution_options=options):
-        try:
-            said = {
-                name: encode(value)
-                for (name, encode), value in zip(columns, row, strict=True)
-                if value is not None
-            }
-            yield _encoded(said)
-        except (ValueError, RecursionError) as error:
-            raise _unsayable(section, row, columns, error) from error
+    with session.execute(_statement(section), execution_options=options) as rows:
+        for row in rows:
+            try:
+                yield _encoded(
+                    {
+                        name: encode(value)
+                        for (name, encode), value in zip(columns, row, strict=True)
+                        if value is not None
+                    }
+                )
+            except (ValueError, RecursionError) as error:
+                raise _unsayable(section, row, columns, error) from error
 
 
 def _statement(section: Section) -> Select[Any]:
