@@ -44,7 +44,7 @@ from functools import cache
 from typing import Any, ClassVar
 from weakref import WeakSet
 
-from sqlalchemy import ForeignKey, Index, select
+from sqlalchemy import ForeignKey, Index, func, select
 from sqlalchemy.orm import Mapped, Session, declared_attr, mapped_column, relationship
 
 from archmodel.base import Base
@@ -184,7 +184,8 @@ class Entity(Base):
     @declared_attr.directive
     @classmethod
     def __mapper_args__(cls) -> dict[str, object]:
-        identity: dict[str, object] = {"polymorphic_identity": kind_of(cls)}
+        # A query of a general kind loads the attributes of its subkinds at once, not one entity after another.
+        identity: dict[str, object] = {"polymorphic_identity": kind_of(cls), "with_polymorphic": "*"}
         return identity | {"polymorphic_on": "kind"} if cls.__name__ == "Entity" else identity
 
     def __repr__(self) -> str:
@@ -392,7 +393,16 @@ def refuse_unknown_kinds(session: Session) -> None:
     DatabaseError
         naming such a kind
     """
-    unknown = session.scalar(select(Entity.kind).where(Entity.kind.not_in(list(kinds()))).limit(1))
+    unknown = next((kind for kind in _stored_kinds(session) if kind not in kinds()), None)
     if unknown is not None:
         remedy = "import the module that declares it, or use the version of MOMA that stored it"
         raise DatabaseError(f"the database holds a kind {unknown!r} that is not declared", remedy=remedy)
+
+
+def _stored_kinds(session: Session) -> list[str]:
+    """The kinds that entities in the database are of: from one to the next in the index, not all entities."""
+    kind = Entity.__table__.c.kind
+    stored = select(func.min(kind).label("kind")).cte("stored", recursive=True)
+    following = select(func.min(kind)).where(kind > stored.c.kind).correlate(stored).scalar_subquery()
+    stored = stored.union_all(select(following).where(stored.c.kind.is_not(None)))
+    return list(session.scalars(select(stored.c.kind).where(stored.c.kind.is_not(None))))

@@ -81,6 +81,7 @@ class Measurement(Recorded, Base):
             sqlite_where=text("superseded_id IS NULL"),
             postgresql_where=text("superseded_id IS NULL"),
         ),
+        Index("ix_measurement_entity_id", "entity_id"),
         Index("ix_measurement_survey_id", "survey_id"),
     )
 

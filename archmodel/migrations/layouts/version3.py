@@ -292,6 +292,7 @@ Table(
     Column("entry_id", Integer(), ForeignKey("entry.id"), nullable=False),
     Column("superseded_id", Integer(), ForeignKey("entry.id")),
     current("ix_measurement_current", "entity_id"),
+    Index("ix_measurement_entity_id", "entity_id"),
     Index("ix_measurement_survey_id", "survey_id"),
 )
 Table(
