@@ -25,6 +25,8 @@ def record_lines(report: "RecordReport", verbose: bool) -> list[str]:
         lines.append(f"{file.path}: {_counts(file.outcome)}, as {noun} {numbers}{would}")
         if verbose or report.dry_run:
             lines += [f"  {name}: {_counts(outcome)}" for name, outcome in file.tables.items()]
+    if report.related is not None:
+        lines.append(f"relations of the corrected stones computed anew, as entry {report.related}")
     return lines
 
 

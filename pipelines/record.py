@@ -9,11 +9,13 @@ from sqlalchemy.orm import Session
 
 from archmodel.database import open_database
 from archmodel.entries import Entry, new_entry
+from archmodel.knowledge import Correction
 from archmodel.recording import NOTHING, Outcome
 from archmodel.rows import storable
 from moma.errors import UsageError
 from pipelines.record_file import RecordFile, Table, read_record
 from pipelines.record_tables import record_table
+from pipelines.relate import relate
 
 __all__ = ["FileRecorded", "RecordReport", "record"]
 
@@ -45,11 +47,21 @@ class FileRecorded:
 
 @dataclass(frozen=True)
 class RecordReport:
-    """What became of all files; `dry_run`: nothing was kept."""
+    """What became of all files.
+
+    Attributes
+    ----------
+    url : of the database
+    dry_run : nothing was kept
+    files : each of them
+    related : number of the entry with which the relations of corrected stones were computed anew; None if they
+        are as they were
+    """
 
     url: str
     dry_run: bool
     files: tuple[FileRecorded, ...]
+    related: int | None
 
 
 def record(
@@ -75,11 +87,12 @@ def record(
     with open_database(url, create=not dry_run) as database, database.session() as session:
         kept = session.begin_nested()
         reports = tuple(_record_file(session, file, author) for file in files)
+        related = _relate_corrected(session, [number for one in reports for number in one.entries])
         if dry_run:
             kept.rollback()
         else:
             kept.commit()
-        return RecordReport(database.url, dry_run, reports)
+        return RecordReport(database.url, dry_run, reports, related)
 
 
 def _record_file(session: Session, file: RecordFile, author: str | None) -> FileRecorded:
@@ -96,6 +109,14 @@ def _record_file(session: Session, file: RecordFile, author: str | None) -> File
         changes[entry.id] = changes.get(entry.id, 0) + outcome.changes
     entries.drop(number for number, count in changes.items() if not count)
     return FileRecorded(path, tables, tuple(number for number, count in changes.items() if count))
+
+
+def _relate_corrected(session: Session, entries: Sequence[int]) -> int | None:
+    """What follows from kinds, courses and solids, for the stones that these entries corrected."""
+    corrected = session.scalars(
+        select(Correction.entity_id).where(Correction.entry_id.in_(entries)).distinct()
+    ).all()
+    return relate(session, only=corrected).entry if corrected else None
 
 
 class _Entries:
