@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from sqlalchemy.orm import Session
 
 from archmodel.bulk import insert_rows
 from archmodel.database import open_database
@@ -24,6 +23,8 @@ __all__ = ["main"]
 _ACROSS = 500  # stones of one course
 _LENGTH, _HEIGHT, _DEPTH = 0.6, 0.3, 0.4
 _FACE = np.array([[0.0, 0.0, 0.0], [_LENGTH, 0.0, 0.0], [_LENGTH, 0.0, _HEIGHT], [0.0, 0.0, _HEIGHT]])
+_AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+_BEHIND = np.array([0.0, _DEPTH, 0.0])
 _SOLID = [[0, 1, 2, 3], [4, 7, 6, 5], [0, 4, 5, 1], [1, 5, 6, 2], [2, 6, 7, 3], [3, 7, 4, 0]]
 
 
@@ -46,7 +47,9 @@ def _make(folder: Path, stones: int, suffix: str) -> dict[str, Any]:
     """One wall of so many stones and three relations for each, with their measurements."""
     with open_database(f"sqlite:///{folder / 'made.db'}") as database, database.session() as session:
         entry = new_entry(session, "ingest", "benchmark").id
-        survey = Survey(name="wall", path="wall.moma", sha256="0" * 64, entry_id=entry, stations={}, frame=None)
+        survey = Survey(
+            name="wall", path="wall.moma", sha256="0" * 64, entry_id=entry, stations={}, frame=None
+        )
         session.add(survey)
         session.flush()
         rows = insert_rows(session, Entity, _entities(stones, entry))
@@ -112,12 +115,12 @@ def _measurements(stones: int, entry: int, survey: int) -> Iterator[dict[str, An
             "direction": None,
             "normal": rng.normal(0.0, 0.01, 3) - [0.0, 1.0, 0.0],
             "centroid": outline.mean(axis=0),
-            "axes": rng.normal(0.0, 0.01, (2, 3)) + [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
+            "axes": _AXES + rng.normal(0.0, 0.01, (2, 3)),
             "covariance": 1e-6 * rng.normal(1.0, 0.1, (3, 3)),
             "vertices": outline + rng.normal(0.0, 0.003, (4, 3)),
             "points": inside + corner + rng.normal(0.0, 0.003, (10, 3)),
             "outline": outline,
-            "solid_vertices": np.vstack([outline, outline + [0.0, _DEPTH, 0.0]]),
+            "solid_vertices": np.vstack([outline, outline + _BEHIND]),
             "solid_faces": _SOLID,
             "vertex_sigma": np.vstack([rng.uniform(0.001, 0.004, (4, 3)), np.full((4, 3), np.nan)]),
             "image": np.empty((0, 2)),
@@ -134,16 +137,16 @@ def _relations(stones: int, entry: int) -> Iterator[dict[str, Any]]:
     for number in range(3 * stones):
         subject, which = divmod(number, 3)
         below = (subject - _ACROSS, subject - _ACROSS + 1, subject - 1)[which] % stones
-        x, y, z, nx, ny, nz = rng.normal(0.0, 1.0, 6).tolist()
+        numbers = rng.normal(0.0, 1.0, 6).tolist()
         yield {
             "id": number + 1,
             "kind": "beside" if which == 2 else "rests_on",
             "subject_id": min(subject, below) + 1 if which == 2 else subject + 1,
             "object_id": max(subject, below) + 1 if which == 2 else below + 1,
             "declared": False,
-            "area": 0.12 + 0.001 * x,
-            "gap": 0.01 + 0.001 * y,
-            **{"x": x, "y": y, "z": z, "nx": nx, "ny": ny, "nz": nz},
+            "area": 0.12 + 0.001 * numbers[0],
+            "gap": 0.01 + 0.001 * numbers[1],
+            **dict(zip(("x", "y", "z", "nx", "ny", "nz"), numbers, strict=True)),
             "entry_id": entry,
             "superseded_id": None,
         }
