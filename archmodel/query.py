@@ -19,6 +19,7 @@ from archmodel.scope import Context, Scope
 from moma.errors import DatabaseError, QueryError
 
 __all__ = [
+    "MAX_EXPRESSIONS",
     "Face",
     "asked_columns",
     "attributes",
@@ -192,7 +193,9 @@ def _select(
     """The chosen columns of the entities of a kind that satisfy all expressions, in the order of the survey."""
     cls = kind_named(kind)
     scope, conditions = _asked(session, where, run)
-    subkinds = [name for name, sub in kinds().items() if issubclass(sub, cls)]
     columns = chosen(scope)
-    statement = scope.joined(select(*columns)).where(scope.entity.c.kind.in_(subkinds), *conditions)
-    return session.execute(statement.order_by(scope.entity.c.id))
+    statement = scope.joined(select(*columns)).where(*conditions).order_by(scope.entity.c.id)
+    if cls is not Entity:
+        subkinds = [name for name, sub in kinds().items() if issubclass(sub, cls)]
+        statement = statement.where(scope.entity.c.kind.in_(subkinds))
+    return session.execute(statement)

@@ -48,11 +48,12 @@ def said_of_structures(*kinds: str) -> CTE:
         of structure_id, statement_id, distance (0: said of the structure itself)
     """
     said, part = alias_of(Statement), alias_of(Structure)
+    # > 0, and not "is not null", since SQLite has an index for it
     seeds = select(
         said.c.structure_id.label("structure_id"),
         said.c.id.label("statement_id"),
         literal(0).label("distance"),
-    ).where(said.c.structure_id.is_not(None), said.c.kind.in_(kinds), held(said))
+    ).where(said.c.structure_id > 0, said.c.kind.in_(kinds), held(said))
     reach = seeds.cte(recursive=True)
     return reach.union_all(
         select(part.c.id, reach.c.statement_id, reach.c.distance + 1)
