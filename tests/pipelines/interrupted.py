@@ -15,9 +15,7 @@ from pipelines.progress import Progress
 __all__ = ["Ingest", "wall_survey"]
 
 _CONTEXT = multiprocessing.get_context("forkserver")
-_CONTEXT.set_forkserver_preload(
-    ["tests.pipelines.interrupted", "psycopg", "scipy.spatial", "pipelines.relate"]
-)
+_CONTEXT.set_forkserver_preload(["tests.pipelines.warmed", "psycopg"])
 
 PATIENCE = 60.0  # [s] for what takes a second on an idle machine
 
