@@ -118,8 +118,8 @@ class JsonText:
                 self.refuse("lists or objects are nested too deeply")
             except ValueError as error:
                 self.refuse(str(error) if isinstance(error, _Unreadable) else "a number has too many digits")
-            # A number at the end of what was read may go on.
-            if end == len(self._text) and self._more():
+            # A number at the end of what was read may go on: 1e+ was read as 1 so far.
+            if end + 2 >= len(self._text) and self._more():
                 continue
             self._at = end
             return value
