@@ -59,8 +59,9 @@ def _changes(report: "RelationReport") -> list[dict[str, object]]:
 def load_path(
     code: Annotated[str, typer.Argument(metavar="CODE", help="Code of a stone.")],
     up: Annotated[bool, typer.Option("--up", help="What it carries, instead of what carries it.")] = False,
-    as_of: Annotated[
-        int | None, typer.Option("--as-of", metavar="ENTRY", help="As it was known at this entry.")
+    at: Annotated[
+        int | None,
+        typer.Option("--at", metavar="ENTRY", help="As it was known when this entry had just been made."),
     ] = None,
     db: Db = DEFAULT_DB,
     json: Json = False,
@@ -72,7 +73,7 @@ def load_path(
     from moma.listing import as_json, as_table
 
     with open_database(db, create=False) as database, database.session(read_only=True) as session:
-        path = follow(session, code, up=up, as_of=as_of)
+        path = follow(session, code, up=up, as_of=at)
     if json:
         print(as_json(asdict(path)))
         return
