@@ -32,7 +32,9 @@ def place(tmp_path):
     sample.mkdir(parents=True)
     (sample / "window.moma").symlink_to(ROOT / "data/samples/window/window.moma")
     (tmp_path / "docs/howto").mkdir(parents=True)
-    (tmp_path / "docs/howto/survey").symlink_to(ROOT / "docs/howto/survey")
+    for folder in ("survey", "query"):
+        (tmp_path / "docs/howto" / folder).symlink_to(ROOT / "docs/howto" / folder)
+    (sample / "knowledge.toml").symlink_to(ROOT / "data/samples/window/knowledge.toml")
     text = (ROOT / SCENE).read_text(encoding="utf-8")
     assert 'default = "deformable"' in text
     quick = text.replace('default = "deformable"', 'default = "rigid"').replace(
@@ -90,6 +92,33 @@ def test_what_the_how_to_on_surveys_shows_is_what_the_files_and_commands_say(pla
     shown = [line for block in blocks(page, "text") for line in block.splitlines()]
     assert len(shown) > 20
     assert [line for line in shown if line not in known] == []
+
+
+def test_the_questions_of_the_how_to_on_queries_have_the_answers_it_shows(place):
+    page = "docs/howto/query.md"
+    text = (ROOT / page).read_text(encoding="utf-8")
+    pieces = re.findall(r"^```(bash|text|python)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    questions = 0
+    for (language, block), (following, answer) in zip(pieces, [*pieces[1:], ("", "")], strict=True):
+        for number, line in enumerate(block.splitlines() if language == "bash" else []):
+            command = shlex.split(line)
+            done = execute([sys.executable, "-m", *command], place)
+            assert done.returncode == 0, (command, done.stderr)
+            shown = answer if following == "text" and number == 0 else ""
+            if command[1] == "query" and "--format" not in command:
+                assert done.stdout == shown, command  # the whole answer
+            else:
+                assert set(untimed(shown)) <= set(untimed(done.stdout)), command
+            questions += command[1] not in ("ingest", "record", "run")
+    assert questions >= 15
+    (script,) = blocks(page, "python")
+    done = execute([sys.executable, "-W", "error", "-c", script], place)
+    assert done.stdout.split() == ["W10-03", "10", "W10-06", "10", "W11-06", "11"], done.stderr
+
+
+def untimed(text):
+    """Lines without the instants in them, which differ from day to day."""
+    return re.sub(r"\d{4}-\d\d-\d\dT[:\d]+\+00:00", "", text).splitlines()
 
 
 def test_the_links_of_the_pages_lead_somewhere():
