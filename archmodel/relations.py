@@ -36,8 +36,6 @@ class Relation(Recorded, Base):
     gap : mean width of the joint between them; None if declared [m]
     x, y, z : centroid of the shared area; None if declared [m]
     nx, ny, nz : its unit normal, from object to subject; None if declared
-    supersedes : not kept: what an entry of action "geometry" or a declaration superseded has its number in
-        ``superseded_id``
     """
 
     __tablename__ = "relation"
