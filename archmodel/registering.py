@@ -50,7 +50,7 @@ def register_kind(
     above = kind_named(parent)
     given = {key: (unit, definition.strip()) for key, (unit, definition) in (attributes or {}).items()}
     row = RegisteredKind(
-        name=_checked_name("kind", name),
+        name=_checked_name("a kind", name),
         parent=kind_of(above),
         definition=" ".join(str(checked_text("definition", definition)).split()),
         canon=canon,
@@ -81,7 +81,7 @@ def _check_attributes(
     built_in = {one.name for cls in kinds().values() if cls.__users__ is None for one in cls.__own__}
     units = {one.name: one.unit for cls in kinds().values() for one in cls.__own__}
     for name, (unit, definition) in given.items():
-        _checked_name("attribute", name)
+        _checked_name("an attribute", name)
         checked_text(f"definition of {name}", definition)
         if unit is not None:
             checked_label(f"unit of {name}", unit)
@@ -96,5 +96,5 @@ def _check_attributes(
 def _checked_name(thing: str, name: str) -> str:
     if not _NAME.fullmatch(name) or len(name) > 40:
         remedy = "write it in small letters a–z and digits, with _ between words, e.g. corner_merlon"
-        raise UsageError(f"{name[:40]!a} is not the name of a {thing}", remedy=remedy)
+        raise UsageError(f"{name[:40]!a} is not the name of {thing}", remedy=remedy)
     return name

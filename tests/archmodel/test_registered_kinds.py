@@ -1,0 +1,143 @@
+"""Kinds of a user's own: classes of the hierarchy while a database that registers them is open."""
+
+from collections.abc import Callable
+
+import pytest
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from archmodel.correcting import correct
+from archmodel.database import Database, open_database
+from archmodel.description import describe
+from archmodel.entities import Ashlar, Entity, canon_of, definition_of, kind_named, kinds, own_attributes
+from archmodel.entries import Entry, new_entry
+from archmodel.knowledge import Correction
+from archmodel.query import find
+from archmodel.recording import Outcome
+from archmodel.registering import register_kind
+from archmodel.store import store_survey
+from moma.errors import DatabaseError, MomaError, UsageError
+from tests.archmodel.stones import box_stone
+
+OWN: dict[str, tuple[str | None, str]] = {
+    "slit_width": ("m", "clear width of the slit"),
+    "slit_shape": (None, "in words"),
+    "slit_count": ("-", "how many"),
+}
+
+
+def entry_of(session: Session) -> Entry:
+    return new_entry(session, "declaration", "a test")
+
+
+def merlon(session: Session, definition: str = "A stone of a merlon.") -> Outcome:
+    return register_kind(
+        session, entry_of(session), "merlon", "coping", definition, canon="depth < length", attributes=OWN
+    )
+
+
+def test_a_registered_kind_is_like_any_other(filled: Database) -> None:
+    with filled.session() as session:
+        assert merlon(session) == Outcome(new=1)
+        assert merlon(session) == Outcome(unchanged=1)
+        register_kind(session, entry_of(session), "corner_merlon", "merlon", "A merlon's stone at a corner.")
+        cls = kind_named("Corner merlon")
+        assert definition_of(kind_named("merlon")) == "A stone of a merlon."
+        assert (canon_of(cls), list(own_attributes(cls))) == ("depth < length", list(OWN))
+        store_survey(
+            session,
+            "more",
+            "more.moma",
+            "cd" * 32,
+            [box_stone("M1", "merlon"), box_stone("M2", "corner_merlon")],
+        )
+        assert [one.code for one in find(session, "merlon")] == ["M1", "M2"]
+        assert [one.code for one in find(session, "coping", ["kind = corner_merlon"])] == ["M2"]
+        assert len(session.scalars(select(Ashlar)).all()) == 8
+
+
+def test_values_of_its_attributes_are_set_by_corrections(filled: Database) -> None:
+    with filled.session() as session:
+        merlon(session)
+        entry = entry_of(session)
+        values = {"kind": "merlon", "slit_width": 0.1, "slit_shape": "a cross", "slit_count": 2}
+        correct(session, entry, "W01-01", values)
+        correct(session, entry, "W01-01", {"slit_width": 0.12, "slit_shape": None})
+        told = describe(session, "W01-01")
+        assert told["own"] == {
+            "slit_width": {"value": 0.12, "unit": "m", "definition": "clear width of the slit"},
+            "slit_count": {"value": 2.0, "unit": "-", "definition": "how many"},
+        }
+        with pytest.raises(UsageError, match="slit_width is wide; give a finite number in m"):
+            correct(session, entry, "W01-01", {"slit_width": "wide"})
+        with pytest.raises(UsageError, match="slit_shape is 3; give a text"):
+            correct(session, entry, "W01-01", {"slit_shape": 3})
+        correct(session, entry, "W01-01", {"kind": "header"})
+        stone = session.scalars(select(Entity).where(Entity.code == "W01-01")).one()
+        assert stone.own is None
+        last = session.scalars(select(Correction).order_by(Correction.id.desc()).limit(3)).all()
+        assert {(one.attribute, one.before, one.after) for one in last} == {
+            ("kind", "merlon", "header"),
+            ("slit_width", 0.12, None),
+            ("slit_count", 2.0, None),
+        }
+
+
+def test_it_is_known_as_long_as_a_database_that_registers_it_is_open(new_url: Callable[[], str]) -> None:
+    url = new_url()
+    with open_database(url) as database, database.session() as session:
+        merlon(session)
+        assert "merlon" in kinds()
+    assert "merlon" not in kinds()
+    with pytest.raises(UsageError, match="unknown kind 'merlon'"):
+        kind_named("merlon")
+    with open_database(url), open_database(url) as again:
+        assert "merlon" in kinds()
+        again.close()
+        assert "merlon" in kinds()
+    assert "merlon" not in kinds()
+
+
+def test_two_buildings_can_mean_different_things_but_not_at_once(new_url: Callable[[], str]) -> None:
+    first, second = new_url(), new_url()
+    for url, definition in ((first, "A stone of a merlon."), (second, "A small merle.")):
+        with open_database(url) as database, database.session() as session:
+            merlon(session, definition)
+            store_survey(session, "w", "w.moma", "ef" * 32, [box_stone("M1", "merlon")])
+    with open_database(first):
+        with pytest.raises(DatabaseError, match="the kind merlon means something else here"):
+            open_database(second)
+        assert definition_of(kind_named("merlon")) == "A stone of a merlon."
+    with open_database(second) as database, database.session(read_only=True) as session:
+        (stone,) = find(session, "merlon")
+        assert definition_of(type(stone)) == "A small merle."
+
+
+def test_what_cannot_be_registered_is_refused(empty: Database) -> None:
+    cases: list[tuple[dict[str, object], str]] = [
+        ({"name": "header"}, "there is a kind header already"),
+        ({"name": "merlon"}, "registered already, with another definition"),
+        ({"name": "Merlon"}, "'Merlon' is not the name of a kind; write it in small letters"),
+        ({"name": "x" * 41}, "is not the name of a kind"),
+        ({"name": "drop table"}, "is not the name of a kind"),
+        ({"parent": "ashlra"}, "unknown kind 'ashlra'; did you mean ashlar"),
+        ({"definition": "  "}, "definition '  ' has no visible character"),
+        ({"canon": "depth >"}, "is not a value"),
+        ({"attributes": {"depth": ("m", "x")}}, "depth means something in queries already"),
+        ({"attributes": {"and": ("m", "x")}}, "and means something in queries already"),
+        ({"attributes": {"tail_length": ("m", "x")}}, "tail_length means something in queries already"),
+        ({"attributes": {"Slit": ("m", "x")}}, "'Slit' is not the name of an attribute"),
+        (
+            {"attributes": {"slit_width": ("cm", "x")}},
+            "slit_width .cm. is an attribute of another kind, in m",
+        ),
+        ({"attributes": {"slit": ("m", "")}}, "definition of slit '' has no visible character"),
+    ]
+    usual: dict[str, object] = {"name": "slab_of_merlon", "parent": "ashlar", "definition": "A slab."}
+    with empty.session() as session:
+        merlon(session)
+        entry = entry_of(session)
+        for given, message in cases:
+            with pytest.raises(MomaError, match=message):
+                register_kind(session, entry, **(usual | given))  # type: ignore[arg-type]
+        assert set(kinds()) & {"merlon", "slab_of_merlon"} == {"merlon"}
