@@ -41,10 +41,12 @@ class Server:
 
     Attributes
     ----------
+    programs : the folder of its tools
     folder : of its data and its socket
     user : who may do everything in it; `guest` may connect, `guarded` needs the password "open sesame"
     """
 
+    programs: Path
     folder: Path
     user: str
     _numbers: Iterator[int] = field(default_factory=itertools.count)
@@ -99,7 +101,7 @@ def running_server() -> Iterator[Server]:
         _make_cluster(programs, folder, user)
         keeper = _start(programs, folder, user)
         try:
-            server = Server(folder, "moma")
+            server = Server(programs, folder, "moma")
             _wait_until_ready(server, keeper)
             server.execute("CREATE ROLE guest LOGIN")
             server.execute("CREATE ROLE guarded SUPERUSER LOGIN PASSWORD 'open sesame'")
