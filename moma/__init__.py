@@ -6,6 +6,7 @@ What scripts need, each loaded when it is first used::
 
     moma.report_surveys(["window.moma"], "out/survey-window")
     moma.ingest(["window.moma"], "sqlite:///moma.db")
+    moma.record(["knowledge.toml"], "sqlite:///moma.db")
     with moma.open_database("sqlite:///moma.db") as database, database.session(read_only=True) as session:
         deep = moma.find(session, "header", ["depth > 0.4"])
     done = moma.run_scene("window.toml", "sqlite:///moma.db", "out/window")
@@ -19,12 +20,16 @@ from moma.errors import MomaError
 
 if TYPE_CHECKING:
     from archmodel.database import open_database
-    from archmodel.query import find
+    from archmodel.graph import load_path
+    from archmodel.history import history
+    from archmodel.query import find, find_rows
+    from archmodel.trace import trace
     from mechanics.result import Result
     from mechanics.scene import Block, Scene
     from mechanics.simulate import simulate
     from pipelines.assemble import assemble
     from pipelines.ingest import ingest
+    from pipelines.record import record
     from pipelines.run import run_scene
     from pipelines.scenefile import read_scene
     from pipelines.survey_report import report_surveys
@@ -40,14 +45,19 @@ __all__ = [
     "__version__",
     "assemble",
     "find",
+    "find_rows",
+    "history",
     "ingest",
+    "load_path",
     "open_database",
     "open_survey",
     "read_scene",
+    "record",
     "report_surveys",
     "run_scene",
     "simulate",
     "survey_stones",
+    "trace",
 ]
 
 _HOMES = {
@@ -57,14 +67,19 @@ _HOMES = {
     "Scene": "mechanics.scene",
     "assemble": "pipelines.assemble",
     "find": "archmodel.query",
+    "find_rows": "archmodel.query",
+    "history": "archmodel.history",
     "ingest": "pipelines.ingest",
+    "load_path": "archmodel.graph",
     "open_database": "archmodel.database",
     "open_survey": "survey.formats.reading",
     "read_scene": "pipelines.scenefile",
+    "record": "pipelines.record",
     "report_surveys": "pipelines.survey_report",
     "run_scene": "pipelines.run",
     "simulate": "mechanics.simulate",
     "survey_stones": "survey.measured",
+    "trace": "archmodel.trace",
 }
 
 __version__: str
