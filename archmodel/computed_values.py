@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from sqlalchemy import ColumnElement, bindparam, func, select, update
 from sqlalchemy.orm import Session, aliased
 
-from archmodel.arches import Arch
+from archmodel.arch_rows import Arch
 from archmodel.bulk import batches, insert_rows
 from archmodel.entities import Entity, Header, Stretcher, kind_of, kinds
 from archmodel.entries import Entry
