@@ -21,11 +21,16 @@ def postgresql() -> Iterator[Server]:
 
 
 @pytest.fixture(params=["sqlite", "postgresql"])
-def new_url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Callable[[], str]]:
-    """URLs of databases that nobody has laid out yet; a test that uses it runs on SQLite and on PostgreSQL."""
-    if request.param == "sqlite":
-        names = ("moma.db", *(f"moma{number}.db" for number in range(1, 100)))
-        files = iter(names)
+def backend(request: pytest.FixtureRequest) -> str:
+    """The kind of database that a test runs on: each in turn."""
+    return str(request.param)
+
+
+@pytest.fixture
+def new_url(backend: str, request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Callable[[], str]]:
+    """A function that gives URLs of databases that nobody has laid out yet."""
+    if backend == "sqlite":
+        files = iter(("new.db", *(f"new{number}.db" for number in range(1, 100))))
         yield lambda: f"sqlite:///{tmp_path / next(files)}"
         return
     server = request.getfixturevalue("postgresql")

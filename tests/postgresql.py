@@ -11,6 +11,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from psycopg import Connection
+    from psycopg.rows import TupleRow
 
 __all__ = ["Server", "Unavailable", "running_server"]
 
@@ -55,13 +60,15 @@ class Server:
         """The URL of one of its databases."""
         return f"postgresql://{self.user}@/{name}?host={self.folder}"
 
-    def execute(self, statement: str) -> None:
-        """A statement outside of transactions, in the database that is always there."""
+    def connect(self, name: str = "postgres") -> "Connection[TupleRow]":
+        """A connection to one of its databases, beside those of the program; each statement is a transaction."""
         import psycopg
 
-        with psycopg.connect(
-            host=str(self.folder), user=self.user, dbname="postgres", autocommit=True
-        ) as connection:
+        return psycopg.connect(host=str(self.folder), user=self.user, dbname=name, autocommit=True)
+
+    def execute(self, statement: str) -> None:
+        """A statement in the database that is always there."""
+        with self.connect() as connection:
             connection.execute(statement.encode())
 
     @contextmanager

@@ -2,13 +2,16 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from pathlib import Path
 
 import pytest
 
 from archmodel.database import Database, open_database
 from archmodel.records import StoneRecord
 from archmodel.store import store_survey
+from tests.archmodel.recycling import Recycled
 from tests.archmodel.stones import SHA, box_stone
+from tests.postgresql import Server
 
 WALL = (
     box_stone("W01-01", "header", course=1, size=(0.3, 0.5, 0.25), at=(0.0, 0.0, 0.0)),
@@ -26,11 +29,25 @@ def wall() -> tuple[StoneRecord, ...]:
     return WALL
 
 
-@pytest.fixture
-def new_database(new_url: Callable[[], str]) -> Iterator[Callable[[], Database]]:
-    """Further databases, laid out and empty, beside the fixture `empty` and of the same kind."""
+@pytest.fixture(scope="session")
+def recycled(postgresql: Server) -> Iterator[Recycled]:
+    """Databases of the server, laid out and empty."""
     with ExitStack() as held:
-        yield lambda: held.enter_context(open_database(new_url()))
+        yield Recycled(postgresql, held)
+
+
+@pytest.fixture
+def new_database(
+    backend: str, request: pytest.FixtureRequest, tmp_path: Path
+) -> Iterator[Callable[[], Database]]:
+    """A function that gives databases that are laid out and empty."""
+    with ExitStack() as held:
+        if backend == "sqlite":
+            files = iter(("moma.db", *(f"moma{number}.db" for number in range(1, 100))))
+            yield lambda: held.enter_context(open_database(f"sqlite:///{tmp_path / next(files)}"))
+        else:
+            pool: Recycled = request.getfixturevalue("recycled")
+            yield lambda: held.enter_context(open_database(held.enter_context(pool.url())))
 
 
 @pytest.fixture

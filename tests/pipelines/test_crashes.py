@@ -100,7 +100,7 @@ def copies(url: str, postgresql: Server | None) -> Iterator[NewUrl]:
 
 
 @pytest.mark.parametrize(
-    ("seed", "kills"), [(1, 8), pytest.param(2, 50, marks=pytest.mark.slow)], ids=["some", "many"]
+    ("seed", "kills"), [(1, 6), pytest.param(2, 50, marks=pytest.mark.slow)], ids=["some", "many"]
 )
 def test_a_killed_ingest_leaves_the_database_as_it_was_and_the_next_one_works(
     new_url: NewUrl,
@@ -128,7 +128,7 @@ def test_a_killed_ingest_leaves_the_database_as_it_was_and_the_next_one_works(
     assert moments.count("writing") >= kills // 3
 
 
-@pytest.mark.parametrize("kills", [4, pytest.param(25, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kills", [2, pytest.param(25, marks=pytest.mark.slow)])
 def test_an_ingest_killed_while_it_makes_the_database_leaves_one_that_can_be_used(
     new_url: NewUrl, surveys: tuple[Path, Path], usual: tuple[float, float], kills: int
 ) -> None:
