@@ -1,8 +1,6 @@
-"""Numba kernels of touching faces: a tree of boxes, and the overlap of two polygons seen square to their joint.
+"""Numba kernels of touching faces: what two polygons share, seen square to the joint between them.
 
-Solids are held as in `survey.adjacency.Polyhedra`, in coordinates about a place among them. The tree is complete
-and binary over boxes in Morton order: node 1 is the root, the children of k are 2k and 2k + 1, and the
-leaves begin at `size`, a power of two; empty leaves have boxes that overlap nothing.
+Solids are held as in `survey.adjacency.Polyhedra`, in coordinates about a place among them.
 """
 
 import math
@@ -10,7 +8,7 @@ import math
 import numpy as np
 from numba import njit
 
-__all__ = ["GROUPS", "count_near", "face_planes", "list_near", "morton_codes", "touching_faces"]
+__all__ = ["GROUPS", "face_planes", "touching_faces"]
 
 GROUPS = 4
 """Directions in which one solid can touch another; more are counted with the nearest of these."""
@@ -20,76 +18,6 @@ _ONE_WAY = 0.866
 
 _OF_STONE = 0.5
 """A joint is at most so wide, against the thinner of its stones: across a course of thin bricks lies no joint."""
-
-
-@njit(cache=True)
-def morton_codes(centres, low, scale):
-    """Interleave 21 bits of each coordinate, so that boxes that are near have codes that are near."""
-    out = np.empty(centres.shape[0], np.uint64)
-    for i in range(centres.shape[0]):
-        code = np.uint64(0)
-        for k in range(3):
-            cell = np.uint64(min(max((centres[i, k] - low[k]) * scale[k], 0.0), 2097151.0))
-            for bit in range(21):
-                code |= ((cell >> np.uint64(bit)) & np.uint64(1)) << np.uint64(3 * bit + k)
-        out[i] = code
-    return out
-
-
-@njit(cache=True)
-def _apart(one, other):
-    """Whether two boxes (6,), lower corner first, have nothing in common."""
-    for k in range(3):  # noqa: SIM110  (numba has no any())
-        if one[k] > other[3 + k] or other[k] > one[3 + k]:
-            return True
-    return False
-
-
-@njit(cache=True)
-def _near(leaf, tree, size, order, wanted, found, stop):
-    """Pairs of the leaf with later leaves, at least one of them wanted, into `found` from row `stop`."""
-    box = tree[size + leaf]
-    mine = order[leaf]
-    stack = np.empty(64, np.int64)
-    stack[0], top = 1, 1
-    while top:
-        top -= 1
-        node = stack[top]
-        if _apart(box, tree[node]):
-            continue
-        if node >= size:
-            other = order[node - size]
-            if node - size > leaf and (wanted[mine] or wanted[other]):
-                if stop < found.shape[0]:
-                    found[stop, 0], found[stop, 1] = min(mine, other), max(mine, other)
-                stop += 1
-            continue
-        for child in (2 * node, 2 * node + 1):
-            last = child
-            while last < size:
-                last = 2 * last + 1
-            if last - size > leaf:
-                stack[top] = child
-                top += 1
-    return stop
-
-
-@njit(cache=True)
-def count_near(tree, size, order, wanted):
-    """How many pairs of boxes overlap, by leaf of the first."""
-    nothing = np.empty((0, 2), np.int64)
-    counts = np.zeros(order.shape[0], np.int64)
-    for leaf in range(order.shape[0]):
-        counts[leaf] = _near(leaf, tree, size, order, wanted, nothing, 0)
-    return counts
-
-
-@njit(cache=True)
-def list_near(tree, size, order, wanted, start, stop, found):
-    """The pairs of some leaves, smaller index first."""
-    row = 0
-    for leaf in range(start, stop):
-        row = _near(leaf, tree, size, order, wanted, found, row)
 
 
 @njit(cache=True)

@@ -16,14 +16,8 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from survey._kernels_adjacency import (
-    GROUPS,
-    count_near,
-    face_planes,
-    list_near,
-    morton_codes,
-    touching_faces,
-)
+from survey._kernels_adjacency import GROUPS, face_planes, touching_faces
+from survey._kernels_boxes import count_near, list_near, morton_codes
 
 __all__ = ["Polyhedra", "PolyhedraBuilder", "Touching", "find_touching"]
 
