@@ -12,7 +12,7 @@ from archmodel.knowledge import Correction, Statement
 from archmodel.relations import Membership, Relation
 from archmodel.run_records import STONE_VALUES
 from archmodel.runs import FIDELITIES, EntityResult
-from archmodel.said import alias_of, held, observations_of, statements_of
+from archmodel.said import held, observations_of, statements_of
 from archmodel.scope import Scope
 from archmodel.structures import Structure
 
@@ -75,7 +75,7 @@ def _rows(table: type[Any], column: str, *, now: bool = True) -> Value:
     """How many rows of a table name the entity in this column."""
 
     def value(scope: Scope, run: int | None) -> ColumnElement[int]:
-        rows = alias_of(table)
+        rows = scope.context.alias(table)
         count = select(func.count()).select_from(rows).where(rows.c[column] == scope.entity.c.id)
         return (count.where(held(rows)) if now else count).correlate(scope.entity).scalar_subquery()
 
@@ -88,7 +88,7 @@ def _of_relations(what: Callable[[FromClause], ColumnElement[Any]], *sides: str,
     def value(scope: Scope, run: int | None) -> ColumnElement[Any]:
         parts: list[ColumnElement[Any]] = []
         for side in sides:
-            rows = alias_of(Relation)
+            rows = scope.context.alias(Relation)
             chosen = select(what(rows)).where(
                 rows.c[side] == scope.entity.c.id, rows.c.kind == kind, held(rows)
             )
@@ -109,7 +109,7 @@ def _of_marks(what: Callable[[FromClause], ColumnElement[Any]]) -> Value:
     """Something of the mason marks that the entity itself bears."""
 
     def value(scope: Scope, run: int | None) -> ColumnElement[Any]:
-        said = alias_of(Statement)
+        said = scope.context.alias(Statement)
         marks = select(what(said)).where(
             said.c.entity_id == scope.entity.c.id, said.c.kind == "mason_mark", held(said)
         )
@@ -120,21 +120,25 @@ def _of_marks(what: Callable[[FromClause], ColumnElement[Any]]) -> Value:
 
 def _of_observations(what: Callable[[FromClause], ColumnElement[Any]]) -> Value:
     def value(scope: Scope, run: int | None) -> ColumnElement[Any]:
-        said, seen = observations_of(scope.entity, scope.context.said_of_structures("observation"))
+        said, seen = observations_of(
+            scope.context.alias, scope.entity, scope.context.said_of_structures("observation")
+        )
         return select(what(said)).where(seen).correlate(scope.entity).scalar_subquery()
 
     return value
 
 
 def _documents(scope: Scope, run: int | None) -> ColumnElement[int]:
-    said = alias_of(Statement)
-    told = statements_of(scope.entity, said, scope.context.said_of_structures(*DOCUMENTING))
+    said = scope.context.alias(Statement)
+    told = statements_of(
+        scope.context.alias, scope.entity, said, scope.context.said_of_structures(*DOCUMENTING)
+    )
     count = select(func.count(distinct(said.c.document_id))).where(told)
     return count.correlate(scope.entity).scalar_subquery()
 
 
 def _structures(scope: Scope, run: int | None) -> ColumnElement[int]:
-    rows, structure = alias_of(Membership), alias_of(Structure)
+    rows, structure = scope.context.alias(Membership), scope.context.alias(Structure)
     count = (
         select(func.count())
         .select_from(rows.join(structure, structure.c.id == rows.c.structure_id))

@@ -8,7 +8,7 @@ from sqlalchemy import ColumnElement, FromClause, Select, exists, or_, select, u
 from archmodel.grammar import Call, Node
 from archmodel.lookups import stone_named, structure_named
 from archmodel.relations import SYMMETRIC, Membership, Relation
-from archmodel.said import alias_of, held
+from archmodel.said import held
 from archmodel.scope import Context, Scope, StructureScope
 from archmodel.structures import Structure
 from archmodel.tokens import Token
@@ -27,7 +27,7 @@ def related(name: str, subject: str, other: str) -> Callable[[Scope, Call, Ask],
         wanted = _others(scope.context, only(call), ask)
         parts: list[Select[Any]] = []
         for mine, theirs in sides:
-            rows = alias_of(Relation)
+            rows = scope.context.alias(Relation)
             chosen = select(rows.c[mine]).where(rows.c.kind == name, held(rows))
             parts.append(chosen if wanted is None else chosen.where(wanted(rows.c[theirs])))
         if wanted is not None:
@@ -41,7 +41,8 @@ def related(name: str, subject: str, other: str) -> Callable[[Scope, Call, Ask],
 def _others(context: Context, argument: Token | Node | None, ask: Ask) -> Wanted | None:
     """The condition on the number of the other entity; None: any will do.
 
-    A nested expression is a select of its own, which is done once and not for every entity.
+    A nested expression is a table of its own before the statement, which is made once and not for every entity;
+    selects within selects would be too deep for SQLite's parser.
     """
     if argument is None:
         return None
@@ -50,8 +51,8 @@ def _others(context: Context, argument: Token | Node | None, ask: Ask) -> Wanted
         return lambda column: column == number
     there = Scope.elsewhere(context)
     condition = ask(there, argument)
-    numbers = there.joined(select(there.entity.c.id)).where(condition)
-    return lambda column: column.in_(numbers)
+    numbers = there.joined(select(there.entity.c.id)).where(condition).cte()
+    return lambda column: column.in_(select(numbers.c.id))
 
 
 def load_path(step_from: str, step_to: str) -> Callable[[Scope, Call, Ask], Condition]:
@@ -60,7 +61,7 @@ def load_path(step_from: str, step_to: str) -> Callable[[Scope, Call, Ask], Cond
     def sql(scope: Scope, call: Call, ask: Ask) -> Condition:
         wanted = _others(scope.context, only(call, needed=True), ask)
         assert wanted is not None
-        first, further = alias_of(Relation), alias_of(Relation)
+        first, further = scope.context.alias(Relation), scope.context.alias(Relation)
         path = (
             select(first.c[step_to].label("entity_id"))
             .where(first.c.kind == "rests_on", held(first), wanted(first.c[step_from]))
@@ -79,10 +80,10 @@ def load_path(step_from: str, step_to: str) -> Callable[[Scope, Call, Ask], Cond
 
 def member_of(scope: Scope, call: Call, ask: Ask) -> Condition:
     """Membership in a structure, or in a part of it."""
-    rows = alias_of(Membership)
+    rows = scope.context.alias(Membership)
     argument = only(call)
     if argument is None:
-        structure = alias_of(Structure)
+        structure = scope.context.alias(Structure)
         source = rows.join(structure, structure.c.id == rows.c.structure_id)
         held_now = (held(rows), held(structure), rows.c.entity_id == scope.entity.c.id)
         return exists().select_from(source).where(*held_now).correlate(scope.entity)
@@ -93,7 +94,7 @@ def member_of(scope: Scope, call: Call, ask: Ask) -> Condition:
 
 def _with_parts(context: Context, argument: Token | Node, ask: Ask) -> FromClause:
     """Numbers of the structures that are meant, and of their parts."""
-    whole, part = alias_of(Structure), alias_of(Structure)
+    whole, part = context.alias(Structure), context.alias(Structure)
     if isinstance(argument, Token):
         meant_here: Condition = whole.c.id == structure_named(context, argument)
     else:

@@ -4,6 +4,8 @@ Statements about a structure hold for its members and for the members of its par
 nearer to it, has a statement of its own.
 """
 
+from collections.abc import Callable
+
 from sqlalchemy import (
     CTE,
     ColumnElement,
@@ -21,17 +23,15 @@ from archmodel.knowledge import Statement
 from archmodel.relations import Membership
 from archmodel.structures import Structure
 
-__all__ = ["alias_of", "held", "observations_of", "said_of", "said_of_structures", "statements_of"]
+__all__ = ["Alias", "held", "observations_of", "said_of", "said_of_structures", "statements_of"]
 
 MAX_LEVELS = 40
 """Deepest structure within structures; ends the search where structures contain one another in a circle."""
 
+Alias = Callable[[type[Base]], FromClause]
+"""A new alias of the table of a class, see ``scope.Context.alias``."""
+
 _SUBJECT = {"of_phase": "phase_id", "made_of": "material_id"}
-
-
-def alias_of(cls: type[Base]) -> FromClause:
-    """An alias of the table of a class: a query can need the same table at many places."""
-    return cls.__table__.alias()
 
 
 def held(rows: FromClause) -> ColumnElement[bool]:
@@ -39,7 +39,7 @@ def held(rows: FromClause) -> ColumnElement[bool]:
     return rows.c.superseded_id.is_(None)
 
 
-def said_of_structures(*kinds: str) -> CTE:
+def said_of_structures(alias: Alias, *kinds: str) -> CTE:
     """Held statements of some kinds about structures, for each structure and all parts of it.
 
     Returns
@@ -47,7 +47,7 @@ def said_of_structures(*kinds: str) -> CTE:
     CTE
         of structure_id, statement_id, distance (0: said of the structure itself)
     """
-    said, part = alias_of(Statement), alias_of(Structure)
+    said, part = alias(Statement), alias(Structure)
     # > 0, and not "is not null", since SQLite has an index for it
     seeds = select(
         said.c.structure_id.label("structure_id"),
@@ -62,7 +62,7 @@ def said_of_structures(*kinds: str) -> CTE:
     )
 
 
-def said_of(entity: FromClause, kind: str, of_structures: CTE) -> ColumnElement[int]:
+def said_of(alias: Alias, entity: FromClause, kind: str, of_structures: CTE) -> ColumnElement[int]:
     """Number of the phase or the material that an entity is held to be of; the latest statement decides.
 
     Parameters
@@ -70,7 +70,7 @@ def said_of(entity: FromClause, kind: str, of_structures: CTE) -> ColumnElement[
     kind : of statement: of_phase or made_of
     of_structures : `said_of_structures` of that kind
     """
-    own, inherited, member = alias_of(Statement), alias_of(Statement), alias_of(Membership)
+    own, inherited, member = alias(Statement), alias(Statement), alias(Membership)
     subject = _SUBJECT[kind]
     by_itself = (
         select(own.c[subject])
@@ -92,9 +92,11 @@ def said_of(entity: FromClause, kind: str, of_structures: CTE) -> ColumnElement[
     )
 
 
-def statements_of(entity: FromClause, said: FromClause, of_structures: CTE) -> ColumnElement[bool]:
+def statements_of(
+    alias: Alias, entity: FromClause, said: FromClause, of_structures: CTE
+) -> ColumnElement[bool]:
     """The condition that a statement `said` is one of the entity, or of a structure that it is a member of."""
-    member = alias_of(Membership)
+    member = alias(Membership)
     inherited = (
         select(of_structures.c.statement_id)
         .join(member, member.c.structure_id == of_structures.c.structure_id)
@@ -103,7 +105,9 @@ def statements_of(entity: FromClause, said: FromClause, of_structures: CTE) -> C
     return and_(held(said), or_(said.c.entity_id == entity.c.id, said.c.id.in_(inherited.correlate(entity))))
 
 
-def observations_of(entity: FromClause, of_structures: CTE) -> tuple[FromClause, ColumnElement[bool]]:
+def observations_of(
+    alias: Alias, entity: FromClause, of_structures: CTE
+) -> tuple[FromClause, ColumnElement[bool]]:
     """Observations that hold for an entity: its own, and those of its structures of types that it has none of.
 
     Returns
@@ -111,7 +115,7 @@ def observations_of(entity: FromClause, of_structures: CTE) -> tuple[FromClause,
     tuple
         an alias of the statements, and the condition on it, which speaks of the `entity` around it
     """
-    said, own = alias_of(Statement), alias_of(Statement)
+    said, own = alias(Statement), alias(Statement)
     same = (
         select(own.c.id)
         .where(
@@ -125,7 +129,7 @@ def observations_of(entity: FromClause, of_structures: CTE) -> tuple[FromClause,
     )
     seen = and_(
         said.c.kind == "observation",
-        statements_of(entity, said, of_structures),
+        statements_of(alias, entity, said, of_structures),
         or_(said.c.entity_id.is_not(None), not_(same)),
     )
     return said, seen

@@ -1,5 +1,6 @@
 """Where the names of a query are found: a table of entities, and tables joined to it only as they are asked for."""
 
+from collections import Counter
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
@@ -11,7 +12,7 @@ from archmodel.base import Base
 from archmodel.entities import Entity
 from archmodel.knowledge import Material, MaterialProperty, Phase
 from archmodel.runs import EntityResult, Run
-from archmodel.said import alias_of, held, said_of, said_of_structures
+from archmodel.said import held, said_of, said_of_structures
 from archmodel.surveys import Measurement, Simplification, Survey
 from archmodel.tokens import Token, complaint
 
@@ -24,6 +25,8 @@ MAX_RUNS = 12
 """Most runs in one query, each a table joined (SQLite joins at most 64)."""
 
 S = TypeVar("S", bound=Select[Any])
+
+_ALIASES: dict[type[Base], list[FromClause]] = {}
 
 
 @dataclass
@@ -41,7 +44,20 @@ class Context:
     run: int | None = None
     within_canon: bool = field(default=False, init=False)
     _functions: int = field(default=0, init=False)
+    _aliases: Counter[type[Base]] = field(default_factory=Counter, init=False)
     _shared: dict[Hashable, Any] = field(default_factory=dict, init=False)
+
+    def alias(self, cls: type[Base]) -> FromClause:
+        """An alias of the table of a class that this query does not have yet.
+
+        Queries share their aliases with later ones, since to make one takes longer than most queries do.
+        """
+        pool = _ALIASES.setdefault(cls, [])
+        number = self._aliases[cls]
+        self._aliases[cls] += 1
+        if number == len(pool):
+            pool.append(cls.__table__.alias())
+        return pool[number]
 
     def count_function(self, token: Token) -> None:
         """Refuse one function too many."""
@@ -57,7 +73,7 @@ class Context:
 
     def said_of_structures(self, *kinds: str) -> CTE:
         """Statements of some kinds about structures, for every structure that is a part of theirs."""
-        cte: CTE = self.once(("structures", kinds), lambda: said_of_structures(*kinds))
+        cte: CTE = self.once(("structures", kinds), lambda: said_of_structures(self.alias, *kinds))
         return cte
 
 
@@ -80,7 +96,7 @@ class Scope:
     @classmethod
     def elsewhere(cls, context: Context) -> "Scope":
         """Other entities than those that are spoken of."""
-        return cls(context, alias_of(Entity))
+        return cls(context, context.alias(Entity))
 
     @property
     def is_bare(self) -> bool:
@@ -131,12 +147,16 @@ class Scope:
 
     def phase(self) -> FromClause:
         """The phase that it is held to be of."""
-        number = said_of(self.entity, "of_phase", self.context.said_of_structures("of_phase"))
+        number = said_of(
+            self.context.alias, self.entity, "of_phase", self.context.said_of_structures("of_phase")
+        )
         return self._join("phase", Phase, lambda rows: rows.c.id == number)
 
     def material(self) -> FromClause:
         """The material that it is held to be of."""
-        number = said_of(self.entity, "made_of", self.context.said_of_structures("made_of"))
+        number = said_of(
+            self.context.alias, self.entity, "made_of", self.context.said_of_structures("made_of")
+        )
         return self._join("material", Material, lambda rows: rows.c.id == number)
 
     def material_property(self, name: str) -> FromClause:
@@ -150,7 +170,7 @@ class Scope:
 
     def _latest_run(self) -> ColumnElement[int]:
         """Number of the latest run that holds the entity: one step in the primary key."""
-        result = alias_of(EntityResult)
+        result = self.context.alias(EntityResult)
         latest = select(func.max(result.c.run_id)).where(result.c.entity_id == self.entity.c.id)
         return latest.correlate(self.entity).scalar_subquery()
 
@@ -159,7 +179,7 @@ class Scope:
     ) -> FromClause:
         """The alias that is joined under this key, joined now if it was not."""
         if key not in self._joins:
-            rows = alias_of(cls)
+            rows = self.context.alias(cls)
             self._joins[key] = rows, condition(rows)
         return self._joins[key][0]
 

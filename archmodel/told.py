@@ -7,7 +7,7 @@ from archmodel.entities import canon_of, kind_named, kinds
 from archmodel.grammar import Call, parse
 from archmodel.knowledge import OBSERVATIONS, Correction, Statement
 from archmodel.lookups import document_named, mark_named, meant
-from archmodel.said import alias_of, held, observations_of, statements_of
+from archmodel.said import held, observations_of, statements_of
 from archmodel.scope import Scope
 from archmodel.tokens import Token, complaint
 from archmodel.usages import Ask, Condition, tokens
@@ -20,7 +20,7 @@ MAX_SEVERITY = 4
 
 def has_mark(scope: Scope, call: Call, ask: Ask) -> Condition:
     """Mason marks. One that is said of a structure is somewhere on it, on no stone in particular."""
-    said = alias_of(Statement)
+    said = scope.context.alias(Statement)
     conditions: list[Condition] = [
         held(said),
         said.c.entity_id == scope.entity.c.id,
@@ -33,7 +33,9 @@ def has_mark(scope: Scope, call: Call, ask: Ask) -> Condition:
 def observed(scope: Scope, call: Call, ask: Ask) -> Condition:
     """Observations of the stone, and of its structures if it has none of their type."""
     values = tokens(call, 0, 1, 2)
-    said, seen = observations_of(scope.entity, scope.context.said_of_structures("observation"))
+    said, seen = observations_of(
+        scope.context.alias, scope.entity, scope.context.said_of_structures("observation")
+    )
     conditions = [seen]
     if values:
         type_ = values[0].text.lower()
@@ -55,16 +57,18 @@ def _severity(token: Token) -> int:
 
 def documented(scope: Scope, call: Call, ask: Ask) -> Condition:
     """Documents that any statement about the stone, or its structures, names."""
-    said = alias_of(Statement)
+    said = scope.context.alias(Statement)
     conditions: list[Condition] = [said.c.document_id.is_not(None)]
     conditions += [said.c.document_id == document_named(scope.context, code) for code in tokens(call, 0, 1)]
-    told = statements_of(scope.entity, said, scope.context.said_of_structures(*DOCUMENTING))
+    told = statements_of(
+        scope.context.alias, scope.entity, said, scope.context.said_of_structures(*DOCUMENTING)
+    )
     return _any_row(scope, told, *conditions)
 
 
 def corrected(scope: Scope, call: Call, ask: Ask) -> Condition:
     """Corrections of its attributes."""
-    rows = alias_of(Correction)
+    rows = scope.context.alias(Correction)
     conditions: list[Condition] = [rows.c.entity_id == scope.entity.c.id]
     for token in tokens(call, 0, 1):
         known = attributes_of(scope.context.session)

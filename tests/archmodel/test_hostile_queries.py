@@ -1,58 +1,109 @@
-"""Whatever is written in --where gives stones or a QueryError, soon, and changes nothing."""
+"""Whatever is written in --where gives stones or a QueryError, soon, and changes nothing; on every database."""
 
+import random
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from sqlalchemy import event
 
 from archmodel.attributes import ATTRIBUTES
 from archmodel.database import Database, open_database
+from archmodel.functions import FUNCTIONS, STRUCTURE_FUNCTIONS
 from archmodel.query import find, find_rows
 from archmodel.store import store_survey
-from archmodel.store_runs import store_run
 from moma.errors import QueryError
 from tests.archmodel.conftest import WALL
-from tests.archmodel.stones import SHA, box_stone, contents, run_record
+from tests.archmodel.furnished import furnish
+from tests.archmodel.stones import SHA, box_stone, contents
 
-pytestmark = pytest.mark.filterwarnings("error")
+LONGEST = 1.0
+"""That an answer or a refusal may take [s]."""
 
 
-@pytest.fixture(scope="module")
-def database(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Database]:
-    folder: Path = tmp_path_factory.mktemp("hostile")
-    with open_database(f"sqlite:///{folder / 'moma.db'}") as database:
+@pytest.fixture(scope="module", params=["sqlite", "postgresql"])
+def database(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Database]:
+    """The furnished wall. Nothing in this module may change it, though its sessions could write."""
+    with _new_url(request, tmp_path_factory) as url, open_database(url) as database:
         with database.session() as session:
             store_survey(session, "window", "window.moma", SHA, WALL)
-            store_run(session, run_record({"V1": 3e5, "V2": None}))
+        furnish(database)
+        before = contents(database)
         yield database
+        assert contents(database) == before
 
 
-@pytest.fixture(scope="module", autouse=True)
-def unchanged(database: Database) -> Iterator[None]:
-    """Nothing in this module may change the database, though its sessions could write."""
-    before = contents(database)
-    yield
-    assert contents(database) == before
+@contextmanager
+def _new_url(request: pytest.FixtureRequest, folders: pytest.TempPathFactory) -> Iterator[str]:
+    if request.param == "sqlite":
+        folder: Path = folders.mktemp("hostile")
+        yield f"sqlite:///{folder / 'moma.db'}"
+    else:
+        with request.getfixturevalue("postgresql").database() as url:
+            yield url
 
 
 def ask(database: Database, expression: str) -> list[str] | None:
     """Codes that were found; None if the expression was refused."""
-    refusal: QueryError | None = None
+    for _ in range(3):
+        start = time.perf_counter()
+        answer = _answer(database, expression)
+        if (spent := time.perf_counter() - start) < LONGEST:
+            return answer
+    # Not once, which may be because the machine has other work.
+    raise AssertionError(f"{spent:.1f} s for {expression[:80]}")
+
+
+def _answer(database: Database, expression: str) -> list[str] | None:
     try:
         with database.session() as session:
             return [entity.code for entity in find(session, "entity", [expression])]
     except QueryError as error:
-        refusal = error
-    assert str(refusal).isprintable()
-    assert len(str(refusal)) < 600
+        refusal = str(error)
+    assert refusal.isprintable()
+    assert len(refusal) < 600
     return None
+
+
+@contextmanager
+def statements_of(database: Database) -> Iterator[list[str]]:
+    """Every statement that reaches the database, without its parameters."""
+    told: list[str] = []
+
+    def note(connection: object, cursor: object, statement: str, *rest: object) -> None:
+        told.append(statement)
+
+    event.listen(database.engine, "before_cursor_execute", note)
+    try:
+        yield told
+    finally:
+        event.remove(database.engine, "before_cursor_execute", note)
 
 
 PIECES = [
     *ATTRIBUTES,
+    *FUNCTIONS,
+    *STRUCTURE_FUNCTIONS,
+    *[f"{name}(" for name in FUNCTIONS],
+    *[
+        "@",
+        "@1",
+        "@2",
+        "@-1",
+        "@1e9",
+        "von_mises_max@1",
+        "A1",
+        "T1",
+        "fish",
+        "crack",
+        "jamb",
+        "1e308",
+        "-0.0",
+    ],
     *["and", "or", "not", "in", "like", "is", "null", "(", ")", ",", "=", "==", "!=", "<", "<=", ">", ">="],
     *[
         "0.4",
@@ -116,7 +167,7 @@ written = st.one_of(
 )
 
 
-@settings(max_examples=1000, deadline=None)
+@settings(max_examples=400, deadline=None)
 @given(written)
 @example("code = 'V1'; DROP TABLE entity; --'")
 @example("code = 'V1' OR 1=1")
@@ -124,6 +175,98 @@ written = st.one_of(
 @example("İ = 1")
 def test_anything_gives_stones_or_a_query_error(database: Database, expression: str) -> None:
     ask(database, expression)
+
+
+# Of the thousand, each piece of text of the user's own has this in it, in words, quotes and names.
+MARK = "zq7"
+
+POISON = [
+    "'",
+    '"',
+    "''",
+    ";",
+    "--",
+    "/*",
+    "*/",
+    "\\",
+    "%",
+    "_",
+    "\0",
+    "\n",
+    "🧱",
+    "\u202e",
+    "\ud800",
+    "'; DROP TABLE entity; --",
+    "' OR 1=1 --",
+    '" OR ""="',
+    ") UNION SELECT code FROM entity --",
+    ":kind_1",
+    "%(kind_1)s",
+    "$1",
+    "?",
+    "{0}",
+    "~",
+    "(a+)+$",
+]
+
+
+def hostile(number: int) -> str:
+    """An expression that is mostly well formed, with values and names that are meant to break out."""
+    chance = random.Random(number)
+
+    def own_text() -> str:
+        return "".join(chance.choices([*POISON, "a", "V1", "7"], k=chance.randint(0, 4))) + MARK
+
+    def value() -> str:
+        text = chance.choice([own_text(), own_text(), "V1", "A1", "crack", "1", "1e308", "0.4"])
+        quote = chance.choice(["'", '"'])
+        closed = quote + text.replace(quote, 2 * quote) + quote
+        return chance.choice([text, *6 * [closed], quote + text])
+
+    def name() -> str:
+        known = chance.choice(
+            ["code", "zone", "survey", "phase", "material", "mark", "title", "von_mises_max"]
+        )
+        return chance.choice([*8 * [known], *ATTRIBUTES, own_text() + "@1", "fidelity@" + MARK])
+
+    def test(depth: int) -> str:
+        shape = chance.randrange(8)
+        if shape < 2:
+            return f"{name()} {chance.choice(['=', '!=', '<', '>='])} {value()}"
+        if shape == 2:
+            return f"{name()} in ({', '.join(value() for _ in range(chance.randint(0, 30)))})"
+        if shape == 3:
+            return f"{name()} {chance.choice(['', 'not '])}like {value()}"
+        if shape == 4:
+            return f"{name()} is null"
+        function = chance.choice([*4 * list(FUNCTIONS), *STRUCTURE_FUNCTIONS, own_text()])
+        inside = [value() if depth > 6 or chance.random() < 0.6 else expression(depth + 1) for _ in range(3)]
+        return f"{function}({', '.join(inside[: chance.randint(0, 3)])})"
+
+    def expression(depth: int) -> str:
+        parts = [chance.choice(["", "not "]) + test(depth) for _ in range(chance.choice([1, 1, 1, 2, 3]))]
+        return chance.choice([*5 * [" and ", " or "], ""]).join(parts)
+
+    return expression(0)
+
+
+def test_a_thousand_hostile_expressions_reach_the_database_as_values_only(database: Database) -> None:
+    with statements_of(database) as told:
+        answers = [ask(database, hostile(number)) for number in range(1000)]
+    # Many are well formed, so that they do get there.
+    assert 150 < sum(answer is not None for answer in answers) < 850
+    assert len(told) > 500
+    assert not [statement for statement in told if MARK in statement.lower()]
+
+
+def test_columns_of_the_users_own_reach_the_database_as_values_only(database: Database) -> None:
+    with statements_of(database) as told:
+        for text in (*POISON, *(f"von_mises_max@{text}" for text in POISON)):
+            with pytest.raises(QueryError), database.session() as session:
+                find_rows(session, "entity", columns=["code", text + MARK])
+        with database.session() as session:
+            find_rows(session, "entity", columns=["von_mises_max@1", "VON_MISES_MAX@2"])
+    assert not [statement for statement in told if MARK in statement.lower() or "@" in statement]
 
 
 INJECTIONS = [
@@ -163,12 +306,29 @@ def test_an_injected_statement_outside_quotes_finds_nothing_or_is_refused(
         assert ask(database, shape.replace("{}", value)) in (None, [])
 
 
+@pytest.mark.parametrize("value", INJECTIONS)
+def test_an_injected_statement_is_no_argument_of_a_function(database: Database, value: str) -> None:
+    quoted = "'" + value.replace("'", "''") + "'"
+    for shape in (
+        "rests_on({})",
+        "member_of({})",
+        "has_mark({})",
+        "documented({})",
+        "within({}, 1)",
+        "above({})",
+    ):
+        assert ask(database, shape.replace("{}", quoted)) is None
+    assert ask(database, f"member_of(title = {quoted}) or rests_on(code = {quoted})") == []
+
+
 def test_a_code_with_every_quote_in_it_is_found_by_its_quoted_text(empty: Database) -> None:
     code = """W'1"';DROP--%_\\"""
     with empty.session() as session:
         store_survey(session, "odd", "odd.moma", SHA, [box_stone(code), box_stone("W2")])
     assert ask(empty, "code = '" + code.replace("'", "''") + "'") == [code]
     assert ask(empty, 'code = "' + code.replace('"', '""') + '"') == [code]
+    assert ask(empty, "code like '" + code.replace("'", "''") + "'") == [code]
+    assert ask(empty, "within('" + code.replace("'", "''") + "', 1)") == ["W2"]
 
 
 LONG: list[tuple[str, str]] = [
@@ -186,6 +346,17 @@ LONG: list[tuple[str, str]] = [
     ("a long unknown name", "d" * 1990 + " = 1"),
     ("a long unknown kind", "kind = " + "v" * 1990),
     ("digits", "depth > " + "9" * 1900),
+    ("a megabyte of functions", "rests_on(" * 110_000),
+    ("functions too deep", "rests_on(" * 9 + "V1" + ")" * 9),
+    ("too many functions", " or ".join(["rests_on()"] * 41)),
+    ("too many canonical proportions", " or ".join(["canonical()"] * 41)),
+    ("runs that are none", " or ".join(f"von_mises_max@{n} > 1" for n in range(3, 70))),
+    ("a long run", "von_mises_max@" + "9" * 1900 + " > 1"),
+    ("a long code", "rests_on(" + "V" * 1980 + ")"),
+    ("a long structure", "member_of(" + "A" * 1980 + ")"),
+    ("a huge place", "within(1e300, 0, 0, 1)"),
+    ("a huge radius", "within(0, 0, 0, 1e200)"),
+    ("no radius", "within(0, 0, 0, nan)"),
 ]
 
 
@@ -193,9 +364,7 @@ LONG: list[tuple[str, str]] = [
 def test_long_and_deep_expressions_are_refused_at_once(
     database: Database, name: str, expression: str
 ) -> None:
-    start = time.perf_counter()
     assert ask(database, expression) is None
-    assert time.perf_counter() - start < 0.5
 
 
 BIG: list[tuple[str, str]] = [
@@ -206,24 +375,29 @@ BIG: list[tuple[str, str]] = [
     ("a long list", "not code in (" + ",".join(["a"] * 990) + ")"),
     ("a tiny number", "depth > 1e-9999"),
     ("a number with many digits", "depth > 0." + "0" * 1900 + "1"),
+    ("the deepest functions", "not " + "rests_on(" * 8 + "V1" + ")" * 8),
+    ("the deepest load paths", "not " + "above(" * 8 + "V3" + ")" * 8),
+    ("the most functions", " or ".join(["observed() or depth > 0"] * 40)),
+    ("the most load paths", " or ".join(["not above(depth > 9)"] * 40)),
+    (
+        "the most joins",
+        "depth > 0 or " + " or ".join(["von_mises_max@1 > 1 and phase = 2 and density > 1"] * 25),
+    ),
+    ("all attributes", " or ".join(f"{name} is null" for name in ATTRIBUTES) + " or depth > 0"),
 ]
 
 
 @pytest.mark.parametrize(("name", "expression"), BIG, ids=[name for name, _ in BIG])
 def test_expressions_at_the_limits_are_answered(database: Database, name: str, expression: str) -> None:
     assert len(expression) <= 2000
-    start = time.perf_counter()
     assert ask(database, expression) == [stone.code for stone in WALL]
-    assert time.perf_counter() - start < 2.0
 
 
 def test_a_pattern_of_wildcards_does_not_hang(empty: Database) -> None:
     with empty.session() as session:
         store_survey(session, "long", "long.moma", SHA, [box_stone("a" * 300)])
-    start = time.perf_counter()
     assert ask(empty, "code like '" + "%a" * 250 + "%b'") == []
     assert ask(empty, "code like '" + "%a_" * 90 + "%b'") == []
-    assert time.perf_counter() - start < 5.0
 
 
 def test_many_expressions_are_refused(database: Database) -> None:
@@ -319,10 +493,15 @@ sentences = st.recursive(
 )
 
 
-@settings(max_examples=500, deadline=None)
+@pytest.fixture(scope="module")
+def rows(database: Database) -> list[Row]:
+    with database.session(read_only=True) as session:
+        return find_rows(session, "entity")
+
+
+@settings(max_examples=200, deadline=None)
 @given(sentences)
-def test_an_expression_finds_what_it_means(database: Database, sentence: Sentence) -> None:
+def test_an_expression_finds_what_it_means(database: Database, rows: list[Row], sentence: Sentence) -> None:
     text, meaning = sentence
     with database.session(read_only=True) as session:
-        rows = find_rows(session, "entity")
         assert [e.code for e in find(session, "entity", [text])] == [r["code"] for r in rows if meaning(r)]
