@@ -4,7 +4,9 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 from sqlalchemy import URL, Connection, Engine, create_engine, event
+from sqlalchemy.engine.interfaces import DBAPIConnection
 from sqlalchemy.exc import DBAPIError
+from sqlalchemy.pool import ConnectionPoolEntry
 
 from archmodel.base import json_text
 from moma.errors import DatabaseError, MissingLibraryError
@@ -58,7 +60,8 @@ class PostgresqlServer:
 
     def engine(self, create: bool) -> Engine:
         """An engine on the database, which must be there; MOMA makes its tables, not the database."""
-        ours = {"connect_timeout": "10", "application_name": "moma"}
+        # Compiling a statement of many small parts takes seconds, answering it takes milliseconds.
+        ours = {"connect_timeout": "10", "application_name": "moma", "options": "-c jit=off"}
         arguments = {name: value for name, value in ours.items() if name not in self.url.query}
         try:
             engine = create_engine(
@@ -73,21 +76,17 @@ class PostgresqlServer:
                 where=self.place,
                 remedy="python -m pip install 'moma-masonry[postgresql]'",
             ) from error
-        event.listen(engine, "begin", self._on_begin)
+        event.listen(engine, "connect", self._on_connect)
+        event.listen(engine, "begin", _on_begin)
         return engine
 
-    def _on_begin(self, connection: Connection) -> None:
-        """Readers see one state of the database; writers go one after another.
-
-        A writer reads committed rows, not a snapshot: its first statement is the wait for the lock, and what
-        was written until then must be seen.
-        """
-        if connection.get_execution_options().get("moma_read_only", False):
-            connection.exec_driver_sql("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ, READ ONLY")
-            return
+    def _on_connect(self, connection: DBAPIConnection, entry: ConnectionPoolEntry) -> None:
+        """Wait for locks as long as was asked: writers for one another, readers for a migration alone."""
         patience = max(1, round(1000 * self.lock_timeout))  # [ms]; zero would wait for ever
-        connection.exec_driver_sql(f"SET LOCAL lock_timeout = {patience}")
-        connection.exec_driver_sql(f"SELECT pg_advisory_xact_lock({WRITE_LOCK})")
+        cursor = connection.cursor()
+        cursor.execute(f"SET lock_timeout = {patience}")
+        cursor.close()
+        connection.commit()
 
     def settle(self, engine: Engine) -> None:
         """Nothing to do: the server lets readers and a writer work at once."""
@@ -102,6 +101,18 @@ class PostgresqlServer:
                 remedy = remedy.format(name=self.url.database)
                 return DatabaseError(what.format(said=said), where=self.place, remedy=remedy)
         return DatabaseError(f"the database refused: {said}", where=self.place, remedy="nothing was changed")
+
+
+def _on_begin(connection: Connection) -> None:
+    """Readers see one state of the database; writers go one after another.
+
+    A writer reads committed rows, not a snapshot: its first statement is the wait for the lock, and what was written
+    until then must be seen.
+    """
+    if connection.get_execution_options().get("moma_read_only", False):
+        connection.exec_driver_sql("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ, READ ONLY")
+    else:
+        connection.exec_driver_sql(f"SELECT pg_advisory_xact_lock({WRITE_LOCK})")
 
 
 def _first_line(said: str) -> str:

@@ -97,7 +97,7 @@ class SqliteFile:
 
     def refusal(self, error: Exception) -> DatabaseError:
         """SQLite's complaint in the user's words."""
-        said = str(error.orig if isinstance(error, DBAPIError) else error)
+        said = _said(error)
         for words, what, remedy in _COMPLAINTS:
             if any(word in said for word in words):
                 return DatabaseError(what.format(said=said), where=self.place, remedy=remedy)
@@ -119,6 +119,17 @@ _COMPLAINTS = (
     ),
 )
 """Words of SQLite, what they mean, and what to do."""
+
+
+def _said(error: Exception) -> str:
+    """What SQLite said first: after some failures it has ended the transaction, and knows its savepoints no more."""
+    said: str = str(error.orig if isinstance(error, DBAPIError) else error)
+    before = error.__context__
+    while "no such savepoint" in said and before is not None:
+        if isinstance(before, sqlite3.Error):
+            said = str(before)
+        before = before.__context__
+    return said
 
 
 def _check_file(file: Path, create: bool) -> None:

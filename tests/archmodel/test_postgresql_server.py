@@ -170,6 +170,35 @@ def test_a_connection_that_the_server_ended_is_said_to_be_lost(url: str, postgre
             assert session.scalar(select(Entity.id)) is None
 
 
+@pytest.mark.parametrize(
+    ("state", "said"),
+    [
+        ("53100", "the disk of the server is full; make room"),
+        ("53300", "the server has too many users; try again later"),
+        ("40P01", "locked by another program"),
+        ("XX000", "the database refused: something; nothing was changed"),
+    ],
+)
+def test_what_a_server_says_rarely_is_understood_too(url: str, state: str, said: str) -> None:
+    """The server raises these itself, asked to."""
+    failing = text(f"DO $$ BEGIN RAISE EXCEPTION 'something' USING ERRCODE = '{state}'; END $$")
+    with (
+        open_database(url) as database,
+        pytest.raises(DatabaseError, match=said),
+        database.session() as session,
+    ):
+        session.execute(failing)
+
+
+def test_a_reader_is_patient_with_a_migration_as_long_as_was_asked(url: str, postgresql: Server) -> None:
+    name = url.split("?")[0].rpartition("/")[2]
+    open_database(url).close()
+    with postgresql.connect(name) as migrating, open_database(url, lock_timeout=0.05) as database:
+        migrating.execute("BEGIN; LOCK TABLE entity IN ACCESS EXCLUSIVE MODE")
+        with pytest.raises(DatabaseError, match="locked"), database.session(read_only=True) as session:
+            session.scalar(select(Entity.id))
+
+
 def test_texts_are_sorted_by_code_points_whatever_the_servers_language(url: str) -> None:
     codes = ["W01", "a1", "B1", "Ä1", "_1", "b1", "A 1", "A-1", "é", "z", "1"]
     with open_database(url) as database, database.session() as session:
@@ -181,11 +210,6 @@ def test_texts_are_sorted_by_code_points_whatever_the_servers_language(url: str)
 
 def statement(server: Server, url: str, sql: str) -> list[tuple[Any, ...]]:
     """What the server itself says, in a connection beside."""
-    import psycopg
-
-    name = url.split("?")[0].rpartition("/")[2]
-    with psycopg.connect(
-        host=str(server.folder), user=server.user, dbname=name, autocommit=True
-    ) as connection:
+    with server.connect(url.split("?")[0].rpartition("/")[2]) as connection:
         cursor = connection.execute(sql.encode())
         return cursor.fetchall() if cursor.description else []

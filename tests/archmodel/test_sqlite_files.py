@@ -9,7 +9,9 @@ from sqlalchemy import func, select
 
 from archmodel.database import Database, open_database
 from archmodel.entities import Entity
+from archmodel.store import store_survey
 from moma.errors import DatabaseError
+from tests.archmodel.stones import SHA, box_stone, contents
 
 
 @pytest.fixture
@@ -100,6 +102,19 @@ def test_opening_waits_no_longer_than_asked(empty: Database) -> None:
     with pytest.raises(DatabaseError, match="locked by another program"):
         open_database(empty.url, lock_timeout=0.05)
     writer.close()
+
+
+def test_a_full_disk_is_said_to_be_full_and_nothing_is_changed(empty: Database) -> None:
+    before = contents(empty)
+
+    def write_much() -> None:
+        with empty.session() as session:
+            session.connection().exec_driver_sql("PRAGMA max_page_count = 1")  # at most as large as it is
+            store_survey(session, "a", "a.moma", SHA, (box_stone(f"A{number}") for number in range(500)))
+
+    with pytest.raises(DatabaseError, match=r"moma\.db: the disk is full; make room"):
+        write_much()
+    assert contents(empty) == before
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
