@@ -395,7 +395,9 @@ def refuse_unknown_kinds(session: Session) -> None:
     """
     unknown = next((kind for kind in _stored_kinds(session) if kind not in kinds()), None)
     if unknown is not None:
-        remedy = "import the module that declares it, or use the version of MOMA that stored it"
+        remedy = (
+            "open the database again if it was registered since; else use the version of MOMA that stored it"
+        )
         raise DatabaseError(f"the database holds a kind {unknown!r} that is not declared", remedy=remedy)
 
 

@@ -47,7 +47,9 @@ found again."""
 
 
 def declare_registered(session: Session) -> None:
-    """Make the kinds that this database registers known; until `release_registered`, if no other one does.
+    """Make the kinds that this database registers known, and let go of those that it does not register any more.
+
+    They are known until `release_registered`. A kind is not registered any more if that was rolled back.
 
     Raises
     ------
@@ -55,6 +57,7 @@ def declare_registered(session: Session) -> None:
         if another open database gives one of the names to something else, or a parent is not known
     """
     user = session.get_bind().dialect
+    declared: set[type[Entity]] = set()
     waiting = list(session.scalars(select(RegisteredKind).order_by(RegisteredKind.entry_id)))
     while waiting:
         ready = [one for one in waiting if one.parent in kinds()]
@@ -63,8 +66,13 @@ def declare_registered(session: Session) -> None:
             what = f"the kind {one.name} is a case of {one.parent}, which is not known"
             raise DatabaseError(what, remedy="use the version of MOMA that registered it")
         for kind in ready:
-            _declared(kind).add(user)
+            cls = _declared(kind)
+            _users(cls).add(user)
+            declared.add(cls)
         waiting = [one for one in waiting if one not in ready]
+    for cls in _CLASSES.values():
+        if cls not in declared:
+            _users(cls).discard(user)
     if (engine := session.get_bind().engine) is not None:
         # statements that were compiled before do not know the new kinds
         engine.clear_compiled_cache()
@@ -73,12 +81,17 @@ def declare_registered(session: Session) -> None:
 def release_registered(engine: Engine) -> None:
     """Say that a database is closed: kinds that no open database registers are known no longer."""
     for cls in _CLASSES.values():
-        if cls.__users__ is not None:
-            cls.__users__.discard(engine.dialect)
+        _users(cls).discard(engine.dialect)
 
 
-def _declared(kind: RegisteredKind) -> "WeakSet[Any]":
-    """The open databases that register the kind, after its class was made or found."""
+def _users(cls: type[Entity]) -> "WeakSet[Any]":
+    """The open databases that register a kind."""
+    assert cls.__users__ is not None
+    return cls.__users__
+
+
+def _declared(kind: RegisteredKind) -> type[Entity]:
+    """The class of a kind, made or found."""
     held = kinds().get(kind.name)
     parent = kinds()[kind.parent]
     key = (parent, *kind.says())
@@ -91,8 +104,7 @@ def _declared(kind: RegisteredKind) -> "WeakSet[Any]":
         identities.pop(kind.name, None)
         cls = _CLASSES[key] = _made(kind, parent)
     identities[kind.name] = inspect(cls)
-    assert cls.__users__ is not None
-    return cls.__users__
+    return cls
 
 
 def _made(kind: RegisteredKind, parent: Any) -> type[Entity]:

@@ -47,6 +47,7 @@ def register_kind(
     QueryError
         if the canon is no expression
     """
+    declare_registered(session)
     above = kind_named(parent)
     given = {key: (unit, definition.strip()) for key, (unit, definition) in (attributes or {}).items()}
     row = RegisteredKind(

@@ -98,6 +98,15 @@ def test_it_is_known_as_long_as_a_database_that_registers_it_is_open(new_url: Ca
     assert "merlon" not in kinds()
 
 
+def test_what_was_rolled_back_is_not_known(empty: Database) -> None:
+    with empty.session() as session:
+        attempt = session.begin_nested()
+        merlon(session)
+        attempt.rollback()
+        assert merlon(session, "Another stone.") == Outcome(new=1)
+        assert definition_of(kind_named("merlon")) == "Another stone."
+
+
 def test_two_buildings_can_mean_different_things_but_not_at_once(new_url: Callable[[], str]) -> None:
     first, second = new_url(), new_url()
     for url, definition in ((first, "A stone of a merlon."), (second, "A small merle.")):
