@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pipelines.check import CheckReport
-    from pipelines.ingest import IngestReport
+    from pipelines.ingest_report import IngestReport
     from pipelines.run import RunReport
     from pipelines.survey_report import SurveyReport
 

@@ -2,12 +2,9 @@
 
 import hashlib
 import os
-from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from sqlalchemy.orm import Session
 
@@ -17,6 +14,7 @@ from archmodel.records import StoneRecord
 from archmodel.store import store_survey
 from moma.errors import NoDatabaseError, SurveyError, UsageError
 from pipelines.frame_records import frame_record
+from pipelines.ingest_report import IngestReport, Tally
 from pipelines.progress import Listener, Progress, silent
 from pipelines.reading_options import check_survey_file
 from pipelines.rejects import check_targets, default_path, rejects_text
@@ -25,63 +23,15 @@ from pipelines.spool import Spool
 from pipelines.stone_records import stone_record
 from survey.extrusion import SurveyedBlock
 from survey.formats.reading import ReadingOptions, open_survey
-from survey.measured import SurveyedStream, survey_stones
+from survey.measured import survey_stones
 from survey.records import Reject
 
-__all__ = ["FileReport", "IngestReport", "Refusal", "ingest"]
+__all__ = ["ingest"]
 
 
 _PATIENCE = 300.0
 """How long to wait for another program that writes [s]: not less than a large survey takes, since waiting is cheaper
 than fitting it anew."""
-
-
-@dataclass(frozen=True)
-class Refusal:
-    """A stone that was not taken in, and why."""
-
-    code: str | None
-    reason: str
-
-
-@dataclass(frozen=True)
-class FileReport:
-    """What became of one file.
-
-    Attributes
-    ----------
-    path : the file
-    survey : name of the survey in the database
-    stones : how many it holds, by kind
-    rejected : measured points left out as blunders, by stone code
-    rms : root mean square distance of the accepted points from their planes, worst stone [m]
-    worst : code of that stone; empty if none was measured in space
-    shapes : faces that are not one plane, in words, by stone code
-    refused : stones that were not taken in
-    rejects : the file that holds them; None if there are none
-    frame : how the survey was carried into the frame of the site; None if it was there
-    again : how many of the stones were in the database already, and have a new measurement now
-    """
-
-    path: str
-    survey: str
-    stones: dict[str, int]
-    rejected: dict[str, int]
-    rms: float
-    worst: str
-    shapes: dict[str, str]
-    refused: tuple[Refusal, ...] = ()
-    rejects: str | None = None
-    frame: dict[str, Any] | None = None
-    again: int = 0
-
-
-@dataclass(frozen=True)
-class IngestReport:
-    """What became of all files."""
-
-    url: str
-    files: tuple[FileReport, ...]
 
 
 def ingest(
@@ -147,36 +97,10 @@ def ingest(
             progress(Progress("relate", 0, None))
             relate(session, only=[number for tally in tallies for number in tally.stored])
         reports = tuple(
-            _report(tally, target if tally.refused else None)
+            tally.report(target if tally.refused else None)
             for tally, target in zip(tallies, targets, strict=True)
         )
     return IngestReport(database.url, reports)
-
-
-@dataclass
-class _Tally:
-    """What is counted while the stones of a file go by."""
-
-    path: Path
-    stream: SurveyedStream
-    stones: Counter[str] = field(default_factory=Counter)
-    rejected: dict[str, int] = field(default_factory=dict)
-    shapes: dict[str, str] = field(default_factory=dict)
-    rms: float = 0.0
-    worst: str = ""
-    refused: list[Reject] = field(default_factory=list)
-    again: int = 0
-    stored: Sequence[int] = ()
-
-    def count(self, block: SurveyedBlock) -> None:
-        face = block.face
-        self.stones[block.kind] += 1
-        if face.rejected_points:
-            self.rejected[block.code] = len(face.rejected_points)
-        if str(face.shape.kind) not in ("plane", "untested"):
-            self.shapes[block.code] = face.shape.text
-        if face.provenance.source == "points" and face.fit.rms >= self.rms:
-            self.rms, self.worst = face.fit.rms, block.code
 
 
 def _open_if_there(url: str, held: ExitStack) -> None:
@@ -196,7 +120,7 @@ def _check_files(surveys: Sequence[Path]) -> None:
         seen.add(path.resolve())
 
 
-def _check_codes(tallies: Sequence["_Tally"], spools: Sequence[Spool]) -> None:
+def _check_codes(tallies: Sequence[Tally], spools: Sequence[Spool]) -> None:
     """Refuse files that contradict each other before a database is made for them."""
     places: dict[str, str] = {}
     for tally, spool in zip(tallies, spools, strict=True):
@@ -210,7 +134,7 @@ def _check_codes(tallies: Sequence["_Tally"], spools: Sequence[Spool]) -> None:
 _LISTS = ("pnezd", "penzd")
 
 
-def _listed_stations(tally: "_Tally", options: ReadingOptions | None) -> list[int]:
+def _listed_stations(tally: Tally, options: ReadingOptions | None) -> list[int]:
     """Lines of the stations that stand among the points of a list, not in its header file."""
     elsewhere = () if options is None or options.head is None else options.head.stations
     known = {one.name for one in elsewhere}
@@ -224,9 +148,9 @@ def _measure(
     options: ReadingOptions | None,
     keep_going: bool,
     progress: Listener,
-) -> _Tally:
+) -> Tally:
     """The good stones of one file into a spool; the first bad one ends it, or is kept for the rejects."""
-    tally = _Tally(path, survey_stones(open_survey(path, format, options)))
+    tally = Tally(path, survey_stones(open_survey(path, format, options)))
     stage, head, kinds = f"fit {path.name}", tally.stream.head, set[str]()
     for one in tally.stream.stones:
         made = one if isinstance(one, Reject) else _of_known_kind(one, head.path, kinds)
@@ -245,7 +169,7 @@ def _measure(
     return tally
 
 
-def _store(session: Session, tally: _Tally, stones: Iterator[StoneRecord], again: bool) -> None:
+def _store(session: Session, tally: Tally, stones: Iterator[StoneRecord], again: bool) -> None:
     head = tally.stream.head
     stored = store_survey(
         session,
@@ -261,7 +185,7 @@ def _store(session: Session, tally: _Tally, stones: Iterator[StoneRecord], again
     tally.again = len(stored.again)
 
 
-def _told(stones: Iterable[StoneRecord], tally: _Tally, progress: Listener) -> Iterator[StoneRecord]:
+def _told(stones: Iterable[StoneRecord], tally: Tally, progress: Listener) -> Iterator[StoneRecord]:
     total = tally.stones.total()
     for number, stone in enumerate(stones, start=1):
         progress(Progress(f"store {tally.path.name}", number, total, stone.code))
@@ -305,19 +229,3 @@ def _published(path: Path, text: bytes) -> Iterator[None]:
     except BaseException:
         part.unlink(missing_ok=True)
         raise
-
-
-def _report(tally: _Tally, rejects: Path | None) -> FileReport:
-    return FileReport(
-        path=tally.stream.head.path,
-        survey=tally.stream.head.name,
-        stones=dict(sorted(tally.stones.items())),
-        rejected=tally.rejected,
-        rms=tally.rms,
-        worst=tally.worst,
-        shapes=tally.shapes,
-        refused=tuple(Refusal(one.code, str(one.error)) for one in tally.refused),
-        rejects=None if rejects is None else str(rejects),
-        frame=frame_record(tally.stream.transform),
-        again=tally.again,
-    )

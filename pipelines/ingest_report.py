@@ -1,0 +1,105 @@
+"""What became of survey files: counted while their stones go by, and told at the end."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from pipelines.frame_records import frame_record
+from survey.extrusion import SurveyedBlock
+from survey.measured import SurveyedStream
+from survey.records import Reject
+
+__all__ = ["FileReport", "IngestReport", "Refusal", "Tally"]
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A stone that was not taken in, and why."""
+
+    code: str | None
+    reason: str
+
+
+@dataclass(frozen=True)
+class FileReport:
+    """What became of one file.
+
+    Attributes
+    ----------
+    path : the file
+    survey : name of the survey in the database
+    stones : how many it holds, by kind
+    rejected : measured points left out as blunders, by stone code
+    rms : root mean square distance of the accepted points from their planes, worst stone [m]
+    worst : code of that stone; empty if none was measured in space
+    shapes : faces that are not one plane, in words, by stone code
+    refused : stones that were not taken in
+    rejects : the file that holds them; None if there are none
+    frame : how the survey was carried into the frame of the site; None if it was there
+    again : how many of the stones were in the database already, and have a new measurement now
+    """
+
+    path: str
+    survey: str
+    stones: dict[str, int]
+    rejected: dict[str, int]
+    rms: float
+    worst: str
+    shapes: dict[str, str]
+    refused: tuple[Refusal, ...] = ()
+    rejects: str | None = None
+    frame: dict[str, Any] | None = None
+    again: int = 0
+
+
+@dataclass(frozen=True)
+class IngestReport:
+    """What became of all files."""
+
+    url: str
+    files: tuple[FileReport, ...]
+
+
+@dataclass
+class Tally:
+    """What is counted while the stones of a file go by."""
+
+    path: Path
+    stream: SurveyedStream
+    stones: Counter[str] = field(default_factory=Counter)
+    rejected: dict[str, int] = field(default_factory=dict)
+    shapes: dict[str, str] = field(default_factory=dict)
+    rms: float = 0.0
+    worst: str = ""
+    refused: list[Reject] = field(default_factory=list)
+    again: int = 0
+    stored: Sequence[int] = ()
+
+    def count(self, block: SurveyedBlock) -> None:
+        """One more stone that is taken in."""
+        face = block.face
+        self.stones[block.kind] += 1
+        if face.rejected_points:
+            self.rejected[block.code] = len(face.rejected_points)
+        if str(face.shape.kind) not in ("plane", "untested"):
+            self.shapes[block.code] = face.shape.text
+        if face.provenance.source == "points" and face.fit.rms >= self.rms:
+            self.rms, self.worst = face.fit.rms, block.code
+
+    def report(self, rejects: Path | None) -> FileReport:
+        """What is told of the file; `rejects` is the file that holds the refused stones."""
+        return FileReport(
+            path=self.stream.head.path,
+            survey=self.stream.head.name,
+            stones=dict(sorted(self.stones.items())),
+            rejected=self.rejected,
+            rms=self.rms,
+            worst=self.worst,
+            shapes=self.shapes,
+            refused=tuple(Refusal(one.code, str(one.error)) for one in self.refused),
+            rejects=None if rejects is None else str(rejects),
+            frame=frame_record(self.stream.transform),
+            again=self.again,
+        )
