@@ -60,8 +60,7 @@ class PostgresqlServer:
 
     def engine(self, create: bool) -> Engine:
         """An engine on the database, which must be there; MOMA makes its tables, not the database."""
-        # Compiling a statement of many small parts takes seconds, answering it takes milliseconds.
-        ours = {"connect_timeout": "10", "application_name": "moma", "options": "-c jit=off"}
+        ours = {"connect_timeout": "10", "application_name": "moma"}
         arguments = {name: value for name, value in ours.items() if name not in self.url.query}
         try:
             engine = create_engine(
@@ -85,6 +84,8 @@ class PostgresqlServer:
         patience = max(1, round(1000 * self.lock_timeout))  # [ms]; zero would wait for ever
         cursor = connection.cursor()
         cursor.execute(f"SET lock_timeout = {patience}")
+        # To compile a statement of many small parts takes seconds, to answer it takes milliseconds.
+        cursor.execute("SET jit = off")
         cursor.close()
         connection.commit()
 
