@@ -164,7 +164,13 @@ class Statement(Recorded, Base):
     __tablename__ = "statement"
     __table_args__ = (
         Index("ix_statement_entity", "entity_id", "kind"),
-        Index("ix_statement_structure", "structure_id", "kind"),
+        Index(
+            "ix_statement_structure",
+            "structure_id",
+            "kind",
+            sqlite_where=text("structure_id IS NOT NULL"),
+            postgresql_where=text("structure_id IS NOT NULL"),
+        ),
     )
 
     id: Mapped[int] = mapped_column(primary_key=True)

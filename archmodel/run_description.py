@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from sqlalchemy import Select, func, select
+from sqlalchemy import func, select
 from sqlalchemy.orm import InstrumentedAttribute, Session, aliased, joinedload
 
 from archmodel.entities import Entity
@@ -141,12 +141,19 @@ def _run(session: Session, number: int) -> Run:
 
 def _stresses(session: Session, run: int, count: int) -> list[dict[str, object]]:
     """The stones with the largest Von Mises stress [Pa]."""
-    statement = (
-        select(Entity.code, Entity.kind, EntityResult.von_mises_max, EntityResult.von_mises_mean)
-        .join(EntityResult.entity)
+    # the largest first, and their codes then: of all stones, sorting would look up every code
+    largest = aliased(
+        EntityResult,
+        select(EntityResult)
         .where(EntityResult.run_id == run, EntityResult.von_mises_max.is_not(None))
-        .order_by(EntityResult.von_mises_max.desc(), Entity.id)
+        .order_by(EntityResult.von_mises_max.desc(), EntityResult.entity_id)
         .limit(count)
+        .subquery(),
+    )
+    statement = (
+        select(Entity.code, Entity.kind, largest.von_mises_max, largest.von_mises_mean)
+        .join(Entity, Entity.id == largest.entity_id)
+        .order_by(largest.von_mises_max.desc(), Entity.id)
     )
     return [dict(row) for row in session.execute(statement).mappings()]
 
@@ -155,18 +162,23 @@ def _joints(
     session: Session, run: int, worst: InstrumentedAttribute[Any], above: float, count: int
 ) -> list[dict[str, object]]:
     """The joints that have the largest of one value, of those above a bound."""
-    first, second = aliased(Entity), aliased(Entity)
-    statement: Select[Any] = (
-        select(
-            first.code.label("first"),
-            second.code.label("second"),
-            *(getattr(JointResult, name) for name in _JOINT_VALUES),
-        )
-        .join(first, JointResult.first_id == first.id)
-        .join(second, JointResult.second_id == second.id)
+    chosen = (
+        select(JointResult)
         .where(JointResult.run_id == run, worst > above)
         .order_by(worst.desc(), JointResult.number)
         .limit(count)
+        .subquery()
+    )
+    joint, first, second = aliased(JointResult, chosen), aliased(Entity), aliased(Entity)
+    statement = (
+        select(
+            first.code.label("first"),
+            second.code.label("second"),
+            *(getattr(joint, name) for name in _JOINT_VALUES),
+        )
+        .join(first, joint.first_id == first.id)
+        .join(second, joint.second_id == second.id)
+        .order_by(chosen.c[worst.key].desc(), joint.number)
     )
     return [dict(row) for row in session.execute(statement).mappings()]
 

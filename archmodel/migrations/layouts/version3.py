@@ -3,7 +3,19 @@
 Never to be changed: a new layout of `archmodel.layout` is a new version.
 """
 
-from sqlalchemy import Boolean, Column, Date, DateTime, Double, ForeignKey, Index, Integer, MetaData, Table
+from sqlalchemy import (
+    Boolean,
+    Column,
+    Date,
+    DateTime,
+    Double,
+    ForeignKey,
+    Index,
+    Integer,
+    MetaData,
+    Table,
+    text,
+)
 
 from archmodel.migrations.layouts.columns import BYTES, JSON_TEXT, TEXT, current
 
@@ -368,5 +380,11 @@ Table(
     Column("sigma", Double()),
     Column("key", TEXT),
     Index("ix_statement_entity", "entity_id", "kind"),
-    Index("ix_statement_structure", "structure_id", "kind"),
+    Index(
+        "ix_statement_structure",
+        "structure_id",
+        "kind",
+        sqlite_where=text("structure_id IS NOT NULL"),
+        postgresql_where=text("structure_id IS NOT NULL"),
+    ),
 )
