@@ -10,6 +10,7 @@ from archmodel.bulk import batches, insert_rows
 from archmodel.entities import Entity, Header, Stretcher, kind_of, kinds
 from archmodel.entries import Entry
 from archmodel.knowledge import Correction
+from archmodel.recording import table_of
 from archmodel.relation_store import Act
 from archmodel.relations import Relation
 from archmodel.stone_columns import id_conditions
@@ -88,12 +89,14 @@ def give_values(session: Session, values: Mapping[int, Mapping[str, float | None
     if not names:
         return 0
     declared = _declared(session, names)
-    columns = [Entity.__table__.c[name] for name in names]
+    columns = [table_of(Entity).c[name] for name in names]
     changed = 0
     for some in batches(values):
         held = {
             row[0]: dict(zip(names, row[1:], strict=True))
-            for row in session.execute(select(Entity.__table__.c.id, *columns).where(Entity.id.in_(some)))
+            for row in session.execute(
+                select(table_of(Entity).c.id, *columns).where(table_of(Entity).c.id.in_(some))
+            )
         }
         changes = [
             (number, name, before, after)
@@ -134,9 +137,9 @@ def _update(
     after = {number: dict(held[number]) for number, *_ in changes}
     for number, name, _, value in changes:
         after[number][name] = value
-    table = Entity.__table__
+    table = table_of(Entity)
     statement = (
-        update(table)  # type: ignore[arg-type]
+        update(table)
         .where(table.c.id == bindparam("number"))
         .values({name: bindparam(f"new_{name}") for name in names})
     )

@@ -12,6 +12,7 @@ from sqlalchemy.orm import Session
 from archmodel.base import Base
 from archmodel.bulk import batches, insert_rows
 from archmodel.entries import Entry, new_entry
+from archmodel.recording import table_of
 from archmodel.relating import FoundRelations
 from archmodel.relations import RELATIONS, Relation
 from archmodel.stone_columns import id_conditions
@@ -114,13 +115,9 @@ def store_relations(
 
 def supersede(session: Session, table: type[Base], numbers: list[int], act: Act) -> None:
     """End rows that are held now."""
-    columns = table.__table__.c
+    target = table_of(table)
     for batch in batches(numbers):
-        session.execute(
-            update(table.__table__)  # type: ignore[arg-type]
-            .where(columns.id.in_(batch))
-            .values(superseded_id=act.id)
-        )
+        session.execute(update(target).where(target.c.id.in_(batch)).values(superseded_id=act.id))
 
 
 @dataclass(frozen=True)
@@ -150,13 +147,13 @@ def _held(session: Session, only: Collection[int] | None) -> _Held:
 
 
 def _select(session: Session, condition: ColumnElement[bool]) -> list[Any]:
-    columns = Relation.__table__.c
+    columns = table_of(Relation).c
     numbers = [columns[name] for name in _NUMBERS]
     return list(
         session.execute(
             select(
                 columns.id, columns.kind, columns.subject_id, columns.object_id, columns.declared, *numbers
-            ).where(Relation.superseded_id.is_(None), condition)
+            ).where(columns.superseded_id.is_(None), condition)
         )
     )
 
@@ -164,11 +161,11 @@ def _select(session: Session, condition: ColumnElement[bool]) -> list[Any]:
 def _concerning(only: Collection[int] | None) -> Iterator[ColumnElement[bool]]:
     """Conditions that together hold for the relations of some entities."""
     if only is None:
-        yield Relation.id.is_not(None)
+        yield table_of(Relation).c.id.is_not(None)
         return
-    for one in id_conditions(Relation.subject_id, only):
+    for one in id_conditions(table_of(Relation).c.subject_id, only):
         yield one
-    for one in id_conditions(Relation.object_id, only):
+    for one in id_conditions(table_of(Relation).c.object_id, only):
         yield one
 
 

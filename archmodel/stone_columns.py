@@ -13,9 +13,10 @@ from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from archmodel.bulk import batches
 from archmodel.entities import Entity
+from archmodel.recording import table_of
 from archmodel.surveys import Measurement
 
-__all__ = ["StoneColumns", "id_conditions", "joined", "near_box", "stone_columns", "stone_shapes"]
+__all__ = ["ENTITY", "StoneColumns", "id_conditions", "joined", "near_box", "stone_columns", "stone_shapes"]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -23,6 +24,11 @@ Faces = tuple[tuple[int, ...], ...]
 
 _AT_ONCE = 2000  # rows that are fetched together
 _RANGES = 200  # ranges of numbers in one condition, far below SQLite's limit of parameters
+
+ENTITY = table_of(Entity).c
+"""Columns of entities, for statements that make no objects."""
+
+_MEASUREMENT = table_of(Measurement).c
 
 
 @dataclass(frozen=True)
@@ -49,21 +55,24 @@ class StoneColumns:
 
 
 def stone_columns(session: Session, *conditions: ColumnElement[bool]) -> StoneColumns:
-    """The stones for which the conditions on Entity hold."""
+    """The stones for which the conditions on ENTITY hold."""
     statement = (
         select(
-            Entity.id,
-            Entity.kind,
-            Entity.zone,
-            Entity.course,
-            Entity.x,
-            Entity.y,
-            Entity.z,
-            type_coerce(Measurement.normal, LargeBinary),
+            ENTITY.id,
+            ENTITY.kind,
+            ENTITY.zone,
+            ENTITY.course,
+            ENTITY.x,
+            ENTITY.y,
+            ENTITY.z,
+            type_coerce(_MEASUREMENT.normal, LargeBinary),
         )
-        .outerjoin(Measurement, (Measurement.entity_id == Entity.id) & Measurement.superseded_id.is_(None))
+        .outerjoin(
+            table_of(Measurement),
+            (_MEASUREMENT.entity_id == ENTITY.id) & _MEASUREMENT.superseded_id.is_(None),
+        )
         .where(*conditions)
-        .order_by(Entity.id)
+        .order_by(ENTITY.id)
     )
     rows = list(_rows(session, statement))
     ids, kinds, zones, courses, x, y, z, normals = zip(*rows, strict=True) if rows else ((),) * 8
@@ -100,13 +109,16 @@ def stone_shapes(session: Session, *conditions: ColumnElement[bool]) -> Iterator
     """Number, vertices (nv, 3) [m] and faces of the solid of each measured stone for which the conditions hold."""
     statement = (
         select(
-            Entity.id,
-            type_coerce(Measurement.solid_vertices, LargeBinary),
-            cast(Measurement.solid_faces, Text),
+            ENTITY.id,
+            type_coerce(_MEASUREMENT.solid_vertices, LargeBinary),
+            cast(_MEASUREMENT.solid_faces, Text),
         )
-        .join(Measurement, (Measurement.entity_id == Entity.id) & Measurement.superseded_id.is_(None))
+        .join(
+            table_of(Measurement),
+            (_MEASUREMENT.entity_id == ENTITY.id) & _MEASUREMENT.superseded_id.is_(None),
+        )
         .where(*conditions)
-        .order_by(Entity.id)
+        .order_by(ENTITY.id)
     )
     for number, vertices, faces in _rows(session, statement):
         yield number, np.frombuffer(vertices, dtype="<f8").reshape(-1, 3), _faces(faces)
@@ -125,7 +137,7 @@ def _rows(session: Session, statement: Executable) -> Iterator[Any]:
 
 
 def id_conditions(
-    column: InstrumentedAttribute[int], numbers: Collection[int]
+    column: ColumnElement[int] | InstrumentedAttribute[int], numbers: Collection[int]
 ) -> Iterator[ColumnElement[bool]]:
     """Conditions that together hold for these numbers, each number in one: few where they follow one another."""
     for some in _chunks(_runs(sorted(set(numbers)))):
@@ -168,12 +180,12 @@ def near_box(low: Array, high: Array, reach: float) -> ColumnElement[bool]:
     reach : the distance [m]
     """
     size = (
-        func.coalesce(Entity.length, 0.0)
-        + func.coalesce(Entity.height, 0.0)
-        + func.coalesce(Entity.depth, 0.0)
+        func.coalesce(ENTITY.length, 0.0)
+        + func.coalesce(ENTITY.height, 0.0)
+        + func.coalesce(ENTITY.depth, 0.0)
         + reach
     )
-    out: ColumnElement[bool] = Entity.x.is_not(None)
-    for place, bottom, top in zip((Entity.x, Entity.y, Entity.z), low.tolist(), high.tolist(), strict=True):
+    out: ColumnElement[bool] = ENTITY.x.is_not(None)
+    for place, bottom, top in zip((ENTITY.x, ENTITY.y, ENTITY.z), low.tolist(), high.tolist(), strict=True):
         out = out & (place + size >= bottom) & (place - size <= top)
     return out

@@ -15,7 +15,15 @@ from archmodel.computed_values import arch_values, give_values, tail_lengths
 from archmodel.entities import Entity
 from archmodel.relating import Contacts, FoundRelations, RelationSettings, StonesOf, relations_between
 from archmodel.relation_store import Act, Changes, store_relations
-from archmodel.stone_columns import StoneColumns, id_conditions, joined, near_box, stone_columns, stone_shapes
+from archmodel.stone_columns import (
+    ENTITY,
+    StoneColumns,
+    id_conditions,
+    joined,
+    near_box,
+    stone_columns,
+    stone_shapes,
+)
 from survey.adjacency import Polyhedra, PolyhedraBuilder, find_touching
 
 __all__ = ["KnownSolids", "RelationReport", "relate"]
@@ -138,7 +146,7 @@ def _stones(
         _read_missing(session, only, solids)
         box = solids.box(only)
         if box is None:
-            return stone_columns(session, Entity.id.is_(None)), solids
+            return stone_columns(session, ENTITY.id.is_(None)), solids
         stones = stone_columns(session, near_box(*box, settings.width))
     _read_missing(session, None if only is None and not len(solids) else set(stones.ids.tolist()), solids)
     return stones, solids
@@ -146,9 +154,9 @@ def _stones(
 
 def _read_missing(session: Session, wanted: set[int] | None, solids: KnownSolids) -> None:
     """Add the solids of some entities, or of all, that are not at hand."""
-    conditions: Iterable[ColumnElement[bool]] = [Entity.id.is_not(None)]
+    conditions: Iterable[ColumnElement[bool]] = [ENTITY.id.is_not(None)]
     if wanted is not None:
-        conditions = id_conditions(Entity.id, wanted.difference(solids.ids))
+        conditions = id_conditions(ENTITY.id, wanted.difference(solids.ids))
     for condition in conditions:
         for number, vertices, faces in stone_shapes(session, condition):
             solids.add(number, vertices, faces)
@@ -194,7 +202,7 @@ def _whole_courses(session: Session, stones: StoneColumns, only: set[int]) -> St
     places.discard((None, None))
     parts = [
         stone_columns(
-            session, or_(*(and_(Entity.zone == zone, Entity.course == course) for zone, course in some))
+            session, or_(*(and_(ENTITY.zone == zone, ENTITY.course == course) for zone, course in some))
         )
         for some in batches(sorted(places, key=lambda place: (place[0] or "", place[1] or 0)))
     ]
