@@ -46,7 +46,7 @@ def export_building(session: Session, path: str | Path) -> dict[str, int]:
     path = Path(path)
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        with part.open("xb") as file:
+        with part.open("wb") as file:
             with _compressed(file, path) as stream:
                 counts = write_building(session, stream)
             file.flush()

@@ -1,5 +1,6 @@
 """The head of a building document: what it is, what wrote it, in which units and which frame."""
 
+import re
 from importlib.metadata import version
 from typing import Any
 
@@ -78,6 +79,10 @@ def check_head(head: dict[str, Any], name: str) -> None:
         if key in expected and (type(given), given) != (type(expected[key]), expected[key]):
             what = f"is {said(given)}, expected {expected[key]!r}"
             raise ExchangeError(what, where=place, remedy=remedies[key])
+    until = head["recorded_until"]
+    if until is not None and not (type(until) is str and re.match(INSTANT, until)):
+        what = f"is {said(until)}, expected the instant of the latest entry, or null"
+        raise ExchangeError(what, where=f"{name} $.recorded_until")
     if type(head["moma"]) is not str:
         raise ExchangeError(f"is {said(head['moma'])}, expected the version of MOMA", where=f"{name} $.moma")
 

@@ -127,9 +127,8 @@ class RowReader:
             return
         kind = row.values[self._kind]
         if kind not in self._kinds and not (self._of_entities and kind in self._registered):
-            known = {*self._kinds, *(self._registered if self._of_entities else ())}
-            near = difflib.get_close_matches(kind[:40], known, n=1)
-            remedy = f"did you mean {near[0]}?" if near else f"known are {', '.join(sorted(known))}"
+            near = difflib.get_close_matches(kind[:40], self._kinds, n=1)
+            remedy = f"did you mean {near[0]}?" if near else f"known are {', '.join(sorted(self._kinds))}"
             raise row.wrong(f"is {said(kind)}, which is no kind", f".{self._kind}", remedy)
 
 

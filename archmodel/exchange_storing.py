@@ -1,6 +1,7 @@
 """Rows of one section into the database, many at a time, each refusal brought back to its row."""
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 from sqlalchemy import Column, UniqueConstraint, bindparam, select, update
@@ -47,7 +48,8 @@ class SectionStore:
         self._waiting.append(row)
         self._weight += weight
         if row.later:
-            self._later.append(row)
+            key = self._section.key[0]
+            self._later.append(replace(row, values={key: row.values[key]}, labels={}))
         if len(self._waiting) >= BATCH or self._weight >= WEIGHT:
             self._store()
 
@@ -154,7 +156,9 @@ class SectionStore:
 
     def _same(self, row: Row, columns: list[Column[Any]], where: Any) -> tuple[Any, ...] | None:
         """The key of another row with the values that must be unique."""
-        if where is not None and row.values.get("superseded_id") is not None:
+        if not {column.name for column in columns} <= row.values.keys():
+            return None  # only a reference was to be set
+        if where is not None and row.values["superseded_id"] is not None:
             return None
         conditions = [column == row.values[column.name] for column in columns]
         found = select(*self._section.table.primary_key).where(

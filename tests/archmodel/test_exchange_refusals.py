@@ -98,6 +98,7 @@ WRONG = (
     ("format_version", True, r"\$\.format_version: is true, expected 1"),
     ("schema_version", 2, rf"\$\.schema_version: is 2, expected {SCHEMA_VERSION}; .*moma migrate.*export it again"),
     ("schema_version", DROP, r"\$\.schema_version: is missing"),
+    ("recorded_until", "today", r"\$\.recorded_until: is 'today', expected the instant"),
     ("moma", 7, r"\$\.moma: is 7"),
     ("units", UNITS | {"length": "mm"}, r"\$\.units: is an object of 7, expected .*; convert the numbers"),
     ("frame", FRAME.replace("z", "y"), r"\$\.frame: .*; carry the coordinates into that frame"),

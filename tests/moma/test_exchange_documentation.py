@@ -11,6 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from archmodel.exchange_sections import sections
+from archmodel.layout import SCHEMA_VERSION
 from moma.cli import app
 
 ROOT = Path(__file__).parents[2]
@@ -69,7 +70,7 @@ def test_the_errors_are_those_that_are_said(folder: Path, monkeypatch: pytest.Mo
     whole = (folder / "window.json").read_text(encoding="utf-8")
     broken = (
         '{"format": no}',
-        whole.replace('"schema_version": 3', '"schema_version": 2'),
+        whole.replace(f'"schema_version": {SCHEMA_VERSION}', '"schema_version": 2'),
         whole.replace('"course"', '"coarse"', 1),
         whole.replace('"entity_id": 3, "entity": "', '"entity_id": 4000, "entity": "', 1),
     )
