@@ -23,6 +23,9 @@ _ONE_WAY = 0.9  # length of the mean of unit normals of faces that look one way
 _CROSSED = np.sin(
     np.radians(45.0)
 )  # of a joint's normal and the ray from the centre: more lies between rings
+_PARALLEL = 0.02  # sine of the angle between joints of which it cannot be told where they meet
+_POINTS_THERE = 0.1  # sine of the angle by which a joint may point past the centre
+_CANDIDATES = 400  # places that are tried for the centre
 _ROUNDS = 5  # until the centre and the joints within rings agree; two or three do
 _FEWEST = 3  # stones of an arch, with its springers
 
@@ -188,21 +191,15 @@ class _View:
 def _within_rings(
     group: Sequence[int], joints: Sequence[ArchJoint], view: _View
 ) -> tuple[list[ArchJoint], Array]:
-    """The joints that the rings cross, and the centre about which they turn.
-
-    The centre of the circle through the stones tells the joints apart well enough to find a better one: the
-    place that is nearest to the planes of all joints within rings.
-    """
-    centre = _circle_centre(view.places(group))
+    """The joints that the rings cross, and the centre about which they turn."""
     degrees = Counter(i for joint in joints for i in (joint.first, joint.second))
     if max(degrees.values(), default=0) <= 2 and len(joints) < len(group):
-        return list(joints), centre  # one row, however its centre lies
+        return list(joints), np.zeros(2)  # one row, however its centre lies
     middle = 0.5 * (view.places(one.first for one in joints) + view.places(one.second for one in joints))
     normal = view.project(np.array([joint.normal for joint in joints]))
+    centre = _centre(middle, normal)
     for _ in range(_ROUNDS):
-        ray = middle - centre
-        ray /= np.maximum(np.linalg.norm(ray, axis=1), 1e-12)[:, None]
-        crossing = np.abs((normal * ray).sum(axis=1)) <= _CROSSED
+        crossing = _off(centre, middle, normal) <= _CROSSED
         if crossing.sum() < 2:
             break
         rows = normal[crossing]
@@ -210,13 +207,35 @@ def _within_rings(
     return [joint for joint, is_within in zip(joints, crossing, strict=True) if is_within], centre
 
 
-def _circle_centre(places: Array) -> Array:
-    """Centre (2,) of the circle through places (n, 2), by linear least squares (Kåsa 1976)."""
-    mean = places.mean(axis=0)
-    local = places - mean
-    rows = np.column_stack([2.0 * local, np.ones(len(local))])
-    solution = np.linalg.lstsq(rows, (local**2).sum(axis=1), rcond=1e-9)[0]
-    out: Array = mean + solution[:2]
+def _centre(middle: Array, normal: Array) -> Array:
+    """The place (2,) to which most joints point: joints within rings meet there, those between rings nowhere.
+
+    Parameters
+    ----------
+    middle, normal : (m, 2) of the joints, seen along the axis
+    """
+    count = len(middle)
+    steps = [step for step in (1, 2, 3, 5, 8, 13, count // 3, count // 2) if 0 < step < count]
+    first = np.tile(np.arange(count), len(steps))
+    second = (first + np.repeat(np.array(steps, dtype=np.int64), count)) % count
+    sine = normal[first, 0] * normal[second, 1] - normal[first, 1] * normal[second, 0]
+    chosen = np.flatnonzero(np.abs(sine) > _PARALLEL)
+    chosen = chosen[:: max(1, len(chosen) // _CANDIDATES)]
+    best: Array = middle.mean(axis=0)
+    most = 0
+    for i, j in zip(first[chosen].tolist(), second[chosen].tolist(), strict=True):
+        pair = normal[[i, j]]
+        place = np.linalg.solve(pair, (pair * middle[[i, j]]).sum(axis=1))
+        votes = int((_off(place, middle, normal) <= _POINTS_THERE).sum())
+        if votes > most:
+            best, most = place, votes
+    return best
+
+
+def _off(centre: Array, middle: Array, normal: Array) -> Array:
+    """Sine of the angle (m,) by which the face of each joint points past a place."""
+    ray = middle - centre
+    out: Array = np.abs((normal * ray).sum(axis=1)) / np.maximum(np.linalg.norm(ray, axis=1), 1e-12)
     return out
 
 
