@@ -116,10 +116,10 @@ def _structure(session: Session, held: Structure, at: int | None) -> Values:
     owners = owners_of_structure(session, row.parent_id, at)
     parts = select(Structure.code).where(Structure.parent_id == number, held_at(Structure, at))
     members = (
-        select(Membership)
+        select(Entity.code)
+        .join(Membership, Membership.entity_id == Entity.id)
         .where(Membership.structure_id == number, held_at(Membership, at))
-        .options(joinedload(Membership.entity))
-        .order_by(Membership.rank, Membership.id)
+        .order_by(Membership.rank.is_(None), Membership.rank, Membership.id)
     )
     ended = row.superseded_by if held.superseded_id is not None else None
     withdrawn = ended is not None and (at is None or ended.id <= at)
@@ -132,7 +132,7 @@ def _structure(session: Session, held: Structure, at: int | None) -> Values:
         "side": row.side,
         "part_of": [owner.structure.code for owner in owners],
         "parts": sorted(session.scalars(parts)),
-        "members": [one.entity.code for one in session.scalars(members)],
+        "members": list(session.scalars(members)),
         "knowledge": knowledge(session, "structure_id", number, owners, at),
         "recorded": entry_values(row.entry),
         "withdrawn": entry_values(ended) if withdrawn and ended is not None else None,

@@ -54,7 +54,7 @@ def register_kind(
         name=_checked_name("a kind", name),
         parent=kind_of(above),
         definition=" ".join(str(checked_text("definition", definition)).split()),
-        canon=canon,
+        canon=checked_text("canon", canon),
         attributes=given,
         entry_id=entry.id,
     )

@@ -12,6 +12,7 @@ from archmodel.entries import Entry, new_entry
 from archmodel.knowledge import Correction
 from archmodel.recording import NOTHING, Outcome
 from archmodel.rows import storable
+from archmodel.values import checked_text
 from moma.errors import UsageError
 from pipelines.record_file import RecordFile, Table, read_record
 from pipelines.record_tables import record_table
@@ -129,8 +130,10 @@ class _Entries:
     def of(self, table: Table) -> Entry:
         """The entry that a table belongs to."""
         record, own = self.file.record, table.values
-        author = own["author"] or self.author or record["author"]
-        source = own.get("reason") or own["source"] or record["source"] or self.file.document.path
+        with self.file.at(*table.path):
+            author = checked_text("author", own["author"] or self.author or record["author"])
+            source = checked_text("source", own.get("reason") or own["source"] or record["source"])
+        source = source or self.file.document.path
         action = "correction" if table.name in _CORRECTIONS else "declaration"
         key = (action, author, source)
         if key not in self.made:

@@ -275,6 +275,7 @@ name = "WALL"
         ),
         ("[[relation]]\nkind = 'beside'\nof = ['V1']\nto = ['V1']\n", 1, "in relation to themselves"),
         ("[[structure]]\nkind = 'wal'\ncode = 'W'\n", 2, "did you mean 'wall'"),
+        ("[[phase]]\nname = 'x'\nauthor = \"\\u0000\"\n", 1, "author '.x00' has no visible character"),
         ("[[depth]]\nstones = ['V1']\nvalue = 0\n", 3, "value = 0 is out of range"),
     ],
 )
