@@ -20,10 +20,10 @@ def print_schema(schema: Branch) -> None:
     console = Console(highlight=False)
     for line in schema_lines(schema):
         text = Text(line)
-        text.highlight_regex(r"^[│├└─ ]*(?P<kind>[a-z_]+)(?=  )", style_prefix="")
-        text.highlight_words(["canonical:", "registered:"], style="italic")
-        text.highlight_regex(r"^[│├└─ ]+", style="dim")
-        text.highlight_regex(r"· [a-z_0-9]+( \[[^\]]+\])?", style="cyan")
+        text.highlight_regex(r"(?<=── )[a-z_0-9]+(?=  )|^[a-z_0-9]+(?=  )", "bold")
+        text.highlight_regex(r"canonical:|registered:", "italic")
+        text.highlight_regex(r"^[│├└─ ]+", "dim")
+        text.highlight_regex(r"(?<=· )[a-z_0-9]+", "cyan")
         console.print(text, soft_wrap=True)
 
 

@@ -1,0 +1,151 @@
+"""The schema as a tree, held against the classes themselves."""
+
+import json
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from archmodel.database import Database
+from archmodel.entities import Entity, definition_of, kind_of, kinds
+from archmodel.entries import new_entry
+from archmodel.query import attributes, condition, find, find_rows
+from archmodel.registering import register_kind
+from archmodel.relations import INVERSE
+from archmodel.schema_tree import schema
+from archmodel.store import store_survey
+from archmodel.structures import structure_kinds
+from moma.errors import QueryError, UsageError
+from tests.archmodel.stones import SHA, box_stone
+
+
+def branches(tree: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    for branch in tree["kinds"]:
+        yield branch
+        yield from branches(branch)
+
+
+def test_every_kind_is_below_what_it_is_a_case_of() -> None:
+    tree = json.loads(json.dumps(schema()))
+    assert [branch["kind"] for branch in branches(tree)] == list(kinds())
+    for branch in branches(tree):
+        cls = kinds()[branch["kind"]]
+        assert branch["definition"] == definition_of(cls)
+        assert [one["name"] for one in branch["attributes"]] == [
+            one.name for one in cls.__dict__.get("__own__", ())
+        ]
+        assert branch["canonical"] == cls.__dict__.get("__canon__")
+        assert [sub["kind"] for sub in branch["kinds"]] == [kind_of(sub) for sub in cls.__subclasses__()]
+
+
+def test_structures_relations_and_attributes_are_all_there() -> None:
+    tree: Any = schema()
+    assert [one["kind"] for one in tree["structures"]] == list(structure_kinds())
+    assert {one["relation"] for one in tree["relations"]} == {*INVERSE, "member_of"}
+    assert [one["name"] for one in tree["attributes"]] == [one.name for one in attributes()]
+    assert all(one["definition"] for key in ("structures", "relations", "attributes") for one in tree[key])
+
+
+def test_one_kind_tells_what_it_inherits() -> None:
+    tree: Any = schema(kind="keystone")
+    assert list(tree) == ["kinds"]
+    (keystone,) = tree["kinds"]
+    assert [one["name"] for one in keystone["attributes"]] == ["ring", "rank", "intrados_angle"]
+    assert keystone["kinds"] == []
+    with pytest.raises(UsageError, match="did you mean keystone"):
+        schema(kind="kestone")
+
+
+@pytest.fixture
+def with_merlon(empty: Database) -> Database:
+    """A database that registers merlons, corner merlons, and has two of them."""
+    with empty.session() as session:
+        entry = new_entry(session, "declaration", "field book")
+        register_kind(
+            session,
+            entry,
+            "merlon",
+            "ashlar",
+            "A stone of a parapet between two openings.",
+            canon="height >= length and width_of_top > 0",
+            attributes={"width_of_top": ("m", "of its upper face"), "form": (None, "flat or swallowtail")},
+        )
+        register_kind(session, entry, "corner_merlon", "merlon", "A merlon where two parapets meet.")
+    with empty.session() as session:
+        stones = [
+            box_stone("M1", "merlon", size=(0.5, 0.4, 0.9)),
+            box_stone("M2", "corner_merlon", size=(0.9, 0.4, 0.5)),
+            box_stone("M3", "merlon"),
+            box_stone("H1", "header"),
+        ]
+        store_survey(session, "parapet", "parapet.moma", SHA, stones)
+    with empty.session() as session:
+        own = {
+            "M1": {"width_of_top": 0.4, "form": "flat"},
+            "M2": {"width_of_top": 0.2, "form": "Swallowtail"},
+        }
+        for entity in session.query(Entity):
+            entity.own = own.get(entity.code)  # type: ignore[assignment]
+    return empty
+
+
+def test_a_registered_kind_is_in_the_tree_of_its_database_alone(with_merlon: Database) -> None:
+    with with_merlon.session(read_only=True) as session:
+        (merlon,) = (one for one in branches(schema(session)) if one["kind"] == "merlon")
+    assert merlon["registered"]
+    assert [sub["kind"] for sub in merlon["kinds"]] == ["corner_merlon"]
+    assert "merlon" not in [one["kind"] for one in branches(schema())]
+
+
+FOUND = {
+    "width_of_top > 0.3": ["M1"],
+    "width_of_top <= depth": ["M1", "M2"],
+    "width_of_top is null": ["M3", "H1"],
+    "form = flat": ["M1"],
+    "form like swallow%": ["M2"],
+    "form in (flat, Swallowtail)": ["M1", "M2"],
+    "canonical() and is_a(merlon)": ["M1"],
+    "not canonical() and is_a(merlon)": ["M2", "M3"],
+    "is_a(merlon) and canonical() is null": [],
+    "kind = corner_merlon": ["M2"],
+}
+
+
+def test_attributes_of_registered_kinds_can_be_asked_for(with_merlon: Database) -> None:
+    with with_merlon.session(read_only=True) as session:
+        found = {text: [one.code for one in find(session, "entity", text)] for text in FOUND}
+        rows = find_rows(session, "merlon", columns=["code", "form", "width_of_top"])
+        assert [one.code for one in session.query(Entity).where(condition(session, "form = flat"))] == ["M1"]
+    # height < length decides for M3, though its width is not known
+    assert found == FOUND
+    assert rows[0] == {"code": "M1", "form": "flat", "width_of_top": 0.4}
+    assert [one["form"] for one in rows] == ["flat", "Swallowtail", None]
+
+
+def test_another_database_does_not_know_them(
+    with_merlon: Database, new_database: Callable[[], Database]
+) -> None:
+    other = new_database()
+    with other.session() as session:
+        store_survey(session, "wall", "wall.moma", SHA, [box_stone("H1", "header")])
+    with other.session(read_only=True) as session:
+        with pytest.raises(QueryError, match="unknown attribute 'form'"):
+            find(session, "entity", "form = flat")
+        assert [one.code for one in find(session, "entity", "canonical() is not null")] == ["H1"]
+        assert "merlon" not in [one["kind"] for one in branches(schema(session))]
+
+
+def test_proportions_that_cannot_be_understood_are_named(empty: Database) -> None:
+    with empty.session() as session:
+        entry = new_entry(session, "declaration", "field book")
+        register_kind(session, entry, "odd", "ashlar", "An odd stone.", canon="breadth > 2")
+        with pytest.raises(QueryError, match=r"character 1: the canonical proportions of odd .*'breadth'"):
+            find(session, "entity", "canonical()")
+
+
+def test_proportions_do_not_refer_to_themselves(empty: Database) -> None:
+    with empty.session() as session:
+        entry = new_entry(session, "declaration", "field book")
+        register_kind(session, entry, "odd", "ashlar", "An odd stone.", canon="not canonical()")
+        with pytest.raises(QueryError, match="cannot refer to canonical"):
+            find(session, "entity", "canonical()")
