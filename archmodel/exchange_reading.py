@@ -108,7 +108,8 @@ def _read_tables(session: Session, text: JsonText, name: str) -> dict[str, int]:
         counts[key] = _read_section(session, section, text, name, kinds)
         if section is not sections()[-1] and text.peek() != "}":
             text.take(",")
-    text.take("}")
+    if text.take(",", "}") == ",":
+        _key(text, counts, known)  # which is unknown, or comes twice
     return counts
 
 

@@ -37,3 +37,19 @@ def test_all_stages_run_and_say_their_costs():
         assert row["rows"] == 502
         assert row["us_per_row"] > 0
         assert row["memory_mb"] >= row["before_mb"] > 0
+
+
+@pytest.mark.slow
+def test_memory_does_not_grow_with_the_building(tmp_path):
+    """Ten times the stones: documents of 2 and 23 MB, and less than 10 MB between them."""
+    peaks = {}
+    for stones in (500, 5000):
+        folder = tmp_path / str(stones)
+        folder.mkdir()
+        run("benchmarks.exchange_child", "make", folder, stones, "")
+        for stage in ("export", "import"):
+            found = run("benchmarks.exchange_child", stage, folder, stones, ".json")
+            peaks[stage, stones] = found["memory"]
+        assert found["bytes"] > 4000 * stones
+    for stage in ("export", "import"):
+        assert peaks[stage, 5000] - peaks[stage, 500] < 10e6
