@@ -15,6 +15,7 @@ from archmodel.runs import FIDELITIES, EntityResult
 from archmodel.said import held, observations_of, statements_of
 from archmodel.scope import Scope
 from archmodel.structures import Structure
+from archmodel.surveys import Measurement
 
 __all__ = ["ATTRIBUTES", "DOCUMENTING", "Attribute", "attributes_of", "kinds_of", "own_attributes_of"]
 
@@ -188,6 +189,12 @@ _MEASURED = (
     Attribute("photograph", None, "on which its face was drawn", _of_measurement("photograph")),
     Attribute(
         "survey", None, "name of the survey that measured it", lambda scope, run: scope.survey().c.name
+    ),
+    Attribute(
+        "measurements",
+        "-",
+        "how often it was measured, or its solid made anew",
+        _rows(Measurement, "entity_id", now=False),
     ),
 )
 
