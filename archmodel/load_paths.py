@@ -1,16 +1,17 @@
 """Load paths: all stones on which one rests, directly or through others; or, upwards, all that rest on it."""
 
-from collections import Counter, defaultdict
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from itertools import chain
+from typing import Any, Literal
 
-from sqlalchemy import Row, and_, literal, select
-from sqlalchemy.orm import InstrumentedAttribute, Session
+from sqlalchemy import CTE, ColumnElement, Row, Select, and_, literal, or_, select
+from sqlalchemy.orm import Session
 
 from archmodel.entities import Entity
-from archmodel.entries import held_at
 from archmodel.finding import no_such_code
+from archmodel.recording import table_of
 from archmodel.relations import Relation
 
 __all__ = ["LoadPath", "LoadPathStone", "load_path", "place_of"]
@@ -75,82 +76,90 @@ def load_path(session: Session, code: str, *, up: bool = False, as_of: int | Non
     as_of : number of an entry; None: what is held now
     """
     me = place_of(session, code).id
-    start, end = Relation.subject_id, Relation.object_id
-    if up:
-        start, end = end, start
-    steps: dict[int, list[int]] = defaultdict(list)
-    stones: dict[int, tuple[str, str, int | None, str | None]] = {}
-    for before, after, name, kind, course, zone in _steps(session, me, start, end, as_of):
-        if after not in steps[before]:  # else it is computed and declared
-            steps[before].append(after)
-        stones[after] = (name, kind, course, zone)
+    reached, holds, start, end = _reached(me, up, as_of)
+    steps: dict[int, list[int]] = {}
+    edges = select(start, end).join(reached, start == reached.c.id).where(holds)
+    for before, after in session.execute(edges).all():
+        following = steps.setdefault(before, [])
+        if after not in following:  # else it is computed and declared
+            following.append(after)
+    stones: dict[int, Any] = {number: facts for number, *facts in session.execute(_facts(reached)).all()}
     levels = _levels(me, steps)
-    codes = {number: facts[0] for number, facts in stones.items()} | {me: code}
-    through: dict[int, list[str]] = defaultdict(list)
-    for before in sorted(levels, key=lambda number: (levels[number], number)):
+    order = sorted(levels, key=lambda number: (levels[number], number))
+    through: dict[int, list[str]] = {number: [] for number in order}
+    for before in order:
         for after in steps.get(before, ()):
-            through[after].append(codes[before])
+            through[after].append(stones[before][0])
     return LoadPath(
         code,
         "up" if up else "down",
         tuple(
-            LoadPathStone(*stones[number], levels[number], tuple(through[number]), not steps.get(number))
-            for number in sorted(levels, key=lambda number: (levels[number], number))
+            LoadPathStone(
+                name, kind, course, zone, levels[number], tuple(through[number]), number not in steps
+            )
+            for number, (name, kind, course, zone) in ((number, stones[number]) for number in order)
             if number != me
         ),
     )
 
 
-def _steps(
-    session: Session,
-    me: int,
-    start: InstrumentedAttribute[int],
-    end: InstrumentedAttribute[int],
-    as_of: int | None,
-) -> Iterable[Row[int, int, str, str, int | None, str | None]]:
-    """Every step of every path from a stone, with the stone that it leads to; UNION ends circles."""
+def _reached(
+    me: int, up: bool, as_of: int | None
+) -> tuple[CTE, ColumnElement[bool], ColumnElement[int], ColumnElement[int]]:
+    """The stones on the path, the condition of its steps, and where a step starts and ends; UNION ends circles."""
+    columns = table_of(Relation).c
+    start, end = (columns.object_id, columns.subject_id) if up else (columns.subject_id, columns.object_id)
+    ended = columns.superseded_id
+    holds = and_(columns.kind == "rests_on", ended.is_(None))
+    if as_of is not None:
+        known = or_(ended.is_(None), ended > as_of)
+        holds = and_(columns.kind == "rests_on", columns.entry_id <= as_of, known)
     reached = select(literal(me).label("id")).cte("reached", recursive=True)
-    holds = and_(Relation.kind == "rests_on", held_at(Relation, as_of))
     reached = reached.union(select(end).join(reached, start == reached.c.id).where(holds))
-    return session.execute(
-        select(start, end, Entity.code, Entity.kind, Entity.course, Entity.zone)
-        .join(reached, start == reached.c.id)
-        .join(Entity, Entity.id == end)
-        .where(holds)
-        .order_by(start, end)
+    return reached, holds, start, end
+
+
+def _facts(reached: CTE) -> Select[Any]:
+    """Number, code, kind, course and zone of the stones on the path."""
+    columns = table_of(Entity).c
+    return select(columns.id, columns.code, columns.kind, columns.course, columns.zone).join(
+        reached, columns.id == reached.c.id
     )
 
 
-def _levels(me: int, steps: dict[int, list[int]]) -> dict[int, int]:
+def _levels(me: int, steps: Mapping[int, Sequence[int]]) -> dict[int, int]:
     """Most steps to every stone that can be reached, so that each comes after all through which the load comes.
 
     Where stones bear one another in a circle, the one that the fewest steps lead to is taken to be the first.
     """
-    fewest = _fewest_steps(me, steps)
-    waiting = Counter(after for one in fewest for after in steps.get(one, ()) if after != me)
-    levels, ready = {me: 0}, [me]
-    left = {number: far for number, far in fewest.items() if number != me}
-    while left or ready:
-        if not ready:
-            first = min(left, key=lambda number: (left[number], number))
-            ready, waiting[first] = [first], 0
+    waiting = Counter(chain.from_iterable(steps.values()))
+    waiting.pop(me, None)
+    levels, ready, fewest = {me: 0}, [me], None
+    while ready:
         one = ready.pop()
-        left.pop(one, None)
+        below = levels[one] + 1
         for after in steps.get(one, ()):
-            if after in left:
-                levels[after] = max(levels.get(after, 0), levels[one] + 1)
+            if after in waiting:
+                if below > levels.get(after, 0):
+                    levels[after] = below
                 waiting[after] -= 1
                 if waiting[after] == 0:
+                    del waiting[after]
                     ready.append(after)
+        if waiting and not ready:
+            fewest = fewest or _fewest_steps(me, steps)
+            first = min(waiting, key=lambda number: (fewest[number], number))
+            del waiting[first]
+            ready.append(first)
     return levels
 
 
-def _fewest_steps(me: int, steps: dict[int, list[int]]) -> dict[int, int]:
+def _fewest_steps(me: int, steps: Mapping[int, Sequence[int]]) -> dict[int, int]:
     found, front, level = {me: 0}, [me], 0
     while front:
+        level += 1
         following = (after for one in front for after in steps.get(one, ()) if after not in found)
         front = list(dict.fromkeys(following))
-        level += 1
         found.update(dict.fromkeys(front, level))
     return found
 
