@@ -247,7 +247,7 @@ def test_going_down_says_what_is_lost_and_asks_first(new_url: NewUrl) -> None:
         entry = new_entry(session, "declaration", "a test")
         first, second = session.scalars(select(Entity).where(Entity.code.in_(["H1", "C1"]))).all()
         session.add(Relation(kind="beside", subject=first, object=second, declared=True, entry=entry))
-        session.add(Joint(code="J1", entry=entry))
+        session.add(Joint(code="J1", entry=entry, thickness=0.01))
         old = session.scalars(select(Measurement).where(Measurement.entity_id == first.id)).one()
         old.superseded_by = entry
         session.flush()
@@ -258,6 +258,8 @@ def test_going_down_says_what_is_lost_and_asks_first(new_url: NewUrl) -> None:
         UsageError, match=r"relations \(1\).*superseded \(1\).*not measured.*\(1\)"
     ) as refused:
         migrate(url, 2)
+    assert "acts of recording besides surveys and runs (1)" in str(refused.value)
+    assert "attributes that not every kind has: tail_length, rank, … (1)" in str(refused.value)
     assert "the kind base, which becomes entity (1)" in str(refused.value)
     assert "the kind corbel, which becomes ashlar (1)" in str(refused.value)
     assert rows_of(url, 3) == before

@@ -19,6 +19,7 @@ from sqlalchemy import (
     func,
     insert,
     literal,
+    or_,
     select,
 )
 
@@ -47,6 +48,9 @@ _PARENTS = {
     **dict.fromkeys(("stone", "column_part", "base", "shaft", "capital", "infill", "joint"), "entity"),
 }
 """What of those is nearest to each kind that version 3 brought."""
+
+_OWN = ("own", "tail_length", "span", "projection", "ring", "rank", "intrados_angle", "drum", "thickness")
+"""Columns of attributes that one kind has."""
 
 _DROPPED = {
     "structure": "structures",
@@ -122,7 +126,16 @@ def losses(connection: Connection) -> Iterator[str]:
     for name, text in _DROPPED.items():
         if count := _count(connection, select(func.count()).select_from(tables[name])):
             yield f"{text} ({count})"
+    entry, run = tables["entry"], tables["run"]
+    other = select(func.count()).where(entry.c.action.not_in(["ingest", "run"]))
+    if count := _count(connection, other):
+        yield f"acts of recording besides surveys and runs ({count})"
+    if count := sum(set(versions) != {"moma"} for versions in connection.scalars(select(run.c.versions))):
+        yield f"settings of runs, and versions of the libraries ({count})"
     measurement, entity = tables["measurement"], tables["entity"]
+    said = or_(*(entity.c[name].is_not(None) for name in _OWN))
+    if count := _count(connection, select(func.count()).where(said)):
+        yield f"attributes that not every kind has: tail_length, rank, … ({count})"
     old = select(func.count()).where(measurement.c.superseded_id.is_not(None))
     if count := _count(connection, old):
         yield f"measurements that were superseded ({count})"
