@@ -1,6 +1,6 @@
 """Walking along relations: what a stone carries and is carried by, its load path, its neighbours, the courses.
 
-Each question is one statement, whatever the size of the building, and can be asked of what was known at an
+Each question is a statement or two, whatever the size of the building, and can be asked of what was known at an
 earlier entry (`as_of`). A relation that is both computed and declared counts once.
 """
 
@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass
 from itertools import groupby
 
-from sqlalchemy import ColumnElement, and_, func, or_, select
+from sqlalchemy import ColumnElement, func, select, union_all
 from sqlalchemy.orm import Session, aliased
 
 from archmodel.entities import Entity
@@ -112,21 +112,18 @@ def neighbours(session: Session, code: str, as_of: int | None = None) -> tuple[N
     as_of : number of an entry; None: what is held now
     """
     me = place_of(session, code).id
-    other = aliased(Entity)
-    rows = session.execute(
-        select(other.code, other.kind, Relation.kind, Relation.subject_id, Relation.area, Relation.gap)
-        .add_columns(Relation.declared)
-        .join(
-            other,
-            or_(
-                and_(Relation.subject_id == me, other.id == Relation.object_id),
-                and_(Relation.object_id == me, other.id == Relation.subject_id),
-            ),
+    sides = ((Relation.subject_id, Relation.object_id), (Relation.object_id, Relation.subject_id))
+    rows = union_all(
+        *(
+            select(Entity.code, Entity.kind, Relation.kind.label("relation"), Relation.subject_id)
+            .add_columns(Relation.area, Relation.gap, Relation.declared)
+            .join(Relation, theirs == Entity.id)
+            .where(mine == me, held_at(Relation, as_of))
+            for mine, theirs in sides
         )
-        .where(or_(Relation.subject_id == me, Relation.object_id == me), held_at(Relation, as_of))
     )
     found: dict[tuple[str, str], Neighbour] = {}
-    for name, kind, relation, subject, area, gap, declared in rows:
+    for name, kind, relation, subject, area, gap, declared in session.execute(rows):
         seen = relation if subject == me else INVERSE[relation]
         before = found.get((seen, name))
         if before is not None:  # computed and declared: the numbers are those of the geometry
