@@ -85,7 +85,7 @@ STRUCTURE_USAGES: Mapping[str, Usages] = {
 """The functions of structures, within ``member_of(…)``."""
 
 
-def refusal(call: Call) -> QueryError:
+def _refusal(call: Call) -> QueryError:
     """The error for arguments that a function does not take."""
     name = call.function.text.lower()
     ways = " or ".join(usage for usage, _ in (USAGES.get(name) or STRUCTURE_USAGES[name]))
@@ -96,14 +96,14 @@ def tokens(call: Call, *lengths: int) -> tuple[Token, ...]:
     """The arguments, which must be values, as many as one of the lengths says."""
     values = tuple(one for one in call.arguments if isinstance(one, Token))
     if len(values) != len(call.arguments) or len(values) not in lengths:
-        raise refusal(call)
+        raise _refusal(call)
     return values
 
 
 def only(call: Call, *, needed: bool = False) -> Token | Node | None:
     """The one argument; None if there is none, and none is needed."""
     if len(call.arguments) > 1 or (needed and not call.arguments):
-        raise refusal(call)
+        raise _refusal(call)
     return call.arguments[0] if call.arguments else None
 
 
