@@ -202,7 +202,7 @@ def declare_structure(
 def declare_members(
     session: Session, entry: Entry, code: str, entities: Sequence[int], *, ordered: bool = False
 ) -> Outcome:
-    """Entities, by their numbers, are members of a structure; those that are so already stay.
+    """Entities, by their numbers, are members of a structure; those of which it was declared already stay.
 
     Parameters
     ----------
@@ -291,17 +291,21 @@ def _declare_members(
     )
     same: set[int] = set()
     other: dict[int, int] = {}
+    given = dict(ranks)
     for row in session.execute(held).mappings():
         number = row["entity_id"]
-        if ranks[number] is None or row["rank"] == ranks[number]:
+        if ranks[number] is None:
+            given[number] = row["rank"]
+        if row["declared"] and row["rank"] == given[number]:
             same.add(number)
         else:
+            # what was computed, too, is declared from now on
             other[number] = row["id"]
     if other:
         end_rows(session, entry, Membership, list(other.values()))
     rows = [
         {"entry_id": entry.id, "entity_id": number, "structure_id": structure, "rank": rank, "declared": True}
-        for number, rank in ranks.items()
+        for number, rank in given.items()
         if number not in same
     ]
     if rows:

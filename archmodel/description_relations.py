@@ -26,20 +26,24 @@ def relations(session: Session, entity: int, at: int | None) -> dict[str, list[V
         .options(joinedload(Relation.subject), joinedload(Relation.object))
         .order_by(Relation.id)
     )
-    told: dict[str, list[Values]] = {name: [] for name in INVERSE}
+    told: dict[str, dict[str, Values]] = {name: {} for name in INVERSE}
     for one in session.scalars(statement):
         name = one.kind if one.subject_id == entity else INVERSE[one.kind]
         other = one.object if one.subject_id == entity else one.subject
-        told[name].append(
-            {
-                "code": other.code,
-                "declared": one.declared,
-                "area": one.area,
-                "gap": one.gap,
-                "entry": one.entry_id,
-            }
-        )
-    return {name: sorted(ones, key=lambda one: str(one["code"])) for name, ones in told.items() if ones}
+        values = {
+            "code": other.code,
+            "declared": one.declared,
+            "area": one.area,
+            "gap": one.gap,
+            "entry": one.entry_id,
+        }
+        # computed and declared: one relation, of which the geometry gives the numbers
+        before = told[name].get(other.code)
+        if before is not None:
+            numbers = before if before["area"] is not None else values
+            values = {**numbers, "declared": True}
+        told[name][other.code] = values
+    return {name: [ones[code] for code in sorted(ones)] for name, ones in told.items() if ones}
 
 
 def joints(session: Session, entity: int, run: int) -> list[Values]:

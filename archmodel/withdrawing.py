@@ -52,18 +52,20 @@ def withdraw_statements(
 
 
 def withdraw_members(session: Session, entry: Entry, about: Subjects) -> Outcome:
-    """The entities are members of the structures no longer."""
+    """The entities are members of the structures no longer; memberships that were computed stay."""
     outcome, held = NOTHING, []
     for batch in batches(about.entities):
         statement = select(Membership).where(
-            Membership.entity_id.in_(batch), Membership.structure_id.in_(about.structures)
+            Membership.entity_id.in_(batch),
+            Membership.structure_id.in_(about.structures),
+            Membership.declared,
         )
         for one in session.scalars(statement):
             if one.superseded_id is None:
                 held.append(one.id)
             else:
                 outcome += Outcome(unchanged=1)
-    return _ended(session, entry, Membership, held, outcome, "membership")
+    return _ended(session, entry, Membership, held, outcome, "declared membership")
 
 
 def withdraw_relations(

@@ -17,12 +17,14 @@ from archmodel.declaring import (
     declare_relation,
     declare_structure,
 )
+from archmodel.description import describe
 from archmodel.entries import Entry, held_at, new_entry
-from archmodel.finding import held_named, subjects
+from archmodel.finding import Subjects, held_named, subjects
 from archmodel.knowledge import Document, MaterialProperty, Phase
 from archmodel.recording import Outcome, supersede, withdraw
 from archmodel.relations import Membership, Relation
 from archmodel.structures import Arch, Structure
+from archmodel.withdrawing import withdraw_members
 from moma.errors import DatabaseError, UsageError
 
 NEW, SAME, OTHER = Outcome(new=1), Outcome(unchanged=1), Outcome(replaced=1)
@@ -181,3 +183,40 @@ def test_only_like_replaces_like(empty: Database) -> None:
         declare_phase(session, entry, "2")
         with pytest.raises(UsageError, match="a Document cannot replace a Phase"):
             supersede(session, entry, held_named(session, Phase, "2"), Document(code="D"))
+
+
+def test_what_was_computed_can_be_declared_too(filled: Database) -> None:
+    with filled.session() as session:
+        computed, entry = new_entry(session, "geometry", "solids"), entry_of(session)
+        declare_structure(session, entry, "course", "course 1")
+        one, other = subjects(session, ["W01-01", "W01-02"]).entities
+        course = held_named(session, Structure, "course 1").id
+        for number, rank in ((one, 1), (other, 2)):
+            session.add(
+                Membership(
+                    entity_id=number, structure_id=course, rank=rank, declared=False, entry_id=computed.id
+                )
+            )
+        session.flush()
+        assert declare_members(session, entry, "course 1", [other]) == OTHER
+        assert declare_members(session, entry, "course 1", [other]) == SAME
+        held = session.scalars(select(Membership).where(held_at(Membership)).order_by(Membership.rank))
+        assert [(row.entity_id, row.rank, row.declared) for row in held] == [
+            (one, 1, False),
+            (other, 2, True),
+        ]
+        with pytest.raises(UsageError, match="no such declared membership to withdraw"):
+            withdraw_members(session, entry, Subjects((one,), (course,)))
+        assert withdraw_members(session, entry, Subjects((other,), (course,))) == Outcome(withdrawn=1)
+
+
+def test_a_relation_that_is_computed_and_declared_is_told_once(filled: Database) -> None:
+    with filled.session() as session:
+        computed, entry = new_entry(session, "geometry", "solids"), entry_of(session)
+        one, other = subjects(session, ["W01-01", "W02-01"]).entities
+        values = {"subject_id": other, "object_id": one, "area": 0.12, "gap": 0.01, "declared": False}
+        session.add(Relation(kind="rests_on", entry_id=computed.id, **values))
+        declare_relation(session, entry, "rests_on", [other], [one])
+        told = describe(session, "W01-01")["relations"]
+    expected = {"code": "W02-01", "declared": True, "area": 0.12, "gap": 0.01, "entry": computed.id}
+    assert told == {"supports": [expected]}

@@ -153,7 +153,7 @@ def test_what_cannot_be_said_is_refused_and_nothing_is_kept(known: Database) -> 
         (lambda s, e, a: say_note(s, e, a, "edge", Remark()), "the note 'edge' says nothing"),
         (lambda s, e, a: say_note(s, e, a, "edge", Remark("x", None, "p. 2")), "is in no document"),
         (lambda s, e, a: say_note(s, e, a, "edge", Remark("x" * 10_001)), "text has 10001 characters"),
-        (lambda s, e, a: withdraw_members(s, e, a), "no such membership"),
+        (lambda s, e, a: withdraw_members(s, e, a), "no such declared membership"),
         (lambda s, e, a: withdraw_relations(s, e, "beside", [1], [2]), "no such declared relation beside"),
     ]
     with known.session() as session:
