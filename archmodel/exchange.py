@@ -19,7 +19,7 @@ from moma.errors import ExchangeError
 
 __all__ = ["export_building", "import_building"]
 
-COMPRESSION = 6
+COMPRESSION = 4
 """Of gzip: more takes twice the time for a few percent."""
 
 
