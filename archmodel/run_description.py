@@ -141,19 +141,20 @@ def _run(session: Session, number: int) -> Run:
 
 def _stresses(session: Session, run: int, count: int) -> list[dict[str, object]]:
     """The stones with the largest Von Mises stress [Pa]."""
-    # the largest first, and their codes then: of all stones, sorting would look up every code
-    largest = aliased(
-        EntityResult,
-        select(EntityResult)
+    # the largest first, all else of them then: what is sorted should be short
+    largest = (
+        select(EntityResult.entity_id)
         .where(EntityResult.run_id == run, EntityResult.von_mises_max.is_not(None))
         .order_by(EntityResult.von_mises_max.desc(), EntityResult.entity_id)
         .limit(count)
-        .subquery(),
+        .subquery()
     )
     statement = (
-        select(Entity.code, Entity.kind, largest.von_mises_max, largest.von_mises_mean)
-        .join(Entity, Entity.id == largest.entity_id)
-        .order_by(largest.von_mises_max.desc(), Entity.id)
+        select(Entity.code, Entity.kind, EntityResult.von_mises_max, EntityResult.von_mises_mean)
+        .join(EntityResult.entity)
+        .join(largest, largest.c.entity_id == Entity.id)
+        .where(EntityResult.run_id == run)
+        .order_by(EntityResult.von_mises_max.desc(), Entity.id)
     )
     return [dict(row) for row in session.execute(statement).mappings()]
 
@@ -163,22 +164,24 @@ def _joints(
 ) -> list[dict[str, object]]:
     """The joints that have the largest of one value, of those above a bound."""
     chosen = (
-        select(JointResult)
+        select(JointResult.number)
         .where(JointResult.run_id == run, worst > above)
         .order_by(worst.desc(), JointResult.number)
         .limit(count)
         .subquery()
     )
-    joint, first, second = aliased(JointResult, chosen), aliased(Entity), aliased(Entity)
+    first, second = aliased(Entity), aliased(Entity)
     statement = (
         select(
             first.code.label("first"),
             second.code.label("second"),
-            *(getattr(joint, name) for name in _JOINT_VALUES),
+            *(getattr(JointResult, name) for name in _JOINT_VALUES),
         )
-        .join(first, joint.first_id == first.id)
-        .join(second, joint.second_id == second.id)
-        .order_by(chosen.c[worst.key].desc(), joint.number)
+        .join(chosen, chosen.c.number == JointResult.number)
+        .join(first, JointResult.first_id == first.id)
+        .join(second, JointResult.second_id == second.id)
+        .where(JointResult.run_id == run)
+        .order_by(worst.desc(), JointResult.number)
     )
     return [dict(row) for row in session.execute(statement).mappings()]
 
