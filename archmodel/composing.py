@@ -1,21 +1,21 @@
 """Zones and courses as structures: what the survey says of each stone, and the stones' order along the wall."""
 
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import select
-from sqlalchemy.orm import Session
+from sqlalchemy import and_, or_, select
+from sqlalchemy.orm import Session, aliased
 
 from archmodel.bulk import batches, insert_rows
 from archmodel.relation_store import Act, Changes, supersede
 from archmodel.relations import Membership
-from archmodel.stone_columns import StoneColumns, id_conditions
+from archmodel.stone_columns import ENTITY, StoneColumns, id_conditions, joined, stone_columns
 from archmodel.structures import Structure, structure_kind_named
 
-__all__ = ["Part", "along_the_wall", "course_code", "parts_of_survey", "store_parts"]
+__all__ = ["Part", "along_the_wall", "course_code", "parts_of_survey", "store_parts", "whole_courses"]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -77,6 +77,40 @@ def parts_of_survey(stones: StoneColumns) -> list[Part]:
         members = tuple(stones.ids[order].tolist())
         parts.append(Part("course", course_code(zone, course), course, zone, members, ranks))
     return parts
+
+
+def whole_courses(session: Session, entities: Collection[int]) -> StoneColumns:
+    """All stones of the zones and courses that some entities belong to, or belonged to until now."""
+    places: set[tuple[str | None, int | None]] = set()
+    zone = aliased(Structure)
+    held = (
+        select(zone.code, Structure.number)
+        .join(Membership, Membership.structure_id == Structure.id)
+        .outerjoin(zone, zone.id == Structure.parent_id)
+        .where(
+            Structure.kind == "course",
+            Membership.superseded_id.is_(None),
+            Membership.declared.is_(False),
+        )
+    )
+    for condition in id_conditions(ENTITY.id, entities):
+        places.update(
+            (part, course)
+            for part, course in session.execute(
+                select(ENTITY.zone, ENTITY.course).where(condition).distinct()
+            )
+        )
+    for condition in id_conditions(Membership.entity_id, entities):
+        places.update((part, course) for part, course in session.execute(held.where(condition).distinct()))
+    places.discard((None, None))
+    return joined(
+        [
+            stone_columns(
+                session, or_(*(and_(ENTITY.zone == part, ENTITY.course == course) for part, course in some))
+            )
+            for some in batches(sorted(places, key=lambda place: (place[0] or "", place[1] or 0)))
+        ]
+    )
 
 
 def along_the_wall(centres: Array, normals: Array) -> Indices:

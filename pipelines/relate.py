@@ -5,12 +5,11 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import ColumnElement, and_, func, or_, select
+from sqlalchemy import ColumnElement, func, select
 from sqlalchemy.orm import Session
 
 from archmodel.arches import arch_parts, find_arches
-from archmodel.bulk import batches
-from archmodel.composing import parts_of_survey, store_parts
+from archmodel.composing import parts_of_survey, store_parts, whole_courses
 from archmodel.computed_values import arch_values, give_values, tail_lengths
 from archmodel.entities import Entity
 from archmodel.relating import Contacts, FoundRelations, RelationSettings, StonesOf, relations_between
@@ -19,7 +18,6 @@ from archmodel.stone_columns import (
     ENTITY,
     StoneColumns,
     id_conditions,
-    joined,
     near_box,
     stone_columns,
     stone_shapes,
@@ -40,7 +38,9 @@ class KnownSolids:
     _builder: PolyhedraBuilder = field(default_factory=PolyhedraBuilder)
 
     def add(self, entity: int, vertices: Array, faces: Faces) -> None:
-        """The solid of one entity, by its number: vertices (nv, 3) [m] and faces."""
+        """The solid of one entity, by its number: vertices (nv, 3) [m] and faces; one without faces is none."""
+        if not faces:
+            return
         self.ids.append(entity)
         self._builder.add(vertices, faces)
 
@@ -108,7 +108,7 @@ def relate(
     stones, shapes = _stones(session, settings, chosen, solids or KnownSolids())
     found, ids = _relations(stones, shapes, settings, chosen)
     relations = store_relations(session, ids, found, act, chosen)
-    courses = stones if chosen is None else _whole_courses(session, stones, chosen)
+    courses = stones if chosen is None else whole_courses(session, chosen)
     changes = [
         store_parts(session, parts_of_survey(courses), act, kinds=("structure", "course"), among=chosen)
     ]
@@ -193,17 +193,3 @@ def _relations(
     kinds = [stones.kinds[i] for i in place.tolist()]
     facts = StonesOf(kinds, stones.normals[place])
     return relations_between(contacts, facts, settings), ids
-
-
-def _whole_courses(session: Session, stones: StoneColumns, only: set[int]) -> StoneColumns:
-    """All stones of the zones and courses that the chosen ones belong to."""
-    chosen = np.isin(stones.ids, list(only))
-    places = {(stones.zones[i], stones.courses[i]) for i in np.flatnonzero(chosen).tolist()}
-    places.discard((None, None))
-    parts = [
-        stone_columns(
-            session, or_(*(and_(ENTITY.zone == zone, ENTITY.course == course) for zone, course in some))
-        )
-        for some in batches(sorted(places, key=lambda place: (place[0] or "", place[1] or 0)))
-    ]
-    return joined(parts)

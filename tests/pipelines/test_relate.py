@@ -338,6 +338,35 @@ def test_a_stone_whose_course_is_corrected_moves_to_the_other_course(database):
     assert [code for code, _ in members(database, first.entry)["course 2"]] == ["2-1", "2-2"]
 
 
+@pytest.mark.parametrize("zone", [None, "north wall"])
+def test_a_stone_that_is_corrected_alone_leaves_all_as_if_all_were_computed_again(database, zone):
+    take_in(database, wall(3, 3, zone=zone))
+    related(database)
+    with database.session() as session:
+        moved = session.scalar(select(Entity.id).where(Entity.code == "1-2"))
+        session.execute(update(Entity.__table__).where(Entity.id == moved).values(course=2, kind="header"))
+    assert related(database, only=[moved]).memberships.superseded > 0
+    course = "course 1" if zone is None else f"{zone}/course 1"
+    assert members(database)[course] == [("1-1", 1), ("1-3", 2), ("1-4", 3)]
+    assert related(database).entry is None
+
+
+def test_a_stone_without_a_solid_has_a_course_and_touches_nothing(database):
+    take_in(database, wall(2, 2))
+    with database.session() as session:
+        entry = new_entry(session, "declaration", "seen on an old photograph")
+        session.add(Entity(code="lost", course=2, entry_id=entry.id))
+    related(database)
+    assert ("lost", 3) in members(database)["course 2"]
+    assert not [one for one in relations(database) if "lost" in one]
+    with database.session() as session:
+        lost = session.scalar(select(Entity.id).where(Entity.code == "lost"))
+        session.execute(update(Entity.__table__).where(Entity.id == lost).values(course=1))
+    related(database, only=[lost])
+    assert ("lost", 4) in members(database)["course 1"]
+    assert related(database).entry is None
+
+
 def test_an_arch_is_a_row_from_its_left_springer_to_its_right_one(database):
     take_in(database, [*wall(3, 2), *arch(9, at=(9.0, 0.0, 0.0))])
     related(database)
