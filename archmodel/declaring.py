@@ -1,28 +1,25 @@
-"""Declaring materials, phases, documents, structures with their members, and relations.
+"""Declaring materials, phases and documents; structures and relations are declared by ``archmodel.arranging``.
 
 What is declared again as it is changes nothing; what is declared otherwise supersedes what was held; what is left
 out (None) stays as it was.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-from sqlalchemy import insert, select
+from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from archmodel.bulk import batches
 from archmodel.entries import Entry
 from archmodel.finding import held_named, held_or_none
 from archmodel.knowledge import Document, Material, MaterialProperty, Phase
-from archmodel.recording import NOTHING, Outcome, end_rows, revise, supersede, table_of
-from archmodel.relations import INVERSE, RELATIONS, SYMMETRIC, Membership, Relation
-from archmodel.structures import Structure, structure_kind_named, structure_kind_of
+from archmodel.recording import Outcome, revise, supersede
+from archmodel.structures import Structure
 from archmodel.values import (
     checked_choice,
     checked_label,
     checked_number,
     checked_text,
-    checked_whole,
     checked_years,
 )
 from moma.errors import UsageError
@@ -33,11 +30,9 @@ __all__ = [
     "PropertyValue",
     "declare_document",
     "declare_material",
-    "declare_members",
+    "declare_named",
     "declare_phase",
     "declare_property",
-    "declare_relation",
-    "declare_structure",
 ]
 
 DOCUMENT_TYPES = ("document", "drawing", "photograph")
@@ -84,7 +79,7 @@ def declare_material(
 ) -> Outcome:
     """A stone or a mortar under one name, with its properties; properties that are not named stay as they are."""
     values = {"description": checked_text("description", description)}
-    outcome = _declare(session, entry, Material, {"name": checked_label("name", name)}, values)
+    outcome = declare_named(session, entry, Material, {"name": checked_label("name", name)}, values)
     for key, given in (properties or {}).items():
         outcome += declare_property(session, entry, name, key, given)
     return outcome
@@ -147,7 +142,7 @@ def declare_phase(
         ends = held.ends if ends is None else ends
     checked_years(begins, ends)
     values = {"begins": begins, "ends": ends, "description": checked_text("description", description)}
-    return _declare(session, entry, Phase, {"name": checked_label("name", name)}, values)
+    return declare_named(session, entry, Phase, {"name": checked_label("name", name)}, values)
 
 
 def declare_document(
@@ -169,83 +164,10 @@ def declare_document(
         "author": checked_text("author", author),
         "dated": checked_text("dated", dated),
     }
-    return _declare(session, entry, Document, {"code": checked_label("code", code)}, values)
+    return declare_named(session, entry, Document, {"code": checked_label("code", code)}, values)
 
 
-def declare_structure(
-    session: Session,
-    entry: Entry,
-    kind: str,
-    code: str,
-    *,
-    title: str | None = None,
-    parent: str | None = None,
-    number: int | None = None,
-    side: str | None = None,
-) -> Outcome:
-    """A part of the building, within another one perhaps; its members are declared by `declare_members`."""
-    cls = structure_kind_named(kind)
-    if side is not None:
-        checked_choice("side", side, ("outer", "inner"))
-    above = None if parent is None else held_named(session, Structure, parent)
-    _refuse_circle(code, above)
-    values = {
-        "kind": structure_kind_of(cls),
-        "title": checked_text("title", title),
-        "parent_id": None if above is None else above.id,
-        "number": checked_whole("number", number, 0),
-        "side": side,
-    }
-    return _declare(session, entry, Structure, {"code": checked_label("code", code)}, values, cls)
-
-
-def declare_members(
-    session: Session, entry: Entry, code: str, entities: Sequence[int], *, ordered: bool = False
-) -> Outcome:
-    """Entities, by their numbers, are members of a structure; those of which it was declared already stay.
-
-    Parameters
-    ----------
-    ordered : their ranks are their places in `entities`, from 1
-    """
-    structure = held_named(session, Structure, code)
-    outcome = NOTHING
-    for batch in batches(enumerate(entities, start=1)):
-        ranks = {number: rank if ordered else None for rank, number in batch}
-        outcome += _declare_members(session, entry, structure.id, ranks)
-    return outcome
-
-
-def declare_relation(
-    session: Session, entry: Entry, kind: str, of: Sequence[int], to: Sequence[int]
-) -> Outcome:
-    """Each of some entities, by their numbers, is in a relation to each of others.
-
-    A relation that was computed from the geometry stays beside the declared one.
-
-    Raises
-    ------
-    UsageError
-        for an unknown relation, or an entity in relation to itself
-    """
-    checked_choice("relation", kind, (*RELATIONS, "supports"))
-    both = set(of) & set(to)
-    if both:
-        raise UsageError(
-            f"{len(both)} stones would be in relation to themselves", remedy="leave them out of one"
-        )
-    pairs = [(one, other) for one in of for other in to]
-    if kind not in RELATIONS:
-        kind, pairs = INVERSE[kind], [(other, one) for one, other in pairs]
-    if kind in SYMMETRIC:
-        pairs = [(min(pair), max(pair)) for pair in pairs]
-    outcome = NOTHING
-    for batch in batches(dict.fromkeys(pairs)):
-        outcome += _declare_relations(session, entry, kind, batch)
-    return outcome
-
-
-def _declare(
+def declare_named(
     session: Session,
     entry: Entry,
     cls: type[Material] | type[Phase] | type[Document] | type[Structure],
@@ -272,63 +194,3 @@ def _unit(name: str, given: str | None) -> str:
     if usual is not None and given not in (None, usual):
         raise UsageError(f"{name} in {given}", remedy=f"give it in {usual}")
     return checked_label("unit", given or usual or "-")
-
-
-def _refuse_circle(code: str, above: Structure | None) -> None:
-    """A structure cannot be a part of itself, however many levels up."""
-    while above is not None:
-        if above.code == code:
-            raise UsageError(f"{code} would be a part of itself", remedy="give it another parent")
-        above = above.parent
-
-
-def _declare_members(
-    session: Session, entry: Entry, structure: int, ranks: Mapping[int, int | None]
-) -> Outcome:
-    table = table_of(Membership)
-    held = select(table).where(
-        table.c.structure_id == structure, table.c.entity_id.in_(ranks), table.c.superseded_id.is_(None)
-    )
-    same: set[int] = set()
-    other: dict[int, int] = {}
-    given = dict(ranks)
-    for row in session.execute(held).mappings():
-        number = row["entity_id"]
-        if ranks[number] is None:
-            given[number] = row["rank"]
-        if row["declared"] and row["rank"] == given[number]:
-            same.add(number)
-        else:
-            # what was computed, too, is declared from now on
-            other[number] = row["id"]
-    if other:
-        end_rows(session, entry, Membership, list(other.values()))
-    rows = [
-        {"entry_id": entry.id, "entity_id": number, "structure_id": structure, "rank": rank, "declared": True}
-        for number, rank in given.items()
-        if number not in same
-    ]
-    if rows:
-        session.execute(insert(table), rows)
-    return Outcome(new=len(rows) - len(other), replaced=len(other), unchanged=len(same))
-
-
-def _declare_relations(
-    session: Session, entry: Entry, kind: str, pairs: Sequence[tuple[int, int]]
-) -> Outcome:
-    table = table_of(Relation)
-    held = select(table.c.subject_id, table.c.object_id).where(
-        table.c.kind == kind,
-        table.c.declared,
-        table.c.superseded_id.is_(None),
-        table.c.subject_id.in_({subject for subject, _ in pairs}),
-    )
-    same = {(subject, target) for subject, target in session.execute(held)} & set(pairs)
-    rows = [
-        {"entry_id": entry.id, "kind": kind, "subject_id": subject, "object_id": target, "declared": True}
-        for subject, target in pairs
-        if (subject, target) not in same
-    ]
-    if rows:
-        session.execute(insert(table), rows)
-    return Outcome(new=len(rows), unchanged=len(same))

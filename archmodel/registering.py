@@ -8,12 +8,13 @@ from sqlalchemy.orm import Session
 from archmodel.attributes import ATTRIBUTES
 from archmodel.entities import OwnAttribute, kind_named, kind_of, kinds, own_attributes
 from archmodel.entries import Entry
-from archmodel.grammar import parse
+from archmodel.expressions import condition
+from archmodel.functions import FUNCTIONS, STRUCTURE_FUNCTIONS
 from archmodel.recording import Outcome
 from archmodel.registered import RegisteredKind, declare_registered
 from archmodel.tokens import KEYWORDS
 from archmodel.values import checked_label, checked_text
-from moma.errors import UsageError
+from moma.errors import QueryError, UsageError
 
 __all__ = ["register_kind"]
 
@@ -45,7 +46,7 @@ def register_kind(
     UsageError
         if the name is taken, the parent unknown, or an attribute is named like another one
     QueryError
-        if the canon is no expression
+        if the canon is no expression, or asks for what is not known
     """
     declare_registered(session)
     above = kind_named(parent)
@@ -67,11 +68,16 @@ def register_kind(
     if name in kinds():
         raise UsageError(f"there is a kind {name} already", remedy="give yours another name")
     _check_attributes(given, own_attributes(above))
-    if canon is not None:
-        parse(canon)
-    session.add(row)
-    session.flush()
-    declare_registered(session)
+    try:
+        with session.begin_nested():
+            session.add(row)
+            session.flush()
+            declare_registered(session)
+            if row.canon is not None:
+                condition(session, row.canon)
+    except QueryError:
+        declare_registered(session)
+        raise
     return Outcome(new=1)
 
 
@@ -79,14 +85,15 @@ def _check_attributes(
     given: Mapping[str, tuple[str | None, str]], inherited: Mapping[str, OwnAttribute]
 ) -> None:
     """An attribute has a name of its own, so that a query can ask for it."""
-    built_in = {one.name for cls in kinds().values() if cls.__users__ is None for one in cls.__own__}
+    built_in = [one.name for cls in kinds().values() if cls.__users__ is None for one in cls.__own__]
+    taken = {*ATTRIBUTES, *built_in, *inherited, *KEYWORDS, *FUNCTIONS, *STRUCTURE_FUNCTIONS}
     units = {one.name: one.unit for cls in kinds().values() for one in cls.__own__}
     for name, (unit, definition) in given.items():
         _checked_name("an attribute", name)
         checked_text(f"definition of {name}", definition)
         if unit is not None:
             checked_label(f"unit of {name}", unit)
-        if name in ATTRIBUTES or name in built_in or name in inherited or name in KEYWORDS:
+        if name in taken:
             remedy = "give it another name"
             raise UsageError(f"{name} means something in queries already", remedy=remedy)
         if name in units and units[name] != unit:

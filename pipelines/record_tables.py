@@ -7,16 +7,9 @@ from typing import Any
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
+from archmodel.arranging import declare_members, declare_relation, declare_structure
 from archmodel.correcting import correct
-from archmodel.declaring import (
-    PropertyValue,
-    declare_document,
-    declare_material,
-    declare_members,
-    declare_phase,
-    declare_relation,
-    declare_structure,
-)
+from archmodel.declaring import PropertyValue, declare_document, declare_material, declare_phase
 from archmodel.entries import Entry
 from archmodel.finding import held_or_none
 from archmodel.knowledge import (

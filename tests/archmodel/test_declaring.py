@@ -6,17 +6,9 @@ import pytest
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
+from archmodel.arranging import declare_members, declare_relation, declare_structure
 from archmodel.database import Database
-from archmodel.declaring import (
-    PROPERTIES,
-    PropertyValue,
-    declare_document,
-    declare_material,
-    declare_members,
-    declare_phase,
-    declare_relation,
-    declare_structure,
-)
+from archmodel.declaring import PROPERTIES, PropertyValue, declare_document, declare_material, declare_phase
 from archmodel.description import describe
 from archmodel.entries import Entry, held_at, new_entry
 from archmodel.finding import Subjects, held_named, subjects

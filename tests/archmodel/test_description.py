@@ -5,16 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from archmodel.arranging import declare_members, declare_relation, declare_structure
 from archmodel.database import Database
-from archmodel.declaring import (
-    PropertyValue,
-    declare_document,
-    declare_material,
-    declare_members,
-    declare_phase,
-    declare_relation,
-    declare_structure,
-)
+from archmodel.declaring import PropertyValue, declare_document, declare_material, declare_phase
 from archmodel.description import describe
 from archmodel.entries import new_entry
 from archmodel.finding import subjects

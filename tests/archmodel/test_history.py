@@ -12,16 +12,10 @@ from hypothesis import strategies as st
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
+from archmodel.arranging import declare_members, declare_relation, declare_structure
 from archmodel.correcting import correct
 from archmodel.database import Database, open_database
-from archmodel.declaring import (
-    PropertyValue,
-    declare_material,
-    declare_members,
-    declare_phase,
-    declare_relation,
-    declare_structure,
-)
+from archmodel.declaring import PropertyValue, declare_material, declare_phase
 from archmodel.entries import Entry, new_entry
 from archmodel.finding import held_named, subjects
 from archmodel.history import history, known_at

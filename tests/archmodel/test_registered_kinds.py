@@ -132,6 +132,8 @@ def test_what_cannot_be_registered_is_refused(empty: Database) -> None:
         ({"parent": "ashlra"}, "unknown kind 'ashlra'; did you mean ashlar"),
         ({"definition": "  "}, "definition '  ' has no visible character"),
         ({"canon": "depth >"}, "is not a value"),
+        ({"canon": "slit_widht < depth"}, "unknown attribute 'slit_widht'"),
+        ({"attributes": {"within": ("m", "x")}}, "within means something in queries already"),
         ({"attributes": {"depth": ("m", "x")}}, "depth means something in queries already"),
         ({"attributes": {"and": ("m", "x")}}, "and means something in queries already"),
         ({"attributes": {"tail_length": ("m", "x")}}, "tail_length means something in queries already"),

@@ -7,8 +7,9 @@ import pytest
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
+from archmodel.arranging import declare_structure
 from archmodel.database import Database
-from archmodel.declaring import declare_document, declare_material, declare_phase, declare_structure
+from archmodel.declaring import declare_document, declare_material, declare_phase
 from archmodel.entries import Entry, new_entry
 from archmodel.finding import Subjects, subjects
 from archmodel.knowledge import DepthEvidence, MadeOf, MasonMark, Note, Observation, Statement
