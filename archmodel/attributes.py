@@ -132,7 +132,11 @@ def _of_observations(what: Callable[[FromClause], ColumnElement[Any]]) -> Value:
 def _documents(scope: Scope, run: int | None) -> ColumnElement[int]:
     said = scope.context.alias(Statement)
     told = statements_of(
-        scope.context.alias, scope.entity, said, scope.context.said_of_structures(*DOCUMENTING)
+        scope.context.alias,
+        scope.entity,
+        said,
+        scope.context.said_of_structures(*DOCUMENTING),
+        *DOCUMENTING,
     )
     count = select(func.count(distinct(said.c.document_id))).where(told)
     return count.correlate(scope.entity).scalar_subquery()

@@ -61,7 +61,11 @@ def documented(scope: Scope, call: Call, ask: Ask) -> Condition:
     conditions: list[Condition] = [said.c.document_id.is_not(None)]
     conditions += [said.c.document_id == document_named(scope.context, code) for code in tokens(call, 0, 1)]
     told = statements_of(
-        scope.context.alias, scope.entity, said, scope.context.said_of_structures(*DOCUMENTING)
+        scope.context.alias,
+        scope.entity,
+        said,
+        scope.context.said_of_structures(*DOCUMENTING),
+        *DOCUMENTING,
     )
     return _any_row(scope, told, *conditions)
 
