@@ -121,8 +121,7 @@ def joint_rows(joints: JointArrays, entities: Ints, run: int, place: str) -> Ite
 
 def contact_rows(contacts: ContactArrays, entities: Ints, run: int, place: str) -> Iterator[dict[str, Any]]:
     """Rows of the `contact_point` table; as `joint_rows`."""
-    joint = np.asarray(contacts.joint).astype(object)
-    joint[contacts.joint < 0] = None
+    joint = np.ma.masked_less(contacts.joint, 0)
     columns: dict[str, NDArray[Any]] = {"number": np.arange(len(joint)), "joint": joint}
     columns |= _stones(contacts.stones, entities, ("candidate_id", "antagonist_id"), place)
     columns |= _vectors(contacts.point, ("x", "y", "z"), place)
@@ -133,7 +132,7 @@ def contact_rows(contacts: ContactArrays, entities: Ints, run: int, place: str) 
 
 
 def _rows(columns: Mapping[str, NDArray[Any]], run: int) -> Iterator[dict[str, Any]]:
-    """One mapping per row, made a chunk at a time; every column must be equally long."""
+    """One mapping per row, made a chunk at a time, None where it is masked; every column must be equally long."""
     names, count = ("run_id", *columns), len(next(iter(columns.values())))
     for start in range(0, count, _CHUNK):
         lists = [column[start : start + _CHUNK].tolist() for column in columns.values()]
@@ -165,12 +164,10 @@ def _all_finite(values: Array, name: str, place: str) -> Array:
 
 
 def _known(values: Array, name: str, place: str) -> NDArray[Any]:
-    """The values, None where there is nothing to say; infinity is no value."""
-    known = np.asarray(values, dtype=np.float64).astype(object)
+    """The values, masked where there is nothing to say; infinity is no value."""
     unknown = np.isnan(values)
-    _all_finite(np.where(unknown, 0.0, values), name, place)
-    known[unknown] = None
-    return known
+    known = _all_finite(np.where(unknown, 0.0, values), name, place)
+    return np.ma.masked_array(known, unknown)
 
 
 def _finite(value: float | None, name: str, place: str) -> float | None:
