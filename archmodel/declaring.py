@@ -106,7 +106,7 @@ def declare_property(
         "value": checked_number(name, given.value, unit, **bounds),
         "sigma": checked_number(f"sigma of {name}", given.sigma, unit, at_least=0.0),
         "unit": unit,
-        "source": checked_text("source", given.source) or entry.source,
+        "source": checked_text("source", given.source),
     }
     held = session.scalar(
         select(MaterialProperty).where(
@@ -115,14 +115,15 @@ def declare_property(
             MaterialProperty.superseded_id.is_(None),
         )
     )
+    if held is not None and all(one in (None, getattr(held, key)) for key, one in values.items()):
+        return Outcome(unchanged=1)
+    values["source"] = values["source"] or entry.source
     new = MaterialProperty(material_id=owner.id, name=checked_label("property", name), **values)
     if held is None:
         new.entry_id = entry.id
         session.add(new)
         session.flush()
         return Outcome(new=1)
-    if all(getattr(held, key) == value for key, value in values.items()):
-        return Outcome(unchanged=1)
     supersede(session, entry, held, new)
     return Outcome(replaced=1)
 

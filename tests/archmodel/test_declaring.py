@@ -48,6 +48,9 @@ def test_properties_are_replaced_one_by_one(empty: Database) -> None:
         given = {"density": PropertyValue(2300), "young": PropertyValue(9e9, sigma=1e9, source="cores")}
         assert declare_material(session, entry, "tuff", "soft", given) == Outcome(new=3)
         assert declare_material(session, entry, "tuff", None, given) == Outcome(unchanged=3)
+        # from another source, nothing else is said
+        elsewhere = new_entry(session, "declaration", "another test")
+        assert declare_material(session, elsewhere, "tuff", None, given) == Outcome(unchanged=3)
         later = entry_of(session)
         better = {"density": PropertyValue(2310, sigma=20), "grain": PropertyValue(0.004, unit="m")}
         assert declare_material(session, later, "tuff", None, better) == Outcome(1, 1, 1)
