@@ -67,7 +67,7 @@ def test_every_table_comes_back_as_it_was(seed: int, new_database: Callable[[], 
     assert export(other, tmp_path / "other.json") == first
 
 
-@settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(random=st.randoms(use_true_random=False), rows=st.integers(1, 3))
 def test_whatever_the_values_they_come_back(
     tmp_path_factory: pytest.TempPathFactory, random: Random, rows: int
@@ -86,6 +86,7 @@ def test_whatever_the_values_they_come_back(
 finite = st.floats(allow_nan=False, width=64)
 
 
+@settings(max_examples=50, deadline=None)
 @given(rows=st.lists(st.lists(st.one_of(finite, st.just(float("nan"))), min_size=3, max_size=3), max_size=4))
 def test_arrays_keep_every_bit(rows: list[list[float]]):
     value = value_of(Column("points", ArrayType(-1, 3)))

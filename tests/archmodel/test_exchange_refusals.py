@@ -167,6 +167,8 @@ def test_what_is_wrong_is_said_at_its_place(path: str, value: Any, said: str, wr
 def test_postgresql_refuses_the_same(postgresql: Server, written: str, tmp_path: Path):
     with postgresql.database() as url, open_database(url) as database:
         for path, value, said in WRONG:
+            if "there is no" not in said and "correct one" not in said:
+                continue  # refused before the database is asked
             document = edited(written, set_at(path, value))
             assert re.search(said, refused_by(database, document, tmp_path / "given.json")), path
 
@@ -427,9 +429,9 @@ def _clear(database: Database) -> None:
 
 
 def test_mutated_documents_are_refused_or_right(written: str, tmp_path: Path):
-    taken, refused = endure(written, 80, 1, tmp_path)
-    assert taken > 3
-    assert refused > 30
+    taken, refused = endure(written, 40, 1, tmp_path)
+    assert taken > 1
+    assert refused > 20
 
 
 @pytest.mark.slow

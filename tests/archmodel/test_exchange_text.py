@@ -5,7 +5,7 @@ import json
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from archmodel import exchange_text
@@ -29,6 +29,7 @@ class Dripping(io.RawIOBase):
         return self._raw.read(self._size)
 
 
+@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(values=st.lists(VALUES, min_size=1, max_size=5), size=st.integers(1, 7), escaped=st.booleans())
 def test_a_value_is_whole_however_few_bytes_come_at_a_time(values: list[Any], size: int, escaped: bool):
     raw = " , \n".join(json.dumps(value, ensure_ascii=escaped, indent=1) for value in values)
@@ -39,6 +40,7 @@ def test_a_value_is_whole_however_few_bytes_come_at_a_time(values: list[Any], si
     assert repr(found) == repr(json.loads(f"[{raw}]".encode("utf-8", "replace")))
 
 
+@settings(max_examples=50, deadline=None)
 @given(lines=st.lists(st.text("a é", max_size=20), max_size=5), size=st.integers(1, 5))
 def test_a_mistake_is_at_its_line_and_character(lines: list[str], size: int):
     strings = ",\n".join(json.dumps(line, ensure_ascii=False) for line in ["", *lines])
