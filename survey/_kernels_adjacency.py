@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numba import njit
 
-__all__ = ["GROUPS", "face_planes", "touching_faces"]
+__all__ = ["GROUPS", "face_planes", "thickness", "touching_faces"]
 
 GROUPS = 4
 """Directions in which one solid can touch another; more are counted with the nearest of these."""
@@ -176,10 +176,11 @@ def _boxes_apart(boxes, i, j, width):
 
 
 @njit(cache=True)
-def _thickness(solid, vertices, corners, face_starts, solid_starts, n):
+def thickness(one, solid, n):
     """Extent of a solid along n."""
+    vertices, corners, face_starts, solid_starts = solid
     low, high = math.inf, -math.inf
-    for c in range(face_starts[solid_starts[solid]], face_starts[solid_starts[solid + 1]]):
+    for c in range(face_starts[solid_starts[one]], face_starts[solid_starts[one + 1]]):
         along = 0.0
         for k in range(3):
             along += vertices[corners[c], k] * n[k]
@@ -218,64 +219,77 @@ def touching_faces(pairs, solid, planes, limits, out_pairs, out):
     limits : widest joint, deepest overlap [m], cosine of the largest angle, least share of the smaller face [-]
     out_pairs, out : at least `GROUPS` n rows
     """
-    vertices, corners, face_starts, solid_starts = solid
-    normals, areas, boxes, convex = planes
-    width, overlap, cosine, share = limits
+    face_starts, solid_starts = solid[2], solid[3]
+    normals, boxes, width, cosine = planes[0], planes[2], limits[0], limits[2]
     longest = 0
     for f in range(face_starts.shape[0] - 1):
         longest = max(longest, face_starts[f + 1] - face_starts[f])
-    buffers = np.empty((4, 2 * longest + 8, 2))
-    n, u, v, place = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    work = (np.empty((4, 2 * longest + 8, 2)), np.empty((4, 3)))
     row, total = np.empty(8), 0
     for pair in range(pairs.shape[0]):
+        one, two = pairs[pair]
         groups, count = out[total:], 0
         groups[:GROUPS] = 0.0
-        for i in range(solid_starts[pairs[pair, 0]], solid_starts[pairs[pair, 0] + 1]):
-            for j in range(solid_starts[pairs[pair, 1]], solid_starts[pairs[pair, 1] + 1]):
+        for i in range(solid_starts[one], solid_starts[one + 1]):
+            for j in range(solid_starts[two], solid_starts[two + 1]):
+                # most faces look elsewhere: that is found out without a call
                 facing = (
                     normals[i, 0] * normals[j, 0]
                     + normals[i, 1] * normals[j, 1]
                     + normals[i, 2] * normals[j, 2]
                 )
-                if facing > -cosine or areas[i] == 0.0 or _boxes_apart(boxes, i, j, width):
+                if facing > -cosine or _boxes_apart(boxes, i, j, width):
                     continue
-                size = 0.0
-                for k in range(3):
-                    n[k] = normals[j, k] - normals[i, k]
-                    size += n[k] ** 2
-                for k in range(3):
-                    n[k] /= math.sqrt(size)
-                _basis(n, u, v)
-                one = corners[face_starts[i] : face_starts[i + 1]]
-                two = corners[face_starts[j] : face_starts[j + 1]]
-                origin = vertices[one[0]]
-                ni = _flatten(vertices, one, origin, u, v, True, buffers[0])
-                nj = _flatten(vertices, two, origin, u, v, False, buffers[1])
-                area, mx, my = _shared(buffers[0], ni, buffers[1], nj, convex[i] and convex[j], buffers)
-                if area < share * min(areas[i], areas[j]) or area <= 0.0:
-                    continue
-                for k in range(3):
-                    place[k] = origin[k] + mx / area * u[k] + my / area * v[k]
-                high = _height(vertices, one, normals[i], n, place)
-                low = _height(vertices, two, normals[j], n, place)
-                if not -overlap <= high - low <= width:
-                    continue
-                thin = min(
-                    _thickness(pairs[pair, 0], vertices, corners, face_starts, solid_starts, n),
-                    _thickness(pairs[pair, 1], vertices, corners, face_starts, solid_starts, n),
-                )
-                if abs(high - low) > _OF_STONE * thin:
-                    continue
-                row[0], row[1] = area, high - low
-                for k in range(3):
-                    row[2 + k], row[5 + k] = place[k] + 0.5 * (high + low) * n[k], n[k]
-                count = _add(groups, count, row)
+                if _contact(i, j, one, two, facing, solid, planes, limits, work, row):
+                    count = _add(groups, count, row)
         for g in range(count):
-            for k in range(1, 5):
-                out[total + g, k] /= out[total + g, 0]
-            size = math.sqrt(out[total + g, 5] ** 2 + out[total + g, 6] ** 2 + out[total + g, 7] ** 2)
-            for k in range(5, 8):
-                out[total + g, k] /= size
-            out_pairs[total + g, 0], out_pairs[total + g, 1] = pairs[pair]
+            _finish(groups[g])
+            out_pairs[total + g, 0], out_pairs[total + g, 1] = one, two
         total += count
     return total
+
+
+@njit(cache=True)
+def _contact(i, j, one, two, facing, solid, planes, limits, work, row):
+    """Whether face i of one solid touches face j of another; area, gap, place and normal (8,) into `row`.
+
+    `facing` is the cosine of the angle between their normals, about -1.
+    """
+    vertices, corners, face_starts = solid[:3]
+    normals, areas, convex = planes[0], planes[1], planes[3]
+    width, overlap, share = limits[0], limits[1], limits[3]
+    buffers, (n, u, v, place) = work[0], (work[1][0], work[1][1], work[1][2], work[1][3])
+    size = math.sqrt(2.0 - 2.0 * facing)
+    for k in range(3):
+        n[k] = (normals[j, k] - normals[i, k]) / size
+    _basis(n, u, v)
+    first = corners[face_starts[i] : face_starts[i + 1]]
+    second = corners[face_starts[j] : face_starts[j + 1]]
+    origin = vertices[first[0]]
+    ni = _flatten(vertices, first, origin, u, v, True, buffers[0])
+    nj = _flatten(vertices, second, origin, u, v, False, buffers[1])
+    area, mx, my = _shared(buffers[0], ni, buffers[1], nj, convex[i] and convex[j], buffers)
+    if area <= 0.0 or area < share * min(areas[i], areas[j]):
+        return False
+    for k in range(3):
+        place[k] = origin[k] + mx / area * u[k] + my / area * v[k]
+    high = _height(vertices, first, normals[i], n, place)
+    low = _height(vertices, second, normals[j], n, place)
+    if not -overlap <= high - low <= width:
+        return False
+    if abs(high - low) > _OF_STONE * min(thickness(one, solid, n), thickness(two, solid, n)):
+        return False
+    row[0], row[1] = area, high - low
+    for k in range(3):
+        row[2 + k], row[5 + k] = place[k] + 0.5 * (high + low) * n[k], n[k]
+    return True
+
+
+@njit(cache=True)
+def _finish(group):
+    """From sums weighted by area to means."""
+    for k in range(1, 5):
+        group[k] /= group[0]
+    size = math.sqrt(group[5] ** 2 + group[6] ** 2 + group[7] ** 2)
+    for k in range(5, 8):
+        group[k] /= size

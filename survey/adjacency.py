@@ -12,11 +12,13 @@ area's centroid: area and centroid of what two polygons share say all.
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from survey._kernels_adjacency import GROUPS, face_planes, touching_faces
+from survey._kernels_between import hidden, thinnest_of
 from survey._kernels_boxes import count_near, list_near, morton_codes
 
 __all__ = ["Polyhedra", "PolyhedraBuilder", "Touching", "find_touching"]
@@ -126,8 +128,7 @@ def find_touching(
     Parameters
     ----------
     solids : closed, with planar faces of any number of corners, convex or not
-    width : of the widest open joint [m]; at most half the thickness of either stone. A slab that is thinner than
-        `width` does not hide two thicker stones from each other
+    width : of the widest open joint [m]; at most half the thickness of either stone, and no third stone in it
     angle : by which the two faces may be out of parallel [degrees]
     overlap : by which solids may lie in each other [m]
     share : least part of the smaller face that the other covers [-]; below, they meet at an edge but for noise
@@ -152,7 +153,20 @@ def find_touching(
         count = touching_faces(near, solid, planes, limits, found, values)
         pairs.append(found[:count].copy())
         rows.append(values[:count].copy())
-    return _touching(np.concatenate(pairs), np.concatenate(rows), origin)
+    return _touching(*_seen(np.concatenate(pairs), np.concatenate(rows), solid, planes, width), origin)
+
+
+def _seen(pairs: Indices, rows: Array, solid: Any, planes: Any, width: float) -> tuple[Indices, Array]:
+    """The contacts between which no third, thinner solid lies."""
+    thinnest = thinnest_of(solid, planes[0])
+    if not (rows[:, 1] >= thinnest.min()).any():
+        return pairs, rows
+    both = np.concatenate([pairs, pairs[:, ::-1]])
+    both = both[np.argsort(both[:, 0], kind="stable")]
+    starts = np.searchsorted(both[:, 0], np.arange(len(thinnest) + 1))
+    near = (starts, np.ascontiguousarray(both[:, 1]))
+    open_to_each_other = ~hidden(pairs, rows, near, solid, planes, thinnest, 0.5 * width)
+    return pairs[open_to_each_other], rows[open_to_each_other]
 
 
 def _touching(pairs: Indices, rows: Array, origin: Array) -> Touching:

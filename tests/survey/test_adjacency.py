@@ -202,6 +202,25 @@ def test_a_joint_is_so_wide_and_no_wider(gap, touches):
         assert contacts.gap == pytest.approx([gap])
 
 
+def test_a_thin_slab_hides_the_stones_between_which_it_lies():
+    # 25 mm of slate in a bed of 35 mm, whole or in two pieces with a joint of 10 mm between them
+    below, above = box((0, 0, -0.3), (1, 0.4, 0.0)), box((0, 0, 0.035), (1, 0.4, 0.4))
+    whole = box((0, 0, 0.005), (1, 0.4, 0.03))
+    assert found(find_touching(gathered([below, above]))).keys() == {(0, 1)}
+    assert found(find_touching(gathered([below, above, whole]))).keys() == {(0, 2), (1, 2)}
+    pieces = [box((0, 0, 0.005), (0.495, 0.4, 0.03)), box((0.505, 0, 0.005), (1, 0.4, 0.03))]
+    assert found(find_touching(gathered([below, above, *pieces]))).keys() == {
+        (0, 2),
+        (0, 3),
+        (1, 2),
+        (1, 3),
+        (2, 3),
+    }
+    # a slab that fills a tenth of the bed leaves the rest to the two
+    some = box((0, 0, 0.005), (0.1, 0.4, 0.03))
+    assert (0, 1) in found(find_touching(gathered([below, above, some])))
+
+
 @pytest.mark.parametrize(("degrees", "touches"), [(11.5, True), (12.5, False)])
 def test_faces_may_be_a_little_out_of_parallel(degrees, touches):
     # A prism whose lower side is tilted about its middle: the mean gap is that of the middle.
