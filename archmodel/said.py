@@ -9,6 +9,7 @@ from collections.abc import Callable
 from sqlalchemy import (
     CTE,
     ColumnElement,
+    CompoundSelect,
     FromClause,
     and_,
     func,
@@ -24,7 +25,15 @@ from archmodel.knowledge import Statement
 from archmodel.relations import Membership
 from archmodel.structures import Structure
 
-__all__ = ["Alias", "held", "observations_of", "said_of", "said_of_structures", "statements_of"]
+__all__ = [
+    "Alias",
+    "entities_told",
+    "held",
+    "observations_of",
+    "said_of",
+    "said_of_structures",
+    "statements_of",
+]
 
 MAX_LEVELS = 40
 """Deepest structure within structures; ends the search where structures contain one another in a circle."""
@@ -113,6 +122,37 @@ def statements_of(
     return said.c.id.in_(union_all(by_itself.correlate(entity), by_structure.correlate(entity)))
 
 
+def entities_told(
+    alias: Alias,
+    of_structures: CTE,
+    wanted: Callable[[FromClause], list[ColumnElement[bool]]],
+    *kinds: str,
+    own_type_first: bool = False,
+) -> CompoundSelect[int]:
+    """Numbers of all entities for which a statement holds: one search, however many entities there are.
+
+    Parameters
+    ----------
+    of_structures : `said_of_structures` of these kinds
+    wanted : what is asked of the statement
+    own_type_first : a statement about a structure gives way to one of the same type about the entity
+    """
+    said, inherited, member = alias(Statement), alias(Statement), alias(Membership)
+    by_themselves = select(said.c.entity_id).where(
+        said.c.entity_id > 0, said.c.kind.in_(kinds), held(said), *wanted(said)
+    )
+    by_structures = (
+        select(member.c.entity_id)
+        .select_from(of_structures)
+        .join(inherited, inherited.c.id == of_structures.c.statement_id)
+        .join(member, member.c.structure_id == of_structures.c.structure_id)
+        .where(held(member), *wanted(inherited))
+    )
+    if own_type_first:
+        by_structures = by_structures.where(not_(_of_same_type(alias, member.c.entity_id, inherited, member)))
+    return union_all(by_themselves, by_structures)
+
+
 def observations_of(
     alias: Alias, entity: FromClause, of_structures: CTE
 ) -> tuple[FromClause, ColumnElement[bool]]:
@@ -123,20 +163,21 @@ def observations_of(
     tuple
         an alias of the statements, and the condition on it, which speaks of the `entity` around it
     """
-    said, own = alias(Statement), alias(Statement)
-    same = (
-        select(own.c.id)
-        .where(
-            own.c.entity_id == entity.c.id,
-            own.c.kind == "observation",
-            own.c.type == said.c.type,
-            held(own),
-        )
-        .correlate(entity, said)
-        .exists()
-    )
+    said = alias(Statement)
+    same = _of_same_type(alias, entity.c.id, said, entity)
     seen = and_(
         statements_of(alias, entity, said, of_structures, "observation"),
         or_(said.c.entity_id.is_not(None), not_(same)),
     )
     return said, seen
+
+
+def _of_same_type(
+    alias: Alias, entity_id: ColumnElement[int], said: FromClause, around: FromClause
+) -> ColumnElement[bool]:
+    """Whether there is an observation about the entity itself that is of the type of `said`."""
+    own = alias(Statement)
+    same = select(own.c.id).where(
+        own.c.entity_id == entity_id, own.c.kind == "observation", own.c.type == said.c.type, held(own)
+    )
+    return same.correlate(around, said).exists()

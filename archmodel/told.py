@@ -1,13 +1,13 @@
 """Functions of query expressions that ask what is said of a stone, and whether it is as its kind should be."""
 
-from sqlalchemy import case, exists, null
+from sqlalchemy import FromClause, case, exists, null
 
 from archmodel.attributes import DOCUMENTING, attributes_of, kinds_of
 from archmodel.entities import canon_of, kind_named, kinds
 from archmodel.grammar import Call, parse
 from archmodel.knowledge import OBSERVATIONS, Correction, Statement
 from archmodel.lookups import document_named, mark_named, meant
-from archmodel.said import held, observations_of, statements_of
+from archmodel.said import entities_told, held
 from archmodel.scope import Scope
 from archmodel.tokens import Token, complaint
 from archmodel.usages import Ask, Condition, tokens
@@ -33,19 +33,22 @@ def has_mark(scope: Scope, call: Call, ask: Ask) -> Condition:
 def observed(scope: Scope, call: Call, ask: Ask) -> Condition:
     """Observations of the stone, and of its structures if it has none of their type."""
     values = tokens(call, 0, 1, 2)
-    said, seen = observations_of(
-        scope.context.alias, scope.entity, scope.context.said_of_structures("observation")
-    )
-    conditions = [seen]
+    wanted = {}
     if values:
-        type_ = values[0].text.lower()
+        wanted["type"] = type_ = values[0].text.lower()
         if type_ not in OBSERVATIONS:
             remedy = meant(type_, OBSERVATIONS, "the types")
             raise complaint(values[0], f"unknown type of observation {values[0].text[:40]!r}", remedy)
-        conditions.append(said.c.type == type_)
-    if len(values) == 2:
-        conditions.append(said.c.severity >= _severity(values[1]))
-    return _any_row(scope, *conditions)
+    least = _severity(values[1]) if len(values) == 2 else None
+
+    def conditions(said: FromClause) -> list[Condition]:
+        of_type = [said.c[name] == value for name, value in wanted.items()]
+        return of_type if least is None else [*of_type, said.c.severity >= least]
+
+    context = scope.context
+    of_structures = context.said_of_structures("observation")
+    told = entities_told(context.alias, of_structures, conditions, "observation", own_type_first=True)
+    return scope.entity.c.id.in_(told)
 
 
 def _severity(token: Token) -> int:
@@ -57,17 +60,14 @@ def _severity(token: Token) -> int:
 
 def documented(scope: Scope, call: Call, ask: Ask) -> Condition:
     """Documents that any statement about the stone, or its structures, names."""
-    said = scope.context.alias(Statement)
-    conditions: list[Condition] = [said.c.document_id.is_not(None)]
-    conditions += [said.c.document_id == document_named(scope.context, code) for code in tokens(call, 0, 1)]
-    told = statements_of(
-        scope.context.alias,
-        scope.entity,
-        said,
-        scope.context.said_of_structures(*DOCUMENTING),
-        *DOCUMENTING,
-    )
-    return _any_row(scope, told, *conditions)
+    numbers = [document_named(scope.context, code) for code in tokens(call, 0, 1)]
+
+    def conditions(said: FromClause) -> list[Condition]:
+        return [said.c.document_id > 0, *(said.c.document_id == number for number in numbers)]
+
+    context = scope.context
+    of_structures = context.said_of_structures(*DOCUMENTING)
+    return scope.entity.c.id.in_(entities_told(context.alias, of_structures, conditions, *DOCUMENTING))
 
 
 def corrected(scope: Scope, call: Call, ask: Ask) -> Condition:
