@@ -262,7 +262,7 @@ def random_actions(count: int) -> list[Action]:
 
 
 def test_so_it_is_on_every_database(empty: Database) -> None:
-    play(empty, random_actions(60))
+    play(empty, random_actions(30))
 
 
 def test_a_history_tells_who_said_what_and_what_it_replaced(empty: Database) -> None:

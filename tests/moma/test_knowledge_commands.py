@@ -146,3 +146,10 @@ def test_wrong_use_ends_in_one_line(arguments: tuple[str, ...], message: str) ->
     done = invoke(*arguments)
     assert done.exit_code == 2
     assert message in done.stderr
+
+
+@pytest.mark.parametrize("command", ["record", "show"])
+def test_the_commands_explain_themselves(command: str) -> None:
+    done = invoke(command, "--help")
+    assert done.exit_code == 0
+    assert "--db" in done.stdout
