@@ -4,16 +4,33 @@ import gzip
 import json
 import struct
 from collections.abc import Callable
+from datetime import UTC
+from math import isfinite
 from pathlib import Path
 from random import Random
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from sqlalchemy import Column, Double, Interval, MetaData, Table, func, select, update
+from sqlalchemy import (
+    JSON,
+    Boolean,
+    Column,
+    Date,
+    Double,
+    Integer,
+    Interval,
+    MetaData,
+    String,
+    Table,
+    func,
+    select,
+    update,
+)
 
-from archmodel.base import ArrayType
+from archmodel.base import ArrayType, UtcDateTime
 from archmodel.database import Database, open_database
 from archmodel.entities import Entity, Header, kinds
 from archmodel.entries import Entry, new_entry
@@ -23,7 +40,7 @@ from archmodel.exchange_values import value_of
 from archmodel.knowledge import MadeOf, Material
 from archmodel.structures import Building, Tower
 from moma.errors import ExchangeError
-from tests.archmodel.buildings import everything, fill, tables
+from tests.archmodel.buildings import everything, exact, fill, tables
 from tests.postgresql import Server
 
 
@@ -68,14 +85,12 @@ def test_every_table_comes_back_as_it_was(seed: int, new_database: Callable[[], 
 
 
 @settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-@given(random=st.randoms(use_true_random=False), rows=st.integers(1, 3))
-def test_whatever_the_values_they_come_back(
-    tmp_path_factory: pytest.TempPathFactory, random: Random, rows: int
-):
+@given(seed=st.integers(0, 2**64), rows=st.integers(1, 3))
+def test_whatever_the_values_they_come_back(tmp_path_factory: pytest.TempPathFactory, seed: int, rows: int):
     path = tmp_path_factory.mktemp("exchange") / "building.json"
     with open_database("sqlite://") as one, open_database("sqlite://") as other:
         with one.session() as session:
-            fill(session, random, rows)
+            fill(session, Random(seed), rows)
         first = export(one, path)
         json.loads(first, parse_constant=pytest.fail)
         import_building(path, other)
@@ -94,6 +109,26 @@ def test_arrays_keep_every_bit(rows: list[list[float]]):
     again = value.decode(json.loads(json.dumps(value.encode(array), allow_nan=False)))
     assert (again.shape, again.dtype) == (array.shape, array.dtype)
     assert again.tobytes() == array.tobytes()
+
+
+SCALARS: tuple[tuple[Any, st.SearchStrategy[Any]], ...] = (
+    (Double(), finite),
+    (Integer(), st.integers(-(2**63), 2**63 - 1)),
+    (Boolean(), st.booleans()),
+    (String(), st.text()),
+    (Date(), st.dates()),
+    (UtcDateTime(), st.datetimes(timezones=st.just(UTC))),
+    (JSON(), st.recursive(st.none() | st.integers() | finite.filter(isfinite) | st.text(), st.lists)),
+)
+
+
+@settings(max_examples=100, deadline=None)
+@given(case=st.sampled_from(SCALARS).flatmap(lambda one: st.tuples(st.just(one[0]), one[1])))
+def test_single_values_keep_type_and_bits(case: tuple[Any, Any]):
+    kind, value = case
+    form = value_of(Column("c", kind))
+    said = json.dumps(form.encode(value), allow_nan=False, ensure_ascii=False)
+    assert exact(form.decode(json.loads(said))) == exact(value)
 
 
 def test_from_sqlite_to_postgresql_and_back(postgresql: Server, tmp_path: Path):
