@@ -1,28 +1,35 @@
 """What can be asked of every entity, and where in the tables it is found."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import ColumnElement, FromClause, distinct, func, select
+from sqlalchemy import ColumnElement, func
 from sqlalchemy.orm import Session
 
+from archmodel.columns import (
+    Value,
+    count,
+    documents,
+    of_entity,
+    of_marks,
+    of_material,
+    of_measurement,
+    of_observations,
+    of_relations,
+    of_result,
+    of_values,
+    rows,
+    structures,
+)
 from archmodel.entities import Entity, OwnAttribute, kinds, own_attributes
-from archmodel.knowledge import Correction, Statement
-from archmodel.relations import Membership, Relation
+from archmodel.knowledge import Correction
 from archmodel.run_records import STONE_VALUES
 from archmodel.runs import FIDELITIES, EntityResult
-from archmodel.said import held, observations_of, statements_of
 from archmodel.scope import Scope
-from archmodel.structures import Structure
 from archmodel.surveys import Measurement
 
-__all__ = ["ATTRIBUTES", "DOCUMENTING", "Attribute", "attributes_of", "kinds_of", "own_attributes_of"]
-
-Value = Callable[[Scope, int | None], ColumnElement[Any]]
-
-DOCUMENTING = ("made_of", "of_phase", "mason_mark", "observation", "depth", "reference", "note")
-"""Kinds of statements that can name a document: all."""
+__all__ = ["ATTRIBUTES", "Attribute", "attributes_of", "kinds_of", "own_attributes_of"]
 
 
 @dataclass(frozen=True)
@@ -52,106 +59,6 @@ class Attribute:
         return self.unit is not None
 
 
-def _of_entity(name: str) -> Value:
-    return lambda scope, run: scope.entity.c[name]
-
-
-def _of_measurement(name: str) -> Value:
-    return lambda scope, run: scope.measurement().c[name]
-
-
-def _of_result(name: str) -> Value:
-    return lambda scope, run: scope.result(run).c[name]
-
-
-def _of_values(name: str) -> Value:
-    return lambda scope, run: scope.result(run).c["values"][name].as_float()
-
-
-def _of_material(name: str) -> Value:
-    return lambda scope, run: scope.material_property(name).c.value
-
-
-def _rows(table: type[Any], column: str, *, now: bool = True) -> Value:
-    """How many rows of a table name the entity in this column."""
-
-    def value(scope: Scope, run: int | None) -> ColumnElement[int]:
-        rows = scope.context.alias(table)
-        count = select(func.count()).select_from(rows).where(rows.c[column] == scope.entity.c.id)
-        return (count.where(held(rows)) if now else count).correlate(scope.entity).scalar_subquery()
-
-    return value
-
-
-def _of_relations(what: Callable[[FromClause], ColumnElement[Any]], *sides: str, kind: str) -> Value:
-    """Something of all relations of a kind in which the entity stands on one of the sides."""
-
-    def value(scope: Scope, run: int | None) -> ColumnElement[Any]:
-        parts: list[ColumnElement[Any]] = []
-        for side in sides:
-            rows = scope.context.alias(Relation)
-            chosen = select(what(rows)).where(
-                rows.c[side] == scope.entity.c.id, rows.c.kind == kind, held(rows)
-            )
-            parts.append(chosen.correlate(scope.entity).scalar_subquery())
-        total = parts[0]
-        for part in parts[1:]:
-            total = total + part
-        return total
-
-    return value
-
-
-def _count(rows: FromClause) -> ColumnElement[int]:
-    return func.count(rows.c.id)
-
-
-def _of_marks(what: Callable[[FromClause], ColumnElement[Any]]) -> Value:
-    """Something of the mason marks that the entity itself bears."""
-
-    def value(scope: Scope, run: int | None) -> ColumnElement[Any]:
-        said = scope.context.alias(Statement)
-        marks = select(what(said)).where(
-            said.c.entity_id == scope.entity.c.id, said.c.kind == "mason_mark", held(said)
-        )
-        return marks.correlate(scope.entity).scalar_subquery()
-
-    return value
-
-
-def _of_observations(what: Callable[[FromClause], ColumnElement[Any]]) -> Value:
-    def value(scope: Scope, run: int | None) -> ColumnElement[Any]:
-        said, seen = observations_of(
-            scope.context.alias, scope.entity, scope.context.said_of_structures("observation")
-        )
-        return select(what(said)).where(seen).correlate(scope.entity).scalar_subquery()
-
-    return value
-
-
-def _documents(scope: Scope, run: int | None) -> ColumnElement[int]:
-    said = scope.context.alias(Statement)
-    told = statements_of(
-        scope.context.alias,
-        scope.entity,
-        said,
-        scope.context.said_of_structures(*DOCUMENTING),
-        *DOCUMENTING,
-    )
-    count = select(func.count(distinct(said.c.document_id))).where(told)
-    return count.correlate(scope.entity).scalar_subquery()
-
-
-def _structures(scope: Scope, run: int | None) -> ColumnElement[int]:
-    rows, structure = scope.context.alias(Membership), scope.context.alias(Structure)
-    count = (
-        select(func.count())
-        .select_from(rows.join(structure, structure.c.id == rows.c.structure_id))
-        .where(rows.c.entity_id == scope.entity.c.id, held(rows), held(structure))
-    )
-    return count.correlate(scope.entity).scalar_subquery()
-
-
 def _result(
     name: str, unit: str | None, definition: str, value: Value, words: tuple[str, ...] | None = None
 ) -> Attribute:
@@ -159,38 +66,38 @@ def _result(
 
 
 _BUILT = (
-    Attribute("code", None, "name of the stone in the survey", _of_entity("code")),
-    Attribute("kind", None, "its own kind, e.g. keystone", _of_entity("kind")),
-    Attribute("course", "-", "number of its course, from the ground", _of_entity("course")),
-    Attribute("zone", None, "part of the building", _of_entity("zone")),
-    Attribute("depth", "m", "how far it reaches into the wall", _of_entity("depth")),
-    Attribute("depth_sigma", "m", "standard deviation of the depth", _of_entity("depth_sigma")),
+    Attribute("code", None, "name of the stone in the survey", of_entity("code")),
+    Attribute("kind", None, "its own kind, e.g. keystone", of_entity("kind")),
+    Attribute("course", "-", "number of its course, from the ground", of_entity("course")),
+    Attribute("zone", None, "part of the building", of_entity("zone")),
+    Attribute("depth", "m", "how far it reaches into the wall", of_entity("depth")),
+    Attribute("depth_sigma", "m", "standard deviation of the depth", of_entity("depth_sigma")),
     Attribute(
-        "depth_origin", None, "evidence: stone, rule, kind, structure or solid", _of_entity("depth_origin")
+        "depth_origin", None, "evidence: stone, rule, kind, structure or solid", of_entity("depth_origin")
     ),
-    Attribute("depth_source", None, "that evidence in words", _of_entity("depth_source")),
-    Attribute("length", "m", "horizontal extent of its face", _of_entity("length")),
-    Attribute("height", "m", "extent of its face upwards", _of_entity("height")),
-    Attribute("area", "m²", "area of its face", _of_entity("area")),
-    Attribute("volume", "m³", "volume of its solid", _of_entity("volume")),
-    Attribute("x", "m", "centroid of its solid", _of_entity("x")),
-    Attribute("y", "m", "centroid of its solid", _of_entity("y")),
-    Attribute("z", "m", "centroid of its solid", _of_entity("z")),
+    Attribute("depth_source", None, "that evidence in words", of_entity("depth_source")),
+    Attribute("length", "m", "horizontal extent of its face", of_entity("length")),
+    Attribute("height", "m", "extent of its face upwards", of_entity("height")),
+    Attribute("area", "m²", "area of its face", of_entity("area")),
+    Attribute("volume", "m³", "volume of its solid", of_entity("volume")),
+    Attribute("x", "m", "centroid of its solid", of_entity("x")),
+    Attribute("y", "m", "centroid of its solid", of_entity("y")),
+    Attribute("z", "m", "centroid of its solid", of_entity("z")),
 )
 
 _MEASURED = (
     Attribute(
-        "rms", "m", "root mean square distance of its points from the fitted plane", _of_measurement("rms")
+        "rms", "m", "root mean square distance of its points from the fitted plane", of_measurement("rms")
     ),
-    Attribute("redundancy", "-", "accepted points minus 3", _of_measurement("redundancy")),
-    Attribute("points", "-", "measured points on its face", _of_measurement("point_count")),
-    Attribute("rejected", "-", "points left out as blunders", _of_measurement("rejected_count")),
+    Attribute("redundancy", "-", "accepted points minus 3", of_measurement("redundancy")),
+    Attribute("points", "-", "measured points on its face", of_measurement("point_count")),
+    Attribute("rejected", "-", "points left out as blunders", of_measurement("rejected_count")),
     Attribute(
-        "shape", None, "of its face: plane, bevelled, curved, rough, untested", _of_measurement("shape")
+        "shape", None, "of its face: plane, bevelled, curved, rough, untested", of_measurement("shape")
     ),
-    Attribute("provenance", None, "of its face: points, photograph or solid", _of_measurement("provenance")),
-    Attribute("station", None, "where the instrument stood", _of_measurement("station")),
-    Attribute("photograph", None, "on which its face was drawn", _of_measurement("photograph")),
+    Attribute("provenance", None, "of its face: points, photograph or solid", of_measurement("provenance")),
+    Attribute("station", None, "where the instrument stood", of_measurement("station")),
+    Attribute("photograph", None, "on which its face was drawn", of_measurement("photograph")),
     Attribute(
         "survey", None, "name of the survey that measured it", lambda scope, run: scope.survey().c.name
     ),
@@ -198,7 +105,7 @@ _MEASURED = (
         "measurements",
         "-",
         "how often it was measured, or its solid made anew",
-        _rows(Measurement, "entity_id", now=False),
+        rows(Measurement, "entity_id", now=False),
     ),
 )
 
@@ -212,53 +119,51 @@ _KNOWN = (
     ),
     Attribute("phase_ends", "year", "of that phase, at the latest", lambda scope, run: scope.phase().c.ends),
     Attribute("material", None, "name of its material", lambda scope, run: scope.material().c.name),
-    Attribute("density", "kg/m³", "of its material", _of_material("density")),
-    Attribute("tensile_strength", "Pa", "of its material", _of_material("tensile_strength")),
-    Attribute("compressive_strength", "Pa", "of its material", _of_material("compressive_strength")),
-    Attribute("marks", "-", "mason marks on it", _of_marks(_count)),
+    Attribute("density", "kg/m³", "of its material", of_material("density")),
+    Attribute("tensile_strength", "Pa", "of its material", of_material("tensile_strength")),
+    Attribute("compressive_strength", "Pa", "of its material", of_material("compressive_strength")),
+    Attribute("marks", "-", "mason marks on it", of_marks(count)),
     Attribute(
         "mark",
         None,
         "name of its mason mark; of several, the first by the alphabet",
-        _of_marks(lambda said: func.min(said.c.sign)),
+        of_marks(lambda said: func.min(said.c.sign)),
     ),
-    Attribute("observations", "-", "observations of damage and change", _of_observations(_count)),
+    Attribute("observations", "-", "observations of damage and change", of_observations(count)),
     Attribute(
         "severity",
         "-",
         "largest severity observed, from 0 (traces) to 4 (lost, or about to be)",
-        _of_observations(lambda said: func.max(said.c.severity)),
+        of_observations(lambda said: func.max(said.c.severity)),
     ),
-    Attribute("documents", "-", "documents, drawings and photographs that treat it", _documents),
+    Attribute("documents", "-", "documents, drawings and photographs that treat it", documents),
     Attribute(
-        "corrections", "-", "attributes of it that were corrected", _rows(Correction, "entity_id", now=False)
+        "corrections", "-", "attributes of it that were corrected", rows(Correction, "entity_id", now=False)
     ),
-    Attribute("structures", "-", "structures that it is a member of", _structures),
+    Attribute("structures", "-", "structures that it is a member of", structures),
 )
 
 _RELATED = (
+    Attribute("bearers", "-", "stones that it rests on", of_relations(count, "subject_id", kind="rests_on")),
+    Attribute("borne", "-", "stones that rest on it", of_relations(count, "object_id", kind="rests_on")),
     Attribute(
-        "bearers", "-", "stones that it rests on", _of_relations(_count, "subject_id", kind="rests_on")
-    ),
-    Attribute("borne", "-", "stones that rest on it", _of_relations(_count, "object_id", kind="rests_on")),
-    Attribute(
-        "neighbours", "-", "stones beside it", _of_relations(_count, "subject_id", "object_id", kind="beside")
+        "neighbours", "-", "stones beside it", of_relations(count, "subject_id", "object_id", kind="beside")
     ),
     Attribute(
         "bearing_area",
         "m²",
         "area on which it rests",
-        _of_relations(lambda rows: func.sum(rows.c.area), "subject_id", kind="rests_on"),
+        of_relations(lambda rows: func.sum(rows.c.area), "subject_id", kind="rests_on"),
     ),
 )
 
 _COMPUTED = (
-    _result("von_mises_max", "Pa", "largest Von Mises stress", _of_result("von_mises_max")),
-    _result("von_mises_mean", "Pa", "mean Von Mises stress", _of_result("von_mises_mean")),
-    _result("displacement_max", "m", "largest displacement", _of_result("displacement_max")),
-    _result("contact_force_max", "N", "largest contact force", _of_result("contact_force_max")),
-    *(_result(name, unit, meaning, _of_values(name)) for name, (unit, meaning) in STONE_VALUES.items()),
-    _result("fidelity", None, "fixed, rigid or deformable", _of_result("fidelity"), FIDELITIES),
+    _result("von_mises_max", "Pa", "largest Von Mises stress", of_result("von_mises_max")),
+    _result("von_mises_mean", "Pa", "mean Von Mises stress", of_result("von_mises_mean")),
+    _result("displacement_max", "m", "largest displacement", of_result("displacement_max")),
+    _result("contact_force_max", "N", "largest contact force", of_result("contact_force_max")),
+    *(_result(name, unit, meaning, of_values(name)) for name, (unit, meaning) in STONE_VALUES.items()),
+    _result("fidelity", None, "fixed, rigid or deformable", of_result("fidelity"), FIDELITIES),
     _result(
         "simplified_by",
         "m",
@@ -267,8 +172,8 @@ _COMPUTED = (
     ),
     _result("outcome", None, "equilibrium, moving or collapsed", lambda scope, run: scope.run(run).c.outcome),
     _result("scene", None, "name of the scene", lambda scope, run: scope.run(run).c.scene),
-    Attribute("run", "-", "number of the run that these are of", _of_result("run_id")),
-    Attribute("runs", "-", "runs that hold it", _rows(EntityResult, "entity_id", now=False)),
+    Attribute("run", "-", "number of the run that these are of", of_result("run_id")),
+    Attribute("runs", "-", "runs that hold it", rows(EntityResult, "entity_id", now=False)),
 )
 
 ATTRIBUTES: Mapping[str, Attribute] = {

@@ -2,7 +2,8 @@
 
 from sqlalchemy import FromClause, case, exists, null
 
-from archmodel.attributes import DOCUMENTING, attributes_of, kinds_of
+from archmodel.attributes import attributes_of, kinds_of
+from archmodel.columns import DOCUMENTING
 from archmodel.entities import canon_of, kind_named, kinds
 from archmodel.grammar import Call, parse
 from archmodel.knowledge import OBSERVATIONS, Correction, Statement

@@ -10,6 +10,15 @@ from moma.errors import UsageError
 
 __all__ = ["query", "schema", "show"]
 
+RunNumber = Annotated[
+    int | None,
+    typer.Option("--run", metavar="N", help="Run whose results are meant; else each stone's latest."),
+]
+Columns = Annotated[
+    str | None,
+    typer.Option("--columns", metavar="NAMES", help="Attributes to show, e.g. code,phase,von_mises_max@12."),
+]
+
 
 @reporting
 def query(
@@ -20,16 +29,8 @@ def query(
         list[str] | None,
         typer.Option("--where", metavar="EXPR", help="Condition, e.g. 'depth > 0.4'; all given ones hold."),
     ] = None,
-    run: Annotated[
-        int | None,
-        typer.Option("--run", metavar="N", help="Run whose results are meant; else each stone's latest."),
-    ] = None,
-    columns: Annotated[
-        str | None,
-        typer.Option(
-            "--columns", metavar="NAMES", help="Attributes to show, e.g. code,phase,von_mises_max@12."
-        ),
-    ] = None,
+    run: RunNumber = None,
+    columns: Columns = None,
     format: Annotated[ListFormat | None, typer.Option(help="Format of the list; else table.")] = None,
     flat: Annotated[
         bool, typer.Option("--flat", help="GeoJSON in the plane of the wall: along it, and upwards.")
