@@ -26,7 +26,7 @@ MAX_RUNS = 12
 
 S = TypeVar("S", bound=Select[Any])
 
-_ALIASES: dict[type[Base], list[FromClause]] = {}
+_ALIASES: dict[tuple[type[Base], int], list[FromClause]] = {}
 
 
 @dataclass
@@ -52,7 +52,8 @@ class Context:
 
         Queries share their aliases with later ones, since to make one takes longer than most queries do.
         """
-        pool = _ALIASES.setdefault(cls, [])
+        # A kind that was declared since then may have brought columns of its own.
+        pool = _ALIASES.setdefault((cls, len(cls.__table__.c)), [])
         number = self._aliases[cls]
         self._aliases[cls] += 1
         if number == len(pool):

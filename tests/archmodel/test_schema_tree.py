@@ -1,6 +1,8 @@
 """The schema as a tree, held against the classes themselves."""
 
 import json
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -161,3 +163,37 @@ def test_proportions_that_cannot_be_understood_are_named(empty: Database, canon:
         declare_registered(session)
         with pytest.raises(QueryError, match=message):
             find(session, "entity", "canonical()")
+
+
+def test_a_kind_with_a_column_of_its_own_is_asked_for_like_any_other() -> None:
+    # In a process of its own, since a kind cannot be taken back.
+    program = '''
+from sqlalchemy.orm import Mapped
+from archmodel.database import open_database
+from archmodel.entities import Ashlar, OwnAttribute
+from archmodel.query import find
+from archmodel.store import store_survey
+from tests.archmodel.stones import SHA, box_stone
+
+question = "not rests_on(depth > 9) and is_a(header)"
+with open_database("sqlite://") as database, database.session() as session:
+    assert find(session, "entity", question) == []
+
+class Merlon(Ashlar):
+    """A stone of a parapet between two openings."""
+
+    __own__ = (OwnAttribute("top_width", "m", "of its upper face"),)
+    __canon__ = "top_width < length"
+
+    top_width: Mapped[float | None]
+
+with open_database("sqlite://") as database, database.session() as session:
+    store_survey(session, "parapet", "p", SHA, [box_stone("M1", "merlon"), box_stone("M2", "merlon")])
+    merlon, other = find(session, "merlon")
+    merlon.top_width = 0.2
+    session.flush()
+    for text in ("top_width > 0.1", "canonical()", "kind = merlon and not top_width is null"):
+        assert find(session, "entity", text) == [merlon]
+        assert find(session, "entity", f"not supports({text}) and code = M1") == [merlon]
+'''
+    subprocess.run([sys.executable, "-W", "error", "-c", program], check=True)
