@@ -115,7 +115,7 @@ def _read_tables(session: Session, text: JsonText, name: str) -> dict[str, int]:
 
 def _read_section(session: Session, section: Section, text: JsonText, name: str, kinds: set[str]) -> int:
     reader = RowReader(section, name, kinds)
-    store = SectionStore(session, section)
+    store = SectionStore(session, section, name)
     text.take("[")
     count = 0
     if text.peek() != "]":

@@ -29,10 +29,11 @@ class SectionStore:
     ----------
     session : a writing session
     section : the section
+    document : its name, for errors
     """
 
-    def __init__(self, session: Session, section: Section) -> None:
-        self._session, self._section = session, section
+    def __init__(self, session: Session, section: Section, document: str) -> None:
+        self._session, self._section, self._document = session, section, document
         self._waiting: list[Row] = []
         self._weight = 0
         self._later: list[Row] = []
@@ -59,6 +60,25 @@ class SectionStore:
         for start in range(0, len(self._later), BATCH):
             self._refer(self._later[start : start + BATCH])
         self._later = []
+        for field in self._section.fields:
+            if field.within:
+                self._refuse_rings(field.column)
+
+    def _refuse_rings(self, column: Column[Any]) -> None:
+        """Nothing is a part or a successor of itself, be it by way of others."""
+        key = self._section.table.c[self._section.key[0]]
+        pairs = self._session.execute(select(key, column).where(column.is_not(None)))
+        target: dict[Any, Any] = {number: other for number, other in pairs}  # noqa: C416
+        while target:
+            start, at = target.popitem()
+            chain = [start]
+            while at != start and at in target:
+                chain.append(at)
+                at = target.pop(at)
+            if at in chain:
+                ring = " → ".join(str(one) for one in [*chain[chain.index(at) :], at][:10])
+                what = f"{self._section.name} {at} refers to itself by {column.name}: {ring}"
+                raise ExchangeError(what, where=f"{self._document} $.tables.{self._section.name}")
 
     def _store(self) -> None:
         rows, self._waiting, self._weight = self._waiting, [], 0

@@ -125,11 +125,12 @@ def _registered(number: int, random: Random) -> Values:
 
 
 def _refer_within(session: Session, table: Table, made: list[Values], random: Random) -> None:
-    """References within the table, to rows before and behind."""
+    """References within the table, all to rows behind or all to rows before, so that none goes round in a ring."""
     for column in table.columns:
         if any(key.column.table is table for key in column.foreign_keys):
-            for row in made[::2]:
-                target = {column.name: random.choice(made)["id"]}
+            rows = made if random.random() < 0.5 else made[::-1]
+            for place, row in enumerate(rows[1:], 1):
+                target = {column.name: random.choice(rows[:place])["id"]}
                 session.execute(update(table).where(table.c.id == row["id"]).values(target))
 
 

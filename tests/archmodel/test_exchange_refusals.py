@@ -179,6 +179,21 @@ def test_the_line_is_that_of_the_row(written: str, refused: Refused):
     assert refused(document).startswith(f"given:{line} $.tables.measurement[2].rms: is 'large'")
 
 
+@pytest.mark.parametrize("ring", [(0,), (0, 1), (2, 0, 1)])
+def test_a_structure_that_is_a_part_of_itself_is_refused(
+    ring: tuple[int, ...], written: str, refused: Refused
+):
+    def close(document: Any) -> None:
+        rows = document["tables"]["structure"]
+        for row, whole in zip(ring, (*ring[1:], ring[0]), strict=True):
+            rows[row]["parent_id"] = rows[whole]["id"]
+
+    said = refused(edited(written, close))
+    assert re.match(
+        r"given \$\.tables\.structure: structure (\d) refers to itself by parent_id: \1( → \d)* → \1$", said
+    )
+
+
 def test_codes_that_come_twice_are_refused(written: str, refused: Refused):
     code = json.loads(written)["tables"]["entity"][0]["code"]
     document = edited(written, set_at("tables.entity.2.code", code))
