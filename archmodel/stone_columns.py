@@ -4,6 +4,8 @@ import json
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import chain
+from sys import intern
 from typing import Any
 
 import numpy as np
@@ -74,18 +76,24 @@ def stone_columns(session: Session, *conditions: ColumnElement[bool]) -> StoneCo
         .where(*conditions)
         .order_by(ENTITY.id)
     )
-    rows = list(_rows(session, statement))
-    ids, kinds, zones, courses, x, y, z, normals = zip(*rows, strict=True) if rows else ((),) * 8
-    unknown = np.full(3, np.nan).tobytes()
-    packed = b"".join(unknown if one is None else one for one in normals)
+    return joined([_columns(rows) for rows in _parts(session, statement)])
+
+
+def _columns(rows: Sequence[Any]) -> StoneColumns:
+    """Some rows, of which only the numbers are kept and each name once."""
+    ids, kinds, zones, courses, x, y, z, normals = zip(*rows, strict=True)
+    packed = b"".join(_UNKNOWN if one is None else one for one in normals)
     return StoneColumns(
         ids=np.array(ids, dtype=np.int64),
-        kinds=kinds,
-        zones=zones,
+        kinds=[intern(kind) for kind in kinds],
+        zones=[None if zone is None else intern(zone) for zone in zones],
         courses=courses,
-        centres=np.array([x, y, z], dtype=np.float64).T.reshape(-1, 3),
+        centres=np.array([x, y, z], dtype=np.float64).T,
         normals=np.frombuffer(packed, dtype="<f8").reshape(-1, 3),
     )
+
+
+_UNKNOWN = np.full(3, np.nan).tobytes()
 
 
 def joined(parts: Sequence[StoneColumns]) -> StoneColumns:
@@ -120,7 +128,7 @@ def stone_shapes(session: Session, *conditions: ColumnElement[bool]) -> Iterator
         .where(*conditions)
         .order_by(ENTITY.id)
     )
-    for number, vertices, faces in _rows(session, statement):
+    for number, vertices, faces in chain.from_iterable(_parts(session, statement)):
         yield number, np.frombuffer(vertices, dtype="<f8").reshape(-1, 3), _faces(faces)
 
 
@@ -130,10 +138,9 @@ def _faces(text: str) -> Faces:
     return tuple(tuple(face) for face in json.loads(text))
 
 
-def _rows(session: Session, statement: Executable) -> Iterator[Any]:
-    result = session.execute(statement, execution_options={"yield_per": _AT_ONCE})
-    for part in result.partitions():
-        yield from part
+def _parts(session: Session, statement: Executable) -> Iterator[Sequence[Any]]:
+    """The rows of a statement, some at a time."""
+    yield from session.execute(statement, execution_options={"yield_per": _AT_ONCE}).partitions()
 
 
 def id_conditions(

@@ -26,7 +26,7 @@ __all__ = ["Polyhedra", "PolyhedraBuilder", "Touching", "find_touching"]
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-_PAIRS = 1 << 17  # neighbours that are looked at in one go, so that memory does not grow with the crowd
+_PAIRS = 1 << 15  # neighbours that are looked at in one go, so that memory does not grow with the crowd
 
 
 @dataclass(frozen=True)
@@ -171,8 +171,13 @@ def _seen(pairs: Indices, rows: Array, solid: Any, planes: Any, width: float) ->
 
 def _touching(pairs: Indices, rows: Array, origin: Array) -> Touching:
     order = np.lexsort((pairs[:, 1], pairs[:, 0]))
-    pairs, rows = pairs[order], rows[order]
-    return Touching(pairs, rows[:, 0].copy(), rows[:, 1].copy(), rows[:, 5:8].copy(), rows[:, 2:5] + origin)
+    return Touching(
+        pairs=pairs[order],
+        area=rows[order, 0],
+        gap=rows[order, 1],
+        normal=rows[order, 5:8],
+        centroid=rows[order, 2:5] + origin,
+    )
 
 
 def _boxes(faces: Array, starts: Indices, width: float) -> Array:
