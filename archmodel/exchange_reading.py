@@ -55,7 +55,8 @@ def _refuse_filled(session: Session) -> None:
         if session.execute(select(section.fields[0].column).limit(1)).first() is not None:
             what = f"it is not empty, its table {section.name} has rows"
             remedy = "a document makes a database of its own; name a new one with --db"
-            raise ExchangeError(what, where="database", remedy=remedy)
+            url = session.get_bind().engine.url.render_as_string()  # without a password
+            raise ExchangeError(what, where=url, remedy=remedy)
 
 
 def _read_head(text: JsonText, name: str) -> None:

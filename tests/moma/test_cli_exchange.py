@@ -82,5 +82,5 @@ def test_a_filled_database_is_refused(url: str):
     invoke("export", "castle.json", "--db", url)
     done = invoke("import", "castle.json", "--db", url)
     assert done.exit_code == 1
-    assert "it is not empty, its table entry has rows" in done.stderr
+    assert done.stderr.startswith(f"moma: error: {url}: it is not empty, its table entry has rows; ")
     assert "--db" in done.stderr
