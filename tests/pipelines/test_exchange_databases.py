@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from random import Random
 
@@ -51,6 +52,15 @@ def test_what_was_done_is_told(document: Path, folder: Path):
         open_database(f"sqlite:///{document.parent / 'source.db'}") as source,
     ):
         assert everything(new) == everything(source)
+
+
+def test_databases_of_every_kind_are_made_of_it(document: Path, folder: Path, new_url: Callable[[], str]):
+    url = new_url()
+    assert import_database(document, url).rows["entity"] == 3
+    export_database(url, folder / "again.json")
+    assert (folder / "again.json").read_bytes() == document.read_bytes()
+    with pytest.raises(ExchangeError, match="it is not empty, its table entry has rows"):
+        import_database(document, url)
 
 
 def test_a_name_with_odd_characters_is_a_name(document: Path, folder: Path):
