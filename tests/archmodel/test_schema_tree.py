@@ -38,7 +38,9 @@ def test_every_kind_is_below_what_it_is_a_case_of() -> None:
             one.name for one in cls.__dict__.get("__own__", ())
         ]
         assert branch["canonical"] == cls.__dict__.get("__canon__")
-        assert [sub["kind"] for sub in branch["kinds"]] == [kind_of(sub) for sub in cls.__subclasses__()]
+        # kinds that another test registered remain classes, but are known no longer
+        known = [sub for sub in cls.__subclasses__() if kinds().get(kind_of(sub)) is sub]
+        assert [sub["kind"] for sub in branch["kinds"]] == [kind_of(sub) for sub in known]
 
 
 def test_structures_relations_and_attributes_are_all_there() -> None:
