@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from archmodel.attributes import Attribute
 from archmodel.geojson import feature_collection, flattened
 from archmodel.query import asked_columns, attributes, find_faces, find_rows
-from moma.listing import USUAL_COLUMNS, as_csv, as_json, as_table, shown_columns
+from moma.listing import USUAL_COLUMNS, as_csv, as_geojson, as_json, as_table, shown_columns
 
 if TYPE_CHECKING:
     from sqlalchemy.orm import Session
@@ -44,7 +44,7 @@ def answer(session: "Session", question: Question, format: str) -> tuple[str, st
     asked = (question.kind, question.where, question.run, names)
     if format == "geojson":
         faces = find_faces(session, *asked)
-        return as_json(feature_collection(flattened(faces) if question.flat else faces)), ""
+        return as_geojson(feature_collection(flattened(faces) if question.flat else faces)), ""
     rows = find_rows(session, *asked)
     if format == "json":
         return as_json(rows), ""

@@ -8,7 +8,7 @@ from typing import Any
 
 from archmodel.run_records import STONE_VALUES
 
-__all__ = ["USUAL_COLUMNS", "as_csv", "as_json", "as_lines", "as_table", "shown_columns"]
+__all__ = ["USUAL_COLUMNS", "as_csv", "as_geojson", "as_json", "as_lines", "as_table", "shown_columns"]
 
 USUAL_COLUMNS = (
     "code",
@@ -88,6 +88,12 @@ def as_csv(columns: Iterable[str], rows: Iterable[Mapping[str, object]]) -> str:
 def as_json(value: object) -> str:
     """JSON, indented."""
     return json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def as_geojson(collection: Mapping[str, Any]) -> str:
+    """A FeatureCollection with one feature on each line."""
+    features = (json.dumps(one, ensure_ascii=False, allow_nan=False) for one in collection["features"])
+    return '{"type": "FeatureCollection", "features": [\n' + ",\n".join(features) + "\n]}"
 
 
 def as_lines(value: Mapping[str, Any], indent: int = 0) -> str:

@@ -108,6 +108,12 @@ def test_geojson_lies_in_space_or_in_the_plane_of_the_wall(url: str) -> None:
         assert drawn == [[x, z] for x, _, z in corners]
 
 
+def test_geojson_has_a_line_for_each_stone(url: str) -> None:
+    text = printed(url, "query", "entity", "--format", "geojson")
+    assert len(text.splitlines()) == len(WALL) + 2
+    assert list(json.loads(text)["features"][0]["properties"])[: len(ATTRIBUTES)] == list(ATTRIBUTES)
+
+
 def test_flat_is_for_geojson(url: str) -> None:
     done = invoke(url, "query", "voussoir", "--flat")
     assert done.exit_code == 2
