@@ -21,7 +21,7 @@ from archmodel.run_records import (
 from archmodel.runs import FIDELITIES
 from moma.errors import DatabaseError
 
-__all__ = ["contact_rows", "joint_rows", "result_row", "run_row", "simplification_row"]
+__all__ = ["contact_rows", "joint_rows", "plain", "result_row", "run_row", "simplification_row"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
