@@ -8,8 +8,9 @@ from pathlib import Path
 
 from sqlalchemy.orm import Session
 
+from archmodel.bulk import first_free_id
 from archmodel.database import home_of, open_database
-from archmodel.entities import kind_named
+from archmodel.entities import Entity, kind_named
 from archmodel.records import StoneRecord
 from archmodel.store import store_survey
 from moma.errors import NoDatabaseError, SurveyError, UsageError
@@ -18,7 +19,7 @@ from pipelines.ingest_report import IngestReport, Tally
 from pipelines.progress import Listener, Progress, silent
 from pipelines.reading_options import check_survey_file
 from pipelines.rejects import check_targets, default_path, rejects_text
-from pipelines.relate import relate
+from pipelines.relate import KnownSolids, relate
 from pipelines.spool import Spool
 from pipelines.stone_records import stone_record
 from survey.extrusion import SurveyedBlock
@@ -92,10 +93,13 @@ def ingest(
                 text = rejects_text(path, format, tally.refused, stations)
                 held.enter_context(_published(target, text))
         with open_database(url, lock_timeout=_PATIENCE) as database, database.session() as session:
+            solids = KnownSolids()
             for tally, spool in zip(tallies, spools, strict=True):
-                _store(session, tally, _told(spool, tally, progress), again)
+                stones = _told(spool, tally, progress)
+                # of stones that are measured again, the numbers are not the next ones
+                _store(session, tally, stones if again else _kept(stones, session, solids), again)
             progress(Progress("relate", 0, None))
-            relate(session, only=[number for tally in tallies for number in tally.stored])
+            relate(session, only=[number for tally in tallies for number in tally.stored], solids=solids)
         reports = tuple(
             tally.report(target if tally.refused else None)
             for tally, target in zip(tallies, targets, strict=True)
@@ -189,6 +193,13 @@ def _told(stones: Iterable[StoneRecord], tally: Tally, progress: Listener) -> It
     total = tally.stones.total()
     for number, stone in enumerate(stones, start=1):
         progress(Progress(f"store {tally.path.name}", number, total, stone.code))
+        yield stone
+
+
+def _kept(stones: Iterator[StoneRecord], session: Session, solids: KnownSolids) -> Iterator[StoneRecord]:
+    """The stones on their way to the database, and their solids for their relations."""
+    for number, stone in enumerate(stones, start=first_free_id(session, Entity)):
+        solids.add(number, stone.solid_vertices, stone.solid_faces)
         yield stone
 
 
