@@ -25,7 +25,7 @@ __all__ = ["main"]
 _BUILT: Table = (
     ("database", "database", ""),
     ("what", "stored", ""),
-    ("seconds", "s", ".3g"),
+    ("seconds", "processor, s", ".3g"),
     ("memory_mb", "memory it took, MB", ".3g"),
 )
 _ASKED: Table = (
