@@ -73,8 +73,9 @@ def _middle(count: int) -> str:
     return f"W{COURSES // 2}-{count // COURSES // 2}"
 
 
-def _top(session: Session, count: int) -> int:
-    return len(load_path(session, f"W{COURSES}-{count // COURSES // 2}").stones)
+def _path(course: int) -> Ask:
+    """The load path of the stone in the middle of a course."""
+    return lambda session, count: len(load_path(session, f"W{course}-{count // COURSES // 2}").stones)
 
 
 QUESTIONS: Mapping[str, Question] = {
@@ -99,7 +100,8 @@ QUESTIONS: Mapping[str, Question] = {
         "headers deeper than 0.698 m, as objects",
         lambda session, count: len(find(session, "header", ["depth > 0.698"])),
     ),
-    "path": Question("load path of a stone of the top course", _top, 200.0),
+    "path": Question(f"load path of a stone of course {COURSES // 2}", _path(COURSES // 2), 200.0),
+    "top": Question(f"load path of a stone of course {COURSES}", _path(COURSES), 200.0),
     "trace": Question(
         "from a stress to its measured points",
         lambda session, count: len(trace(session, _middle(count)).measurement.points),  # type: ignore[union-attr]
