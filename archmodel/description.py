@@ -18,8 +18,8 @@ from archmodel.entities import (
     own_attributes,
     refuse_unknown_kinds,
 )
-from archmodel.entries import Entry, held_at
-from archmodel.finding import no_such_code
+from archmodel.entries import held_at
+from archmodel.finding import check_entry, no_such_code
 from archmodel.knowledge import Correction
 from archmodel.relations import Membership
 from archmodel.runs import EntityResult, Run
@@ -59,8 +59,7 @@ def describe(session: Session, code: str, at: int | None = None) -> dict[str, ob
     refuse_unknown_kinds(session)
     if not code.isprintable():
         raise no_such_code(session, code, Entity.code, Structure.code)
-    if at is not None and session.get(Entry, at) is None:
-        raise UsageError(f"there is no entry {at}", remedy="list them by: moma show CODE --history")
+    check_entry(session, at)
     number = session.scalar(select(Entity.id).where(Entity.code == code))
     if number is not None:
         return _entity(session, number, code, at)

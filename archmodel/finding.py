@@ -5,17 +5,19 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
-from sqlalchemy import select
+from sqlalchemy import func, select
 from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from archmodel.bulk import batches
 from archmodel.entities import Entity
+from archmodel.entries import Entry
 from archmodel.knowledge import Correction, Document, Material, Phase
 from archmodel.structures import Structure
 from moma.errors import UsageError
 
 __all__ = [
     "Subjects",
+    "check_entry",
     "entity_numbers",
     "held_named",
     "held_or_none",
@@ -47,6 +49,20 @@ class Subjects:
 
     def __len__(self) -> int:
         return len(self.entities) + len(self.structures)
+
+
+def check_entry(session: Session, at: int | None) -> None:
+    """Refuse a number that is not that of an entry; None is always right: it means now.
+
+    Raises
+    ------
+    UsageError
+        naming the last entry
+    """
+    if at is not None and session.get(Entry, at) is None:
+        last = session.scalar(select(func.max(Entry.id)))
+        remedy = f"the last one is {last}; list those of a stone by: moma show CODE --history"
+        raise UsageError(f"there is no entry {at}", remedy=remedy)
 
 
 def subjects(session: Session, stones: Iterable[str] = (), structures: Iterable[str] = ()) -> Subjects:

@@ -51,6 +51,9 @@ OPERATORS = frozenset({"=", "==", "!=", "<", "<=", ">", ">="})
 VALUES = frozenset({"quoted", "word", "number"})
 
 
+_JOINING = "join tests by and, or; put a text with blanks in quotes"
+
+
 @dataclass(frozen=True)
 class Comparison:
     """attribute operator value."""
@@ -169,7 +172,7 @@ class _Parser:
     def whole(self) -> Node:
         node = self.expression(0)
         if self.token.role != "end":
-            raise complaint(self.token, f"{named(self.token)} is not expected here", "join tests by and, or")
+            raise complaint(self.token, f"{named(self.token)} is not expected here", _JOINING)
         return node
 
     def expression(self, depth: int) -> Node:

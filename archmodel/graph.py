@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session, aliased
 
 from archmodel.entities import Entity
 from archmodel.entries import held_at
-from archmodel.finding import no_such_code
+from archmodel.finding import check_entry, no_such_code
 from archmodel.load_paths import LoadPath, LoadPathStone, load_path, place_of
 from archmodel.relations import INVERSE, Membership, Relation
 from archmodel.structures import Structure
@@ -92,7 +92,7 @@ def carries(session: Session, code: str, as_of: int | None = None) -> tuple[Neig
     Raises
     ------
     UsageError
-        if there is no stone of this code, here as in what follows; names the nearest codes
+        if there is no stone of this code or no such entry, here as in what follows; names the nearest codes
     """
     return tuple(one for one in neighbours(session, code, as_of) if one.relation == "supports")
 
@@ -111,6 +111,7 @@ def neighbours(session: Session, code: str, as_of: int | None = None) -> tuple[N
     code : of the stone
     as_of : number of an entry; None: what is held now
     """
+    check_entry(session, as_of)
     me = place_of(session, code).id
     sides = ((Relation.subject_id, Relation.object_id), (Relation.object_id, Relation.subject_id))
     rows = union_all(
@@ -150,6 +151,7 @@ def courses_in_order(
     UsageError
         if there is no such zone; names the nearest ones
     """
+    check_entry(session, as_of)
     part = aliased(Structure)
     statement = (
         select(Structure.code, part.code, Structure.number, Entity.code)

@@ -10,7 +10,7 @@ from sqlalchemy import CTE, ColumnElement, Row, Select, and_, literal, or_, sele
 from sqlalchemy.orm import Session
 
 from archmodel.entities import Entity
-from archmodel.finding import no_such_code
+from archmodel.finding import check_entry, no_such_code
 from archmodel.recording import table_of
 from archmodel.relations import Relation
 
@@ -75,6 +75,7 @@ def load_path(session: Session, code: str, *, up: bool = False, as_of: int | Non
     up : what it carries, instead of what carries it
     as_of : number of an entry; None: what is held now
     """
+    check_entry(session, as_of)
     me = place_of(session, code).id
     reached, holds, start, end = _reached(me, up, as_of)
     steps: dict[int, list[int]] = {}

@@ -307,3 +307,15 @@ def test_the_load_path_through_a_hundred_courses_takes_less_than_a_fifth_of_a_se
     assert len(path.stones) == sum(range(2, 101))
     assert path.levels == 99
     assert min(spent) < 0.2
+
+
+@pytest.mark.parametrize("question", [neighbours, load_path, carries, carried_by])
+@pytest.mark.parametrize("entry", [-1, 0, 99])
+def test_an_entry_that_is_not_there_is_an_error(filled, question, entry):
+    with pytest.raises(UsageError, match=f"there is no entry {entry}; the last one is 1"):
+        asked(filled, question, "V2", as_of=entry)
+
+
+def test_courses_of_an_entry_that_is_not_there_are_an_error(filled):
+    with pytest.raises(UsageError, match="there is no entry 99"):
+        asked(filled, courses_in_order, as_of=99)

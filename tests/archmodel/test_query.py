@@ -98,6 +98,10 @@ def test_what_an_expression_finds(filled: Database, expression: str, expected: l
         ("code in (V1", r"the end instead of \)"),
         ("(depth > 1", r"the end instead of \)"),
         ("depth > 1)", r"'\)' is not expected here; join tests by and, or"),
+        (
+            "material = white limestone",
+            "'limestone' is not expected here; .* put a text with blanks in quotes",
+        ),
         ("depth > 1 course = 2", "'course' is not expected here"),
         ("code = 'V1", "at character 8: the quote is not closed"),
         ("code = 'V1' '", "at character 13: the quote is not closed"),
