@@ -185,8 +185,12 @@ class Entity(Base):
     @classmethod
     def __mapper_args__(cls) -> dict[str, object]:
         # A query of a general kind loads the attributes of its subkinds at once, not one entity after another.
-        identity: dict[str, object] = {"polymorphic_identity": kind_of(cls), "with_polymorphic": "*"}
-        return identity | {"polymorphic_on": "kind"} if cls.__name__ == "Entity" else identity
+        identity: dict[str, object] = {"polymorphic_identity": kind_of(cls)}
+        if cls.__name__ != "Entity":
+            return identity
+        # Columns of all kinds come with a query of Entity. Of Entity alone: an alias of a class takes an alias of
+        # each subclass that comes with it, and where these do the same, their number doubles with every level.
+        return identity | {"polymorphic_on": "kind", "with_polymorphic": "*"}
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.code}>"

@@ -88,10 +88,10 @@ def find(session: Session, kind: str, where: Sequence[str] = (), run: int | None
     QueryError
         if an expression cannot be understood, or there is no such run
     """
-    cls = kind_named(kind)
     scope, conditions = _asked(session, where, run)
-    statement = scope.joined(select(cls)).where(*conditions).order_by(cls.id)
-    return list(session.scalars(statement))
+    # Entity, whatever the kind: the columns of all subkinds come with it
+    statement = scope.joined(select(Entity)).where(*_of_kind(scope, kind), *conditions)
+    return list(session.scalars(statement.order_by(Entity.id)))
 
 
 def find_rows(
@@ -191,11 +191,15 @@ def _select(
     chosen: Callable[[Scope], list[ColumnElement[Any]]],
 ) -> Iterable[Sequence[Any]]:
     """The chosen columns of the entities of a kind that satisfy all expressions, in the order of the survey."""
-    cls = kind_named(kind)
     scope, conditions = _asked(session, where, run)
     columns = chosen(scope)
-    statement = scope.joined(select(*columns)).where(*conditions).order_by(scope.entity.c.id)
-    if cls is not Entity:
-        subkinds = [name for name, sub in kinds().items() if issubclass(sub, cls)]
-        statement = statement.where(scope.entity.c.kind.in_(subkinds))
-    return session.execute(statement)
+    statement = scope.joined(select(*columns)).where(*_of_kind(scope, kind), *conditions)
+    return session.execute(statement.order_by(scope.entity.c.id))
+
+
+def _of_kind(scope: Scope, kind: str) -> list[ColumnElement[bool]]:
+    """That an entity is of a kind or one of its subkinds; nothing where every entity is."""
+    cls = kind_named(kind)
+    if cls is Entity:
+        return []
+    return [scope.entity.c.kind.in_([name for name, sub in kinds().items() if issubclass(sub, cls)])]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from sqlalchemy.orm import Session
 
 from archmodel.attributes import ATTRIBUTES
-from archmodel.entities import OwnAttribute, kind_named, kind_of, kinds, own_attributes
+from archmodel.entities import OwnAttribute, kind_chain, kind_named, kind_of, kinds, own_attributes
 from archmodel.entries import Entry
 from archmodel.expressions import condition
 from archmodel.functions import FUNCTIONS, STRUCTURE_FUNCTIONS
@@ -16,7 +16,10 @@ from archmodel.tokens import KEYWORDS
 from archmodel.values import checked_label, checked_text
 from moma.errors import QueryError, UsageError
 
-__all__ = ["register_kind"]
+__all__ = ["MAX_LEVELS", "register_kind"]
+
+MAX_LEVELS = 20
+"""Most kinds from the most general one down to the most particular."""
 
 _NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 
@@ -50,6 +53,9 @@ def register_kind(
     """
     declare_registered(session)
     above = kind_named(parent)
+    if len(kind_chain(above)) >= MAX_LEVELS:
+        remedy = "make it a case of a kind that is less particular"
+        raise UsageError(f"{name} is a case of a case, {MAX_LEVELS} times over", remedy=remedy)
     given = {key: (unit, definition.strip()) for key, (unit, definition) in (attributes or {}).items()}
     row = RegisteredKind(
         name=_checked_name("a kind", name),

@@ -1,10 +1,11 @@
 """Kinds of a user's own: classes of the hierarchy while a database that registers them is open."""
 
+import itertools
 from collections.abc import Callable
 
 import pytest
 from sqlalchemy import select
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, aliased
 
 from archmodel.correcting import correct
 from archmodel.database import Database, open_database
@@ -14,7 +15,7 @@ from archmodel.entries import Entry, new_entry
 from archmodel.knowledge import Correction
 from archmodel.query import find
 from archmodel.recording import Outcome
-from archmodel.registering import register_kind
+from archmodel.registering import MAX_LEVELS, register_kind
 from archmodel.store import store_survey
 from moma.errors import DatabaseError, MomaError, UsageError
 from tests.archmodel.stones import box_stone
@@ -152,3 +153,18 @@ def test_what_cannot_be_registered_is_refused(empty: Database) -> None:
             with pytest.raises(MomaError, match=message):
                 register_kind(session, entry, **(usual | given))  # type: ignore[arg-type]
         assert set(kinds()) & {"merlon", "slab_of_merlon"} == {"merlon"}
+
+
+def test_cases_of_cases_end_somewhere_and_cost_no_more_than_others(filled: Database) -> None:
+    with filled.session() as session:
+        entry = entry_of(session)
+        names = ["coping", *(f"case_{k}" for k in range(1, MAX_LEVELS - 3))]
+        for parent, name in itertools.pairwise(names):
+            register_kind(session, entry, name, parent, f"A case of {parent}.")
+        with pytest.raises(UsageError, match="case_18 is a case of a case, 20 times over"):
+            register_kind(session, entry, "case_18", names[-1], "One too many.")
+        store_survey(session, "deep", "deep.moma", "ef" * 32, [box_stone("D1", names[-1])])
+        # an alias of an entity takes one of each kind, not one of each way through the hierarchy
+        other = aliased(Entity)
+        assert [one.code for one in session.scalars(select(other).where(other.kind == names[-1]))] == ["D1"]
+        assert [one.code for one in find(session, "case_9")] == ["D1"]
