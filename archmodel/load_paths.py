@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import Any, Literal
 
-from sqlalchemy import CTE, ColumnElement, Row, Select, and_, literal, or_, select
+from sqlalchemy import CTE, ColumnElement, Row, and_, literal, or_, select
 from sqlalchemy.orm import Session
 
 from archmodel.entities import Entity
@@ -17,7 +17,7 @@ from archmodel.relations import Relation
 __all__ = ["LoadPath", "LoadPathStone", "load_path", "place_of"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)  # slots: paths of 10,000 stones are usual, and each is made anew
 class LoadPathStone:
     """A stone on a load path.
 
@@ -78,13 +78,18 @@ def load_path(session: Session, code: str, *, up: bool = False, as_of: int | Non
     check_entry(session, as_of)
     me = place_of(session, code).id
     reached, holds, start, end = _reached(me, up, as_of)
+    entity = table_of(Entity)
+    facts = (entity.c.code, entity.c.kind, entity.c.course, entity.c.zone)
+    edges = (
+        select(start, end, *facts).join(reached, start == reached.c.id).join(entity, entity.c.id == end)
+    ).where(holds)
     steps: dict[int, list[int]] = {}
-    edges = select(start, end).join(reached, start == reached.c.id).where(holds)
-    for before, after in session.execute(edges).all():
+    stones: dict[int, tuple[Any, ...]] = {me: (code, None, None, None)}
+    for before, after, *known in session.execute(edges).all():
         following = steps.setdefault(before, [])
         if after not in following:  # else it is computed and declared
             following.append(after)
-    stones: dict[int, Any] = {number: facts for number, *facts in session.execute(_facts(reached)).all()}
+        stones[after] = tuple(known)
     levels = _levels(me, steps)
     order = sorted(levels, key=lambda number: (levels[number], number))
     through: dict[int, list[str]] = {number: [] for number in order}
@@ -118,14 +123,6 @@ def _reached(
     reached = select(literal(me).label("id")).cte("reached", recursive=True)
     reached = reached.union(select(end).join(reached, start == reached.c.id).where(holds))
     return reached, holds, start, end
-
-
-def _facts(reached: CTE) -> Select[Any]:
-    """Number, code, kind, course and zone of the stones on the path."""
-    columns = table_of(Entity).c
-    return select(columns.id, columns.code, columns.kind, columns.course, columns.zone).join(
-        reached, columns.id == reached.c.id
-    )
 
 
 def _levels(me: int, steps: Mapping[int, Sequence[int]]) -> dict[int, int]:

@@ -78,7 +78,7 @@ def test_it_is_a_table_for_people(database):
 
 
 def test_at_an_entry_before_the_relations_there_is_no_path(database):
-    done = invoke("load-path", "V4", "--at", "0", "--db", database)
+    done = invoke("load-path", "V4", "--at", "1", "--db", database)
     assert done.exit_code == 0
     assert done.stdout == ""
     assert "V4 rests on nothing that is known" in done.stderr
