@@ -91,7 +91,8 @@ def _check_attributes(
     given: Mapping[str, tuple[str | None, str]], inherited: Mapping[str, OwnAttribute]
 ) -> None:
     """An attribute has a name of its own, so that a query can ask for it."""
-    built_in = [one.name for cls in kinds().values() if cls.__users__ is None for one in cls.__own__]
+    # what the classes call their own members (own, entry, metadata, …) would be written over
+    built_in = [name for cls in kinds().values() if cls.__users__ is None for name in dir(cls)]
     taken = {*ATTRIBUTES, *built_in, *inherited, *KEYWORDS, *FUNCTIONS, *STRUCTURE_FUNCTIONS}
     units = {one.name: one.unit for cls in kinds().values() for one in cls.__own__}
     for name, (unit, definition) in given.items():

@@ -99,6 +99,9 @@ def parse_record(text: str, path: str) -> RecordFile:
         given = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise _syntax_error(error, text, path) from None
+    except (RecursionError, ValueError):  # brackets within brackets, numbers of thousands of digits
+        remedy = "see docs/knowledge.md for a file to start from"
+        raise UsageError("too deeply nested, or a number too long", where=path, remedy=remedy) from None
     document = Document(path, key_lines(text))
     try:
         record, tables = _checked(document, given)

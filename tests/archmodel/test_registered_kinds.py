@@ -168,3 +168,10 @@ def test_cases_of_cases_end_somewhere_and_cost_no_more_than_others(filled: Datab
         other = aliased(Entity)
         assert [one.code for one in session.scalars(select(other).where(other.kind == names[-1]))] == ["D1"]
         assert [one.code for one in find(session, "case_9")] == ["D1"]
+
+
+@pytest.mark.parametrize("name", ["own", "metadata", "registry", "entry", "tail_length"])
+def test_attributes_are_not_named_like_members_of_the_classes(empty: Database, name: str) -> None:
+    given = {name: ("m", "the width")}
+    with empty.session() as session, pytest.raises(UsageError, match=f"{name} means something"):
+        register_kind(session, entry_of(session), "slab_of_own", "ashlar", "A slab.", attributes=given)
