@@ -1,7 +1,8 @@
 """Registering a kind of a user's own in a database."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, is_dataclass
 
 from sqlalchemy.orm import Session
 
@@ -10,9 +11,10 @@ from archmodel.entities import OwnAttribute, kind_chain, kind_named, kind_of, ki
 from archmodel.entries import Entry
 from archmodel.expressions import condition
 from archmodel.functions import FUNCTIONS, STRUCTURE_FUNCTIONS
+from archmodel.grammar import Call, parse
 from archmodel.recording import Outcome
 from archmodel.registered import RegisteredKind, declare_registered
-from archmodel.tokens import KEYWORDS
+from archmodel.tokens import KEYWORDS, Token, complaint
 from archmodel.values import checked_label, checked_text
 from moma.errors import QueryError, UsageError
 
@@ -80,6 +82,7 @@ def register_kind(
             session.flush()
             declare_registered(session)
             if row.canon is not None:
+                _check_canon(row.canon)
                 condition(session, row.canon)
     except QueryError:
         declare_registered(session)
@@ -102,10 +105,29 @@ def _check_attributes(
             checked_label(f"unit of {name}", unit)
         if name in taken:
             remedy = "give it another name"
-            raise UsageError(f"{name} means something in queries already", remedy=remedy)
+            raise UsageError(f"{name} means something already", remedy=remedy)
         if name in units and units[name] != unit:
             what = f"{name} [{unit or 'text'}] is an attribute of another kind, in {units[name] or 'text'}"
             raise UsageError(what, remedy="give it the same unit, or another name")
+
+
+def _check_canon(canon: str) -> None:
+    """Proportions are of the stone itself: runs, other stones and structures may be gone when they are asked for."""
+    for node in _nodes(parse(canon)):
+        if isinstance(node, Call):
+            raise complaint(node.function, "canonical proportions cannot ask functions", "compare attributes")
+        if isinstance(node, Token) and node.role == "word" and "@" in node.text:
+            raise complaint(node, "canonical proportions cannot ask a run", "leave out @ and what follows")
+
+
+def _nodes(node: object) -> Iterator[object]:
+    """A node of an expression and all that is in it."""
+    yield node
+    if is_dataclass(node) and not isinstance(node, Token):
+        for part in fields(node):
+            value = getattr(node, part.name)
+            for one in value if isinstance(value, tuple) else (value,):
+                yield from _nodes(one)
 
 
 def _checked_name(thing: str, name: str) -> str:

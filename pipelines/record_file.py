@@ -1,8 +1,6 @@
 """Files of knowledge: TOML text → a RecordFile in which every key has been checked. No database is read here."""
 
 import hashlib
-import re
-import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -20,7 +18,7 @@ from moma.errors import (
 )
 from pipelines.record_keys import ARRAYS, ATTRIBUTE, PROPERTY, RECORD
 from pipelines.schema import Document, Key, check_table, nearest
-from pipelines.toml_lines import Path, key_lines
+from pipelines.toml_lines import Path, key_lines, parse_toml
 
 __all__ = ["RecordFile", "Table", "parse_record", "read_record"]
 
@@ -95,13 +93,7 @@ def read_record(path: str | FilePath) -> RecordFile:
 
 def parse_record(text: str, path: str) -> RecordFile:
     """Check the text of a file of knowledge; `path` is for the messages."""
-    try:
-        given = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise _syntax_error(error, text, path) from None
-    except (RecursionError, ValueError):  # brackets within brackets, numbers of thousands of digits
-        remedy = "see docs/knowledge.md for a file to start from"
-        raise UsageError("too deeply nested, or a number too long", where=path, remedy=remedy) from None
+    given = parse_toml(text, path, UsageError, "see docs/knowledge.md for a file to start from")
     document = Document(path, key_lines(text))
     try:
         record, tables = _checked(document, given)
@@ -151,12 +143,3 @@ def _inner(document: Document, path: Path, given: Any, keys: tuple[Key, ...]) ->
         )
         for name, content in given.items()
     }
-
-
-def _syntax_error(error: tomllib.TOMLDecodeError, text: str, path: str) -> UsageError:
-    message = str(error)
-    place = re.search(r"\(at line (\d+), column \d+\)", message)
-    line = int(place.group(1)) if place else max(1, len(text.rstrip().splitlines()))
-    what = re.sub(r" \(at .*\)$", "", message)
-    remedy = "see docs/knowledge.md for a file to start from"
-    return UsageError(f"not TOML: {what}", where=f"{path}:{line}", remedy=remedy)

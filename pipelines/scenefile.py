@@ -3,8 +3,6 @@
 Nothing runs and no database is read here; stones are still expressions. docs/scene.md lists the keys.
 """
 
-import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,7 +30,7 @@ from pipelines.scene_keys import PICTURES, TABLES
 from pipelines.scene_loads import read_loads, read_throws
 from pipelines.schema import Document, check_table, nearest
 from pipelines.stone_keys import MATERIAL_KEYS, MESH_KEYS, ORTHOTROPY_KEYS
-from pipelines.toml_lines import key_lines
+from pipelines.toml_lines import key_lines, parse_toml
 from survey.joint_lines import JointSettings
 
 __all__ = [
@@ -148,10 +146,7 @@ def read_scene(path: str | Path) -> SceneFile:
 
 def parse_scene(text: str, path: str) -> SceneFile:
     """Check the text of a scene file; `path` is for the messages."""
-    try:
-        given = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise _syntax_error(error, text, path) from None
+    given = parse_toml(text, path, SceneError, "see docs/scene.md for a scene to start from")
     document = Document(path, key_lines(text))
     tables = _checked_tables(document, given)
     return SceneFile(
@@ -172,16 +167,6 @@ def parse_scene(text: str, path: str) -> SceneFile:
         laws=read_laws(document, given),
         loads=read_loads(document, given),
         throws=read_throws(document, given),
-    )
-
-
-def _syntax_error(error: tomllib.TOMLDecodeError, text: str, path: str) -> SceneError:
-    message = str(error)
-    place = re.search(r"\(at line (\d+), column \d+\)", message)
-    line = int(place.group(1)) if place else max(1, len(text.rstrip().splitlines()))
-    what = re.sub(r" \(at .*\)$", "", message)
-    return SceneError(
-        f"not TOML: {what}", where=f"{path}:{line}", remedy="see docs/scene.md for a scene to start from"
     )
 
 

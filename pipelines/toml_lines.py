@@ -1,10 +1,13 @@
-"""On which line of a TOML text each key stands; the standard reader does not tell."""
+"""What a TOML text says, and on which line each key stands, which the standard reader does not tell."""
 
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
+from typing import Any
 
-__all__ = ["Path", "key_lines", "line_of"]
+from moma.errors import UsageError
+
+__all__ = ["Path", "key_lines", "line_of", "parse_toml"]
 
 Path = tuple[str, ...]
 
@@ -91,3 +94,34 @@ def _dotted(key: str) -> Path:
         (name, value), *_ = value.items()
         path.append(name)
     return tuple(path)
+
+
+def parse_toml(text: str, path: str, error: type[UsageError], remedy: str) -> dict[str, Any]:
+    """The contents of a TOML text.
+
+    Parameters
+    ----------
+    path, error, remedy : of the complaint, if it is none
+
+    Raises
+    ------
+    UsageError : as `error`, at the line
+    """
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as complaint:
+        message = str(complaint)
+        place = re.search(r"\(at line (\d+), column \d+\)", message)
+        line = int(place.group(1)) if place else max(1, len(text.rstrip().splitlines()))
+        what = re.sub(r" \(at .*\)$", "", message)
+    except RecursionError:
+        what, line = "lists or tables are nested too deeply", _fullest_line(text, "[{")
+    except ValueError:
+        what, line = "a number has thousands of digits", _fullest_line(text, "0123456789")
+    raise error(f"not TOML: {what}", where=f"{path}:{line}", remedy=remedy) from None
+
+
+def _fullest_line(text: str, characters: str) -> int:
+    """The line with most of these characters."""
+    lines = text.splitlines()
+    return 1 + max(range(len(lines)), key=lambda number: sum(map(lines[number].count, characters)))

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from mechanics.laws.dry_joint import DryJoint
 from mechanics.meshing.elements import Element
 from mechanics.scene import ContactSettings, Fidelity, SolverSettings, Start, TimeSettings
-from moma.errors import MomaError, SceneError
+from moma.errors import MomaError, SceneError, UsageError
+from pipelines.record_file import parse_record
 from pipelines.scene_keys import TABLES
 from pipelines.scenefile import MeshSettings, parse_scene, read_scene
 from pipelines.schema import REQUIRED
@@ -241,3 +242,19 @@ def default_text(key):
         quoted = (f'"{one}"' if isinstance(one, str) else f"{one:g}" for one in key.default)
         return f"`[{', '.join(quoted)}]`"
     return f'`"{key.default}"`' if isinstance(key.default, str) else f"`{key.default:g}`"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            "[scene]\nname = " + "[" * 3000 + "]" * 3000,
+            r"wild\.toml:2: not TOML: lists or tables are nested too",
+        ),
+        ("[scene]\nx = 1\ny = " + "1" * 5000, r"wild\.toml:3: not TOML: a number has thousands of digits"),
+    ],
+)
+def test_toml_that_breaks_its_reader_is_an_error_with_a_line(text, message):
+    for parse in (parse_scene, parse_record):
+        with pytest.raises(UsageError, match=message):
+            parse(text, "wild.toml")
