@@ -10,6 +10,7 @@ from sqlalchemy.orm import Session
 
 from archmodel.bulk import batches
 from archmodel.declaring import declare_named
+from archmodel.entities import Entity
 from archmodel.entries import Entry
 from archmodel.finding import held_named
 from archmodel.recording import NOTHING, Outcome, end_rows, table_of
@@ -38,6 +39,9 @@ def declare_structure(
         checked_choice("side", side, ("outer", "inner"))
     above = None if parent is None else held_named(session, Structure, parent)
     _refuse_circle(code, above)
+    label = checked_label("code", code)
+    if session.scalar(select(Entity.id).where(Entity.code == label)) is not None:
+        raise UsageError(f"{code} is a stone", remedy="give the structure a code of its own")
     values = {
         "kind": structure_kind_of(cls),
         "title": checked_text("title", title),
@@ -45,7 +49,7 @@ def declare_structure(
         "number": checked_whole("number", number, 0),
         "side": side,
     }
-    return declare_named(session, entry, Structure, {"code": checked_label("code", code)}, values, cls)
+    return declare_named(session, entry, Structure, {"code": label}, values, cls)
 
 
 def declare_members(

@@ -1,7 +1,7 @@
 """Computed relations into the database: the same stay, new ones come, those no longer found are superseded."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -13,11 +13,11 @@ from archmodel.base import Base
 from archmodel.bulk import batches, insert_rows
 from archmodel.entries import Entry, new_entry
 from archmodel.recording import table_of
-from archmodel.relating import FoundRelations
+from archmodel.relating import FoundRelations, RelationSettings
 from archmodel.relations import RELATIONS, Relation
 from archmodel.stone_columns import id_conditions
 
-__all__ = ["Act", "Changes", "store_relations", "supersede"]
+__all__ = ["Act", "Changes", "held_settings", "store_relations", "supersede"]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -48,6 +48,19 @@ class Act:
     def made(self) -> int | None:
         """Number of the entry; None as long as nothing needed it."""
         return None if self._entry is None else self._entry.id
+
+
+def held_settings(session: Session) -> RelationSettings:
+    """The tolerances with which the relations of this database were computed last; the usual ones if they were not.
+
+    Relations that are computed later, of stones that come or change, are so to the same measure.
+    """
+    last = select(Entry.settings).where(Entry.action == "geometry").order_by(Entry.id.desc()).limit(1)
+    known = {one.name for one in fields(RelationSettings)}
+    given: dict[str, Any] = {
+        name: value for name, value in (session.scalar(last) or {}).items() if name in known
+    }
+    return RelationSettings(**given)
 
 
 @dataclass(frozen=True)

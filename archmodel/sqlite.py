@@ -111,6 +111,7 @@ _COMPLAINTS = (
         "wait until the other program is done, then try again",
     ),
     (("not a database",), "is not a MOMA database", "name another file with --db"),
+    (("malformed",), "the file is damaged ({said})", "restore a copy of it, or try: sqlite3 FILE .recover"),
     (("is full",), "the disk is full", "make room on it and try again; nothing was changed"),
     (
         ("readonly", "unable to open"),

@@ -63,7 +63,7 @@ _KIND = (
     Key(
         "canon",
         Kind.TEXT,
-        "Canonical proportions, as a query expression; else those of the parent.",
+        "Canonical proportions, as a query expression about attributes of the stone; else those of the parent.",
         default=None,
     ),
     Key("attributes", Kind.TABLE, "Its own: `{ name = { unit, definition } }`.", default={}),

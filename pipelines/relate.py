@@ -13,7 +13,7 @@ from archmodel.composing import parts_of_survey, store_parts, whole_courses
 from archmodel.computed_values import arch_values, give_values, tail_lengths
 from archmodel.entities import Entity
 from archmodel.relating import Contacts, FoundRelations, RelationSettings, StonesOf, relations_between
-from archmodel.relation_store import Act, Changes, store_relations
+from archmodel.relation_store import Act, Changes, held_settings, store_relations
 from archmodel.stone_columns import (
     ENTITY,
     StoneColumns,
@@ -97,11 +97,11 @@ def relate(
     Parameters
     ----------
     session : a writing session
-    settings : tolerances; None: RelationSettings()
+    settings : tolerances; None: those with which this database was related last, else RelationSettings()
     only : numbers of entities; their relations alone are computed, with all stones near them. None: of all
     solids : that are at hand; those that are missing are read from the database, and added
     """
-    settings = settings or RelationSettings()
+    settings = settings or held_settings(session)
     act = Act(session, "the solids of the stones", asdict(settings))
     session.flush()
     chosen = None if only is None else _chosen(session, only)

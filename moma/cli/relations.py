@@ -1,6 +1,6 @@
 """The commands of how stones stand to one another."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -18,23 +18,33 @@ _SHOWN = 6  # codes that are named where a path ends
 
 @reporting
 def relate(
-    width: Annotated[float, typer.Option("--width", metavar="M", help="Widest open joint in metres.")] = 0.04,
+    width: Annotated[
+        float | None,
+        typer.Option(
+            "--width", metavar="M", help="Widest open joint in metres; else as last time, at first 0.04."
+        ),
+    ] = None,
     angle: Annotated[
-        float, typer.Option("--angle", metavar="DEG", help="Largest angle between the two faces of a joint.")
-    ] = 12.0,
+        float | None,
+        typer.Option(
+            "--angle",
+            metavar="DEG",
+            help="Largest angle between the faces of a joint; else as last time, at first 12.",
+        ),
+    ] = None,
     db: Db = DEFAULT_DB,
     json: Json = False,
     verbose: Verbose = False,
 ) -> None:
     """Compute again what rests on what, and which courses and arches there are; see docs/relations.md."""
     from archmodel.database import open_database
-    from archmodel.relating import RelationSettings
+    from archmodel.relation_store import held_settings
     from moma.listing import as_json, as_table
     from pipelines.relate import relate as compute
 
-    settings = RelationSettings(width=width, angle=angle)
+    given = {name: value for name, value in (("width", width), ("angle", angle)) if value is not None}
     with open_database(db, create=False) as database, database.session() as session:
-        report = compute(session, settings)
+        report = compute(session, replace(held_settings(session), **given))
     if json:
         print(as_json(asdict(report)))
         return

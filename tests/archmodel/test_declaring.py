@@ -92,6 +92,8 @@ def test_members_are_ranked_and_stay(filled: Database) -> None:
     with filled.session() as session:
         entry = entry_of(session)
         declare_structure(session, entry, "building", "B")
+        with pytest.raises(UsageError, match="V1 is a stone; give the structure a code of its own"):
+            declare_structure(session, entry, "arch", "V1")
         assert declare_structure(session, entry, "arch", "ARCH", title="Arch", parent="B") == NEW
         stones = subjects(session, ["V3", "V1"]).entities
         assert declare_members(session, entry, "ARCH", stones) == Outcome(new=2)

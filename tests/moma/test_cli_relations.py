@@ -47,7 +47,9 @@ def test_other_tolerances_find_other_joints(tmp_path):
     report = json.loads(done.stdout)
     assert report["relations"]["rests_on"]["superseded"] > 100
     assert report["entry"] is not None
-    wide = json.loads(invoke("relate", "--db", url, "--json").stdout)
+    again = json.loads(invoke("relate", "--db", url, "--json").stdout)
+    assert again["entry"] is None  # as last time
+    wide = json.loads(invoke("relate", "--width", "0.04", "--db", url, "--json").stdout)
     assert wide["relations"]["rests_on"]["added"] == report["relations"]["rests_on"]["superseded"]
 
 

@@ -13,12 +13,14 @@ from archmodel.entities import Entity
 from archmodel.entries import Entry, held_at, new_entry
 from archmodel.knowledge import Correction
 from archmodel.relating import RelationSettings
+from archmodel.relation_store import held_settings
 from archmodel.relations import Membership, Relation
 from archmodel.structures import Structure
 from archmodel.surveys import Measurement
 from moma.errors import UsageError
 from pipelines import relate as relating
 from pipelines.relate import KnownSolids, relate
+from tests.archmodel.stones import box_stone
 from tests.pipelines.standing import FRONT, arch, stone, take_in, wall
 from tests.validation import masonry
 
@@ -244,6 +246,24 @@ def test_what_is_no_longer_found_is_superseded_and_can_be_read_back(database):
     assert relations(database, as_of=first.entry) == before
     assert sum(one.superseded for one in second.relations.values()) == len(gone) > 0
     assert sum(one.kept for one in second.relations.values()) == len(before - gone)
+
+
+def test_later_stones_are_related_with_the_tolerances_of_last_time(database):
+    take_in(database, wall(2, 2))
+    settings = replace(RelationSettings(), width=0.06, arch=2.0)
+    related(database, settings=settings)
+    with database.session(read_only=True) as session:
+        assert held_settings(session) == settings
+    # beds 50 mm wide: too wide but for the tolerance of last time
+    take_in(
+        database,
+        [box_stone("lower", at=(100.0, 0.0, 0.0)), box_stone("upper", at=(100.0, 0.0, 0.35))],
+        "later",
+    )
+    report = related(database)
+    with database.session(read_only=True) as session:
+        assert session.get_one(Entry, report.entry).settings == asdict(settings)
+    assert ("rests_on", "upper", "lower") in relations(database)
 
 
 def test_declared_relations_are_left_alone_and_not_doubled(database):
