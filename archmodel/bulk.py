@@ -1,7 +1,7 @@
 """Many rows at once: numbers for them, and the shortest way into the tables."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from itertools import islice
+from itertools import chain, islice
 from operator import itemgetter
 from typing import Any, TypeVar
 
@@ -39,7 +39,7 @@ def insert_rows(session: Session, table: type[Base], rows: Iterable[Mapping[str,
     connection, target, names = session.connection(), _table(table), tuple(first)
     convert = _converter(target, names, connection.dialect)
     count = 0
-    for batch in batches(_chained(first, source)):
+    for batch in batches(chain((first,), source)):
         if any(len(row) != len(names) for row in batch):
             raise ValueError(f"rows of {target.name} with other columns than {', '.join(names)}")
         _SENDERS[connection.dialect.name](connection, target, names, [convert(row) for row in batch])
@@ -60,11 +60,6 @@ def _table(table: type[Base]) -> Table:
     found = table.__table__
     assert isinstance(found, Table)
     return found
-
-
-def _chained(first: T, rest: Iterator[T]) -> Iterator[T]:
-    yield first
-    yield from rest
 
 
 def _converter(table: Table, names: Sequence[str], dialect: Dialect) -> Callable[[Mapping[str, Any]], Row]:
