@@ -5,12 +5,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
-from sqlalchemy import func, select
+from sqlalchemy import select
 from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from archmodel.bulk import batches
 from archmodel.entities import Entity
-from archmodel.entries import Entry
+from archmodel.entries import Entry, latest_entry
 from archmodel.knowledge import Correction, Document, Material, Phase
 from archmodel.structures import Structure
 from moma.errors import UsageError
@@ -60,8 +60,9 @@ def check_entry(session: Session, at: int | None) -> None:
         naming the last entry
     """
     if at is not None and session.get(Entry, at) is None:
-        last = session.scalar(select(func.max(Entry.id)))
-        remedy = f"the last one is {last}; list those of a stone by: moma show CODE --history"
+        remedy = (
+            f"the last one is {latest_entry(session)}; list those of a stone by: moma show CODE --history"
+        )
         raise UsageError(f"there is no entry {at}", remedy=remedy)
 
 

@@ -43,23 +43,10 @@ __all__ = [
     "say_observation",
     "say_of_phase",
     "say_reference",
-    "statement_columns",
 ]
 
 SINGLE: tuple[type[Statement], ...] = (MadeOf, OfPhase, DepthEvidence)
 """Statements of which a subject has at most one that is held."""
-
-_COMMON = ("text", "document_id", "locator", "observed_on")
-
-_OWN: Mapping[type[Statement], tuple[str, ...]] = {
-    MadeOf: ("material_id",),
-    OfPhase: ("phase_id",),
-    MasonMark: ("sign", "place"),
-    Observation: ("type", "severity", "place", "x", "y", "z"),
-    DepthEvidence: ("value", "sigma"),
-    Reference: (),
-    Note: ("key",),
-}
 
 
 @dataclass(frozen=True)
@@ -80,11 +67,6 @@ class Remark:
 
 
 PLAIN = Remark()
-
-
-def statement_columns(cls: type[Statement]) -> tuple[str, ...]:
-    """Names of the columns that a kind of statement says something in."""
-    return (*_OWN[cls], *_COMMON)
 
 
 def say_made_of(

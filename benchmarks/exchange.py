@@ -5,13 +5,10 @@ relations for each stone. Each row is a process of its own on one core. See benc
 """
 
 import argparse
-import json
-import os
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
+from benchmarks.child import run_child
 from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
 from moma.errors import ExchangeError
 
@@ -65,20 +62,15 @@ def _options() -> argparse.Namespace:
 
 
 def _child(stage: str, folder: Path, stones: int, suffix: str) -> Row:
-    threads = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
-    done = subprocess.run(
-        [sys.executable, "-m", "benchmarks.exchange_child", stage, str(folder), str(stones), suffix],
-        cwd=Path(__file__).resolve().parents[1],
-        env=os.environ | dict.fromkeys(threads, "1"),
-        capture_output=True,
-        text=True,
-        check=False,
+    return run_child(
+        "benchmarks.exchange_child",
+        stage,
+        folder,
+        stones,
+        suffix,
+        where=f"{stage} {suffix}",
+        error=ExchangeError,
     )
-    if done.returncode:
-        said = done.stderr.strip().splitlines()
-        raise ExchangeError(said[-1] if said else "no word", where=f"{stage} {suffix}")
-    row: Row = json.loads(done.stdout.splitlines()[-1])
-    return row
 
 
 def _derived(row: Row) -> Row:

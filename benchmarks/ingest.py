@@ -5,13 +5,10 @@ tables. Each row is a process of its own on one core. See benchmarks/README.md f
 """
 
 import argparse
-import json
-import os
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
+from benchmarks.child import run_child
 from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
 from moma.errors import SurveyError
 
@@ -71,20 +68,9 @@ def _options() -> argparse.Namespace:
 
 
 def _child(stage: str, format: str, path: Path, stones: int) -> Row:
-    threads = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
-    done = subprocess.run(
-        [sys.executable, "-m", "benchmarks.ingest_child", stage, format, str(path), str(stones)],
-        cwd=Path(__file__).resolve().parents[1],
-        env=os.environ | dict.fromkeys(threads, "1"),
-        capture_output=True,
-        text=True,
-        check=False,
+    return run_child(
+        "benchmarks.ingest_child", stage, format, path, stones, where=f"{stage}, {format}", error=SurveyError
     )
-    if done.returncode:
-        said = done.stderr.strip().splitlines()
-        raise SurveyError(said[-1] if said else "no word", where=f"{stage}, {format}")
-    row: Row = json.loads(done.stdout.splitlines()[-1])
-    return row
 
 
 def _derived(row: Row) -> Row:

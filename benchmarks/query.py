@@ -6,15 +6,12 @@ benchmarks/README.md for what the columns mean.
 """
 
 import argparse
-import json
-import os
-import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
+from benchmarks.child import run_child
 from benchmarks.query_child import QUESTIONS, STEPS
 from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
 from moma.errors import DatabaseError
@@ -93,20 +90,9 @@ def _databases(options: argparse.Namespace, held: ExitStack) -> Iterator[tuple[s
 
 
 def _child(action: str, name: str, url: str, stones: int) -> Row:
-    threads = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
-    done = subprocess.run(
-        [sys.executable, "-m", "benchmarks.query_child", action, name, url, str(stones)],
-        cwd=Path(__file__).resolve().parents[1],
-        env=os.environ | dict.fromkeys(threads, "1"),
-        capture_output=True,
-        text=True,
-        check=False,
+    return run_child(
+        "benchmarks.query_child", action, name, url, stones, where=f"{action} {name}", error=DatabaseError
     )
-    if done.returncode:
-        said = done.stderr.strip().splitlines()
-        raise DatabaseError(said[-1] if said else "no word", where=f"{action} {name}")
-    row: Row = json.loads(done.stdout.splitlines()[-1])
-    return row
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ from moma.errors import (
 )
 from pipelines.record_keys import ARRAYS, ATTRIBUTE, PROPERTY, RECORD
 from pipelines.schema import Document, Key, check_table, nearest
-from pipelines.toml_lines import Path, key_lines, parse_toml
+from pipelines.toml_lines import Path, key_lines, parse_toml, read_text
 
 __all__ = ["RecordFile", "Table", "parse_record", "read_record"]
 
@@ -79,16 +79,7 @@ def read_record(path: str | FilePath) -> RecordFile:
     ------
     UsageError : with file and line, at the first thing that is wrong
     """
-    try:
-        text = FilePath(path).read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise UsageError("no such file", where=str(path), remedy="check the path") from None
-    except UnicodeDecodeError as error:
-        what = f"byte {error.start} is not UTF-8"
-        raise UsageError(what, where=str(path), remedy="save the file as UTF-8") from None
-    except OSError as error:
-        raise UsageError(f"cannot be read: {error.strerror}", where=str(path)) from None
-    return parse_record(text, str(path))
+    return parse_record(read_text(path, UsageError, encoding="utf-8-sig"), str(path))
 
 
 def parse_record(text: str, path: str) -> RecordFile:

@@ -30,7 +30,7 @@ from pipelines.scene_keys import PICTURES, TABLES
 from pipelines.scene_loads import read_loads, read_throws
 from pipelines.schema import Document, check_table, nearest
 from pipelines.stone_keys import MATERIAL_KEYS, MESH_KEYS, ORTHOTROPY_KEYS
-from pipelines.toml_lines import key_lines, parse_toml
+from pipelines.toml_lines import key_lines, parse_toml, read_text
 from survey.joint_lines import JointSettings
 
 __all__ = [
@@ -131,17 +131,7 @@ def read_scene(path: str | Path) -> SceneFile:
     ------
     SceneError : with file and line, at the first thing that is wrong
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise SceneError("no such scene file", where=str(path), remedy="check the path") from None
-    except UnicodeDecodeError as error:
-        raise SceneError(
-            f"byte {error.start} is not UTF-8", where=str(path), remedy="save the file as UTF-8"
-        ) from None
-    except OSError as error:
-        raise SceneError(f"cannot be read: {error.strerror}", where=str(path)) from None
-    return parse_scene(text, str(path))
+    return parse_scene(read_text(path, SceneError, missing="no such scene file"), str(path))
 
 
 def parse_scene(text: str, path: str) -> SceneFile:

@@ -3,11 +3,12 @@
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
+from pathlib import Path as FilePath
 from typing import Any
 
 from moma.errors import UsageError
 
-__all__ = ["Path", "key_lines", "line_of", "parse_toml"]
+__all__ = ["Path", "key_lines", "line_of", "parse_toml", "read_text"]
 
 Path = tuple[str, ...]
 
@@ -94,6 +95,30 @@ def _dotted(key: str) -> Path:
         (name, value), *_ = value.items()
         path.append(name)
     return tuple(path)
+
+
+def read_text(
+    path: str | FilePath, error: type[UsageError], *, missing: str = "no such file", encoding: str = "utf-8"
+) -> str:
+    """The text of a file that a user wrote.
+
+    Parameters
+    ----------
+    error, missing : of the complaint, and its words where there is no such file
+
+    Raises
+    ------
+    UsageError : as `error`
+    """
+    try:
+        return FilePath(path).read_text(encoding=encoding)
+    except FileNotFoundError:
+        raise error(missing, where=str(path), remedy="check the path") from None
+    except UnicodeDecodeError as fault:
+        what = f"byte {fault.start} is not UTF-8"
+        raise error(what, where=str(path), remedy="save the file as UTF-8") from None
+    except OSError as fault:
+        raise error(f"cannot be read: {fault.strerror}", where=str(path)) from None
 
 
 def parse_toml(text: str, path: str, error: type[UsageError], remedy: str) -> dict[str, Any]:
