@@ -7,31 +7,12 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from survey.joint_settings import JointSettings
 from survey.walls import Sides
 
 __all__ = ["JointLine", "JointSettings", "facing_pairs", "joint_lines"]
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class JointSettings:
-    """What counts as a joint, and how far closing it may move a stone.
-
-    Attributes
-    ----------
-    max_width : sides farther apart do not touch [m]
-    max_angle : sides that open wider do not face each other [degrees]
-    min_overlap : length over which two sides must face each other [m]
-    straightness : largest distance of a sound corner from its side of a joint that is taken as straight [m]
-    max_displacement : largest distance by which a corner may move [m]
-    """
-
-    max_width: float = 0.05
-    max_angle: float = 20.0
-    min_overlap: float = 0.03
-    straightness: float = 0.02
-    max_displacement: float = 0.08
 
 
 @dataclass(frozen=True)
