@@ -10,6 +10,7 @@ a springer stay as they were measured.
 """
 
 from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,14 +23,52 @@ from survey.faces import Face
 from survey.records import Extrusion
 from survey.solids import Solid
 
-__all__ = ["BlockyStone", "simplify"]
+__all__ = ["BlockShape", "BlockyStone", "Simplified", "simplify"]
 
 Array = NDArray[np.float64]
 
 
+class BlockShape(StrEnum):
+    """What a simplified stone is.
+
+    HEXAHEDRON: six faces of four corners. WEDGE: a prism on a triangle. PRISM: one on a convex face of five corners
+    or more. POLYHEDRON: general, convex or not, as it was surveyed.
+    """
+
+    HEXAHEDRON = "hexahedron"
+    WEDGE = "wedge"
+    PRISM = "prism"
+    POLYHEDRON = "polyhedron"
+
+
+@dataclass(frozen=True)
+class Simplified:
+    """What simplifying one stone changed, and how sure that is.
+
+    Attributes
+    ----------
+    displacement : (nv,) of each corner of the surveyed solid: its distance from the surface of the simplified one, or,
+        if larger, the distance of the nearest new corner from the surface of the surveyed one [m]
+    volume_change : new volume over surveyed volume, minus 1 [-]
+    worst_angle : largest departure from a right angle between two neighbouring faces of the new solid [degrees]
+    blockiness : 1 for a stone that was a hexahedron; less, the more of it lies beside one [-]
+    tolerance : by which the survey itself may be wrong [m]
+    within : whether no sound corner moved by more than the tolerance
+    reason : what was done, or why nothing was, in words
+    """
+
+    displacement: Array
+    volume_change: float
+    worst_angle: float
+    blockiness: float
+    tolerance: float
+    within: bool
+    reason: str
+
+
 @dataclass(frozen=True)
 class BlockyStone:
-    """A stone with six faces.
+    """A stone as the simplest solid that is true to it.
 
     Attributes
     ----------
@@ -37,11 +76,12 @@ class BlockyStone:
     face : the measured face it comes from
     depth : its depth, with the evidence
     extrusion : how its hidden side lies
-    corners : (4, 3) of the face, on its plane, counter-clockwise seen from outside [m]
-    sound : (4,) whether each corner is known from measurement on the face; False for a worn corner
-    solid : hexahedron; the four visible corners first, then the four hidden ones in the same order
-    displacement : (nv,) distance of each corner of the measured outline from the new outline [m]
-    volume_change : new volume over measured volume, minus 1 [-]
+    solid : closed, with planar faces. A hexahedron, wedge or prism has the visible corners first, counter-clockwise
+        seen from outside, then the hidden ones in the same order
+    sound : (n,) whether each visible corner of the solid, or each corner of a POLYHEDRON that another program made,
+        is known from measurement; False: reconstructed, or worn
+    shape : what it is
+    report : what was changed
     """
 
     code: str
@@ -50,37 +90,53 @@ class BlockyStone:
     face: Face
     depth: Depth
     extrusion: Extrusion
-    corners: Array
-    sound: tuple[bool, ...]
     solid: Solid
-    displacement: Array
-    volume_change: float
+    sound: NDArray[np.bool_]
+    shape: BlockShape
+    report: Simplified
+
+    @property
+    def corners(self) -> Array:
+        """The visible face of a hexahedron, (4, 3) [m].
+
+        Raises
+        ------
+        GeometryError
+            if it is none
+        """
+        if self.shape is not BlockShape.HEXAHEDRON:
+            raise GeometryError(
+                f"it is no hexahedron: {self.report.reason}",
+                where=f"stone {self.code}",
+                remedy="leave the joints as surveyed, or leave the stone out",
+            )
+        corners: Array = self.solid.vertices[:4]
+        return corners
 
 
 def simplify(block: SurveyedBlock) -> BlockyStone:
-    """Make a hexahedron of a surveyed block.
+    """Make the simplest honest solid of a surveyed block.
 
     Parameters
     ----------
     block : a stone with its measured face of three or more corners, or with the solid that another program made
-
-    Returns
-    -------
-    BlockyStone, with what was changed; a solid of six faces is taken as it is, be it a prism or not
-
-    Raises
-    ------
-    GeometryError
-        for a triangular face, which has no quadrilateral of its own, and for a solid that is no hexahedron
     """
-    sound: tuple[bool, ...]
-    if block.face.provenance.source == "solid":
-        corners, solid = block.face.outline, _hexahedron(block)
-        sound, displacement, change = (True,) * 4, np.zeros(4), 0.0
+    shape, reason = BlockShape.HEXAHEDRON, "a face of four corners"
+    displacement, change = np.zeros(len(block.solid.vertices)), 0.0
+    if block.face.provenance.source in ("points", "photograph"):
+        if len(block.face.outline) == 3:
+            solid, shape, reason = block.solid, BlockShape.WEDGE, "a triangular face"
+            sound = np.array([i not in block.face.rejected_vertices for i in range(3)])
+        else:
+            corners, sound, moved, change = _squared(block)
+            hidden = hidden_side(corners, block.face.fit.normal, block.depth.value, block.extrusion)
+            solid = prism(block.code, corners, hidden)
+            displacement = np.concatenate([moved, moved])
+    elif len(block.solid.vertices) == 8 and all(len(face) == 4 for face in block.solid.faces):
+        solid, sound = _hexahedron(block), np.ones(4, dtype=np.bool_)
     else:
-        corners, sound, displacement, change = _squared(block)
-        hidden = hidden_side(corners, block.face.fit.normal, block.depth.value, block.extrusion)
-        solid = prism(block.code, corners, hidden)
+        solid, sound = block.solid, np.ones(len(block.solid.vertices), dtype=np.bool_)
+        shape, reason = BlockShape.POLYHEDRON, f"a solid of {len(block.solid.faces)} faces"
     return BlockyStone(
         code=block.code,
         kind=block.kind,
@@ -88,15 +144,14 @@ def simplify(block: SurveyedBlock) -> BlockyStone:
         face=block.face,
         depth=block.depth,
         extrusion=block.extrusion,
-        corners=corners,
-        sound=sound,
         solid=solid,
-        displacement=displacement,
-        volume_change=change,
+        sound=sound,
+        shape=shape,
+        report=Simplified(displacement, change, 0.0, 1.0, 0.005, True, reason),
     )
 
 
-def _squared(block: SurveyedBlock) -> tuple[Array, tuple[bool, ...], Array, float]:
+def _squared(block: SurveyedBlock) -> tuple[Array, NDArray[np.bool_], Array, float]:
     """Corners of a measured face's own quadrilateral; which are sound, how far the outline moved, change of area."""
     fit = block.face.fit
     axes = np.array([fit.axes[0], np.cross(fit.normal, fit.axes[0])])
@@ -105,7 +160,7 @@ def _squared(block: SurveyedBlock) -> tuple[Array, tuple[bool, ...], Array, floa
     worn = flat[list(block.face.rejected_vertices)]
     return (
         fit.centroid + quad @ axes,
-        tuple(not bool((np.linalg.norm(worn - corner, axis=1) < 1e-9).any()) for corner in quad),
+        np.array([not bool((np.linalg.norm(worn - corner, axis=1) < 1e-9).any()) for corner in quad]),
         np.array([_distance_to_outline(corner, quad) for corner in flat]),
         _area(quad) / _area(flat) - 1.0,
     )
@@ -114,12 +169,6 @@ def _squared(block: SurveyedBlock) -> tuple[Array, tuple[bool, ...], Array, floa
 def _hexahedron(block: SurveyedBlock) -> Solid:
     """A solid of six faces of four corners, with its corners in the order of a BlockyStone's."""
     solid, outline = block.solid, block.face.outline
-    if len(solid.vertices) != 8 or any(len(face) != 4 for face in solid.faces):
-        raise GeometryError(
-            f"its solid has {len(solid.faces)} faces and {len(solid.vertices)} corners, not 6 faces of 4 corners",
-            where=f"stone {block.code}",
-            remedy='leave joints open (mode = "open" in [joints]), or make a solid of six faces of it',
-        )
     visible = [int(np.linalg.norm(solid.vertices - corner, axis=1).argmin()) for corner in outline]
     edges = [{face[k - 1], face[k]} for face in solid.faces for k in range(4)]
     hidden = [
