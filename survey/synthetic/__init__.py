@@ -1,1 +1,1 @@
-"""A synthetic survey: a wall with a window that never stood, measured as a surveyor would, and its truth."""
+"""Synthetic buildings that never stood, measured as a surveyor would, with their truth; the sample is one of them."""

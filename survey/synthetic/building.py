@@ -1,0 +1,132 @@
+"""A synthetic building: its true stones with closed joints, and how a surveyor finds them, with open ones."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from random import Random
+
+import numpy as np
+from numpy.typing import NDArray
+
+from survey.depth import depth_for
+from survey.extrusion import SurveyedBlock, extrude, prism
+from survey.faces import outline_face
+from survey.records import OBSERVER, BlockRecord, DepthRule, Station, Survey, SurveyHead
+from survey.solids import Solid
+from survey.synthetic.bond import PlannedStone
+from survey.synthetic.frame import TrueStone, WallFrame
+from survey.synthetic.measure import HALF_JOINT, SIGMA, measure_stone
+from survey.synthetic.shared_faces import TrueJoint, true_joints
+
+__all__ = ["Building", "Draft", "flat_stone", "measured_building", "observer"]
+
+Array = NDArray[np.float64]
+
+SOURCE = "synthetic value, chosen for this building"
+SEEN = "synthetic value, as if measured on a side that can be seen"
+DEPTH_SIGMA = 0.03
+
+
+@dataclass(frozen=True)
+class Draft:
+    """A true stone that waits to be measured.
+
+    Attributes
+    ----------
+    stone : as it truly is
+    frame : in which its plan lies
+    quad : (4, 2) the four corners that a surveyor sees, counter-clockwise [m]
+    side_of : which side of `quad` each side of the plan belongs to
+    zone, station : as in a survey's record
+    seen_depth : whether its depth can be seen, and is measured
+    """
+
+    stone: TrueStone
+    frame: WallFrame
+    quad: Array
+    side_of: tuple[int, ...] = (0, 1, 2, 3)
+    zone: str | None = None
+    station: str | None = None
+    seen_depth: bool = False
+
+
+@dataclass(frozen=True)
+class Building:
+    """A synthetic building: no such one exists.
+
+    Attributes
+    ----------
+    name : says what it is
+    survey : what a surveyor measured of it
+    solids : the true stones, closed joints, convex; in the order of the survey
+    joints : all true joints
+    base : codes of the stones that stand on the ground
+    """
+
+    name: str
+    survey: Survey
+    solids: tuple[Solid, ...]
+    joints: tuple[TrueJoint, ...]
+    base: tuple[str, ...]
+
+    def blocks(self) -> list[SurveyedBlock]:
+        """The surveyed stones: planes fitted, outlines extruded by their depth."""
+        head = self.survey.head
+        return [
+            extrude(outline_face(one, head.viewpoint(one.station)), depth_for(one, head.depth_rules))
+            for one in self.survey.blocks
+        ]
+
+
+def flat_stone(plan: PlannedStone, depth: float, frame: WallFrame) -> TrueStone:
+    """A stone whose face lies in the frame's plane itself."""
+    corners = frame.place(plan.corners)
+    solid = prism(plan.code, corners, corners - depth * frame.axes[2])
+    return TrueStone(plan, frame.axes[2], float(frame.axes[2] @ frame.origin), depth, solid)
+
+
+def measured_building(
+    name: str,
+    drafts: Sequence[Draft],
+    depths: dict[str, float],
+    stations: Sequence[Station],
+    base: Sequence[str],
+    rng: Random,
+) -> Building:
+    """Measure a building; sides that truly touch a stone are surveyed half a joint inside.
+
+    Parameters
+    ----------
+    name : of the survey
+    drafts : the true stones
+    depths : by kind, what is known of depths [m]
+    stations : where the surveyor stood
+    base : codes of the stones on the ground
+    rng : source of chance
+    """
+    joints = true_joints([draft.stone.solid for draft in drafts])
+    touched = {(code, face) for joint in joints for code, face in zip(joint.stones, joint.faces, strict=True)}
+    records = tuple(_measured(draft, touched, rng) for draft in drafts)
+    rules = tuple(DepthRule(kind, depth, DEPTH_SIGMA, SOURCE) for kind, depth in sorted(depths.items()))
+    head = SurveyHead(f"{name} (synthetic)", f"{name}.moma", tuple(stations), depth_rules=rules)
+    solids = tuple(draft.stone.solid for draft in drafts)
+    return Building(name, Survey(head, records), solids, joints, tuple(base))
+
+
+def observer(position: Array) -> Station:
+    """The usual place from which all is seen."""
+    return Station(OBSERVER, np.round(position, 4))
+
+
+def _measured(draft: Draft, touched: set[tuple[str, int]], rng: Random) -> BlockRecord:
+    """Measure one face, and the depth where it can be seen."""
+    stone, code = draft.stone, draft.stone.plan.code
+    touching = {side for i, side in enumerate(draft.side_of) if (code, 2 + i) in touched}
+    joint = (0 in touching, 1 in touching, 2 in touching, 3 in touching)
+    plan = replace(stone.plan, corners=draft.quad, joint=joint)
+    record = measure_stone(replace(stone, plan=plan), draft.frame, rng).record
+    record = replace(record, zone=draft.zone, station=draft.station)
+    if not draft.seen_depth:
+        return record
+    hidden_half = rng.uniform(*HALF_JOINT) if (code, 1) in touched else 0.0
+    depth = round(stone.depth - hidden_half + rng.gauss(0.0, SIGMA), 4)
+    return replace(record, depth=depth, depth_sigma=SIGMA, depth_source=SEEN)
