@@ -18,6 +18,7 @@ from archmodel.columns import (
     of_observations,
     of_relations,
     of_result,
+    of_simplification,
     of_values,
     rows,
     structures,
@@ -44,6 +45,7 @@ class Attribute:
     value : where it is found: of a scope and, if it is one of a run, of the number of that run
     of_run : a run computed it, so that ``name@12`` asks for that of run 12
     words : all texts that it can be; None if it can be any
+    is_truth : it is true or false
     """
 
     name: str
@@ -52,11 +54,17 @@ class Attribute:
     value: Value
     of_run: bool = False
     words: tuple[str, ...] | None = None
+    is_truth: bool = False
 
     @property
     def is_number(self) -> bool:
         """Whether it is a number, and not a text."""
         return self.unit is not None
+
+    @property
+    def type_name(self) -> str:
+        """Its unit; of what has none, whether it is a text or true or false."""
+        return self.unit or ("true/false" if self.is_truth else "text")
 
 
 def _result(
@@ -83,6 +91,13 @@ _BUILT = (
     Attribute("x", "m", "centroid of its solid", of_entity("x")),
     Attribute("y", "m", "centroid of its solid", of_entity("y")),
     Attribute("z", "m", "centroid of its solid", of_entity("z")),
+    Attribute(
+        "hypothesis",
+        None,
+        "nobody has seen it: missing, or hidden in the wall",
+        of_entity("hypothesis"),
+        is_truth=True,
+    ),
 )
 
 _MEASURED = (
@@ -95,7 +110,12 @@ _MEASURED = (
     Attribute(
         "shape", None, "of its face: plane, bevelled, curved, rough, untested", of_measurement("shape")
     ),
-    Attribute("provenance", None, "of its face: points, photograph or solid", of_measurement("provenance")),
+    Attribute(
+        "provenance",
+        None,
+        "of its face: points, photograph, solid or hypothesis",
+        of_measurement("provenance"),
+    ),
     Attribute("station", None, "where the instrument stood", of_measurement("station")),
     Attribute("photograph", None, "on which its face was drawn", of_measurement("photograph")),
     Attribute(
@@ -168,7 +188,20 @@ _COMPUTED = (
         "simplified_by",
         "m",
         "farthest that a corner of its solid was moved for the run",
-        lambda scope, run: scope.simplification(run).c.displacement_max,
+        of_simplification("displacement_max"),
+    ),
+    _result("solid_shape", None, "of its simplified solid, e.g. hexahedron", of_simplification("shape")),
+    _result("blockiness", "-", "how near it was to that shape, up to 1", of_simplification("blockiness")),
+    _result(
+        "worst_angle", "rad", "farthest that simplifying turned a face", of_simplification("worst_angle")
+    ),
+    Attribute(
+        "within_tolerance",
+        None,
+        "simplifying kept within what the survey can tell",
+        of_simplification("within_tolerance"),
+        of_run=True,
+        is_truth=True,
     ),
     _result("outcome", None, "equilibrium, moving or collapsed", lambda scope, run: scope.run(run).c.outcome),
     _result("scene", None, "name of the scene", lambda scope, run: scope.run(run).c.scene),

@@ -23,6 +23,7 @@ __all__ = [
     "of_observations",
     "of_relations",
     "of_result",
+    "of_simplification",
     "of_values",
     "rows",
     "structures",
@@ -47,6 +48,11 @@ def of_measurement(name: str) -> Value:
 def of_result(name: str) -> Value:
     """A column of its result in a run."""
     return lambda scope, run: scope.result(run).c[name]
+
+
+def of_simplification(name: str) -> Value:
+    """A column of the solid that stood for it in a run."""
+    return lambda scope, run: scope.simplification(run).c[name]
 
 
 def of_values(name: str) -> Value:

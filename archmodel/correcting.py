@@ -29,7 +29,7 @@ CORRECTABLE = ("kind", "code", "course", "zone")
 
 _GEOMETRY = ("depth", "depth_sigma", "depth_source", "depth_origin", "volume", "x", "y", "z")
 
-_FOLLOWS = frozenset({"length", "height", "area", "volume", "x", "y", "z"})
+_FOLLOWS = frozenset({"length", "height", "area", "volume", "x", "y", "z", "hypothesis"})
 
 
 def correct(session: Session, entry: Entry, code: str, values: Mapping[str, object]) -> Outcome:

@@ -46,7 +46,7 @@ def describe(session: Session, code: str, at: int | None = None) -> dict[str, ob
     -------
     dict
         of a stone: code, kind, definition, kinds (general to particular, each with its definition), canon,
-        course, zone, own (attributes of its kind: value, unit, definition), face, solid, depth, structures,
+        course, zone, hypothesis, own (attributes of its kind: value, unit, definition), face, solid, depth, structures,
         relations, knowledge, survey, measured, notes, runs (latest first), joints (of the latest run),
         corrections; of a structure: code, kind, definition, title, number, side, part_of, parts, members,
         knowledge, recorded, withdrawn; SI units
@@ -87,6 +87,7 @@ def _entity(session: Session, number: int, code: str, at: int | None) -> Values:
         "canon": canon_of(cls),
         "course": row["course"],
         "zone": row["zone"],
+        "hypothesis": row["hypothesis"],
         "own": _own(cls, row),
         "face": {"length": row["length"], "height": row["height"], "area": row["area"]},
         "solid": {"volume": row["volume"], "centroid": [row["x"], row["y"], row["z"]]},

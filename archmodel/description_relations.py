@@ -60,6 +60,7 @@ def joints(session: Session, entity: int, run: int) -> list[Values]:
         {
             "neighbour": (one.second if one.first_id == entity else one.first).code,
             "area": one.area,
+            "width": one.width,
             "force_normal": one.force_normal,
             "force_shear": one.force_shear,
             "pressure_max": one.pressure_max,

@@ -27,7 +27,8 @@
     │   │   └── Capital
     │   └── Rubble
     ├── Infill
-    └── Joint
+    ├── Joint
+    └── Support
 
 To add a kind, write one class with a docstring; all kinds live in one table and differ in the column `kind`
 (single-table inheritance, see ``docs/decisions/015-one-table-of-entities.md``). Attributes of its own are typed
@@ -80,6 +81,7 @@ __all__ = [
     "Springer",
     "Stone",
     "Stretcher",
+    "Support",
     "Voussoir",
     "canon_of",
     "definition_of",
@@ -130,6 +132,7 @@ class Entity(Base):
     area : of its face [m²]
     volume : of its solid [m³]
     x, y, z : centroid of its solid [m]
+    hypothesis : nobody has seen it: a stone that is missing, or hidden within the wall, and thought to be there
     own : values of the attributes of a registered kind, by name
     entry : the act of recording that it came with; later changes are `knowledge.Correction`
 
@@ -169,6 +172,7 @@ class Entity(Base):
     x: Mapped[float | None]
     y: Mapped[float | None]
     z: Mapped[float | None]
+    hypothesis: Mapped[bool] = mapped_column(default=False)
     own: Mapped[dict[str, object] | None]
 
     entry: Mapped[Entry] = relationship()
@@ -338,6 +342,10 @@ class Joint(Entity):
     __own__ = (OwnAttribute("thickness", "m", "distance of the two faces that it fills"),)
 
     thickness: Mapped[float | None]
+
+
+class Support(Entity):
+    """The ground, the rock or a foundation, on which the masonry stands and which does not move."""
 
 
 def kinds() -> Mapping[str, type[Entity]]:

@@ -9,7 +9,7 @@ import operator
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from sqlalchemy import ColumnElement, Double, Integer, and_, literal, not_, or_, select
+from sqlalchemy import Boolean, ColumnElement, Double, Integer, and_, literal, not_, or_, select
 from sqlalchemy.orm import Session
 
 from archmodel.attributes import ATTRIBUTES, Attribute, attributes_of
@@ -110,6 +110,9 @@ def condition_in(scope: Where, node: Node) -> ColumnElement[bool]:
             attribute, column = _column(scope, name)
             if attribute.is_number:
                 raise complaint(name, f"{attribute.name} is a number, like is for texts", "use < and >")
+            if attribute.is_truth:
+                what = f"{attribute.name} is true or false, like is for texts"
+                raise complaint(name, what, f"write {attribute.name} = true")
             # With an escape character of our own: databases differ in the one that they assume.
             return column.ilike(pattern.text.replace("~", "~~"), escape="~")
         case Membership(name, values):
@@ -174,15 +177,13 @@ def _operand(scope: Where, attribute: Attribute, value: Token) -> Any:
         name = value.text.partition("@")[0].lower()
         other = _found(scope, name)
         if other is None:
-            kind = "a number" if attribute.is_number else "a text"
+            kind = _type_of(attribute)
             what = f"{value.text[:40]!r} is neither {kind} nor an attribute, and {attribute.name} is {kind}"
             raise complaint(value, what, meant(name, _attributes(scope), "the attributes"))
-        if other.is_number is not attribute.is_number:
-            kinds = ("a text", "a number")
-            what = (
-                f"{attribute.name} is {kinds[attribute.is_number]}, {other.name} is {kinds[other.is_number]}"
+        if (other.is_number, other.is_truth) != (attribute.is_number, attribute.is_truth):
+            raise complaint(
+                value, f"{attribute.name} is {_type_of(attribute)}, {other.name} is {_type_of(other)}"
             )
-            raise complaint(value, what)
         return _column(scope, value)[1]
     return _constant(scope, attribute, value)
 
@@ -191,6 +192,8 @@ def _constant(scope: Where, attribute: Attribute, value: Token) -> Any:
     """The value as the attribute's type has it."""
     if attribute.is_number:
         return _number(attribute, value)
+    if attribute.is_truth:
+        return _truth(attribute, value)
     if attribute.name == "kind":
         try:
             if isinstance(scope, StructureScope):
@@ -202,6 +205,21 @@ def _constant(scope: Where, attribute: Attribute, value: Token) -> Any:
         what = f"unknown {attribute.name} {value.text[:40]!r}"
         raise complaint(value, what, f"they are {', '.join(attribute.words)}")
     return value.text
+
+
+def _type_of(attribute: Attribute) -> str:
+    return "a number" if attribute.is_number else "true or false" if attribute.is_truth else "a text"
+
+
+def _truth(attribute: Attribute, value: Token) -> ColumnElement[Any]:
+    """True or false, in upper or lower case."""
+    if value.text.lower() not in _TRUTHS:
+        what = f"{attribute.name} is true or false, {value.text[:40]!r} is not"
+        raise complaint(value, what, f"write {attribute.name} = true or {attribute.name} = false")
+    return literal(_TRUTHS[value.text.lower()], Boolean)
+
+
+_TRUTHS = {"true": True, "false": False}
 
 
 def _number(attribute: Attribute, value: Token) -> ColumnElement[Any]:

@@ -16,7 +16,7 @@ from archmodel.base import Base
 
 __all__ = ["SCHEMA_VERSION", "SchemaVersion", "metadata"]
 
-SCHEMA_VERSION = 3
+SCHEMA_VERSION = 4
 """Layout of the tables that this version of MOMA reads and writes."""
 
 

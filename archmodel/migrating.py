@@ -15,13 +15,13 @@ from sqlalchemy.exc import DBAPIError
 
 from archmodel.database import Home, home_of, version_of
 from archmodel.layout import SCHEMA_VERSION
-from archmodel.migrations.versions import v2_frames_and_shapes, v3_architectural_model
+from archmodel.migrations.versions import v2_frames_and_shapes, v3_architectural_model, v4_hypotheses
 from archmodel.sqlite import SqliteFile
 from moma.errors import DatabaseError, UsageError
 
 __all__ = ["Migration", "migrate"]
 
-_STEPS_DOWN = {3: v3_architectural_model, 2: v2_frames_and_shapes}
+_STEPS_DOWN = {4: v4_hypotheses, 3: v3_architectural_model, 2: v2_frames_and_shapes}
 """What knows what is lost by a step down from a version."""
 
 

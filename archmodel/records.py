@@ -42,7 +42,7 @@ class StoneRecord:
     notes : observations of the surveyor, e.g. {"edge": "eroded"}
     zone : part of the building; None if not said
     depth_origin : stone, rule (of course or zone), kind, structure or solid
-    provenance, provenance_text : points, photograph or solid; the same in words
+    provenance, provenance_text : points, photograph, solid or hypothesis; the same in words
     station, photograph : names of those that saw it; None if not said
     image : (nv, 2) corners on the photograph [px]
     sigmas : (np + nv,) standard deviations of the points, then of the corners [m]; None: all `sigma`
@@ -52,6 +52,7 @@ class StoneRecord:
     direction : (3,) of the extrusion; None: square to the face
     tail : size of the hidden face over that of the visible one
     remarks : what was changed to make the outline a polygon
+    hypothesis : nobody has seen it; it is thought to be there, for the reasons that `provenance_text` gives
     """
 
     code: str
@@ -95,3 +96,4 @@ class StoneRecord:
     direction: Array | None = None
     tail: float = 1.0
     remarks: tuple[str, ...] = ()
+    hypothesis: bool = False

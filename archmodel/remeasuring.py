@@ -27,6 +27,7 @@ _MEASURED = (
     "x",
     "y",
     "z",
+    "hypothesis",
 )
 """Columns of an entity that follow from its measurement. Kind, course and zone do not: whoever corrected them since
 knew more than the survey."""

@@ -54,6 +54,7 @@ def _entity_row(stone: StoneRecord, place: str, volume: float, centroid: list[fl
         "depth_source": storable(stone.depth_source),
         "depth_origin": stone.depth_origin,
         "zone": None if stone.zone is None else _text(stone.zone, "zone", place),
+        "hypothesis": bool(stone.hypothesis),
         "length": _number(stone.length, "length", place),
         "height": _number(stone.height, "height", place),
         "area": _number(stone.area, "area", place),
@@ -150,6 +151,7 @@ def stone_record(entity: Entity, measured: Measurement) -> StoneRecord:
         direction=None if measured.direction is None else measured.direction.copy(),
         tail=measured.tail,
         remarks=tuple(measured.remarks),
+        hypothesis=entity.hypothesis,
     )
 
 

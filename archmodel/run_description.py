@@ -186,7 +186,16 @@ def _joints(
     return [dict(row) for row in session.execute(statement).mappings()]
 
 
-_JOINT_VALUES = ("force_normal", "force_shear", "pressure_max", "kern", "friction_use", "opening", "sliding")
+_JOINT_VALUES = (
+    "width",
+    "force_normal",
+    "force_shear",
+    "pressure_max",
+    "kern",
+    "friction_use",
+    "opening",
+    "sliding",
+)
 
 
 def _flat(settings: Mapping[str, Any], prefix: str = "") -> dict[str, object]:

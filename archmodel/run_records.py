@@ -104,6 +104,7 @@ class JointArrays:
     slipping, open : (nj,) parts of its contact area that slip, that bear nothing; NaN where it has none [-]
     gap : (nj,) largest [m]
     opening, sliding : (nj,) largest since the start [m]
+    width : (nj,) as surveyed, which is the thickness of its mortar; NaN where not known [m]; None: not known of any
     """
 
     stones: Ints
@@ -122,6 +123,7 @@ class JointArrays:
     gap: Array
     opening: Array
     sliding: Array
+    width: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -160,11 +162,15 @@ class SimplificationRecord:
     Attributes
     ----------
     code : the stone
-    mode : how joints were treated: open or close
+    mode : what became of the joints: close, mortar or as-surveyed
     displacement_max : largest distance of a corner from the nearest surveyed one [m]
     volume_change : volume over that of the surveyed solid, minus 1 [-]
     vertices : (nv, 3) [m]
     faces : vertex indices of each face, counter-clockwise seen from outside
+    shape : what the surveyed solid was simplified to before its joints were closed, e.g. hexahedron; None if it was not
+    blockiness : how near the surveyed solid was to that shape, up to 1; None if not known [-]
+    worst_angle : farthest that one of its faces was turned; None if not known [rad]
+    within_tolerance : whether simplifying kept within what the survey can tell; None if not known
     """
 
     code: str
@@ -173,6 +179,10 @@ class SimplificationRecord:
     volume_change: float
     vertices: Array
     faces: tuple[tuple[int, ...], ...]
+    shape: str | None = None
+    blockiness: float | None = None
+    worst_angle: float | None = None
+    within_tolerance: bool | None = None
 
 
 @dataclass(frozen=True)

@@ -95,6 +95,10 @@ def simplification_row(record: SimplificationRecord, place: str) -> dict[str, ob
         "mode": record.mode,
         "displacement_max": _finite(record.displacement_max, "displacement_max", place),
         "volume_change": _finite(record.volume_change, "volume_change", place),
+        "shape": record.shape,
+        "blockiness": _finite(record.blockiness, "blockiness", place),
+        "worst_angle": _finite(record.worst_angle, "worst_angle", place),
+        "within_tolerance": record.within_tolerance,
         "vertices": vertices,
         "faces": [[int(index) for index in face] for face in record.faces],
     }
@@ -116,6 +120,8 @@ def joint_rows(joints: JointArrays, entities: Ints, run: int, place: str) -> Ite
     columns |= _vectors(joints.normal, ("nx", "ny", "nz"), place)
     columns |= {name: _all_finite(getattr(joints, name), name, place) for name in _JOINT_NUMBERS}
     columns |= {name: _known(getattr(joints, name), name, place) for name in _JOINT_UNKNOWNS}
+    width = np.full(len(joints.area), np.nan) if joints.width is None else joints.width
+    columns["width"] = _known(width, "width", place)
     return _rows(columns | {"parted": np.asarray(joints.parted, dtype=bool)}, run)
 
 

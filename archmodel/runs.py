@@ -95,6 +95,7 @@ class JointResult(Base):
     pressure_mean, pressure_max : [Pa]
     kern, friction_use, slipping, open : [-]; None where there is nothing to say
     gap, opening, sliding : [m]
+    width : as surveyed, which is the thickness of its mortar; None if not known [m]
     """
 
     __tablename__ = "joint_result"
@@ -126,6 +127,7 @@ class JointResult(Base):
     gap: Mapped[float]
     opening: Mapped[float]
     sliding: Mapped[float]
+    width: Mapped[float | None]
 
     run: Mapped[Run] = relationship()
     first: Mapped["Entity"] = relationship(foreign_keys=[first_id])

@@ -135,9 +135,10 @@ class Simplification(Base):
 
     Attributes
     ----------
-    mode : how the joints were treated: open, close, …
+    mode : what became of the joints: close, mortar or as-surveyed
     displacement_max : farthest that a corner was moved [m]
     volume_change : relative to the surveyed solid [-]
+    shape, blockiness, worst_angle, within_tolerance : as in ``run_records.SimplificationRecord``
     vertices, faces : the solid [m]
     """
 
@@ -149,5 +150,9 @@ class Simplification(Base):
     mode: Mapped[str]
     displacement_max: Mapped[float]
     volume_change: Mapped[float]
+    shape: Mapped[str | None]
+    blockiness: Mapped[float | None]
+    worst_angle: Mapped[float | None]
+    within_tolerance: Mapped[bool | None]
     vertices: Mapped[Array] = mapped_column(ArrayType(-1, 3))
     faces: Mapped[list[list[int]]] = mapped_column(JSON_TYPE)

@@ -79,6 +79,7 @@ def _entities(stones: int, entry: int) -> Iterator[dict[str, Any]]:
             "x": _LENGTH * (place + 0.5),
             "y": _DEPTH / 2,
             "z": _HEIGHT * (course + 0.5),
+            "hypothesis": False,
         }
 
 

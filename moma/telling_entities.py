@@ -24,6 +24,8 @@ def entity_lines(description: Values) -> str:
     shown["relations"] = {
         name: [_neighbour(one) for one in ones] for name, ones in description.get("relations", {}).items()
     }
+    if not shown.get("hypothesis"):
+        shown.pop("hypothesis", None)  # it was surveyed, as nearly all are
     for name in ("recorded", "withdrawn"):
         shown[name] = _by(description[name]) if description.get(name) else None
     return as_lines({name: _listed(one) for name, one in shown.items()})
@@ -121,10 +123,11 @@ def _neighbour(one: Values) -> str:
 
 
 def _joint(one: Values) -> str:
+    width = "" if one["width"] is None else f", {one['width'] * 1e3:.1f} mm wide as surveyed"
     pressure = "" if one["pressure_max"] is None else f", up to {one['pressure_max']:.3g} Pa"
     return (
         f"{one['neighbour']}: {one['force_normal']:.4g} N across, {one['force_shear']:.4g} N along, "
-        f"on {one['area']:.3g} m²{pressure}"
+        f"on {one['area']:.3g} m²{pressure}{width}"
     )
 
 
@@ -149,4 +152,9 @@ def _value(value: Any) -> str:
         return f"({', '.join(map(_value, value))})"
     if isinstance(value, float):
         return f"{value:.4g}"
+    if isinstance(value, bool):
+        return _TRUTHS[value]
     return "not known" if value is None else str(value)
+
+
+_TRUTHS = {True: "true", False: "false"}

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from archmodel.records import StoneRecord
 from survey.depth import Depth, Origin
 from survey.extrusion import SurveyedBlock, extrude
-from survey.faces import Face, Provenance, face_on, outline_face
+from survey.faces import Face, Provenance, Source, face_on, outline_face
 from survey.planes import FaceFit
 from survey.records import BlockRecord, Extrusion
 from survey.shapes import FaceShape, ShapeKind
@@ -64,6 +64,7 @@ def stone_record(block: SurveyedBlock) -> StoneRecord:
         direction=block.extrusion.direction,
         tail=block.extrusion.tail,
         remarks=face.remarks,
+        hypothesis=face.provenance.source == "hypothesis",
     )
 
 
@@ -118,10 +119,14 @@ def _origin(stone: StoneRecord) -> Origin:
     return next(one for one in get_args(Origin) if one == stone.depth_origin)
 
 
+def _source(stone: StoneRecord) -> Source:
+    return next(one for one in get_args(Source) if one == stone.provenance)
+
+
 def _kept_face(stone: StoneRecord, measured: BlockRecord) -> Face:
     """A face whose plane was not fitted to its corners: that of its neighbours, or the side of a solid."""
     residuals = (stone.vertices - stone.centroid) @ stone.normal
-    on_solid = stone.provenance == "solid"
+    on_solid = stone.provenance in ("solid", "hypothesis")
     fit = FaceFit(
         normal=stone.normal,
         offset=stone.offset,
@@ -142,6 +147,6 @@ def _kept_face(stone: StoneRecord, measured: BlockRecord) -> Face:
         fit,
         corners,
         FaceShape(ShapeKind(stone.shape), stone.shape_text),
-        Provenance("solid" if on_solid else "photograph", stone.provenance_text),
+        Provenance(_source(stone), stone.provenance_text),
         measured,
     )

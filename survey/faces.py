@@ -13,9 +13,12 @@ from survey.records import BlockRecord
 from survey.shapes import FaceShape, judge_shape
 from survey.solids import area_vector
 
-__all__ = ["Face", "Provenance", "face_on", "outline_face"]
+__all__ = ["Face", "Provenance", "Source", "face_on", "outline_face"]
 
 Array = NDArray[np.float64]
+
+Source = Literal["points", "photograph", "solid", "hypothesis"]
+"""What a face can be known from."""
 
 
 @dataclass(frozen=True)
@@ -24,11 +27,12 @@ class Provenance:
 
     Attributes
     ----------
-    source : from points measured in space, from a photograph, or from a solid that another program made
+    source : from points measured in space, from a photograph, or from a solid that another program made; a
+        hypothesis is a face that nobody has seen
     text : the same in words, with names
     """
 
-    source: Literal["points", "photograph", "solid"]
+    source: Source
     text: str
 
 

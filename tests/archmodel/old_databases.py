@@ -2,25 +2,31 @@
 
 ``data/version1.sql`` and ``version2.sql`` are dumps of SQLite files: eight stones of the window bay with every other of
 their points, one point and one corner moved aside, notes; a stone with corners alone; a small run of five of them. The
-second has a ninth stone too, with a value in every column.
+second has a ninth stone too, with a value in every column. ``version3.sql`` has rows in every table, and registers a
+kind and an attribute whose names version 4 took.
 """
 
 import json
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
-from datetime import datetime
+from datetime import date, datetime
 from pathlib import Path
 from typing import Any
 
 from alembic import command
 from alembic.config import Config
-from sqlalchemy import Connection, DateTime, create_engine, insert, select, text
-from sqlalchemy.types import JSON
+from sqlalchemy import Boolean, Connection, DateTime, create_engine, insert, select, text
+from sqlalchemy.types import JSON, Date
 
-from archmodel.migrations.layouts import version1, version2, version3
+from archmodel.migrations.layouts import version1, version2, version3, version4
 
-LAYOUTS = {1: version1.metadata, 2: version2.metadata, 3: version3.metadata}
+LAYOUTS = {
+    1: version1.metadata,
+    2: version2.metadata,
+    3: version3.metadata,
+    4: version4.metadata,
+}
 
 Rows = dict[str, list[dict[str, Any]]]
 
@@ -40,8 +46,12 @@ def dumped(version: int) -> Rows:
             rows = [dict(row) for row in connection.execute(f'SELECT * FROM "{table.name}"')]
             for row in rows:
                 for column in table.columns:
-                    if row[column.name] is not None and isinstance(column.type, JSON):
-                        row[column.name] = json.loads(row[column.name])
+                    if isinstance(row[column.name], str) and isinstance(column.type, JSON):
+                        row[column.name] = json.loads(row[column.name])  # numbers are kept as numbers
+                    if row[column.name] is not None and isinstance(column.type, Boolean):
+                        row[column.name] = bool(row[column.name])
+                    if row[column.name] is not None and isinstance(column.type, Date):
+                        row[column.name] = date.fromisoformat(row[column.name])
                     if isinstance(column.type, DateTime):
                         row[column.name] = datetime.fromisoformat(row[column.name])
             found[table.name] = _sorted(rows)

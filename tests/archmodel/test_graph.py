@@ -223,7 +223,10 @@ def test_of_any_relations_the_path_holds_what_can_be_reached(edges):
             insert_rows(
                 session,
                 Entity,
-                [{"id": k + 1, "kind": "stone", "code": f"s{k}", "entry_id": entry} for k in range(8)],
+                [
+                    {"id": k + 1, "kind": "stone", "code": f"s{k}", "entry_id": entry, "hypothesis": False}
+                    for k in range(8)
+                ],
             )
             rows = [
                 {
@@ -259,6 +262,7 @@ def fill(database, courses, across):
                 {
                     "id": row * across + k + 1,
                     "kind": "stretcher",
+                    "hypothesis": False,
                     "code": f"{row + 1}-{k + 1}",
                     "entry_id": entry,
                     "course": row + 1,

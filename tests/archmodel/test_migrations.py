@@ -1,9 +1,11 @@
+import re
 import sqlite3
 import subprocess
 import sys
 import time
 from collections.abc import Callable
 from contextlib import closing
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +22,13 @@ from archmodel.entities import Corbel, Entity, Joint
 from archmodel.entries import new_entry
 from archmodel.migrating import migrate
 from archmodel.relations import Relation
+from archmodel.run_records import JointArrays, SimplificationRecord
 from archmodel.store import load_stones, store_survey
+from archmodel.store_runs import store_run
 from archmodel.surveys import Measurement
 from moma.errors import DatabaseError, UsageError
 from tests.archmodel.old_databases import LAYOUTS, Rows, connected, dumped, make_old, rows_of, run_alembic
-from tests.archmodel.stones import SHA, box_stone
+from tests.archmodel.stones import SHA, box_stone, run_record
 
 NewUrl = Callable[[], str]
 
@@ -43,7 +47,7 @@ def array(stored: bytes, *shape: int) -> NDArray[np.float64]:
     return np.frombuffer(stored).reshape(shape)
 
 
-@pytest.mark.parametrize("version", [1, 2])
+@pytest.mark.parametrize("version", [1, 2, 3])
 def test_the_frozen_layouts_are_those_that_the_old_programs_made(tmp_path: Path, version: int) -> None:
     url = f"sqlite:///{tmp_path / 'old.db'}"
     make_old(url, version)
@@ -59,7 +63,7 @@ def test_from_nothing_the_steps_lead_to_the_layout_of_the_program(new_url: NewUr
         store_survey(session, "window", "window.moma", SHA, [box_stone("A1")])
 
 
-@pytest.mark.parametrize("version", [1, 2])
+@pytest.mark.parametrize("version", [1, 2, 3])
 def test_indexes_and_keys_are_named_as_in_a_new_database(new_url: NewUrl, version: int) -> None:
     old, new = new_url(), new_url()
     make_old(old, version)
@@ -88,9 +92,9 @@ def test_every_row_and_value_is_there_afterwards(new_url: NewUrl, version: int) 
     make_old(url, version)
     assert rows_of(url, version) == before
     done = migrate(url)
-    assert (done.before, done.after, done.lost) == (version, 3, ())
-    after = rows_of(url, 3)
-    assert after["moma_schema"] == [{"version": 3}]
+    assert (done.before, done.after, done.lost) == (version, 4, ())
+    after = rows_of(url, 4)
+    assert after["moma_schema"] == [{"version": 4}]
     moved = {("survey", "stored_at"), ("survey", "observer"), ("entity", "survey_id")}
     moved |= {("run", "stored_at"), ("run", "version")}
     computed = {("measurement", "covariance")} if version == 1 else set()
@@ -118,7 +122,7 @@ def test_surveys_and_runs_become_acts_of_recording(new_url: NewUrl, version: int
     url, before = new_url(), dumped(version)
     make_old(url, version)
     migrate(url)
-    after = rows_of(url, 3)
+    after = rows_of(url, 4)
     entries = by_id(after["entry"])
     assert len(entries) == len(before["survey"]) + len(before["run"])
     times = [entries[number]["recorded_at"] for number in sorted(entries)]
@@ -192,35 +196,52 @@ def test_what_version_1_did_not_say_is_said_to_be_unknown_or_follows(new_url: Ne
         assert (row["shape"], row["tail"], row["names"], row["image"]) == ("untested", 1.0, [], b"")
 
 
-@pytest.mark.parametrize("version", [1, 2])
+@pytest.mark.parametrize("version", [1, 2, 3])
 def test_the_program_works_with_what_was_migrated(new_url: NewUrl, version: int) -> None:
     url = new_url()
     make_old(url, version)
     with pytest.raises(
-        DatabaseError, match=rf"schema version {version}, .* reads version 3; moma migrate --db "
+        DatabaseError, match=rf"schema version {version}, .* reads version 4; moma migrate --db "
     ):
         open_database(url)
     migrate(url)
     with open_database(url, create=False) as database, database.session() as session:
-        stones = load_stones(session, session.scalars(select(Entity)).all())
-        assert len(stones) == (9 if version == 1 else 10)
-        store_survey(session, "more", "more.moma", SHA, [box_stone("A1"), box_stone("A2")])
+        measured = select(Entity).where(Entity.measurement.has())
+        stones = load_stones(session, session.scalars(measured).all())
+        assert len(stones) == {1: 9, 2: 10, 3: 9}[version]
+        assert not any(stone.hypothesis for stone in stones)
+        store_survey(session, "more", "more.moma", "ef" * 32, [box_stone("A1"), box_stone("A2")])
         session.flush()
         assert session.scalars(select(Entity.code).order_by(Entity.id.desc())).first() == "A2"
 
 
-@pytest.mark.parametrize("version", [1, 2])
+@pytest.mark.parametrize("version", [1, 2, 3])
 def test_up_and_down_and_up_again_is_the_same(new_url: NewUrl, version: int) -> None:
     url, before = new_url(), dumped(version)
     make_old(url, version)
     migrate(url)
-    up = rows_of(url, 3)
+    up = rows_of(url, 4)
     migrate(url, version, lossy=True)
     assert differences(url, LAYOUTS[version]) == []
-    assert same_but_for_rounding(rows_of(url, version), before)
+    assert same_but_for_rounding(rows_of(url, version), lengthened(before))
     migrate(url)
-    again = rows_of(url, 3)
+    again = rows_of(url, 4)
     assert same_but_for_rounding(again, up)
+
+
+def lengthened(value: Any) -> Any:
+    """Rows of version 3 with the names that version 4 leaves to a user's own kind and attribute."""
+    if isinstance(value, dict):
+        rows = {lengthened(name): lengthened(one) for name, one in value.items()}
+        return {
+            name: sorted(one, key=repr) if name == "kind" and isinstance(one, list) else one
+            for name, one in rows.items()
+        }
+    if isinstance(value, list):
+        return [lengthened(one) for one in value]
+    if isinstance(value, str):
+        return re.sub(r"\b(support|blockiness)\b", r"own_\1", value)
+    return value
 
 
 def same_but_for_rounding(found: Rows, truth: Rows) -> bool:
@@ -239,6 +260,76 @@ def same_but_for_rounding(found: Rows, truth: Rows) -> bool:
     return True
 
 
+def test_version_4_leaves_what_was_surveyed_and_run_as_it_was(new_url: NewUrl) -> None:
+    url, before = new_url(), lengthened(dumped(3))
+    make_old(url, 3)
+    assert migrate(url).lost == ()
+    after = rows_of(url, 4)
+    modes = {"open": "as-surveyed", "close": "close"}
+    for row in before["simplification"]:
+        row |= {"mode": modes[row["mode"]], "within_tolerance": None}
+        row |= dict.fromkeys(("shape", "blockiness", "worst_angle"))
+    for row in before["entry"]:
+        if row["action"] == "run" and row["settings"]:
+            row["settings"]["joints"]["mode"] = modes[row["settings"]["joints"]["mode"]]
+    for row in before["entity"]:
+        row["hypothesis"] = False
+    for row in before["joint_result"]:
+        row["width"] = None
+    before["moma_schema"] = [{"version": 4}]
+    assert {row["mode"] for row in before["simplification"]} == {"close", "as-surveyed"}
+    for name, rows in before.items():
+        assert len(rows) == len(after[name]) > 0
+        assert all(row in after[name] for row in rows), name
+
+
+def test_version_3_has_no_hypotheses_and_no_supports(new_url: NewUrl) -> None:
+    url = new_url()
+    stones = [box_stone("A1"), replace(box_stone("A2"), provenance="hypothesis", hypothesis=True)]
+    with open_database(url) as database, database.session() as session:
+        store_survey(session, "wall", "wall.moma", SHA, [*stones, box_stone("G1", "support")])
+        run = run_record({"A1": 1e5, "A2": None})
+        solid = stones[0].solid_vertices, stones[0].solid_faces
+        told = SimplificationRecord("A1", "mortar", 0.004, -0.01, *solid, "hexahedron", 0.98, 0.02, True)
+        store_run(session, replace(run, simplifications=(told,), joints=one_joint(0.012)))
+    before = rows_of(url, 4)
+    lost = (
+        r"that entities are hypotheses \(1\); what solids of runs were simplified to \(1\); "
+        r"widths of joints as surveyed \(1\); the kind support, which becomes entity \(1\)"
+    )
+    with pytest.raises(UsageError, match=lost):
+        migrate(url, 3)
+    assert rows_of(url, 4) == before
+    migrate(url, 3, lossy=True)
+    assert differences(url, LAYOUTS[3]) == []
+    kinds = {row["code"]: row["kind"] for row in rows_of(url, 3)["entity"]}
+    assert kinds == {"A1": "header", "A2": "header", "G1": "entity"}
+    migrate(url)
+    again = rows_of(url, 4)
+    for row in before["entity"]:
+        row |= {"hypothesis": False, "kind": kinds[row["code"]]}
+    for row in before["simplification"]:
+        row |= dict.fromkeys(("shape", "blockiness", "worst_angle", "within_tolerance"))
+    for row in before["joint_result"]:
+        row["width"] = None
+    assert again == before
+
+
+def one_joint(width: float) -> JointArrays:
+    numbers = np.ones(1)
+    names = [
+        one.name for one in fields(JointArrays) if one.name not in ("stones", "centroid", "normal", "parted")
+    ]
+    arrays = {
+        "stones": np.array([[0, 1]]),
+        "centroid": np.ones((1, 3)),
+        "normal": np.array([[0.0, 0.0, 1.0]]),
+    }
+    return JointArrays(
+        **arrays, **dict.fromkeys(names, numbers) | {"parted": np.array([False]), "width": np.array([width])}
+    )
+
+
 def test_going_down_says_what_is_lost_and_asks_first(new_url: NewUrl) -> None:
     url = new_url()
     with open_database(url) as database, database.session() as session:
@@ -253,7 +344,7 @@ def test_going_down_says_what_is_lost_and_asks_first(new_url: NewUrl) -> None:
         session.flush()
         session.add(measured_again(old, entry.id))
     assert Corbel  # declared, so that its kind is known
-    before = rows_of(url, 3)
+    before = rows_of(url, 4)
     with pytest.raises(
         UsageError, match=r"relations \(1\).*superseded \(1\).*not measured.*\(1\)"
     ) as refused:
@@ -262,7 +353,7 @@ def test_going_down_says_what_is_lost_and_asks_first(new_url: NewUrl) -> None:
     assert "attributes that not every kind has: tail_length, rank, … (1)" in str(refused.value)
     assert "the kind base, which becomes entity (1)" in str(refused.value)
     assert "the kind corbel, which becomes ashlar (1)" in str(refused.value)
-    assert rows_of(url, 3) == before
+    assert rows_of(url, 4) == before
     migrate(url, 2, lossy=True)
     after = rows_of(url, 2)
     assert {row["code"]: row["kind"] for row in after["entity"]} == {
@@ -335,8 +426,8 @@ def test_what_cannot_be_migrated_is_said(new_url: NewUrl, tmp_path: Path) -> Non
     url = new_url()
     with pytest.raises(DatabaseError, match=r"there is no database|the database is empty"):
         migrate(url)
-    with pytest.raises(UsageError, match="version 4 of the layout is not known; name one up to 3"):
-        migrate(url, 4)
+    with pytest.raises(UsageError, match="version 5 of the layout is not known; name one up to 4"):
+        migrate(url, 5)
     with connected(url) as connection:
         connection.execute(text("CREATE TABLE photo (id INTEGER)"))
     with pytest.raises(DatabaseError, match="is not a MOMA database"):
@@ -345,7 +436,7 @@ def test_what_cannot_be_migrated_is_said(new_url: NewUrl, tmp_path: Path) -> Non
     with open_database(newer) as database, database.session() as session:
         session.execute(text("UPDATE moma_schema SET version = 99"))
     with pytest.raises(
-        DatabaseError, match="schema version 99, this program knows versions up to 3; install"
+        DatabaseError, match="schema version 99, this program knows versions up to 4; install"
     ):
         migrate(newer)
 
@@ -364,7 +455,7 @@ def test_a_migration_that_is_killed_leaves_all_or_nothing(new_url: NewUrl, part:
     url, before = new_url(), dumped(1)
     make_old(url, 1)
     with subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, url, "3"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        [sys.executable, "-c", PROGRAM, url, "4"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as process:
         assert process.stdout is not None
         assert process.stdin is not None
@@ -375,8 +466,8 @@ def test_a_migration_that_is_killed_leaves_all_or_nothing(new_url: NewUrl, part:
         process.kill()
     with connected(url) as connection:
         version = connection.execute(text("SELECT version FROM moma_schema")).scalar_one()
-    assert version in (1, 3)
+    assert version in (1, 4)
     if version == 1:
         assert rows_of(url, 1) == before
         assert migrate(url).before == 1
-    assert len(rows_of(url, 3)["measurement"]) == 9
+    assert len(rows_of(url, 4)["measurement"]) == 9

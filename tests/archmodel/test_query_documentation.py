@@ -109,7 +109,7 @@ def test_the_relations_and_structures_are_those_on_the_page() -> None:
 
 def test_the_attributes_are_those_of_the_program() -> None:
     def lines(of_run: bool) -> list[list[str]]:
-        return [[f"`{a.name}`", a.unit or "text", a.definition] for a in attributes() if a.of_run is of_run]
+        return [[f"`{a.name}`", a.type_name, a.definition] for a in attributes() if a.of_run is of_run]
 
     assert table("attribute")[1:] == lines(of_run=False)
     assert table("result")[1:] == lines(of_run=True)
