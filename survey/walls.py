@@ -97,7 +97,7 @@ def sides_of(stones: Sequence[BlockyStone], wall: WallPlane) -> Sides:
     stop = np.roll(start, -1, axis=1)
     run = stop - start
     run /= np.linalg.norm(run, axis=2)[:, :, None]
-    sound = np.array([stone.sound for stone in stones])
+    sound = np.array([stone.sound[:4] for stone in stones])
     return Sides(
         start=start,
         stop=stop,

@@ -1,0 +1,180 @@
+"""Numba kernels that measure a solid: volume, angles, how far from another one's edges, what two have in common.
+
+A solid is its vertices (nv, 3), the corners of all faces one after the other, (nc,), and where each face begins,
+(nf + 1,).
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+__all__ = ["common_volume", "edge_distances", "face_planes", "volume", "worst_angle"]
+
+
+@njit(cache=True)
+def face_planes(vertices, corners, starts):
+    """Planes (nf, 4) of the faces: unit normal, and offset of the mean of the corners. Zero where there is no area."""
+    out = np.zeros((len(starts) - 1, 4))
+    for f in range(len(starts) - 1):
+        origin = vertices[corners[starts[f]]]
+        normal, mean = np.zeros(3), np.zeros(3)
+        for c in range(starts[f], starts[f + 1]):
+            following = c + 1 if c + 1 < starts[f + 1] else starts[f]
+            a, b = vertices[corners[c]] - origin, vertices[corners[following]] - origin
+            normal += _cross(a, b)
+            mean += a
+        length = math.sqrt((normal * normal).sum())
+        if length > 0.0:
+            normal /= length
+            out[f, :3] = normal
+            out[f, 3] = (normal * (origin + mean / (starts[f + 1] - starts[f]))).sum()
+    return out
+
+
+@njit(cache=True)
+def volume(vertices, corners, starts):
+    """Volume, by the divergence theorem."""
+    origin = vertices[corners[0]]
+    total = 0.0
+    for f in range(len(starts) - 1):
+        a = vertices[corners[starts[f]]] - origin
+        for c in range(starts[f] + 1, starts[f + 1] - 1):
+            total += (a * _cross(vertices[corners[c]] - origin, vertices[corners[c + 1]] - origin)).sum()
+    return total / 6.0
+
+
+@njit(cache=True)
+def worst_angle(vertices, corners, starts):
+    """Largest departure from a right angle of the angle inside, between two faces with a common edge [rad]."""
+    planes = face_planes(vertices, corners, starts)
+    worst = 0.0
+    for f in range(len(starts) - 1):
+        for c in range(starts[f], starts[f + 1]):
+            p = corners[c]
+            q = corners[c + 1 if c + 1 < starts[f + 1] else starts[f]]
+            if p > q:
+                continue
+            g = _face_with(q, p, corners, starts)
+            if g < 0:
+                continue
+            n, m = planes[f, :3], planes[g, :3]
+            turn = _cross(n, m)
+            sine = (turn * (vertices[q] - vertices[p])).sum()
+            exterior = math.copysign(math.atan2(math.sqrt((turn * turn).sum()), (n * m).sum()), sine)
+            worst = max(worst, abs(0.5 * math.pi - exterior))
+    return worst
+
+
+@njit(cache=True)
+def _face_with(p, q, corners, starts):
+    """The face that has the edge from p to q; -1 if there is none."""
+    for f in range(len(starts) - 1):
+        for c in range(starts[f], starts[f + 1]):
+            following = c + 1 if c + 1 < starts[f + 1] else starts[f]
+            if corners[c] == p and corners[following] == q:
+                return f
+    return -1
+
+
+@njit(cache=True)
+def edge_distances(points, vertices, corners, starts):
+    """Distance of each point (n, 3) from the nearest edge of a solid."""
+    out = np.full(len(points), math.inf)
+    for f in range(len(starts) - 1):
+        for c in range(starts[f], starts[f + 1]):
+            a = vertices[corners[c]]
+            u = vertices[corners[c + 1 if c + 1 < starts[f + 1] else starts[f]]] - a
+            square = (u * u).sum()
+            for i in range(len(points)):
+                w = points[i] - a
+                along = min(max((w * u).sum() / square, 0.0), 1.0) if square > 0.0 else 0.0
+                w = w - along * u
+                out[i] = min(out[i], math.sqrt((w * w).sum()))
+    return out
+
+
+@njit(cache=True)
+def common_volume(vertices, corners, starts, planes):
+    """Volume that a solid has in common with a convex body, the half-spaces n·x ≤ d of planes (np, 4).
+
+    The solid is the signed sum of tetrahedra over the triangles of its faces, each clipped by all planes.
+    """
+    apex = vertices[corners].copy().sum(axis=0) / len(corners)
+    total = 0.0
+    for f in range(len(starts) - 1):
+        a = vertices[corners[starts[f]]]
+        for c in range(starts[f] + 1, starts[f + 1] - 1):
+            four = np.empty((4, 3))
+            four[0], four[1], four[2], four[3] = apex, a, vertices[corners[c]], vertices[corners[c + 1]]
+            total += math.copysign(_clipped(four, planes), _six_volumes(four))
+    return total
+
+
+@njit(cache=True)
+def _clipped(four, planes):
+    """Volume of a tetrahedron inside half-spaces: clipped by one plane after the other, and cut into tetrahedra."""
+    waiting = np.empty((2 * len(planes) + 2, 4, 3))
+    done = np.zeros(2 * len(planes) + 2, np.int64)
+    waiting[0] = four
+    count, total = 1, 0.0
+    while count:
+        count -= 1
+        body, number = waiting[count].copy(), done[count]
+        if number == len(planes):
+            total += abs(_six_volumes(body)) / 6.0
+            continue
+        heights = np.empty(4)
+        for i in range(4):
+            heights[i] = (planes[number, :3] * body[i]).sum() - planes[number, 3]
+        order = np.argsort(heights)
+        inside = 0
+        for i in range(4):
+            inside += heights[i] <= 0.0
+        if inside == 0:
+            continue
+        for piece in _pieces(body[order], heights[order], inside):
+            waiting[count], done[count] = piece, number + 1
+            count += 1
+    return total
+
+
+@njit(cache=True)
+def _pieces(body, heights, inside):
+    """The tetrahedra (np, 4, 3) of the part of a tetrahedron, its corners the lowest first, that is below a plane."""
+    if inside == 4:
+        return body.reshape(1, 4, 3)
+    cut = np.empty((inside, 4 - inside, 3))
+    for i in range(inside):
+        for j in range(inside, 4):
+            share = heights[i] / (heights[i] - heights[j])
+            cut[i, j - inside] = body[i] + share * (body[j] - body[i])
+    if inside == 1:
+        out = np.empty((1, 4, 3))
+        out[0, 0], out[0, 1:] = body[0], cut[0]
+        return out
+    ends = np.empty((2, 3, 3))  # of a prism
+    if inside == 3:
+        ends[0], ends[1] = body[:3], cut[:, 0]
+    else:
+        ends[0, 0], ends[0, 1:] = body[0], cut[0]
+        ends[1, 0], ends[1, 1:] = body[1], cut[1]
+    out = np.empty((3, 4, 3))
+    out[0, :3], out[0, 3] = ends[0], ends[1, 0]
+    out[1, :2], out[1, 2:] = ends[0, 1:], ends[1, :2]
+    out[2, 0], out[2, 1:] = ends[0, 2], ends[1]
+    return out
+
+
+@njit(cache=True)
+def _six_volumes(four):
+    return ((four[1] - four[0]) * _cross(four[2] - four[0], four[3] - four[0])).sum()
+
+
+@njit(cache=True)
+def _cross(u, v):
+    out = np.empty(3)
+    out[0] = u[1] * v[2] - u[2] * v[1]
+    out[1] = u[2] * v[0] - u[0] * v[2]
+    out[2] = u[0] * v[1] - u[1] * v[0]
+    return out

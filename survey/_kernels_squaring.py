@@ -1,0 +1,191 @@
+"""Numba kernel that takes corners out of the outline of a face, one by one, as long as that is honest."""
+
+import math
+
+import numpy as np
+from numba import njit
+
+__all__ = ["square"]
+
+_PARALLEL = 1e-9  # sine below which two sides do not meet
+
+
+@njit(cache=True)
+def square(flat, worn, limits):
+    """Reduce a polygon to four corners, or to as few as the limits allow; see ``squaring.square_face``.
+
+    Parameters
+    ----------
+    flat : (n, 2) corners, counter-clockwise
+    worn : (n,) whether each corner's place is not to be trusted
+    limits : (5,) max_shift, shift_share, max_restored, restored_share, tolerance
+
+    Returns
+    -------
+    polygon (m, 2), source (m,) which corner each is (-1: restored), width, depth: how far a corner lies inside
+    its convex hull beyond what is allowed (0: none does), in which case the polygon is the hull
+    """
+    n = len(flat)
+    source = _hull(flat)
+    m = len(source)
+    polygon = np.empty((n, 2))
+    for k in range(m):
+        polygon[k] = flat[source[k]]
+    width = _width(polygon, m) if m > 2 else 0.0
+    tolerance = limits[4]
+    shift = min(limits[0], max(limits[1] * width, min(tolerance, 0.25 * width)))
+    restored = min(limits[2], max(limits[3] * width, shift))
+    depth = _deepest(flat, worn, polygon, m, shift, restored)
+    if m < 4 or depth > 0.0:
+        return polygon[:m].copy(), source, width, depth
+    labels = np.empty(n, np.int64)
+    labels[:m] = source
+    m = _reduce(flat, worn, polygon, labels, m, 4, shift, restored, True)
+    if m == 4:  # a corner half-way along a side of a triangle
+        little = min(tolerance, limits[1] * width)
+        m = _reduce(flat, np.zeros(n, np.bool_), polygon, labels, m, 3, little, little, False)
+    first = 0
+    for k in range(m):
+        if _length(polygon[k] - flat[0]) < _length(polygon[first] - flat[0]):
+            first = k
+    out, names = np.empty((m, 2)), np.empty(m, np.int64)
+    for k in range(m):
+        out[k], names[k] = polygon[(first + k) % m], labels[(first + k) % m]
+    return out, names, width, 0.0
+
+
+@njit(cache=True)
+def _reduce(flat, worn, polygon, source, m, few, shift, restored, prolong):
+    """Take out corners of a convex polygon, each time by the smallest allowed change of area; how many are left."""
+    n = len(flat)
+    trial, labels = np.empty((n, 2)), np.empty(n, np.int64)
+    best, best_labels = np.empty((n, 2)), np.empty(n, np.int64)
+    while m > few:
+        smallest = math.inf
+        for k in range(m):
+            for way in range(2 if prolong else 1):
+                area = _change(polygon, m, k, way, trial, source, labels)
+                if area < smallest and _allowed(flat, worn, trial, labels, m - 1, shift, restored):
+                    smallest = area
+                    best[: m - 1], best_labels[: m - 1] = trial[: m - 1], labels[: m - 1]
+        if smallest == math.inf:
+            break
+        m -= 1
+        polygon[:m], source[:m] = best[:m], best_labels[:m]
+    return m
+
+
+@njit(cache=True)
+def _change(polygon, m, k, way, trial, source, labels):
+    """Polygon without corner k (way 0), or with the sides beside side k prolonged (way 1); the change of area."""
+    before, here, after = polygon[k - 1 if k else m - 1], polygon[k], polygon[(k + 1) % m]
+    gone, area = k, 0.5 * abs(_cross(here - before, after - here))
+    peak = here
+    if way == 1:
+        gone = (k + 1) % m
+        beyond = polygon[(k + 2) % m]
+        u, v = here - before, after - beyond  # the sides before and after side k, towards it
+        turn = _cross(u, v)
+        if turn > -_PARALLEL * _length(u) * _length(v):
+            return math.inf  # they do not meet beyond side k
+        peak = before + _cross(after - before, v) / turn * u
+        area = 0.5 * abs(_cross(peak - here, after - peak))
+    j = 0
+    for i in range(m):
+        if i != gone:
+            trial[j], labels[j] = polygon[i], source[i]
+            if way == 1 and i == k:
+                trial[j], labels[j] = peak, -1
+            j += 1
+    return area
+
+
+@njit(cache=True)
+def _allowed(flat, worn, polygon, source, m, shift, restored):
+    """Whether no measured corner is left too far from a polygon, and no restored one stands out too far."""
+    for k in range(m):
+        if source[k] < 0 and _away(polygon[k], flat, len(flat)) > restored:
+            return False
+    return _deepest(flat, worn, polygon, m, shift, restored) == 0.0
+
+
+@njit(cache=True)
+def _deepest(flat, worn, polygon, m, shift, restored):
+    """Largest distance of a corner from a polygon's sides that is not allowed; 0 if all are."""
+    deepest = 0.0
+    for i in range(len(flat)):
+        distance = _away(flat[i], polygon, m)
+        if distance > (restored if worn[i] else shift):
+            deepest = max(deepest, distance)
+    return deepest
+
+
+@njit(cache=True)
+def _away(point, polygon, m):
+    """Distance of a point from the nearest side of a polygon."""
+    nearest = math.inf
+    for k in range(m):
+        ax, ay = polygon[k]
+        ux, uy = polygon[(k + 1) % m, 0] - ax, polygon[(k + 1) % m, 1] - ay
+        wx, wy = point[0] - ax, point[1] - ay
+        square_length = ux * ux + uy * uy
+        along = 0.0
+        if square_length > 0.0:
+            along = min(max((wx * ux + wy * uy) / square_length, 0.0), 1.0)
+        nearest = min(nearest, math.hypot(wx - along * ux, wy - along * uy))
+    return nearest
+
+
+@njit(cache=True)
+def _width(polygon, m):
+    """Smallest distance between two parallel lines that enclose a convex polygon."""
+    smallest = math.inf
+    for k in range(m):
+        side = polygon[(k + 1) % m] - polygon[k]
+        highest = 0.0
+        for i in range(m):
+            highest = max(highest, _cross(side, polygon[i] - polygon[k]))
+        smallest = min(smallest, highest / _length(side))
+    return smallest
+
+
+@njit(cache=True)
+def _hull(flat):
+    """Indices of the corners that stand out, counter-clockwise (Andrew's monotone chain)."""
+    n = len(flat)
+    order = np.arange(n)
+    for i in range(1, n):  # few corners: sort by x, then y, by insertion
+        one, j = order[i], i
+        while j > 0 and _after(flat, order[j - 1], one):
+            order[j] = order[j - 1]
+            j -= 1
+        order[j] = one
+    chain, count = np.empty(2 * n, np.int64), 0
+    for way in range(2):
+        start = count
+        for i in range(n):
+            one = order[i] if way == 0 else order[n - 1 - i]
+            while count - start > 1 and (
+                _cross(flat[chain[count - 1]] - flat[chain[count - 2]], flat[one] - flat[chain[count - 1]])
+                <= 0.0
+            ):
+                count -= 1
+            chain[count] = one
+            count += 1
+        count -= 1  # the last is the first of the way back
+    return chain[:count].copy()
+
+
+@njit(cache=True)
+def _after(flat, i, j):
+    return flat[i, 0] > flat[j, 0] or (flat[i, 0] == flat[j, 0] and flat[i, 1] > flat[j, 1])
+
+
+@njit(cache=True)
+def _cross(u, v):
+    return u[0] * v[1] - u[1] * v[0]
+
+
+@njit(cache=True)
+def _length(u):
+    return math.hypot(u[0], u[1])
