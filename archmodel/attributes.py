@@ -191,9 +191,17 @@ _COMPUTED = (
         of_simplification("displacement_max"),
     ),
     _result("solid_shape", None, "of its simplified solid, e.g. hexahedron", of_simplification("shape")),
-    _result("blockiness", "-", "how near it was to that shape, up to 1", of_simplification("blockiness")),
     _result(
-        "worst_angle", "rad", "farthest that simplifying turned a face", of_simplification("worst_angle")
+        "blockiness",
+        "-",
+        "what it and a hexahedron have in common, over what they fill together",
+        of_simplification("blockiness"),
+    ),
+    _result(
+        "worst_angle",
+        "rad",
+        "largest departure from a right angle between two faces of that solid",
+        of_simplification("worst_angle"),
     ),
     Attribute(
         "within_tolerance",

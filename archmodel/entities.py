@@ -25,10 +25,10 @@
     │   │   ├── ColumnBase (base)
     │   │   ├── Shaft
     │   │   └── Capital
-    │   └── Rubble
+    │   ├── Rubble
+    │   └── Support
     ├── Infill
-    ├── Joint
-    └── Support
+    └── Joint
 
 To add a kind, write one class with a docstring; all kinds live in one table and differ in the column `kind`
 (single-table inheritance, see ``docs/decisions/015-one-table-of-entities.md``). Attributes of its own are typed
@@ -332,6 +332,10 @@ class Rubble(Stone):
     """A stone laid as it was found, without cut faces."""
 
 
+class Support(Stone):
+    """A block that carries the masonry and does not move: a foundation, an abutment."""
+
+
 class Infill(Entity):
     """The core of mortar and small stones between the two facings of a wall."""
 
@@ -342,10 +346,6 @@ class Joint(Entity):
     __own__ = (OwnAttribute("thickness", "m", "distance of the two faces that it fills"),)
 
     thickness: Mapped[float | None]
-
-
-class Support(Entity):
-    """The ground, the rock or a foundation, on which the masonry stands and which does not move."""
 
 
 def kinds() -> Mapping[str, type[Entity]]:

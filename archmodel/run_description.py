@@ -8,6 +8,7 @@ from sqlalchemy.orm import InstrumentedAttribute, Session, aliased, joinedload
 
 from archmodel.entities import Entity
 from archmodel.runs import EntityResult, JointResult, Run
+from archmodel.surveys import Simplification
 from moma.errors import UsageError
 
 __all__ = ["compare_runs", "describe_run", "list_runs"]
@@ -54,6 +55,8 @@ def describe_run(session: Session, number: int, count: int = 5) -> dict[str, Any
     -------
     dict
         as in `list_runs`, and: steps, simulated [s], fidelities, as_of, author, versions, settings, scene_text;
+        simplification (mode; how many stones of each shape, and how many outside of the survey's tolerance; the largest
+        displacement of a corner and its stone; None where solids are not kept),
         largest_stresses (by stone), and joints by what is worst of them: largest_openings, least_centred
         (outside of the kern), most_used_friction; SI units
 
@@ -86,6 +89,7 @@ def describe_run(session: Session, number: int, count: int = 5) -> dict[str, Any
         "author": run.entry.author,
         "versions": dict(run.versions),
         "settings": dict(run.entry.settings),
+        "simplification": _simplification(session, number),
         "largest_stresses": _stresses(session, number, count),
         "largest_openings": _joints(session, number, JointResult.opening, 0.0, count),
         "least_centred": _joints(session, number, JointResult.kern, 1.0, count),
@@ -157,6 +161,32 @@ def _stresses(session: Session, run: int, count: int) -> list[dict[str, object]]
         .order_by(EntityResult.von_mises_max.desc(), Entity.id)
     )
     return [dict(row) for row in session.execute(statement).mappings()]
+
+
+def _simplification(session: Session, run: int) -> dict[str, object] | None:
+    """What the solids of the stones were made of."""
+    of_run = Simplification.run_id == run
+    farthest = session.execute(
+        select(Entity.code, Simplification.displacement_max, Simplification.mode)
+        .join(Entity, Entity.id == Simplification.entity_id)
+        .where(of_run)
+        .order_by(Simplification.displacement_max.desc(), Entity.id)
+        .limit(1)
+    ).first()
+    if farthest is None:
+        return None
+    shape, count = Simplification.shape, func.count().label("stones")
+    shapes = session.execute(
+        select(shape, count).where(of_run, shape.is_not(None)).group_by(shape).order_by(shape)
+    )
+    outside = select(func.count()).where(of_run, Simplification.within_tolerance.is_(False))
+    return {
+        "mode": farthest.mode,
+        "shapes": {row.shape: row.stones for row in shapes},
+        "outside_tolerance": session.scalar(outside),
+        "displacement_max": farthest.displacement_max,
+        "farthest": farthest.code,
+    }
 
 
 def _joints(

@@ -168,8 +168,9 @@ class SimplificationRecord:
     vertices : (nv, 3) [m]
     faces : vertex indices of each face, counter-clockwise seen from outside
     shape : what the surveyed solid was simplified to before its joints were closed, e.g. hexahedron; None if it was not
-    blockiness : how near the surveyed solid was to that shape, up to 1; None if not known [-]
-    worst_angle : farthest that one of its faces was turned; None if not known [rad]
+    blockiness : what the surveyed solid and a hexahedron have in common, over what they fill together; None if not
+        known [-]
+    worst_angle : largest departure from a right angle between two of its faces; None if not known [rad]
     within_tolerance : whether simplifying kept within what the survey can tell; None if not known
     """
 

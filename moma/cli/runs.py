@@ -27,6 +27,7 @@ _STRESSES = {"code": None, "kind": None, "von_mises_max": "Pa", "von_mises_mean"
 _JOINTS = {
     "first": None,
     "second": None,
+    "width": "m",
     "force_normal": "N",
     "force_shear": "N",
     "pressure_max": "Pa",

@@ -295,7 +295,7 @@ def test_version_3_has_no_hypotheses_and_no_supports(new_url: NewUrl) -> None:
     before = rows_of(url, 4)
     lost = (
         r"that entities are hypotheses \(1\); what solids of runs were simplified to \(1\); "
-        r"widths of joints as surveyed \(1\); the kind support, which becomes entity \(1\)"
+        r"widths of joints as surveyed \(1\); the kind support, which becomes stone \(1\)"
     )
     with pytest.raises(UsageError, match=lost):
         migrate(url, 3)
@@ -303,7 +303,7 @@ def test_version_3_has_no_hypotheses_and_no_supports(new_url: NewUrl) -> None:
     migrate(url, 3, lossy=True)
     assert differences(url, LAYOUTS[3]) == []
     kinds = {row["code"]: row["kind"] for row in rows_of(url, 3)["entity"]}
-    assert kinds == {"A1": "header", "A2": "header", "G1": "entity"}
+    assert kinds == {"A1": "header", "A2": "header", "G1": "stone"}
     migrate(url)
     again = rows_of(url, 4)
     for row in before["entity"]:

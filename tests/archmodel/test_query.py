@@ -63,6 +63,9 @@ def test_one_expression_need_not_be_in_a_list(filled: Database) -> None:
         ("code < V2", ["V1", "R1"]),
         ("points = 9 and rejected != 0", ["V3"]),
         ("depth > .4\n and\tdepth < 4.4e-1", ["V2", "V3"]),
+        ("hypothesis = true or hypothesis = FALSE and code = V1", ["V1"]),
+        ("hypothesis in (true) or within_tolerance = true", []),
+        ("hypothesis != true and code = V1 and within_tolerance is null", ["V1"]),
     ],
 )
 def test_what_an_expression_finds(filled: Database, expression: str, expected: list[str] | None) -> None:
@@ -85,6 +88,11 @@ def test_what_an_expression_finds(filled: Database, expression: str, expected: l
         ("depth > nan", "'nan' is neither"),
         ("depth > code", "depth is a number, code is a text"),
         ("depth like 0.4", "depth is a number, like is for texts; use < and >"),
+        ("hypothesis = yes", "hypothesis is true or false, 'yes' is not; write hypothesis = true or"),
+        ("hypothesis = 1", "hypothesis is true or false, '1' is not"),
+        ("hypothesis like 't%'", "hypothesis is true or false, like is for texts; write hypothesis = true"),
+        ("depth > hypothesis", "depth is a number, hypothesis is true or false"),
+        ("within_tolerance = within_tolerances@1", "neither true or false nor an attribute"),
         ("kind = hedaer", "unknown kind 'hedaer'; did you mean header"),
         ("fidelity = soft", "unknown fidelity 'soft'; they are fixed, rigid, deformable"),
         ("depth", "the end after depth; write one of = !="),

@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 
 from archmodel.database import Database
 from archmodel.run_description import compare_runs, describe_run, list_runs
-from archmodel.run_records import ErrorMeasures, JointArrays
+from archmodel.run_records import ErrorMeasures, JointArrays, SimplificationRecord
 from archmodel.store_runs import store_run
 from moma.errors import UsageError
 from tests.archmodel.stones import run_record
@@ -37,7 +37,13 @@ def joints(opening: list[float], kern: list[float], friction_use: list[float]) -
         gap=ones,
         opening=np.array(opening),
         sliding=ones,
+        width=np.array([0.01, NAN, 0.012]),
     )
+
+
+def solid(code: str, moved: float, shape: str | None = None, within: bool = True) -> SimplificationRecord:
+    corners, faces = np.eye(4, 3), ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3))
+    return SimplificationRecord(code, "mortar", moved, 0.0, corners, faces, shape, 0.9, 0.1, within)
 
 
 @pytest.fixture
@@ -49,6 +55,11 @@ def session(filled: Database) -> Iterator[Session]:
         errors=ErrorMeasures(natural_map=1e-7),
         joints=joints([1e-3, 0.0, 2e-3], [0.5, 1.5, NAN], [0.2, NAN, 0.9]),
         wall=12.5,
+        simplifications=(
+            solid("V1", 0.02, "wedge", False),
+            solid("V2", 0.03, "hexahedron"),
+            solid("V3", 0.01),
+        ),
     )
     second = replace(
         run_record({"V1": 2e5, "V2": 3.1e5, "V3": None, "R1": None}, scene="again"),
@@ -86,6 +97,22 @@ def test_a_run_in_full_names_the_worst_stones_and_joints(session: Session) -> No
     assert told["settings"]["time"]["step"] == 0.01
     assert told["errors"]["natural_map"] == 1e-7
     assert [row["code"] for row in describe_run(session, 1, count=1)["largest_stresses"]] == ["V2"]
+
+
+def test_a_run_in_full_says_what_its_stones_were_simplified_to(session: Session) -> None:
+    told = describe_run(session, 1)
+    assert told["simplification"] == {
+        "mode": "mortar",
+        "shapes": {"hexahedron": 1, "wedge": 1},
+        "outside_tolerance": 1,
+        "displacement_max": 0.03,
+        "farthest": "V2",
+    }
+    assert {(row["first"], row["second"]): row["width"] for row in told["most_used_friction"]} == {
+        ("V1", "V3"): 0.012,
+        ("V1", "V2"): 0.01,
+    }
+    assert describe_run(session, 2)["simplification"] is None
 
 
 def test_two_runs_differ_by_settings_stones_and_values(session: Session) -> None:

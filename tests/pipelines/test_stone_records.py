@@ -1,5 +1,6 @@
 """A stone that went through the database is the stone that was surveyed, to the last bit."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from archmodel.query import find
 from archmodel.store import load_stones
 from pipelines.ingest import ingest
 from pipelines.stone_records import stone_record, surveyed_block
+from survey.faces import Provenance
 from survey.formats.reading import open_survey
 from survey.measured import survey_stones
 from survey.records import Reject
@@ -220,3 +222,22 @@ def test_what_is_kept_again_is_the_same_record(measured, code):
         "shape",
     ):
         assert getattr(again, name) == getattr(record, name), name
+
+
+@pytest.mark.parametrize("code", ["A", "ROOF"])
+def test_a_hypothesis_keeps_its_solid_and_says_what_it_is(solids, code):
+    _, record = solids[code]
+    guess = replace(record, provenance="hypothesis", provenance_text="closes a hole", hypothesis=True)
+    block = surveyed_block(guess)
+    assert block.face.provenance == Provenance("hypothesis", "closes a hole")
+    np.testing.assert_array_equal(block.solid.vertices, record.solid_vertices)
+    np.testing.assert_array_equal(block.face.outline, record.outline)
+    assert block.solid.faces == record.solid_faces
+    again = stone_record(block)
+    assert (again.hypothesis, again.provenance, again.provenance_text) == (
+        True,
+        "hypothesis",
+        "closes a hole",
+    )
+    assert not record.hypothesis
+    np.testing.assert_array_equal(again.solid_vertices, guess.solid_vertices)

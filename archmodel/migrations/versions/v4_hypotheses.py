@@ -66,7 +66,7 @@ def downgrade() -> None:
     connection = op.get_bind()
     old = begin_layout(connection, version4.metadata, version3.metadata)
     modes = {after: before for before, after in _MODES.items()}
-    plain = {_SUPPORT: "entity"}
+    plain = {_SUPPORT: "stone"}
     changed: dict[str, dict[str, ColumnElement[Any]]] = {
         "entity": {"kind": _renamed(old["entity"].c.kind, plain)},
         "kind": {"parent": _renamed(old["kind"].c.parent, plain)},
@@ -85,7 +85,7 @@ def losses(connection: Connection) -> Iterator[str]:
         "that entities are hypotheses": entity.hypothesis,
         "what solids of runs were simplified to": or_(*(solid[name].is_not(None) for name in _SIMPLIFIED)),
         "widths of joints as surveyed": joint.width.is_not(None),
-        f"the kind {_SUPPORT}, which becomes entity": entity.kind == _SUPPORT,
+        f"the kind {_SUPPORT}, which becomes stone": entity.kind == _SUPPORT,
     }
     for text, condition in conditions.items():
         if count := connection.scalar(select(func.count()).where(condition)):
