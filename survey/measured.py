@@ -13,6 +13,7 @@ from survey.frames import SiteTransform, fit_similarity, record_to_site, to_site
 from survey.hybrid import LiftedFace, lift_faces
 from survey.records import BlockRecord, Reject, SolidRecord, SurveyHead, SurveyStream
 from survey.shapes import FaceShape, ShapeKind
+from survey.snapping_report import Snapping
 from survey.solid_blocks import block_of_solid
 
 __all__ = ["SurveyedStream", "survey_stones"]
@@ -29,11 +30,13 @@ class SurveyedStream:
     stones : the stones with their hidden side, in the frame of the site, and what could not become one. Those
         measured on photographs come last, since they need the faces of their neighbours. To be gone through
         once.
+    snapping : of solids, what bringing their faces into common planes has changed; None if that was not asked for
     """
 
     head: SurveyHead
     transform: SiteTransform | None
     stones: Iterator[SurveyedBlock | Reject]
+    snapping: Snapping | None = None
 
 
 def survey_stones(stream: SurveyStream) -> SurveyedStream:
@@ -48,7 +51,7 @@ def survey_stones(stream: SurveyStream) -> SurveyedStream:
     """
     transform = fit_similarity(stream.head.control) if stream.head.control else None
     head = stream.head if transform is None else to_site(stream.head, transform)
-    return SurveyedStream(head, transform, _stones(stream, head, transform))
+    return SurveyedStream(head, transform, _stones(stream, head, transform), stream.snapping)
 
 
 def _stones(

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from moma.errors import MomaError, SurveyError
+from survey.snapping_report import Snapping
 
 __all__ = [
     "OBSERVER",
@@ -284,6 +285,7 @@ class SolidRecord:
     faces : vertex indices of each planar face, counter-clockwise seen from outside
     line : line of the file on which it begins, counted from 1; 0 in a binary file
     spans : lines of the file that it was read from
+    remarks : what was settled or moved to make it a solid with plane faces, in words
     """
 
     code: str
@@ -293,6 +295,7 @@ class SolidRecord:
     faces: tuple[tuple[int, ...], ...]
     line: int = 0
     spans: tuple[range, ...] = ()
+    remarks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -320,10 +323,12 @@ class SurveyStream:
     head : what holds for all stones
     blocks : the stones in the order of the file; a stone that is wrong comes as a Reject, a file that is
         wrong as a whole raises SurveyError. To be gone through once.
+    snapping : of solids, what bringing their faces into common planes has changed; None if that was not asked for
     """
 
     head: SurveyHead
     blocks: Iterator[BlockRecord | SolidRecord | Reject]
+    snapping: Snapping | None = None
 
 
 @dataclass(frozen=True)

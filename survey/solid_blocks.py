@@ -62,7 +62,7 @@ def block_of_solid(record: SolidRecord, viewpoint: Array | None, path: str) -> S
         line=record.line,
     )
     shape = FaceShape(ShapeKind.UNTESTED, "the side of a solid")
-    provenance = Provenance("solid", f"solid of {path}")
+    provenance = Provenance("solid", "; ".join((f"solid of {path}", *record.remarks)))
     corners = side - np.outer(fit.residuals, normal)
     return SurveyedBlock(
         code=record.code,

@@ -1,22 +1,24 @@
 """From the polygons of a file of solids to closed stones with planar faces.
 
 Nothing is repaired: corners are the same only where their coordinates are. What is decided is what the polygons leave
-open and their neighbours settle: which of them make one body, and which side of each is outside.
+open and their neighbours settle: which of them make one body, which side of each is outside, and how a polygon that is
+not plane is folded.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from moma.errors import GeometryError, SurveyError
+from survey.folds import fold, warp
 from survey.formats.body_groups import body_groups, signed_volume
-from survey.formats.flat_faces import is_flat, merge_flat
+from survey.formats.flat_faces import merge_flat, rounding
 from survey.solids import Solid
-from survey.watertight import check_watertight, triangulate
+from survey.watertight import check_watertight
 
-__all__ = ["RawBody", "closed_bodies"]
+__all__ = ["ClosedBody", "RawBody", "closed_bodies"]
 
 Array = NDArray[np.float64]
 Polygon = tuple[int, ...]
@@ -48,19 +50,38 @@ class RawBody:
     error: SurveyError | None = None
 
 
-def closed_bodies(raw: RawBody) -> Iterator[Solid | GeometryError]:
+@dataclass(frozen=True)
+class ClosedBody:
+    """A closed stone, and what was settled of its faces.
+
+    Attributes
+    ----------
+    solid : under the name of all bodies of the file's object
+    folded : how many polygons that are not plane were cut along folds
+    doubled : how many faces of the file's object were there twice
+    """
+
+    solid: Solid
+    folded: int = 0
+    doubled: int = 0
+
+
+def closed_bodies(raw: RawBody, flat: float = 0.0) -> Iterator[ClosedBody | GeometryError]:
     """Make the closed bodies of one name, each with its planar faces counter-clockwise seen from outside.
 
     Parameters
     ----------
     raw : its vertices finite, its indices valid
+    flat : a polygon whose corners lie no farther from its mean plane is taken for plane [m]; at least what rounding to
+        a few digits does to one
 
     Returns
     -------
-    For each body the solid, under the name of all, or why it is not one
+    For each body the solid, or why it is not one
     """
     try:
         vertices, polygons = _welded(raw)
+        doubled = len(raw.polygons) - len(polygons)
         groups = body_groups(vertices, polygons)
         volumes = [signed_volume(vertices, group) for group in groups]
         if groups and min(volumes) < 0.0 < max(volumes) and set().union(*groups) <= set(polygons):
@@ -74,7 +95,7 @@ def closed_bodies(raw: RawBody) -> Iterator[Solid | GeometryError]:
     for group, volume in zip(groups, volumes, strict=True):
         outward = group if volume >= 0.0 else [one[::-1] for one in group]
         try:
-            yield _closed(raw, vertices, outward)
+            yield replace(_closed(raw, vertices, outward, flat), doubled=doubled)
         except GeometryError as error:
             yield error
 
@@ -104,26 +125,29 @@ def _welded(raw: RawBody) -> tuple[Array, list[Polygon]]:
     return vertices, list(polygons)
 
 
-def _closed(raw: RawBody, vertices: Array, polygons: list[Polygon]) -> Solid:
+def _closed(raw: RawBody, vertices: Array, polygons: list[Polygon], flat: float) -> ClosedBody:
     """The solid with faces as large as planes allow, if it is closed."""
-    flat: list[Polygon] = []
+    pieces: list[Polygon] = []
+    folded = 0
     for polygon in polygons:
-        if len(polygon) == 3 or is_flat(vertices[list(polygon)], raw.resolution):
-            flat.append(polygon)
+        corners = vertices[list(polygon)]
+        tolerance = flat + rounding(corners, raw.resolution)
+        if len(polygon) == 3 or warp(corners) <= tolerance:
+            pieces.append(polygon)
         else:
-            cut = triangulate(Solid(raw.name, vertices, (polygon,))).tolist()
-            flat += [(one[0], one[1], one[2]) for one in cut]
-    used = np.unique(np.concatenate([np.array(one) for one in flat]))
-    merged = _compact(raw.name, vertices, merge_flat(vertices, flat, used, raw.resolution))
+            pieces += fold(vertices, polygon, tolerance)
+            folded += 1
+    used = np.unique(np.concatenate([np.array(one) for one in pieces]))
+    merged = _compact(raw.name, vertices, merge_flat(vertices, pieces, used, flat + raw.resolution))
     with np.errstate(all="ignore"):  # a body without volume is found, and not warned of
         try:
             check_watertight(merged)
         except (
             GeometryError
-        ):  # an outline that cannot be cut into ears; the triangles as they came can say more
-            merged = _compact(raw.name, vertices, flat)
+        ):  # an outline that cannot be cut into ears; the polygons as they came can say more
+            merged = _compact(raw.name, vertices, pieces)
             check_watertight(merged)
-    return merged
+    return ClosedBody(merged, folded)
 
 
 def _compact(name: str, vertices: Array, polygons: Sequence[Polygon]) -> Solid:

@@ -3,14 +3,18 @@
 An object is an ``o`` (or ``g``) of OBJ, a ``solid`` of STL, a volume of MSH, the whole of a PLY. Where one has several
 bodies, each is a stone: NAME-1, NAME-2, … The name is taken apart by the code template,
 {block}:{kind} by default; if it does not fit, it is the code itself, blanks replaced by "_".
+
+Coordinates stay as they are in the file unless snapping is asked for: then faces of neighbours that match but for a
+tolerance are brought into common planes (`survey.snapping`), for which all stones of the file must be there at once.
 """
 
 import re
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from moma.errors import GeometryError, SurveyError, UsageError
-from survey.formats.bodies import RawBody, closed_bodies
+from survey.formats.bodies import ClosedBody, RawBody, closed_bodies
 from survey.formats.code_template import CodeTemplate
 from survey.formats.fields import CODE, shown
 from survey.formats.msh_bodies import msh_bodies
@@ -19,6 +23,10 @@ from survey.formats.options import ReadingOptions
 from survey.formats.ply_bodies import ply_bodies
 from survey.formats.stl_bodies import stl_bodies
 from survey.records import Reject, SolidRecord, SurveyStream
+from survey.snapping import snap
+from survey.snapping_report import Snapping
+from survey.solids import Solid
+from survey.watertight import check_watertight
 
 __all__ = ["open_solids"]
 
@@ -37,7 +45,8 @@ def open_solids(path: Path, options: ReadingOptions | None = None) -> SurveyStre
     Parameters
     ----------
     path : the file; its ending says what it is
-    options : the code template of names; kind of stones whose names do not say it; the head of another file
+    options : the code template of names; kind of stones whose names do not say it; the unit; the tolerance of snapping;
+        the head of another file
 
     Raises
     ------
@@ -65,14 +74,44 @@ def open_solids(path: Path, options: ReadingOptions | None = None) -> SurveyStre
     first = next(raw, None)
     if first is None:
         raise SurveyError("the file has no solids", where=str(path), remedy="export closed surfaces")
-    return SurveyStream(options.head_for(path), _Solids(path, template, options.kind).records(first, raw))
+    head, records = options.head_for(path), _Solids(path, template, options).records(first, raw)
+    if not options.snap > 0.0:
+        return SurveyStream(head, records)
+    snapped, snapping = _snapped(list(records), options.snap, str(path))
+    return SurveyStream(head, iter(snapped), snapping)
+
+
+def _snapped(
+    found: list[SolidRecord | Reject], tolerance: float, path: str
+) -> tuple[list[SolidRecord | Reject], Snapping]:
+    """The same stones with the planes of their faces in common."""
+    records = [one for one in found if isinstance(one, SolidRecord)]
+    given = [Solid(one.code, one.vertices, one.faces) for one in records]
+    solids, snapping = snap(given, tolerance)
+    made = {one.code: _moved(one, solid, snapping, path) for one, solid in zip(records, solids, strict=True)}
+    return [made[one.code] if isinstance(one, SolidRecord) else one for one in found], snapping
+
+
+def _moved(record: SolidRecord, solid: Solid, snapping: Snapping, path: str) -> SolidRecord | Reject:
+    """The stone as it is now, if it is one still."""
+    try:
+        check_watertight(solid)
+    except GeometryError as error:
+        where = f"{path}:{record.line}" if record.line else path
+        what = f"solid {record.code}: within {snapping.tolerance:g} m of its corners {error.what}"
+        remedy = "give a smaller tolerance with --snap"
+        return Reject(record.code, SurveyError(what, where=where, remedy=remedy), record.spans)
+    moved, folded = snapping.moved[record.code], snapping.folded.get(record.code, 0)
+    text = f"snapped within {snapping.tolerance:g} m: corners moved by up to {moved:.2g} m"
+    more = (f"{folded} faces folded for that",) if folded else ()
+    return replace(record, vertices=solid.vertices, faces=solid.faces, remarks=(*record.remarks, text, *more))
 
 
 class _Solids:
     """The solids of a file, and those that are none."""
 
-    def __init__(self, path: Path, template: CodeTemplate, kind: str) -> None:
-        self._path, self._template, self._kind = path, template, kind
+    def __init__(self, path: Path, template: CodeTemplate, options: ReadingOptions) -> None:
+        self._path, self._template, self._options = path, template, options
         self._known: set[str] = set()
 
     def records(self, first: RawBody, others: Iterator[RawBody]) -> Iterator[SolidRecord | Reject]:
@@ -88,11 +127,13 @@ class _Solids:
         if raw.error is not None:
             yield self._reject(name, raw, raw.error)
             return
-        found = list(closed_bodies(raw))
-        for number, solid in enumerate(found, start=1):
+        unit = self._options.unit
+        metric = replace(raw, vertices=raw.vertices * unit, resolution=raw.resolution * unit)
+        found = list(closed_bodies(metric, self._options.snap))
+        for number, body in enumerate(found, start=1):
             code = name if len(found) == 1 else f"{name}-{number}"
-            if isinstance(solid, GeometryError):
-                yield self._reject(code, raw, self._error(code, raw, solid.what, solid.remedy))
+            if isinstance(body, GeometryError):
+                yield self._reject(code, raw, self._error(code, raw, body.what, body.remedy))
             elif CODE.fullmatch(code) is None:
                 remedy = "use letters, digits and . + / : - _, at most 64"
                 yield self._reject(code, raw, self._error(code, raw, "that is not a code", remedy))
@@ -101,7 +142,9 @@ class _Solids:
                 yield self._reject(code, raw, self._error(code, raw, "a second of that name", remedy))
             else:
                 self._known.add(code)
-                yield SolidRecord(code, kind or self._kind, course, solid.vertices, solid.faces, raw.line)
+                vertices, faces = body.solid.vertices, body.solid.faces
+                own = kind or self._options.kind
+                yield SolidRecord(code, own, course, vertices, faces, raw.line, remarks=_remarks(body))
 
     def _error(self, code: str, raw: RawBody, what: str, remedy: str | None) -> SurveyError:
         where = f"{self._path}:{raw.line}" if raw.line else str(self._path)
@@ -110,3 +153,13 @@ class _Solids:
     def _reject(self, code: str, raw: RawBody, error: SurveyError) -> Reject:
         spans = (range(raw.line, raw.end),) if raw.line else ()
         return Reject(code if CODE.fullmatch(code) else None, error, spans)
+
+
+def _remarks(body: ClosedBody) -> tuple[str, ...]:
+    """What was settled of its faces."""
+    out = []
+    if body.doubled:
+        out.append(f"{body.doubled} faces were there twice")
+    if body.folded:
+        out.append(f"{body.folded} faces that are not plane were folded")
+    return tuple(out)

@@ -1,4 +1,4 @@
-"""Planar faces of a body: which polygons are flat, and which triangles lie in one plane.
+"""Planar faces of a body: how flat polygons are, and which triangles lie in one plane.
 
 Meshes have planes cut into triangles, which say nothing of the stone; its faces are the planes. Triangles that share
 edges and lie in the plane of the largest of them become one polygon where their common boundary is one loop.
@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["is_flat", "merge_flat"]
+__all__ = ["merge_flat", "rounding"]
 
 Array = NDArray[np.float64]
 Polygon = tuple[int, ...]
@@ -20,21 +20,15 @@ _SAME_PLANE = 1e-5  # of a body's size
 _SAME_SIDE = 0.9  # cosine between normals, which are poor in thin triangles: heights decide
 
 
-def is_flat(corners: Array, resolution: float) -> bool:
-    """Whether a polygon is plane, but for rounding.
+def rounding(corners: Array, resolution: float) -> float:
+    """By how much rounding to a few digits may lift a corner of a plane polygon out of its plane [m].
 
     Parameters
     ----------
-    corners : (n, 3) in order [m]
+    corners : (n, 3) [m]
     resolution : of their coordinates [m]
     """
-    centred = corners - corners.mean(axis=0)
-    normal = np.cross(centred, np.roll(centred, -1, axis=0)).sum(axis=0)
-    length = float(np.linalg.norm(normal))
-    if not length > 0.0:
-        return False
-    size = float(np.linalg.norm(np.ptp(corners, axis=0)))
-    return bool(np.abs(centred @ normal).max() / length <= _BULGE * size + resolution)
+    return _BULGE * float(np.linalg.norm(np.ptp(corners, axis=0))) + resolution
 
 
 def merge_flat(

@@ -21,12 +21,16 @@ class ReadingOptions:
     kind : of stones that do not say it
     sigma : standard deviation of a coordinate, where the file does not say it [m]
     head : from a header file, for formats that have no head of their own
+    unit : length of the unit in which solids are given [m]
+    snap : faces of neighbouring solids that match but for so much are brought into one plane [m]; 0: none is
     """
 
     codes: str | None = None
     kind: str = "ashlar"
     sigma: float = 0.003
     head: SurveyHead | None = None
+    unit: float = 1.0
+    snap: float = 0.0
 
     def head_for(self, path: Path) -> SurveyHead:
         """Make the head of a file that has none of its own: that of the header file, under the file's own path."""

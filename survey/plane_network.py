@@ -1,0 +1,132 @@
+"""Corners that are to lie on planes, which are not known either: all of them with the least movement.
+
+Unknown are the corners x_v and the planes (n_p, d_p). The squared movement Σ |x_v - x_v⁰|² is least, subject to
+n_p·x_v = d_p for each corner v of each plane p. Every step solves the linearised problem (sequential quadratic
+programming with the Hessian of the movement alone),
+
+    | I        Aᵀ | | δx |   | x⁰ - x |
+    |     μI   Bᵀ | | δp | = |   0    |
+    | A   B   -δI | | λ  |   |  -g    |
+
+with A, B the derivatives of the distances g by corners and by planes. A plane turns about two axes in it and shifts
+along its normal; its turns are counted in metres at its own radius, so that all unknowns are lengths. δ makes the
+system solvable where a corner has more planes than three directions can tell apart; the last steps start from where the
+corners are, so that it leaves nothing behind.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csc_array
+from scipy.sparse.linalg import splu
+
+__all__ = ["Settled", "settle"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_STEPS = 30
+_POLISH = 4
+_DONE = 1e-14  # of the size of all: smaller steps are rounding
+_SOFT = 1e-9  # δ and μ
+
+
+@dataclass(frozen=True)
+class Settled:
+    """Where the corners came to lie.
+
+    Attributes
+    ----------
+    vertices : (nv, 3) [m]
+    normals : (np, 3) unit normals of the planes [-]
+    residual : (ni,) distance of each corner from each of its planes [m]
+    """
+
+    vertices: Array
+    normals: Array
+    residual: Array
+
+
+def settle(vertices: Array, corner: Ints, plane: Ints) -> Settled:
+    """Move corners onto planes by as little as can be.
+
+    Parameters
+    ----------
+    vertices : (nv, 3) where the corners are [m]
+    corner, plane : (ni,) which corner lies on which plane; each plane has three corners or more, not in a line
+    """
+    centre = vertices.mean(axis=0)
+    network = _Network(vertices - centre, corner, plane)
+    size = float(np.abs(network.x).max())
+    for _ in range(_STEPS):
+        if network.step() <= _DONE * size:
+            break
+    for _ in range(_POLISH):
+        network.start = network.x.copy()
+        network.step()
+    return Settled(network.x + centre, network.normal, network.distances())
+
+
+class _Network:
+    """The corners and planes on their way."""
+
+    def __init__(self, vertices: Array, corner: Ints, plane: Ints) -> None:
+        self.start, self.x = vertices.copy(), vertices.copy()
+        self._corner, self._plane = corner, plane
+        count = int(plane.max()) + 1 if len(plane) else 0
+        share = 1.0 / np.bincount(plane, minlength=count)
+        self._centre = np.zeros((count, 3))
+        np.add.at(self._centre, plane, vertices[corner] * share[plane, None])
+        lever = vertices[corner] - self._centre[plane]
+        second = np.zeros((count, 3, 3))
+        np.add.at(second, plane, lever[:, :, None] * lever[:, None, :] * share[plane, None, None])
+        values, vectors = np.linalg.eigh(second)
+        self._radius = np.sqrt(values[:, 2])
+        self.normal, self._turns = vectors[:, :, 0], vectors[:, :, 1:]
+        self._offset = np.zeros(count)
+
+    def distances(self) -> Array:
+        """Of each corner from each of its planes."""
+        lever = self.x[self._corner] - self._centre[self._plane]
+        out: Array = (self.normal[self._plane] * lever).sum(axis=1) - self._offset[self._plane]
+        return out
+
+    def step(self) -> float:
+        """One step; how far the corner moved that moved farthest."""
+        nv, count, ni = len(self.x), len(self._offset), len(self._corner)
+        right = np.concatenate([(self.start - self.x).ravel(), np.zeros(3 * count), -self.distances()])
+        solution = splu(self._matrix()).solve(right)
+        move = solution[: 3 * nv].reshape(-1, 3)
+        turn = solution[3 * nv : 3 * (nv + count)].reshape(-1, 3)
+        self.x += move
+        self._offset += turn[:, 2]
+        tilt = (self._turns @ turn[:, :2, None])[:, :, 0] / self._radius[:, None]
+        self.normal = self.normal + tilt
+        self.normal /= np.linalg.norm(self.normal, axis=1)[:, None]
+        first = self._turns[:, :, 0] - (self._turns[:, :, 0] * self.normal).sum(axis=1)[:, None] * self.normal
+        first /= np.linalg.norm(first, axis=1)[:, None]
+        self._turns = np.stack([first, np.cross(self.normal, first)], axis=2)
+        return float(np.linalg.norm(move, axis=1).max(initial=0.0)) if ni else 0.0
+
+    def _matrix(self) -> csc_array:
+        """Of the linearised problem, symmetric."""
+        nv, count, ni = len(self.x), len(self._offset), len(self._corner)
+        lever = self.x[self._corner] - self._centre[self._plane]
+        turns = np.einsum("ki,kij->kj", lever, self._turns[self._plane]) / self._radius[self._plane, None]
+        values = np.column_stack([self.normal[self._plane], turns, -np.ones(ni)])
+        columns = np.column_stack(
+            [3 * self._corner[:, None] + np.arange(3), 3 * (nv + self._plane[:, None]) + np.arange(3)]
+        )
+        rows = 3 * (nv + count) + np.repeat(np.arange(ni), 6)
+        diagonal = np.repeat([1.0, _SOFT, -_SOFT], [3 * nv, 3 * count, ni])
+        every = np.arange(len(diagonal))
+        flat = columns.ravel()
+        matrix = coo_array(
+            (
+                np.concatenate([values.ravel(), values.ravel(), diagonal]),
+                (np.concatenate([rows, flat, every]), np.concatenate([flat, rows, every])),
+            ),
+            shape=(len(diagonal), len(diagonal)),
+        )
+        return csc_array(matrix)
