@@ -1,0 +1,70 @@
+"""Small walls of two facings for the tests of the core, and checks that know nothing of how it was made."""
+
+import numpy as np
+from scipy.optimize import linprog
+from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
+
+from survey.extrusion import prism
+from survey.infill_facings import FacingStone
+from survey.solids import Solid
+from survey.watertight import triangulate
+
+HALF = 0.5  # of the thickness of the wall [m]
+
+
+def facing(rows, beds, *, back=False, joint=0.0, placed=None):
+    """Stones of one facing of a wall along x, whose front looks along -y.
+
+    rows: for each course (length, depth) of the stones from the left of the plan; a depth of None leaves a hole.
+    """
+    sign = -1.0 if back else 1.0
+    stones = []
+    for course, row in enumerate(rows, start=1):
+        x = 0.0
+        for number, (length, depth) in enumerate(row, start=1):
+            left, right = x + joint, x + length - joint
+            low, high = beds[course - 1] + joint, beds[course] - joint
+            x += length
+            if depth is None:
+                continue
+            flat = np.array([[left, low], [right, low], [right, high], [left, high]])[
+                :: 1 if not back else -1
+            ]
+            front = np.column_stack([flat[:, 0], np.full(4, -sign * HALF), flat[:, 1]])
+            code = f"{'B' if back else 'F'}{course:02d}-{number:02d}"
+            solid = prism(code, front, front + np.array([0.0, sign * depth, 0.0]))
+            stones.append(FacingStone(code, course, solid, np.array([0.0, -sign, 0.0])))
+    return stones if placed is None else [moved(stone, *placed) for stone in stones]
+
+
+def moved(stone, rotation, shift):
+    """The stone elsewhere."""
+    turn = Rotation.from_rotvec(rotation).as_matrix()
+    solid = Solid(stone.code, stone.solid.vertices @ turn.T + shift, stone.solid.faces)
+    return FacingStone(stone.code, stone.course, solid, turn @ stone.normal)
+
+
+def depth_of_overlap(one, other):
+    """Radius of the largest ball in what two convex solids share; negative if they are apart [m]."""
+    shift = one.mean(axis=0)
+    planes = np.concatenate([ConvexHull(points - shift).equations for points in (one, other)])
+    rows = np.column_stack([planes[:, :3], np.ones(len(planes))])
+    done = linprog([0, 0, 0, -1], A_ub=rows, b_ub=-planes[:, 3], bounds=[(None, None)] * 4)
+    assert done.status == 0
+    return float(done.x[3])
+
+
+def boxes_meet(one, other):
+    """Whether the boxes of two sets of corners overlap."""
+    return bool((one.min(axis=0) < other.max(axis=0)).all() and (other.min(axis=0) < one.max(axis=0)).all())
+
+
+def contains(solid, points):
+    """Which points are in a closed solid: the solid angle under which they see it is 4π there."""
+    corners = solid.vertices[triangulate(solid)]
+    a, b, c = (corners[None, :, k] - points[:, None] for k in range(3))
+    la, lb, lc = (np.linalg.norm(side, axis=2) for side in (a, b, c))
+    upper = (a * np.cross(b, c)).sum(axis=2)
+    lower = la * lb * lc + (a * b).sum(axis=2) * lc + (b * c).sum(axis=2) * la + (c * a).sum(axis=2) * lb
+    return np.abs(2.0 * np.arctan2(upper, lower).sum(axis=1)) > 2.0 * np.pi
