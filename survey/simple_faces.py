@@ -9,6 +9,7 @@ from survey.extrusion import SurveyedBlock, hidden_side, prism
 from survey.simplified import BlockShape, SimpleSolid, Simplified, prism_shape
 from survey.solids import Solid
 from survey.squaring import SimplifyBounds, SquaredFace, nearest_quadrilateral, square_face
+from survey.worn_corners import restore_worn
 
 __all__ = ["simplify_face"]
 
@@ -37,9 +38,12 @@ def simplify_face(block: SurveyedBlock, bounds: SimplifyBounds) -> SimpleSolid:
             f"kept as surveyed: a corner lies {squared.dent * 1e3:.0f} mm inside the outline of the others"
         )
     else:
+        points = np.delete(block.face.record.points, list(block.face.rejected_points), axis=0)
+        farthest = min(bounds.max_restored, bounds.restored_share * squared.width)
+        squared, count = restore_worn(squared, worn, (points - fit.centroid) @ axes.T, tolerance, farthest)
         solid, shape = _extruded(block, squared, axes), prism_shape(len(squared.corners))
         sound = (squared.source >= 0) & ~worn[squared.source]
-        reason = _said(squared, worn)
+        reason = _said(squared, worn, count)
     old, new = about(block.solid, fit.centroid), about(solid, fit.centroid)
     same = solid is block.solid
     left = np.zeros(len(old.vertices)) if same else from_edges(old.vertices, new)
@@ -112,17 +116,17 @@ def _nearest_hexahedron(block: SurveyedBlock, flat: Array, axes: Array) -> Solid
     return prism(block.code, corners, hidden)
 
 
-def _said(squared: SquaredFace, worn: NDArray[np.bool_]) -> str:
+def _said(squared: SquaredFace, worn: NDArray[np.bool_], along_points: int) -> str:
     """What was done to a measured face, in words."""
-    count = len(squared.corners)
-    restored = int((squared.source < 0).sum())
-    left_out = len(worn) - (count - restored)
-    kept = {3: "a triangular face", 4: "a face of four corners"}.get(count, f"a face of {count} corners")
-    said = [kept]
+    count, restored = len(squared.corners), int((squared.source < 0).sum())
+    left_out = len(worn) - (count - restored) - along_points
+    said = [{3: "a triangular face", 4: "a face of four corners"}.get(count, f"a face of {count} corners")]
     if left_out:
         said.append(f"{left_out} of {len(worn)} measured corners left out")
-    if restored:
-        said.append(f"{restored} restored where the sides beside a bevel or a break meet")
+    if restored > along_points:
+        said.append(f"{restored - along_points} restored where the sides beside a bevel or a break meet")
+    if along_points:
+        said.append(f"{along_points} worn, restored along the points measured beside its sides")
     if count > 4:
         said.append("four would lie too far from those that were measured")
     return "; ".join(said)
