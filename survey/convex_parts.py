@@ -84,23 +84,27 @@ class _Cutter:
         whole = _Region((), tuple(self._pieces()), reflex_edges(self._local))
         ranked = sorted(self._ranked(whole), key=lambda one: one[0])
         beginnings = [cut for rank, cut in ranked if rank[0] == ranked[0][0][0]][:_BEGINNINGS]
-        best, score = None, (0, 0.0)
         starts: list[Plane | None] = [*beginnings] or [None]
-        for first in starts:
-            found = self._follow(whole, first)
-            if found is not None:
-                widths = [_width(part) for part in found]
-                own = (-len(found), round(min(widths) / self._size, 9))
-                if best is None or own > score:
-                    best, score = found, own
-        if best is None:
+        found = [parts for parts in (self._follow(whole, first) for first in starts) if parts is not None]
+        if not found:
             raise GeometryError(
                 f"it is not convex, and would take more than {self._most} convex parts",
                 where=f"stone {self._solid.code}",
                 remedy="simplify it, or make several stones of it",
             )
-        self._check(best)
+        filling = [parts for parts in found if self._is_filled(parts)]
+        if not filling:
+            raise GeometryError(
+                "its convex parts do not fill it: its faces are not quite planes",
+                where=f"stone {self._solid.code}",
+                remedy="make them planes: moma ingest --snap",
+            )
+        best = max(filling, key=self._worth)
         return tuple(replace(part, vertices=self._placed(part.vertices)) for part in best)
+
+    def _worth(self, parts: Sequence[Solid]) -> tuple[int, float]:
+        """The fewer parts, and the thicker the thinnest, the better."""
+        return -len(parts), round(min(map(_width, parts)) / self._size, 9)
 
     def _pieces(self) -> Iterator[tuple[int, tuple[Place, ...]]]:
         """Faces as convex polygons."""
@@ -110,7 +114,10 @@ class _Cutter:
                 yield k, tuple(corners[i] for i in face)
             else:
                 for triangle in triangulate(replace(self._local, faces=(face,))).tolist():
-                    yield k, tuple(corners[i] for i in triangle)
+                    a, b, c = self._local.vertices[triangle]
+                    longest = max(float(np.linalg.norm(one)) for one in (b - a, c - b, a - c))
+                    if float(np.linalg.norm(np.cross(b - a, c - a))) > self._flat * longest:
+                        yield k, tuple(corners[i] for i in triangle)
 
     def _follow(self, whole: _Region, first: Plane | None) -> list[Solid] | None:
         """Cut until all is convex; None if that takes too many parts."""
@@ -226,14 +233,9 @@ class _Cutter:
         out: Array = np.where(own[:, None], self._solid.vertices[nearest], vertices + self._origin)
         return out
 
-    def _check(self, parts: Sequence[Solid]) -> None:
+    def _is_filled(self, parts: Sequence[Solid]) -> bool:
         whole = _volume(self._local)
-        if abs(sum(_volume(part) for part in parts) - whole) > _SAME_VOLUME * whole:
-            raise GeometryError(
-                "its convex parts do not fill it: its faces are not quite planes",
-                where=f"stone {self._solid.code}",
-                remedy="make them planes: moma ingest --snap",
-            )
+        return abs(sum(map(_volume, parts)) - whole) <= _SAME_VOLUME * whole
 
 
 def _place(row: Sequence[float]) -> Place:

@@ -10,6 +10,7 @@ from survey.solids import Solid, area_vector
 __all__ = ["check_watertight", "triangulate"]
 
 _CONVEX_TOLERANCE = 1e-9  # metres that a corner may stand in front of a face plane
+_ON_A_SIDE = 1e-12  # of a triangle's size: corners so near to it are on its side
 
 
 def check_watertight(solid: Solid, *, convex: bool = False) -> None:
@@ -74,7 +75,9 @@ def _is_ear(vertices: NDArray[np.float64], rest: list[int], k: int, normal: NDAr
     if inward[0] @ (corners[2] - corners[0]) <= 0.0:
         return False
     others = vertices[[i for i in rest if i not in ids]]
-    inside = ((others[:, None, :] - corners) * inward).sum(axis=2) >= 0.0
+    # a corner on the side that would be cut is in the way, also where rounding puts it just outside
+    slack = _ON_A_SIDE * np.linalg.norm(inward, axis=1) * float(np.abs(corners - corners[0]).max())
+    inside = ((others[:, None, :] - corners) * inward).sum(axis=2) >= -slack
     return not inside.all(axis=1).any()
 
 
