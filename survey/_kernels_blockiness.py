@@ -9,26 +9,31 @@ import math
 import numpy as np
 from numba import njit
 
-__all__ = ["common_volume", "edge_distances", "face_planes", "volume", "worst_angle"]
+__all__ = ["area_vectors", "common_volume", "edge_distances", "face_planes", "volume", "worst_angle"]
+
+
+@njit(cache=True)
+def area_vectors(vertices, corners, starts):
+    """Area times outward normal of each face, (nf, 3)."""
+    out = np.zeros((len(starts) - 1, 3))
+    for f in range(len(starts) - 1):
+        origin = vertices[corners[starts[f]]]
+        for c in range(starts[f] + 1, starts[f + 1] - 1):
+            out[f] += 0.5 * _cross(vertices[corners[c]] - origin, vertices[corners[c + 1]] - origin)
+    return out
 
 
 @njit(cache=True)
 def face_planes(vertices, corners, starts):
     """Planes (nf, 4) of the faces: unit normal, and offset of the mean of the corners. Zero where there is no area."""
     out = np.zeros((len(starts) - 1, 4))
+    vectors = area_vectors(vertices, corners, starts)
     for f in range(len(starts) - 1):
-        origin = vertices[corners[starts[f]]]
-        normal, mean = np.zeros(3), np.zeros(3)
-        for c in range(starts[f], starts[f + 1]):
-            following = c + 1 if c + 1 < starts[f + 1] else starts[f]
-            a, b = vertices[corners[c]] - origin, vertices[corners[following]] - origin
-            normal += _cross(a, b)
-            mean += a
-        length = math.sqrt((normal * normal).sum())
+        length = math.sqrt((vectors[f] * vectors[f]).sum())
         if length > 0.0:
-            normal /= length
-            out[f, :3] = normal
-            out[f, 3] = (normal * (origin + mean / (starts[f + 1] - starts[f]))).sum()
+            out[f, :3] = vectors[f] / length
+            for c in range(starts[f], starts[f + 1]):
+                out[f, 3] += (out[f, :3] * vertices[corners[c]]).sum() / (starts[f + 1] - starts[f])
     return out
 
 

@@ -5,7 +5,14 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from survey._kernels_blockiness import common_volume, edge_distances, face_planes, volume, worst_angle
+from survey._kernels_blockiness import (
+    area_vectors,
+    common_volume,
+    edge_distances,
+    face_planes,
+    volume,
+    worst_angle,
+)
 from survey.solids import Solid
 
 __all__ = [
@@ -36,6 +43,12 @@ def solid_planes(solid: Solid) -> Array:
     """Planes (nf, 4) of the faces: unit normal outwards [-], distance from the origin [m]."""
     planes: Array = face_planes(*_arrays(solid))
     return planes
+
+
+def face_vectors(solid: Solid) -> Array:
+    """Area times outward normal of each face (nf, 3) [m²]."""
+    vectors: Array = area_vectors(*_arrays(solid))
+    return vectors
 
 
 def largest_skew(solid: Solid) -> float:

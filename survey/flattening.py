@@ -6,16 +6,16 @@ planes cross; corners where only one or two planes meet are none.
 """
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Container
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from survey.blockiness import from_edges
+from survey.blockiness import face_vectors, from_edges
 from survey.solids import Solid, area_vector
 
-__all__ = ["FlatSolid", "flatten", "highest_corner", "is_plane", "split_bent_faces"]
+__all__ = ["FlatSolid", "flatten", "highest_corner", "is_plane"]
 
 Array = NDArray[np.float64]
 Face = tuple[int, ...]
@@ -55,7 +55,8 @@ def flatten(solid: Solid, tolerance: float) -> FlatSolid | None:
     FlatSolid; None if no such solid is within the tolerance, a face has a hole, or more than three planes meet
     in one corner
     """
-    groups = _plane_groups(solid, tolerance)
+    vectors = face_vectors(solid)
+    groups = _plane_groups(solid, vectors, tolerance)
     around: dict[int, list[int]] = defaultdict(list)
     for number, group in enumerate(groups):
         for i in sorted({i for face in group for i in solid.faces[face]}):
@@ -68,7 +69,7 @@ def flatten(solid: Solid, tolerance: float) -> FlatSolid | None:
     faces = [tuple(place[i] for i in loop if i in place) for loop in loops if loop is not None]
     if len(faces) < len(groups) or min(len(face) for face in faces) < 3:
         return None
-    planes = np.array([_plane(solid, group, corners) for group in groups])
+    planes = np.array([_plane(solid, vectors, group, place) for group in groups])
     vertices = _crossings(solid.vertices[corners], planes, [around[i] for i in corners])
     if vertices is None:
         return None
@@ -96,25 +97,6 @@ def highest_corner(solid: Solid, planes: Array) -> float:
     return float((solid.vertices @ planes[:, :3].T - planes[:, 3]).max())
 
 
-def split_bent_faces(solid: Solid, triangles: Sequence[Sequence[int]], tolerance: float) -> Solid:
-    """The same solid, with the triangles of every face that is not plane in place of it.
-
-    Parameters
-    ----------
-    triangles : of all faces, in their order, each face of n corners cut into n - 2
-    """
-    faces: list[Face] = []
-    start = 0
-    for face in solid.faces:
-        stop = start + len(face) - 2
-        if len(face) == 3 or np.abs(_heights(solid.vertices[list(face)])).max() <= tolerance:
-            faces.append(face)
-        else:
-            faces += [(int(a), int(b), int(c)) for a, b, c in triangles[start:stop]]
-        start = stop
-    return Solid(solid.code, solid.vertices, tuple(faces))
-
-
 def _heights(polygon: Array) -> Array:
     """Of the corners of a polygon above its mean plane (n,) [m]."""
     normal = area_vector(polygon)
@@ -122,10 +104,9 @@ def _heights(polygon: Array) -> Array:
     return out
 
 
-def _plane_groups(solid: Solid, tolerance: float) -> list[list[int]]:
+def _plane_groups(solid: Solid, vectors: Array, tolerance: float) -> list[list[int]]:
     """Faces that share edges and lie in one plane, that of the largest of them."""
     polygons = [solid.vertices[list(face)] for face in solid.faces]
-    vectors = np.array([area_vector(polygon) for polygon in polygons])
     areas = np.linalg.norm(vectors, axis=1)
     normals = vectors / np.maximum(areas, 1e-300)[:, None]
     owner = {edge: k for k, face in enumerate(solid.faces) for edge in _edges(face)}
@@ -168,11 +149,11 @@ def _outline(faces: list[Face]) -> Face | None:
     return tuple(loop) if len(loop) == len(after) else None
 
 
-def _plane(solid: Solid, group: list[int], corners: list[int]) -> Array:
+def _plane(solid: Solid, vectors: Array, group: list[int], corners: Container[int]) -> Array:
     """Mean plane of the faces of a group: (4,) unit normal, and offset that is the mean of its corners'."""
-    vector = sum((area_vector(solid.vertices[list(solid.faces[k])]) for k in group), np.zeros(3))
+    vector = vectors[group].sum(axis=0)
     normal = vector / max(float(np.linalg.norm(vector)), 1e-300)
-    own = sorted({i for k in group for i in solid.faces[k]} & set(corners))
+    own = sorted({i for k in group for i in solid.faces[k] if i in corners})
     return np.append(normal, float((solid.vertices[own] @ normal).mean()) if own else 0.0)
 
 

@@ -3,8 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from survey.blockiness import solid_planes
 from survey.extrusion import prism
-from survey.solids import Solid, area_vector
+from survey.solids import Solid
 
 __all__ = ["as_prism", "box_around"]
 
@@ -23,23 +24,19 @@ def as_prism(solid: Solid, outward: Array, first: Array) -> Solid | None:
     first : (3,) the corner that is nearest to it comes first [m]
     """
     count = len(solid.faces) - 2
-    ends = [face for face in solid.faces if len(face) == count]
+    ends = [k for k, face in enumerate(solid.faces) if len(face) == count]
     if len(solid.vertices) != 2 * count or sum(len(face) == 4 for face in solid.faces) < count:
         return None
-    if len(ends) < 2 or (count != 4 and set(ends[0]) & set(ends[1])):
+    if len(ends) < 2 or (count != 4 and set(solid.faces[ends[0]]) & set(solid.faces[ends[1]])):
         return None
-    front = max(ends, key=lambda end: _towards(solid.vertices[list(end)], outward))
+    towards = solid_planes(solid)[ends, :3] @ outward
+    front = solid.faces[ends[int(towards.argmax())]]
     behind = {a: b for face in solid.faces for a, b in _both_ways(face) if a in front and b not in front}
     if len(set(behind.values())) != count:
         return None
     start = int(np.linalg.norm(solid.vertices[list(front)] - first, axis=1).argmin())
     visible = list(front[start:] + front[:start])
     return prism(solid.code, solid.vertices[visible], solid.vertices[[behind[i] for i in visible]])
-
-
-def _towards(polygon: Array, outward: Array) -> float:
-    normal = area_vector(polygon)
-    return float(normal @ outward / np.linalg.norm(normal))
 
 
 def _both_ways(face: tuple[int, ...]) -> list[tuple[int, int]]:

@@ -6,18 +6,18 @@ from numpy.typing import NDArray
 from moma.errors import GeometryError
 from survey.blockiness import about, common_share, largest_skew, moved_corners, solid_planes, solid_volume
 from survey.extrusion import SurveyedBlock
-from survey.flattening import FlatSolid, flatten, highest_corner, is_plane, split_bent_faces
+from survey.flattening import FlatSolid, flatten, highest_corner, is_plane
 from survey.prisms import as_prism, box_around
 from survey.simplified import BlockShape, SimpleSolid, Simplified, prism_shape
+from survey.snapping import snap
 from survey.solids import Solid
 from survey.squaring import SimplifyBounds
-from survey.watertight import triangulate
 
 __all__ = ["simplify_solid"]
 
 Array = NDArray[np.float64]
 
-_EQUAL = 1e-12  # of a stone's size: a corner nearer to a plane than that is on it
+_PLANE = 5e-9  # metres: what rounding in a national grid bends a plane face
 _CONVEX = 1e-10  # of a stone's size: a corner above a face by less is on it
 _FLAT = 1e-12  # of the cube on a stone's length: a solid that encloses less is flat
 
@@ -34,10 +34,13 @@ def simplify_solid(block: SurveyedBlock, bounds: SimplifyBounds) -> SimpleSolid:
     if found is not None and new is not None:
         shape, reason = prism_shape(len(new.faces) - 2), _said(old, new, found)
     else:
-        shape, reason = BlockShape.POLYHEDRON, _why_general(old, found, tolerance)
-        new = _general(old, found)
+        shape, new = BlockShape.POLYHEDRON, _general(old, tolerance)
+        reason = _why_general(old, new)
     same = new is old
-    left = np.zeros(len(old.vertices)) if same or found is None else found.moved
+    if found is None or shape is BlockShape.POLYHEDRON:
+        left = np.linalg.norm(new.vertices - old.vertices, axis=1)
+    else:
+        left = found.moved
     hexahedron = new if shape is BlockShape.HEXAHEDRON else box_around(old, block.face.fit.normal)
     report = Simplified(
         displacement=left if same else moved_corners(old, new, left),
@@ -67,12 +70,9 @@ def _prism(solid: Solid, outward: Array, first: Array) -> Solid | None:
     return as_prism(solid, outward, first) if _rise(solid) <= _CONVEX * _size(solid) else None
 
 
-def _general(old: Solid, found: FlatSolid | None) -> Solid:
-    """A solid that is no prism, with plane faces."""
-    plane = _EQUAL * _size(old)
-    if is_plane(old, plane):
-        return old
-    return split_bent_faces(old, triangulate(old).tolist(), plane) if found is None else found.solid
+def _general(old: Solid, tolerance: float) -> Solid:
+    """A solid that is no prism, its faces plane: corners are moved by as little as can be, or faces are folded."""
+    return old if is_plane(old, _PLANE) else snap([old], tolerance)[0][0]
 
 
 def _rise(solid: Solid) -> float:
@@ -92,16 +92,17 @@ def _said(old: Solid, new: Solid, found: FlatSolid) -> str:
     return "; ".join(said)
 
 
-def _why_general(old: Solid, found: FlatSolid | None, tolerance: float) -> str:
+def _why_general(old: Solid, new: Solid) -> str:
     """Why a solid stays general, in words."""
-    if found is None:
-        return (
-            f"kept as it was made: its {len(old.faces)} faces are no planes within {tolerance * 1e3:.2g} mm of which "
-            "three meet in each corner"
-        )
-    if (rise := _rise(found.solid)) > _CONVEX * _size(old):
-        return f"kept as it was made: not convex, a corner stands {rise * 1e3:.2g} mm above a face"
-    return f"kept as it was made: its {len(found.solid.faces)} faces are those of no prism"
+    said = [f"stays general, with {len(new.faces)} faces"]
+    if (rise := _rise(new)) > _CONVEX * _size(old):
+        said.append(f"not convex, a corner stands {rise * 1e3:.2g} mm above the plane of a face")
+    else:
+        said.append("convex, but no prism of which three planes meet in each corner")
+    if new is not old:
+        moved = float(np.linalg.norm(new.vertices - old.vertices, axis=1).max())
+        said.append(f"corners moved by up to {moved * 1e3:.2g} mm to make them plane")
+    return "; ".join(said)
 
 
 def _placed(new: Solid, old: Solid, world: Solid) -> Solid:
