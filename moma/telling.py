@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pipelines.check import CheckReport
-    from pipelines.ingest_report import IngestReport
+    from pipelines.ingest_report import IngestReport, SolidsReport
     from pipelines.run import RunReport
     from pipelines.survey_report import SurveyReport
 
@@ -33,12 +33,37 @@ def ingest_lines(report: "IngestReport", verbose: bool) -> list[str]:
         if verbose:
             lines += [f"  {code}: {count} left out" for code, count in file.rejected.items()]
             lines += [f"  {code}: {text}" for code, text in file.shapes.items()]
+        if file.solids is not None:
+            lines += _solid_lines(file.solids, verbose)
         if file.refused:
             lines.append(f"  {len(file.refused)} stones not taken in, to be corrected in {file.rejects}:")
             shown = file.refused if verbose else file.refused[:5]
             lines += [f"    {one.reason}" for one in shown]
             if len(shown) < len(file.refused):
                 lines.append(f"    and {len(file.refused) - len(shown)} more")
+    return lines
+
+
+def _solid_lines(solids: "SolidsReport", verbose: bool) -> list[str]:
+    """Whether solids are convex, what was settled of them, and what snapping did."""
+    lines = [f"  {solids.convex} convex, {len(solids.not_convex)} not"]
+    if verbose and solids.not_convex:
+        lines.append(f"  not convex: {', '.join(solids.not_convex)}")
+    if (snapping := solids.snapping) is not None:
+        lines.append(
+            f"  {snapping.contacts} contacts brought into {snapping.planes} planes within "
+            f"{snapping.tolerance:g} m; corners moved by up to {snapping.largest_movement:.2g} m"
+        )
+        shown = snapping.left_open if verbose else snapping.left_open[:5]
+        if snapping.left_open:
+            lines.append(f"  {len(snapping.left_open)} contacts left as they are:")
+        lines += [f"    {' and '.join(one.stones)}: {one.reason}" for one in shown]
+        if len(shown) < len(snapping.left_open):
+            lines.append(f"    and {len(snapping.left_open) - len(shown)} more, with -v")
+    if verbose:
+        lines += [f"  {code}: {'; '.join(texts)}" for code, texts in solids.remarks.items()]
+    elif solids.remarks:
+        lines.append(f"  remarks on {len(solids.remarks)} solids, with -v")
     return lines
 
 

@@ -16,6 +16,7 @@ from archmodel.store import store_survey
 from moma.errors import NoDatabaseError, SurveyError, UsageError
 from pipelines.frame_records import frame_record
 from pipelines.ingest_report import IngestReport, Tally
+from pipelines.kind_rules import KindRule, check_kinds, ruled
 from pipelines.progress import Listener, Progress, silent
 from pipelines.reading_options import check_survey_file
 from pipelines.rejects import check_targets, default_path, rejects_text
@@ -45,6 +46,7 @@ def ingest(
     keep_going: bool = False,
     rejects: str | Path | None = None,
     again: bool = False,
+    rules: Sequence[KindRule] = (),
 ) -> IngestReport:
     """Take survey files into the database: all of them, or, if anything is wrong in any, none.
 
@@ -59,10 +61,12 @@ def ingest(
     rejects : that file, if there is one survey file; by default ``NAME.rejects.SUFFIX`` beside each survey file
     again : stones that are in the database already were measured again: their old measurements are kept as superseded;
         otherwise they are an error
+    rules : which solids are of which kind
 
     Raises
     ------
-    UsageError : no such file, one named twice, no such format, a file of rejects that would replace one of the user's
+    UsageError : no such file, one named twice, no such format, a file of rejects that would replace one of the user's,
+        rules for stones that are no solids
     SurveyError, GeometryError : at the line or stone that is wrong, or has the code of one in another of the files;
         the database is not touched
     DatabaseError : a stone or a file is in the database already; the database is unchanged
@@ -74,15 +78,19 @@ def ingest(
         raise UsageError(
             f"one file of rejects for {len(surveys)} survey files", remedy="take in one file at a time"
         )
+    if rules and format != "solids":
+        remedy = "give it with --format solids; surveys say the kind of each stone"
+        raise UsageError(f"a rule for solids, and format {format}", where=rules[0].option, remedy=remedy)
     _check_files(surveys)
     targets = [Path(rejects) if rejects is not None else default_path(survey) for survey in surveys]
     if keep_going:
         check_targets(targets, surveys)
     with ExitStack() as held:
         _open_if_there(url, held)
+        check_kinds(rules)
         spools = [held.enter_context(Spool()) for _ in surveys]
         tallies = [
-            _measure(path, spool, format, options, keep_going, progress)
+            _measure(path, spool, format, options, rules, keep_going, progress)
             for path, spool in zip(surveys, spools, strict=True)
         ]
         if len(surveys) > 1:
@@ -150,6 +158,7 @@ def _measure(
     spool: Spool,
     format: str,
     options: ReadingOptions | None,
+    rules: Sequence[KindRule],
     keep_going: bool,
     progress: Listener,
 ) -> Tally:
@@ -157,7 +166,7 @@ def _measure(
     tally = Tally(path, survey_stones(open_survey(path, format, options)))
     stage, head, kinds = f"fit {path.name}", tally.stream.head, set[str]()
     for one in tally.stream.stones:
-        made = one if isinstance(one, Reject) else _of_known_kind(one, head.path, kinds)
+        made = one if isinstance(one, Reject) else _of_known_kind(ruled(one, rules), head.path, kinds)
         if not isinstance(made, Reject):
             tally.count(made)
             spool.append(stone_record(made))

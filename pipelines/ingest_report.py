@@ -10,8 +10,10 @@ from pipelines.frame_records import frame_record
 from survey.extrusion import SurveyedBlock
 from survey.measured import SurveyedStream
 from survey.records import Reject
+from survey.reflex_edges import is_convex
+from survey.snapping_report import Snapping
 
-__all__ = ["FileReport", "IngestReport", "Refusal", "Tally"]
+__all__ = ["FileReport", "IngestReport", "Refusal", "SolidsReport", "Tally"]
 
 
 @dataclass(frozen=True)
@@ -20,6 +22,24 @@ class Refusal:
 
     code: str | None
     reason: str
+
+
+@dataclass(frozen=True)
+class SolidsReport:
+    """What the solids of a file are like.
+
+    Attributes
+    ----------
+    convex : how many are
+    not_convex : codes of the others
+    remarks : what was settled or moved to make them solids with plane faces, by code
+    snapping : what bringing their faces into common planes has changed; None if that was not asked for
+    """
+
+    convex: int
+    not_convex: tuple[str, ...]
+    remarks: dict[str, tuple[str, ...]]
+    snapping: Snapping | None
 
 
 @dataclass(frozen=True)
@@ -39,6 +59,7 @@ class FileReport:
     rejects : the file that holds them; None if there are none
     frame : how the survey was carried into the frame of the site; None if it was there
     again : how many of the stones were in the database already, and have a new measurement now
+    solids : what they are like, in a file of solids
     """
 
     path: str
@@ -52,6 +73,7 @@ class FileReport:
     rejects: str | None = None
     frame: dict[str, Any] | None = None
     again: int = 0
+    solids: SolidsReport | None = None
 
 
 @dataclass(frozen=True)
@@ -76,6 +98,9 @@ class Tally:
     refused: list[Reject] = field(default_factory=list)
     again: int = 0
     stored: Sequence[int] = ()
+    convex: Counter[bool] = field(default_factory=Counter)
+    not_convex: list[str] = field(default_factory=list)
+    remarks: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
     def count(self, block: SurveyedBlock) -> None:
         """One more stone that is taken in."""
@@ -85,8 +110,24 @@ class Tally:
             self.rejected[block.code] = len(face.rejected_points)
         if str(face.shape.kind) not in ("plane", "untested"):
             self.shapes[block.code] = face.shape.text
+        if face.provenance.source == "solid":
+            self._count_solid(block)
         if face.provenance.source == "points" and face.fit.rms >= self.rms:
             self.rms, self.worst = face.fit.rms, block.code
+
+    def _count_solid(self, block: SurveyedBlock) -> None:
+        convex = is_convex(block.solid)
+        self.convex[convex] += 1
+        if not convex:
+            self.not_convex.append(block.code)
+        if block.face.remarks:
+            self.remarks[block.code] = block.face.remarks
+
+    def _solids(self) -> SolidsReport | None:
+        if not self.convex:
+            return None
+        codes = tuple(self.not_convex)
+        return SolidsReport(self.convex[True], codes, self.remarks, self.stream.snapping)
 
     def report(self, rejects: Path | None) -> FileReport:
         """What is told of the file; `rejects` is the file that holds the refused stones."""
@@ -102,4 +143,5 @@ class Tally:
             rejects=None if rejects is None else str(rejects),
             frame=frame_record(self.stream.transform),
             again=self.again,
+            solids=self._solids(),
         )

@@ -1,5 +1,6 @@
 """What a user says of survey files beside their names, as the readers want it."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,7 +8,10 @@ from moma.errors import UsageError
 from survey.formats.options import ReadingOptions
 from survey.formats.reading import with_header
 
-__all__ = ["check_survey_file", "reading_options"]
+__all__ = ["UNITS", "check_survey_file", "reading_options"]
+
+UNITS: Mapping[str, float] = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "in": 0.0254}
+"""Units in which solids may be given, by their length [m]."""
 
 
 def check_survey_file(path: Path) -> None:
@@ -18,7 +22,12 @@ def check_survey_file(path: Path) -> None:
 
 
 def reading_options(
-    header: Path | None = None, codes: str | None = None, kind: str | None = None, sigma: float | None = None
+    header: Path | None = None,
+    codes: str | None = None,
+    kind: str | None = None,
+    sigma: float | None = None,
+    unit: str | None = None,
+    snap: float | None = None,
 ) -> ReadingOptions:
     """Gather the options of a reader; what is None keeps its default.
 
@@ -28,10 +37,12 @@ def reading_options(
     codes : template of the codes of a point list
     kind : of stones that do not say it
     sigma : of a coordinate, where the file does not say it; it holds before that of the header file [m]
+    unit : one of `UNITS`, in which solids are given
+    snap : tolerance within which faces of neighbouring solids are brought into one plane [m]
 
     Raises
     ------
-    UsageError : the sigma is not positive, or there is no such header file
+    UsageError : the sigma is not positive, there is no such header file or unit, or the tolerance is negative
     SurveyError : naming the line of the header file that is wrong
     """
     options = ReadingOptions(codes=codes)
@@ -45,4 +56,14 @@ def reading_options(
         if not 0.0 < sigma < 1.0:
             raise UsageError(f"sigma is {sigma:g} m", where="--sigma", remedy="give it in metres, e.g. 0.003")
         options = replace(options, sigma=sigma)
+    if unit is not None:
+        if unit not in UNITS:
+            what, remedy = f"unknown unit {unit!r}", f"units: {', '.join(UNITS)}"
+            raise UsageError(what, where="--unit", remedy=remedy)
+        options = replace(options, unit=UNITS[unit])
+    if snap is not None:
+        if not 0.0 <= snap < 1.0:
+            what, remedy = f"the tolerance is {snap:g} m", "give it in metres, e.g. 0.002; 0: none"
+            raise UsageError(what, where="--snap", remedy=remedy)
+        options = replace(options, snap=snap)
     return options

@@ -1,5 +1,7 @@
 """Stones that another program made: which side of the solid is the face, and how deep the stone is behind it."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -64,11 +66,12 @@ def block_of_solid(record: SolidRecord, viewpoint: Array | None, path: str) -> S
     shape = FaceShape(ShapeKind.UNTESTED, "the side of a solid")
     provenance = Provenance("solid", "; ".join((f"solid of {path}", *record.remarks)))
     corners = side - np.outer(fit.residuals, normal)
+    face = face_on(fit, corners, shape, provenance, measured)
     return SurveyedBlock(
         code=record.code,
         kind=record.kind,
         course=record.course,
-        face=face_on(fit, corners, shape, provenance, measured),
+        face=replace(face, remarks=(*face.remarks, *record.remarks)),
         depth=Depth(depth, None, f"extent of the solid behind its face, {path}", "solid", record.line),
         extrusion=Extrusion(),
         solid=Solid(record.code, record.vertices, record.faces),

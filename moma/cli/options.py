@@ -14,11 +14,15 @@ __all__ = [
     "Header",
     "Json",
     "Kind",
+    "KindWhere",
     "ListFormat",
     "SceneArgument",
     "Sigma",
+    "Snap",
+    "Support",
     "SurveyFiles",
     "SurveyFormat",
+    "Unit",
     "Verbose",
 ]
 
@@ -78,6 +82,34 @@ Sigma = Annotated[
         "--sigma",
         metavar="S",
         help="Standard deviation of a coordinate in metres, where a file does not say it.",
+    ),
+]
+KindWhere = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--kind-where",
+        metavar="RULE",
+        help="Kind of solids by rule, e.g. 'voussoir: z > 0.5'; may be repeated, the last that holds counts.",
+    ),
+]
+Support = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--support",
+        metavar="EXPR",
+        help="Solids that are supports, e.g. 'z < 0.01': z is the lowest corner; may be repeated.",
+    ),
+]
+Unit = Annotated[
+    str | None,
+    typer.Option("--unit", metavar="UNIT", help="Unit of solids: m, dm, cm, mm, ft or in; else m."),
+]
+Snap = Annotated[
+    float | None,
+    typer.Option(
+        "--snap",
+        metavar="T",
+        help="Bring faces of neighbouring solids that match within T metres into one plane, e.g. 0.002.",
     ),
 ]
 SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene file; see docs/scene.md.")]

@@ -14,9 +14,13 @@ from moma.cli.options import (
     Header,
     Json,
     Kind,
+    KindWhere,
     Sigma,
+    Snap,
+    Support,
     SurveyFiles,
     SurveyFormat,
+    Unit,
     Verbose,
 )
 from moma.console import progress_bars, reporting, say
@@ -33,6 +37,10 @@ def ingest(
     codes: Codes = None,
     kind: Kind = None,
     sigma: Sigma = None,
+    unit: Unit = None,
+    snap: Snap = None,
+    kind_where: KindWhere = None,
+    support: Support = None,
     keep_going: Annotated[
         bool,
         typer.Option("--keep-going", help="Take the good stones, write the others to a file of rejects."),
@@ -58,11 +66,16 @@ def ingest(
     from moma.listing import as_json
     from moma.telling import ingest_lines
     from pipelines.ingest import ingest as take_in
+    from pipelines.kind_rules import kind_rules
     from pipelines.reading_options import reading_options
 
     if rejects is not None and not keep_going:
         raise UsageError("--rejects without --keep-going", remedy="give --keep-going too")
-    options = reading_options(header, codes, kind, sigma)
+    for name, given in (("--unit", unit), ("--snap", snap)):
+        if given is not None and format is not SurveyFormat.SOLIDS:
+            raise UsageError(f"{name} with format {format}", remedy="it is for --format solids")
+    options = reading_options(header, codes, kind, sigma, unit, snap)
+    rules = kind_rules(kind_where or (), support or ())
     with progress_bars() as listener:
         report = take_in(
             files,
@@ -73,6 +86,7 @@ def ingest(
             keep_going=keep_going,
             rejects=rejects,
             again=again,
+            rules=rules,
         )
     print(as_json(asdict(report)) if json else "\n".join(ingest_lines(report, verbose)))
 

@@ -1,0 +1,230 @@
+"""What kind a solid is, by rule: ``support: z < 0.01``.
+
+The expressions are those of ``moma query --where``, without functions, of what a solid says of itself. `x`, `y` and
+`z` are the lower corner of its box, `x_max`, `y_max` and `z_max` the upper one: ``z < 0.01`` is what stands on the
+ground, however high it is.
+"""
+
+import difflib
+import fnmatch
+import operator
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from archmodel.entities import kind_named
+from archmodel.grammar import All, AnyOf, Call, Comparison, IsNull, Like, Membership, Node, Not, parse
+from archmodel.tokens import Token, complaint
+from moma.errors import UsageError
+from survey.extrusion import SurveyedBlock
+from survey.solids import area_vector
+
+__all__ = ["RULE_ATTRIBUTES", "KindRule", "check_kinds", "kind_rules", "ruled"]
+
+Value = float | str | None
+
+RULE_ATTRIBUTES: Mapping[str, str] = {
+    "code": "name of the stone",
+    "kind": "as its name says it, or --kind",
+    "course": "as its name says it",
+    "x": "lower corner of its box [m]",
+    "y": "lower corner of its box [m]",
+    "z": "lowest corner: where it stands [m]",
+    "x_max": "upper corner of its box [m]",
+    "y_max": "upper corner of its box [m]",
+    "z_max": "highest corner [m]",
+    "volume": "[m³]",
+    "length": "horizontal extent of its face [m]",
+    "height": "extent of its face upwards [m]",
+    "depth": "how far it reaches behind its face [m]",
+}
+"""What a rule may ask for."""
+
+_TEXTS = frozenset({"code", "kind"})
+_SUPPORT = "support"
+_OPERATORS: Mapping[str, Callable[[float | str, float | str], bool]] = {
+    "=": operator.eq,
+    "!=": operator.ne,
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+}
+
+
+@dataclass(frozen=True)
+class KindRule:
+    """The kind of all stones for which an expression holds.
+
+    Attributes
+    ----------
+    kind : e.g. voussoir
+    node : the expression
+    option : by which it was given, for messages
+    """
+
+    kind: str
+    node: Node
+    option: str
+
+
+def kind_rules(texts: Sequence[str] = (), supports: Sequence[str] = ()) -> tuple[KindRule, ...]:
+    """Read rules; of those that hold for a stone the last one counts, and those of supports after all others.
+
+    Parameters
+    ----------
+    texts : "KIND: EXPRESSION"
+    supports : expressions, for stones that are supports
+
+    Raises
+    ------
+    UsageError
+        naming the option, and the place in the expression
+    """
+    rules = []
+    for text in texts:
+        kind, colon, expression = text.partition(":")
+        if not colon or not kind.strip():
+            remedy = 'write it as "KIND: EXPRESSION", e.g. "voussoir: z > 0.5"'
+            raise UsageError(f"{text!r} names no kind", where="--kind-where", remedy=remedy)
+        rules.append(KindRule(kind.strip(), _checked(expression), "--kind-where"))
+    return (*rules, *(KindRule(_SUPPORT, _checked(text), "--support") for text in supports))
+
+
+def check_kinds(rules: Sequence[KindRule]) -> None:
+    """Check that the hierarchy has all kinds of the rules.
+
+    Raises
+    ------
+    UsageError
+        naming the nearest known kinds
+    """
+    for rule in rules:
+        try:
+            kind_named(rule.kind)
+        except UsageError as error:
+            raise error.at(rule.option) from error
+
+
+def ruled(block: SurveyedBlock, rules: Sequence[KindRule]) -> SurveyedBlock:
+    """The stone with the kind that the rules give it."""
+    if not rules:
+        return block
+    values = _values(block)
+    kind = next((rule.kind for rule in reversed(rules) if _holds(rule.node, values)), block.kind)
+    if kind == block.kind:
+        return block
+    face = replace(block.face, kind=kind, record=replace(block.face.record, kind=kind))
+    return replace(block, kind=kind, face=face)
+
+
+def _values(block: SurveyedBlock) -> dict[str, Value]:
+    vertices, measures = block.solid.vertices, block.face.measures
+    low, high, middle = vertices.min(axis=0), vertices.max(axis=0), vertices.mean(axis=0)
+    sides = [vertices[list(face)] for face in block.solid.faces]
+    volume = sum(float((side[0] - middle) @ area_vector(side)) for side in sides) / 3.0
+    return {
+        "code": block.code,
+        "kind": block.kind,
+        "course": block.course,
+        **dict(zip(("x", "y", "z"), map(float, low), strict=True)),
+        **dict(zip(("x_max", "y_max", "z_max"), map(float, high), strict=True)),
+        "volume": volume,
+        "length": measures.length,
+        "height": measures.height,
+        "depth": block.depth.value,
+    }
+
+
+def _checked(expression: str) -> Node:
+    node = parse(expression)
+    _check(node)
+    return node
+
+
+def _check(node: Node) -> None:
+    """Refuse what a solid does not say of itself, and numbers against texts."""
+    match node:
+        case All(operands) | AnyOf(operands):
+            for operand in operands:
+                _check(operand)
+        case Not(operand):
+            _check(operand)
+        case Call(function) | IsNull(Call(function)):
+            raise complaint(function, f"{function.text} is a function", "a rule may ask for attributes only")
+        case IsNull(Token() as attribute):
+            _check_attribute(attribute)
+        case Like(attribute, _):
+            _check_attribute(attribute)
+            if attribute.text not in _TEXTS:
+                raise complaint(attribute, f"{attribute.text} is a number, like is for texts", "use < and >")
+        case Comparison(attribute, _, value):
+            _check_attribute(attribute)
+            _check_value(attribute, value)
+        case Membership(attribute, values):
+            _check_attribute(attribute)
+            for value in values:
+                _check_value(attribute, value)
+
+
+def _check_attribute(token: Token) -> None:
+    if token.text not in RULE_ATTRIBUTES:
+        near = difflib.get_close_matches(token.text, RULE_ATTRIBUTES, n=3) or list(RULE_ATTRIBUTES)
+        raise complaint(token, f"unknown attribute {token.text!r}", f"known: {', '.join(near)}")
+
+
+def _check_value(attribute: Token, value: Token) -> None:
+    """A number is compared with a number, or with another attribute that is one."""
+    if attribute.text in _TEXTS or value.role == "number":
+        return
+    if value.role != "word" or value.text not in RULE_ATTRIBUTES or value.text in _TEXTS:
+        what = f"{attribute.text} is a number, {value.text!r} is not"
+        raise complaint(value, what, "compare it with a number, or with another attribute")
+
+
+def _holds(node: Node, values: Mapping[str, Value]) -> bool | None:
+    """Whether an expression is true of a stone; None where it asks for what the stone does not say."""
+    match node:
+        case All(operands):
+            found = [_holds(one, values) for one in operands]
+            return False if False in found else None if None in found else True
+        case AnyOf(operands):
+            found = [_holds(one, values) for one in operands]
+            return True if True in found else None if None in found else False
+        case Not(operand):
+            held = _holds(operand, values)
+            return None if held is None else not held
+        case IsNull(Token() as attribute):
+            return values[attribute.text] is None
+        case Like(attribute, pattern):
+            return bool(_matches(str(values[attribute.text]), pattern.text))
+        case Comparison(attribute, sign, value):
+            return _compared(sign, values[attribute.text], _value(attribute, value, values))
+        case Membership(attribute, members):
+            found = [
+                _compared("=", values[attribute.text], _value(attribute, one, values)) for one in members
+            ]
+            return True if True in found else None if None in found else False
+    return None
+
+
+def _compared(sign: str, one: Value, other: Value) -> bool | None:
+    if one is None or other is None:
+        return None
+    return _OPERATORS[sign](one, other)
+
+
+def _value(attribute: Token, token: Token, values: Mapping[str, Value]) -> Value:
+    if attribute.text in _TEXTS:
+        return token.text
+    return float(token.text) if token.role == "number" else values[token.text]
+
+
+def _matches(text: str, pattern: str) -> bool:
+    """As in queries: % stands for any text, _ for one character; capitals are as small letters."""
+    escaped = "".join(_wild(pattern))
+    return fnmatch.fnmatchcase(text.lower(), escaped.lower())
+
+
+def _wild(pattern: str) -> Iterator[str]:
+    for character in pattern:
+        yield {"%": "*", "_": "?", "*": "[*]", "?": "[?]", "[": "[[]"}.get(character, character)
