@@ -10,6 +10,7 @@ from mechanics.laws.dry_joint import DryJoint
 from mechanics.laws.law import Law
 from mechanics.loads.load import Loads
 from mechanics.materials import Material
+from mechanics.meshing.choice import Mesher
 from mechanics.meshing.elements import Element
 from moma.errors import SceneError
 
@@ -60,11 +61,14 @@ class Block:
     material : density and elasticity
     fidelity : fixed, rigid or deformable
     mesh_size : target edge length of the finite elements [m]; only for deformable blocks
-    element : kind of its finite elements; hexahedra suit blocks with six faces of four corners
+    element : kind of its finite elements; hexahedra suit blocks whose corners each join three faces
     velocity : (6,) initial translation [m/s] and rotation [rad/s] velocity; not for fixed blocks
     parts : convex parts that fill a non-convex stone without overlap; empty if it is convex
     radius : of a ball, whose surface is the sphere about the mean of its corners; corners and faces are for pictures
         (mechanics.balls makes them) [m]. None: a polyhedron
+    contact_size : target edge length at the faces that touch other blocks where the scene begins; None: as inside [m]
+    growth : by how much edges get longer per metre away from these faces, up to the mesh size [-]
+    mesher : of its tetrahedra
     """
 
     code: str
@@ -77,6 +81,9 @@ class Block:
     velocity: tuple[float, ...] = (0.0,) * 6
     parts: tuple[Part, ...] = ()
     radius: float | None = None
+    contact_size: float | None = None
+    growth: float = 0.5
+    mesher: Mesher = Mesher.AUTO
 
 
 class Placement(StrEnum):

@@ -1,67 +1,146 @@
-"""Tetrahedra by scipy's Delaunay triangulation, for convex stones where gmsh cannot be loaded."""
+"""Tetrahedra by scipy's Delaunay triangulation, for convex stones.
+
+Points are laid on edges, faces and inside, as far apart as the size field asks for; triangulated, moved to the middle
+of their tetrahedra and triangulated again; at last the nodes of badly shaped tetrahedra are moved to better places. All
+moves keep to the faces that a point lies on, so the mesh fills the stone exactly.
+"""
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import Delaunay
+from scipy.spatial import Delaunay, QhullError
 
+from mechanics.meshing._kernels_sampling import lay_points
+from mechanics.meshing._kernels_shaping import relax
 from mechanics.meshing.mesh import SolidMesh, tet_mesh
-from mechanics.polyhedra import face_plane, fan
+from mechanics.meshing.shaping import improve_cells
+from mechanics.meshing.sizes import SizeField, as_field
+from mechanics.meshing.soundness import CONVEX
+from mechanics.polyhedra import face_plane
+from moma.errors import MeshError
 
 __all__ = ["mesh_with_delaunay"]
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 Faces = tuple[tuple[int, ...], ...]
 
-# points on a regular lattice lie by fours on a plane and by fives on a sphere, where Delaunay makes flat tetrahedra
-_JITTER = 0.12
+# points on a regular lattice lie by fours on a plane and by fives on a sphere, where Delaunay makes flat tetrahedra:
+# each is moved by up to this part of the size
+_JITTER = 0.06
+# how often points are moved to the middle of their tetrahedra and triangulated anew
+_RELAXATIONS = 1
 
 
-def mesh_with_delaunay(vertices: Array, faces: Faces, size: float, code: str) -> SolidMesh:
+@dataclass(frozen=True)
+class _Cloud:
+    """Points of a mesh.
+
+    Attributes
+    ----------
+    points : (n, 3)
+    on_plane : (n, m) which planes each lies on: corners on three or more, points on edges on two
+    free : (n, 3, 3) projectors on the directions in which they may move
+    """
+
+    points: Array
+    on_plane: Bools
+    free: Array
+
+
+def mesh_with_delaunay(vertices: Array, faces: Faces, size: SizeField | float, code: str) -> SolidMesh:
     """Mesh one convex polyhedron with linear tetrahedra of edge length about `size` [m].
-
-    Points are laid on the faces and on shrunken copies of them, each moved a little within the faces that it
-    lies on (always in the same way); tetrahedra that are flat on a face are dropped.
 
     Raises
     ------
-    MeshError : if the mesh does not fill the polyhedron
+    MeshError : if it is not convex, or the mesh does not fill it
     """
-    centre = vertices.mean(axis=0)
-    reach = float(np.linalg.norm(vertices - centre, axis=1).max())
-    layers = max(1, round(reach / size))
-    shells = np.arange(layers, 0, -1) / layers
-    points = [centre + shell * (_lattice(vertices, faces, size / shell) - centre) for shell in shells]
-    cloud = np.vstack([*points, centre[None]])
-    normals, origins = map(np.array, zip(*(face_plane(vertices[list(face)]) for face in faces), strict=True))
-    depth = np.abs(np.einsum("pfk,fk->pf", cloud[:, None] - origins, normals))
-    on_face = depth < 1e-9 * reach
-    # no point may reach a face that it does not lie on, or a slender stone would lose its shape
-    room = np.minimum(size, np.where(on_face, np.inf, depth).min(axis=1))
-    moves = np.random.default_rng(0).uniform(-1.0, 1.0, cloud.shape) * (_JITTER * room)[:, None]
-    cloud = cloud + _tangential(moves, normals, on_face)
-    tetrahedra = Delaunay((cloud - centre) / reach).simplices.astype(np.int64)
-    flat = on_face[tetrahedra].all(axis=1).any(axis=1)
-    return tet_mesh(cloud, tetrahedra[~flat], vertices, faces, code)
+    origin = vertices.mean(axis=0)
+    reach = float(np.linalg.norm(vertices - origin, axis=1).max())
+    corners, field = (vertices - origin) / reach, as_field(size).local(origin, reach)
+    planes = _planes(corners, faces)
+    if (corners @ planes[:, :3].T - planes[:, 3]).max() > CONVEX:
+        raise MeshError("it is not convex", where=f"stone {code}", remedy="mesh it with gmsh")
+    cloud = _cloud(corners, faces, planes, field)
+    nodes = cloud.points.copy()
+    weight = field(nodes) ** 3
+    cells = _triangulated(nodes, cloud.on_plane, code)
+    for _ in range(_RELAXATIONS):
+        relax(nodes, cells, cloud.free, planes, cloud.on_plane, weight)
+        cells = _triangulated(nodes, cloud.on_plane, code)
+    improve_cells(nodes, cells, cloud.free)
+    return tet_mesh(nodes * reach + origin, cells, vertices, faces, code)
 
 
-def _lattice(vertices: Array, faces: Faces, size: float) -> Array:
-    """Distinct points that cut every triangle of the surface into equal parts no longer than `size`."""
-    triangles = vertices[fan(faces)]
-    longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max()
-    n = max(1, round(float(longest) / size))
-    weights = np.array([(i, j, n - i - j) for i in range(n + 1) for j in range(n + 1 - i)]) / n
-    points = np.einsum("wk,tki->twi", weights, triangles).reshape(-1, 3)
-    _, first = np.unique(np.round((points - vertices[0]) / (1e-6 * size)), axis=0, return_index=True)
-    distinct: Array = points[np.sort(first)]
-    return distinct
+def _planes(corners: Array, faces: Faces) -> Array:
+    """Rows (n, d) of the faces, with n·x ≤ d inside."""
+    rows = [face_plane(corners[list(face)]) for face in faces]
+    return np.array([(*normal, normal @ origin) for normal, origin in rows])
 
 
-def _tangential(moves: Array, normals: Array, on_face: NDArray[np.bool_]) -> Array:
-    """Take from each move (n, 3) what would leave the faces that its point lies on."""
-    result = moves.copy()
-    for pattern in np.unique(on_face, axis=0):
-        rows = (on_face == pattern).all(axis=1)
-        if pattern.any():
-            active = normals[pattern]
-            result[rows] -= moves[rows] @ (np.linalg.pinv(active) @ active).T
-    return result
+def _cloud(corners: Array, faces: Faces, planes: Array, field: SizeField) -> _Cloud:
+    sides: dict[tuple[int, int], list[int]] = {}
+    for k, face in enumerate(faces):
+        for a, b in zip(face, (*face[1:], face[0]), strict=True):
+            sides.setdefault((min(a, b), max(a, b)), []).append(k)
+    edges = np.array(sorted(sides), dtype=np.int64)
+    loops = np.concatenate([np.array(face, dtype=np.int64) for face in faces])
+    start = np.cumsum([0, *map(len, faces)]).astype(np.int64)
+    points, ends, owner = lay_points(
+        corners, edges, loops, start, planes, _axes(planes),
+        field.size, field.fine, field.growth, field.normals, field.offsets,
+    )  # fmt: skip
+    own_edge, own_face = owner[ends[0] : ends[1]], owner[ends[1] : ends[2]]
+    on_plane = np.zeros((len(points), len(faces)), dtype=bool)
+    on_plane[loops, np.repeat(np.arange(len(faces)), np.diff(start))] = True
+    neighbours = np.array([sides[a, b] for a, b in edges.tolist()])
+    rows = np.arange(ends[0], ends[1])
+    on_plane[rows, neighbours[own_edge, 0]] = on_plane[rows, neighbours[own_edge, 1]] = True
+    on_plane[np.arange(ends[1], ends[2]), own_face] = True
+    free = np.zeros((len(points), 3, 3))
+    along = corners[edges[own_edge, 1]] - corners[edges[own_edge, 0]]
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    free[ends[0] : ends[1]] = along[:, :, None] * along[:, None]
+    normals = planes[own_face, :3]
+    free[ends[1] : ends[2]] = np.eye(3) - normals[:, :, None] * normals[:, None]
+    free[ends[2] :] = np.eye(3)
+    return _Cloud(_jittered(points, free, planes, on_plane, field), on_plane, free)
+
+
+def _axes(planes: Array) -> Array:
+    """Rows: directions of the lattice, along the first face and across it."""
+    z = planes[0, :3]
+    away = planes[1:, :3] - np.outer(planes[1:, :3] @ z, z)
+    lengths = np.linalg.norm(away, axis=1)
+    first = int(
+        (lengths > (1.0 - CONVEX) * lengths.max()).argmax()
+    )  # whatever rounding has done to equal ones
+    x = away[first] / lengths[first]
+    return np.array([x, np.cross(z, x), z])
+
+
+def _jittered(cloud: Array, free: Array, planes: Array, on_plane: Bools, field: SizeField) -> Array:
+    """The points, each moved a little, always in the same way; none nearer to a face than it was by half."""
+    depth = np.where(on_plane, np.inf, np.abs(planes[:, 3] - cloud @ planes[:, :3].T)).min(axis=1)
+    room = _JITTER * np.minimum(field(cloud), depth)
+    golden = np.array([0.8191725134, 0.6710436067, 0.5497004779])  # evenly spread, and the same everywhere
+    moves = 2.0 * np.modf(np.arange(1, len(cloud) + 1)[:, None] * golden)[0] - 1.0
+    jittered: Array = cloud + room[:, None] * np.einsum("nij,nj->ni", free, moves)
+    return jittered
+
+
+def _triangulated(nodes: Array, on_plane: Bools, code: str) -> Ints:
+    try:
+        tetrahedra = Delaunay(nodes).simplices.astype(np.int64)
+    except QhullError as error:
+        raise MeshError(
+            f"Delaunay failed: {str(error).splitlines()[0]}",
+            where=f"stone {code}",
+        ) from error
+    flat = (on_plane[tetrahedra].sum(axis=1) == 4).any(axis=1)
+    cells = tetrahedra[~flat]
+    volumes = np.linalg.det(nodes[cells[:, 1:]] - nodes[cells[:, :1]])
+    turned: Ints = np.where((volumes < 0)[:, None], cells[:, [0, 2, 1, 3]], cells)
+    return turned

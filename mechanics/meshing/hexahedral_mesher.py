@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from mechanics.meshing.elements import Element
 from mechanics.meshing.mesh import SolidMesh, solid_mesh
+from mechanics.meshing.sizes import SizeField, as_field
 from moma.errors import MeshError
 
 __all__ = ["mesh_with_hexahedra"]
@@ -12,23 +13,26 @@ __all__ = ["mesh_with_hexahedra"]
 Array = NDArray[np.float64]
 Faces = tuple[tuple[int, ...], ...]
 
+# so many parts a direction is measured in where the size changes
+_STATIONS = 64
 # the corners at the start and at the end of the four edges along each direction of a hexahedron, VTK's order
 _EDGES = (((0, 3, 4, 7), (1, 2, 5, 6)), ((0, 1, 4, 5), (3, 2, 7, 6)), ((0, 1, 2, 3), (4, 5, 6, 7)))
 
 
-def mesh_with_hexahedra(vertices: Array, faces: Faces, size: float, code: str) -> SolidMesh:
-    """Mesh a stone with linear hexahedra: the trilinear map of a cube that is cut into equal parts.
+def mesh_with_hexahedra(vertices: Array, faces: Faces, size: SizeField | float, code: str) -> SolidMesh:
+    """Mesh a stone with linear hexahedra: the trilinear map of a cube that is cut into parts.
 
-    In each direction there are as many parts as the mean edge holds `size` [m], at least one.
+    In each direction there are as many parts as the mean edge holds `size` [m], at least one; equal parts, or
+    in the proportion of the sizes between the middles of opposite sides.
 
     Raises
     ------
     MeshError : if the stone has not the corners, edges and faces of a cube, or its cells would be turned inside out
     """
     corners = vertices[_corners(faces, len(vertices), code)]
-    lengths = [np.linalg.norm(corners[list(b)] - corners[list(a)], axis=1).mean() for a, b in _EDGES]
-    counts = np.maximum(1, np.rint(np.array(lengths) / size)).astype(np.int64)
-    x, y, z = np.meshgrid(*(np.arange(n + 1) / n for n in counts), indexing="ij")
+    cuts = [_cuts(corners[list(a)], corners[list(b)], as_field(size)) for a, b in _EDGES]
+    counts = np.array([len(cut) - 1 for cut in cuts])
+    x, y, z = np.meshgrid(*cuts, indexing="ij")
     grid = np.stack([x, y, z], axis=-1).reshape(-1, 3)
     nodes = _trilinear(grid) @ corners
     strides = np.array([(counts[1] + 1) * (counts[2] + 1), counts[2] + 1, 1])
@@ -58,6 +62,20 @@ def _corners(faces: Faces, count: int, code: str) -> list[int]:
     bottom = list(faces[0][::-1])  # counter-clockwise seen from above
     top = [next(iter(neighbours[corner] - set(bottom))) for corner in bottom]
     return bottom + top
+
+
+def _cuts(start: Array, end: Array, size: SizeField) -> Array:
+    """Places (n + 1,) from 0 to 1 between opposite sides, given the ends (4, 3) of the edges that join them."""
+    length = float(np.linalg.norm(end - start, axis=1).mean())
+    if size.uniform:
+        n = max(1, round(length / size.size))
+        return np.arange(n + 1) / n
+    middle = (np.arange(_STATIONS) + 0.5)[:, None] / _STATIONS
+    parts = length / _STATIONS / size((1.0 - middle) * start.mean(axis=0) + middle * end.mean(axis=0))
+    total = np.concatenate([[0.0], np.cumsum(parts)])
+    n = max(1, round(float(total[-1])))
+    places: Array = np.interp(total[-1] * np.arange(n + 1) / n, total, np.arange(_STATIONS + 1) / _STATIONS)
+    return places
 
 
 def _trilinear(grid: Array) -> Array:

@@ -45,19 +45,31 @@ class SolidMesh:
 def boundary_facets(element: Element, cells: Ints) -> Ints:
     """Facets (ns, element.facet_nodes) that belong to one cell alone, oriented outwards."""
     facets = cells[:, element.cell_facets].reshape(-1, element.facet_nodes)
-    corners = np.sort(facets[:, : element.facet_corners], axis=1)
-    _, first, count = np.unique(corners, axis=0, return_index=True, return_counts=True)
+    _, first, count = np.unique(_names(facets, element), return_index=True, return_counts=True)
     boundary: Ints = facets[np.sort(first[count == 1])]
     return boundary
+
+
+def _names(facets: Ints, element: Element) -> Ints:
+    """One number for each facet (ns, kf), the same for facets with the same corners."""
+    corners = np.sort(facets[:, : element.facet_corners], axis=1)
+    nodes = int(corners.max()) + 1
+    if nodes**element.facet_corners < 2**63:  # digits in a system with as many figures as there are nodes
+        powers = [nodes**k for k in range(element.facet_corners)]
+        names: Ints = corners @ np.array(powers, dtype=np.int64)
+        return names
+    _, number = np.unique(corners, axis=0, return_inverse=True)
+    return number.reshape(-1).astype(np.int64)
 
 
 def tet_mesh(nodes: Array, tetrahedra: Ints, vertices: Array, faces: Faces, code: str) -> SolidMesh:
     """Orient linear tetrahedra and drop unused nodes; the rest as in `solid_mesh`."""
     volumes = np.linalg.det(nodes[tetrahedra[:, 1:]] - nodes[tetrahedra[:, :1]]) / 6.0
     tetrahedra = np.where((volumes < 0)[:, None], tetrahedra[:, [0, 2, 1, 3]], tetrahedra)
-    used, inverse = np.unique(tetrahedra, return_inverse=True)
-    cells = inverse.reshape(-1, 4).astype(np.int64)
-    return solid_mesh(Element.TET4, nodes[used], cells, vertices, faces, code)
+    used = np.zeros(len(nodes), dtype=bool)
+    used[tetrahedra] = True
+    number = np.cumsum(used) - 1
+    return solid_mesh(Element.TET4, nodes[used], number[tetrahedra], vertices, faces, code)
 
 
 def solid_mesh(
@@ -100,6 +112,8 @@ def _volumes(element: Element, nodes: Array, cells: Ints, where: str) -> float:
             where=where,
             remedy="give another mesh size, or element = tet10 for stones that are not nearly boxes",
         )
+    if element.is_tetrahedron:
+        return float(determinant.sum()) / 6.0
     return float(integration(element, nodes, cells, 3).volume.sum())
 
 

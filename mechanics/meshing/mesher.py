@@ -1,29 +1,72 @@
-"""Mesh a block with its kind of element."""
+"""Mesh a block with its kind of element: one mesher after the other, until one succeeds."""
 
 import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
+from mechanics.meshing.choice import Mesher
+from mechanics.meshing.corner_hexahedra import mesh_at_corners
 from mechanics.meshing.delaunay_mesher import mesh_with_delaunay
-from mechanics.meshing.gmsh_mesher import mesh_with_gmsh
+from mechanics.meshing.gmsh_mesher import Algorithm, mesh_with_gmsh
 from mechanics.meshing.hexahedral_mesher import mesh_with_hexahedra
 from mechanics.meshing.mesh import SolidMesh
 from mechanics.meshing.quadratic import with_middle_nodes
+from mechanics.meshing.quality import mesh_quality
+from mechanics.meshing.sizes import SizeField, as_field, graded
+from mechanics.meshing.soundness import check_meshable, is_convex
 from mechanics.scene import Block
 from moma.errors import MeshError, MissingLibraryError
 
-__all__ = ["mesh_block"]
+__all__ = ["Meshed", "mesh_block", "meshed_block"]
+
+# tetrahedra with a smaller scaled Jacobian are slivers: another mesher may do better
+_POOR = 0.005
+# a second attempt is that much finer
+_FINER = 0.7
 
 
-def mesh_block(block: Block) -> SolidMesh:
+@dataclass(frozen=True)
+class Meshed:
+    """The mesh of a stone, and how it was made.
+
+    Attributes
+    ----------
+    mesh : the finite elements
+    how : the mesher that made it
+    failures : the meshers that were tried before, each with its reason
+    """
+
+    mesh: SolidMesh
+    how: str
+    failures: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Attempt:
+    how: str
+    make: Callable[[SizeField], SolidMesh]
+    factor: float = 1.0
+
+
+def mesh_block(block: Block, contact: tuple[int, ...] = ()) -> SolidMesh:
+    """The mesh of `meshed_block` alone."""
+    return meshed_block(block, contact).mesh
+
+
+def meshed_block(block: Block, contact: tuple[int, ...] = ()) -> Meshed:
     """Finite elements of one deformable block, of edge length about its mesh size.
 
-    Tetrahedra by gmsh, or by scipy's Delaunay where gmsh's shared libraries are missing; hexahedra in a regular grid.
+    Hexahedra in a regular grid, or at each corner in stones that are no boxes. Tetrahedra by the mesher that the block
+    asks for; if it fails, or leaves slivers, by the others, and finer: the best of them is taken.
+
+    Parameters
+    ----------
+    block : with a mesh size
+    contact : faces at which its contact size holds
 
     Raises
     ------
-    MeshError : if the block cannot be meshed
+    MeshError : if the block cannot be meshed, with the reason
     """
     assert block.mesh_size is not None
     if not block.mesh_size > 0:
@@ -32,16 +75,63 @@ def mesh_block(block: Block) -> SolidMesh:
             where=f"stone {block.code}",
             remedy="give metres greater than 0",
         )
-    arguments = block.vertices, block.faces, block.mesh_size, block.code
-    mesh = _tetrahedra(*arguments) if block.element.is_tetrahedron else mesh_with_hexahedra(*arguments)
-    return mesh if block.element.order == 1 else with_middle_nodes(mesh, block.element)
+    check_meshable(block.vertices, block.faces, block.code)
+    size = as_field(block.mesh_size)
+    if block.contact_size is not None:
+        size = graded(block.mesh_size, block.contact_size, block.growth, block.vertices, block.faces, contact)
+    made = _first_good(_attempts(block), size, block.code)
+    if block.element.order == 1:
+        return made
+    return replace(made, mesh=with_middle_nodes(made.mesh, block.element))
 
 
-def _tetrahedra(
-    vertices: NDArray[np.float64], faces: tuple[tuple[int, ...], ...], size: float, code: str
-) -> SolidMesh:
-    try:
-        return mesh_with_gmsh(vertices, faces, size, code)
-    except MissingLibraryError as error:
-        warnings.warn(f"meshing with scipy's Delaunay instead of gmsh: {error}", stacklevel=3)
-        return mesh_with_delaunay(vertices, faces, size, code)
+def _attempts(block: Block) -> tuple[_Attempt, ...]:
+    """The meshers that may mesh a block, in the order in which they are tried."""
+
+    def using(mesher: Callable[..., SolidMesh], **options: object) -> Callable[[SizeField], SolidMesh]:
+        return lambda size: mesher(block.vertices, block.faces, size, block.code, **options)
+
+    if not block.element.is_tetrahedron:
+        grid, corners = using(mesh_with_hexahedra), using(mesh_at_corners)
+        cubic = len(block.vertices) == 8 and all(len(face) == 4 for face in block.faces)
+        return (_Attempt("grid", grid),) if cubic else (_Attempt("hexahedra at corners", corners),)
+    delaunay = using(mesh_with_delaunay)
+    gmsh = (
+        _Attempt("gmsh", using(mesh_with_gmsh)),
+        _Attempt("gmsh, finer and by HXT", using(mesh_with_gmsh, algorithm=Algorithm.HXT), _FINER),
+    )
+    if not is_convex(block.vertices, block.faces):
+        return gmsh
+    convex = (_Attempt("delaunay", delaunay),)
+    finer = (_Attempt("delaunay, finer", delaunay, _FINER),)
+    if block.mesher is Mesher.DELAUNAY:
+        return convex + finer
+    return gmsh + convex if block.mesher is Mesher.GMSH else convex + gmsh + finer
+
+
+def _first_good(attempts: tuple[_Attempt, ...], size: SizeField, code: str) -> Meshed:
+    failures: list[str] = []
+    best: Meshed | None = None
+    least, remedy = -1.0, None
+    for attempt in attempts:
+        try:
+            mesh = attempt.make(size if attempt.factor == 1.0 else size.scaled(attempt.factor))
+        except MissingLibraryError as error:
+            warnings.warn(f"meshing without gmsh: {error}", stacklevel=3)
+            failures.append(f"{attempt.how}: {error.what}")
+            remedy = error.remedy
+            continue
+        except MeshError as error:
+            failures.append(f"{attempt.how}: {error.what}")
+            remedy = remedy or error.remedy
+            continue
+        shape = mesh_quality([mesh])[0].min_scaled_jacobian
+        if shape > least:
+            best, least = Meshed(mesh, attempt.how, tuple(failures)), shape
+        if shape >= _POOR or not mesh.element.is_tetrahedron:
+            break
+        failures.append(f"{attempt.how}: slivers, scaled Jacobian {shape:.2g}")
+    if best is None:
+        what = "; ".join(failures) if len(failures) > 1 else failures[0].partition(": ")[2]
+        raise MeshError(what, where=f"stone {code}", remedy=remedy)
+    return best

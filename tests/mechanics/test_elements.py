@@ -203,17 +203,36 @@ def test_a_stone_always_gets_the_same_mesh(element):
 
 
 SIX_SIDED = prism(np.array([(0, 0), (1, 0), (1.4, 0.6), (1, 1.2), (0, 1.2), (-0.4, 0.6)]), 0.0, 0.5)
+WEDGE = prism(np.array([(0, 0), (1, 0), (0.2, 0.7)]), 0.0, 0.5)
+TETRAHEDRON = np.vstack([np.zeros(3), np.eye(3)]), TETRAHEDRON_FACES
+PYRAMID = (
+    np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0.5, 0.5, 1.0)]),
+    ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
+)
 
 
 @HEXAHEDRA
+@pytest.mark.parametrize("size", [2.0, 0.2])
 @pytest.mark.parametrize(
     ("vertices", "faces"),
-    [(np.vstack([np.zeros(3), np.eye(3)]), TETRAHEDRON_FACES), SIX_SIDED],
-    ids=["tetrahedron", "six-sided prism"],
+    [TETRAHEDRON, SIX_SIDED, WEDGE],
+    ids=["tetrahedron", "six-sided prism", "wedge"],
 )
-def test_other_stones_are_refused_with_the_element_that_suits_them(element, vertices, faces):
-    with pytest.raises(MeshError, match=r"stone S1: hexahedra need six faces.*use element = tet10"):
-        mesh_block(stone(element, vertices, faces, 0.5))
+def test_hexahedra_fill_stones_whose_corners_join_three_faces(element, vertices, faces, size):
+    mesh = mesh_block(stone(element, vertices @ TURN.T, faces, size))
+    assert_fills(mesh, vertices @ TURN.T, faces)
+    # one hexahedron at each corner, cut into n × n × n
+    n = round((len(mesh.cells) / len(vertices)) ** (1 / 3))
+    assert len(mesh.cells) == len(vertices) * n**3
+    assert (n > 1) == (size < 1.0)
+
+
+@HEXAHEDRA
+def test_other_stones_are_refused_with_the_element_that_suits_them(element):
+    with pytest.raises(
+        MeshError, match=r"stone S1: hexahedra need three faces.*4 at corner 4.*use element = tet10"
+    ):
+        mesh_block(stone(element, *PYRAMID, 0.5))
 
 
 @HEXAHEDRA

@@ -8,11 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mechanics.meshing.choice import Mesher
 from mechanics.meshing.delaunay_mesher import mesh_with_delaunay
 from mechanics.meshing.elements import Element
 from mechanics.meshing.gmsh_mesher import mesh_with_gmsh
 from mechanics.meshing.mesh import boundary_facets, tet_mesh
-from mechanics.meshing.mesher import mesh_block
+from mechanics.meshing.mesher import meshed_block
 from mechanics.polyhedra import face_plane, mass_properties
 from mechanics.scene import Fidelity
 from moma.errors import MeshError, MissingLibraryError
@@ -153,8 +154,19 @@ def test_missing_library_names_the_package_to_install(without_gmsh):
         mesh_with_gmsh(STONE, BOX_FACES, 0.3, "A1")
 
 
+def soft(**more):
+    return brick("A1", (0, 0, 0), (0.6, 0.4, 0.3), Fidelity.DEFORMABLE, mesh_size=0.3, **more)
+
+
+def test_convex_stones_need_no_gmsh(without_gmsh):
+    made = meshed_block(soft())
+    assert (made.how, made.failures) == ("delaunay", ())
+    assert_fills(made.mesh, soft().vertices, BOX_FACES)
+
+
 def test_without_gmsh_delaunay_meshes_the_stone_and_says_so(without_gmsh):
-    block = brick("A1", (0, 0, 0), (0.6, 0.4, 0.3), Fidelity.DEFORMABLE, mesh_size=0.3)
-    with pytest.warns(UserWarning, match=r"Delaunay instead of gmsh.*libglu1-mesa"):
-        mesh = mesh_block(block)
-    assert_fills(mesh, block.vertices, BOX_FACES)
+    with pytest.warns(UserWarning, match=r"without gmsh.*libglu1-mesa"):
+        made = meshed_block(soft(mesher=Mesher.GMSH))
+    assert made.how == "delaunay"
+    assert all("libGLU" in failure for failure in made.failures)
+    assert_fills(made.mesh, soft().vertices, BOX_FACES)

@@ -1,0 +1,219 @@
+"""Numba kernels that lay points on and in a convex polyhedron, as far apart as a size field asks for."""
+
+from math import ceil, floor, log2, sqrt
+
+import numpy as np
+from numba import njit
+
+__all__ = ["lay_points", "size_at"]
+
+# a point keeps this many times the size from all others, and from the boundary of what it fills
+_APART = 0.65
+_INSIDE = 0.45
+# step of the cubic lattice, over the size: tetrahedra then have edges of about that length
+_STEP = 0.92
+# points lie on a plane within this part of the stone's size; what is nearly too near is not, so that rounding matters
+# to few stones
+_ON_PLANE = 1e-9
+# so many parts an edge is measured in where its size changes
+_STATIONS = 64
+
+
+@njit(cache=True)
+def size_at(x, y, z, size, fine, growth, normals, offsets):
+    """H(x) of mechanics.meshing.sizes.SizeField."""
+    h = size
+    for k in range(len(offsets)):
+        away = abs(normals[k, 0] * x + normals[k, 1] * y + normals[k, 2] * z - offsets[k])
+        h = min(h, fine + growth * away)
+    return h
+
+
+@njit(cache=True)
+def lay_points(corners, edges, loops, start, planes, axes, size, fine, growth, normals, offsets):
+    """Corners, then points on edges, on faces and inside.
+
+    Parameters
+    ----------
+    corners : (nv, 3)
+    edges : (ne, 2) corners that an edge joins
+    loops, start : corners of face k are loops[start[k]:start[k + 1]], counter-clockwise seen from outside
+    planes : (nf, 4) rows (n, d) with n·x ≤ d inside
+    axes : (3, 3) rows: directions of the lattice inside
+    size, fine, growth, normals, offsets : the size field
+
+    Returns
+    -------
+    points : (n, 3)
+    ends : (4,) how many points there are after the corners, the edges, the faces, all
+    owner : (n,) which corner, edge or face a point lies on; -1 inside
+    """
+    points = np.empty((512, 3))
+    owner = np.empty(512, dtype=np.int64)
+    ends = np.empty(4, dtype=np.int64)
+    count = 0
+    for k in range(len(corners)):
+        points, owner, count = _add(points, owner, count, corners[k, 0], corners[k, 1], corners[k, 2], k)
+    ends[0] = count
+    for k in range(len(edges)):
+        a, b = corners[edges[k, 0]], corners[edges[k, 1]]
+        for t in _cuts(a, b, size, fine, growth, normals, offsets):
+            x, y, z = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])
+            points, owner, count = _add(points, owner, count, x, y, z, k)
+    ends[1] = count
+    for k in range(len(planes)):
+        loop = loops[start[k] : start[k + 1]]
+        points, owner, count = _on_face(
+            points, owner, count, corners, loop, planes[k], k, size, fine, growth, normals, offsets
+        )
+    ends[2] = count
+    points, owner, count = _inside(
+        points, owner, count, corners, planes, axes, size, fine, growth, normals, offsets
+    )
+    ends[3] = count
+    return points[:count], ends, owner[:count]
+
+
+@njit(cache=True)
+def _add(points, owner, count, x, y, z, of):
+    """Append a point, in twice the room if there is none left."""
+    if count == len(points):
+        more = np.empty((2 * count, 3))
+        more[:count] = points
+        whose = np.empty(2 * count, dtype=np.int64)
+        whose[:count] = owner
+        points, owner = more, whose
+    points[count, 0], points[count, 1], points[count, 2] = x, y, z
+    owner[count] = of
+    return points, owner, count + 1
+
+
+@njit(cache=True)
+def _cuts(a, b, size, fine, growth, normals, offsets):
+    """Places t (n,) in (0, 1) that cut the edge from a to b into parts as long as the field asks for."""
+    length = sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
+    if len(offsets) == 0:
+        count = max(1, floor(length / size + 0.5 + _ON_PLANE))
+        return np.arange(1, count) / count
+    parts = np.zeros(_STATIONS + 1)
+    for s in range(_STATIONS):
+        t = (s + 0.5) / _STATIONS
+        x, y, z = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])
+        parts[s + 1] = parts[s] + length / _STATIONS / size_at(x, y, z, size, fine, growth, normals, offsets)
+    count = max(1, floor(parts[-1] + 0.5 + _ON_PLANE))
+    places = np.empty(count - 1)
+    s = 0
+    for k in range(1, count):
+        goal = parts[-1] * k / count
+        while parts[s + 1] < goal:
+            s += 1
+        places[k - 1] = (s + (goal - parts[s]) / (parts[s + 1] - parts[s])) / _STATIONS
+    return places
+
+
+@njit(cache=True)
+def _steps(size, fine, offsets):
+    """Steps (n,) of the lattices, from the largest size to the smallest, each at least half of the one before."""
+    if len(offsets) == 0 or fine >= size:
+        return np.array([size])
+    levels = ceil(log2(size / fine) - 1e-9)
+    return size * (fine / size) ** (np.arange(levels + 1) / levels)
+
+
+@njit(cache=True)
+def _free(points, first, last, x, y, z, apart):
+    least = (apart - _ON_PLANE) ** 2
+    for j in range(first, last):
+        if (points[j, 0] - x) ** 2 + (points[j, 1] - y) ** 2 + (points[j, 2] - z) ** 2 < least:
+            return False
+    return True
+
+
+@njit(cache=True)
+def _on_face(points, owner, count, corners, loop, plane, face, size, fine, growth, normals, offsets):
+    """Add points of triangular lattices inside a face.
+
+    Lattices follow each other, each finer than the one before: coarse regions are filled first, and evenly.
+    """
+    m = len(loop)
+    origin, along = np.zeros(3), np.zeros(3)
+    longest = 0.0
+    for k in range(m):
+        origin += corners[loop[k]] / m
+        side = corners[loop[(k + 1) % m]] - corners[loop[k]]
+        if side @ side > (1.0 + _ON_PLANE) * longest:  # of equal ones the first
+            longest, along = side @ side, side
+    u = along / sqrt(longest)
+    v = np.cross(plane[:3], u)
+    walls = np.empty((m, 3))  # p s + q t ≤ d inside, at origin + s u + t v
+    far_u, far_v = 0.0, 0.0
+    for k in range(m):
+        here = corners[loop[k]] - origin
+        there = corners[loop[(k + 1) % m]] - origin
+        p, q = (there - here) @ v, -((there - here) @ u)
+        length = sqrt(p * p + q * q)
+        walls[k, 0], walls[k, 1] = p / length, q / length
+        walls[k, 2] = (p * (here @ u) + q * (here @ v)) / length
+        far_u, far_v = max(far_u, abs(here @ u)), max(far_v, abs(here @ v))
+    near, there = (
+        np.empty((count, 3)),
+        0,
+    )  # the points on its edges; those on the other side of a thin stone are no matter
+    for j in range(count):
+        if abs(plane[:3] @ points[j] - plane[3]) < _ON_PLANE:
+            near[there] = points[j]
+            there += 1
+    first = count
+    for step in _steps(size, fine, offsets):
+        rows = int(far_v / (0.5 * sqrt(3.0) * step)) + 1
+        across = int(far_u / step) + 2
+        for row in range(-rows, rows + 1):
+            t = row * 0.5 * sqrt(3.0) * step
+            for column in range(-across, across + 1):
+                s = (column + 0.5 * (row % 2)) * step
+                x = origin[0] + s * u[0] + t * v[0]
+                y = origin[1] + s * u[1] + t * v[1]
+                z = origin[2] + s * u[2] + t * v[2]
+                h = size_at(x, y, z, size, fine, growth, normals, offsets)
+                inside = h <= 2.0 * step  # else a coarser lattice has filled the place
+                for w in range(m):
+                    if not inside:
+                        break
+                    inside = walls[w, 0] * s + walls[w, 1] * t <= walls[w, 2] - _INSIDE * h + _ON_PLANE
+                inside = inside and _free(near, 0, there, x, y, z, _APART * h)
+                if inside and _free(points, first, count, x, y, z, _APART * h):
+                    points, owner, count = _add(points, owner, count, x, y, z, face)
+    return points, owner, count
+
+
+@njit(cache=True)
+def _inside(points, owner, count, corners, planes, axes, size, fine, growth, normals, offsets):
+    """Add points of body-centred cubic lattices, as `_on_face` does those of triangular ones."""
+    origin = np.zeros(3)
+    for k in range(len(corners)):
+        origin += corners[k] / len(corners)
+    extent = np.zeros(3)
+    for j in range(len(corners)):
+        for k in range(3):
+            extent[k] = max(extent[k], abs(axes[k] @ (corners[j] - origin)))
+    for step in _STEP * _steps(size, fine, offsets):
+        across = int(extent[0] / step) + 1
+        rows = int(extent[1] / step) + 1
+        layers = int(extent[2] / step) + 1
+        for i in range(-2 * across, 2 * across + 1):
+            for j in range(-2 * rows + i % 2, 2 * rows + 1, 2):
+                for k in range(-2 * layers + i % 2, 2 * layers + 1, 2):
+                    a, b, c = 0.5 * i * step, 0.5 * j * step, 0.5 * k * step
+                    x = origin[0] + a * axes[0, 0] + b * axes[1, 0] + c * axes[2, 0]
+                    y = origin[1] + a * axes[0, 1] + b * axes[1, 1] + c * axes[2, 1]
+                    z = origin[2] + a * axes[0, 2] + b * axes[1, 2] + c * axes[2, 2]
+                    h = size_at(x, y, z, size, fine, growth, normals, offsets)
+                    inside = h <= 2.0 * step
+                    for w in range(len(planes)):
+                        if not inside:
+                            break
+                        deep = planes[w, 3] - planes[w, 0] * x - planes[w, 1] * y - planes[w, 2] * z
+                        inside = deep >= _INSIDE * h - _ON_PLANE
+                    if inside and _free(points, 0, count, x, y, z, _APART * h):
+                        points, owner, count = _add(points, owner, count, x, y, z, -1)
+    return points, owner, count
