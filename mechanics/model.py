@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechanics.balls import ball_properties
-from mechanics.bodies.deformable import Deformable, deformable
+from mechanics.bodies.deformable import Deformable
 from mechanics.bodies.rigid import RigidInertia
 from mechanics.contact._kernels_narrow import MAX_CORNERS
 from mechanics.contact.face_meshes import FaceMesh
@@ -17,10 +17,11 @@ from mechanics.elastic_stones import ElasticStones, elastic_stones
 from mechanics.laws.table import LawTable, law_table
 from mechanics.loads.load import Force, Motion
 from mechanics.meshing.mesh import SolidMesh
-from mechanics.meshing.mesher import mesh_block
+from mechanics.meshing.report import MeshReport
 from mechanics.polyhedra import MassProperties, mass_properties, united
 from mechanics.scene import Block, Fidelity, LawRule, Part, Scene
 from mechanics.state import State
+from mechanics.stone_workshop import StoneWorkshop
 from moma.errors import GeometryError, SceneError
 
 __all__ = ["Model", "build_model"]
@@ -30,8 +31,6 @@ Ints = NDArray[np.int64]
 
 # contact keys number the faces of a stone in six bits
 _MAX_FACES = 64
-# stones whose corners differ by less than this part of their size are equal
-_EQUAL = 1e-11
 # by this fraction the volume of a stone's parts may differ from that of its outline
 _SAME_VOLUME = 1e-6
 
@@ -55,6 +54,7 @@ class Model:
     outline : per body its corners (n, 3) as the scene gives them, from the centre of mass, body axes [m]
     stones : per body its finite elements; None if it has none
     elastic_stones : the same, packed; equal stones together
+    meshes : how the deformable stones were meshed
     """
 
     scene: Scene
@@ -71,6 +71,7 @@ class Model:
     outline: tuple[Array, ...]
     stones: tuple[Deformable | None, ...]
     elastic_stones: ElasticStones
+    meshes: MeshReport
 
     @property
     def rigid_only(self) -> bool:
@@ -99,14 +100,15 @@ def build_model(scene: Scene, progress: Callable[[int, int], None] | None = None
     MeshError, GeometryError : if a stone cannot be meshed or its faces do not close
     """
     blocks = scene.blocks
+    for block in blocks:
+        _check(block)
     properties = [_mass_properties(block) for block in blocks]
     stones: list[Deformable | None] = []
     centres = np.array([p.centroid for p in properties])
-    workshop = _Workshop(scene.time.lumped_mass)
+    workshop = StoneWorkshop(blocks, scene.contact.alert_distance, scene.time.lumped_mass)
     for index, block in enumerate(blocks):
-        _check(block)
         if block.fidelity is Fidelity.DEFORMABLE:
-            stone, centres[index] = workshop(block)
+            stone, centres[index] = workshop(index)
             stones.append(stone)
         else:
             stones.append(None)
@@ -134,38 +136,10 @@ def build_model(scene: Scene, progress: Callable[[int, int], None] | None = None
         outline=tuple(block.vertices - centre for block, centre in zip(blocks, centres, strict=True)),
         stones=tuple(stones),
         elastic_stones=packed,
+        meshes=workshop.report(),
     )
     _check_loads(model)
     return model, _start(model, centres)
-
-
-class _Workshop:
-    """Makes elastic stones; equal blocks share one."""
-
-    def __init__(self, lumped: bool) -> None:
-        self._lumped = lumped
-        self._made: dict[tuple[object, ...], tuple[Deformable, Array]] = {}
-
-    def __call__(self, block: Block) -> tuple[Deformable, Array]:
-        """The finite elements of a block, and its centre of mass (3,) [m]."""
-        corner = block.vertices[0]
-        size = float(np.ptp(block.vertices, axis=0).max())
-        # equal but for rounding: blocks come at different places
-        shape = np.round((block.vertices - corner) / (_EQUAL * size)).astype(np.int64).tobytes()
-        key = (
-            shape,
-            float(f"{size:.10e}"),
-            block.faces,
-            block.mesh_size,
-            block.element,
-            block.material,
-            tuple(map(id, block.parts)),
-        )
-        if key not in self._made:
-            stone, centre = deformable(mesh_block(block), block.material, self._lumped)
-            self._made[key] = stone, centre - corner
-        stone, arm = self._made[key]
-        return stone, corner + arm
 
 
 def _flight(inertia: RigidInertia, stones: list[Deformable | None]) -> RigidInertia:

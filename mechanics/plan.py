@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from mechanics.meshing.report import MeshReport
 from mechanics.model import Model, build_model
 from mechanics.scene import Fidelity, Scene
 from mechanics.simulation import detector
@@ -33,6 +34,7 @@ class Plan:
     contacts : contact points where the scene begins
     unknowns : velocities: six for each rigid block, three for each node of a deformable one
     memory : estimate of the largest arrays, dense compliances above all [bytes]
+    meshes : how the deformable blocks were meshed, and how well
     loose : codes of the blocks that no chain of touching blocks ties to a fixed one
     """
 
@@ -41,6 +43,7 @@ class Plan:
     contacts: int
     unknowns: int
     memory: int
+    meshes: MeshReport
     loose: tuple[str, ...]
 
 
@@ -64,6 +67,7 @@ def plan(scene: Scene) -> Plan:
         contacts=len(contacts),
         unknowns=6 * rigid + 3 * len(start.node),
         memory=_memory(model, contacts.bodies),
+        meshes=model.meshes,
         loose=tuple(codes[i] for i in _loose(pairs, model.fixed)),
     )
 

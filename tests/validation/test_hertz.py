@@ -20,6 +20,7 @@ from mechanics.loads.motions import ImposedMotion
 from mechanics.materials import Material
 from mechanics.meshing.elements import Element
 from mechanics.meshing.mesh import solid_mesh
+from mechanics.meshing.mesher import Meshed
 from mechanics.meshing.quadratic import with_middle_nodes
 from mechanics.model import build_model
 from mechanics.result import Outcome
@@ -101,7 +102,10 @@ def block_on_feet(monkeypatch, a, per_radius, width, poisson, element):
     side = graded(fine, 1.2 * a, half, 3.0)
     x = np.concatenate([-side[:0:-1], side])
     z = -graded(fine, 2 * fine, half, 1.8)[::-1]
-    monkeypatch.setattr("mechanics.model.mesh_block", lambda block: lattice(x, x, z, block))
+    monkeypatch.setattr(
+        "mechanics.stone_workshop.meshed_block",
+        lambda block, contact: Meshed(lattice(x, x, z, block), "lattice", ()),
+    )
     soft = Material("soft", density=2000.0, young=YOUNG, poisson=poisson)
     corners = np.array([-half, -half, -half]) + CORNERS * [2 * half, 2 * half, half]
     cell = x[1] - x[0]
