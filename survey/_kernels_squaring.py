@@ -7,6 +7,7 @@ from numba import njit
 
 __all__ = ["square"]
 
+_STRAIGHT = 0.34  # sine of 20°: a corner that turns less may lie half-way along a side
 _PARALLEL = 1e-9  # sine below which two sides do not meet
 
 
@@ -36,14 +37,14 @@ def square(flat, worn, limits):
     shift = min(limits[0], max(limits[1] * width, min(tolerance, 0.25 * width)))
     restored = min(limits[2], max(limits[3] * width, shift))
     depth = _deepest(flat, worn, polygon, m, shift, restored)
-    if m < 4 or depth > 0.0:
-        return polygon[:m].copy(), source, width, depth
     labels = np.empty(n, np.int64)
     labels[:m] = source
-    m = _reduce(flat, worn, polygon, labels, m, 4, shift, restored, True)
-    if m == 4:  # a corner half-way along a side of a triangle
-        little = min(tolerance, limits[1] * width)
-        m = _reduce(flat, np.zeros(n, np.bool_), polygon, labels, m, 3, little, little, False)
+    if depth > 0.0:
+        return polygon[:m].copy(), source, width, depth
+    little = min(tolerance, limits[1] * width)
+    # corners half-way along a side first: none of two short pieces of a side is a good one to prolong
+    m = _reduce(flat, worn, polygon, labels, m, 3, little, little, _STRAIGHT)
+    m = _reduce(flat, worn, polygon, labels, m, 4, shift, restored, 0.0)
     first = 0
     for k in range(m):
         if _length(polygon[k] - flat[0]) < _length(polygon[first] - flat[0]):
@@ -55,15 +56,23 @@ def square(flat, worn, limits):
 
 
 @njit(cache=True)
-def _reduce(flat, worn, polygon, source, m, few, shift, restored, prolong):
-    """Take out corners of a convex polygon, each time by the smallest allowed change of area; how many are left."""
+def _reduce(flat, worn, polygon, source, m, few, shift, restored, straight):
+    """Take out corners of a convex polygon, each time by the smallest allowed change of area; how many are left.
+
+    With `straight` above zero, only corners at which the outline turns by less than this sine.
+    """
     n = len(flat)
     trial, labels = np.empty((n, 2)), np.empty(n, np.int64)
     best, best_labels = np.empty((n, 2)), np.empty(n, np.int64)
     while m > few:
         smallest = math.inf
         for k in range(m):
-            for way in range(2 if prolong else 1):
+            if (
+                straight > 0.0
+                and _turn(polygon[k - 1 if k else m - 1], polygon[k], polygon[(k + 1) % m]) > straight
+            ):
+                continue
+            for way in range(1 if straight > 0.0 else 2):
                 area = _change(polygon, m, k, way, trial, source, labels)
                 if area < smallest and _allowed(flat, worn, trial, labels, m - 1, shift, restored):
                     smallest = area
@@ -73,6 +82,15 @@ def _reduce(flat, worn, polygon, source, m, few, shift, restored, prolong):
         m -= 1
         polygon[:m], source[:m] = best[:m], best_labels[:m]
     return m
+
+
+@njit(cache=True)
+def _turn(before, here, after):
+    """Sine of the angle by which an outline turns at a corner; 1 where it turns back."""
+    u, v = here - before, after - here
+    if u[0] * v[0] + u[1] * v[1] <= 0.0:
+        return 1.0
+    return abs(_cross(u, v)) / (_length(u) * _length(v))
 
 
 @njit(cache=True)

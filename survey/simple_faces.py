@@ -101,7 +101,7 @@ def _extruded(block: SurveyedBlock, squared: SquaredFace, axes: Array) -> Solid:
         nearest = np.spacing(
             np.abs(solid.vertices).max()
         )  # what rounding leaves of places far from the origin
-        if np.abs(solid.vertices - block.solid.vertices).max() <= _EQUAL * size + 2.0 * nearest:
+        if np.abs(solid.vertices - block.solid.vertices).max() <= _EQUAL * size + 4.0 * nearest:
             return block.solid
     return solid
 

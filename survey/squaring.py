@@ -19,7 +19,7 @@ __all__ = ["SimplifyBounds", "SquaredFace", "nearest_quadrilateral", "square_fac
 
 Array = NDArray[np.float64]
 
-_BOUNDLESS = np.array([np.inf, 0.0, np.inf, 0.0, 0.0])
+_BOUNDLESS = np.array([np.inf, np.inf, np.inf, np.inf, 0.0])
 
 
 @dataclass(frozen=True)
