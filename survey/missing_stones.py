@@ -1,0 +1,270 @@
+"""Stones that are missing in the survey of a wall, proposed from their neighbours.
+
+A hole is a gap between two neighbours of a course that is wider than a joint and has stones, or the ground, below
+it and stones above it; in an arch, an angle between two voussoirs that no joint is wide. Openings stay open: what two
+jambs, a jamb and a sill or the like frame, what is several courses high, and what would take many stones. The end of a
+wall and its top tell nothing of what may be missing there.
+"""
+
+import re
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from survey.extrusion import SurveyedBlock
+from survey.missing_stones_arches import ArchGap, arch_gaps, voussoir_outlines
+from survey.missing_stones_faces import MissingFace, stone_of
+from survey.missing_stones_gaps import CourseGap, Gaps, Hole, find_gaps, find_holes, opening_signs
+from survey.missing_stones_kinds import Filling, depth_of_kind, likeliest, split, usual_kinds
+from survey.missing_stones_settings import MissingSettings
+from survey.missing_stones_sides import Elevation, FlatStone, Line, elevations, meeting
+
+__all__ = ["MissingStone", "propose_missing"]
+
+Array = NDArray[np.float64]
+
+_LEFT, _RIGHT, _UPRIGHT = np.array([-1.0, 0.0]), np.array([1.0, 0.0]), np.array([0.0, 1.0])
+_USUAL_JOINT = 0.01  # metres, where no joint can be measured
+_SCATTER = 0.003  # metres: how far a stone ends from the middle of its joint, one time as another
+_TALL = 0.04  # metres: ends of gaps of two courses that are nearer belong to one stone
+_SPLIT_SIGMA = 0.08  # metres: how well the joint between two missing stones is known
+
+
+@dataclass(frozen=True)
+class MissingStone:
+    """A stone that the survey does not have, as it probably is.
+
+    Attributes
+    ----------
+    block : the stone; its face's provenance is "hypothesis", with the evidence
+    notes : what makes it less certain, in words
+    """
+
+    block: SurveyedBlock
+    notes: tuple[str, ...]
+
+    @property
+    def evidence(self) -> str:
+        """On what it rests, in words."""
+        return self.block.face.provenance.text
+
+
+def propose_missing(
+    blocks: Sequence[SurveyedBlock],
+    settings: MissingSettings | None = None,
+    *,
+    taken: Collection[str] = (),
+) -> tuple[MissingStone, ...]:
+    """Propose the stones that are missing in all facades of a survey.
+
+    Parameters
+    ----------
+    blocks : all stones that are known
+    settings : what counts as a hole, and what as an opening
+    taken : codes that proposals must not have, besides those of the stones
+
+    Returns
+    -------
+    Proposals, facade by facade: the voussoirs first, then course by course from below
+    """
+    settings = settings or MissingSettings()
+    codes = _Codes({*taken, *(block.code for block in blocks)})
+    found: list[MissingStone] = []
+    for elevation in elevations(blocks):
+        voussoirs = list(_voussoirs(elevation, settings, codes))
+        found += voussoirs
+        flat = [_flat(stone.block, elevation) for stone in voussoirs]
+        found += _of_courses(Elevation(elevation.frame, (*elevation.stones, *flat)), settings, codes)
+    return tuple(found)
+
+
+def _flat(block: SurveyedBlock, elevation: Elevation) -> FlatStone:
+    return FlatStone(block, elevation.frame.flatten(block.face.outline), frozenset())
+
+
+class _Codes:
+    """Codes that are taken, and the next one that is free."""
+
+    def __init__(self, taken: set[str]) -> None:
+        self._taken = taken
+
+    def after(self, left: str, right: str) -> str:
+        """H- and the code that a stone between two others would have: the next number after the left one."""
+        left, right = left.removeprefix("H-"), right.removeprefix("H-")
+        for code, step in ((left, 1), (right, -1)):
+            number = re.search(r"\d+$", code)
+            if number is None:
+                continue
+            name = f"{code[: number.start()]}{int(number[0]) + step:0{len(number[0])}d}"
+            if int(number[0]) + step >= 0 and not {name, f"H-{name}"} & self._taken:
+                return self._take(f"H-{name}")
+        count = 1
+        while f"H-{left}+{count}" in self._taken:
+            count += 1
+        return self._take(f"H-{left}+{count}")
+
+    def _take(self, code: str) -> str:
+        self._taken.add(code)
+        return code
+
+
+def _voussoirs(elevation: Elevation, settings: MissingSettings, codes: _Codes) -> Iterator[MissingStone]:
+    gaps = arch_gaps(elevation, settings)
+    joint = _usual_joint(find_gaps(elevation, settings)) if gaps else _USUAL_JOINT
+    for gap in gaps:
+        left, right = gap.left.block.code, gap.right.block.code
+        before = left
+        for k, outline in enumerate(voussoir_outlines(gap, joint)):
+            kind = "keystone" if k == gap.keystone else "voussoir"
+            depth = depth_of_kind("voussoir", (gap.left, gap.right), elevation, None)
+            angle = float(np.degrees(gap.sides[1].angle - gap.sides[0].angle))
+            evidence = (
+                f"gap of {angle:.1f}° in an arch between {left} and {right}, whose voussoirs take "
+                f"{np.degrees(gap.usual):.1f}°; intrados and extrados from theirs, joints of {joint * 1e3:.0f} mm"
+            )
+            code = codes.after(before, right)
+            sigma = _sigma(gap.left, gap.right, gap.count > 1)
+            face = MissingFace(
+                code,
+                kind,
+                None,
+                gap.left.block.face.record.zone,
+                outline,
+                (gap.left, gap.right),
+                depth,
+                sigma,
+                evidence,
+            )
+            notes = _arch_notes(gap, k)
+            before = code
+            yield MissingStone(stone_of(face, elevation), notes)
+
+
+def _arch_notes(gap: ArchGap, number: int) -> tuple[str, ...]:
+    notes = []
+    if gap.count > 1:
+        notes.append(f"one of {gap.count} in the gap: their joints are thought to be evenly spaced")
+    if number == gap.keystone:
+        notes.append("at the crown of an arch without a keystone, taken for one")
+    return tuple(notes)
+
+
+def _usual_joint(gaps: Gaps) -> float:
+    return float(np.median(gaps.joints)) if len(gaps.joints) else _USUAL_JOINT
+
+
+def _sigma(left: FlatStone, right: FlatStone, cut: bool) -> float:
+    measured = max(stone.block.face.record.sigma for stone in (left, right))
+    return float(np.hypot(np.hypot(measured, _SCATTER), _SPLIT_SIGMA if cut else 0.0))
+
+
+def _of_courses(elevation: Elevation, settings: MissingSettings, codes: _Codes) -> Iterator[MissingStone]:
+    gaps = find_gaps(elevation, settings)
+    joint, kinds = _usual_joint(gaps), usual_kinds(elevation)
+    for hole in find_holes(gaps.gaps):
+        signs = opening_signs(hole, elevation)
+        if len(signs) >= 2 or hole.courses > settings.max_courses or hole.bounded < settings.covered:
+            continue
+        fillings = [likeliest(gap.width, joint, kinds, settings) for gap in hole.gaps]
+        tall = _is_tall(hole)
+        known = [filling for filling in fillings if filling is not None]
+        if len(known) < len(fillings) or sum(len(one.kinds) for one in known) > settings.max_stones + tall:
+            continue
+        pairs = list(zip(hole.gaps, known, strict=True))
+        for gap, filling in pairs[:1] if tall else pairs:
+            if gap.width - 2.0 * joint >= settings.min_length:
+                upper = hole.gaps[-1].upper if tall else gap.upper
+                yield from _Fill(gap, filling, upper, joint, elevation, signs).stones(codes)
+
+
+def _is_tall(hole: Hole) -> bool:
+    """Whether two gaps on one another begin and end at the same places: one stone, two courses high, is missing."""
+    if len(hole.gaps) != 2 or hole.courses != 2:
+        return False
+    lower, upper = hole.gaps
+    return abs(lower.start - upper.start) < _TALL and abs(lower.stop - upper.stop) < _TALL
+
+
+@dataclass(frozen=True)
+class _Fill:
+    """A gap that is to be filled."""
+
+    gap: CourseGap
+    filling: Filling
+    upper: Line
+    joint: float
+    elevation: Elevation
+    signs: tuple[str, ...]
+
+    def stones(self, codes: _Codes) -> Iterator[MissingStone]:
+        """The stones of the gap, from left to right."""
+        gap, count = self.gap, len(self.filling.kinds)
+        kinds, cuts = split(gap, self.filling, usual_kinds(self.elevation), self.elevation)
+        before = gap.left.block.code
+        for kind, outline in zip(kinds, self._outlines(cuts), strict=True):
+            kind = self._kind(kind)
+            code = codes.after(before, gap.right.block.code)
+            before = code
+            depth = depth_of_kind(kind, (gap.left, gap.right), self.elevation, gap.course)
+            sigma = _sigma(gap.left, gap.right, count > 1)
+            beside = (gap.left, gap.right)
+            face = MissingFace(
+                code, kind, gap.course, gap.zone, outline, beside, depth, sigma, self._evidence(kind)
+            )
+            yield MissingStone(stone_of(face, self.elevation), self._notes())
+
+    def _kind(self, kind: str) -> str:
+        """The kind by length; between a stone of an arch and one of the wall it is a springer."""
+        arch = [stone.block.kind in ("voussoir", "keystone") for stone in (self.gap.left, self.gap.right)]
+        return "springer" if any(arch) and not all(arch) else kind
+
+    def _outlines(self, cuts: Sequence[float]) -> Iterator[Array]:
+        gap = self.gap
+        inside = np.array(
+            [gap.middle, 0.5 * (gap.lower.at_place(gap.middle) + self.upper.at_place(gap.middle))]
+        )
+        left = gap.left.side(_RIGHT, _UPRIGHT) or Line(np.array([gap.start, inside[1]]), _UPRIGHT)
+        right = gap.right.side(_LEFT, _UPRIGHT) or Line(np.array([gap.stop, inside[1]]), _UPRIGHT)
+        sides = [left.moved(inside, self.joint)]
+        for cut in cuts:
+            sides += [
+                Line(np.array([cut + by, inside[1]]), _UPRIGHT)
+                for by in (-0.5 * self.joint, 0.5 * self.joint)
+            ]
+        sides.append(right.moved(inside, self.joint))
+        for one, other in zip(sides[::2], sides[1::2], strict=True):
+            beds = (gap.lower, self.upper)
+            yield np.array(
+                [
+                    meeting(one, beds[0]),
+                    meeting(other, beds[0]),
+                    meeting(other, beds[1]),
+                    meeting(one, beds[1]),
+                ]
+            )
+
+    def _evidence(self, kind: str) -> str:
+        gap = self.gap
+        return (
+            f"gap of {gap.width:.3f} m in course {gap.course} between {gap.left.block.code} and "
+            f"{gap.right.block.code}, with stones below and above; {kind} by its length "
+            f"({self.filling.probability:.0%}); beds from its course, joints of {self.joint * 1e3:.0f} mm"
+        )
+
+    def _notes(self) -> tuple[str, ...]:
+        notes = []
+        if len(self.filling.kinds) > 1:
+            notes.append(
+                f"one of {len(self.filling.kinds)} in the gap: where they meet follows from usual lengths only"
+            )
+        if not self.filling.usual:
+            notes.append("no stone of the facade is as long")
+        if self.filling.probability < 0.8:
+            notes.append("other stones are nearly as likely")
+        if (self.gap.below == -2).all():
+            notes.append("on the ground: it may be an opening")
+        if self.signs:
+            notes.append(f"beside {self.signs[0]}: it may be an opening")
+        return tuple(notes)

@@ -1,0 +1,109 @@
+"""From the outline of a missing stone in the elevation to a stone in space, with its evidence."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from survey.common_planes import PlaneEstimate, common_plane
+from survey.depth import Depth
+from survey.extrusion import SurveyedBlock, extrude
+from survey.faces import Provenance, face_on
+from survey.missing_stones_sides import Elevation, FlatStone
+from survey.neighbours import Neighbours
+from survey.planes import FaceFit
+from survey.records import BlockRecord
+from survey.shapes import FaceShape, ShapeKind
+
+__all__ = ["MissingFace", "stone_of"]
+
+Array = NDArray[np.float64]
+
+_ENOUGH = 3  # faces that have a common plane
+
+
+@dataclass(frozen=True)
+class MissingFace:
+    """What is thought of a stone that is missing, in the elevation.
+
+    Attributes
+    ----------
+    code, kind, course, zone : as of any stone
+    outline : (nv, 2) counter-clockwise [m]
+    beside : its neighbours
+    depth : with the evidence
+    sigma : standard deviation of a corner in the plane of the facade [m]
+    evidence : of outline and kind, in words
+    """
+
+    code: str
+    kind: str
+    course: int | None
+    zone: str | None
+    outline: Array
+    beside: tuple[FlatStone, ...]
+    depth: Depth
+    sigma: float
+    evidence: str
+
+
+def stone_of(face: MissingFace, elevation: Elevation) -> SurveyedBlock:
+    """Put the outline on the common plane of the neighbouring faces, and extrude it by the depth."""
+    frame = elevation.frame
+    flat = frame.origin + face.outline @ frame.axes[:2]
+    plane = _plane(flat, face.beside, elevation)
+    lift = ((plane.centroid - flat) @ plane.normal) / float(frame.axes[2] @ plane.normal)
+    corners = flat + lift[:, None] * frame.axes[2]
+    text = f"{face.evidence}; in {plane.text}"
+    record = BlockRecord(
+        code=face.code,
+        kind=face.kind,
+        course=face.course,
+        vertices=corners,
+        points=np.empty((0, 3)),
+        sigma=face.sigma,
+        zone=face.zone,
+    )
+    shape = FaceShape(ShapeKind.UNTESTED, "nobody has seen it")
+    made = face_on(_fit(plane, corners), corners, shape, Provenance("hypothesis", text), record)
+    return extrude(made, face.depth)
+
+
+def _plane(corners: Array, beside: Sequence[FlatStone], elevation: Elevation) -> PlaneEstimate:
+    """The common plane of the faces near an outline, else of all of the facade, else that of a neighbour."""
+    faces = [stone.block.face for stone in elevation.stones]
+    around = Neighbours(faces)
+    near = around.near(corners, elevation.frame.axes[2])
+    place = corners.mean(axis=0)
+    if len(near) >= _ENOUGH:
+        text = f"the plane of {', '.join(around.codes[i] for i in near.tolist())}"
+        return common_plane(around.fits(near), place).face_at(place, text)
+    if len(faces) >= _ENOUGH:
+        return common_plane([face.fit for face in faces], place).face_at(place, "the plane of the facade")
+    fit = beside[0].block.face.fit
+    return PlaneEstimate(
+        fit.centroid, fit.normal, fit.axes, fit.covariance, fit.rms, f"the plane of {beside[0].block.code}"
+    )
+
+
+def _fit(plane: PlaneEstimate, corners: Array) -> FaceFit:
+    """The predicted plane as any other, without residuals, its covariance at the middle of the corners."""
+    middle = corners.mean(axis=0)
+    carry = np.eye(3)
+    carry[2, :2] = plane.axes @ (middle - plane.centroid)
+    nothing = np.empty(0)
+    return FaceFit(
+        normal=plane.normal,
+        offset=float(plane.normal @ plane.centroid),
+        centroid=middle,
+        axes=plane.axes,
+        singular_values=np.full(3, np.nan),
+        covariance=carry @ plane.covariance @ carry.T,
+        rms=plane.scatter,
+        sigma0=float("nan"),
+        redundancy=0,
+        rejected=(),
+        residuals=nothing,
+        standardised=nothing,
+    )
