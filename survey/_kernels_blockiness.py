@@ -38,14 +38,24 @@ def face_planes(vertices, corners, starts):
 
 
 @njit(cache=True)
+def _middle(vertices, corners, start, stop):
+    """Mean of the corners of a face."""
+    out = np.zeros(3)
+    for c in range(start, stop):
+        out += vertices[corners[c]] / (stop - start)
+    return out
+
+
+@njit(cache=True)
 def volume(vertices, corners, starts):
-    """Volume, by the divergence theorem."""
+    """Volume, by the divergence theorem; a face that is bent is that of the triangles on its middle."""
     origin = vertices[corners[0]]
     total = 0.0
     for f in range(len(starts) - 1):
-        a = vertices[corners[starts[f]]] - origin
-        for c in range(starts[f] + 1, starts[f + 1] - 1):
-            total += (a * _cross(vertices[corners[c]] - origin, vertices[corners[c + 1]] - origin)).sum()
+        a = _middle(vertices, corners, starts[f], starts[f + 1]) - origin
+        for c in range(starts[f], starts[f + 1]):
+            following = c + 1 if c + 1 < starts[f + 1] else starts[f]
+            total += (a * _cross(vertices[corners[c]] - origin, vertices[corners[following]] - origin)).sum()
     return total / 6.0
 
 
@@ -103,15 +113,21 @@ def edge_distances(points, vertices, corners, starts):
 def common_volume(vertices, corners, starts, planes):
     """Volume that a solid has in common with a convex body, the half-spaces n·x ≤ d of planes (np, 4).
 
-    The solid is the signed sum of tetrahedra over the triangles of its faces, each clipped by all planes.
+    The solid is the signed sum of tetrahedra over the triangles on the middles of its faces, each clipped by all.
     """
     apex = vertices[corners].copy().sum(axis=0) / len(corners)
     total = 0.0
     for f in range(len(starts) - 1):
-        a = vertices[corners[starts[f]]]
-        for c in range(starts[f] + 1, starts[f + 1] - 1):
+        middle = _middle(vertices, corners, starts[f], starts[f + 1])
+        for c in range(starts[f], starts[f + 1]):
+            following = c + 1 if c + 1 < starts[f + 1] else starts[f]
             four = np.empty((4, 3))
-            four[0], four[1], four[2], four[3] = apex, a, vertices[corners[c]], vertices[corners[c + 1]]
+            four[0], four[1], four[2], four[3] = (
+                apex,
+                middle,
+                vertices[corners[c]],
+                vertices[corners[following]],
+            )
             total += math.copysign(_clipped(four, planes), _six_volumes(four))
     return total
 
