@@ -1,26 +1,27 @@
-"""From the database to a scene: selected stones → hexahedra → closed joints → blocks.
+"""From the database to a scene: selected stones → simplified solids → closed joints → blocks."""
 
-A stone that came as a closed solid stays that solid where joints are left open; only their closing needs hexahedra.
-"""
-
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy.orm import Session
 
+from mechanics.meshing.choice import Mesher
 from mechanics.meshing.elements import Element
-from mechanics.scene import Block, Fidelity, Scene
+from mechanics.scene import Block, Fidelity, Part, Scene
 from pipelines.joint_laws import law_rules
 from pipelines.local_frame import entry_about, local_origin, stone_about
 from pipelines.scene_loads import build_loads, thrown
 from pipelines.scenefile import MeshSettings, SceneFile
 from pipelines.selection import Groups, StoneModel, select_groups, select_stones
 from pipelines.stone_records import surveyed_block
-from survey.blocky import simplify
+from survey.blocky import BlockyStone
+from survey.closing_report import ClosingReport
+from survey.convex_parts import convex_parts
 from survey.extrusion import SurveyedBlock
-from survey.joints import ClosingReport, close_joints
+from survey.joints import close_joints
 from survey.solids import Solid
 
 __all__ = ["Assembly", "assemble", "assemble_stones"]
@@ -36,14 +37,16 @@ class Assembly:
     ----------
     scene : for `mechanics.simulate`, with places counted from `origin`
     models : the stones as surveyed, in the order of the scene's blocks
-    closing : what closing the joints has changed; None if they stay open
+    simplified : the stones before their joints were closed
+    closing : what became of their joints
     towards : (3,) mean normal of the faces, from the wall to the observer [-]
     origin : (3,) of the scene, in the frame of the site [m]
     """
 
     scene: Scene
     models: tuple[StoneModel, ...]
-    closing: ClosingReport | None
+    simplified: tuple[BlockyStone, ...]
+    closing: ClosingReport
     towards: Array
     origin: Array
 
@@ -54,7 +57,7 @@ def assemble(scene: SceneFile, session: Session) -> Assembly:
     Raises
     ------
     SceneError : a key names no stone, a stone has no material, or a load does not suit its stones
-    GeometryError : a stone cannot be made a hexahedron where it has to be, or its joints cannot be closed
+    GeometryError : a stone is degenerate, or not convex and cannot be cut into convex parts
     """
     models = select_stones(scene, session)
     return assemble_stones(scene, models, select_groups(scene, session, models))
@@ -64,21 +67,17 @@ def assemble_stones(scene: SceneFile, models: tuple[StoneModel, ...], groups: Gr
     """As `assemble`, of stones that have been selected; the database is not needed."""
     origin = local_origin([model.record for model in models])
     stones = [surveyed_block(stone_about(model.record, origin)) for model in models]
-    solids: Sequence[Solid]
-    if scene.joints is None:
-        solids, closing = [_open(stone) for stone in stones], None
-    else:
-        closed = close_joints(stones, scene.joints)
-        solids, closing = closed.solids, closed.report
+    closed = close_joints(stones, scene.joints)
     meshes = _meshes(scene, groups)
     blocks = tuple(
         _block(model, solid, meshes.get(solid.code, scene.mesh))
-        for model, solid in zip(models, solids, strict=True)
+        for model, solid in zip(models, closed.solids, strict=True)
     )
     return Assembly(
         scene=_scene(scene, blocks, groups, origin),
         models=models,
-        closing=closing,
+        simplified=closed.simplified,
+        closing=closed.report,
         towards=_facing(stones),
         origin=origin,
     )
@@ -109,12 +108,10 @@ def _meshes(scene: SceneFile, groups: Groups) -> dict[str, MeshSettings]:
     """The meshes of the stones that an entry of [[meshes]] names; of two, the later counts."""
     meshes: dict[str, MeshSettings] = {}
     for entry in scene.meshes:
-        size, element = entry.values["size"], entry.values["element"]
-        for code in groups[entry.path][0]:
-            meshes[code] = MeshSettings(
-                scene.mesh.size if size is None else size,
-                scene.mesh.element if element is None else Element(element),
-            )
+        given = {key: value for key, value in entry.values.items() if value is not None and key != "stones"}
+        kinds: dict[str, Callable[[str], Any]] = {"element": Element, "mesher": Mesher}
+        own = {key: kinds[key](value) if key in kinds else value for key, value in given.items()}
+        meshes |= dict.fromkeys(groups[entry.path][0], replace(scene.mesh, **own))
     return meshes
 
 
@@ -127,12 +124,17 @@ def _block(model: StoneModel, solid: Solid, mesh: MeshSettings) -> Block:
         fidelity=model.fidelity,
         mesh_size=mesh.size if model.fidelity is Fidelity.DEFORMABLE else None,
         element=mesh.element,
+        contact_size=mesh.contact_size,
+        growth=mesh.growth,
+        mesher=mesh.mesher,
+        parts=_parts(solid),
     )
 
 
-def _open(stone: SurveyedBlock) -> Solid:
-    """What a stone is where its joints stay open."""
-    return stone.solid if stone.face.provenance.source == "solid" else simplify(stone).solid
+def _parts(solid: Solid) -> tuple[Part, ...]:
+    """Convex parts of a stone that is not convex."""
+    parts = convex_parts(solid)
+    return tuple(Part(one.vertices, one.faces) for one in parts) if len(parts) > 1 else ()
 
 
 def _facing(stones: Sequence[SurveyedBlock]) -> Array:

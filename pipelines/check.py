@@ -15,7 +15,7 @@ from pipelines.assemble import assemble_stones
 from pipelines.entries import describe
 from pipelines.scenefile import read_scene
 from pipelines.selection import select_groups, select_stones
-from survey.joints import ClosingReport
+from survey.closing_report import ClosingReport
 from survey.solids import Solid
 from survey.watertight import check_watertight
 
@@ -123,7 +123,7 @@ def check_scene(path: str | Path, url: str) -> CheckReport:
     meshes: tuple[MeshUse, ...] = ()
     try:
         assembly = assemble_stones(scene, models, groups)
-        joints = _joints(assembly.closing) if assembly.closing is not None else None
+        joints = _joints(assembly.closing)
         meshes = _meshes(assembly.scene)
         problems += _unsound_solids(assembly.scene)
         needs = plan(assembly.scene)

@@ -14,7 +14,10 @@ from pipelines.entries import Entry, read_entries
 from pipelines.entry_keys import LAW_KEYS, LAW_TYPES
 from pipelines.schema import Document, nearest
 
-__all__ = ["JointLaw", "law_rules", "read_laws"]
+__all__ = ["BONDS", "JointLaw", "law_rules", "read_laws"]
+
+# types of laws that are mortar
+BONDS = ("mortar", "cohesive_zone")
 
 _CLASSES: Mapping[str, type[Law]] = {
     "dry": DryJoint,

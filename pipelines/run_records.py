@@ -112,7 +112,7 @@ def contact_arrays(contacts: ContactResult, origin: Array) -> ContactArrays:
 
 def simplifications(assembly: Assembly) -> tuple[SimplificationRecord, ...]:
     """The solids that stood for the stones, compared with those of the survey."""
-    mode, records = "open" if assembly.closing is None else "close", []
+    mode, records = str(assembly.closing.mode), []
     for model, block in zip(assembly.models, assembly.scene.blocks, strict=True):
         surveyed, vertices = model.record.solid_vertices - assembly.origin, block.vertices
         measured, _ = solid_volume(surveyed, model.record.solid_faces)
@@ -136,7 +136,7 @@ def settings_of(scene: SceneFile, built: Scene) -> dict[str, Any]:
     contact = built.contact
     return {
         "gravity": list(built.gravity),
-        "joints": {"mode": "open"} if scene.joints is None else {"mode": "close", **asdict(scene.joints)},
+        "joints": _values(scene.joints),
         "contact": {
             "law": {"type": type(contact.law).__name__, **_values(contact.law)},
             "alert_distance": contact.alert_distance,

@@ -14,7 +14,7 @@ from mechanics.scene import (
 )
 from pipelines.schema import Key, Kind
 from pipelines.stone_keys import MESH
-from survey.joint_lines import JointSettings
+from survey.joint_settings import JointMode, JointSettings
 
 __all__ = ["PICTURES", "TABLES"]
 
@@ -54,14 +54,15 @@ _JOINTS = (
     Key(
         "mode",
         Kind.TEXT,
-        "close: neighbouring stones share contact planes; open: stones keep their measured sides.",
-        default="close",
-        choices=("close", "open"),
+        "close: neighbours share contact planes; mortar: so too, with the width kept as the mortar's thickness; "
+        "as-surveyed: stones keep their measured sides.",
+        default=JointSettings.mode.value,
+        choices=tuple(one.value for one in JointMode),
     ),
     Key(
         "max_width",
         Kind.NUMBER,
-        "Sides farther apart do not make a joint.",
+        "Faces farther apart do not make a joint.",
         "m",
         JointSettings.max_width,
         above=0,
@@ -69,7 +70,7 @@ _JOINTS = (
     Key(
         "max_angle",
         Kind.NUMBER,
-        "Sides that open wider do not make a joint.",
+        "Faces that open wider do not make a joint.",
         "°",
         JointSettings.max_angle,
         above=0,
@@ -78,7 +79,7 @@ _JOINTS = (
     Key(
         "min_overlap",
         Kind.NUMBER,
-        "Length over which two sides must face each other.",
+        "Narrowest strip in which two faces must face each other.",
         "m",
         JointSettings.min_overlap,
         at_least=0,
@@ -86,7 +87,7 @@ _JOINTS = (
     Key(
         "straightness",
         Kind.NUMBER,
-        "Largest distance of a corner from its joint that still counts as straight.",
+        "Largest distance of a corner from its joint that still counts as plane; a bed that is less so is bent.",
         "m",
         JointSettings.straightness,
         above=0,

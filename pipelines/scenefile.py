@@ -3,7 +3,7 @@
 Nothing runs and no database is read here; stones are still expressions. docs/scene.md lists the keys.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,8 +12,10 @@ import numpy as np
 
 from mechanics.laws.dry_joint import DryJoint
 from mechanics.materials import Material, Orthotropy
+from mechanics.meshing.choice import Mesher
 from mechanics.meshing.elements import Element
 from mechanics.scene import (
+    Block,
     ContactSettings,
     Fidelity,
     Method,
@@ -25,13 +27,13 @@ from mechanics.scene import (
 from moma.errors import SceneError
 from pipelines.entries import Entry, read_entries
 from pipelines.entry_keys import ARRAYS
-from pipelines.joint_laws import JointLaw, read_laws
+from pipelines.joint_laws import BONDS, JointLaw, read_laws
 from pipelines.scene_keys import PICTURES, TABLES
 from pipelines.scene_loads import read_loads, read_throws
 from pipelines.schema import Document, check_table, nearest
 from pipelines.stone_keys import MATERIAL_KEYS, MESH_KEYS, ORTHOTROPY_KEYS
 from pipelines.toml_lines import key_lines, parse_toml, read_text
-from survey.joint_lines import JointSettings
+from survey.joint_settings import JointMode, JointSettings
 
 __all__ = [
     "Fidelities",
@@ -74,10 +76,22 @@ class Fidelities:
 
 @dataclass(frozen=True)
 class MeshSettings:
-    """Finite elements of deformable stones: target edge length [m], and kind."""
+    """Finite elements of deformable stones.
+
+    Attributes
+    ----------
+    size : target edge length [m]
+    element : kind
+    contact_size : target edge length at faces that touch other stones; None: as everywhere [m]
+    growth : by how much edges get longer per metre away from these faces [-]
+    mesher : of tetrahedra
+    """
 
     size: float
     element: Element
+    contact_size: float | None = None
+    growth: float = Block.growth
+    mesher: Mesher = Block.mesher
 
 
 @dataclass(frozen=True)
@@ -97,7 +111,7 @@ class SceneFile:
     document : file and lines, for error messages
     text : the file, as it is kept with the run
     name : title
-    joints : how joints are closed; None: they stay open
+    joints : what becomes of joints
     gravity : (3,) acceleration [m/s²]
     mesh : finite elements of deformable stones that no entry of `meshes` names
     meshes : groups of stones that are meshed otherwise
@@ -111,7 +125,7 @@ class SceneFile:
     selection: Selection
     materials: tuple[MaterialRule, ...]
     bodies: Fidelities
-    joints: JointSettings | None
+    joints: JointSettings
     contact: ContactSettings
     gravity: tuple[float, float, float]
     mesh: MeshSettings
@@ -139,6 +153,7 @@ def parse_scene(text: str, path: str) -> SceneFile:
     given = parse_toml(text, path, SceneError, "see docs/scene.md for a scene to start from")
     document = Document(path, key_lines(text))
     tables = _checked_tables(document, given)
+    laws = read_laws(document, given)
     return SceneFile(
         document=document,
         text=text,
@@ -146,18 +161,22 @@ def parse_scene(text: str, path: str) -> SceneFile:
         selection=Selection(**tables["select"]),
         materials=_materials(document, given),
         bodies=Fidelities(**tables["bodies"] | {"default": Fidelity(tables["bodies"]["default"])}),
-        joints=_joints(**tables["joints"]),
+        joints=_joints(document, laws, **tables["joints"]),
         contact=_contact(document, **tables["contact"]),
         gravity=_gravity(document, **tables["gravity"]),
-        mesh=MeshSettings(tables["mesh"]["size"], Element(tables["mesh"]["element"])),
+        mesh=_mesh(**tables["mesh"]),
         meshes=read_entries(document, given, "meshes", {"mesh": MESH_KEYS}),
         time=_time(document, tables["time"]),
         solver=SolverSettings(**tables["solver"] | {"method": Method(tables["solver"]["method"])}),
         output=_output(document, **tables["output"]),
-        laws=read_laws(document, given),
+        laws=laws,
         loads=read_loads(document, given),
         throws=read_throws(document, given),
     )
+
+
+def _mesh(*, element: str, mesher: str, **sizes: Any) -> MeshSettings:
+    return MeshSettings(element=Element(element), mesher=Mesher(mesher), **sizes)
 
 
 def _checked_tables(document: Document, given: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
@@ -217,8 +236,15 @@ def _orthotropy(document: Document, material: str, content: Any) -> Orthotropy:
     return Orthotropy(**values, axes=tuple(map(tuple, (np.array(axes) / lengths[:, None]).tolist())))
 
 
-def _joints(mode: str, **settings: float) -> JointSettings | None:
-    return JointSettings(**settings) if mode == "close" else None
+def _joints(document: Document, laws: Sequence[JointLaw], mode: str, **settings: float) -> JointSettings:
+    if mode == JointMode.MORTAR and not any(one.entry.type in BONDS for one in laws):
+        document.fail(
+            'mode = "mortar", but no law says how mortar bonds',
+            "joints",
+            "mode",
+            remedy='add [[laws]] of type "mortar" or "cohesive_zone"',
+        )
+    return JointSettings(mode=JointMode(mode), **settings)
 
 
 def _contact(

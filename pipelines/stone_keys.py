@@ -4,6 +4,7 @@ docs/scene.md is held to these lists by a test.
 """
 
 from mechanics.materials import Material
+from mechanics.meshing.choice import Mesher
 from mechanics.meshing.elements import Element
 from mechanics.scene import Block
 from pipelines.schema import Key, Kind
@@ -64,6 +65,7 @@ ORTHOTROPY_KEYS = (
 )
 
 _ELEMENTS = tuple(one.value for one in Element)
+_MESHERS = tuple(one.value for one in Mesher)
 
 MESH = (
     Key("size", Kind.NUMBER, "Target edge length of the finite elements.", "m", 0.2, above=0),
@@ -74,10 +76,36 @@ MESH = (
         default=Block.element.value,
         choices=_ELEMENTS,
     ),
+    Key(
+        "contact_size",
+        Kind.NUMBER,
+        "Target edge length at faces that touch other stones; else `size`, which a larger one does not change.",
+        "m",
+        None,
+        above=0,
+    ),
+    Key(
+        "growth",
+        Kind.NUMBER,
+        "By how much edges get longer with the distance from these faces, until they reach `size`.",
+        "-",
+        Block.growth,
+        above=0,
+    ),
+    Key(
+        "mesher",
+        Kind.TEXT,
+        "Of tetrahedra: auto: delaunay for convex stones, gmsh for others; gmsh: first; delaunay: alone.",
+        default=Block.mesher.value,
+        choices=_MESHERS,
+    ),
 )
 
 MESH_KEYS = (
     Key("stones", Kind.STONES, "Codes or expressions of the stones that are meshed otherwise."),
     Key("size", Kind.NUMBER, "Target edge length; else that of `[mesh]`.", "m", None, above=0),
     Key("element", Kind.TEXT, "Kind of element; else that of `[mesh]`.", default=None, choices=_ELEMENTS),
+    Key("contact_size", Kind.NUMBER, "At faces in contact; else that of `[mesh]`.", "m", None, above=0),
+    Key("growth", Kind.NUMBER, "Away from them; else that of `[mesh]`.", "-", None, above=0),
+    Key("mesher", Kind.TEXT, "Of tetrahedra; else that of `[mesh]`.", default=None, choices=_MESHERS),
 )

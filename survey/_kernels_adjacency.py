@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numba import njit
 
-__all__ = ["GROUPS", "face_planes", "thickness", "touching_faces"]
+__all__ = ["GROUPS", "face_planes", "facing_faces", "thickness", "touching_faces"]
 
 GROUPS = 4
 """Directions in which one solid can touch another; more are counted with the nearest of these."""
@@ -246,6 +246,38 @@ def touching_faces(pairs, solid, planes, limits, out_pairs, out):
             _finish(groups[g])
             out_pairs[total + g, 0], out_pairs[total + g, 1] = one, two
         total += count
+    return total
+
+
+@njit(cache=True)
+def facing_faces(pairs, solid, planes, limits, out_faces, out):
+    """As `touching_faces`, of single faces: each two that face each other into `out_faces` (…, 2) and `out` (…, 8).
+
+    Returns how many there are; what does not fit is counted only.
+    """
+    face_starts, solid_starts = solid[2], solid[3]
+    normals, boxes, width, cosine = planes[0], planes[2], limits[0], limits[2]
+    longest = 0
+    for f in range(face_starts.shape[0] - 1):
+        longest = max(longest, face_starts[f + 1] - face_starts[f])
+    work = (np.empty((4, 2 * longest + 8, 2)), np.empty((4, 3)))
+    row, total = np.empty(8), 0
+    for pair in range(pairs.shape[0]):
+        one, two = pairs[pair]
+        for i in range(solid_starts[one], solid_starts[one + 1]):
+            for j in range(solid_starts[two], solid_starts[two + 1]):
+                facing = (
+                    normals[i, 0] * normals[j, 0]
+                    + normals[i, 1] * normals[j, 1]
+                    + normals[i, 2] * normals[j, 2]
+                )
+                if facing > -cosine or _boxes_apart(boxes, i, j, width):
+                    continue
+                if _contact(i, j, one, two, facing, solid, planes, limits, work, row):
+                    if total < out.shape[0]:
+                        out_faces[total, 0], out_faces[total, 1] = i, j
+                        out[total] = row
+                    total += 1
     return total
 
 

@@ -9,9 +9,9 @@ __all__ = ["JointMode", "JointSettings"]
 class JointMode(StrEnum):
     """What becomes of the open joints of a survey.
 
-    CLOSE: both stones are led to the middle of the joint and share its plane (dry joints). MORTAR: so too, and the width
-    that was open is kept as the thickness of the mortar, which the plane then stands for. AS_SURVEYED: stones keep their
-    measured sides, gaps and all.
+    CLOSE: both stones are led to the middle of the joint and share its plane (dry joints). MORTAR: so too, and the
+    width that was open is kept as the thickness of the mortar, which the plane then stands for. AS_SURVEYED: stones
+    keep their measured sides, gaps and all.
     """
 
     CLOSE = "close"
@@ -36,6 +36,6 @@ class JointSettings:
     mode: JointMode = JointMode.CLOSE
     max_width: float = 0.05
     max_angle: float = 20.0
-    min_overlap: float = 0.03
+    min_overlap: float = 0.01
     straightness: float = 0.02
     max_displacement: float = 0.08

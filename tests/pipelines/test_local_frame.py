@@ -105,7 +105,7 @@ def assembled(url, text):
         return assemble(parse_scene(text, "scene.toml"), session)
 
 
-@pytest.mark.parametrize("joints", ["", '[joints]\nmode = "open"\n'])
+@pytest.mark.parametrize("joints", ["", '[joints]\nmode = "as-surveyed"\n'])
 def test_a_far_scene_is_the_near_one_about_its_own_origin(walls, joints):
     near = assembled(walls[0], text_for(np.zeros(3)) + joints)
     far = assembled(walls[1], text_for(GRID) + joints)

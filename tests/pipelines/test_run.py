@@ -128,7 +128,7 @@ def test_a_stone_from_the_database_is_the_stone_that_was_surveyed(session):
 
 def test_closed_stones_touch_and_open_ones_do_not(session):
     closed = assemble(parse_scene(LOW, "scene.toml"), session)
-    opened = assemble(parse_scene(LOW + '[joints]\nmode = "open"\n', "scene.toml"), session)
+    opened = assemble(parse_scene(LOW + '[joints]\nmode = "as-surveyed"\n', "scene.toml"), session)
     assert opened.closing is None
     assert closed.closing.largest_displacement > 0.0
     assert closed.towards == pytest.approx([0.12, -0.99, 0.0], abs=0.02)
@@ -224,7 +224,7 @@ def test_a_static_start_is_told_and_a_warning_where_there_is_none(tmp_path):
     assert "Began in static equilibrium" in (tmp_path / "out/report.html").read_text(encoding="utf-8")
     # without the course that holds them up, the stones fall
     falling = (
-        text.replace('where = ["course <= 2"]', 'where = ["course in (1, 3)"]') + "[joints]\nmode = 'open'\n"
+        text.replace('where = ["course <= 2"]', 'where = ["course in (1, 3)"]') + "[joints]\nmode = 'as-surveyed'\n"
     )
     (tmp_path / "falling.toml").write_text(falling.replace('["W02-02"]', '["W03-02"]'), encoding="utf-8")
     done = run_scene(tmp_path / "falling.toml", url, tmp_path / "out2")

@@ -29,7 +29,7 @@ fixed = ["BASE"]
 [output]
 pictures = []
 """
-OPEN = '[joints]\nmode = "open"\n'
+OPEN = '[joints]\nmode = "as-surveyed"\n'
 
 
 def loft(name, front, back):
@@ -142,7 +142,7 @@ def test_closing_tells_how_far_it_moves_the_corners_of_a_solid_that_is_no_prism(
 def test_closing_refuses_a_solid_of_more_sides_and_says_how_to_go_on(scene_of, tmp_path):
     with pytest.raises(GeometryError, match=r"stone COLUMN: its solid has 8 faces and 12 corners") as caught:
         scene_of([BASE, COLUMN], SCENE)
-    assert 'mode = "open"' in caught.value.remedy
+    assert 'mode = "as-surveyed"' in caught.value.remedy
     (tmp_path / "scene.toml").write_text(SCENE)
     (problem,) = check_scene(tmp_path / "scene.toml", scene_of.url).problems
     assert "COLUMN" in problem

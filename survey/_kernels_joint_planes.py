@@ -1,0 +1,128 @@
+"""Numba kernel that fits the plane half-way between the faces on either hand of a joint."""
+
+import math
+
+import numpy as np
+from numba import njit
+
+__all__ = ["fit_middle_planes"]
+
+_ROUNDS = 30
+_HUBER = 1.5
+"""Residuals beyond so many robust standard deviations lose weight."""
+
+_WORN = 0.01
+"""Weight of a corner that is worn, and so some 25 mm off where a sound one is 2.5 mm off."""
+
+_USUAL = 0.25
+"""Weight of the usual width of joints, where fewer than three sound corners tell of one of the hands."""
+
+_OWN = 4
+"""Sound corners that tell the plane of one hand, and more."""
+
+_WEDGE = 0.035
+"""Opening of a joint, as a slope, from which the two hands may have planes of their own (2°)."""
+
+
+@njit(cache=True)
+def fit_middle_planes(points, hands, sound, starts, scales, usual, straightness, planes, values):
+    """For each joint the plane half-way between the faces on either hand.
+
+    In the frame of a joint a corner at (x, y) on hand s = ±1 is at the height z = a + b x + c y + s (w + p x + q y)/2.
+    The middle plane is a + b x + c y; w is the width. The opening p, q is taken for zero unless it explains most of
+    what is left over: two faces tell their mean direction better than each its own.
+
+    Parameters
+    ----------
+    points : (k, 3) corners in the frame of their joint: along it, along it, across [m]
+    hands : (k,) +1 above the joint, -1 below
+    sound : (k,) whether a corner is known from measurement
+    starts : (n + 1,) where the corners of each joint begin
+    scales : (n,) by which the coordinates of each joint are divided [m]
+    usual : usual width [m]; negative: not known
+    straightness : residual of a sound corner above which it is off the joint [m]
+    planes : (n, 3) into which a, b, c are written
+    values : (n, 4) into which width, rms, and of sound corners the largest residual and the share of those off
+    """
+    for j in range(starts.shape[0] - 1):
+        rows = slice(starts[j], starts[j + 1])
+        _fit(points[rows], hands[rows], sound[rows], scales[j], usual, straightness, planes[j], values[j])
+
+
+@njit(cache=True)
+def _fit(points, hands, sound, scale, usual, straightness, plane, value):
+    k = points.shape[0]
+    number, above = 0, 0
+    for i in range(k):
+        number += sound[i]
+        above += sound[i] and hands[i] > 0.0
+    prior = _USUAL if usual >= 0.0 and min(above, number - above) < 3 else 0.0
+    design = np.empty((k, 6))
+    for i in range(k):
+        x, y, s = points[i, 0] / scale, points[i, 1] / scale, 0.5 * hands[i]
+        design[i, 0], design[i, 1], design[i, 2] = 1.0, x, y
+        design[i, 3], design[i, 4], design[i, 5] = s, s * x, s * y
+    solution, left = _huber(design, points[:, 2], sound, 4, prior, usual)
+    if above >= _OWN and number - above >= _OWN:
+        open_, less = _huber(design, points[:, 2], sound, 6, prior, usual)
+        wedge = math.sqrt(open_[4] ** 2 + open_[5] ** 2) / scale
+        if wedge > _WEDGE and less < 0.1 * left:
+            solution = open_
+    plane[0], plane[1], plane[2] = solution[0], solution[1] / scale, solution[2] / scale
+    total, weight, largest, off = 0.0, 0.0, 0.0, 0
+    for i in range(k):
+        residual = abs(points[i, 2] - _value(design[i], solution))
+        w = 1.0 if sound[i] else _WORN
+        total, weight = total + w * residual**2, weight + w
+        if sound[i]:
+            largest = max(largest, residual)
+            off += residual > straightness
+    value[0], value[1], value[2] = solution[3], math.sqrt(total / weight), largest
+    value[3] = off / max(number, 1)
+
+
+@njit(cache=True)
+def _value(row, solution):
+    out = 0.0
+    for c in range(6):
+        out += row[c] * solution[c]
+    return out
+
+
+@njit(cache=True)
+def _huber(design, heights, sound, unknowns, prior, usual):
+    """Least squares with less weight on large residuals; the solution (6,) and the weighted mean square left over."""
+    k = design.shape[0]
+    solution, previous = np.zeros(6), np.zeros(6)
+    weights, residuals = np.ones(k), np.empty(k)
+    for i in range(k):
+        weights[i] = 1.0 if sound[i] else _WORN
+    left = 0.0
+    for _ in range(_ROUNDS):
+        matrix, right = np.zeros((unknowns, unknowns)), np.zeros(unknowns)
+        for i in range(k):
+            for c in range(unknowns):
+                right[c] += weights[i] * design[i, c] * heights[i]
+                for d in range(unknowns):
+                    matrix[c, d] += weights[i] * design[i, c] * design[i, d]
+        matrix[3, 3] += prior
+        right[3] += prior * usual
+        for c in range(unknowns):  # what nothing tells stays zero
+            matrix[c, c] += 1e-12 * k
+        previous[:] = solution
+        solution[:unknowns] = np.linalg.solve(matrix, right)
+        count, total, weight = 0, 0.0, 0.0
+        for i in range(k):
+            residual = abs(heights[i] - _value(design[i], solution))
+            total, weight = total + weights[i] * residual**2, weight + weights[i]
+            if sound[i]:
+                residuals[count] = residual
+                count += 1
+        left = total / weight
+        spread = 1e-4 if count == 0 else max(1.4826 * np.median(residuals[:count]), 1e-4)
+        for i in range(k):
+            residual = abs(heights[i] - _value(design[i], solution))
+            weights[i] = min(1.0, _HUBER * spread / max(residual, 1e-300)) if sound[i] else _WORN
+        if np.abs(solution - previous).max() < 1e-12:
+            break
+    return solution, left

@@ -1,0 +1,127 @@
+"""What closing the joints of a building came to, in the terms of its stones."""
+
+from collections import defaultdict
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from survey.adjacency import Polyhedra
+from survey.closing import Building, Cut
+from survey.closing_report import ClosingReport, Gap, Joint, Overlap
+from survey.cutting import moves
+from survey.facing import FacingFaces, find_facing, planes_of
+from survey.joint_settings import JointSettings
+from survey.overlaps import Overlapping, volume_of
+
+__all__ = ["closing_report"]
+
+Array = NDArray[np.float64]
+
+_MEETS = 1e-6  # metres: faces of two stones that are nearer are in contact
+_SAME_WAY = 0.999  # cosine: contacts of two stones that look so much alike are of one joint
+_MOST_LOST = 0.5  # of the area in which two stones face each other: if more does not touch, a gap is reported
+_BENT = "the bed is bent or stepped here, and stones stay convex"
+
+
+def closing_report(
+    building: Building,
+    facing: FacingFaces,
+    cut: Cut,
+    overlaps: list[Overlapping],
+    settings: JointSettings,
+) -> ClosingReport:
+    """Tell joints, movements, gaps and overlaps.
+
+    Parameters
+    ----------
+    building : the stones before
+    facing : the pairs of faces that were to be closed
+    cut : what became of them, the solids in their last state
+    overlaps : stones that lie in each other still
+    settings : as they were closed
+    """
+    joints = _joints(building, facing, cut, settings)
+    codes = [stone.code for stone in building.stones]
+    joined = {code for joint in joints for code in joint.stones}
+    facing_area = facing.area.tolist()
+    gaps = [
+        Gap(joint.stones, joint.width, facing_area[k], joint.centroid, joint.left_open or _BENT)
+        for k, joint in enumerate(joints)
+        if joint.left_open or joint.area < _MOST_LOST * facing_area[k]
+    ]
+    return ClosingReport(
+        mode=settings.mode,
+        joints=tuple(joints),
+        displacement={
+            code: moves(old, new) for code, old, new in zip(codes, building.solids, cut.solids, strict=True)
+        },
+        volume_change={
+            code: 0.0 if old is new else volume_of(new) / volume_of(old) - 1.0
+            for code, old, new in zip(codes, building.solids, cut.solids, strict=True)
+        },
+        alone=tuple(code for code in codes if code not in joined),
+        gaps=tuple(gaps),
+        overlaps=tuple(
+            Overlap(
+                (codes[one.pair[0]], codes[one.pair[1]]),
+                one.volume,
+                one.depth,
+                one.part.vertices.mean(axis=0) + building.origin,
+            )
+            for one in overlaps
+        ),
+    )
+
+
+def _joints(building: Building, facing: FacingFaces, cut: Cut, settings: JointSettings) -> list[Joint]:
+    """All joints in the order of `facing`."""
+    planes, codes = building.faces.planes, [stone.code for stone in building.stones]
+    pairs = planes.owner[facing.faces]
+    touching = _contacts(cut, settings)
+    cosines = -(planes.normals[facing.faces[:, 0]] * planes.normals[facing.faces[:, 1]]).sum(axis=1)
+    opening = np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0)))
+    joints = []
+    for k in range(len(facing)):
+        plane, reason = int(cut.contact.of_link[k]), cut.reasons[k]
+        area, centroid, normal = float(facing.area[k]), facing.centroid[k], facing.normal[k]
+        if not reason:
+            # the plane leads out of the first stone, the joint's normal into it
+            normal = -cut.contact.side[k] * cut.contact.normals[plane]
+            area, middle = _shared(touching.get((int(pairs[k, 0]), int(pairs[k, 1])), []), normal)
+            centroid = centroid if middle is None else middle
+        joints.append(
+            Joint(
+                stones=(codes[pairs[k, 0]], codes[pairs[k, 1]]),
+                plane=plane if not reason else -1,
+                width=float(facing.gap[k]),
+                opening=float(opening[k]),
+                area=area,
+                centroid=centroid + building.origin,
+                normal=normal,
+                left_open=reason,
+            )
+        )
+    return joints
+
+
+def _contacts(cut: Cut, settings: JointSettings) -> dict[tuple[int, int], list[tuple[float, Array, Array]]]:
+    """Area, centroid and normal of all faces that are in contact now, by the pair of stones."""
+    solids = Polyhedra.gather((solid.vertices, solid.faces) for solid in cut.solids)
+    planes = planes_of(solids)
+    close = replace(settings, max_width=_MEETS, max_angle=0.01, min_overlap=0.0)
+    found = find_facing(solids, planes, close)
+    out = defaultdict(list)
+    for k, (i, j) in enumerate(planes.owner[found.faces].tolist()):
+        out[i, j].append((float(found.area[k]), found.centroid[k], found.normal[k]))
+    return out
+
+
+def _shared(contacts: list[tuple[float, Array, Array]], normal: Array) -> tuple[float, Array | None]:
+    """Area and centroid of the contacts that look along a normal."""
+    alike = [(area, centroid) for area, centroid, own in contacts if own @ normal > _SAME_WAY]
+    total = sum(area for area, _ in alike)
+    if not total > 0.0:
+        return 0.0, None
+    middle: Array = np.sum([area * centroid for area, centroid in alike], axis=0) / total
+    return total, middle

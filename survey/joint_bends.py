@@ -1,0 +1,238 @@
+"""Beds that are not straight: several planes that meet at head joints.
+
+A course that has sagged is still a course. Its bed is taken as a chain of planes. Where two of them make a valley, the
+stone that lies across it gets two undersides, and the planes change at a head joint below; where they make a ridge, the
+stone under it gets two tops, and they change at a head joint above. So all stones stay convex and touch all over.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from survey.adjacency import Polyhedra
+from survey.facing import FacePlanes, FacingFaces
+from survey.joint_settings import JointSettings
+
+__all__ = ["bent"]
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+_FINER = (0.5, 0.25, 0.125)  # of the straightness: how far the middle of a joint may be off its chain
+_FEW = 0.1  # part of the sound corners that may be off the chain
+_WORN = 0.01  # weight of a worn corner
+_LEAST = 3  # links that make a chain
+_ROUNDS = 10
+
+
+@dataclass(frozen=True)
+class _Bed:
+    """A joint seen from the side: its links in order along it.
+
+    Attributes
+    ----------
+    axes : (3, 3) rows: along, square to it in the joint, across it
+    origin : (3,)
+    place, height : (m,) along and across of the middle of each link [m]
+    lower, upper : (m,) faces of each link
+    """
+
+    axes: Array
+    origin: Array
+    place: Array
+    height: Array
+    lower: Indices
+    upper: Indices
+
+
+def bent(
+    solids: Polyhedra,
+    planes: FacePlanes,
+    sound: Bools,
+    facing: FacingFaces,
+    links: Indices,
+    settings: JointSettings,
+) -> tuple[Array, Indices] | None:
+    """Planes of a joint that one plane does not fit.
+
+    Parameters
+    ----------
+    solids, planes, sound : the stones, the planes of their faces, and which of their corners are sound
+    facing, links : which faces face each other, and the pairs of this joint
+    settings : how far a sound corner may be off its plane
+
+    Returns
+    -------
+    planes (n, 4) as n·x = d, and the plane (m,) of each link; None if a chain of planes does not fit either
+    """
+    bed = _bed(planes, facing, links)
+    extents = _extents(solids, bed)
+    for part in _FINER:
+        ends = _chains(bed.place, bed.height, part * settings.straightness)
+        if len(ends) <= 1:
+            continue
+        number, knots = _changes(bed, ends, extents)
+        reach = [end for face in extents.values() for end in face]
+        posts = np.array([min(reach), *knots, max(reach)])
+        if (np.diff(posts) <= 0.0).any():
+            continue
+        heights, slant, off = _fitted(solids, sound, bed, posts, settings.straightness)
+        if off <= _FEW:
+            return _planes(bed, posts, heights, slant), number
+    return None
+
+
+def _bed(planes: FacePlanes, facing: FacingFaces, links: Indices) -> _Bed:
+    pairs, centroid = facing.faces[links], facing.centroid[links]
+    reference = planes.normals[pairs[int(facing.area[links].argmax()), 0]]
+    out_of_first = (planes.normals[pairs[:, 0]] * reference).sum(axis=1) > 0.0
+    up = (np.where(out_of_first, 1.0, -1.0)[:, None] * -facing.normal[links]).sum(axis=0)
+    up /= np.linalg.norm(up)
+    origin = centroid.mean(axis=0)
+    flat = (centroid - origin) - np.outer((centroid - origin) @ up, up)
+    along = np.linalg.svd(flat, full_matrices=False)[2][0]
+    along = along - (along @ up) * up
+    along /= np.linalg.norm(along)
+    axes = np.array([along, np.cross(up, along), up])
+    lower = np.where(out_of_first, pairs[:, 0], pairs[:, 1])
+    upper = np.where(out_of_first, pairs[:, 1], pairs[:, 0])
+    local = (centroid - origin) @ axes.T
+    return _Bed(axes, origin, local[:, 0], local[:, 2], lower, upper)
+
+
+def _extents(solids: Polyhedra, bed: _Bed) -> dict[int, tuple[float, float]]:
+    """From where to where each face reaches along the bed [m]."""
+    out = {}
+    for face in np.unique(np.concatenate([bed.lower, bed.upper])).tolist():
+        corners = solids.corners[solids.face_starts[face] : solids.face_starts[face + 1]]
+        along = (solids.vertices[corners] - bed.origin) @ bed.axes[0]
+        out[face] = float(along.min()), float(along.max())
+    return out
+
+
+def _chains(place: Array, height: Array, tolerance: float) -> list[int]:
+    """Ends (in the order along the bed) of the fewest straight chains that the links make, single odd ones apart."""
+    order = np.argsort(place, kind="stable")
+    x, y = place[order], median_filter(height[order], size=5, mode="nearest")
+    count, start = 0, 0
+    while start < len(x):
+        stop = min(start + _LEAST, len(x))
+        while stop < len(x) and _off_line(x[start : stop + 1], y[start : stop + 1]) <= tolerance:
+            stop += 1
+        count, start = count + 1, stop
+    return _divided(x, y, min(count, len(x) // _LEAST))
+
+
+def _divided(x: Array, y: Array, count: int) -> list[int]:
+    """Ends of so many chains of three links or more with the least sum of squares off their lines (Bellman 1961)."""
+    n = len(x)
+    cost = _squares(x, y)
+    best = np.full((count + 1, n + 1), np.inf)
+    before = np.zeros((count + 1, n + 1), np.int64)
+    best[0, 0] = 0.0
+    for k in range(1, count + 1):
+        total = best[k - 1][:, None] + cost
+        before[k], best[k] = total.argmin(axis=0), total.min(axis=0)
+    ends, at = [], n
+    for k in range(count, 0, -1):
+        ends.append(at)
+        at = int(before[k, at])
+    return ends[::-1]
+
+
+def _squares(x: Array, y: Array) -> Array:
+    """Sum of squares (n + 1, n + 1) off the line of links i to j - 1; infinite where there are too few."""
+    x, y = x - x.mean(), y - y.mean()
+    sums = [np.concatenate([[0.0], np.cumsum(term)]) for term in (np.ones_like(x), x, y, x * x, x * y, y * y)]
+    n, sx, sy, sxx, sxy, syy = (one[None, :] - one[:, None] for one in sums)
+    safe = np.maximum(n, 1.0)
+    xx, xy, yy = sxx - sx * sx / safe, sxy - sx * sy / safe, syy - sy * sy / safe
+    off = yy - np.where(xx > 1e-12, xy * xy / np.maximum(xx, 1e-12), 0.0)
+    out: Array = np.where(n >= _LEAST, np.maximum(off, 0.0), np.inf)
+    return out
+
+
+def _off_line(x: Array, y: Array) -> float:
+    slope, intercept = _line(x, y)
+    return float(np.abs(y - intercept - slope * x).max())
+
+
+def _line(x: Array, y: Array) -> tuple[float, float]:
+    mean_x, mean_y = float(x.mean()), float(y.mean())
+    square = float(((x - mean_x) ** 2).sum())
+    slope = float(((x - mean_x) * (y - mean_y)).sum()) / square if square > 1e-12 else 0.0
+    return slope, mean_y - slope * mean_x
+
+
+def _changes(
+    bed: _Bed, ends: list[int], extents: dict[int, tuple[float, float]]
+) -> tuple[Indices, list[float]]:
+    """Plane (m,) of each link, and where (n - 1) along the bed one plane follows another [m]."""
+    order = np.argsort(bed.place, kind="stable")
+    x, y = bed.place[order], bed.height[order]
+    starts = [0, *ends[:-1]]
+    slopes = [_line(x[a:b], y[a:b])[0] for a, b in zip(starts, ends, strict=True)]
+    middle = {face: 0.5 * (low + high) for face, (low, high) in extents.items()}
+    number, knots = np.zeros(len(x), np.int64), []
+    for k, end in enumerate(ends[:-1]):
+        at = 0.5 * (x[end - 1] + x[end])
+        valley = slopes[k + 1] > slopes[k]
+        faces = (bed.lower if valley else bed.upper)[order]
+        centres = np.array([middle[int(face)] for face in faces])
+        after = centres > at
+        number[after] = k + 1
+        before_end = max((extents[int(f)][1] for f in faces[~after]), default=at)
+        after_start = min((extents[int(f)][0] for f in faces[after]), default=at)
+        knots.append(0.5 * (before_end + after_start))
+    of_link = np.empty(len(x), np.int64)
+    of_link[order] = number
+    return of_link, knots
+
+
+def _fitted(
+    solids: Polyhedra, sound: Bools, bed: _Bed, posts: Array, straightness: float
+) -> tuple[Array, float, float]:
+    """Heights (n + 1,) of the chain at its posts, its slant across, and the part of corners off it."""
+    rows, hands = [], []
+    for side, hand in ((bed.lower, -1.0), (bed.upper, 1.0)):
+        for face in np.unique(side).tolist():
+            corners = solids.corners[solids.face_starts[face] : solids.face_starts[face + 1]]
+            rows.append(corners)
+            hands.append(np.full(len(corners), hand))
+    corner, hand = np.concatenate(rows), np.concatenate(hands)
+    local = (solids.vertices[corner] - bed.origin) @ bed.axes.T
+    design = np.column_stack([_hats(local[:, 0], posts), local[:, 1], 0.5 * hand])
+    weight = np.where(sound[corner], 1.0, _WORN)
+    solution: Array = np.zeros(design.shape[1])
+    residual: Array = np.zeros(len(corner))
+    for _ in range(_ROUNDS):
+        root = np.sqrt(weight)
+        solution = np.linalg.lstsq(design * root[:, None], local[:, 2] * root, rcond=None)[0]
+        residual = np.abs(local[:, 2] - design @ solution)
+        spread = max(1.4826 * float(np.median(residual)), 1e-4)
+        robust = np.minimum(1.0, 1.5 * spread / np.maximum(residual, 1e-300))
+        weight = np.where(sound[corner], robust, _WORN)
+    beyond = residual[sound[corner]] > straightness
+    return solution[:-2], float(solution[-2]), float(beyond.mean()) if len(beyond) else 0.0
+
+
+def _hats(x: Array, posts: Array) -> Array:
+    """Weights (k, n + 1) with which heights at the posts make the height at each place of the chain."""
+    piece = np.clip(np.searchsorted(posts, x, side="right") - 1, 0, len(posts) - 2)
+    share = (x - posts[piece]) / (posts[piece + 1] - posts[piece])
+    out = np.zeros((len(x), len(posts)))
+    out[np.arange(len(x)), piece] = 1.0 - share
+    out[np.arange(len(x)), piece + 1] = share
+    return out
+
+
+def _planes(bed: _Bed, posts: Array, heights: Array, slant: float) -> Array:
+    """The planes (n, 4) between posts, in the frame of the stones."""
+    slopes = np.diff(heights) / np.diff(posts)
+    across = np.column_stack([-slopes, np.full(len(slopes), -slant), np.ones(len(slopes))])
+    normals = across / np.linalg.norm(across, axis=1)[:, None] @ bed.axes
+    through = bed.origin + np.outer(posts[:-1], bed.axes[0]) + np.outer(heights[:-1], bed.axes[2])
+    return np.column_stack([normals, (normals * through).sum(axis=1)])

@@ -1,0 +1,206 @@
+"""Stones that lie in each other, and how they are parted."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from survey._kernels_apart import deepest_overlaps
+from survey.cutting import common_part, cut_stones, moves
+from survey.near_solids import boxes_of, near_pairs
+from survey.solids import Solid, area_vector
+
+__all__ = ["Overlapping", "find_overlaps", "part_stones", "planes_of_solid", "volume_of"]
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+_LEAST = 1e-10  # metres: solids that share a plane lie so deep in each other by rounding
+_LEAST_VOLUME = 1e-12  # cubic metres
+_ALIKE = 0.3  # normals of two faces that differ by less have no plane between them
+_SHALLOW = 0.01  # metres by which a free face rather gives way than that a stone gets a further face
+
+
+@dataclass(frozen=True)
+class Overlapping:
+    """Two convex solids that lie in each other.
+
+    Attributes
+    ----------
+    pair : their indices
+    part : what both take
+    volume : of it [m³]
+    depth : by which one would have to move along a face's normal to be free [m]
+    """
+
+    pair: tuple[int, int]
+    part: Solid
+    volume: float
+    depth: float
+
+
+def planes_of_solid(solid: Solid) -> Array:
+    """Planes (nf, 4) of a solid's faces: outward unit normals, and offsets d of n·x = d."""
+    rows = np.empty((len(solid.faces), 4))
+    for row, face in zip(rows, solid.faces, strict=True):
+        polygon = solid.vertices[list(face)]
+        normal = area_vector(polygon)
+        row[:3] = normal / np.linalg.norm(normal)
+        row[3] = row[:3] @ polygon.mean(axis=0)
+    return rows
+
+
+def volume_of(solid: Solid) -> float:
+    """Volume of a closed solid with planar faces, by the divergence theorem [m³]."""
+    centre = solid.vertices.mean(axis=0)
+    return (
+        sum(
+            float((solid.vertices[face[0]] - centre) @ area_vector(solid.vertices[list(face)]))
+            for face in solid.faces
+        )
+        / 3.0
+    )
+
+
+def find_overlaps(solids: Sequence[Solid], planes: Mapping[int, Array]) -> list[Overlapping]:
+    """Pairs of solids that lie in each other, of those that `planes` names: convex ones, with their planes (n, 4)."""
+    chosen = sorted(planes)
+    if len(chosen) < 2:
+        return []
+    vertices = [solids[i].vertices for i in chosen]
+    rows = [planes[i] for i in chosen]
+    boxes = np.array([[*v.min(axis=0), *v.max(axis=0)] for v in vertices])
+    starts = np.arange(len(chosen) + 1)
+    vertex_starts = np.cumsum([0, *map(len, vertices)])
+    plane_starts = np.cumsum([0, *map(len, rows)])
+    all_vertices, all_planes = np.concatenate(vertices), np.concatenate(rows)
+    out = []
+    for near in near_pairs(boxes_of(boxes, starts, 0.0), np.ones(len(chosen), np.bool_)):
+        depth = deepest_overlaps(near, all_vertices, vertex_starts, all_planes, plane_starts, _LEAST)
+        for k in np.flatnonzero(depth > _LEAST):
+            i, j = sorted((chosen[near[k, 0]], chosen[near[k, 1]]))
+            found = overlapping(i, j, solids[i], solids[j], planes, float(depth[k]))
+            if found is not None:
+                out.append(found)
+    return sorted(out, key=lambda one: one.pair)
+
+
+def overlapping(
+    i: int, j: int, first: Solid, second: Solid, planes: Mapping[int, Array], depth: float
+) -> Overlapping | None:
+    """What two solids have in common; None if that is nothing but rounding."""
+    low, high = first.vertices.min(axis=0), first.vertices.max(axis=0)
+    part = common_part(planes[i], planes[j], 0.5 * (low + high), 2.0 * float((high - low).max()))
+    if part is None or (volume := volume_of(part)) <= _LEAST_VOLUME:
+        return None
+    return Overlapping((i, j), part, volume, depth)
+
+
+@dataclass
+class _Parting:
+    """Stones while they are parted: what each was, is now, its planes, and which of these are free to move."""
+
+    originals: Sequence[Solid]
+    solids: list[Solid]
+    planes: dict[int, Array]
+    free: dict[int, NDArray[np.bool_]]
+    bound: float
+
+    def part(self, found: Overlapping) -> None:
+        """Part two stones by the cheapest way that moves no corner farther than the bound."""
+        i, j = found.pair
+        current = overlapping(i, j, self.solids[i], self.solids[j], self.planes, found.depth)
+        if current is None:
+            return
+        ways = [*self._retreats(i, j), *self._retreats(j, i)]
+        ways = [way for way in ways if way[0] <= _SHALLOW]
+        if ways:
+            _, stone, plane, offset = min(ways)
+            new = self.planes[stone].copy()
+            new[plane, 3] = offset
+            if self._cut({stone: new}):
+                return
+        self._divide(current)
+
+    def _retreats(self, one: int, other: int) -> list[tuple[float, int, int, float]]:
+        """How far each free face of one stone has to go back to free the other: distance, stone, plane, offset."""
+        out = []
+        for p in np.flatnonzero(self.free[one]):
+            low = float((self.solids[other].vertices @ self.planes[one][p, :3]).min())
+            out.append((float(self.planes[one][p, 3]) - low, one, int(p), low))
+        return out
+
+    def _divide(self, found: Overlapping) -> None:
+        """Cut one along a face of the other, or both through the middle of what they share: where least is lost."""
+        i, j = found.pair
+        ways = [*self._beside(i, j), *self._beside(j, i), *self._between(found)]
+        for _, cuts in sorted(ways, key=lambda way: way[0]):
+            if self._cut({k: np.vstack([self.planes[k], plane]) for k, plane in cuts.items()}):
+                return
+
+    def _beside(self, one: int, other: int) -> list[tuple[float, dict[int, Array]]]:
+        """Ways to cut one stone along each face of another: what is lost [m³], and the plane."""
+        return [(self._lost(one, -plane), {one: -plane}) for plane in self.planes[other]]
+
+    def _between(self, found: Overlapping) -> list[tuple[float, dict[int, Array]]]:
+        """Ways to cut both along a plane half-way between a face of each."""
+        i, j = found.pair
+        middle, ways = found.part.vertices.mean(axis=0), []
+        for a in self.planes[i]:
+            for b in self.planes[j]:
+                normal = a[:3] - b[:3]
+                if (length := float(np.linalg.norm(normal))) < _ALIKE:
+                    continue
+                plane = np.array([*(normal / length), float(middle @ normal) / length])
+                ways.append((self._lost(i, plane) + self._lost(j, -plane), {i: plane, j: -plane}))
+        return ways
+
+    def _lost(self, stone: int, plane: Array) -> float:
+        """What of a stone lies over a plane [m³]."""
+        solid = self.solids[stone]
+        low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
+        over = common_part(
+            self.planes[stone], -plane[None], 0.5 * (low + high), 2.0 * float((high - low).max())
+        )
+        return 0.0 if over is None else volume_of(over)
+
+    def _cut(self, planes: dict[int, Array]) -> bool:
+        """Cut stones anew, all or none, if no corner moves farther than the bound."""
+        cut = {i: stone.solid for i, stone in cut_stones(self.originals, planes).items() if stone is not None}
+        if len(cut) < len(planes) or any(moves(self.originals[i], cut[i]).max() > self.bound for i in cut):
+            return False
+        for i, solid in cut.items():
+            self.solids[i] = solid
+            further = len(planes[i]) - len(self.free[i])
+            self.planes[i] = planes[i]
+            self.free[i] = np.concatenate([self.free[i], np.zeros(further, np.bool_)])
+        return True
+
+
+def part_stones(
+    originals: Sequence[Solid],
+    solids: Sequence[Solid],
+    planes: Mapping[int, Array],
+    free: Mapping[int, NDArray[np.bool_]],
+    bound: float,
+) -> tuple[list[Solid], list[Overlapping]]:
+    """Part stones that lie in each other; a stone only gets smaller, so that no new overlap comes about.
+
+    Parameters
+    ----------
+    originals : all stones before any was cut
+    solids : as they are now
+    planes : of those that may be cut, (n, 4); the first belong to the faces of the originals, in order
+    free : of each of these, whether it is a face that touches no stone
+    bound : farthest that a corner may move [m]
+
+    Returns
+    -------
+    the stones, and the pairs that still lie in each other
+    """
+    own = {i: rows.copy() for i, rows in planes.items()}
+    state = _Parting(originals, list(solids), own, dict(free), bound)
+    for found in find_overlaps(state.solids, own):
+        state.part(found)
+    return state.solids, find_overlaps(state.solids, own)
