@@ -18,7 +18,7 @@ from mechanics.stress_values import volume_quantile
 from moma.errors import MissingLibraryError
 from pipelines.surfaces import FIELDS, save_surface, stone_fields, wall_surface
 
-__all__ = ["draw_pictures", "missing", "package_of"]
+__all__ = ["draw_apart", "draw_pictures", "missing", "package_of"]
 
 _TIMEOUT = 300.0  # seconds; software rendering of 10⁵ triangles takes a few
 _PACKAGES = {
@@ -93,7 +93,7 @@ def draw_pictures(
         save_surface(surface, wall_surface(result))
         job_file = Path(scratch) / "job.json"
         job_file.write_text(json.dumps({"surface": str(surface), "pictures": jobs}), encoding="utf-8")
-        _draw_apart(job_file)
+        draw_apart("pipelines.drawing", job_file)
     return tuple(f"{name}.png" for name in wanted)
 
 
@@ -127,14 +127,18 @@ def _fields_of(body: BodyResult, material: Material, name: str) -> NDArray[np.fl
     return stone_fields(body, material)[:, FIELDS.index(name)]
 
 
-def _draw_apart(job_file: Path) -> None:
-    """Run pipelines.drawing on a job; its noise about displays is kept back unless it fails.
+def draw_apart(module: str, job_file: Path) -> None:
+    """Run a module that draws on a job; its noise about displays is kept back unless it fails.
 
     EGL comes first: it needs no X server, and no X libraries either.
+
+    Raises
+    ------
+    MissingLibraryError : VTK cannot be loaded or cannot draw on this machine
     """
     reason = ""
     for window in ("vtkEGLRenderWindow", None):
-        done = _attempt(job_file, window)
+        done = _attempt(module, job_file, window)
         if done.returncode == 0:
             return
         if done.returncode == 3:
@@ -150,7 +154,7 @@ def _draw_apart(job_file: Path) -> None:
     )
 
 
-def _attempt(job_file: Path, window: str | None) -> "subprocess.CompletedProcess[str]":
+def _attempt(module: str, job_file: Path, window: str | None) -> "subprocess.CompletedProcess[str]":
     """One process that draws, with the given kind of VTK window; None: the one that VTK would take."""
     root = str(Path(__file__).resolve().parent.parent)
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([root, os.environ.get("PYTHONPATH", "")])}
@@ -158,7 +162,7 @@ def _attempt(job_file: Path, window: str | None) -> "subprocess.CompletedProcess
         environment.setdefault("VTK_DEFAULT_OPENGL_WINDOW", window)
     try:
         return subprocess.run(
-            [sys.executable, "-m", "pipelines.drawing", str(job_file)],
+            [sys.executable, "-m", module, str(job_file)],
             capture_output=True,
             text=True,
             errors="replace",

@@ -17,7 +17,8 @@ from mechanics.result import Outcome
 from mechanics.scene import Block, Fidelity
 from moma.errors import MissingLibraryError
 from pipelines import pictures
-from pipelines.drawing import colouring, nice_ceiling
+from pipelines.drawing import colouring
+from pipelines.picture_parts import nice_ceiling
 from pipelines.pictures import draw_pictures, missing, package_of
 from pipelines.report import write_report
 from pipelines.scene_keys import PICTURES

@@ -1,0 +1,198 @@
+"""What `moma check` tells of simplified stones and closed joints, as plain values; places are those of the site."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from survey.blocky import BlockyStone
+from survey.closing_report import ClosingReport
+
+__all__ = [
+    "GapPlace",
+    "JointsReport",
+    "OutsideStone",
+    "OverlapPlace",
+    "SimplificationReport",
+    "joints_report",
+    "simplification_report",
+]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class OutsideStone:
+    """A stone that simplifying changed by more than the survey may be wrong.
+
+    Attributes
+    ----------
+    code : of the stone
+    displacement : largest of a corner [m]
+    tolerance : by which the survey may be wrong [m]
+    reason : what was done, in words
+    """
+
+    code: str
+    displacement: float
+    tolerance: float
+    reason: str
+
+
+@dataclass(frozen=True)
+class SimplificationReport:
+    """What simplifying the stones changed.
+
+    Attributes
+    ----------
+    shapes : how many stones of each shape
+    least_blocky : code of the stone that was farthest from a hexahedron
+    blockiness : of that stone [-]
+    max_displacement : largest of a corner [m], of `worst_stone`
+    outside : stones outside of the survey's tolerance, the farthest first
+    general : stones that stay general polyhedra, and why
+    displacement : largest of a corner of each stone [m]
+    """
+
+    shapes: Mapping[str, int]
+    least_blocky: str
+    blockiness: float
+    max_displacement: float
+    worst_stone: str
+    outside: tuple[OutsideStone, ...]
+    general: Mapping[str, str]
+    displacement: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class GapPlace:
+    """Two stones that face each other and do not meet.
+
+    Attributes
+    ----------
+    stones : codes of the two
+    width : mean [m]
+    area : over which they face each other [m²]
+    place : (x, y, z) [m]
+    reason : why it was not closed
+    """
+
+    stones: tuple[str, str]
+    width: float
+    area: float
+    place: tuple[float, float, float]
+    reason: str
+
+
+@dataclass(frozen=True)
+class OverlapPlace:
+    """Two stones that lie in each other.
+
+    Attributes
+    ----------
+    stones : codes of the two
+    volume : that both take [m³]
+    depth : by which one would have to move to be free [m]
+    place : (x, y, z) [m]
+    """
+
+    stones: tuple[str, str]
+    volume: float
+    depth: float
+    place: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class JointsReport:
+    """What became of the joints.
+
+    Attributes
+    ----------
+    mode : close, mortar or as-surveyed
+    count : joints that are closed
+    planes : on so many contact planes
+    mean_width : how wide they were surveyed on average, by area [m]
+    area : of all of them [m²]
+    left_open : how many joints stay open, by reason
+    max_displacement : largest movement of a corner [m], of `worst_stone`
+    max_volume_change : largest relative change of a volume [-]
+    alone : stones without any joint
+    displacement : largest movement of a corner of each stone [m]
+    gaps, overlaps : what remains, the largest first
+    """
+
+    mode: str
+    count: int
+    planes: int
+    mean_width: float
+    area: float
+    left_open: Mapping[str, int]
+    max_displacement: float
+    worst_stone: str | None
+    max_volume_change: float
+    alone: tuple[str, ...]
+    displacement: Mapping[str, float]
+    gaps: tuple[GapPlace, ...]
+    overlaps: tuple[OverlapPlace, ...]
+
+
+def simplification_report(stones: Sequence[BlockyStone]) -> SimplificationReport | None:
+    """What simplifying changed; None without stones."""
+    if not stones:
+        return None
+    moved = {one.code: float(one.report.displacement.max(initial=0.0)) for one in stones}
+    least = min(stones, key=lambda one: one.report.blockiness)
+    worst = max(moved, key=lambda code: moved[code])
+    outside = [
+        OutsideStone(one.code, moved[one.code], one.report.tolerance, one.report.reason)
+        for one in stones
+        if not one.report.within
+    ]
+    shapes = Counter(str(one.shape) for one in stones)
+    return SimplificationReport(
+        shapes=dict(shapes.most_common()),
+        least_blocky=least.code,
+        blockiness=least.report.blockiness,
+        max_displacement=moved[worst],
+        worst_stone=worst,
+        outside=tuple(sorted(outside, key=lambda one: -one.displacement)),
+        general={one.code: one.report.reason for one in stones if str(one.shape) == "polyhedron"},
+        displacement=moved,
+    )
+
+
+def joints_report(closing: ClosingReport, origin: Array) -> JointsReport:
+    """What became of the joints, whose places are counted from `origin` (3,) [m]."""
+    closed = [one for one in closing.joints if not one.left_open]
+    areas = np.array([one.area for one in closed])
+    moved = {code: float(one.max(initial=0.0)) for code, one in closing.displacement.items()}
+    worst = max(moved, key=lambda code: moved[code], default=None)
+    open_for = Counter(one.left_open for one in closing.joints if one.left_open)
+    return JointsReport(
+        mode=str(closing.mode),
+        count=len(closed),
+        planes=len({one.plane for one in closed}),
+        mean_width=float(np.average([one.width for one in closed], weights=areas)) if areas.any() else 0.0,
+        area=float(areas.sum()),
+        left_open=dict(open_for.most_common()),
+        max_displacement=0.0 if worst is None else moved[worst],
+        worst_stone=worst,
+        max_volume_change=max((abs(change) for change in closing.volume_change.values()), default=0.0),
+        alone=closing.alone,
+        displacement=moved,
+        gaps=tuple(
+            GapPlace(one.stones, one.width, one.area, _place(one.centroid + origin), one.reason)
+            for one in sorted(closing.gaps, key=lambda one: -one.width * one.area)
+        ),
+        overlaps=tuple(
+            OverlapPlace(one.stones, one.volume, one.depth, _place(one.centroid + origin))
+            for one in sorted(closing.overlaps, key=lambda one: -one.volume)
+        ),
+    )
+
+
+def _place(point: Array) -> tuple[float, float, float]:
+    x, y, z = point.tolist()
+    return x, y, z

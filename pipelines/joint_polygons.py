@@ -1,0 +1,82 @@
+"""The area over which two stones face each other, as a polygon in space: what pictures show of a joint."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from survey.solids import Solid, area_vector
+
+__all__ = ["joint_polygon"]
+
+Array = NDArray[np.float64]
+
+_FACING = np.cos(np.radians(45.0))  # a face that is turned farther from the joint is not a side of it
+_NOTHING = 1e-10  # areas below are none [m²]
+
+
+def joint_polygon(first: Solid, second: Solid, normal: Array, centroid: Array) -> Array | None:
+    """What a face of one stone and a face of the other have in common, seen square to their joint.
+
+    Of several pairs of faces, the one with most in common. Faces that are not convex are taken as if they were.
+
+    Parameters
+    ----------
+    first, second : the two stones
+    normal : (3,) unit normal of the joint, from the second to the first [-]
+    centroid : (3,) a place of the joint [m]
+
+    Returns
+    -------
+    (k, 3) corners on the joint's plane, counter-clockwise about its normal [m]; None where no faces face each other
+    """
+    along = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+    along /= np.linalg.norm(along)
+    axes = np.array([along, np.cross(normal, along)])
+    best: Array | None = None
+    most = _NOTHING
+    for above in _sides(first, -normal, axes, centroid):
+        for below in _sides(second, normal, axes, centroid):
+            common = _clipped(above, below)
+            if (area := _area(common)) > most:
+                best, most = common, area
+    return None if best is None else centroid + best @ axes
+
+
+def _sides(solid: Solid, towards: Array, axes: Array, centroid: Array) -> list[Array]:
+    """Faces (k, 2) of a stone that look in a direction, seen square to the joint, all counter-clockwise."""
+    found = []
+    for face in solid.faces:
+        polygon = solid.vertices[list(face)]
+        area = area_vector(polygon)
+        if area @ towards > _FACING * float(np.linalg.norm(area)):
+            flat = (polygon - centroid) @ axes.T
+            found.append(flat if _area(flat) > 0.0 else flat[::-1])
+    return found
+
+
+def _clipped(subject: Array, window: Array) -> Array:
+    """The part of a polygon within a convex one, both counter-clockwise, (k, 2) (Sutherland and Hodgman 1974)."""
+    corners: Sequence[Array] = list(subject)
+    for start, end in zip(window, np.roll(window, -1, axis=0), strict=True):
+        edge = end - start
+        inside = [float(edge[0] * (one[1] - start[1]) - edge[1] * (one[0] - start[0])) for one in corners]
+        kept: list[Array] = []
+        for i, corner in enumerate(corners):
+            before = inside[i - 1]
+            if before * inside[i] < 0.0:
+                kept.append(corners[i - 1] + before / (before - inside[i]) * (corner - corners[i - 1]))
+            if inside[i] >= 0.0:
+                kept.append(corner)
+        corners = kept
+        if not corners:
+            break
+    return np.array(corners).reshape(-1, 2)
+
+
+def _area(polygon: Array) -> float:
+    """Area of a polygon (k, 2), positive if it is counter-clockwise [m²]."""
+    if len(polygon) < 3:
+        return 0.0
+    x, y = (polygon - polygon[0]).T
+    return float(0.5 * (x * np.roll(y, -1) - np.roll(x, -1) * y).sum())

@@ -1,0 +1,183 @@
+"""Parts that all pictures drawn by PyVista are made of: the sheet, the viewer, edges, colours and their scale."""
+
+from dataclasses import dataclass
+from math import ceil, floor, log10
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "INK",
+    "LIGHT",
+    "OBLIQUELY",
+    "PLAIN",
+    "Colouring",
+    "add_coloured",
+    "add_edges",
+    "add_glass",
+    "mesh_of",
+    "new_plotter",
+    "nice_ceiling",
+    "place_camera",
+    "save_picture",
+]
+
+Array = NDArray[np.float64]
+
+_SIZE = (1600, 1300)
+_EDGE = "#3a3733"
+PLAIN, INK = "#c9c6c0", "#222222"
+LIGHT: dict[str, Any] = {"ambient": 0.55, "diffuse": 0.5, "specular": 0.0}
+_ROUND = {1.0: 5, 1.2: 6, 1.5: 5, 2.0: 4, 2.5: 5, 3.0: 6, 4.0: 4, 5.0: 5, 6.0: 6, 8.0: 4}  # end: intervals
+_AZIMUTH = np.deg2rad(-24.0)
+OBLIQUELY = np.deg2rad(14.0)
+"""How far from above a wall is looked at, so that depth is seen [rad]."""
+
+
+@dataclass(frozen=True)
+class Colouring:
+    """How a quantity is shown.
+
+    Attributes
+    ----------
+    values : (n,) in the unit of the scalar bar; NaN is drawn grey
+    title : of the scalar bar, with unit
+    top : end of the scale
+    intervals : how many the scalar bar has between its labels, so that these are round numbers
+    saturated : whether some values lie above the end
+    palette : name of a matplotlib colour map, and how much of it is used
+    """
+
+    values: Array
+    title: str
+    top: float
+    intervals: int
+    saturated: bool
+    palette: tuple[str, float]
+
+
+def nice_ceiling(value: float) -> tuple[float, int]:
+    """A round number that reaches a positive value, and how many round intervals divide it."""
+    decade = 10.0 ** floor(log10(value))
+    for step, intervals in _ROUND.items():
+        if value <= step * decade * (1.0 + 1e-9):
+            return step * decade, intervals
+    return 10.0 * decade, _ROUND[1.0]
+
+
+def new_plotter(pyvista: Any) -> Any:
+    """An empty picture, without a window."""
+    plotter = pyvista.Plotter(off_screen=True, window_size=list(_SIZE), lighting="none")
+    plotter.set_background("white")
+    return plotter
+
+
+def save_picture(plotter: Any, path: Path, title: str, note: str) -> None:
+    """Write a picture as PNG, with a title above and perhaps a note below."""
+    plotter.add_text("\n" + title, position="upper_edge", font_size=15, color=INK)
+    if note:
+        plotter.add_text(note + "\n", position="lower_edge", font_size=13, color=INK)
+    plotter.enable_anti_aliasing("ssaa")
+    plotter.screenshot(str(path))
+    plotter.close()
+
+
+def add_coloured(plotter: Any, mesh: Any, colours: Colouring, *, lit: bool = True) -> None:
+    """A mesh in the colours of its "value", and their scale; not lit, it has just these colours."""
+    light = LIGHT if lit else {"lighting": False}
+    plotter.add_mesh(
+        mesh,
+        scalars="value",
+        cmap=_palette(*colours.palette),
+        clim=(0.0, colours.top),
+        show_scalar_bar=False,
+        **light,
+    )
+    _add_scalar_bar(plotter, colours)
+
+
+def add_glass(pyvista: Any, plotter: Any, points: Array, triangles: NDArray[np.int64]) -> None:
+    """The stones, so that one sees what is in their joints."""
+    plotter.add_mesh(mesh_of(pyvista, points, triangles), color=PLAIN, opacity=0.15, lighting=False)
+
+
+def add_edges(pyvista: Any, plotter: Any, points: Array, edges: NDArray[np.int64]) -> None:
+    """Edges of the stones, a hair before their faces so that they are not drawn half hidden."""
+    toward = plotter.camera.position - np.array(plotter.camera.focal_point)
+    lines = pyvista.PolyData()
+    lines.points = points + 1e-4 * toward
+    lines.lines = np.column_stack([np.full(len(edges), 2), edges]).ravel()
+    plotter.add_mesh(lines, color=_EDGE, line_width=2.5, lighting=False)
+
+
+def _palette(name: str, part: float) -> Any:
+    """The lighter part of a colour map: on its darkest part the edges of the stones cannot be seen."""
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap
+
+    return ListedColormap(colormaps[name](np.linspace(0.0, part, 256)))
+
+
+def mesh_of(pyvista: Any, points: Array, triangles: NDArray[np.int64]) -> Any:
+    """Triangles on points, as PyVista has them."""
+    return pyvista.PolyData(points, faces=np.column_stack([np.full(len(triangles), 3), triangles]).ravel())
+
+
+def _add_scalar_bar(plotter: Any, colours: Colouring) -> None:
+    step = colours.top / colours.intervals
+    decimals = max(0, ceil(-log10(step) - 1e-9))
+    decimals += round(step * 10**decimals, 6) % 1 > 0
+    plotter.add_scalar_bar(
+        title=colours.title + (" (and above)" if colours.saturated else "") + "\n",
+        n_labels=colours.intervals + 1,
+        fmt=f"%.{decimals}f",
+        color=INK,
+        title_font_size=26,
+        label_font_size=24,
+        position_x=0.25,
+        position_y=0.03,
+        width=0.5,
+        height=0.085,
+    )
+
+
+def place_camera(
+    pyvista: Any, plotter: Any, points: Array, towards: Array, up: Array, elevation: float = OBLIQUELY
+) -> None:
+    """Look at the middle of the wall from its outside, a little from the side and from above.
+
+    Parameters
+    ----------
+    points : (n, 3) that must be in the picture [m]
+    towards, up : (3,) to the viewer, and upwards; not parallel
+    elevation : of the viewer above the middle, negative below [rad]
+    """
+    up = up / np.linalg.norm(up)
+    front = towards - (towards @ up) * up
+    front /= np.linalg.norm(front)
+    right = np.cross(up, front)
+    level = np.cos(_AZIMUTH) * front + np.sin(_AZIMUTH) * right
+    view = np.cos(elevation) * level + np.sin(elevation) * up
+    side = np.cross(up, view)
+    side /= np.linalg.norm(side)
+    top = np.cross(view, side)
+    across, along = points @ side, points @ top
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    middle = middle + side * ((across.min() + across.max()) / 2 - middle @ side)
+    middle = middle + top * ((along.min() + along.max()) / 2 - middle @ top)
+    width, height = np.ptp(across), np.ptp(along)
+    # room above for the title and below for the scalar bar: the wall takes 74 % of the height
+    visible = max(height / 0.74, width / 0.92 * _SIZE[1] / _SIZE[0])
+    camera = plotter.camera
+    camera.parallel_projection = True
+    camera.parallel_scale = visible / 2
+    focus = middle - top * 0.03 * visible
+    reach = 10.0 * float(np.linalg.norm(np.ptp(points, axis=0)))
+    camera.focal_point, camera.position, camera.up = focus, focus + reach * view, top
+    camera.clipping_range = (reach / 10, reach * 2)
+    for direction, strength in ((view + 0.6 * top - 0.5 * side, 0.85), (view + 0.2 * side, 0.35)):
+        plotter.add_light(
+            pyvista.Light(position=focus + reach * direction, focal_point=focus, intensity=strength)
+        )
