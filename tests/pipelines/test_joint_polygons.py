@@ -50,7 +50,9 @@ def test_turned_stones_share_what_half_planes_leave(angle, shift, size, seed):
     lower = brick("L", (-0.5, -0.3, -1.0), (0.5, 0.3, 0.0), turn)
     half = np.array([*size, 0.0]) / 2
     place = np.array([*shift, 0.0])
-    upper = Solid("U", (np.array(box(-half, half + np.array([0, 0, 1.0]))) @ about.T + place) @ turn.T, BOX_FACES)
+    upper = Solid(
+        "U", (np.array(box(-half, half + np.array([0, 0, 1.0]))) @ about.T + place) @ turn.T, BOX_FACES
+    )
     found = joint_polygon(upper, lower, turn @ UP, turn @ place)
     # x ≤ 0.5 …: and the four sides of the turned one
     normals = np.array([[1.0, 0], [-1, 0], [0, 1], [0, -1]])
