@@ -14,6 +14,7 @@ from archmodel.description import describe
 from archmodel.entities import Entity, kind_named, kinds, refuse_unknown_kinds
 from archmodel.expressions import column_named, condition, condition_in
 from archmodel.grammar import attributes_in, parse
+from archmodel.hypotheses import not_withdrawn
 from archmodel.lookups import refuse_unknown_run
 from archmodel.scope import Context, Scope
 from moma.errors import DatabaseError, QueryError
@@ -175,7 +176,7 @@ def _asked(
     refuse_unknown_run(scope.context)
     conditions = [condition_in(scope, parse(expression)) for expression in expressions]
     refuse_unknown_kinds(session)
-    return scope, conditions
+    return scope, [*conditions, not_withdrawn(scope.entity.c)]
 
 
 def _columns(scope: Scope, names: Sequence[str]) -> list[ColumnElement[Any]]:

@@ -15,7 +15,7 @@ from archmodel.rows import entity_rows, measurement_row, stone_record, storable
 from archmodel.surveys import Measurement, Survey
 from moma.errors import DatabaseError
 
-__all__ = ["StoredSurvey", "load_stones", "store_survey", "survey_with_hash"]
+__all__ = ["StoredSurvey", "insert_stones", "load_stones", "store_survey", "survey_with_hash"]
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def store_survey(
         for batch in batches(stones):
             known = _known_codes(session, batch)
             _refuse_codes(batch, {} if again else known, lines, source_path)
-            _insert_stones(session, [one for one in batch if one.code not in known], survey)
+            insert_stones(session, [one for one in batch if one.code not in known], survey)
             old = [one for one in batch if one.code in known]
             numbers = [known[one.code][0] for one in old]
             supersede_measurements(
@@ -169,8 +169,8 @@ def _places(batch: Sequence[StoneRecord], path: str) -> list[str]:
     return [f"{path}:{stone.line} stone {stone.code}" for stone in batch]
 
 
-def _insert_stones(session: Session, batch: Sequence[StoneRecord], survey: Survey) -> None:
-    """The rows of one batch of new stones, checked."""
+def insert_stones(session: Session, batch: Sequence[StoneRecord], survey: Survey) -> range:
+    """The rows of one batch of new stones, checked; primary keys of the entities, in their order."""
     places = _places(batch, survey.path)
     first = first_free_id(session, Entity)
     entities = [
@@ -185,3 +185,4 @@ def _insert_stones(session: Session, batch: Sequence[StoneRecord], survey: Surve
     ]
     insert_rows(session, Entity, entities)
     insert_rows(session, Measurement, measurements)
+    return range(first, first + len(entities))

@@ -24,6 +24,7 @@ WITHDRAWN = (
     "phase",
     "document",
     "structure",
+    "hypothesis",
 )
 """What can be withdrawn; a depth is replaced by another one, a kind of one's own stays."""
 

@@ -12,6 +12,7 @@ from archmodel.correcting import correct
 from archmodel.declaring import PropertyValue, declare_document, declare_material, declare_phase
 from archmodel.entries import Entry
 from archmodel.finding import held_or_none
+from archmodel.hypotheses import withdraw_hypotheses
 from archmodel.knowledge import (
     Document,
     MadeOf,
@@ -200,6 +201,9 @@ def _withdraw(work: _Work) -> Outcome:
         return withdraw_relations(
             work.session, work.entry, work["kind"], list(of.values()), list(to.values())
         )
+    if what == "hypothesis":
+        named = named_stones(work.session, work.file, work.table)
+        return withdraw_hypotheses(work.session, work.entry, named.values())
     about = named_subjects(work.session, work.file, work.table)
     if what == "member":
         return withdraw_members(work.session, work.entry, about)

@@ -20,6 +20,7 @@ from survey.missing_stones_gaps import CourseGap, Gaps, Hole, find_gaps, find_ho
 from survey.missing_stones_kinds import Filling, depth_of_kind, likeliest, split, usual_kinds
 from survey.missing_stones_settings import MissingSettings
 from survey.missing_stones_sides import Elevation, FlatStone, Line, elevations, meeting
+from survey.solids import area_vector
 
 __all__ = ["MissingStone", "propose_missing"]
 
@@ -29,6 +30,9 @@ _LEFT, _RIGHT, _UPRIGHT = np.array([-1.0, 0.0]), np.array([1.0, 0.0]), np.array(
 _USUAL_JOINT = 0.01  # metres, where no joint can be measured
 _SCATTER = 0.003  # metres: how far a stone ends from the middle of its joint, one time as another
 _TALL = 0.04  # metres: ends of gaps of two courses that are nearer belong to one stone
+_BEHIND = (
+    0.05  # metres behind its face at which a proposal is compared with stones that were seen from elsewhere
+)
 _SPLIT_SIGMA = 0.08  # metres: how well the joint between two missing stones is known
 
 
@@ -39,10 +43,12 @@ class MissingStone:
     Attributes
     ----------
     block : the stone; its face's provenance is "hypothesis", with the evidence
+    beside : codes of the stones, or proposals, on its left and on its right
     notes : what makes it less certain, in words
     """
 
     block: SurveyedBlock
+    beside: tuple[str, str]
     notes: tuple[str, ...]
 
     @property
@@ -74,10 +80,28 @@ def propose_missing(
     found: list[MissingStone] = []
     for elevation in elevations(blocks):
         voussoirs = list(_voussoirs(elevation, settings, codes))
-        found += voussoirs
         flat = [_flat(stone.block, elevation) for stone in voussoirs]
-        found += _of_courses(Elevation(elevation.frame, (*elevation.stones, *flat)), settings, codes)
+        whole = Elevation(elevation.frame, (*elevation.stones, *flat))
+        mine = {id(stone.block) for stone in elevation.stones}
+        others = [block for block in blocks if id(block) not in mine]
+        proposed = [*voussoirs, *_of_courses(whole, settings, codes)]
+        found += [stone for stone in proposed if not _is_there(stone.block, others)]
     return tuple(found)
+
+
+def _is_there(proposal: SurveyedBlock, others: Sequence[SurveyedBlock]) -> bool:
+    """Whether another stone, seen from elsewhere, takes the middle of the proposal: it reaches through the wall."""
+    outline = proposal.face.outline
+    middle = outline.mean(axis=0) - _BEHIND * proposal.face.fit.normal
+    places = np.concatenate([[middle], 0.5 * (middle + outline - _BEHIND * proposal.face.fit.normal)])
+    for other in others:
+        corners = other.solid.vertices
+        if (corners.min(axis=0) <= middle).all() and (middle <= corners.max(axis=0)).all():
+            polygons = [corners[list(face)] for face in other.solid.faces]
+            inside = [((places - one.mean(axis=0)) @ area_vector(one) <= 0.0) for one in polygons]
+            if 2 * int(np.all(inside, axis=0).sum()) > len(places):
+                return True
+    return False
 
 
 def _flat(block: SurveyedBlock, elevation: Elevation) -> FlatStone:
@@ -137,9 +161,10 @@ def _voussoirs(elevation: Elevation, settings: MissingSettings, codes: _Codes) -
                 sigma,
                 evidence,
             )
+            beside = (before, right)
             notes = _arch_notes(gap, k)
             before = code
-            yield MissingStone(stone_of(face, elevation), notes)
+            yield MissingStone(stone_of(face, elevation), beside, notes)
 
 
 def _arch_notes(gap: ArchGap, number: int) -> tuple[str, ...]:
@@ -206,19 +231,20 @@ class _Fill:
         for kind, outline in zip(kinds, self._outlines(cuts), strict=True):
             kind = self._kind(kind)
             code = codes.after(before, gap.right.block.code)
-            before = code
+            names, before = (before, gap.right.block.code), code
             depth = depth_of_kind(kind, (gap.left, gap.right), self.elevation, gap.course)
             sigma = _sigma(gap.left, gap.right, count > 1)
             beside = (gap.left, gap.right)
             face = MissingFace(
                 code, kind, gap.course, gap.zone, outline, beside, depth, sigma, self._evidence(kind)
             )
-            yield MissingStone(stone_of(face, self.elevation), self._notes())
+            yield MissingStone(stone_of(face, self.elevation), names, self._notes())
 
     def _kind(self, kind: str) -> str:
         """The kind by length; between a stone of an arch and one of the wall it is a springer."""
         arch = [stone.block.kind in ("voussoir", "keystone") for stone in (self.gap.left, self.gap.right)]
-        return "springer" if any(arch) and not all(arch) else kind
+        known = any(stone.block.kind == "springer" for stone in self.elevation.stones)
+        return "springer" if known and any(arch) and not all(arch) else kind
 
     def _outlines(self, cuts: Sequence[float]) -> Iterator[Array]:
         gap = self.gap

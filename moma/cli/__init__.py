@@ -8,6 +8,7 @@ from moma.cli.database import migrate
 from moma.cli.entities import query, schema, show
 from moma.cli.exchange import export, import_
 from moma.cli.knowledge import record
+from moma.cli.proposals import propose
 from moma.cli.relations import load_path, relate
 from moma.cli.runs import runs
 from moma.cli.scenes import check, run
@@ -52,6 +53,7 @@ _COMMANDS = (
     survey_report,
     record,
     relate,
+    propose,
     query,
     schema,
     show,

@@ -1,0 +1,142 @@
+"""The command that proposes what no survey sees."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from moma.cli.options import DEFAULT_DB, Db, Json, Verbose
+from moma.console import reporting, say
+from moma.errors import UsageError
+
+if TYPE_CHECKING:
+    from pipelines.propose import ProposalReport
+
+__all__ = ["propose"]
+
+
+class What(StrEnum):
+    """What can be proposed."""
+
+    MISSING = "missing"
+    INFILL = "infill"
+
+
+class CoreShape(StrEnum):
+    """What the core of a wall can be made of."""
+
+    BLOCKS = "blocks"
+    STOREYS = "storeys"
+
+
+@reporting
+def propose(
+    what: Annotated[
+        What, typer.Argument(metavar="missing|infill", help="Missing stones, or the core of walls.")
+    ],
+    where: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--where", metavar="EXPR", help="Only with stones for which this holds; all given ones hold."
+        ),
+    ] = None,
+    shape: Annotated[
+        CoreShape | None,
+        typer.Option("--as", help="The core as blocks, or as one continuum a storey; else blocks."),
+    ] = None,
+    storey_height: Annotated[
+        float | None,
+        typer.Option(
+            "--storey-height", metavar="M", help="Height of a storey in metres; else the whole wall is one."
+        ),
+    ] = None,
+    facings: Annotated[
+        tuple[str, str] | None,
+        typer.Option("--facings", metavar="EXPR EXPR", help="Two facings of one wall; else recognised."),
+    ] = None,
+    record: Annotated[
+        bool, typer.Option("--record", help="Put them into the database, as hypotheses.")
+    ] = False,
+    author: Annotated[str | None, typer.Option("--author", metavar="NAME", help="Who records them.")] = None,
+    source: Annotated[
+        str | None,
+        typer.Option("--source", metavar="TEXT", help="On what grounds; else those of each proposal."),
+    ] = None,
+    db: Db = DEFAULT_DB,
+    json: Json = False,
+    verbose: Verbose = False,
+) -> None:
+    """Propose stones that are missing, or the core between two facings; see docs/unseen.md."""
+    from moma.listing import as_json
+    from pipelines.propose import Recording, propose_core, propose_stones
+    from survey.infill_settings import InfillSettings, InfillShape
+
+    given = {"--as": shape, "--storey-height": storey_height, "--facings": facings}
+    _refuse_others(what, given, shape, record, author, source)
+    recording = Recording(author, source) if record else None
+    if what is What.MISSING:
+        report = propose_stones(db, where or (), recording=recording)
+    else:
+        settings = InfillSettings(shape=InfillShape(shape or CoreShape.BLOCKS), storey_height=storey_height)
+        report = propose_core(db, where or (), settings, recording, facings=facings)
+    if json:
+        print(as_json(asdict(report)))
+        return
+    if report.proposals:
+        print(_table(report))
+    if verbose:
+        for one in report.proposals:
+            print("\n".join([f"{one.code}: {one.evidence}", f"  depth: {one.depth_source}"]))
+    say(_summary(report, record))
+
+
+def _refuse_others(
+    what: What,
+    given: Mapping[str, object],
+    shape: CoreShape | None,
+    record: bool,
+    author: str | None,
+    source: str | None,
+) -> None:
+    """Options that do not belong together."""
+    if what is What.MISSING:
+        for name, value in given.items():
+            if value is not None:
+                raise UsageError(f"{name} is for the core of walls", remedy="leave it out, or propose infill")
+    height = given["--storey-height"]
+    if height is not None and shape is not CoreShape.STOREYS:
+        raise UsageError("--storey-height is for storeys", remedy="give --as storeys too")
+    if isinstance(height, float) and not height > 0.0:
+        raise UsageError(f"--storey-height is {height:g} m", remedy="give a height above zero")
+    if not record and (author is not None or source is not None):
+        name = "--author" if author is not None else "--source"
+        raise UsageError(f"{name} is for what is recorded", remedy="give --record too")
+
+
+def _table(report: "ProposalReport") -> str:
+    from moma.listing import as_table
+
+    columns = ("code", "kind", "course", "length", "height", "depth", "volume", "notes")
+    rows = [{**asdict(one), "notes": "; ".join(one.notes) or None} for one in report.proposals]
+    shown = {
+        name: {"length": "m", "height": "m", "depth": "m", "volume": "m³"}.get(name)
+        for name in columns
+        if any(row[name] is not None for row in rows)
+    }
+    return as_table(shown, rows)
+
+
+def _summary(report: "ProposalReport", record: bool) -> str:
+    count = len(report.proposals)
+    if not count:
+        return f"nothing to propose among {report.stones} stones"
+    text = f"{count} proposal{'s' if count > 1 else ''} from {report.stones} stones"
+    volume = sum(one.volume for one in report.proposals)
+    if report.what == "infill":
+        text += f", {volume:.3f} m³"
+    if report.entry is None:
+        return f"{text}; nothing is recorded: give --record" if not record else text
+    text += f"; recorded as entry {report.entry}"
+    return text if report.related is None else f"{text}, relations computed anew as entry {report.related}"
