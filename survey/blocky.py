@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from moma.errors import GeometryError
 from survey.depth import Depth
 from survey.extrusion import SurveyedBlock
 from survey.faces import Face
@@ -22,8 +21,6 @@ from survey.solids import Solid
 from survey.squaring import SimplifyBounds
 
 __all__ = ["BlockShape", "BlockyStone", "Simplified", "SimplifyBounds", "simplify"]
-
-Array = NDArray[np.float64]
 
 _BOUNDS = SimplifyBounds()
 
@@ -56,24 +53,6 @@ class BlockyStone:
     sound: NDArray[np.bool_]
     shape: BlockShape
     report: Simplified
-
-    @property
-    def corners(self) -> Array:
-        """The visible face of a hexahedron, (4, 3) [m].
-
-        Raises
-        ------
-        GeometryError
-            if it is none
-        """
-        if self.shape is not BlockShape.HEXAHEDRON:
-            raise GeometryError(
-                f"it is no hexahedron: {self.report.reason}",
-                where=f"stone {self.code}",
-                remedy="leave the joints as surveyed, or leave the stone out",
-            )
-        corners: Array = self.solid.vertices[:4]
-        return corners
 
 
 def simplify(block: SurveyedBlock, bounds: SimplifyBounds = _BOUNDS) -> BlockyStone:
