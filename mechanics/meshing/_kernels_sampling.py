@@ -1,6 +1,6 @@
 """Numba kernels that lay points on and in a convex polyhedron, as far apart as a size field asks for."""
 
-from math import ceil, floor, log2, sqrt
+from math import ceil, log2, sqrt
 
 import numpy as np
 from numba import njit
@@ -9,14 +9,16 @@ __all__ = ["lay_points", "size_at"]
 
 # a point keeps this many times the size from all others, and from the boundary of what it fills
 _APART = 0.65
-_INSIDE = 0.45
+_INSIDE = .4
 # step of the cubic lattice, over the size: tetrahedra then have edges of about that length
-_STEP = 0.92
+_STEP = .97
 # points lie on a plane within this part of the stone's size; what is nearly too near is not, so that rounding matters
 # to few stones
 _ON_PLANE = 1e-9
 # so many parts an edge is measured in where its size changes
 _STATIONS = 64
+# no part of an edge is longer than the size, but for this part of it (gmsh's rule)
+_SHORT = 0.01
 
 
 @njit(cache=True)
@@ -70,6 +72,12 @@ def lay_points(corners, edges, loops, start, planes, axes, size, fine, growth, n
     points, owner, count = _inside(
         points, owner, count, corners, planes, axes, size, fine, growth, normals, offsets
     )
+    if count == len(corners):
+        # not an edge is cut: a point in the middle lets the stone deform at all
+        middle = np.zeros(3)
+        for k in range(len(corners)):
+            middle += corners[k] / len(corners)
+        points, owner, count = _add(points, owner, count, middle[0], middle[1], middle[2], -1)
     ends[3] = count
     return points[:count], ends, owner[:count]
 
@@ -90,17 +98,17 @@ def _add(points, owner, count, x, y, z, of):
 
 @njit(cache=True)
 def _cuts(a, b, size, fine, growth, normals, offsets):
-    """Places t (n,) in (0, 1) that cut the edge from a to b into parts as long as the field asks for."""
+    """Places t (n,) in (0, 1) that cut the edge from a to b into parts no longer than the field asks for."""
     length = sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
     if len(offsets) == 0:
-        count = max(1, floor(length / size + 0.5 + _ON_PLANE))
+        count = max(1, ceil(length / size - _SHORT))
         return np.arange(1, count) / count
     parts = np.zeros(_STATIONS + 1)
     for s in range(_STATIONS):
         t = (s + 0.5) / _STATIONS
         x, y, z = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])
         parts[s + 1] = parts[s] + length / _STATIONS / size_at(x, y, z, size, fine, growth, normals, offsets)
-    count = max(1, floor(parts[-1] + 0.5 + _ON_PLANE))
+    count = max(1, ceil(parts[-1] - _SHORT))
     places = np.empty(count - 1)
     s = 0
     for k in range(1, count):

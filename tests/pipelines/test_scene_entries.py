@@ -13,7 +13,7 @@ from mechanics.laws.lennard_jones import LennardJones
 from mechanics.laws.mortar import MortarJoint
 from mechanics.meshing.elements import Element
 from mechanics.polyhedra import mass_properties
-from mechanics.scene import Block, Placement
+from mechanics.scene import Block, Fidelity, Placement
 from moma.errors import SceneError
 from pipelines.assemble import assemble
 from pipelines.check import check_scene
@@ -312,7 +312,7 @@ def test_the_examples_of_the_documentation_are_valid():
     )
     scene = parse_scene("\n".join([material, *examples]), "scene.toml")
     assert scene.materials[0].material.orthotropy is not None
-    assert len(scene.meshes) == len(scene.laws) == len(scene.loads) == 2
+    assert (len(scene.meshes), len(scene.laws), len(scene.loads)) == (3, 2, 2)
 
 
 LOW = """
@@ -466,6 +466,21 @@ def test_groups_of_stones_have_meshes_of_their_own_and_the_later_counts(build):
         (0.3, Element.TET10),
         (None, Element.TET10),  # fixed
     }
+
+
+def test_meshes_by_place_and_by_distance_to_contact(build):
+    scene = build(
+        "deformable = ['course = 2']\n[mesh]\nsize = 0.3\ncontact_size = 0.1\nmesher = 'gmsh'\n"
+        "[[meshes]]\nstones = ['z > 0']\nsize = 0.5\ngrowth = 0.2\n"
+        "[[meshes]]\nstones = ['W02-01']\ncontact_size = 0.05\nmesher = 'delaunay'\n"
+    )
+    settings = {
+        block.code: (block.mesh_size, block.contact_size, block.growth, block.mesher)
+        for block in scene.blocks
+        if block.fidelity is Fidelity.DEFORMABLE
+    }
+    assert settings.pop("W02-01") == (0.3, 0.05, 0.5, "delaunay")
+    assert set(settings.values()) == {(0.5, 0.1, 0.2, "gmsh")}
 
 
 def test_a_mesh_of_no_stone_is_named_with_its_line(build):
