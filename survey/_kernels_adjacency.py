@@ -216,7 +216,8 @@ def touching_faces(pairs, solid, planes, limits, out_pairs, out):
     pairs : (n, 2) solids
     solid : vertices, corners, face_starts, solid_starts of `Polyhedra`
     planes : as from `face_planes`
-    limits : widest joint, deepest overlap [m], cosine of the largest angle, least share of the smaller face [-]
+    limits : widest joint, deepest overlap [m], cosine of the largest angle, least share of the smaller face [-],
+        whether the width counts at the narrow end of a joint, not in its middle
     out_pairs, out : at least `GROUPS` n rows
     """
     face_starts, solid_starts = solid[2], solid[3]
@@ -307,7 +308,9 @@ def _contact(i, j, one, two, facing, solid, planes, limits, work, row):
         place[k] = origin[k] + mx / area * u[k] + my / area * v[k]
     high = _height(vertices, first, normals[i], n, place)
     low = _height(vertices, second, normals[j], n, place)
-    if not -overlap <= high - low <= width:
+    # two faces that open like a wedge are as wide apart as they are at the narrow end
+    narrower = 0.5 * math.sqrt(area) * math.sqrt(max(1.0 / facing**2 - 1.0, 0.0)) if limits[4] else 0.0
+    if not -overlap - narrower <= high - low <= width + narrower:
         return False
     if abs(high - low) > _OF_STONE * min(thickness(one, solid, n), thickness(two, solid, n)):
         return False

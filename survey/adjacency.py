@@ -143,7 +143,7 @@ def find_touching(
     local = np.ascontiguousarray(solids.vertices - origin)
     planes = face_planes(local, solids.corners, solids.face_starts)
     solid = (local, solids.corners, solids.face_starts, solids.solid_starts)
-    limits = (width, overlap, float(np.cos(np.radians(angle))), share)
+    limits = (width, overlap, float(np.cos(np.radians(angle))), share, False)
     pairs, rows = [np.zeros((0, 2), np.int64)], [np.zeros((0, 8))]
     for near in near_pairs(boxes_of(planes[2], solids.solid_starts, width), wanted):
         room = GROUPS * len(near)

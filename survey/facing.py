@@ -86,6 +86,7 @@ def find_facing(solids: Polyhedra, planes: FacePlanes, settings: JointSettings) 
         settings.max_width,
         float(np.cos(np.radians(settings.max_angle))),
         0.0,
+        True,
     )
     solid = (solids.vertices, solids.corners, solids.face_starts, solids.solid_starts)
     kernel_planes = (planes.normals, planes.areas, planes.boxes, planes.convex)

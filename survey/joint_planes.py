@@ -1,10 +1,11 @@
 """The contact planes of a building's joints: one for each straight bed, whatever the bond.
 
 Faces that face each other in turn make one joint: the tops of a course and the undersides of the next, the two
-sides of a head joint, springers and voussoir at a skewback. All of them are fitted together, so that a course stays
-a course. Where a bed is not straight it is taken as several planes that meet at head joints (`survey.joint_bends`).
-Where that does not do either, the few stones that are off are led to the plane of the others; if they are not few, each
-two stones have a plane of their own.
+sides of a head joint, springers and voussoir at a skewback. So do faces of neighbours that continue each other, where
+four stones meet at a cross. All of them are fitted together, so that a course stays a course. Where a bed is not
+straight it is taken as several planes that meet at head joints (`survey.joint_bends`). Where that does not do either,
+the few stones that are off are led to the plane of the others; if they are not few, each two stones have a plane of
+their own.
 """
 
 from dataclasses import dataclass, replace
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from survey._kernels_continuing import continuing_faces
 from survey._kernels_joint_planes import fit_middle_planes
 from survey.adjacency import Polyhedra
 from survey.facing import FacePlanes, FacingFaces
@@ -26,6 +28,7 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
+_ALIKE = 0.985  # cosine of 10°: faces of neighbours that are turned by more do not continue each other
 _FEW = 0.25  # part of the corners of a joint that may be off it
 _SAME = 1e-9  # metres: faces of stones that keep their shape that are nearer lie in one plane
 
@@ -89,7 +92,7 @@ def contact_planes(faces: StoneFaces, facing: FacingFaces, settings: JointSettin
     facing : the pairs
     settings : how far a corner may be off its side of a straight joint
     """
-    label = _joints(facing, len(faces.planes.areas))
+    label = _joints(faces, facing, settings)
     count = int(label.max()) + 1 if len(label) else 0
     groups = _gathered(faces, facing, label, count)
     _, values = _fitted(faces, groups, -1.0, settings)
@@ -186,18 +189,36 @@ def some_links(facing: FacingFaces, links: Indices) -> FacingFaces:
     )
 
 
-def _joints(facing: FacingFaces, count: int) -> Indices:
+def _joints(faces: StoneFaces, facing: FacingFaces, settings: JointSettings) -> Indices:
     """Number (m,) of the joint that each pair belongs to, in the order of their first pair."""
     if not len(facing):
         return np.zeros(0, np.int64)
-    pairs = facing.faces
+    count = len(faces.planes.areas)
+    pairs = np.concatenate([facing.faces, _continuing(faces, facing, settings)])
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     _, label = connected_components(graph, directed=False)
-    _, first, number = np.unique(label[pairs[:, 0]], return_index=True, return_inverse=True)
+    _, first, number = np.unique(label[facing.faces[:, 0]], return_index=True, return_inverse=True)
     rank = np.empty(len(first), np.int64)
     rank[np.argsort(first, kind="stable")] = np.arange(len(first))
     out: Indices = rank[number]
     return out
+
+
+def _continuing(faces: StoneFaces, facing: FacingFaces, settings: JointSettings) -> Indices:
+    """Faces (m, 2) of neighbours that lie in one plane."""
+    solids, planes = faces.solids, faces.planes
+    joined = np.zeros(len(planes.areas), np.bool_)
+    joined[facing.faces] = True
+    found: Indices = continuing_faces(
+        planes.owner[facing.faces],
+        (solids.vertices, solids.corners, solids.face_starts, solids.solid_starts),
+        planes.normals,
+        planes.offsets,
+        joined & ~faces.kept,
+        _ALIKE,
+        settings.straightness,
+    )
+    return found
 
 
 def _gathered(faces: StoneFaces, facing: FacingFaces, label: Indices, count: int) -> _Groups:
