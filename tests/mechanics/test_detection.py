@@ -197,7 +197,7 @@ def mixed():
         ground(),
         moved(brick("rocking", (0, 0, 0), (0.4, 0.4, 0.9)), wedge([0, -1, 0], 7.0)),
         brick("flat", (1, 0, 0.003), (1.7, 0.6, 0.5)),
-        brick("soft", (1.1, 0.1, 0.503), (1.6, 0.5, 0.9), SOFT, mesh_size=0.3),
+        brick("soft", (1.1, 0.1, 0.503), (1.6, 0.5, 0.9), SOFT, mesh_size=0.2),
         moved(roof("edge", np.eye(3), 0.7), np.eye(3), (-1.2, 0, 0), 0.5),
         moved(roof("across", wedge([0, 0, 1], 90), 0.7 + np.sqrt(2)), np.eye(3), (-1.2, 0, 0), 0.5),
     )
