@@ -74,8 +74,8 @@ def _spread(vertices, first, second, n):
 
 
 @njit(cache=True)
-def matching_faces(pairs, solid, planes, tolerance, out, areas):
-    """Faces of pairs of solids that lie in one plane, into `out` and `areas`, as long as there is room; how many.
+def matching_faces(pairs, solid, planes, tolerance, out, measures):
+    """Faces of pairs of solids that lie in one plane, into `out` and `measures`, as far as there is room; how many.
 
     Parameters
     ----------
@@ -83,8 +83,8 @@ def matching_faces(pairs, solid, planes, tolerance, out, areas):
     solid : vertices, corners, face_starts, solid_starts of `Polyhedra`
     planes : as from `face_planes`
     tolerance : within which the corners of both faces lie in their common plane [m]
-    out, areas : (…, 2) the two faces, and (…,) what they share [m²]; negative if that is a seam no wider than the
-        tolerance, or they come only so near
+    out, measures : (…, 2) the two faces; (…, 2) how far their corners lie from the plane [m], and what they share [m²]:
+        negative if that is a seam no wider than the tolerance, or they come only so near
     """
     vertices, corners, face_starts, solid_starts = solid
     normals, sizes, boxes, convex = planes
@@ -103,7 +103,11 @@ def matching_faces(pairs, solid, planes, tolerance, out, areas):
                     + normals[i, 1] * normals[j, 1]
                     + normals[i, 2] * normals[j, 2]
                 )
-                if facing > _OPPOSITE or _apart(boxes, i, j, tolerance) or not min(sizes[i], sizes[j]) > 0.0:
+                if (
+                    facing > _OPPOSITE
+                    or _apart(boxes, i, j, 2.0 * tolerance)
+                    or not min(sizes[i], sizes[j]) > 0.0
+                ):
                     continue
                 # the larger face knows its normal better
                 a, b = sizes[i] / (sizes[i] + sizes[j]), sizes[j] / (sizes[i] + sizes[j])
@@ -112,7 +116,8 @@ def matching_faces(pairs, solid, planes, tolerance, out, areas):
                     n[k] = (b * normals[j, k] - a * normals[i, k]) / size
                 first = corners[face_starts[i] : face_starts[i + 1]]
                 second = corners[face_starts[j] : face_starts[j + 1]]
-                if _spread(vertices, first, second, n) > tolerance:
+                spread = _spread(vertices, first, second, n)
+                if spread > tolerance:
                     continue
                 _basis(n, u, v)
                 origin = vertices[first[0]]
@@ -127,7 +132,8 @@ def matching_faces(pairs, solid, planes, tolerance, out, areas):
                         continue
                     area = -1.0
                 if count < out.shape[0]:
-                    out[count, 0], out[count, 1], areas[count] = i, j, area
+                    out[count, 0], out[count, 1] = i, j
+                    measures[count, 0], measures[count, 1] = spread, area
                 count += 1
     return count
 

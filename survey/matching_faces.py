@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from survey._kernels_adjacency import face_planes
 from survey._kernels_matching import matching_faces, near_pairs
 from survey.adjacency import Polyhedra
-from survey.solids import Solid
+from survey.solids import Solid, area_vector
 
 __all__ = ["Match", "common_planes", "find_matches"]
 
@@ -31,21 +31,23 @@ class Match:
     ----------
     faces : numbers of the two, counted through all solids
     solids : numbers of the two
+    spread : how far their corners lie from that plane [m]
     area : that they share [m²]; 0 if they meet at a seam alone
     """
 
     faces: tuple[int, int]
     solids: tuple[int, int]
+    spread: float
     area: float
 
 
 def find_matches(solids: Sequence[Solid], tolerance: float) -> tuple[Match, ...]:
-    """Find the faces that match, the largest shared areas first.
+    """Find the faces that match, those that do so best first, and seams last.
 
     Parameters
     ----------
     solids : closed
-    tolerance : within which the corners of both faces lie in one plane [m]
+    tolerance : within which the corners of both faces lie in one plane [m]; faces that are twice as far apart match
     """
     all_ = Polyhedra.gather((one.vertices, one.faces) for one in solids)
     local = np.ascontiguousarray(all_.vertices - all_.vertices.min(axis=0))
@@ -57,33 +59,52 @@ def find_matches(solids: Sequence[Solid], tolerance: float) -> tuple[Match, ...]
             np.maximum.reduceat(planes[2][:, 3:], starts, axis=0),
         ]
     )
-    order = np.argsort(boxes[:, 0], kind="stable")
-    pairs = np.empty((near_pairs(boxes, order, tolerance, np.empty((0, 2), np.int64)), 2), np.int64)
-    near_pairs(boxes, order, tolerance, pairs)
+    order, margin = np.argsort(boxes[:, 0], kind="stable"), 2.0 * tolerance
+    pairs = np.empty((near_pairs(boxes, order, margin, np.empty((0, 2), np.int64)), 2), np.int64)
+    near_pairs(boxes, order, margin, pairs)
     solid = (local, all_.corners, all_.face_starts, all_.solid_starts)
-    count = matching_faces(pairs, solid, planes, tolerance, np.empty((0, 2), np.int64), np.empty(0))
-    faces, areas = np.empty((count, 2), np.int64), np.empty(count)
-    matching_faces(pairs, solid, planes, tolerance, faces, areas)
+    count = matching_faces(pairs, solid, planes, tolerance, np.empty((0, 2), np.int64), np.empty((0, 2)))
+    faces, measures = np.empty((count, 2), np.int64), np.empty((count, 2))
+    matching_faces(pairs, solid, planes, tolerance, faces, measures)
     owner = np.searchsorted(all_.solid_starts, faces, side="right") - 1
-    order = np.lexsort((faces[:, 1], faces[:, 0], -areas))
+    spread, area = measures.T
+    ranked = np.lexsort((faces[:, 1], faces[:, 0], -area, np.round(spread / tolerance, 3), area <= 0.0))
     return tuple(
         Match(
             (int(faces[k, 0]), int(faces[k, 1])),
             (int(owner[k, 0]), int(owner[k, 1])),
-            max(float(areas[k]), 0.0),
+            float(spread[k]),
+            max(float(area[k]), 0.0),
         )
-        for k in order
+        for k in ranked
     )
 
 
+@dataclass
+class _Plane:
+    """Faces that are to lie in one plane: their corners, and which way each stone looks at it."""
+
+    corners: Array
+    looks: dict[int, Array]
+
+    def joined(self, other: "_Plane") -> "_Plane":
+        return _Plane(np.concatenate([self.corners, other.corners]), {**other.looks, **self.looks})
+
+    def flattens(self, other: "_Plane") -> bool:
+        """Whether a stone would have both its sides in the plane."""
+        both = self.looks.keys() & other.looks.keys()
+        return any(float(self.looks[one] @ other.looks[one]) < 0.0 for one in both)
+
+
 def common_planes(
-    corners: Sequence[Array], matches: Sequence[Match], tolerance: float
+    corners: Sequence[Array], owner: Sequence[int], matches: Sequence[Match], tolerance: float
 ) -> tuple[list[int], list[Match]]:
     """Join matching faces to planes, as long as the corners of all of a plane lie in it.
 
     Parameters
     ----------
     corners : (n, 3) of each face [m]
+    owner : number of its solid
     matches : in the order in which they are to be joined
     tolerance : within which corners lie in a plane [m]
 
@@ -93,18 +114,20 @@ def common_planes(
     that could not be joined
     """
     root = list(range(len(corners)))
-    members: dict[int, Array] = {}
+    planes: dict[int, _Plane] = {}
     apart: list[Match] = []
     for match in matches:
-        one, two = (_find(root, face) for face in match.faces)
+        for face in match.faces:
+            if face not in planes and root[face] == face:
+                planes[face] = _Plane(corners[face], {owner[face]: area_vector(corners[face])})
+        one, two = sorted(_find(root, face) for face in match.faces)
         if one == two:
             continue
-        both = np.concatenate([members.get(one, corners[one]), members.get(two, corners[two])])
-        if _spread(both) <= tolerance:
-            first, second = min(one, two), max(one, two)
-            root[second] = first
-            members[first] = both
-            members.pop(second, None)
+        both = planes[one].joined(planes[two])
+        if not planes[one].flattens(planes[two]) and _spread(both.corners) <= tolerance:
+            root[two] = one
+            planes[one] = both
+            del planes[two]
         elif match.area > 0.0:
             apart.append(match)
     return [_find(root, face) for face in range(len(corners))], apart
@@ -118,7 +141,7 @@ def _find(root: list[int], face: int) -> int:
 
 
 def _spread(places: Array) -> float:
-    """Largest distance of places from the plane that fits them best."""
+    """Half the extent of places across the plane that fits them best."""
     centred = places - places.mean(axis=0)
     normal = np.linalg.eigh(centred.T @ centred)[1][:, 0]
     heights = centred @ normal

@@ -81,12 +81,11 @@ class _Assembly:
 
     def _join(self) -> None:
         """Give each face its plane."""
-        self._plane, apart = common_planes(
-            [self._vertices[list(face)] for face in self._faces], self._matches, self._tolerance
-        )
+        corners = [self._vertices[list(face)] for face in self._faces]
+        self._plane, apart = common_planes(corners, self._owner, self._matches, self._tolerance)
         for match in apart:
             self._matches.remove(match)
-            self._open.append((match, "a plane for both would be too far from others that share it"))
+            self._open.append((match, "others that share their planes are too far from a common one"))
 
     def _incidences(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Which corner lies on which plane; a triangle of its own has no need of one."""
@@ -132,7 +131,7 @@ class _Assembly:
             self._fold(max(free, key=lambda k: len(self._faces[k])))
             return
         own = [one for one in self._matches if set(one.faces) & set(faces)]
-        worst = max(own, key=self._misfit)
+        worst = max(own, key=lambda one: one.spread)
         self._matches.remove(worst)
         self._open.append((worst, f"it would move a corner by {moved:.3g} m"))
 
@@ -142,11 +141,6 @@ class _Assembly:
         self._faces += pieces
         self._owner += [self._owner[face]] * len(pieces)
         self._folded[self._owner[face]] += 1
-
-    def _misfit(self, match: Match) -> float:
-        places = np.concatenate([self._vertices[list(self._faces[k])] for k in match.faces])
-        centred = places - places.mean(axis=0)
-        return float(np.linalg.svd(centred, compute_uv=False)[2])
 
     def solids(self) -> tuple[Solid, ...]:
         """The solids as they are now."""

@@ -13,6 +13,8 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from moma.errors import GeometryError, SurveyError, UsageError
 from survey.formats.bodies import ClosedBody, RawBody, closed_bodies
 from survey.formats.code_template import CodeTemplate
@@ -95,7 +97,8 @@ def _snapped(
 def _moved(record: SolidRecord, solid: Solid, snapping: Snapping, path: str) -> SolidRecord | Reject:
     """The stone as it is now, if it is one still."""
     try:
-        check_watertight(solid)
+        with np.errstate(all="ignore"):  # a body without volume is found, and not warned of
+            check_watertight(solid)
     except GeometryError as error:
         where = f"{path}:{record.line}" if record.line else path
         what = f"solid {record.code}: within {snapping.tolerance:g} m of its corners {error.what}"
