@@ -10,7 +10,9 @@ from survey.infill import propose_infill
 from survey.infill_blocks import volume_of
 from survey.infill_cells import CellGrid, grid_solids
 from survey.infill_facings import facing_stone
+from survey.infill_parts import grid_parts
 from survey.infill_settings import InfillSettings, InfillShape
+from survey.solids import Solid
 from survey.synthetic.facings import two_facings
 from survey.watertight import check_watertight
 
@@ -117,3 +119,37 @@ def touches_at_an_edge(filled):
                 if between and not between & cells:
                     return True
     return False
+
+
+@settings(max_examples=40, deadline=None)
+@given(data=st.data())
+def test_parts_of_solids_of_cells_fill_them(data):
+    shape = tuple(data.draw(st.integers(1, 4)) for _ in range(3))
+    count = int(np.prod(shape))
+    filled = np.array(data.draw(st.lists(st.booleans(), min_size=count, max_size=count))).reshape(shape)
+    beds = np.array([[0.02 - 0.005 * k, 1.0, 0.01, 0.3 * k] for k in range(shape[1] + 1)])
+    levels = np.array([[0.01, -0.02 + 0.01 * k, 1.0, -0.2 * k] for k in range(shape[2] + 1)])
+    for solid in grid_solids(CellGrid(0.5 * np.arange(shape[0] + 1.0), beds, levels, filled)):
+        parts = grid_parts(solid)
+        assert parts is not None
+        assert sum(volume_of(part) for part in parts) == pytest.approx(volume_of(solid), rel=1e-9)
+        for part in parts:
+            check_watertight(part, convex=True)
+            inner = part.vertices.mean(axis=0) + 0.99 * (part.vertices - part.vertices.mean(axis=0))
+            assert contains(solid, inner).all()
+            for other in parts:
+                assert other is part or not contains(other, inner).any()
+
+
+def test_what_is_no_solid_of_cells_has_no_such_parts():
+    corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    assert grid_parts(Solid("tetrahedron", corners, ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)))) is None
+
+
+def test_a_storey_of_a_wall_has_parts():
+    wall = two_facings(5.0, 6, 4)
+    stones = [facing_stone(block) for block in wall.building.blocks()]
+    for core in propose_infill(stones, InfillSettings(shape=InfillShape.STOREYS, storey_height=0.8)):
+        parts = grid_parts(core.solid)
+        assert parts is not None
+        assert sum(volume_of(part) for part in parts) == pytest.approx(core.volume, rel=1e-9)
