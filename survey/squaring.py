@@ -29,8 +29,8 @@ class SimplifyBounds:
     Attributes
     ----------
     max_shift : farthest that a sound corner may be left from the new outline [m]
-    shift_share : the same as a part of the face's smallest width [-]; the smaller bound holds, but never less than
-        the survey's own tolerance
+    shift_share : the same as a part of the face's smallest width, or the survey's tolerance if that is more [-]; the
+        smaller bound holds
     max_restored : farthest that a restored corner may stand out of the measured outline, and that a worn corner
         may be left from the new one [m]
     restored_share : the same as a part of the face's smallest width [-]; the smaller bound holds
@@ -40,7 +40,7 @@ class SimplifyBounds:
     max_shift: float = 0.03
     shift_share: float = 0.1
     max_restored: float = 0.06
-    restored_share: float = 0.2
+    restored_share: float = 0.25
     least_tolerance: float = 0.002
 
 

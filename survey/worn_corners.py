@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 _FEWEST_BESIDE_SOUND = 4  # points that tell how wide the margin is
 _FEWEST_BESIDE_WORN = 2  # ... and where a side ran: one finds it, another checks
-_REACH = 0.5  # of the side's length, that the farthest of them must be from the sound end
+_REACH = 0.5  # of the side's length, that one of them beside no other side must be from the sound end
 
 
 def restore_worn(
@@ -52,8 +52,9 @@ def restore_worn(
         if before in lost or after in lost:
             continue
         ends = corners[before], corners[k], corners[after]
-        along = _direction(ends[0], ends[1] - ends[0], points, margin, tolerance, farthest)
-        back = _direction(ends[2], ends[2] - ends[1], points, margin, tolerance, farthest)
+        clear = [_clear(face.corners, side, points, 0.5 * farthest) for side in (before, k)]
+        along = _direction(ends[0], ends[1] - ends[0], points, clear[0], margin, tolerance, farthest)
+        back = _direction(ends[2], ends[2] - ends[1], points, clear[1], margin, tolerance, farthest)
         if along is None or back is None:
             continue
         moved = corners.copy()
@@ -85,8 +86,26 @@ def _margin(
     return float(heights[best].mean())
 
 
+def _clear(corners: Array, side: int, points: Array, beside: float) -> NDArray[np.bool_]:
+    """Which points (np,) are not beside any other side, so that they can only be those of this one."""
+    count = len(corners)
+    clear = np.ones(len(points), dtype=np.bool_)
+    for k in range(count):
+        if k != side:
+            run = corners[(k + 1) % count] - corners[k]
+            share = np.clip((points - corners[k]) @ run / (run @ run), 0.0, 1.0)
+            clear &= np.linalg.norm(points - corners[k] - share[:, None] * run, axis=1) > beside
+    return clear
+
+
 def _direction(
-    anchor: Array, run: Array, points: Array, margin: float, tolerance: float, farthest: float
+    anchor: Array,
+    run: Array,
+    points: Array,
+    clear: NDArray[np.bool_],
+    margin: float,
+    tolerance: float,
+    farthest: float,
 ) -> Array | None:
     """Direction (2,) of a side through its sound end, which has points on its left at a distance; None if unknown.
 
@@ -94,6 +113,7 @@ def _direction(
     ----------
     anchor : (2,) sound end [m]
     run : (2,) the side as measured, counter-clockwise around the face [m]
+    clear : (np,) which points are beside no other side
     """
     length = float(np.linalg.norm(run))
     step = points - anchor
@@ -101,21 +121,21 @@ def _direction(
     inward = 1.0 if np.median(reach) > 0.0 else -1.0  # -1: the sound end is the last of the side
     reach, height = inward * reach, _cross(run, step) / length
     near = (np.abs(height) <= farthest) & (reach > 0.0) & (reach < length + farthest)
+    near &= np.hypot(reach, height) > abs(margin) + tolerance
+    if not near.any():
+        return None
     distance, angle = np.hypot(reach[near], height[near]), np.arctan2(height[near], reach[near])
-    known = distance > abs(margin) + tolerance
-    distance, angle = distance[known], angle[known]
     # each point gives one line through the end; the one that suits most points counts
     turns = angle - np.arcsin(margin / distance)
     misses = distance * np.sin(angle - turns[:, None]) - margin
     fits = np.abs(misses) <= tolerance
-    if not len(turns):
-        return None
     # no point lies nearer to a side than the margin's do
     worth = fits.sum(axis=1) - 2 * (misses < -tolerance).sum(axis=1)
     best = min(range(len(turns)), key=lambda i: (-int(worth[i]), float(np.abs(misses[i][fits[i]]).sum())))
     chosen = fits[best]
+    reaching = distance[chosen & clear[near]].max(initial=0.0)
     distance, angle = distance[chosen], angle[chosen] - turns[best]
-    if len(distance) < _FEWEST_BESIDE_WORN or distance.max() < _REACH * length:
+    if len(distance) < _FEWEST_BESIDE_WORN or reaching < _REACH * length:
         return None
     leverage = distance * np.cos(angle)
     turn = turns[best] + float((distance * np.sin(angle) - margin) @ leverage / (leverage @ leverage))
