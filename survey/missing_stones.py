@@ -18,6 +18,7 @@ from survey.missing_stones_arches import ArchGap, arch_gaps, voussoir_outlines
 from survey.missing_stones_faces import MissingFace, stone_of
 from survey.missing_stones_gaps import CourseGap, Gaps, Hole, find_gaps, find_holes, opening_signs
 from survey.missing_stones_kinds import Filling, depth_of_kind, likeliest, split, usual_kinds
+from survey.missing_stones_openings import FrameGap, frame_gaps
 from survey.missing_stones_settings import MissingSettings
 from survey.missing_stones_sides import Elevation, FlatStone, Line, elevations, meeting
 from survey.solids import area_vector
@@ -190,6 +191,8 @@ def _of_courses(elevation: Elevation, settings: MissingSettings, codes: _Codes) 
     joint, kinds = _usual_joint(gaps), usual_kinds(elevation)
     for hole in find_holes(gaps.gaps):
         signs = opening_signs(hole, elevation)
+        for frame in frame_gaps(hole, signs, elevation, settings):
+            yield _frame_stone(frame, joint, elevation, codes)
         if len(signs) >= 2 or hole.courses > settings.max_courses or hole.bounded < settings.covered:
             continue
         fillings = [likeliest(gap.width, joint, kinds, settings) for gap in hole.gaps]
@@ -202,6 +205,50 @@ def _of_courses(elevation: Elevation, settings: MissingSettings, codes: _Codes) 
             if gap.width - 2.0 * joint >= settings.min_length:
                 upper = hole.gaps[-1].upper if tall else gap.upper
                 yield from _Fill(gap, filling, upper, joint, elevation, signs).stones(codes)
+
+
+def _frame_stone(frame: FrameGap, joint: float, elevation: Elevation, codes: _Codes) -> MissingStone:
+    """A jamb that ends where the others do, or a sill."""
+    gap = frame.gap
+    beside = (gap.left, gap.right)
+    sides = _sides(gap, gap.upper, joint)
+    lines = [
+        sides[k] if place is None else Line(np.array([place, 0.0]), _UPRIGHT)
+        for k, place in enumerate((frame.start, frame.stop))
+    ]
+    if frame.kind == "sill":
+        evidence = f"gap of {gap.width:.3f} m under an opening, beyond its jambs on both sides"
+    else:
+        evidence = f"gap of {gap.width:.3f} m at an opening, beyond the line of its other jambs"
+    names = (gap.left.block.code, gap.right.block.code)
+    # a code next to that of the neighbour in the wall
+    code = codes.after(*(names if frame.start is None else (names[1], names[0])))
+    face = MissingFace(
+        code,
+        frame.kind,
+        gap.course,
+        gap.zone,
+        _quadrilateral(lines[0], lines[1], gap.lower, gap.upper),
+        beside,
+        depth_of_kind(frame.kind, beside, elevation, None),
+        _sigma(*beside, False),
+        f"{evidence}, in course {gap.course} between {names[0]} and {names[1]}",
+    )
+    return MissingStone(stone_of(face, elevation), names, ())
+
+
+def _sides(gap: CourseGap, upper: Line, joint: float) -> tuple[Line, Line]:
+    """Where a stone in a gap would end: a joint away from its neighbours."""
+    inside = np.array([gap.middle, 0.5 * (gap.lower.at_place(gap.middle) + upper.at_place(gap.middle))])
+    left = gap.left.side(_RIGHT, _UPRIGHT) or Line(np.array([gap.start, inside[1]]), _UPRIGHT)
+    right = gap.right.side(_LEFT, _UPRIGHT) or Line(np.array([gap.stop, inside[1]]), _UPRIGHT)
+    return left.moved(inside, joint), right.moved(inside, joint)
+
+
+def _quadrilateral(left: Line, right: Line, lower: Line, upper: Line) -> Array:
+    """Corners (4, 2), counter-clockwise from the lower left one."""
+    pairs = ((left, lower), (right, lower), (right, upper), (left, upper))
+    return np.array([meeting(one, other) for one, other in pairs])
 
 
 def _is_tall(hole: Hole) -> bool:
@@ -247,29 +294,15 @@ class _Fill:
         return "springer" if known and any(arch) and not all(arch) else kind
 
     def _outlines(self, cuts: Sequence[float]) -> Iterator[Array]:
-        gap = self.gap
-        inside = np.array(
-            [gap.middle, 0.5 * (gap.lower.at_place(gap.middle) + self.upper.at_place(gap.middle))]
-        )
-        left = gap.left.side(_RIGHT, _UPRIGHT) or Line(np.array([gap.start, inside[1]]), _UPRIGHT)
-        right = gap.right.side(_LEFT, _UPRIGHT) or Line(np.array([gap.stop, inside[1]]), _UPRIGHT)
-        sides = [left.moved(inside, self.joint)]
+        first, last = _sides(self.gap, self.upper, self.joint)
+        lines = [first]
         for cut in cuts:
-            sides += [
-                Line(np.array([cut + by, inside[1]]), _UPRIGHT)
-                for by in (-0.5 * self.joint, 0.5 * self.joint)
+            lines += [
+                Line(np.array([cut + by, 0.0]), _UPRIGHT) for by in (-0.5 * self.joint, 0.5 * self.joint)
             ]
-        sides.append(right.moved(inside, self.joint))
-        for one, other in zip(sides[::2], sides[1::2], strict=True):
-            beds = (gap.lower, self.upper)
-            yield np.array(
-                [
-                    meeting(one, beds[0]),
-                    meeting(other, beds[0]),
-                    meeting(other, beds[1]),
-                    meeting(one, beds[1]),
-                ]
-            )
+        lines.append(last)
+        for one, other in zip(lines[::2], lines[1::2], strict=True):
+            yield _quadrilateral(one, other, self.gap.lower, self.upper)
 
     def _evidence(self, kind: str) -> str:
         gap = self.gap
