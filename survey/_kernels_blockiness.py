@@ -115,7 +115,7 @@ def common_volume(vertices, corners, starts, planes):
 
     The solid is the signed sum of tetrahedra over the triangles on the middles of its faces, each clipped by all.
     """
-    apex = vertices[corners].copy().sum(axis=0) / len(corners)
+    apex = _middle(vertices, corners, 0, len(corners))
     total = 0.0
     for f in range(len(starts) - 1):
         middle = _middle(vertices, corners, starts[f], starts[f + 1])
@@ -145,26 +145,40 @@ def _clipped(four, planes):
         if number == len(planes):
             total += abs(_six_volumes(body)) / 6.0
             continue
-        heights = np.empty(4)
-        for i in range(4):
-            heights[i] = (planes[number, :3] * body[i]).sum() - planes[number, 3]
-        order = np.argsort(heights)
-        inside = 0
-        for i in range(4):
-            inside += heights[i] <= 0.0
+        inside, sorted_body, heights = _split(body, planes[number])
         if inside == 0:
             continue
-        for piece in _pieces(body[order], heights[order], inside):
-            waiting[count], done[count] = piece, number + 1
+        pieces = _pieces(sorted_body, heights, inside)
+        for k in range(len(pieces)):
+            waiting[count], done[count] = pieces[k], number + 1
             count += 1
     return total
 
 
 @njit(cache=True)
+def _split(body, plane):
+    """How many corners of a tetrahedron are below a plane, its corners with these first, and their heights."""
+    out, heights = np.empty((4, 3)), np.empty(4)
+    inside, last = 0, 4
+    for i in range(4):
+        height = plane[0] * body[i, 0] + plane[1] * body[i, 1] + plane[2] * body[i, 2] - plane[3]
+        if height <= 0.0:
+            place = inside
+            inside += 1
+        else:
+            last -= 1
+            place = last
+        out[place], heights[place] = body[i], height
+    return inside, out, heights
+
+
+@njit(cache=True)
 def _pieces(body, heights, inside):
-    """The tetrahedra (np, 4, 3) of the part of a tetrahedron, its corners the lowest first, that is below a plane."""
+    """The tetrahedra (np, 4, 3) of the part of a tetrahedron, its corners below a plane first, that is below it."""
     if inside == 4:
-        return body.reshape(1, 4, 3)
+        out = np.empty((1, 4, 3))
+        out[0] = body
+        return out
     cut = np.empty((inside, 4 - inside, 3))
     for i in range(inside):
         for j in range(inside, 4):

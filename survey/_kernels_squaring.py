@@ -47,12 +47,17 @@ def square(flat, worn, limits):
     m = _reduce(flat, worn, polygon, labels, m, 4, shift, restored, 0.0)
     first = 0
     for k in range(m):
-        if _length(polygon[k] - flat[0]) < _length(polygon[first] - flat[0]):
+        if _apart(polygon[k], flat[0]) < _apart(polygon[first], flat[0]):
             first = k
     out, names = np.empty((m, 2)), np.empty(m, np.int64)
     for k in range(m):
         out[k], names[k] = polygon[(first + k) % m], labels[(first + k) % m]
     return out, names, width, 0.0
+
+
+@njit(cache=True)
+def _apart(a, b):
+    return math.hypot(a[0] - b[0], a[1] - b[1])
 
 
 @njit(cache=True)
@@ -67,53 +72,61 @@ def _reduce(flat, worn, polygon, source, m, few, shift, restored, straight):
     while m > few:
         smallest = math.inf
         for k in range(m):
-            if (
-                straight > 0.0
-                and _turn(polygon[k - 1 if k else m - 1], polygon[k], polygon[(k + 1) % m]) > straight
-            ):
+            if straight > 0.0 and _turn(polygon, m, k) > straight:
                 continue
             for way in range(1 if straight > 0.0 else 2):
                 area = _change(polygon, m, k, way, trial, source, labels)
                 if area < smallest and _allowed(flat, worn, trial, labels, m - 1, shift, restored):
                     smallest = area
-                    best[: m - 1], best_labels[: m - 1] = trial[: m - 1], labels[: m - 1]
+                    best[:], best_labels[:] = trial, labels
         if smallest == math.inf:
             break
         m -= 1
-        polygon[:m], source[:m] = best[:m], best_labels[:m]
+        polygon[:], source[:] = best, best_labels
     return m
 
 
 @njit(cache=True)
-def _turn(before, here, after):
-    """Sine of the angle by which an outline turns at a corner; 1 where it turns back."""
-    u, v = here - before, after - here
-    if u[0] * v[0] + u[1] * v[1] <= 0.0:
+def _turn(polygon, m, k):
+    """Sine of the angle by which an outline turns at corner k; 1 where it turns back."""
+    ux, uy = _side(polygon, m, k - 1)
+    vx, vy = _side(polygon, m, k)
+    if ux * vx + uy * vy <= 0.0:
         return 1.0
-    return abs(_cross(u, v)) / (_length(u) * _length(v))
+    return abs(ux * vy - uy * vx) / (math.hypot(ux, uy) * math.hypot(vx, vy))
+
+
+@njit(cache=True)
+def _side(polygon, m, k):
+    """From corner k to the next."""
+    i, j = (k + m) % m, (k + 1) % m
+    return polygon[j, 0] - polygon[i, 0], polygon[j, 1] - polygon[i, 1]
 
 
 @njit(cache=True)
 def _change(polygon, m, k, way, trial, source, labels):
     """Polygon without corner k (way 0), or with the sides beside side k prolonged (way 1); the change of area."""
-    before, here, after = polygon[k - 1 if k else m - 1], polygon[k], polygon[(k + 1) % m]
-    gone, area = k, 0.5 * abs(_cross(here - before, after - here))
-    peak = here
+    ux, uy = _side(polygon, m, k - 1)
+    wx, wy = _side(polygon, m, k)
+    gone, area, share = k, 0.5 * abs(ux * wy - uy * wx), 0.0
     if way == 1:
         gone = (k + 1) % m
-        beyond = polygon[(k + 2) % m]
-        u, v = here - before, after - beyond  # the sides before and after side k, towards it
-        turn = _cross(u, v)
-        if turn > -_PARALLEL * _length(u) * _length(v):
+        vx, vy = _side(polygon, m, k + 1)
+        turn = ux * vy - uy * vx
+        if turn < _PARALLEL * math.hypot(ux, uy) * math.hypot(vx, vy):
             return math.inf  # they do not meet beyond side k
-        peak = before + _cross(after - before, v) / turn * u
-        area = 0.5 * abs(_cross(peak - here, after - peak))
+        share = (wx * vy - wy * vx) / turn  # of the side before, to be added to it
+        area = 0.5 * share * abs(ux * wy - uy * wx)
     j = 0
     for i in range(m):
         if i != gone:
-            trial[j], labels[j] = polygon[i], source[i]
+            trial[j, 0], trial[j, 1], labels[j] = polygon[i, 0], polygon[i, 1], source[i]
             if way == 1 and i == k:
-                trial[j], labels[j] = peak, -1
+                trial[j, 0], trial[j, 1], labels[j] = (
+                    polygon[k, 0] + share * ux,
+                    polygon[k, 1] + share * uy,
+                    -1,
+                )
             j += 1
     return area
 
@@ -159,11 +172,13 @@ def _width(polygon, m):
     """Smallest distance between two parallel lines that enclose a convex polygon."""
     smallest = math.inf
     for k in range(m):
-        side = polygon[(k + 1) % m] - polygon[k]
+        ux, uy = _side(polygon, m, k)
         highest = 0.0
         for i in range(m):
-            highest = max(highest, _cross(side, polygon[i] - polygon[k]))
-        smallest = min(smallest, highest / _length(side))
+            highest = max(
+                highest, ux * (polygon[i, 1] - polygon[k, 1]) - uy * (polygon[i, 0] - polygon[k, 0])
+            )
+        smallest = min(smallest, highest / math.hypot(ux, uy))
     return smallest
 
 
@@ -183,10 +198,7 @@ def _hull(flat):
         start = count
         for i in range(n):
             one = order[i] if way == 0 else order[n - 1 - i]
-            while count - start > 1 and (
-                _cross(flat[chain[count - 1]] - flat[chain[count - 2]], flat[one] - flat[chain[count - 1]])
-                <= 0.0
-            ):
+            while count - start > 1 and _bend(flat, chain[count - 2], chain[count - 1], one) <= 0.0:
                 count -= 1
             chain[count] = one
             count += 1
@@ -200,10 +212,12 @@ def _after(flat, i, j):
 
 
 @njit(cache=True)
-def _cross(u, v):
-    return u[0] * v[1] - u[1] * v[0]
-
-
-@njit(cache=True)
-def _length(u):
-    return math.hypot(u[0], u[1])
+def _bend(flat, i, j, k):
+    """Twice the area of a triangle of three corners, positive if they turn to the left."""
+    ux, uy, vx, vy = (
+        flat[j, 0] - flat[i, 0],
+        flat[j, 1] - flat[i, 1],
+        flat[k, 0] - flat[j, 0],
+        flat[k, 1] - flat[j, 1],
+    )
+    return ux * vy - uy * vx
