@@ -6,7 +6,6 @@ jambs, a jamb and a sill or the like frame, what is several courses high, and wh
 wall and its top tell nothing of what may be missing there.
 """
 
-import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from survey.extrusion import SurveyedBlock
 from survey.missing_stones_arches import ArchGap, arch_gaps, voussoir_outlines
+from survey.missing_stones_codes import FreeCodes
 from survey.missing_stones_faces import MissingFace, stone_of
 from survey.missing_stones_gaps import CourseGap, Gaps, Hole, find_gaps, find_holes, opening_signs
 from survey.missing_stones_kinds import Filling, depth_of_kind, likeliest, split, usual_kinds
@@ -77,7 +77,7 @@ def propose_missing(
     Proposals, facade by facade: the voussoirs first, then course by course from below
     """
     settings = settings or MissingSettings()
-    codes = _Codes({*taken, *(block.code for block in blocks)})
+    codes = FreeCodes({*taken, *(block.code for block in blocks)})
     found: list[MissingStone] = []
     for elevation in elevations(blocks):
         voussoirs = list(_voussoirs(elevation, settings, codes))
@@ -109,33 +109,7 @@ def _flat(block: SurveyedBlock, elevation: Elevation) -> FlatStone:
     return FlatStone(block, elevation.frame.flatten(block.face.outline), frozenset())
 
 
-class _Codes:
-    """Codes that are taken, and the next one that is free."""
-
-    def __init__(self, taken: set[str]) -> None:
-        self._taken = taken
-
-    def after(self, left: str, right: str) -> str:
-        """H- and the code that a stone between two others would have: the next number after the left one."""
-        left, right = left.removeprefix("H-"), right.removeprefix("H-")
-        for code, step in ((left, 1), (right, -1)):
-            number = re.search(r"\d+$", code)
-            if number is None:
-                continue
-            name = f"{code[: number.start()]}{int(number[0]) + step:0{len(number[0])}d}"
-            if int(number[0]) + step >= 0 and not {name, f"H-{name}"} & self._taken:
-                return self._take(f"H-{name}")
-        count = 1
-        while f"H-{left}+{count}" in self._taken:
-            count += 1
-        return self._take(f"H-{left}+{count}")
-
-    def _take(self, code: str) -> str:
-        self._taken.add(code)
-        return code
-
-
-def _voussoirs(elevation: Elevation, settings: MissingSettings, codes: _Codes) -> Iterator[MissingStone]:
+def _voussoirs(elevation: Elevation, settings: MissingSettings, codes: FreeCodes) -> Iterator[MissingStone]:
     gaps = arch_gaps(elevation, settings)
     joint = _usual_joint(find_gaps(elevation, settings)) if gaps else _USUAL_JOINT
     for gap in gaps:
@@ -186,7 +160,7 @@ def _sigma(left: FlatStone, right: FlatStone, cut: bool) -> float:
     return float(np.hypot(np.hypot(measured, _SCATTER), _SPLIT_SIGMA if cut else 0.0))
 
 
-def _of_courses(elevation: Elevation, settings: MissingSettings, codes: _Codes) -> Iterator[MissingStone]:
+def _of_courses(elevation: Elevation, settings: MissingSettings, codes: FreeCodes) -> Iterator[MissingStone]:
     gaps = find_gaps(elevation, settings)
     joint, kinds = _usual_joint(gaps), usual_kinds(elevation)
     for hole in find_holes(gaps.gaps):
@@ -207,7 +181,7 @@ def _of_courses(elevation: Elevation, settings: MissingSettings, codes: _Codes) 
                 yield from _Fill(gap, filling, upper, joint, elevation, signs).stones(codes)
 
 
-def _frame_stone(frame: FrameGap, joint: float, elevation: Elevation, codes: _Codes) -> MissingStone:
+def _frame_stone(frame: FrameGap, joint: float, elevation: Elevation, codes: FreeCodes) -> MissingStone:
     """A jamb that ends where the others do, or a sill."""
     gap = frame.gap
     beside = (gap.left, gap.right)
@@ -270,7 +244,7 @@ class _Fill:
     elevation: Elevation
     signs: tuple[str, ...]
 
-    def stones(self, codes: _Codes) -> Iterator[MissingStone]:
+    def stones(self, codes: FreeCodes) -> Iterator[MissingStone]:
         """The stones of the gap, from left to right."""
         gap, count = self.gap, len(self.filling.kinds)
         kinds, cuts = split(gap, self.filling, usual_kinds(self.elevation), self.elevation)

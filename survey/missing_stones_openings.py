@@ -17,6 +17,7 @@ __all__ = ["FrameGap", "frame_gaps"]
 
 _ENOUGH = 2  # jambs on one side that tell where the opening is
 _STRAIGHT = 0.03  # metres by which they may differ
+_OF_ARCHES = {"voussoir", "keystone", "springer"}
 _LONGEST = 1.3  # times the longest jamb of the facade: a longer gap lacks other stones too
 
 
@@ -63,6 +64,7 @@ def frame_gaps(
             continue
         # a course above the jambs, at the arch, is none of theirs
         spans = gap.start <= left + _STRAIGHT and gap.stop >= right - _STRAIGHT
+        spans = spans and not {gap.left.block.kind, gap.right.block.kind} & _OF_ARCHES
         if spans and settings.min_length < before <= longest and gap.left.block.kind != "jamb":
             yield FrameGap(gap, "jamb", None, left)
         if spans and settings.min_length < after <= longest and gap.right.block.kind != "jamb":

@@ -81,7 +81,7 @@ class FlatStone:
         return out
 
     def side(self, towards: Array, otherwise: Array) -> Line | None:
-        """The line of its longest side that looks a way (2,); None if none does.
+        """The line of the side that looks a way (2,); None if none does.
 
         Where an end of the side is worn the line goes through the sound one, in the direction `otherwise` (2,), if
         the side is nearly in that direction.
@@ -96,13 +96,14 @@ class FlatStone:
         return Line(self.outline[sound[0] if sound else ends[0]], otherwise)
 
     def side_ends(self, towards: Array) -> tuple[int, int] | None:
-        """Indices of the ends of its longest side that looks a way."""
+        """Indices of the ends of the side that looks a way; None if none does."""
         run = np.roll(self.outline, -1, axis=0) - self.outline
         length = np.hypot(run[:, 0], run[:, 1])
-        facing = (run[:, 1] * towards[0] - run[:, 0] * towards[1]) >= _FACING * length
-        if not facing.any():
+        facing = (run[:, 1] * towards[0] - run[:, 0] * towards[1]) / length
+        if not (facing >= _FACING).any():
             return None
-        k = int(np.where(facing, length, 0.0).argmax())
+        # of a long side that looks half away and a short one that looks there it is the short one
+        k = int(np.where(facing >= _FACING, length * facing**4, 0.0).argmax())
         return k, (k + 1) % len(self.outline)
 
     def crossing(self, height: Line) -> tuple[float, float] | None:
