@@ -3,12 +3,11 @@
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from pipelines.check import CheckReport
     from pipelines.ingest_report import IngestReport, SolidsReport
     from pipelines.run import RunReport
     from pipelines.survey_report import SurveyReport
 
-__all__ = ["check_lines", "ingest_lines", "run_lines", "survey_report_lines"]
+__all__ = ["ingest_lines", "run_lines", "survey_report_lines"]
 
 _SHOWN = 20  # lines of a list; the report has them all
 
@@ -85,43 +84,6 @@ def _frame_line(frame: dict[str, Any]) -> str:
 
 def _some(names: list[str]) -> str:
     return ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")
-
-
-def check_lines(report: "CheckReport", verbose: bool) -> list[str]:
-    """The plan of a scene and its problems."""
-    lines = [
-        f"{report.scene}: {sum(report.kinds.values())} stones "
-        f"({', '.join(f'{count} {kind}' for kind, count in report.kinds.items())})",
-        f"  models: {', '.join(f'{count} {name}' for name, count in report.bodies.items())}",
-        *(
-            f"  material {one.name}: {one.stones} stones, ρ {one.density:g} kg/m³, "
-            f"E {one.young / 1e9:g} GPa, ν {one.poisson:g}"
-            for one in report.materials
-        ),
-    ]
-    lines += [f"  mesh {one.element}, {one.size:g} m: {one.stones} stones" for one in report.meshes]
-    lines += [f"  law {one}" for one in report.laws] + [f"  load {one}" for one in report.loads]
-    if report.joints is not None:
-        joints = report.joints
-        lines.append(
-            f"  {joints.count} joints closed, {joints.mean_width * 1e3:.1f} mm wide on average; "
-            f"corners moved by {joints.max_displacement * 1e3:.1f} mm at most (stone {joints.worst_stone}), "
-            f"volumes changed by {100 * joints.max_volume_change:.1f} % at most"
-        )
-    if report.cost is not None:
-        cost = report.cost
-        lines += [
-            f"  {cost.pairs} touching pairs, {cost.contacts} contact points at the start",
-            f"  {cost.unknowns} unknowns, about {max(1, round(cost.memory / 2**20))} MiB of arrays",
-            f"  at most {cost.steps} steps of {cost.step:g} s",
-        ]
-    if verbose and report.joints is not None:
-        moved = report.joints.displacement
-        lines += [f"  {code}: {distance * 1e3:.1f} mm" for code, distance in moved.items()]
-    lines += [f"problem: {problem}" for problem in report.problems]
-    if not report.problems:
-        lines.append("sound: it can be run")
-    return lines
 
 
 def run_lines(report: "RunReport", verbose: bool) -> list[str]:

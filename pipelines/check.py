@@ -1,25 +1,36 @@
 """Is a scene sound, and what will it cost: everything that can be known before it runs."""
 
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 from archmodel.database import open_database
+from mechanics.meshing.report import MeshReport
 from mechanics.plan import Plan, plan
 from mechanics.scene import Fidelity, Scene
 from moma.errors import GeometryError, MeshError
-from pipelines.assemble import assemble_stones
+from pipelines.assemble import Assembly, assemble_stones
+from pipelines.closing_check import (
+    JointsReport,
+    SimplificationReport,
+    joints_report,
+    simplification_report,
+)
+from pipelines.closing_pictures import draw_closing
+from pipelines.closing_shapes import ClosingShapes, closing_shapes
 from pipelines.entries import describe
-from pipelines.scenefile import read_scene
-from pipelines.selection import select_groups, select_stones
-from survey.closing_report import ClosingReport
+from pipelines.folder import check_replaceable, replacing
+from pipelines.scenefile import SceneFile, read_scene
+from pipelines.selection import Groups, StoneModel, select_groups, select_stones
+from pipelines.summary import as_json
+from survey.joint_settings import JointMode
 from survey.solids import Solid
 from survey.watertight import check_watertight
 
-__all__ = ["CheckReport", "Cost", "JointsReport", "MaterialUse", "MeshUse", "check_scene"]
+__all__ = ["CheckReport", "Cost", "MaterialUse", "MeshQualityReport", "MeshUse", "check_scene"]
+
+_INDEX = "check.json"
 
 
 @dataclass(frozen=True)
@@ -43,24 +54,28 @@ class MeshUse:
 
 
 @dataclass(frozen=True)
-class JointsReport:
-    """What closing the joints changes.
+class MeshQualityReport:
+    """How the deformable stones were meshed.
 
     Attributes
     ----------
-    count : joints
-    mean_width : how wide they were open on average [m]
-    max_displacement : largest movement of a corner [m], of `worst_stone`
-    max_volume_change : largest relative change of a volume [-]
-    displacement : largest movement of a corner of each stone [m]
+    nodes, cells : of all meshes
+    distinct : meshes that had to be made; stones of one shape share theirs
+    how : how many stones got their mesh from which mesher
+    smallest_angle : between two sides of a cell [degrees], in the stone `sharpest`
+    smallest_jacobian : of a cell, scaled [-], in the stone `worst`
+    retried : stones at which a mesher failed before another succeeded, with the reasons
     """
 
-    count: int
-    mean_width: float
-    max_displacement: float
-    worst_stone: str
-    max_volume_change: float
-    displacement: Mapping[str, float]
+    nodes: int
+    cells: int
+    distinct: int
+    how: Mapping[str, int]
+    smallest_angle: float
+    sharpest: str
+    smallest_jacobian: float
+    worst: str
+    retried: Mapping[str, tuple[str, ...]]
 
 
 @dataclass(frozen=True)
@@ -87,50 +102,106 @@ class Cost:
 
 @dataclass(frozen=True)
 class CheckReport:
-    """The plan of a scene; it is sound if there are no problems. Laws and loads are told in words."""
+    """The plan of a scene; it is sound if there are no problems. Laws and loads are told in words.
+
+    Attributes
+    ----------
+    simplification, joints : what became of the stones and of their joints; None if they could not be made
+    files : pictures that were drawn
+    warnings : what could not be drawn
+    """
 
     scene: str
     kinds: Mapping[str, int]
     bodies: Mapping[str, int]
     materials: tuple[MaterialUse, ...]
     meshes: tuple[MeshUse, ...]
+    mesh_quality: MeshQualityReport | None
+    simplification: SimplificationReport | None
     joints: JointsReport | None
     cost: Cost | None
     laws: tuple[str, ...]
     loads: tuple[str, ...]
     problems: tuple[str, ...]
+    files: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
-def check_scene(path: str | Path, url: str) -> CheckReport:
+def check_scene(path: str | Path, url: str, pictures: Path | None = None) -> CheckReport:
     """Check a scene file against a database, without running anything.
 
     What is wrong with the file itself is raised; what is wrong with the stones is in the report.
+
+    Parameters
+    ----------
+    path : of the scene file
+    url : of the database
+    pictures : folder for pictures of the stones and their joints, and for the report as ``check.json``; None: none
 
     Raises
     ------
     SceneError : the file is wrong, or an expression names no stone
     DatabaseError : the database cannot be read
+    UsageError : the folder holds something else
     """
+    if pictures is not None:
+        check_replaceable(pictures, _INDEX)
     scene = read_scene(path)
     with open_database(url, create=False) as database, database.session(read_only=True) as session:
         models = select_stones(scene, session)
         groups = select_groups(scene, session, models)
-    kinds = Counter(model.record.kind for model in models)
-    bodies = Counter(str(model.fidelity) for model in models)
-    uses = Counter(model.material for model in models)
     problems: list[str] = []
-    joints, cost = None, None
-    meshes: tuple[MeshUse, ...] = ()
+    assembly, needs = None, None
     try:
         assembly = assemble_stones(scene, models, groups)
-        joints = _joints(assembly.closing)
-        meshes = _meshes(assembly.scene)
         problems += _unsound_solids(assembly.scene)
+        problems += _unclosed(assembly)
         needs = plan(assembly.scene)
-        cost = _cost(needs, assembly.scene)
         problems += _unsupported(needs)
     except (GeometryError, MeshError) as error:
         problems.append(str(error))
+    report = _report(scene, models, groups, assembly, needs, tuple(problems))
+    if pictures is None or assembly is None:
+        return report
+    return _with_pictures(report, assembly, pictures)
+
+
+def _with_pictures(report: CheckReport, assembly: Assembly, folder: Path) -> CheckReport:
+    """The report with its pictures, which lie in the folder, all of them or none."""
+    with replacing(folder, _INDEX) as fresh:
+        files, warnings = draw_closing(fresh, _shapes(report.scene, assembly))
+        report = replace(report, files=(*files, _INDEX), warnings=warnings)
+        (fresh / _INDEX).write_text(as_json(asdict(report)), encoding="utf-8")
+    return report
+
+
+def _shapes(scene: str, assembly: Assembly) -> ClosingShapes:
+    """What the pictures show, about the local origin of the scene."""
+    records = [model.record for model in assembly.models]
+    return closing_shapes(
+        scene,
+        surveyed=[Solid(one.code, one.solid_vertices - assembly.origin, one.solid_faces) for one in records],
+        simple=[one.solid for one in assembly.simplified],
+        closed=[Solid(one.code, one.vertices, one.faces) for one in assembly.scene.blocks],
+        simplified={one.code: one.report.displacement for one in assembly.simplified},
+        closing=assembly.closing,
+        faces=[one.outline - assembly.origin for one in records],
+        hypotheses=frozenset(one.code for one in records if one.hypothesis),
+    )
+
+
+def _report(
+    scene: SceneFile,
+    models: Sequence[StoneModel],
+    groups: Groups,
+    assembly: Assembly | None,
+    needs: Plan | None,
+    problems: tuple[str, ...],
+) -> CheckReport:
+    """What is known: of stones that could not be assembled, or of a scene that could not be meshed, less."""
+    kinds = Counter(model.record.kind for model in models)
+    bodies = Counter(str(model.fidelity) for model in models)
+    uses = Counter(model.material for model in models)
     return CheckReport(
         scene=scene.name,
         kinds=dict(sorted(kinds.items())),
@@ -138,12 +209,14 @@ def check_scene(path: str | Path, url: str) -> CheckReport:
         materials=tuple(
             MaterialUse(one.name, one.density, one.young, one.poisson, count) for one, count in uses.items()
         ),
-        meshes=meshes,
-        joints=joints,
-        cost=cost,
+        meshes=() if assembly is None else _meshes(assembly.scene),
+        mesh_quality=None if needs is None else _mesh_quality(needs.meshes),
+        simplification=None if assembly is None else simplification_report(assembly.simplified),
+        joints=None if assembly is None else joints_report(assembly.closing, assembly.origin),
+        cost=None if assembly is None or needs is None else _cost(needs, assembly.scene),
         laws=tuple(describe(one.entry, groups) for one in scene.laws),
         loads=tuple(describe(entry, groups) for entry in (*scene.loads, *scene.throws)),
-        problems=tuple(problems),
+        problems=problems,
     )
 
 
@@ -154,17 +227,20 @@ def _meshes(scene: Scene) -> tuple[MeshUse, ...]:
     return tuple(MeshUse(element, size, count) for (element, size), count in uses.items())
 
 
-def _joints(closing: ClosingReport) -> JointsReport:
-    moved = {code: float(one.max()) for code, one in closing.displacement.items()}
-    worst = max(moved, key=lambda code: moved[code])
-    widths = [joint.width for joint in closing.joints]
-    return JointsReport(
-        count=len(closing.joints),
-        mean_width=float(np.mean(widths)) if widths else 0.0,
-        max_displacement=moved[worst],
-        worst_stone=worst,
-        max_volume_change=max(abs(change) for change in closing.volume_change.values()),
-        displacement=moved,
+def _mesh_quality(meshes: MeshReport) -> MeshQualityReport | None:
+    sharpest, worst = meshes.sharpest, meshes.worst
+    if sharpest is None or worst is None:
+        return None
+    return MeshQualityReport(
+        nodes=meshes.nodes,
+        cells=meshes.cells,
+        distinct=meshes.distinct,
+        how=meshes.how,
+        smallest_angle=sharpest.quality.min_dihedral,
+        sharpest=sharpest.code,
+        smallest_jacobian=worst.quality.min_scaled_jacobian,
+        worst=worst.code,
+        retried={one.code: one.failures for one in meshes.retried},
     )
 
 
@@ -172,10 +248,35 @@ def _unsound_solids(scene: Scene) -> list[str]:
     problems = []
     for block in scene.blocks:
         try:
-            check_watertight(Solid(block.code, block.vertices, block.faces), convex=True)
+            check_watertight(Solid(block.code, block.vertices, block.faces), convex=not block.parts)
         except GeometryError as error:
             problems.append(str(error))
     return problems
+
+
+def _unclosed(assembly: Assembly) -> list[str]:
+    """Stones of which every joint was to be closed and stays open."""
+    if assembly.closing.mode is JointMode.AS_SURVEYED:
+        return []
+    held = {block.code for block in assembly.scene.blocks if block.fidelity is Fidelity.FIXED}
+    closed = {code for one in assembly.closing.joints if not one.left_open for code in one.stones}
+    left = {
+        code: one.left_open
+        for one in reversed(assembly.closing.joints)
+        for code in one.stones
+        if one.left_open and code not in closed | held
+    }
+    if not left:
+        return []
+    first = min(left)
+    return [
+        f"no joint of these could be closed: {_some(sorted(left))}; of {first}, {left[first]}; look at the survey "
+        "there, or allow more by max_displacement in [joints]"
+    ]
+
+
+def _some(codes: Sequence[str]) -> str:
+    return ", ".join(codes[:6]) + (f" and {len(codes) - 6} more" if len(codes) > 6 else "")
 
 
 def _cost(needs: Plan, scene: Scene) -> Cost:
@@ -195,5 +296,5 @@ def _unsupported(needs: Plan) -> list[str]:
         return ['no stone is fixed, so nothing holds the others; give [bodies] fixed, e.g. ["course = 1"]']
     if not needs.loose:
         return []
-    named = ", ".join(needs.loose[:6]) + (f" and {len(needs.loose) - 6} more" if len(needs.loose) > 6 else "")
+    named = _some(needs.loose)
     return [f"no chain of touching stones ties these to a fixed one: {named}; they will fall"]

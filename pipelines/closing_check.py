@@ -113,7 +113,7 @@ class JointsReport:
     mode : close, mortar or as-surveyed
     count : joints that are closed
     planes : on so many contact planes
-    mean_width : how wide they were surveyed on average, by area [m]
+    mean_width : how wide joints were surveyed on average, open ones too, by area [m]
     area : of all of them [m²]
     left_open : how many joints stay open, by reason
     max_displacement : largest movement of a corner [m], of `worst_stone`
@@ -166,7 +166,7 @@ def simplification_report(stones: Sequence[BlockyStone]) -> SimplificationReport
 def joints_report(closing: ClosingReport, origin: Array) -> JointsReport:
     """What became of the joints, whose places are counted from `origin` (3,) [m]."""
     closed = [one for one in closing.joints if not one.left_open]
-    areas = np.array([one.area for one in closed])
+    areas = np.array([one.area for one in closing.joints])
     moved = {code: float(one.max(initial=0.0)) for code, one in closing.displacement.items()}
     worst = max(moved, key=lambda code: moved[code], default=None)
     open_for = Counter(one.left_open for one in closing.joints if one.left_open)
@@ -174,8 +174,10 @@ def joints_report(closing: ClosingReport, origin: Array) -> JointsReport:
         mode=str(closing.mode),
         count=len(closed),
         planes=len({one.plane for one in closed}),
-        mean_width=float(np.average([one.width for one in closed], weights=areas)) if areas.any() else 0.0,
-        area=float(areas.sum()),
+        mean_width=float(np.average([one.width for one in closing.joints], weights=areas))
+        if areas.any()
+        else 0.0,
+        area=sum(one.area for one in closed),
         left_open=dict(open_for.most_common()),
         max_displacement=0.0 if worst is None else moved[worst],
         worst_stone=worst,

@@ -28,6 +28,7 @@ _UNKNOWN = "#dcd9d4"
 _SEEN = np.cos(np.radians(60.0))  # a face that is turned farther away is not seen in an elevation
 _ROBUST = 98.0  # per cent of the corners that the colour scale reaches
 _FINEST = 0.1  # the colour scale ends here at least: what moved less is not worth a colour [mm]
+_DASHES = (0.0, (4.0, 2.0))
 _LABELS = {
     "simplified": "moved by simplifying the stone [mm]",
     "moved": "moved by closing the joints [mm]",
@@ -42,13 +43,13 @@ def draw_moved(path: Path, shapes: ClosingShapes, facade: Facade, step: str) -> 
     path : PNG
     shapes : what there is to draw
     facade : which of the stones, and the frame to draw them in
-    step : "simplified": on the stones as surveyed, and a line about each as simplified; "moved": in closing the joints,
-        on the stones as simulated
+    step : "simplified": on the stones as surveyed, with lines about those that became others; "moved": in closing the
+        joints, on the stones as simplified, with lines about all as simulated
     """
     own = back_to_front(shapes.stones, facade)
     simplified = step == "simplified"
     values = [1e3 * (stone.simplified if simplified else stone.moved) for stone in own]
-    faces = [seen(stone.surveyed if simplified else stone.closed, facade) for stone in own]
+    faces = [seen(stone.surveyed if simplified else stone.simple, facade) for stone in own]
     known = np.concatenate(values)
     known = known[np.isfinite(known)]
     end, _ = nice_ceiling(max(float(np.percentile(known, _ROBUST)) if len(known) else 0.0, _FINEST))
@@ -57,16 +58,18 @@ def draw_moved(path: Path, shapes: ClosingShapes, facade: Facade, step: str) -> 
     axes = figure.subplots()
     shading = _shade_all(axes, faces, values, end)
     hatch(axes, own, faces)
-    if simplified:
-        changed = [one for one in own if np.nanmax(one.simplified, initial=0.0) > 1e-3 * _FINEST]
-        _outline(axes, [corners for stone in changed for corners, _ in seen(stone.simple, facade)])
+    after = [
+        (one.simple if simplified else one.closed, one.simplified if simplified else one.moved) for one in own
+    ]
+    changed = [solid for solid, moved in after if np.nanmax(moved, initial=0.0) > 1e-3 * _FINEST]
+    _outline(axes, [corners for solid in changed for corners, _ in seen(solid, facade)])
     shade = [float(np.nanmean(moved)) / end if np.isfinite(moved).any() else np.nan for moved in values]
     name_stones(axes, own, faces, shade)
     frame_elevation(axes, facade, low, high, _title(shapes.scene, facade, step, own, values))
     if shading is not None:
         beyond = "max" if known.max() > end else "neither"
         figure.colorbar(shading, ax=axes, label=_LABELS[step], shrink=0.75, pad=0.02, extend=beyond)
-    _legend(figure, simplified, any(one.hypothesis for one in own), len(known) < sum(map(len, values)))
+    _legend(figure, step, any(one.hypothesis for one in own), len(known) < sum(map(len, values)))
     save_sheet(figure, path)
 
 
@@ -178,7 +181,7 @@ def _outline(axes: "Axes", polygons: Sequence[Array]) -> None:
     from matplotlib.collections import PolyCollection
 
     axes.add_collection(
-        PolyCollection(polygons, facecolors="none", edgecolors=INK, linewidths=0.7, linestyles=(0, (4, 2)))
+        PolyCollection(polygons, facecolors="none", edgecolors=INK, linewidths=0.7, linestyles=[_DASHES])
     )
 
 
@@ -197,16 +200,14 @@ def _title(
     return f"{scene}, {facade.name}: {what}{most}"
 
 
-def _legend(figure: "Figure", simplified: bool, guessed: bool, unknown: bool) -> None:
+def _legend(figure: "Figure", step: str, guessed: bool, unknown: bool) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    keys: list[Any] = []
-    if simplified:
-        keys.append(Line2D([], [], color=INK, linewidth=0.7, linestyle=(0, (4, 2)), label="as simplified"))
+    after = "as simplified" if step == "simplified" else "as simulated"
+    keys: list[Any] = [Line2D([], [], color=INK, linewidth=0.7, linestyle=_DASHES, label=after)]
     if guessed:
         keys.append(guess_key())
     if unknown:
         keys.append(Patch(facecolor=_UNKNOWN, edgecolor="none", label="not known"))
-    if keys:
-        figure.legend(handles=keys, loc="outside lower left", ncols=len(keys), frameon=False, fontsize=9)
+    figure.legend(handles=keys, loc="outside lower left", ncols=len(keys), frameon=False, fontsize=9)

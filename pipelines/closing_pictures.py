@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from moma.errors import MissingLibraryError
 from pipelines.closing_drawing import ClosingSurface, save_surface
 from pipelines.closing_elevations import draw_moved
 from pipelines.closing_shapes import ClosingShapes, DrawnJoint
@@ -19,7 +20,7 @@ from survey.facades import Facade, find_facades
 from survey.solids import Solid
 from survey.watertight import triangulate
 
-__all__ = ["closing_surface", "draw_elevations", "draw_in_space", "flat_facades", "viewpoint"]
+__all__ = ["closing_surface", "draw_closing", "draw_elevations", "draw_in_space", "flat_facades", "viewpoint"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -31,6 +32,15 @@ _MOST = 4  # elevations
 _MAINLY = 0.6  # of all visible area, that flat facades must have together
 _LEVEL = 0.25  # length of the mean normal, below which the stones look nowhere in particular
 _STEEP = np.deg2rad(32.0)  # how far from above, or from below, vaults and floors are looked at
+
+
+def draw_closing(folder: Path, shapes: ClosingShapes) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Draw all pictures into a folder that is there: names of the files, and what could not be drawn."""
+    flat = draw_elevations(folder, shapes)
+    try:
+        return (*flat, *draw_in_space(folder, shapes)), ()
+    except MissingLibraryError as error:
+        return flat, (f"no pictures in space: {error}",)
 
 
 def draw_elevations(folder: Path, shapes: ClosingShapes) -> tuple[str, ...]:
@@ -129,7 +139,7 @@ def _along(shapes: ClosingShapes) -> Array:
 def closing_surface(shapes: ClosingShapes, step: str = "moved") -> ClosingSurface:
     """The faces of all stones and joints; corners have what simplifying, or closing the joints, moved."""
     simplified = step == "simplified"
-    solids = [one.surveyed if simplified else one.closed for one in shapes.stones]
+    solids = [one.surveyed if simplified else one.simple for one in shapes.stones]
     starts = np.cumsum([0, *(len(one.vertices) for one in solids)])
     shut = [one for one in shapes.joints if not one.joint.left_open and one.polygon is not None]
     left = [one for one in shapes.joints if one.joint.left_open and one.polygon is not None]
@@ -160,10 +170,10 @@ _TITLES = {"simplified": "what simplifying moved", "moved": "what closing the jo
 
 
 def _steps(shapes: ClosingShapes) -> list[str]:
-    """What there is to show: simplifying, closing the joints, or both."""
+    """What moved anything: simplifying, closing the joints, or both."""
     known = {
-        "simplified": any(np.isfinite(one.simplified).any() for one in shapes.stones),
-        "moved": any(np.isfinite(one.moved).any() for one in shapes.stones),
+        "simplified": any(np.nanmax(one.simplified, initial=0.0) > 0.0 for one in shapes.stones),
+        "moved": any(np.nanmax(one.moved, initial=0.0) > 0.0 for one in shapes.stones),
     }
     return [name for name, shown in known.items() if shown]
 

@@ -23,7 +23,7 @@ class DrawnStone:
     ----------
     surveyed, simple, closed : its solid as surveyed, as simplified, and as it is simulated
     simplified : (n,) how far simplifying moved each corner of `surveyed`; NaN where it is not known [m]
-    moved : (m,) how far closing the joints moved each corner of `closed`; NaN where it is not known [m]
+    moved : (m,) how far closing the joints moved each corner of `simple`; NaN where it is not known [m]
     normal : (3,) of its visible face, outwards [-]
     centroid : (3,) of its visible face [m]
     area : of its visible face [m²]
@@ -122,7 +122,7 @@ def closing_shapes(
             simple=between,
             closed=after,
             simplified=_of_corners(simplified.get(after.code), before),
-            moved=_of_corners(closing.displacement.get(after.code), after),
+            moved=_of_corners(closing.displacement.get(after.code), between),
             normal=area_vector(face) / np.linalg.norm(area_vector(face)),
             centroid=face.mean(axis=0),
             area=float(np.linalg.norm(area_vector(face))),

@@ -13,14 +13,32 @@ __all__ = ["check", "run"]
 
 
 @reporting
-def check(scene: SceneArgument, db: Db = DEFAULT_DB, json: Json = False, verbose: Verbose = False) -> None:
+def check(
+    scene: SceneArgument,
+    pictures: Annotated[
+        Path | None,
+        typer.Option(
+            "--pictures",
+            metavar="DIR",
+            help="Draw into DIR how far corners were moved, how wide joints were, and what does not meet.",
+        ),
+    ] = None,
+    db: Db = DEFAULT_DB,
+    json: Json = False,
+    verbose: Verbose = False,
+) -> None:
     """Say whether a scene is sound and what it will cost; run nothing."""
     from moma.listing import as_json
-    from moma.telling import check_lines
+    from moma.telling_checks import check_lines
     from pipelines.check import check_scene
 
-    report = check_scene(scene, db)
-    print(as_json(asdict(report)) if json else "\n".join(check_lines(report, verbose)))
+    report = check_scene(scene, db, pictures)
+    for warning in report.warnings:
+        say(f"warning: {warning}")
+    lines = check_lines(report, verbose)
+    if pictures is not None:
+        lines += [f"  {pictures / name}" for name in report.files]
+    print(as_json(asdict(report)) if json else "\n".join(lines))
     if report.problems:
         raise typer.Exit(1)
 

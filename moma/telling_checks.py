@@ -1,0 +1,142 @@
+"""What `moma check` found, in lines for a person."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pipelines.check import CheckReport, MeshQualityReport
+    from pipelines.closing_check import JointsReport, SimplificationReport
+
+__all__ = ["check_lines"]
+
+_SHOWN = 5
+"""Stones and places that are named if no more is asked for."""
+
+_PLURALS = {
+    "hexahedron": "hexahedra",
+    "polyhedron": "general polyhedra",
+}
+
+
+def check_lines(report: "CheckReport", verbose: bool) -> list[str]:
+    """The plan of a scene, what becomes of its stones and joints, and its problems."""
+    lines = [
+        f"{report.scene}: {sum(report.kinds.values())} stones "
+        f"({', '.join(f'{count} {kind}' for kind, count in report.kinds.items())})",
+        f"  models: {', '.join(f'{count} {name}' for name, count in report.bodies.items())}",
+        *(
+            f"  material {one.name}: {one.stones} stones, ρ {one.density:g} kg/m³, "
+            f"E {one.young / 1e9:g} GPa, ν {one.poisson:g}"
+            for one in report.materials
+        ),
+    ]
+    lines += [f"  mesh {one.element}, {one.size:g} m: {one.stones} stones" for one in report.meshes]
+    if report.mesh_quality is not None:
+        lines += _mesh_lines(report.mesh_quality)
+    lines += [f"  law {one}" for one in report.laws] + [f"  load {one}" for one in report.loads]
+    if report.simplification is not None:
+        lines += _simplification_lines(report.simplification, verbose)
+    if report.joints is not None:
+        lines += _joint_lines(report.joints, verbose)
+    if report.cost is not None:
+        cost = report.cost
+        lines += [
+            f"  {cost.pairs} touching pairs, {cost.contacts} contact points at the start",
+            f"  {cost.unknowns} unknowns, about {max(1, round(cost.memory / 2**20))} MiB of arrays",
+            f"  at most {cost.steps} steps of {cost.step:g} s",
+        ]
+    lines += [f"problem: {problem}" for problem in report.problems]
+    if not report.problems:
+        lines.append("sound: it can be run")
+    return lines
+
+
+def _mesh_lines(quality: "MeshQualityReport") -> list[str]:
+    how = ", ".join(f"{count} {name}" for name, count in quality.how.items())
+    lines = [
+        f"  {quality.nodes} nodes, {quality.cells} cells in {quality.distinct} different meshes ({how}); smallest "
+        f"angle {quality.smallest_angle:.0f}° (stone {quality.sharpest}), smallest scaled Jacobian "
+        f"{quality.smallest_jacobian:.2f} (stone {quality.worst})"
+    ]
+    return lines + [f"  stone {code}: {'; '.join(failures)}" for code, failures in quality.retried.items()]
+
+
+def _simplification_lines(told: "SimplificationReport", verbose: bool) -> list[str]:
+    """What the stones were made, and which of them the survey does not bear out."""
+    shapes = ", ".join(f"{count} {_PLURALS.get(shape, shape + 's')}" for shape, count in told.shapes.items())
+    line = f"  simplified: {shapes}"
+    if told.max_displacement > 0.0:
+        line += (
+            f"; corners moved by {_mm(told.max_displacement)} at most (stone {told.worst_stone}), "
+            f"least blocky {told.least_blocky} ({told.blockiness:.2f})"
+        )
+    lines = [line]
+    outside = [
+        f"    {one.code}: moved by {_mm(one.displacement)}, the survey is good to {_mm(one.tolerance)}; {one.reason}"
+        for one in told.outside
+    ]
+    if outside:
+        lines.append(f"  {_count(len(outside), 'stone')} outside of the survey's tolerance:")
+        lines += _shortened(outside, verbose)
+    general = [f"    {code}: {reason}" for code, reason in told.general.items()]
+    if general:
+        lines.append(f"  {_count(len(general), 'stone')} of general shape:")
+        lines += _shortened(general, verbose)
+    if verbose:
+        moved = {code: distance for code, distance in told.displacement.items() if distance > 0.0}
+        lines += [f"    {code} simplified by {_mm(distance)}" for code, distance in moved.items()]
+    return lines
+
+
+def _joint_lines(told: "JointsReport", verbose: bool) -> list[str]:
+    """What became of the joints, and where stones do not meet or lie in each other."""
+    left = sum(told.left_open.values())
+    lines = [
+        f"  joints ({told.mode}): {told.count} closed on {told.planes} planes, {told.area:.2f} m² in all; "
+        f"{_mm(told.mean_width)} wide on average as surveyed; {left} left open"
+    ]
+    if told.count and told.worst_stone is not None:
+        lines.append(
+            f"  closing moved corners by {_mm(told.max_displacement)} at most (stone {told.worst_stone}), "
+            f"and changed volumes by {100 * told.max_volume_change:.1f} % at most"
+        )
+    overlaps = [
+        f"    {' and '.join(one.stones)} lie {_mm(one.depth)} in each other ({one.volume * 1e6:.3g} cm³) "
+        f"at {_place(one.place)}"
+        for one in told.overlaps
+    ]
+    if overlaps:
+        lines += [f"  {_count(len(overlaps), 'overlap')} left:", *_shortened(overlaps, verbose)]
+    gaps = [
+        f"    {' and '.join(one.stones)} open by {_mm(one.width)} over {one.area:.3f} m² at {_place(one.place)}: "
+        f"{one.reason}"
+        for one in told.gaps
+    ]
+    if gaps:
+        lines += [f"  {_count(len(gaps), 'gap')} left:", *_shortened(gaps, verbose)]
+    if told.alone:
+        some = ", ".join(told.alone[:_SHOWN]) + (", …" if len(told.alone) > _SHOWN else "")
+        lines.append(f"  {_count(len(told.alone), 'stone')} without any joint: {some}")
+    if verbose:
+        moved = {code: distance for code, distance in told.displacement.items() if distance > 0.0}
+        lines += [f"    {code} moved by {_mm(distance)}" for code, distance in moved.items()]
+    return lines
+
+
+def _shortened(lines: Sequence[str], verbose: bool) -> list[str]:
+    """The first lines, and how many more there are."""
+    if verbose or len(lines) <= _SHOWN:
+        return list(lines)
+    return [*lines[:_SHOWN], f"    and {len(lines) - _SHOWN} more, with -v"]
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+def _mm(length: float) -> str:
+    return f"{length * 1e3:.1f} mm"
+
+
+def _place(place: tuple[float, float, float]) -> str:
+    return f"({', '.join(f'{one:.3f}' for one in place)})"
