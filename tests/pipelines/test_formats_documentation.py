@@ -1,11 +1,14 @@
 """docs/formats.md is true of the survey files that are read, and of the files that a run writes."""
 
 import re
+import shlex
 from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from moma.cli import app
 from pipelines.joint_table import JOINT_COLUMNS
 from pipelines.summary import summarise
 from pipelines.vtk_output import body_cells, body_grid, contact_grid, joint_grid
@@ -15,7 +18,9 @@ from survey.formats.moma_head import HeadReader
 from survey.formats.moma_stone import STONE_WORDS
 from survey.formats.reading import FORMATS, ReadingOptions, open_survey, with_header
 from survey.records import Reject
+from survey.solids import Solid
 from tests.pipelines.handmade import deformable_body, result_of, rigid_body
+from tests.survey.assemblies import dome, obj
 
 PAGE = (Path(__file__).parents[2] / "docs" / "formats.md").read_text(encoding="utf-8")
 
@@ -157,3 +162,24 @@ def test_every_format_is_explained():
         name for row in re.findall(r"^\| (`.*?) \|", table, re.MULTILINE) for name in row.split("`")[1::2]
     ]
     assert [name for name in named if not name.startswith("-")] == list(FORMATS)
+
+
+def test_the_commands_for_solids_do_what_they_say(tmp_path, monkeypatch):
+    """On two rings of a dome, rounded to a millimetre, the lower of which stands on the ground."""
+    section = PAGE.split("\n## Closed solids")[1].split("\n# Result files")[0]
+    found = re.findall(r"^```sh\n(.*?)^```$", section, re.MULTILINE | re.DOTALL)
+    assert [line.split()[1] for text in found for line in text.splitlines()] == ["ingest", "ingest"]
+    stones = [Solid(one.code, one.vertices - np.array([0, 0, 0.49]), one.faces) for one in dome(2)]
+    (tmp_path / "vault.obj").write_text(obj(stones, 3))
+    monkeypatch.chdir(tmp_path)
+    printed = []
+    for number, text in enumerate(found):
+        for line in text.splitlines():
+            command = [*shlex.split(line)[1:], "--db", f"sqlite:///{number}.db"]
+            done = CliRunner().invoke(app, command)
+            assert done.exit_code == 0, done.output
+            printed.append(done.stdout)
+    assert "20 stones of survey 'vault' (20 ashlar)" in printed[0]
+    assert "0 convex, 20 not" in printed[0]
+    assert "contacts brought into" in printed[0]
+    assert "(10 support, 10 voussoir)" in printed[1]
