@@ -18,6 +18,7 @@ from survey.solids import Solid
 __all__ = [
     "about",
     "common_share",
+    "face_vectors",
     "from_edges",
     "largest_skew",
     "moved_corners",
