@@ -9,9 +9,9 @@ __all__ = ["lay_points", "size_at"]
 
 # a point keeps this many times the size from all others, and from the boundary of what it fills
 _APART = 0.65
-_INSIDE = .4
+_INSIDE = 0.4
 # step of the cubic lattice, over the size: tetrahedra then have edges of about that length
-_STEP = .97
+_STEP = 0.97
 # points lie on a plane within this part of the stone's size; what is nearly too near is not, so that rounding matters
 # to few stones
 _ON_PLANE = 1e-9

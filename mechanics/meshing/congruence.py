@@ -94,11 +94,14 @@ def motion(
     tolerance = _tolerance(first, second)
     size = float(np.abs(a).max())
     start = _frame(a, faces[0], 0)
-    for turn in (np.eye(3), _fitted(a, b), *_turns(start, faces[0], b, second_faces)):
+    still = np.eye(3)
+    for turn in (still, _fitted(a, b), *_turns(start, faces[0], b, second_faces)):
         corner = _matched(a @ turn.T, b, 1e-6 * size)
         if corner is None:
             continue
-        fine = turn if _off(a, b[corner], turn) <= tolerance else _fitted(a, b[corner])
+        # what moves without a turn, to rounding, has none; other turns are taken from all corners
+        straight = turn is still and _off(a, b[corner], turn) <= tolerance
+        fine = turn if straight else _fitted(a, b[corner])
         if _off(a, b[corner], fine) > tolerance:
             continue
         face = _faces_onto(faces, second_faces, corner)

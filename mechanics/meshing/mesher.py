@@ -100,10 +100,10 @@ def _attempts(block: Block) -> tuple[_Attempt, ...]:
         _Attempt("gmsh", using(mesh_with_gmsh)),
         _Attempt("gmsh, finer and by HXT", using(mesh_with_gmsh, algorithm=Algorithm.HXT), _FINER),
     )
-    if not is_convex(block.vertices, block.faces):
-        return gmsh
     convex = (_Attempt("delaunay", delaunay),)
     finer = (_Attempt("delaunay, finer", delaunay, _FINER),)
+    if not is_convex(block.vertices, block.faces):
+        return convex if block.mesher is Mesher.DELAUNAY else gmsh
     if block.mesher is Mesher.DELAUNAY:
         return convex + finer
     return gmsh + convex if block.mesher is Mesher.GMSH else convex + gmsh + finer

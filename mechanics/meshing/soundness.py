@@ -34,10 +34,10 @@ def check_meshable(vertices: Array, faces: Faces, code: str) -> None:
     size = float(np.ptp(vertices, axis=0).max())
     _check_corners(vertices, faces, size, where)
     try:
-        volume = mass_properties(vertices, faces, where).volume
+        mass_properties(vertices, faces, where)
     except GeometryError as error:
         raise MeshError(error.what, where=where, remedy=error.remedy) from error
-    _check_thickness(vertices, volume, size, where)
+    _check_thickness(vertices, size, where)
     for k, face in enumerate(faces):
         _check_planar(k, face, vertices, size, where)
     if not is_convex(vertices, faces):
@@ -66,10 +66,10 @@ def _check_corners(vertices: Array, faces: Faces, size: float, where: str) -> No
         )
 
 
-def _check_thickness(vertices: Array, volume: float, size: float, where: str) -> None:
+def _check_thickness(vertices: Array, size: float, where: str) -> None:
     local = vertices - vertices.mean(axis=0)
     extents = np.ptp(local @ np.linalg.svd(local, full_matrices=False)[2].T, axis=0)
-    thin = float(min(extents.min(), volume / (extents[0] * extents[1])))
+    thin = float(extents.min())
     if thin < _THIN * size:
         shape = "a needle" if extents[1] < 10.0 * _THIN * size else "flat"
         raise MeshError(
