@@ -2,7 +2,8 @@
 
 import math
 import platform
-from collections.abc import Mapping
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, is_dataclass
 from functools import cache
 from importlib.metadata import version
@@ -26,8 +27,17 @@ from mechanics.scene import Scene
 from pipelines.assemble import Assembly
 from pipelines.joint_table import normal_and_shear
 from pipelines.scenefile import SceneFile
+from survey.closing_report import ClosingReport, Joint
 
-__all__ = ["contact_arrays", "joint_arrays", "run_record", "settings_of", "simplifications", "versions"]
+__all__ = [
+    "contact_arrays",
+    "joint_arrays",
+    "run_record",
+    "settings_of",
+    "simplifications",
+    "surveyed_widths",
+    "versions",
+]
 
 Array = NDArray[np.float64]
 
@@ -65,14 +75,18 @@ def run_record(
         simulated=result.time,
         wall=summary["time"]["wall"],
         errors=_errors(result.errors),
-        joints=joint_arrays(result.joints, assembly.origin),
+        joints=joint_arrays(
+            result.joints,
+            assembly.origin,
+            surveyed_widths(result.joints, [block.code for block in result.scene.blocks], assembly.closing),
+        ),
         contacts=contact_arrays(result.contacts, assembly.origin),
         simplifications=simplifications(assembly),
     )
 
 
-def joint_arrays(joints: JointResult, origin: Array) -> JointArrays:
-    """The joints, whose places are counted from `origin` (3,), in the frame of the site [m]."""
+def joint_arrays(joints: JointResult, origin: Array, widths: Array) -> JointArrays:
+    """The joints in the frame of the site; places are counted from `origin` (3,), `widths` (nj,) as surveyed [m]."""
     normal, shear = normal_and_shear(joints)
     return JointArrays(
         stones=joints.bodies,
@@ -91,6 +105,7 @@ def joint_arrays(joints: JointResult, origin: Array) -> JointArrays:
         gap=joints.gap,
         opening=joints.opening,
         sliding=joints.sliding,
+        width=widths,
     )
 
 
@@ -110,10 +125,31 @@ def contact_arrays(contacts: ContactResult, origin: Array) -> ContactArrays:
     )
 
 
+def surveyed_widths(joints: JointResult, codes: Sequence[str], closing: ClosingReport) -> Array:
+    """How wide each joint of a run (nj,) was surveyed [m]; NaN where two stones touch that were not found to face.
+
+    Parameters
+    ----------
+    joints : of the run
+    codes : of its stones, in the order of their numbers
+    closing : what was found of the joints before it. Of several joints of two stones, the one that lies most alike
+    """
+    known: dict[frozenset[str], list[Joint]] = defaultdict(list)
+    for one in closing.joints:
+        known[frozenset(one.stones)].append(one)
+    widths = np.full(len(joints.area), np.nan)
+    for number, (stones, frame) in enumerate(zip(joints.bodies.tolist(), joints.frame, strict=True)):
+        found = known.get(frozenset(codes[stone] for stone in stones))
+        if found:
+            alike = max(found, key=lambda one: abs(float(one.normal @ frame[0])))
+            widths[number] = alike.width
+    return widths
+
+
 def simplifications(assembly: Assembly) -> tuple[SimplificationRecord, ...]:
     """The solids that stood for the stones, compared with those of the survey."""
     mode, records = str(assembly.closing.mode), []
-    for model, block in zip(assembly.models, assembly.scene.blocks, strict=True):
+    for model, simple, block in zip(assembly.models, assembly.simplified, assembly.scene.blocks, strict=True):
         surveyed, vertices = model.record.solid_vertices - assembly.origin, block.vertices
         measured, _ = solid_volume(surveyed, model.record.solid_faces)
         volume, _ = solid_volume(vertices, block.faces)
@@ -126,6 +162,10 @@ def simplifications(assembly: Assembly) -> tuple[SimplificationRecord, ...]:
                 volume_change=volume / measured - 1.0,
                 vertices=vertices + assembly.origin,
                 faces=block.faces,
+                shape=str(simple.shape),
+                blockiness=float(simple.report.blockiness),
+                worst_angle=math.radians(simple.report.worst_angle),
+                within_tolerance=bool(simple.report.within),
             )
         )
     return tuple(records)

@@ -163,6 +163,7 @@ def check_joints(joints, result, assembly, codes):
         assert stored == wanted, name
     for name in ("area", "gap", "opening", "sliding", "parted"):
         assert [getattr(one, name) for one in joints] == getattr(given, name).tolist()
+    assert columns(joints, "width")[:, 0] == pytest.approx(0.010, abs=1e-6)  # as the faces were surveyed
 
 
 def check_equilibrium(points, result, assembly, codes):
@@ -225,6 +226,9 @@ def check_solids(session, number, assembly, codes):
         volume = tetrahedra(block.vertices, block.faces)[0]
         length = FACES[block.code][3]
         assert one.volume_change == pytest.approx(volume / (length * 0.29 * 0.4) - 1.0, abs=1e-6)
+        # the faces are rectangles
+        assert (one.shape, one.blockiness, one.within_tolerance) == ("hexahedron", 1.0, True)
+        assert one.worst_angle == pytest.approx(0.0, abs=1e-6)
 
 
 def test_a_result_leads_back_to_the_points_that_were_measured(ran):
