@@ -15,6 +15,7 @@ from survey.joint_planes import ContactPlanes, StoneFaces, contact_planes, some_
 from survey.joint_settings import JointSettings
 from survey.overlaps import planes_of_solid
 from survey.solids import Solid
+from survey.worn_sides import mended_planes
 
 __all__ = ["Building", "Cut", "as_building", "close_within_bounds"]
 
@@ -101,7 +102,9 @@ def as_building(stones: Sequence[BlockyStone]) -> Building:
     return Building(tuple(stones), solids, origin, faces, rows, convex)
 
 
-def close_within_bounds(building: Building, facing: FacingFaces, settings: JointSettings) -> Cut:
+def close_within_bounds(
+    building: Building, facing: FacingFaces, settings: JointSettings, known: Sequence[Solid]
+) -> Cut:
     """Close the joints of a building, but for those that would move a corner farther than the bound.
 
     Parameters
@@ -109,6 +112,7 @@ def close_within_bounds(building: Building, facing: FacingFaces, settings: Joint
     building : the stones
     facing : pairs of faces that face each other
     settings : bounds
+    known : the stones with their joints closed, as far as is known by now
     """
     reasons = [""] * len(facing)
     for number in range(_ROUNDS + len(building.stones)):
@@ -117,8 +121,8 @@ def close_within_bounds(building: Building, facing: FacingFaces, settings: Joint
         for k in links[some.of_link < 0].tolist():
             reasons[k] = _KEPT
         contact = _of_all(some, links, len(facing))
-        planes, free = _stone_planes(building, facing, contact)
-        touched = {i: rows for i, rows in planes.items() if not free[i].all()}
+        planes, free = _stone_planes(building, facing, contact, known, settings)
+        touched = {i: rows for i, rows in planes.items() if _changed(building, i, rows)}
         solids, offended = list(building.solids), False
         of_face = {}
         for i, stone in cut_stones(building.solids, touched).items():
@@ -153,11 +157,20 @@ def _of_all(some: ContactPlanes, links: Ints, count: int) -> ContactPlanes:
 
 
 def _stone_planes(
-    building: Building, facing: FacingFaces, contact: ContactPlanes
+    building: Building,
+    facing: FacingFaces,
+    contact: ContactPlanes,
+    known: Sequence[Solid],
+    settings: JointSettings,
 ) -> tuple[dict[int, Array], dict[int, Bools]]:
     """Planes of each convex stone: of its faces in order, those of joints or its own, then further ones of joints."""
-    rows = building.planes.copy()
-    taken = np.zeros(len(rows), np.bool_)
+    taken = np.zeros(len(building.planes), np.bool_)
+    taken[facing.faces[contact.of_link >= 0]] = True
+    neighbours = building.faces.planes.owner[facing.faces[contact.of_link >= 0]]
+    rows = mended_planes(
+        building.faces, building.planes, ~taken, neighbours, known, settings.max_displacement
+    )
+    taken[:] = False
     further: dict[int, list[Array]] = {}
     known: set[tuple[int, int]] = set()
     for k in np.flatnonzero(contact.of_link >= 0).tolist():
@@ -177,6 +190,12 @@ def _stone_planes(
         planes[i] = np.vstack([rows[building.rows(i)], more])
         free[i] = np.concatenate([~taken[building.rows(i)], np.zeros(len(more), np.bool_)])
     return planes, free
+
+
+def _changed(building: Building, stone: int, planes: Array) -> bool:
+    """Whether a stone has other planes than those of its faces."""
+    own = building.planes[building.rows(stone)]
+    return len(planes) != len(own) or not np.array_equal(planes, own)
 
 
 def _leave_open(

@@ -76,12 +76,12 @@ def close_joints(
         cut = _as_surveyed(building, facing)
         overlaps = find_overlaps(cut.solids, cut.planes)
     else:
-        cut = close_within_bounds(building, facing, settings)
+        cut = close_within_bounds(building, facing, settings, building.solids)
         for _ in range(_ROUNDS):
-            more = newly_facing(building, facing, cut, settings)
-            if len(more) == len(facing):
+            before, facing = facing, newly_facing(building, facing, cut, settings)
+            cut = close_within_bounds(building, facing, settings, cut.solids)
+            if len(facing) == len(before):
                 break
-            facing, cut = more, close_within_bounds(building, more, settings)
         parted, overlaps = part_stones(
             building.solids, cut.solids, cut.planes, cut.free, settings.max_displacement
         )

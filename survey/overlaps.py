@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 _LEAST = 1e-10  # metres: solids that share a plane lie so deep in each other by rounding
+_ON_PLANE = 1e-8  # metres
 _LEAST_VOLUME = 1e-12  # cubic metres
 _ALIKE = 0.3  # normals of two faces that differ by less have no plane between them
 _SHALLOW = 0.01  # metres by which a free face rather gives way than that a stone gets a further face
@@ -80,13 +81,13 @@ def find_overlaps(solids: Sequence[Solid], planes: Mapping[int, Array]) -> list[
         depth = deepest_overlaps(near, all_vertices, vertex_starts, all_planes, plane_starts, _LEAST)
         for k in np.flatnonzero(depth > _LEAST):
             i, j = sorted((chosen[near[k, 0]], chosen[near[k, 1]]))
-            found = overlapping(i, j, solids[i], solids[j], planes, float(depth[k]))
+            found = _overlapping(i, j, solids[i], solids[j], planes, float(depth[k]))
             if found is not None:
                 out.append(found)
     return sorted(out, key=lambda one: one.pair)
 
 
-def overlapping(
+def _overlapping(
     i: int, j: int, first: Solid, second: Solid, planes: Mapping[int, Array], depth: float
 ) -> Overlapping | None:
     """What two solids have in common; None if that is nothing but rounding."""
@@ -110,25 +111,31 @@ class _Parting:
     def part(self, found: Overlapping) -> None:
         """Part two stones by the cheapest way that moves no corner farther than the bound."""
         i, j = found.pair
-        current = overlapping(i, j, self.solids[i], self.solids[j], self.planes, found.depth)
+        current = _overlapping(i, j, self.solids[i], self.solids[j], self.planes, found.depth)
         if current is None:
             return
-        ways = [*self._retreats(i, j), *self._retreats(j, i)]
-        ways = [way for way in ways if way[0] <= _SHALLOW]
-        if ways:
-            _, stone, plane, offset = min(ways)
+        ways = [*self._retreats(i, j, current), *self._retreats(j, i, current)]
+        for _, stone, plane, row in sorted(
+            (way for way in ways if way[0] <= _SHALLOW), key=lambda way: way[:3]
+        ):
             new = self.planes[stone].copy()
-            new[plane, 3] = offset
+            new[plane] = row
             if self._cut({stone: new}):
                 return
         self._divide(current)
 
-    def _retreats(self, one: int, other: int) -> list[tuple[float, int, int, float]]:
-        """How far each free face of one stone has to go back to free the other: distance, stone, plane, offset."""
+    def _retreats(self, one: int, other: int, found: Overlapping) -> list[tuple[float, int, int, Array]]:
+        """Ways in which a free face of a stone goes back to free another: how far, stone, plane, its new place.
+
+        It goes back as a whole, or turns about one of its edges, as an intrados does at the foot of an arch.
+        """
         out = []
-        for p in np.flatnonzero(self.free[one]):
-            low = float((self.solids[other].vertices @ self.planes[one][p, :3]).min())
-            out.append((float(self.planes[one][p, 3]) - low, one, int(p), low))
+        for p in np.flatnonzero(self.free[one]).tolist():
+            row = self.planes[one][p]
+            low = float((self.solids[other].vertices @ row[:3]).min())
+            out.append((float(row[3]) - low, one, p, np.array([*row[:3], low])))
+            polygon = _face_on(self.solids[one], row)
+            out += [(far, one, p, turned) for far, turned in _turns(row, polygon, found.part.vertices)]
         return out
 
     def _divide(self, found: Overlapping) -> None:
@@ -204,3 +211,30 @@ def part_stones(
     for found in find_overlaps(state.solids, own):
         state.part(found)
     return state.solids, find_overlaps(state.solids, own)
+
+
+def _face_on(solid: Solid, plane: Array) -> Array:
+    """Corners (n, 3) of the face of a solid that lies on a plane; none if there is no such face."""
+    for face in solid.faces:
+        polygon = solid.vertices[list(face)]
+        if np.abs(polygon @ plane[:3] - plane[3]).max() <= _ON_PLANE:
+            return polygon
+    return np.zeros((0, 3))
+
+
+def _turns(plane: Array, polygon: Array, part: Array) -> list[tuple[float, Array]]:
+    """A face turned about each of its edges until what it shared (n, 3) lies before it: how far it goes, its plane."""
+    out = []
+    for k in range(len(polygon)):
+        start, along = polygon[k - 1], polygon[k] - polygon[k - 1]
+        normals = np.cross(along, part - start)
+        lengths = np.linalg.norm(normals, axis=1)
+        normals = normals[lengths > 1e-9 * float(along @ along)]
+        normals /= np.linalg.norm(normals, axis=1)[:, None]
+        normals *= np.where(normals @ plane[:3] < 0.0, -1.0, 1.0)[:, None]
+        for normal in normals:
+            if ((part - start) @ normal).min() >= -_LEAST:
+                far = float(((polygon - start) @ normal).max())
+                out.append((far, np.array([*normal, float(start @ normal)])))
+                break
+    return out
