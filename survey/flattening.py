@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from survey.blockiness import face_vectors, from_edges
-from survey.solids import Solid, area_vector
+from survey.solids import Solid
 
-__all__ = ["FlatSolid", "flatten", "highest_corner", "is_plane"]
+__all__ = ["FlatSolid", "flatten", "highest_corner"]
 
 Array = NDArray[np.float64]
 Face = tuple[int, ...]
@@ -84,24 +84,9 @@ def flatten(solid: Solid, tolerance: float) -> FlatSolid | None:
     return FlatSolid(flat, moved) if moved.max() <= tolerance else None
 
 
-def is_plane(solid: Solid, tolerance: float) -> bool:
-    """Whether all corners of every face lie in its plane, within a tolerance [m]."""
-    return all(
-        len(face) == 3 or bool(np.abs(_heights(solid.vertices[list(face)])).max() <= tolerance)
-        for face in solid.faces
-    )
-
-
 def highest_corner(solid: Solid, planes: Array) -> float:
     """Largest height of any corner above the plane of any face [m]; planes (nf, 4) as normal and offset."""
     return float((solid.vertices @ planes[:, :3].T - planes[:, 3]).max())
-
-
-def _heights(polygon: Array) -> Array:
-    """Of the corners of a polygon above its mean plane (n,) [m]."""
-    normal = area_vector(polygon)
-    out: Array = (polygon - polygon.mean(axis=0)) @ (normal / max(float(np.linalg.norm(normal)), 1e-300))
-    return out
 
 
 def _plane_groups(solid: Solid, vectors: Array, tolerance: float) -> list[list[int]]:

@@ -6,7 +6,8 @@ from numpy.typing import NDArray
 from moma.errors import GeometryError
 from survey.blockiness import about, common_share, largest_skew, moved_corners, solid_planes, solid_volume
 from survey.extrusion import SurveyedBlock
-from survey.flattening import FlatSolid, flatten, highest_corner, is_plane
+from survey.flattening import FlatSolid, flatten, highest_corner
+from survey.folds import fold, warp
 from survey.prisms import as_prism, box_around
 from survey.simplified import BlockShape, SimpleSolid, Simplified, prism_shape
 from survey.snapping import snap
@@ -71,8 +72,21 @@ def _prism(solid: Solid, outward: Array, first: Array) -> Solid | None:
 
 
 def _general(old: Solid, tolerance: float) -> Solid:
-    """A solid that is no prism, its faces plane: corners are moved by as little as can be, or faces are folded."""
-    return old if is_plane(old, _PLANE) else snap([old], tolerance)[0][0]
+    """A solid that is no prism, its faces plane: its corners are moved by as little as can be, or faces are folded."""
+    if _is_plane(old):
+        return old
+    settled = snap([_folded(old, tolerance)], tolerance)[0][0]
+    moved = float(np.linalg.norm(settled.vertices - old.vertices, axis=1).max())
+    return settled if moved <= tolerance and _is_plane(settled) else _folded(old, _PLANE)
+
+
+def _folded(solid: Solid, tolerance: float) -> Solid:
+    faces = tuple(part for face in solid.faces for part in fold(solid.vertices, face, tolerance))
+    return Solid(solid.code, solid.vertices, faces)
+
+
+def _is_plane(solid: Solid) -> bool:
+    return all(warp(solid.vertices[list(face)]) <= _PLANE for face in solid.faces)
 
 
 def _rise(solid: Solid) -> float:
@@ -99,8 +113,9 @@ def _why_general(old: Solid, new: Solid) -> str:
         said.append(f"not convex, a corner stands {rise * 1e3:.2g} mm above the plane of a face")
     else:
         said.append("convex, but no prism of which three planes meet in each corner")
-    if new is not old:
-        moved = float(np.linalg.norm(new.vertices - old.vertices, axis=1).max())
+    if len(new.faces) > len(old.faces):
+        said.append(f"folded from {len(old.faces)} that are not plane")
+    if (moved := float(np.linalg.norm(new.vertices - old.vertices, axis=1).max())) > 0.0:
         said.append(f"corners moved by up to {moved * 1e3:.2g} mm to make them plane")
     return "; ".join(said)
 
