@@ -31,9 +31,8 @@ _LEFT, _RIGHT, _UPRIGHT = np.array([-1.0, 0.0]), np.array([1.0, 0.0]), np.array(
 _USUAL_JOINT = 0.01  # metres, where no joint can be measured
 _SCATTER = 0.003  # metres: how far a stone ends from the middle of its joint, one time as another
 _TALL = 0.04  # metres: ends of gaps of two courses that are nearer belong to one stone
-_BEHIND = (
-    0.05  # metres behind its face at which a proposal is compared with stones that were seen from elsewhere
-)
+_ROUNDS = 4  # of proposals that rest on those of the round before
+_BEHIND = 0.05  # metres behind its face where a proposal is compared with stones seen from elsewhere
 _SPLIT_SIGMA = 0.08  # metres: how well the joint between two missing stones is known
 
 
@@ -80,13 +79,19 @@ def propose_missing(
     codes = FreeCodes({*taken, *(block.code for block in blocks)})
     found: list[MissingStone] = []
     for elevation in elevations(blocks):
-        voussoirs = list(_voussoirs(elevation, settings, codes))
-        flat = [_flat(stone.block, elevation) for stone in voussoirs]
-        whole = Elevation(elevation.frame, (*elevation.stones, *flat))
         mine = {id(stone.block) for stone in elevation.stones}
         others = [block for block in blocks if id(block) not in mine]
-        proposed = [*voussoirs, *_of_courses(whole, settings, codes)]
-        found += [stone for stone in proposed if not _is_there(stone.block, others)]
+        # what was beside a missing jamb is a hole of its own once the jamb is there
+        for _ in range(_ROUNDS):
+            new = []
+            for propose in (_voussoirs, _of_courses):
+                proposed = list(propose(elevation, settings, codes))
+                new += [stone for stone in proposed if not _is_there(stone.block, others)]
+                flat = [_flat(stone.block, elevation) for stone in proposed]
+                elevation = Elevation(elevation.frame, (*elevation.stones, *flat))
+            found += new
+            if not new:
+                break
     return tuple(found)
 
 
@@ -115,7 +120,10 @@ def _voussoirs(elevation: Elevation, settings: MissingSettings, codes: FreeCodes
     for gap in gaps:
         left, right = gap.left.block.code, gap.right.block.code
         before = left
-        for k, outline in enumerate(voussoir_outlines(gap, joint)):
+        outlines = voussoir_outlines(gap, joint)
+        if any(stone.contains(outline.mean(axis=0)) for outline in outlines for stone in elevation.stones):
+            continue
+        for k, outline in enumerate(outlines):
             kind = "keystone" if k == gap.keystone else "voussoir"
             depth = depth_of_kind("voussoir", (gap.left, gap.right), elevation, None)
             angle = float(np.degrees(gap.sides[1].angle - gap.sides[0].angle))

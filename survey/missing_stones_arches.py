@@ -20,7 +20,7 @@ Ends = tuple[int, int]
 
 _WEDGES = {"voussoir", "keystone"}
 _ENOUGH = 3  # voussoirs from which the centre of an arch is found
-_REACH = 2.7  # lengths of a voussoir within which the next one stands, where one or two are missing
+_REACH = 3.4  # lengths of a voussoir within which the next one stands, where one or two are missing
 _OFF_CENTRE = 0.15  # radii by which the joint of a springer may pass by the centre
 _ONE_SKEWBACK = float(np.radians(4.0))  # sides of springers that are nearer to parallel are one
 _SHORTEST = 0.2  # sine of the least rise of a skewback

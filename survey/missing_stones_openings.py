@@ -76,4 +76,5 @@ def _reveal(places: list[float]) -> float | None:
     if len(places) < _ENOUGH:
         return None
     middle = float(np.median(places))
-    return middle if max(abs(place - middle) for place in places) <= _STRAIGHT else None
+    agreed = [place for place in places if abs(place - middle) <= _STRAIGHT]
+    return float(np.mean(agreed)) if len(agreed) >= max(_ENOUGH, 0.5 * len(places)) else None
