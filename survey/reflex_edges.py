@@ -21,10 +21,12 @@ class ReflexEdge:
 
     Attributes
     ----------
-    start, stop : (3,) its corners [m]
+    corners : numbers of its two corners
+    start, stop : (3,) where they are, or where a piece of the edge begins and ends [m]
     first, second : numbers of its two faces
     """
 
+    corners: tuple[int, int]
     start: tuple[float, float, float]
     stop: tuple[float, float, float]
     first: int
@@ -87,5 +89,5 @@ def reflex_edges(solid: Solid) -> tuple[ReflexEdge, ...]:
         rises = float(np.cross(planes[k, :3], planes[other, :3]) @ edge) < 0.0
         if rises and heights.max() > tolerance:
             start, stop = solid.vertices[i].tolist(), solid.vertices[j].tolist()
-            found.append(ReflexEdge(tuple(start), tuple(stop), k, other))
+            found.append(ReflexEdge((i, j), tuple(start), tuple(stop), k, other))
     return tuple(found)

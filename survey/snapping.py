@@ -3,8 +3,8 @@
 Which faces belong together is found first (`survey.matching_faces`); then corners and planes are moved together
 (`survey.plane_network`), each stone keeping its corners, edges and faces, all faces of which become plane to the
 last digit. Where a corner would have to move farther than the tolerance, what ties it is let go, one thing after
-the other until it stays: first planes that are common only at a seam, then the planeness of a free face, which is
-folded, and last the contact itself, which is left open and listed.
+the other until it stays: first corners of folds (`survey.meeting_corners`) and planes that are common only at a
+seam, then the planeness of a free face, which is folded, and last the contact itself, which is left open and listed.
 """
 
 from collections import Counter
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from survey.folds import fold
 from survey.matching_faces import Match, common_planes, find_matches
+from survey.meeting_corners import meeting_corners
 from survey.plane_network import Settled, settle
 from survey.snapping_report import OpenContact, Snapping
 from survey.solids import Solid
@@ -23,6 +24,7 @@ from survey.solids import Solid
 __all__ = ["snap"]
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 Polygon = tuple[int, ...]
 
 _EXACT = 1e-12  # of the size of all: farther from its planes no corner may stay
@@ -61,6 +63,8 @@ class _Assembly:
         self._folded: Counter[int] = Counter()
         self._gone: set[int] = set()  # faces that were folded: their pieces follow at the end
         self._matches = list(find_matches(solids, tolerance))
+        touching = {k for one in self._matches if one.area > 0.0 for k in one.faces}
+        self._folds = meeting_corners(solids, touching, 2.0 * tolerance)
         self._open: list[tuple[Match, str]] = []
         self._plane: list[int] = []
         self._settled = Settled(self._vertices, np.empty((0, 3)), np.empty(0))
@@ -87,20 +91,20 @@ class _Assembly:
             self._matches.remove(match)
             self._open.append((match, "others that share their planes are too far from a common one"))
 
-    def _incidences(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def _incidences(self) -> tuple[Ints, Ints]:
         """Which corner lies on which plane; a triangle of its own has no need of one."""
         count = Counter(self._plane[k] for k in self._present())
+        planes: dict[int, set[int]] = {}
+        for k in self._present():
+            if len(self._faces[k]) > 3 or count[self._plane[k]] > 1:
+                for i in self._faces[k]:
+                    planes.setdefault(i, set()).add(self._plane[k])
+        for i, others in self._folds.items():
+            planes[i] |= {p for j in others for p in planes.get(j, ()) if count[p] > 1}
         known: dict[int, int] = {}
-        rows = sorted(
-            {
-                (known.setdefault(self._plane[k], len(known)), i)
-                for k in self._present()
-                if len(self._faces[k]) > 3 or count[self._plane[k]] > 1
-                for i in self._faces[k]
-            }
-        )
+        rows = [(i, known.setdefault(p, len(known))) for i in sorted(planes) for p in sorted(planes[i])]
         table = np.array(rows, dtype=np.int64).reshape(-1, 2)
-        return table[:, 1], table[:, 0]
+        return table[:, 0], table[:, 1]
 
     def _present(self) -> Iterator[int]:
         return (k for k in range(len(self._faces)) if k not in self._gone)
@@ -121,6 +125,11 @@ class _Assembly:
                 self._loosen(i, at[i], planes, float(moved[i]))
 
     def _loosen(self, corner: int, faces: list[int], planes: set[int], moved: float) -> None:
+        turned = {i for k in self._present() if self._plane[k] in planes for i in self._faces[k]}
+        folds = {corner} & self._folds.keys() or turned & self._folds.keys()
+        if folds:
+            self._folds = {i: others for i, others in self._folds.items() if i not in folds}
+            return
         seams = [one for one in self._matches if not one.area > 0.0 and self._plane[one.faces[0]] in planes]
         if seams:
             self._matches = [one for one in self._matches if one not in seams]

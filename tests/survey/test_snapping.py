@@ -109,7 +109,7 @@ def test_contacts_come_back_that_were_lost_by_rounding(
     )
     for one in got:
         check_watertight(one)
-    assert largest_overlap(got) < 1e-9
+    assert largest_overlap(got) < 1e-12
 
 
 def test_what_is_exact_stays_where_it_is() -> None:
