@@ -14,7 +14,7 @@ from moma.errors import UsageError
 if TYPE_CHECKING:
     from pipelines.propose import ProposalReport
 
-__all__ = ["propose"]
+__all__ = ["CoreShape", "What", "propose"]
 
 
 class What(StrEnum):

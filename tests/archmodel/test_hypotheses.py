@@ -1,111 +1,96 @@
-"""Stones that nobody has seen are entities like others, and say so wherever they are told of."""
+"""Stones that nobody has seen: all or nothing into the database, and out of every question when withdrawn."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from sqlalchemy import func, select
 
-from archmodel.correcting import correct
-from archmodel.database import Database
-from archmodel.entities import Support, kinds
-from archmodel.entries import new_entry
-from archmodel.query import describe, find, find_rows
-from archmodel.records import StoneRecord
-from archmodel.run_records import SimplificationRecord
-from archmodel.store import load_stones, store_survey
-from archmodel.store_runs import store_run
-from moma.errors import UsageError
-from tests.archmodel.stones import box_stone, run_record
+from archmodel.database import open_database
+from archmodel.entities import Entity
+from archmodel.entries import Entry, new_entry
+from archmodel.hypotheses import store_hypotheses, withdraw_hypotheses
+from archmodel.query import find
+from archmodel.recording import Outcome
+from archmodel.store import load_stones
+from archmodel.surveys import Measurement
+from moma.errors import DatabaseError, UsageError
+from pipelines.stone_records import stone_record, surveyed_block
+from survey.depth import depth_for
+from survey.extrusion import extrude
+from survey.faces import outline_face
+from survey.missing_stones import propose_missing
+from survey.synthetic.sample import make_sample
 
 
-def guessed(code: str) -> StoneRecord:
-    text = "fills the hole between V1 and V2"
-    plain = box_stone(code, at=(8.0, 0.0, 0.0))
-    return replace(plain, hypothesis=True, provenance="hypothesis", provenance_text=text)
+@pytest.fixture(scope="module")
+def records():
+    survey = make_sample().survey
+    blocks = [
+        extrude(outline_face(one, survey.head.viewpoint(None)), depth_for(one, survey.head.depth_rules))
+        for one in survey.blocks
+    ]
+    gone = {"W05-02", "W10-05"}
+    found = propose_missing([one for one in blocks if one.code not in gone])
+    return [stone_record(one.block) for one in found]
 
 
 @pytest.fixture
-def building(filled: Database) -> Database:
-    with filled.session() as session:
-        stones = [guessed("M1"), box_stone("G1", "support", at=(9.0, 0.0, 0.0))]
-        store_survey(session, "proposed", "proposals", "cd" * 32, stones)
-    return filled
+def session():
+    with open_database("sqlite://") as database, database.session() as session:
+        yield session
 
 
-def test_a_hypothesis_is_found_and_comes_back(building: Database) -> None:
-    with building.session(read_only=True) as session:
-        (stone,) = find(session, "header", ["hypothesis == true"])
-        assert (stone.code, stone.hypothesis) == ("M1", True)
-        (record,) = load_stones(session, [stone])
-        assert (record.hypothesis, record.provenance) == (True, "hypothesis")
-        assert len(find(session, "entity", ["hypothesis = false"])) == 8
-        rows = find_rows(
-            session, "entity", ["code in (M1, V1)"], columns=["code", "hypothesis", "provenance"]
-        )
-    assert rows == [
-        {"code": "V1", "hypothesis": False, "provenance": "points"},
-        {"code": "M1", "hypothesis": True, "provenance": "hypothesis"},
-    ]
-    assert all(type(row["hypothesis"]) is bool for row in rows)
+def count(session, table):
+    return session.scalar(select(func.count()).select_from(table))
 
 
-def test_what_it_rests_on_is_told(building: Database) -> None:
-    with building.session(read_only=True) as session:
-        told, other = describe(session, "M1"), describe(session, "V1")
-    assert (told["hypothesis"], other["hypothesis"]) == (True, False)
-    assert told["measured"]["provenance"] == "fills the hole between V1 and V2"  # type: ignore[index]
-
-
-def test_once_it_is_measured_it_is_none_any_more(building: Database) -> None:
-    with building.session() as session:
-        before = store_survey(
-            session, "again", "again.moma", "ef" * 32, [box_stone("M1", at=(8.0, 0.0, 0.0))], again=True
-        )
-        assert find(session, "entity", ["hypothesis = true"]) == []
-        told, then = describe(session, "M1"), describe(session, "M1", before.entry - 1)
-    assert (told["hypothesis"], then["hypothesis"]) == (False, True)
-    (change,) = told["corrections"]  # type: ignore[misc]
-    assert (change["attribute"], change["before"], change["after"]) == ("hypothesis", True, False)
-
-
-def test_nobody_can_declare_that_it_was_seen(building: Database) -> None:
-    with (
-        building.session() as session,
-        pytest.raises(UsageError, match="follows from its survey; measure it"),
-    ):
-        correct(session, new_entry(session, "correction", "a test"), "M1", {"hypothesis": False})
-
-
-def test_a_support_is_a_stone_of_its_own_kind(building: Database) -> None:
-    with building.session(read_only=True) as session:
-        assert [type(stone) for stone in find(session, "support")] == [Support]
-        assert [stone.code for stone in find(session, "stone", ["kind = support"])] == ["G1"]
-    assert "support" in kinds()
-
-
-def test_what_a_solid_was_simplified_to_can_be_asked(building: Database) -> None:
-    corners, faces = np.eye(4, 3), ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3))
-    told = [
-        ("V1", "wedge", 0.8, 0.3, False),
-        ("V2", "hexahedron", 1.0, 0.1, True),
-        ("V3", None, None, None, None),
-    ]
-    solids = tuple(
-        SimplificationRecord(code, "close", 0.0, 0.0, corners, faces, *values) for code, *values in told
+def test_what_is_stored_comes_back_as_it_was(session, records):
+    entry, numbers = store_hypotheses(
+        session, "test", records, "thought", author="A. Mason", settings={"max_stones": 3}
     )
-    with building.session() as session:
-        store_run(session, replace(run_record(dict.fromkeys(("V1", "V2", "V3"))), simplifications=solids))
-    asked = {
-        "solid_shape = wedge": ["V1"],
-        "blockiness < 0.9": ["V1"],
-        "worst_angle > 0.2 and solid_shape = wedge": ["V1"],
-        "within_tolerance = true": ["V2"],
-        "within_tolerance != true": ["V1"],
-        "within_tolerance@1 = false": ["V1"],
-        "within_tolerance is null and runs > 0": ["V3"],
-    }
-    with building.session(read_only=True) as session:
-        found = {where: [one.code for one in find(session, "entity", [where])] for where in asked}
-        (row,) = find_rows(session, "entity", ["code = V1"], columns=["within_tolerance", "blockiness"])
-    assert found == asked
-    assert row == {"within_tolerance": False, "blockiness": 0.8}
+    assert (entry.action, entry.author, entry.source) == ("declaration", "A. Mason", "thought")
+    assert entry.settings == {"max_stones": 3}
+    found = find(session, "entity", ["hypothesis = true"])
+    assert [one.id for one in found] == list(numbers)
+    for loaded, record in zip(load_stones(session, found), records, strict=True):
+        assert loaded.hypothesis
+        assert loaded.provenance == "hypothesis"
+        block = surveyed_block(loaded)
+        assert block.face.provenance.source == "hypothesis"
+        assert block.solid.vertices == pytest.approx(record.solid_vertices, abs=1e-12)
+
+
+def test_all_or_nothing(session, records):
+    store_hypotheses(session, "test", records[:1], "thought")
+    before = count(session, Entity), count(session, Entry), count(session, Measurement)
+    with pytest.raises(DatabaseError, match="is taken"):
+        store_hypotheses(session, "test", records, "thought")
+    with pytest.raises(DatabaseError, match="is taken"):
+        store_hypotheses(session, "test", [records[1], records[1]], "thought")
+    with pytest.raises(UsageError, match="is no hypothesis"):
+        store_hypotheses(session, "test", [replace(records[1], hypothesis=False)], "thought")
+    with pytest.raises(UsageError, match="no stones"):
+        store_hypotheses(session, "test", [], "thought")
+    assert (count(session, Entity), count(session, Entry), count(session, Measurement)) == before
+
+
+def test_one_that_is_withdrawn_is_found_no_more_and_forgotten_not(session, records):
+    _, numbers = store_hypotheses(session, "test", records, "thought")
+    entry = new_entry(session, "declaration", "seen", author="A. Mason")
+    assert withdraw_hypotheses(session, entry, numbers[:1]) == Outcome(withdrawn=1)
+    assert withdraw_hypotheses(session, entry, numbers) == Outcome(withdrawn=1, unchanged=1)
+    assert find(session, "entity") == []
+    assert count(session, Entity) == 2
+    kept = session.scalars(select(Measurement).order_by(Measurement.id)).all()
+    assert [one.superseded_id for one in kept] == [entry.id, entry.id]
+    assert np.array_equal(kept[0].solid_vertices, records[0].solid_vertices)
+
+
+def test_what_was_surveyed_is_not_withdrawn(session, records):
+    _, numbers = store_hypotheses(session, "test", records, "thought")
+    session.get(Entity, numbers[1]).hypothesis = False
+    session.flush()
+    entry = new_entry(session, "declaration", "seen")
+    with pytest.raises(UsageError, match="was surveyed"):
+        withdraw_hypotheses(session, entry, numbers)

@@ -1,0 +1,147 @@
+"""`moma propose`: what it prints, records and refuses."""
+
+import json
+from dataclasses import replace
+
+import pytest
+from typer.testing import CliRunner
+
+from moma.cli import app
+from survey.formats.moma_writer import write_moma
+from survey.synthetic.facings import two_facings
+from survey.synthetic.sample import make_sample
+
+
+def invoke(*arguments):
+    return CliRunner().invoke(app, [str(one) for one in arguments])
+
+
+def ran(*arguments):
+    done = invoke(*arguments)
+    assert done.exit_code == 0, done.output
+    return done
+
+
+@pytest.fixture
+def holes(tmp_path):
+    """A database with the sample without two stones."""
+    survey = make_sample().survey
+    kept = tuple(one for one in survey.blocks if one.code not in {"W05-02", "W10-05"})
+    write_moma(replace(survey, blocks=kept), tmp_path / "holes.moma")
+    url = f"sqlite:///{tmp_path / 'holes.db'}"
+    ran("ingest", tmp_path / "holes.moma", "--db", url)
+    return url
+
+
+@pytest.fixture(scope="module")
+def facings(tmp_path_factory):
+    """A database with a wall of two facings; tests do not write into it."""
+    place = tmp_path_factory.mktemp("facings")
+    write_moma(two_facings(3.0, 4, 2).building.survey, place / "two.moma")
+    url = f"sqlite:///{place / 'two.db'}"
+    ran("ingest", place / "two.moma", "--db", url)
+    return url
+
+
+def proposals(*arguments):
+    return json.loads(ran("propose", *arguments, "--json").stdout)
+
+
+def entries(url):
+    """Numbers of entries that the history of a stone tells."""
+    return len(json.loads(ran("query", "entity", "--db", url, "--json").stdout))
+
+
+def test_missing_stones_are_proposed_and_nothing_is_recorded(holes):
+    report = proposals("missing", "--db", holes)
+    assert [one["code"] for one in report["proposals"]] == ["H-W05-02", "H-W10-05"]
+    assert report["entry"] is None
+    assert entries(holes) == 96
+    again = ran("propose", "missing", "--db", holes)
+    assert "nothing is recorded: give --record" in again.stderr
+
+
+def test_proposals_are_recorded_once_and_related(holes):
+    report = proposals(
+        "missing", "--db", holes, "--record", "--author", "A. Mason", "--source", "photographs"
+    )
+    assert report["entry"] is not None
+    assert report["related"] == report["entry"] + 1
+    assert entries(holes) == 98
+    shown = json.loads(ran("show", "H-W05-02", "--db", holes, "--json").stdout)
+    assert shown["hypothesis"] is True
+    assert set(shown["relations"]) >= {"rests_on", "supports", "beside"}
+    history = ran("show", "H-W05-02", "--history", "--db", holes).stdout
+    assert "A. Mason, photographs" in history
+    second = proposals("missing", "--db", holes, "--record")
+    assert (second["proposals"], second["entry"]) == ([], None)
+    assert "nothing to propose" in ran("propose", "missing", "--db", holes).stderr
+
+
+def test_where_limits_what_is_proposed_not_what_is_known(holes):
+    report = proposals("missing", "--db", holes, "--where", "course = 5")
+    assert [one["code"] for one in report["proposals"]] == ["H-W05-02"]
+    assert report["stones"] == 96
+
+
+def test_hypotheses_are_withdrawn_by_a_record(holes, tmp_path):
+    proposals("missing", "--db", holes, "--record")
+    before = json.loads(ran("show", "W05-01", "--db", holes, "--json").stdout)["relations"]
+    text = '[[withdraw]]\nwhat = "hypothesis"\nstones = ["H-W05-02"]\nsource = "a flue"\n'
+    (tmp_path / "flue.toml").write_text(text, encoding="utf-8")
+    assert "1 withdrawn" in ran("record", tmp_path / "flue.toml", "--db", holes).stdout
+    assert entries(holes) == 97
+    after = json.loads(ran("show", "W05-01", "--db", holes, "--json").stdout)["relations"]
+    assert sum(map(len, after.values())) == sum(map(len, before.values())) - 1
+    (tmp_path / "again.toml").write_text(text.replace("flue", "pipe"), encoding="utf-8")
+    assert "nothing changed" in ran("record", tmp_path / "again.toml", "--db", holes).stdout
+    (tmp_path / "seen.toml").write_text(text.replace("H-W05-02", "W05-01"), encoding="utf-8")
+    refused = invoke("record", tmp_path / "seen.toml", "--db", holes)
+    assert refused.exit_code == 2
+    assert "W05-01 is no hypothesis: it was surveyed" in refused.stderr
+    # the hole is there as before
+    assert [one["code"] for one in proposals("missing", "--db", holes)["proposals"]] == ["H-W05-01+1"]
+
+
+def test_the_core_as_blocks_or_storeys(facings):
+    core = proposals("infill", "--db", facings)["proposals"]
+    assert {one["kind"] for one in core} == {"infill"}
+    storeys = proposals("infill", "--db", facings, "--as", "storeys", "--storey-height", 0.5)["proposals"]
+    assert 1 < len(storeys) < len(core)
+    volumes = [sum(one["volume"] for one in some) for some in (core, storeys)]
+    assert 0.9 * volumes[0] < volumes[1] < volumes[0]
+    named = proposals("infill", "--db", facings, "--facings", "code like 'F%'", "code like 'B%'")["proposals"]
+    assert [one["code"] for one in named][:3] == [one["code"] for one in core][:3]
+    lower = proposals("infill", "--db", facings, "--where", "course <= 2")["proposals"]
+    assert {one["course"] for one in lower} == {1, 2}
+
+
+def test_the_core_is_recorded_once(tmp_path):
+    write_moma(two_facings(2.5, 3, 3).building.survey, tmp_path / "two.moma")
+    url = f"sqlite:///{tmp_path / 'two.db'}"
+    ran("ingest", tmp_path / "two.moma", "--db", url)
+    first = proposals("infill", "--db", url, "--record")
+    assert first["entry"] is not None
+    second = proposals("infill", "--db", url, "--record")
+    assert (second["proposals"], second["entry"]) == ([], None)
+    # another shape of the same core is none that is missing
+    assert proposals("infill", "--db", url, "--as", "storeys")["proposals"] == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["missing", "--as", "blocks"], "--as is for the core of walls"),
+        (["missing", "--facings", "a", "b"], "--facings is for the core of walls"),
+        (["infill", "--storey-height", 2.0], "--storey-height is for storeys"),
+        (["infill", "--as", "storeys", "--storey-height", 0], "--storey-height is 0 m"),
+        (["missing", "--author", "A"], "--author is for what is recorded"),
+        (["infill", "--facings", "zone = 'x'", "zone = 'y'"], "no stone satisfies"),
+        (["infill", "--facings", "course = 1", "course < 3"], "in both facings"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line(facings, arguments, said):
+    done = invoke("propose", *arguments, "--db", facings)
+    assert done.exit_code == 2, done.output
+    assert said in done.stderr
+    assert len(done.stderr.splitlines()) == 1
