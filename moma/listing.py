@@ -62,7 +62,9 @@ def as_table(columns: Mapping[str, str | None], rows: Sequence[Mapping[str, obje
     heads = [name if unit in (None, "-") else f"{name} [{unit}]" for name, unit in columns.items()]
     cells = [[_cell(row[name], name) for name in columns] for row in rows]
     numeric = [
-        all(isinstance(row[name], int | float | None) for row in rows) and bool(rows) for name in columns
+        all(isinstance(row[name], int | float | None) and not isinstance(row[name], bool) for row in rows)
+        and bool(rows)
+        for name in columns
     ]
     widths = [max(map(len, column)) for column in zip(heads, *cells, strict=True)]
 
@@ -119,6 +121,8 @@ def as_lines(value: Mapping[str, Any], indent: int = 0) -> str:
 def _cell(value: object, name: str) -> str:
     if value is None:
         return ""
+    if isinstance(value, bool):
+        return str(value).lower()  # as queries write it
     if name in _PLACES and isinstance(value, float):
         return f"{value:.3f}"  # to the millimetre, however far the origin is
     return f"{value + 0.0:.4g}" if isinstance(value, float) else str(value)  # -0.0 is 0

@@ -12,10 +12,16 @@ __all__ = ["check_lines"]
 _SHOWN = 5
 """Stones and places that are named if no more is asked for."""
 
-_PLURALS = {
-    "hexahedron": "hexahedra",
-    "polyhedron": "general polyhedra",
+_NAMES = {
+    "hexahedron": ("hexahedron", "hexahedra"),
+    "wedge": ("wedge", "wedges"),
+    "prism": ("prism", "prisms"),
+    "polyhedron": ("general polyhedron", "general polyhedra"),
 }
+"""Of one shape, and of several."""
+
+_NOTHING = 5e-5
+"""Movements below are rounding [m]."""
 
 
 def check_lines(report: "CheckReport", verbose: bool) -> list[str]:
@@ -63,13 +69,12 @@ def _mesh_lines(quality: "MeshQualityReport") -> list[str]:
 
 def _simplification_lines(told: "SimplificationReport", verbose: bool) -> list[str]:
     """What the stones were made, and which of them the survey does not bear out."""
-    shapes = ", ".join(f"{count} {_PLURALS.get(shape, shape + 's')}" for shape, count in told.shapes.items())
+    shapes = ", ".join(f"{count} {_NAMES[shape][count != 1]}" for shape, count in told.shapes.items())
     line = f"  simplified: {shapes}"
-    if told.max_displacement > 0.0:
-        line += (
-            f"; corners moved by {_mm(told.max_displacement)} at most (stone {told.worst_stone}), "
-            f"least blocky {told.least_blocky} ({told.blockiness:.2f})"
-        )
+    if told.max_displacement > _NOTHING:
+        line += f"; corners moved by {_mm(told.max_displacement)} at most (stone {told.worst_stone})"
+    if told.blockiness < 1.0 - _NOTHING:
+        line += f"; least blocky {told.least_blocky} ({told.blockiness:.2f})"
     lines = [line]
     outside = [
         f"    {one.code}: moved by {_mm(one.displacement)}, the survey is good to {_mm(one.tolerance)}; {one.reason}"
@@ -83,16 +88,18 @@ def _simplification_lines(told: "SimplificationReport", verbose: bool) -> list[s
         lines.append(f"  {_count(len(general), 'stone')} of general shape:")
         lines += _shortened(general, verbose)
     if verbose:
-        moved = {code: distance for code, distance in told.displacement.items() if distance > 0.0}
+        moved = {code: distance for code, distance in told.displacement.items() if distance > _NOTHING}
         lines += [f"    {code} simplified by {_mm(distance)}" for code, distance in moved.items()]
     return lines
 
 
 def _joint_lines(told: "JointsReport", verbose: bool) -> list[str]:
     """What became of the joints, and where stones do not meet or lie in each other."""
-    left = sum(told.left_open.values())
+    left, as_surveyed = sum(told.left_open.values()), told.mode == "as-surveyed"
     lines = [
-        f"  joints ({told.mode}): {told.count} closed on {told.planes} planes, {told.area:.2f} m² in all; "
+        f"  joints ({told.mode}): {left} left as they are, {_mm(told.mean_width)} wide on average"
+        if as_surveyed
+        else f"  joints ({told.mode}): {told.count} closed on {told.planes} planes, {told.area:.2f} m² in all; "
         f"{_mm(told.mean_width)} wide on average as surveyed; {left} left open"
     ]
     if told.count and told.worst_stone is not None:
@@ -108,17 +115,18 @@ def _joint_lines(told: "JointsReport", verbose: bool) -> list[str]:
     if overlaps:
         lines += [f"  {_count(len(overlaps), 'overlap')} left:", *_shortened(overlaps, verbose)]
     gaps = [
-        f"    {' and '.join(one.stones)} open by {_mm(one.width)} over {one.area:.3f} m² at {_place(one.place)}: "
-        f"{one.reason}"
+        f"    {' and '.join(one.stones)} open by {_mm(one.width)} over {one.area:.3f} m² at {_place(one.place)}"
+        + ("" if as_surveyed else f": {one.reason}")
         for one in told.gaps
     ]
     if gaps:
-        lines += [f"  {_count(len(gaps), 'gap')} left:", *_shortened(gaps, verbose)]
+        left_by = ", the largest first:" if len(gaps) > 1 else ":"
+        lines += [f"  {_count(len(gaps), 'gap')} left{left_by}", *_shortened(gaps, verbose)]
     if told.alone:
         some = ", ".join(told.alone[:_SHOWN]) + (", …" if len(told.alone) > _SHOWN else "")
         lines.append(f"  {_count(len(told.alone), 'stone')} without any joint: {some}")
     if verbose:
-        moved = {code: distance for code, distance in told.displacement.items() if distance > 0.0}
+        moved = {code: distance for code, distance in told.displacement.items() if distance > _NOTHING}
         lines += [f"    {code} moved by {_mm(distance)}" for code, distance in moved.items()]
     return lines
 

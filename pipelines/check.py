@@ -31,6 +31,8 @@ from survey.watertight import check_watertight
 __all__ = ["CheckReport", "Cost", "MaterialUse", "MeshQualityReport", "MeshUse", "check_scene"]
 
 _INDEX = "check.json"
+_DEEP = 0.005  # metres: less than that is noise of a survey, which the contacts take up
+_NAMED = 6  # stones or pairs of stones that one problem is told of
 
 
 @dataclass(frozen=True)
@@ -155,7 +157,7 @@ def check_scene(path: str | Path, url: str, pictures: Path | None = None) -> Che
     try:
         assembly = assemble_stones(scene, models, groups)
         problems += _unsound_solids(assembly.scene)
-        problems += _unclosed(assembly)
+        problems += _unclosed(assembly) + _overlapping(assembly)
         needs = plan(assembly.scene)
         problems += _unsupported(needs)
     except (GeometryError, MeshError) as error:
@@ -275,8 +277,18 @@ def _unclosed(assembly: Assembly) -> list[str]:
     ]
 
 
+def _overlapping(assembly: Assembly) -> list[str]:
+    """Stones that begin deep within each other, and would be driven apart."""
+    deep = [one for one in assembly.closing.overlaps if one.depth > _DEEP]
+    return [
+        f"{' and '.join(one.stones)} lie {one.depth * 1e3:.0f} mm in each other; measure them again, or exclude one"
+        for one in sorted(deep, key=lambda one: -one.volume)[:_NAMED]
+    ]
+
+
 def _some(codes: Sequence[str]) -> str:
-    return ", ".join(codes[:6]) + (f" and {len(codes) - 6} more" if len(codes) > 6 else "")
+    more = f" and {len(codes) - _NAMED} more" if len(codes) > _NAMED else ""
+    return ", ".join(codes[:_NAMED]) + more
 
 
 def _cost(needs: Plan, scene: Scene) -> Cost:

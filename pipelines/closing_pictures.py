@@ -29,6 +29,7 @@ _FLAT = 0.2  # depth of a facade over its extent, up to which an elevation shows
 _LOOKING = np.cos(np.radians(25.0))  # mean of the normals' components square to it
 _SHARE = 0.08  # of all visible area: smaller facades are not worth an elevation
 _MOST = 4  # elevations
+_NOTHING = 5e-5  # movements below are rounding [m]
 _MAINLY = 0.6  # of all visible area, that flat facades must have together
 _LEVEL = 0.25  # length of the mean normal, below which the stones look nowhere in particular
 _STEEP = np.deg2rad(32.0)  # how far from above, or from below, vaults and floors are looked at
@@ -172,8 +173,8 @@ _TITLES = {"simplified": "what simplifying moved", "moved": "what closing the jo
 def _steps(shapes: ClosingShapes) -> list[str]:
     """What moved anything: simplifying, closing the joints, or both."""
     known = {
-        "simplified": any(np.nanmax(one.simplified, initial=0.0) > 0.0 for one in shapes.stones),
-        "moved": any(np.nanmax(one.moved, initial=0.0) > 0.0 for one in shapes.stones),
+        "simplified": any(np.nanmax(one.simplified, initial=0.0) > _NOTHING for one in shapes.stones),
+        "moved": any(np.nanmax(one.moved, initial=0.0) > _NOTHING for one in shapes.stones),
     }
     return [name for name, shown in known.items() if shown]
 
