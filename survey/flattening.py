@@ -71,7 +71,7 @@ def flatten(solid: Solid, tolerance: float) -> FlatSolid | None:
         return None
     planes = np.array([_plane(solid, vectors, group, place) for group in groups])
     vertices = _crossings(solid.vertices[corners], planes, [around[i] for i in corners])
-    if vertices is None:
+    if vertices is None or np.linalg.norm(vertices - solid.vertices[corners], axis=1).max() > tolerance:
         return None
     flat = Solid(solid.code, vertices, tuple(faces))
     moved = from_edges(solid.vertices, flat)

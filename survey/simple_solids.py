@@ -8,9 +8,9 @@ from survey.blockiness import about, common_share, largest_skew, moved_corners, 
 from survey.extrusion import SurveyedBlock
 from survey.flattening import FlatSolid, flatten, highest_corner
 from survey.folds import fold, warp
+from survey.plane_network import settle
 from survey.prisms import as_prism, box_around
 from survey.simplified import BlockShape, SimpleSolid, Simplified, prism_shape
-from survey.snapping import snap
 from survey.solids import Solid
 from survey.squaring import SimplifyBounds
 
@@ -75,9 +75,18 @@ def _general(old: Solid, tolerance: float) -> Solid:
     """A solid that is no prism, its faces plane: its corners are moved by as little as can be, or faces are folded."""
     if _is_plane(old):
         return old
-    settled = snap([_folded(old, tolerance)], tolerance)[0][0]
+    settled = _settled(_folded(old, tolerance))
     moved = float(np.linalg.norm(settled.vertices - old.vertices, axis=1).max())
     return settled if moved <= tolerance and _is_plane(settled) else _folded(old, _PLANE)
+
+
+def _settled(solid: Solid) -> Solid:
+    """The solid with its corners on the planes of its faces."""
+    ties = [(i, k) for k, face in enumerate(face for face in solid.faces if len(face) > 3) for i in face]
+    if not ties:
+        return solid
+    corner, plane = np.array(ties, dtype=np.int64).T
+    return Solid(solid.code, settle(solid.vertices, corner, plane).vertices, solid.faces)
 
 
 def _folded(solid: Solid, tolerance: float) -> Solid:
