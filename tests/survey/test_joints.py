@@ -1,36 +1,58 @@
+"""Closing the joints of small assemblies whose closed shape is known, wherever they stand and in whatever order."""
+
+import re
 from collections.abc import Sequence
+from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from statics import contacts, overlap_depth
+from plain_blocks import DEPTH, as_stone, box, cuboid, drawn, moved, stone
+from statics import contacts, near_pairs, overlap_depth, side_planes
 
 from moma.errors import GeometryError
+from survey.blocky import BlockShape, simplify
 from survey.depth import Depth
 from survey.extrusion import SurveyedBlock, extrude
 from survey.faces import outline_face
-from survey.joints import JointSettings, close_joints
+from survey.joint_settings import JointMode, JointSettings
+from survey.joints import ClosedStones, close_joints
 from survey.records import BlockRecord
+from survey.solids import Solid
 from survey.synthetic.sample import make_sample
 from survey.watertight import check_watertight
 
-DEPTH = Depth(0.4, None, "test", "kind", 1)
-
-
-def stone(code: str, *corners: tuple[float, float], tilt: float = 0.0) -> SurveyedBlock:
-    """A stone in a wall in the plane y = 0, seen from -y; x to the right, z up."""
-    vertices = np.array([(x, tilt * x, z) for x, z in corners])
-    record = BlockRecord(code, "header", 1, vertices, np.empty((0, 3)), 0.002)
-    return extrude(outline_face(record, np.array([0.5, -9.0, 0.5])), DEPTH)
-
-
-def box(code: str, x0: float, x1: float, z0: float, z1: float) -> SurveyedBlock:
-    return stone(code, (x0, z0), (x1, z0), (x1, z1), (x0, z1))
-
-
 # two stones with a 10 mm head joint, a long one above them across a 12 mm bed joint
 THREE = [box("A", 0, 0.495, 0, 0.3), box("B", 0.505, 1, 0, 0.3), box("C", 0, 1, 0.312, 0.6)]
+STEPPED = [
+    *(box("A", 0, 0.495, 0, 0.3), box("B", 0.505, 1, 0, 0.3), box("D", 1.01, 1.5, 0, 0.25)),
+    box("C", 0, 1.5, 0.312, 0.6),
+]
+# an L seen from the front, and two stones in its notch, 10 mm away from it
+CORNERED = drawn("L", [(0, 0), (1, 0), (1, 0.3), (0.4, 0.3), (0.4, 0.6), (0, 0.6)])
+
+
+def assert_sound(solids: Sequence[Solid]) -> None:
+    """All closed and convex, and none in another."""
+    for solid in solids:
+        check_watertight(solid, convex=True)
+    for i, j in near_pairs(solids):
+        assert overlap_depth(solids[i], solids[j]) < 1e-9
+
+
+def open_pairs(closed: ClosedStones) -> dict[frozenset[str], str]:
+    return {frozenset(gap.stones): gap.reason for gap in closed.report.gaps}
+
+
+def shared_area(closed: ClosedStones, one: str, two: str) -> float:
+    solids = {solid.code: solid for solid in closed.solids}
+    polygons = [polygon for _, polygon in contacts(solids[one], solids[two])]
+    return sum(
+        0.5 * float(np.linalg.norm(np.cross(p - p[0], np.roll(p, -1, axis=0) - p[0]).sum(axis=0)))
+        for p in polygons
+    )
 
 
 def test_a_t_junction_closes_half_way_and_fits_exactly() -> None:
@@ -40,21 +62,6 @@ def test_a_t_junction_closes_half_way_and_fits_exactly() -> None:
     np.testing.assert_allclose(b[:4, [0, 2]], [[0.5, 0], [1, 0], [1, 0.306], [0.5, 0.306]], atol=1e-12)
     np.testing.assert_allclose(c[:4, [0, 2]], [[0, 0.306], [1, 0.306], [1, 0.6], [0, 0.6]], atol=1e-12)
     np.testing.assert_allclose([v[:, 1] for v in (a, b, c)], [[0.0] * 4 + [0.4] * 4] * 3, atol=1e-12)
-
-
-def test_the_report_says_what_was_joined_and_moved() -> None:
-    report = close_joints(THREE).report
-    assert {frozenset(joint.stones): round(joint.width, 9) for joint in report.joints} == {
-        frozenset("AB"): 0.010,
-        frozenset("ABC"): 0.012,
-    }
-    np.testing.assert_allclose(report.displacement["C"], [0.006, 0.006, 0, 0] * 2, atol=1e-12)
-    assert report.largest_displacement == pytest.approx(np.hypot(0.005, 0.006))
-    assert report.volume_change["C"] == pytest.approx(0.006 / 0.288)
-    assert report.alone == ()
-    bed = max(report.joints, key=lambda joint: len(joint.stones))
-    np.testing.assert_allclose([bed.start[2], bed.stop[2]], 0.306)
-    assert np.linalg.norm(bed.stop - bed.start) == pytest.approx(1.0)
 
 
 def test_stones_too_far_apart_stay_as_they_are() -> None:
@@ -69,28 +76,82 @@ def test_stones_too_far_apart_stay_as_they_are() -> None:
     assert close_joints([]).solids == ()
 
 
-def test_a_corner_that_would_move_too_far_names_the_stone_and_its_neighbours() -> None:
-    with pytest.raises(
-        GeometryError, match=r"stone A: closing its joints with B, C would move .* 8 mm, .* 7 mm"
-    ):
-        close_joints(THREE, JointSettings(max_displacement=0.007))
+def test_a_joint_that_would_move_a_corner_too_far_stays_open_and_the_others_close() -> None:
+    # closing all, A's upper corner at the head joint goes 5 mm across and 6 mm up: √(5² + 6²) = 7.8 mm
+    closed = close_joints(THREE, JointSettings(max_displacement=0.007))
+    assert open_pairs(closed).keys() == {frozenset("AC"), frozenset("BC")}
+    for pair, reason in open_pairs(closed).items():
+        (code,) = pair - {"C"}
+        assert reason == f"it would move a corner of {code} by 8 mm, more than 7 mm"
+    assert_sound(closed.solids)
+    assert shared_area(closed, "A", "B") == pytest.approx(0.3 * 0.4)
+    assert shared_area(closed, "A", "C") == 0.0
+    assert closed.report.largest_displacement == pytest.approx(0.005)
+    assert {frozenset(one.stones) for one in closed.report.joints if not one.left_open} == {frozenset("AB")}
 
 
-def test_a_joint_that_is_not_straight_is_refused_with_names() -> None:
-    stepped = [
-        *(box("A", 0, 0.495, 0, 0.3), box("B", 0.505, 1, 0, 0.3), box("D", 1.01, 1.5, 0, 0.25)),
-        box("C", 0, 1.5, 0.312, 0.6),
-    ]
-    with pytest.raises(
-        GeometryError, match=r"the joint of A, B, D, C is not straight: stone D is \d+ mm off"
-    ):
-        close_joints(stepped, JointSettings(max_width=0.08))
+def low_stone(count: int, low: int) -> list[SurveyedBlock]:
+    """A course of stones 0.3 m high but for one of 0.25 m, and a long stone across a joint of 12 mm above."""
+    tops = [0.25 if k == low else 0.3 for k in range(count)]
+    course = [box(f"A{k}", 0.5 * k + 0.005, 0.5 * k + 0.495, 0, top) for k, top in enumerate(tops)]
+    return [*course, box("C", 0, 0.5 * count, 0.312, 0.6)]
 
 
-def test_stones_of_two_walls_are_refused_with_the_name_of_the_odd_one() -> None:
-    turned = stone("E", (1.01, 0), (1.4, 0), (1.4, 0.3), (1.01, 0.3), tilt=1.0)
-    with pytest.raises(GeometryError, match="stone E: its face is turned 3"):
-        close_joints([*THREE, turned])
+AT_THE_END = pytest.mark.xfail(strict=True, reason="an odd stone at the end of a bed tilts it by 10 mm")
+
+
+@pytest.mark.parametrize(
+    ("count", "low"),
+    [(4, 2), (5, 2), *(pytest.param(n, k, marks=AT_THE_END) for n, k in [(3, 2), (4, 0), (5, 4)])],
+)
+def test_a_stone_that_lies_too_low_is_led_to_the_bed_of_the_others(count: int, low: int) -> None:
+    closed = close_joints(low_stone(count, low), JointSettings(max_width=0.08))
+    assert_sound(closed.solids)
+    assert closed.report.gaps == ()
+    # the bed of the others lies in the middle of their joint, at 0.306
+    for solid in closed.solids[:-1]:
+        np.testing.assert_allclose(solid.vertices[:, 2].max(), 0.306, atol=1e-4)
+    np.testing.assert_allclose(closed.solids[-1].vertices[:, 2].min(), 0.306, atol=1e-4)
+    assert closed.report.displacement[f"A{low}"].max() == pytest.approx(0.056, abs=5e-4)
+
+
+def test_where_the_bound_forbids_that_the_step_stays_open_and_is_listed() -> None:
+    closed = close_joints(STEPPED, JointSettings(max_width=0.08, max_displacement=0.04))
+    (pair,) = open_pairs(closed)
+    assert pair == frozenset("CD")
+    reason = open_pairs(closed)[pair]
+    assert re.fullmatch(r"it would move a corner of D by \d+ mm, more than 40 mm", reason)
+    assert_sound(closed.solids)
+    for one, two in ("AC", "BC", "AB", "BD"):
+        assert shared_area(closed, one, two) > 0.09
+    (gap,) = closed.report.gaps
+    assert gap.width == pytest.approx(0.062)
+    assert gap.area == pytest.approx(0.4 * 0.49)
+
+
+@pytest.mark.parametrize("angle", [-80.0, -45.0, -30.0, -17.0, -5.0, 5.0, 17.0, 30.0, 45.0, 60.0, 80.0])
+def test_walls_that_meet_at_any_angle_close_without_error(angle: float) -> None:
+    # the other wall begins 10 mm beside B; its stones lie behind its face, away from B or in it
+    ahead = np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle)), 0.0])
+    face = np.array([1.01, 0.0, 0.0]) + np.outer([0.0, 0.4, 0.4, 0.0], ahead)
+    face[2:, 2] = 0.3
+    record = BlockRecord("E", "header", 1, face, np.empty((0, 3)), 0.002)
+    seen_from = face[0] + 9.0 * np.array([ahead[1], -ahead[0], 0.0])
+    closed = close_joints([*THREE, extrude(outline_face(record, seen_from), DEPTH)])
+    solids = {solid.code: solid for solid in closed.solids}
+    for solid in closed.solids:
+        check_watertight(solid, convex=True)
+    lying = {
+        (one, two) for one, two in combinations("ABCE", 2) if overlap_depth(solids[one], solids[two]) > 1e-9
+    }
+    assert {overlap.stones for overlap in closed.report.overlaps} == lying
+    # turned into B, E's hidden side lies up to 0.4 sin(angle) deep in it: at 5° that can be cut off, at 45° not
+    if angle < 11.0:
+        assert not lying
+    if angle >= 45.0:
+        assert ("B", "E") in lying
+    for one, two in ("AB", "AC", "BC"):
+        assert shared_area(closed, one, two) > 0.1
 
 
 def test_a_wedge_stays_a_wedge() -> None:
@@ -102,6 +163,96 @@ def test_a_wedge_stays_a_wedge() -> None:
     closed = close_joints([wedge, *sides])
     flat = closed.solids[0].vertices[:4][:, [0, 2]]
     np.testing.assert_allclose(flat, [[0.445, 0], [0.555, 0], [0.655, 0.4], [0.345, 0.4]], atol=1e-9)
+
+
+def test_as_surveyed_no_bit_of_any_stone_changes() -> None:
+    stones = [simplify(block) for block in (*THREE, box("X", 0.9, 1.3, -0.1, 0.2))]
+    closed = close_joints(stones, JointSettings(mode=JointMode.AS_SURVEYED))
+    for solid, one in zip(closed.solids, stones, strict=True):
+        assert solid.faces == one.solid.faces
+        assert solid.vertices.tobytes() == one.solid.vertices.tobytes()
+    report = closed.report
+    assert {frozenset(one.stones) for one in report.joints} >= {
+        frozenset("AB"),
+        frozenset("AC"),
+        frozenset("BC"),
+    }
+    assert all(one.left_open == "joints are left as surveyed" and one.plane == -1 for one in report.joints)
+    assert {gap.stones for gap in report.gaps} == {one.stones for one in report.joints}
+    assert report.largest_displacement == 0.0
+    assert set(report.volume_change.values()) == {0.0}
+    (overlap,) = report.overlaps  # X lies in B: from 0.9 to 1.0, and from 0.0 to 0.2, through the wall
+    assert overlap.stones == ("B", "X")
+    assert overlap.volume == pytest.approx(0.1 * 0.2 * 0.4, rel=1e-9)
+    assert overlap.depth == pytest.approx(0.1, abs=1e-12)
+    np.testing.assert_allclose(overlap.centroid, [0.95, 0.2, 0.1], atol=1e-9)
+
+
+def test_with_mortar_stones_close_as_without_and_widths_are_kept() -> None:
+    dry, mortar = (close_joints(THREE, JointSettings(mode=mode)) for mode in (JointMode.CLOSE, "mortar"))
+    for one, two in zip(dry.solids, mortar.solids, strict=True):
+        assert one.vertices.tobytes() == two.vertices.tobytes()
+    widths = {frozenset(joint.stones): joint.width for joint in mortar.report.joints}
+    assert widths == pytest.approx({frozenset("AB"): 0.010, frozenset("AC"): 0.012, frozenset("BC"): 0.012})
+    assert mortar.report.mode == "mortar"
+
+
+def test_a_stone_that_is_not_convex_keeps_its_shape_and_neighbours_are_led_to_it() -> None:
+    corner = simplify(as_stone(CORNERED))
+    assert corner.shape is BlockShape.POLYHEDRON
+    beside = [box("N", 0.41, 1.0, 0.312, 0.6), box("R", 1.01, 1.5, 0.0, 0.3)]
+    closed = close_joints([beside[0], corner, beside[1]])
+    notch, kept, right = closed.solids
+    assert kept.vertices.tobytes() == corner.solid.vertices.tobytes()
+    assert kept.faces == corner.solid.faces
+    np.testing.assert_allclose(notch.vertices.min(axis=0), [0.4, 0.0, 0.3], atol=1e-12)
+    np.testing.assert_allclose(notch.vertices.max(axis=0), [1.0, 0.4, 0.6], atol=1e-12)
+    assert right.vertices[:, 0].min() == pytest.approx(1.0, abs=1e-12)
+    own = side_planes(CORNERED)
+    for solid in (notch, right):  # each holds planes of the L's faces, turned about
+        off = np.abs(side_planes(solid)[:, None] + own[None]).max(axis=2).min(axis=1)
+        assert np.sort(off)[0] < 1e-12
+    assert closed.report.gaps == ()
+    areas = {tuple(sorted(one.stones)): [] for one in closed.report.joints}
+    for one in closed.report.joints:
+        areas[tuple(sorted(one.stones))].append(one.area)
+    assert sorted(areas["L", "N"]) == pytest.approx([0.3 * 0.4, 0.6 * 0.4])
+    assert areas["L", "R"] == pytest.approx([0.3 * 0.4])
+
+
+def test_two_stones_that_keep_their_shape_stay_apart() -> None:
+    first = as_stone(CORNERED)
+    second = as_stone(moved(replace(CORNERED, code="M"), np.eye(3), np.array([1.01, 0.0, 0.0])))
+    closed = close_joints([first, second])
+    assert open_pairs(closed) == {frozenset("LM"): "both stones keep their shape"}
+    touching = as_stone(moved(replace(CORNERED, code="M"), np.eye(3), np.array([1.0, 0.0, 0.0])))
+    meeting = close_joints([first, touching])
+    assert meeting.report.gaps == ()
+    (joint,) = meeting.report.joints
+    assert joint.area == pytest.approx(0.3 * 0.4)
+
+
+def test_two_stones_with_one_code_are_refused() -> None:
+    with pytest.raises(GeometryError, match="two stones have this code") as refused:
+        close_joints([THREE[0], THREE[1], replace(THREE[2], code="A")])
+    assert "stone A" in str(refused.value)
+
+
+def test_four_stones_at_a_cross_share_one_bed_and_one_head_joint() -> None:
+    apart = [
+        cuboid(code, (x, 0.0, z), (x + 0.49, 0.4, z + 0.29))
+        for code, (x, z) in zip("ABCD", [(0, 0), (0.5, 0), (0, 0.3), (0.5, 0.3)], strict=True)
+    ]
+    rng = np.random.default_rng(1)
+    for solid in apart:
+        solid.vertices[:, [0, 2]] += np.tile(rng.normal(0.0, 0.001, (4, 2)), (2, 1))
+    closed = close_joints([as_stone(solid) for solid in apart])
+    assert_sound(closed.solids)
+    number = {frozenset(one.stones): one.plane for one in closed.report.joints}
+    assert number[frozenset("AC")] == number[frozenset("BD")]
+    assert number[frozenset("AB")] == number[frozenset("CD")]
+    a, b, c, d = ({tuple(np.round(v, 12)) for v in solid.vertices} for solid in closed.solids)
+    assert len(a & b & c & d) == 2  # the cross, front and back
 
 
 def assert_closed(blocks: Sequence[SurveyedBlock], pairs: Sequence[tuple[int, int]]) -> None:

@@ -133,7 +133,27 @@ def test_no_corner_moves_beyond_the_bound_and_the_report_says_how_far(closed: Cl
     assert report.alone == ()
     widths = [joint.width for joint in report.joints]
     assert 0.010 < np.median(widths) < 0.013  # true: 8 to 15 mm
-    assert max(joint.rms for joint in report.joints) < 0.005
+
+
+def test_both_stones_of_every_joint_have_a_face_on_its_plane(closed: ClosedStones) -> None:
+    solids, of_plane = {solid.code: solid for solid in closed.solids}, {}
+    assert not closed.report.gaps
+    assert not closed.report.overlaps
+    for joint in closed.report.joints:
+        assert joint.left_open == ""
+        assert joint.plane >= 0
+        for code, sign in zip(joint.stones, (-1.0, 1.0), strict=True):  # the normal leads into the first
+            planes = side_planes(solids[code])
+            turned = np.linalg.norm(planes[:, :3] - sign * joint.normal, axis=1)
+            off = np.abs(planes[:, 3] - sign * float(joint.normal @ joint.centroid))
+            assert ((turned < 1e-9) & (off < 1e-9)).any(), joint.stones
+        plane = np.array([*joint.normal, joint.normal @ joint.centroid])
+        of_plane.setdefault(joint.plane, []).append(
+            plane * (1.0 if plane[np.abs(plane).argmax()] > 0 else -1.0)
+        )
+    for rows in of_plane.values():  # a bed of a course is one plane
+        assert np.ptp(rows, axis=0).max() < 1e-9
+    assert max(len(rows) for rows in of_plane.values()) >= 10
 
 
 def test_what_was_measured_can_be_closed_and_stands(closed: ClosedStones, truth: Truth) -> None:
