@@ -1,11 +1,11 @@
-"""Numba kernel that tells which convex solids lie in each other."""
+"""Numba kernels that tell which convex solids lie in each other, and which solids are convex."""
 
 import math
 
 import numpy as np
 from numba import njit
 
-__all__ = ["deepest_overlaps"]
+__all__ = ["deepest_overlaps", "highest_corners"]
 
 
 @njit(cache=True)
@@ -34,3 +34,24 @@ def deepest_overlaps(pairs, vertices, vertex_starts, planes, plane_starts, least
                 break
         out[m] = depth
     return out
+
+
+@njit(cache=True)
+def highest_corners(vertices, corners, face_starts, solid_starts, normals, offsets):
+    """How far a corner of each solid (n,) stands out of the plane of one of its faces, and its extent (n,) [m]."""
+    count = solid_starts.shape[0] - 1
+    height, extent = np.zeros(count), np.zeros(count)
+    for one in range(count):
+        first, last = face_starts[solid_starts[one]], face_starts[solid_starts[one + 1]]
+        for k in range(3):
+            low, high = math.inf, -math.inf
+            for c in range(first, last):
+                low, high = min(low, vertices[corners[c], k]), max(high, vertices[corners[c], k])
+            extent[one] = max(extent[one], high - low)
+        for f in range(solid_starts[one], solid_starts[one + 1]):
+            for c in range(first, last):
+                out = -offsets[f]
+                for k in range(3):
+                    out += normals[f, k] * vertices[corners[c], k]
+                height[one] = max(height[one], out)
+    return height, extent

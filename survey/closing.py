@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from moma.errors import GeometryError
+from survey._kernels_apart import highest_corners
 from survey.adjacency import Polyhedra
 from survey.blocky import BlockyStone
 from survey.cutting import cut_stones, moves
 from survey.facing import FacingFaces, planes_of
 from survey.joint_planes import ContactPlanes, StoneFaces, contact_planes, some_links
 from survey.joint_settings import JointSettings
-from survey.overlaps import planes_of_solid
 from survey.solids import Solid
 from survey.worn_sides import mended_planes
 
@@ -95,7 +95,8 @@ def as_building(stones: Sequence[BlockyStone]) -> Building:
     solids = tuple(replace(one.solid, vertices=one.solid.vertices - origin) for one in stones)
     gathered = Polyhedra.gather((solid.vertices, solid.faces) for solid in solids)
     planes = planes_of(gathered)
-    convex = np.array([_is_convex(solid) for solid in solids])
+    height, extent = highest_corners(*_arrays(gathered), planes.normals, planes.offsets)
+    convex: Bools = height <= _CONVEX * extent
     sound = np.concatenate([_sound(stone) for stone in stones])
     faces = StoneFaces(gathered, planes, sound, ~convex[planes.owner])
     rows = np.column_stack([planes.normals, planes.offsets])
@@ -114,7 +115,7 @@ def close_within_bounds(
     settings : bounds
     known : the stones with their joints closed, as far as is known by now
     """
-    reasons = [""] * len(facing)
+    reasons, unmended = [""] * len(facing), set[int]()
     for number in range(_ROUNDS + len(building.stones)):
         links = np.array([k for k, reason in enumerate(reasons) if not reason], np.int64)
         some = contact_planes(building.faces, some_links(facing, links), settings)
@@ -122,6 +123,7 @@ def close_within_bounds(
             reasons[k] = _KEPT
         contact = _of_all(some, links, len(facing))
         planes, free = _stone_planes(building, facing, contact, known, settings)
+        planes |= {i: building.planes[building.rows(i)] for i in unmended if free[i].all()}
         touched = {i: rows for i, rows in planes.items() if _changed(building, i, rows)}
         solids, offended = list(building.solids), False
         of_face = {}
@@ -131,7 +133,10 @@ def close_within_bounds(
                 solids[i], of_face[i] = stone.solid, stone.of_face
             else:
                 offended = True
-                _leave_open(building, facing, contact, i, moved, settings, reasons, number >= _ROUNDS)
+                if free[i].all():
+                    unmended.add(i)
+                else:
+                    _leave_open(building, facing, contact, i, moved, settings, reasons, number >= _ROUNDS)
         if not offended:
             break
     return Cut(contact, reasons, solids, planes, free, of_face)
@@ -143,10 +148,8 @@ def _sound(stone: BlockyStone) -> Bools:
     return np.tile(known, -(-count // len(known)))[:count]
 
 
-def _is_convex(solid: Solid) -> bool:
-    planes = planes_of_solid(solid)
-    size = float(np.ptp(solid.vertices, axis=0).max())
-    return bool((solid.vertices @ planes[:, :3].T - planes[:, 3]).max() <= _CONVEX * size)
+def _arrays(solids: Polyhedra) -> tuple[Array, Ints, Ints, Ints]:
+    return solids.vertices, solids.corners, solids.face_starts, solids.solid_starts
 
 
 def _of_all(some: ContactPlanes, links: Ints, count: int) -> ContactPlanes:
@@ -172,14 +175,14 @@ def _stone_planes(
     )
     taken[:] = False
     further: dict[int, list[Array]] = {}
-    known: set[tuple[int, int]] = set()
+    placed: set[tuple[int, int]] = set()
     for k in np.flatnonzero(contact.of_link >= 0).tolist():
         plane = int(contact.of_link[k])
         row = np.array([*contact.normals[plane], contact.offsets[plane]])
         for face, side in zip(facing.faces[k].tolist(), (contact.side[k], -contact.side[k]), strict=True):
-            if (face, plane) in known:
+            if (face, plane) in placed:
                 continue
-            known.add((face, plane))
+            placed.add((face, plane))
             if taken[face]:
                 further.setdefault(int(building.faces.planes.owner[face]), []).append(side * row)
             else:
@@ -224,5 +227,6 @@ def _leave_open(
         corners = building.faces.solids.vertices[building.faces.corners(face)]
         plane = int(contact.of_link[k])
         distance[n] = np.abs(corners @ contact.normals[plane] - contact.offsets[plane]).max()
-    for n in np.flatnonzero(distance >= (0.0 if all_of_it else distance.max() - 1e-12)):
-        reasons[int(own[n])] = why
+    least = 0.0 if all_of_it else float(distance.max()) - 1e-12
+    for k in own[distance >= least].tolist():
+        reasons[k] = why

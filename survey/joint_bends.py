@@ -197,11 +197,11 @@ def _fitted(
 ) -> tuple[Array, float, float]:
     """Heights (n + 1,) of the chain at its posts, its slant across, and the part of corners off it."""
     rows, hands = [], []
-    for side, hand in ((bed.lower, -1.0), (bed.upper, 1.0)):
+    for side, sign in ((bed.lower, -1.0), (bed.upper, 1.0)):
         for face in np.unique(side).tolist():
             corners = solids.corners[solids.face_starts[face] : solids.face_starts[face + 1]]
             rows.append(corners)
-            hands.append(np.full(len(corners), hand))
+            hands.append(np.full(len(corners), sign))
     corner, hand = np.concatenate(rows), np.concatenate(hands)
     local = (solids.vertices[corner] - bed.origin) @ bed.axes.T
     design = np.column_stack([_hats(local[:, 0], posts), local[:, 1], 0.5 * hand])

@@ -51,12 +51,13 @@ def mended_planes(
     for face in np.flatnonzero(worn & free & ~faces.kept).tolist():
         near = sorted(set(beside.get(int(faces.planes.owner[face]), [])))
         points = _sound(faces, face)
-        if _through(points, rows[face]) is None and len(points):
-            points = np.vstack([points, _nearest(faces, face, [solids[i].vertices for i in near], reach)])
-        if _through(points, rows[face]) is None and len(points):
+        if len(points) not in (1, 2):  # three tell the plane as it was measured, and without any nothing does
+            continue
+        points = np.vstack([points, _nearest(faces, face, [solids[i].vertices for i in near], reach)])
+        if _through(points, rows[face]) is None:
             points = np.vstack([points, _continuing(faces, rows, free, face, near)])
         mended = _through(points, rows[face])
-        if mended is None and len(points):
+        if mended is None:
             mended = _parallel(faces, rows, face, points)
         if mended is not None:
             out[face] = mended
