@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from moma.errors import GeometryError
 from survey.synthetic.bond import WIDTHS, Line, PlannedStone, crossing, fill, level, upright
 
-__all__ = ["Bed", "Piece", "fill_run", "planned"]
+__all__ = ["CLEARANCES", "Bed", "Piece", "fill_run", "planned"]
 
 Array = NDArray[np.float64]
 
-_CLEARANCES = (0.09, 0.06, 0.03)  # wished for between head joints of neighbouring courses, then allowed [m]
+CLEARANCES = (0.09, 0.06, 0.03)  # wished for between head joints of neighbouring courses, then allowed [m]
 _REST = 2.4  # the end of a run is filled as a whole, so that it comes out [m]
 
 
@@ -66,7 +66,7 @@ def fill_run(rng: Random, start: Line, stop: Line, height: float, below: Sequenc
     height : at which stones are measured off [m]
     below : head joints of the course below, sorted [m]
     """
-    for clearance in _CLEARANCES:
+    for clearance in CLEARANCES:
         for _ in range(5):
             try:
                 ends = _ends(rng, start.at(height), stop.at(height), below, clearance)

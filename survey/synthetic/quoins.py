@@ -55,11 +55,13 @@ def corner(courses: int = 8, length: float = 3.0, seed: int = 1) -> Building:
         quoin = Piece("quoin", upright(0.0, middle), upright(long, middle))
         plan = planned(f"Q{course:02d}", quoin, *beds, course)[0]
         drafts.append(Draft(flat_stone(plan, deep, first), first, plan.corners, seen_depth=True))
-        # the second wall runs to the left from the corner
+        # the second wall runs to the left from the corner; above, the quoin's sides change places
         ends = {"A": (long, length), "B": (-length, -deep)}
+        above = {"A": deep, "B": -long}
         for letter, frame in (("A", first), ("B", second)):
             start, stop = ends[letter]
-            run = fill_run(rng, upright(start, middle), upright(stop, middle), middle, below[letter])
+            avoid = sorted({*below[letter], above[letter]})
+            run = fill_run(rng, upright(start, middle), upright(stop, middle), middle, avoid)
             below[letter] = sorted({line.at(beds[1].height) for p in run for line in (p.left, p.right)})
             for k, piece in enumerate(run, start=1):
                 plan = planned(f"{letter}{course:02d}-{k:02d}", piece, *beds, course)[0]

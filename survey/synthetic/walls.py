@@ -11,7 +11,7 @@ import numpy as np
 from moma.errors import GeometryError
 from survey.synthetic.bond import Line, PlannedStone, upright
 from survey.synthetic.building import Building, Draft, measured_building, observer
-from survey.synthetic.coursing import Bed, Piece, fill_run, planned
+from survey.synthetic.coursing import CLEARANCES, Bed, Piece, fill_run, planned
 from survey.synthetic.frame import build_stone, wall_frame
 from survey.synthetic.openings import Arch, Opening, plan_opening
 
@@ -126,6 +126,8 @@ def plan_courses(
         before = courses[-1] if courses else Course((), frozenset())
         blocked = [before.pieces[k] for k in sorted(before.tall)] + given
         pieces = list(given)
+        if opening is not None and number == opening.jambs[0] - 1:  # no jamb on a sliver of the next stone
+            below = sorted({*below, -opening.half, opening.half})
         for start, stop in _runs(blocked, opening, number, middle, ends):
             pieces += _fill_beside(rng, start, stop, opening, number, middle, below)
         pieces.sort(key=lambda piece: piece.left.at(middle))
@@ -174,12 +176,19 @@ def _fill_beside(
     left, right, kind = edges
     lengths = opening.beside(number)
     if stop == left:
-        cut = upright(min(stop.at(middle), -opening.half) - lengths[0], middle, rng)
+        cut = upright(_clear(min(stop.at(middle), -opening.half) - lengths[0], -1, below), middle, rng)
         return [*fill_run(rng, start, cut, middle, below), Piece(kind, cut, stop)]
     if start == right:
-        cut = upright(max(start.at(middle), opening.half) + lengths[1], middle, rng)
+        cut = upright(_clear(max(start.at(middle), opening.half) + lengths[1], 1, below), middle, rng)
         return [Piece(kind, start, cut), *fill_run(rng, cut, stop, middle, below)]
     return fill_run(rng, start, stop, middle, below)
+
+
+def _clear(place: float, outward: int, below: Sequence[float]) -> float:
+    """Move a head joint outward until it is clear of those of the course below."""
+    while any(abs(place - joint) < CLEARANCES[0] for joint in below):
+        place += 0.02 * outward
+    return place
 
 
 def _forbidden(

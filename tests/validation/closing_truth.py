@@ -24,6 +24,7 @@ class Verdict:
     Attributes
     ----------
     true_area : of all true joints [m²]
+    areas : the same by pair of stones [m²]
     found : by pair of stones, area that they share now over what they truly share [-]
     found_share : what is shared now of the true area, no joint counted for more than it is [-]
     beyond_share : what is shared beyond: joints that are too large, and pairs that do not truly touch [-]
@@ -36,6 +37,7 @@ class Verdict:
     """
 
     true_area: float
+    areas: dict[Pair, float]
     found: dict[Pair, float]
     found_share: float
     beyond_share: float
@@ -85,6 +87,7 @@ def judge(
     common = sum(min(now.get(pair, 0.0), area) for pair, area in true.items())
     return Verdict(
         true_area=total,
+        areas=true,
         found={pair: now.get(pair, 0.0) / area for pair, area in true.items()},
         found_share=common / total,
         beyond_share=(sum(now.values()) - common) / total,
