@@ -8,7 +8,15 @@ from numpy.typing import NDArray
 
 from moma.errors import GeometryError
 
-__all__ = ["MassProperties", "face_plane", "fan", "mass_properties", "smallest_width", "united"]
+__all__ = [
+    "MassProperties",
+    "face_plane",
+    "face_planes",
+    "fan",
+    "mass_properties",
+    "smallest_width",
+    "united",
+]
 
 Array = NDArray[np.float64]
 Faces = Sequence[Sequence[int]]
@@ -92,6 +100,21 @@ def face_plane(points: Array) -> tuple[Array, Array]:
     local = points - centre  # far from the origin the cross products would lose the small differences
     normal = np.cross(local, np.roll(local, -1, axis=0)).sum(axis=0)
     return normal / np.linalg.norm(normal), centre
+
+
+def face_planes(vertices: Array, faces: Faces) -> tuple[Array, Array]:
+    """Unit normals and mean points (nf, 3) of all faces at once, as `face_plane` has those of one."""
+    loops = np.concatenate([np.asarray(face, dtype=np.int64) for face in faces])
+    counts = np.array([len(face) for face in faces])
+    start = np.cumsum(counts) - counts
+    centres = np.add.reduceat(vertices[loops], start) / counts[:, None]
+    local = vertices[loops] - np.repeat(centres, counts, axis=0)
+    following = np.arange(1, len(loops) + 1)
+    following[start + counts - 1] = start
+    (x, y, z), (u, v, w) = local.T, local[following].T
+    normals = np.add.reduceat(np.column_stack([y * w - z * v, z * u - x * w, x * v - y * u]), start)
+    with np.errstate(invalid="ignore"):  # a face without area has no normal
+        return normals / np.linalg.norm(normals, axis=1)[:, None], centres
 
 
 def smallest_width(vertices: Array, faces: Faces) -> float:

@@ -11,6 +11,8 @@ __all__ = ["flattened", "overlap_area", "overlap_integrals", "room"]
 _MAX_CUT = 64
 # covered up to this part a facet is tested by hats, which stay within the overlap; from that part on by dual functions
 _HATS, _DUAL = 0.8, 0.98
+# where a joint ends at a node, rounding leaves overlaps of about this part of a facet, of which no pressure can be told
+_NOTHING = 1e-12
 
 
 @njit(cache=True)
@@ -177,6 +179,14 @@ def room(array, needed):
 
 
 @njit(cache=True)
+def _area(polygon, count):
+    area = 0.0
+    for t in range(1, count - 1):
+        area += abs(_triangle(polygon, t))
+    return area
+
+
+@njit(cache=True)
 def _integrate(polygon, count, own, kind, far, far_kind, n_psi, n_own, n_far, share, moment, mass, cross):
     """Add ∫ψ_i, ∫ψ_i (x, y, x² + y²), ∫ψ_i N_k, ∫ψ_i N_j over a polygon in the facets `own` and, if kind > 0, `far`."""
     corners = corner_count(kind)
@@ -340,7 +350,7 @@ def overlap_integrals(x_c, facet_c, kind_c, x_a, facet_a, kind_a, outlines, outl
                 if k > 0 and o > 0:
                     k = _clip_flat(polygon, k, outlines[begin : begin + o], o, kept)
                 begin += o
-            if k < 3:
+            if k < 3 or _area(polygon, k) <= _NOTHING * _area(own, corners):
                 continue
             pair = cross[pairs * stride_a : (pairs + 1) * stride_a].reshape(corners, kind_a)
             _integrate(polygon, k, own, kind_c, other, kind_a, n_psi, n_own, n_far, part, middle, block, pair)

@@ -17,7 +17,7 @@ from mechanics.meshing.mesh import SolidMesh, tet_mesh
 from mechanics.meshing.shaping import improve_cells
 from mechanics.meshing.sizes import SizeField, as_field
 from mechanics.meshing.soundness import CONVEX
-from mechanics.polyhedra import face_plane
+from mechanics.polyhedra import face_planes
 from moma.errors import MeshError
 
 __all__ = ["mesh_with_delaunay"]
@@ -64,20 +64,37 @@ def mesh_with_delaunay(vertices: Array, faces: Faces, size: SizeField | float, c
     if (corners @ planes[:, :3].T - planes[:, 3]).max() > CONVEX:
         raise MeshError("it is not convex", where=f"stone {code}", remedy="mesh it with gmsh")
     cloud = _cloud(corners, faces, planes, field)
-    nodes = cloud.points.copy()
+    try:
+        nodes, cells = _filled(cloud, planes, field, code, loose=False)
+        return tet_mesh(nodes * reach + origin, cells, vertices, faces, code)
+    except MeshError:
+        nodes, cells = _filled(cloud, planes, field, code, loose=True)
+        return tet_mesh(nodes * reach + origin, cells, vertices, faces, code)
+
+
+def _filled(cloud: _Cloud, planes: Array, field: SizeField, code: str, loose: bool) -> tuple[Array, Ints]:
+    """Nodes (n, 3), and tetrahedra between them.
+
+    Nodes on edges stay at equal parts where they can, so that neighbours meet node on node; they are loose where four
+    of them, on two parallel edges, would make a flat tetrahedron.
+    """
+    free = cloud.free.copy()
+    if not loose:
+        free[cloud.on_plane.sum(axis=1) > 1] = 0.0
+    nodes = _jittered(cloud.points, free, planes, cloud.on_plane, field)
     weight = field(nodes) ** 3
     cells = _triangulated(nodes, cloud.on_plane, code)
     for _ in range(_RELAXATIONS):
-        relax(nodes, cells, cloud.free, planes, cloud.on_plane, weight)
+        relax(nodes, cells, free, planes, cloud.on_plane, weight)
         cells = _triangulated(nodes, cloud.on_plane, code)
     improve_cells(nodes, cells, cloud.free)
-    return tet_mesh(nodes * reach + origin, cells, vertices, faces, code)
+    return nodes, cells
 
 
 def _planes(corners: Array, faces: Faces) -> Array:
     """Rows (n, d) of the faces, with n·x ≤ d inside."""
-    rows = [face_plane(corners[list(face)]) for face in faces]
-    return np.array([(*normal, normal @ origin) for normal, origin in rows])
+    normals, origins = face_planes(corners, faces)
+    return np.column_stack([normals, (normals * origins).sum(axis=1)])
 
 
 def _cloud(corners: Array, faces: Faces, planes: Array, field: SizeField) -> _Cloud:
@@ -100,13 +117,13 @@ def _cloud(corners: Array, faces: Faces, planes: Array, field: SizeField) -> _Cl
     on_plane[rows, neighbours[own_edge, 0]] = on_plane[rows, neighbours[own_edge, 1]] = True
     on_plane[np.arange(ends[1], ends[2]), own_face] = True
     free = np.zeros((len(points), 3, 3))
+    normals = planes[own_face, :3]
     along = corners[edges[own_edge, 1]] - corners[edges[own_edge, 0]]
     along /= np.linalg.norm(along, axis=1)[:, None]
     free[ends[0] : ends[1]] = along[:, :, None] * along[:, None]
-    normals = planes[own_face, :3]
     free[ends[1] : ends[2]] = np.eye(3) - normals[:, :, None] * normals[:, None]
     free[ends[2] :] = np.eye(3)
-    return _Cloud(_jittered(points, free, planes, on_plane, field), on_plane, free)
+    return _Cloud(points, on_plane, free)
 
 
 def _axes(planes: Array) -> Array:
@@ -114,9 +131,8 @@ def _axes(planes: Array) -> Array:
     z = planes[0, :3]
     away = planes[1:, :3] - np.outer(planes[1:, :3] @ z, z)
     lengths = np.linalg.norm(away, axis=1)
-    first = int(
-        (lengths > (1.0 - CONVEX) * lengths.max()).argmax()
-    )  # whatever rounding has done to equal ones
+    # of equal ones the first, whatever rounding has done to them
+    first = int((lengths > (1.0 - CONVEX) * lengths.max()).argmax())
     x = away[first] / lengths[first]
     return np.array([x, np.cross(z, x), z])
 
@@ -138,6 +154,7 @@ def _triangulated(nodes: Array, on_plane: Bools, code: str) -> Ints:
         raise MeshError(
             f"Delaunay failed: {str(error).splitlines()[0]}",
             where=f"stone {code}",
+            remedy="give another mesh size",
         ) from error
     flat = (on_plane[tetrahedra].sum(axis=1) == 4).any(axis=1)
     cells = tetrahedra[~flat]

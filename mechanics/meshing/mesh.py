@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from mechanics.meshing.elements import Element
 from mechanics.meshing.shape_functions import integration, jacobians
-from mechanics.polyhedra import face_plane, mass_properties
+from mechanics.polyhedra import face_plane, face_planes, mass_properties
 from moma.errors import MeshError
 
 __all__ = ["SolidMesh", "boundary_facets", "solid_mesh", "tet_mesh"]
@@ -120,10 +120,10 @@ def _volumes(element: Element, nodes: Array, cells: Ints, where: str) -> float:
 def _faces_of(facets: Array, vertices: Array, faces: Faces, where: str) -> Ints:
     """The face (ns,) that each facet (ns, kf, 3) lies on."""
     size = float(np.ptp(vertices, axis=0).max())
-    distance = np.empty((len(facets), len(faces)))
-    for k, face in enumerate(faces):
-        normal, origin = face_plane(vertices[list(face)])
-        distance[:, k] = np.abs((facets - origin) @ normal).max(axis=1)
+    normals, origins = face_planes(vertices, faces)
+    about = vertices.mean(axis=0)  # far from the origin the products would lose digits
+    offsets = (normals * (origins - about)).sum(axis=1)
+    distance = np.abs((facets - about) @ normals.T - offsets).max(axis=1)
     facet_face: Ints = distance.argmin(axis=1).astype(np.int64)
     worst = float(distance.min(axis=1).max())
     if worst > _OFF_FACE * size:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from mechanics.meshing._kernels_shaping import improve
 from mechanics.meshing.mesh import SolidMesh
-from mechanics.polyhedra import face_plane
+from mechanics.polyhedra import face_planes
 
 __all__ = ["improve_cells", "improved"]
 
@@ -44,7 +44,7 @@ def improved(mesh: SolidMesh, vertices: Array, faces: Faces) -> SolidMesh:
 
 def _freedom(mesh: SolidMesh, vertices: Array, faces: Faces) -> Array:
     """Projectors (n, 3, 3): on a face, on an edge, or on nothing at a corner."""
-    normals = np.array([face_plane(vertices[list(face)])[0] for face in faces])
+    normals, _ = face_planes(vertices, faces)
     on_face = np.zeros((len(mesh.nodes), len(faces)), dtype=bool)
     on_face[mesh.facets, mesh.facet_face[:, None]] = True
     count = on_face.sum(axis=1)

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.polyhedra import face_plane, fan, mass_properties
+from mechanics.polyhedra import face_plane, face_planes, fan, mass_properties
 from moma.errors import GeometryError, MeshError
 
 __all__ = ["CONVEX", "check_meshable", "is_convex"]
@@ -38,8 +38,7 @@ def check_meshable(vertices: Array, faces: Faces, code: str) -> None:
     except GeometryError as error:
         raise MeshError(error.what, where=where, remedy=error.remedy) from error
     _check_thickness(vertices, size, where)
-    for k, face in enumerate(faces):
-        _check_planar(k, face, vertices, size, where)
+    _check_planar(vertices, faces, size, where)
     if not is_convex(vertices, faces):
         _check_crossings(vertices, faces, where)
 
@@ -47,10 +46,10 @@ def check_meshable(vertices: Array, faces: Faces, code: str) -> None:
 def is_convex(vertices: Array, faces: Faces) -> bool:
     """All corners lie behind the planes of all faces."""
     size = float(np.ptp(vertices, axis=0).max())
-    rows = [face_plane(vertices[list(face)]) for face in faces]
-    normals, origins = np.array([normal for normal, _ in rows]), np.array([origin for _, origin in rows])
-    ahead = (vertices[:, None] - origins) * normals
-    return bool(ahead.sum(axis=-1).max() < CONVEX * size)
+    normals, origins = face_planes(vertices, faces)
+    about = vertices.mean(axis=0)
+    ahead = (vertices - about) @ normals.T - (normals * (origins - about)).sum(axis=1)
+    return bool(ahead.max() < CONVEX * size)
 
 
 def _check_corners(vertices: Array, faces: Faces, size: float, where: str) -> None:
@@ -79,12 +78,15 @@ def _check_thickness(vertices: Array, size: float, where: str) -> None:
         )
 
 
-def _check_planar(number: int, face: tuple[int, ...], vertices: Array, size: float, where: str) -> None:
-    normal, origin = face_plane(vertices[list(face)])
-    off = np.abs((vertices[list(face)] - origin) @ normal)
-    if not off.max() <= _PLANAR * size:  # also where a face has no area and so no normal
+def _check_planar(vertices: Array, faces: Faces, size: float, where: str) -> None:
+    normals, origins = face_planes(vertices, faces)
+    owner = np.repeat(np.arange(len(faces)), [len(face) for face in faces])
+    corners = np.array([corner for face in faces for corner in face])
+    off = np.abs(((vertices[corners] - origins[owner]) * normals[owner]).sum(axis=1))
+    worst = int(np.where(np.isnan(off), np.inf, off).argmax())
+    if not off[worst] <= _PLANAR * size:  # also where a face has no area and so no normal
         raise MeshError(
-            f"face {number} is not planar: its corner {face[int(off.argmax())]} lies {off.max():.2g} m off",
+            f"face {owner[worst]} is not planar: its corner {corners[worst]} lies {off[worst]:.2g} m off",
             where=where,
             remedy="make it planar (simplify the stone or close its joints), or cut the face into triangles",
         )

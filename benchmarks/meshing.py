@@ -1,0 +1,148 @@
+"""Meshing, stone by stone: `python -m benchmarks.meshing [--stones 1000 10000] [--shapes N] [--json]`.
+
+Time and quality of each mesher on boxes, voussoirs, slender, flat and leaning hexahedra of about 200 nodes, and
+processor time for many distinct stones. See benchmarks/README.md for what the columns mean.
+"""
+
+import argparse
+import time
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
+from mechanics.materials import Material
+from mechanics.meshing.choice import Mesher
+from mechanics.meshing.elements import Element
+from mechanics.meshing.mesher import mesh_block
+from mechanics.meshing.quality import mesh_quality
+from mechanics.polyhedra import mass_properties
+from mechanics.scene import Block, Fidelity
+
+__all__ = ["main"]
+
+Array = NDArray[np.float64]
+
+_LIMESTONE = Material("limestone", density=2000.0, young=1e10, poisson=0.2)
+_FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
+_UNIT = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)])
+# edge length over the cube root of the volume with which meshes have about 200 nodes
+_SIZES = {"box": 0.245, "voussoir": 0.235, "leaning": 0.245, "slender 1:20": 0.28, "flat 1:20": 0.41}
+_MESHERS: dict[str, tuple[Mesher, Element]] = {
+    "delaunay": (Mesher.DELAUNAY, Element.TET4),
+    "gmsh": (Mesher.GMSH, Element.TET4),
+    "grid of hexahedra": (Mesher.AUTO, Element.HEX8),
+}
+_TABLE: Table = (
+    ("shape", "shape", ""),
+    ("mesher", "mesher", ""),
+    ("stones", "stones", "d"),
+    ("nodes", "nodes", ".0f"),
+    ("cells", "cells", ".0f"),
+    ("ms", "ms per stone", ".1f"),
+    ("quadratic_ms", "second order", ".1f"),
+    ("angle", "dihedral angle, smallest", ".1f"),
+    ("angle_median", "median stone", ".1f"),
+    ("jacobian", "scaled Jacobian, smallest", ".2f"),
+    ("jacobian_median", "median stone", ".2f"),
+)
+_MANY: Table = (
+    ("stones", "distinct stones", "d"),
+    ("mesher", "mesher", ""),
+    ("seconds", "seconds", ".1f"),
+    ("ms", "ms per stone", ".2f"),
+    ("nodes", "nodes per stone", ".0f"),
+    ("angle", "dihedral angle, smallest", ".1f"),
+    ("jacobian", "scaled Jacobian, smallest", ".2f"),
+)
+
+
+def main() -> None:
+    """Run all shapes and sizes and print."""
+    options = _options()
+    rows = [_shape(shape, mesher, options.shapes) for shape in _SIZES for mesher in _MESHERS]
+    many = [_many(count, mesher) for count in options.stones for mesher in _MESHERS]
+    if options.json:
+        print_json(rows + many)
+        return
+    print(f"{machine()}; {environment('moma-masonry', 'gmsh', 'scipy', 'numpy')}\n")
+    print_table(rows, _TABLE)
+    if many:
+        print()
+        print_table(many, _MANY)
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.meshing", description=__doc__)
+    parser.add_argument(
+        "--stones", type=int, nargs="*", default=[1000, 10_000], help="how many distinct stones"
+    )
+    parser.add_argument("--shapes", type=int, default=50, help="stones of each shape (50)")
+    parser.add_argument("--json", action="store_true", help="print an array of objects, one for each row")
+    return parser.parse_args()
+
+
+def _stone(shape: str, rng: np.random.Generator, code: str) -> Block:
+    """A stone of a shape, of random proportions, turned and somewhere."""
+    extent = rng.uniform(0.7, 1.3, 3) * {
+        "slender 1:20": [1.0, 0.05, 0.05],
+        "flat 1:20": [0.6, 0.6, 0.03],
+    }.get(shape, [0.4, 0.3, 0.25])
+    corners = _UNIT - 0.5
+    if shape == "voussoir":
+        corners = corners * np.where(corners[:, 2:] > 0, [1.0, 1.0, 1.0], [0.75, 1.0, 1.0])
+    if shape == "leaning":  # a box seen in perspective: all its faces lean, and stay planar
+        corners = corners / (1.0 + corners @ rng.uniform(-0.3, 0.3, 3))[:, None]
+    corners = (corners * extent) @ Rotation.random(random_state=rng).as_matrix().T + rng.uniform(-10, 10, 3)
+    size = _SIZES[shape] * mass_properties(corners, _FACES).volume ** (1 / 3)
+    return Block(code, corners, _FACES, _LIMESTONE, Fidelity.DEFORMABLE, size)
+
+
+def _meshing(stones: list[Block], mesher: str, second: bool = False) -> tuple[float, Row]:
+    """Processor time [s], and what the meshes are like."""
+    program, element = _MESHERS[mesher]
+    if second:
+        element = {Element.TET4: Element.TET10, Element.HEX8: Element.HEX20}[element]
+    blocks = [replace(stone, mesher=program, element=element) for stone in stones]
+    start = time.process_time()
+    meshes = [mesh_block(block) for block in blocks]
+    seconds = time.process_time() - start
+    found = mesh_quality(meshes)
+    angle, jacobian = [one.min_dihedral for one in found], [one.min_scaled_jacobian for one in found]
+    return seconds, {
+        "mesher": mesher,
+        "stones": len(stones),
+        "nodes": float(np.mean([one.nodes for one in found])),
+        "cells": float(np.mean([one.cells for one in found])),
+        "ms": 1e3 * seconds / len(stones),
+        "angle": min(angle),
+        "angle_median": float(np.median(angle)),
+        "jacobian": min(jacobian),
+        "jacobian_median": float(np.median(jacobian)),
+        "machine": machine(),
+    }
+
+
+def _shape(shape: str, mesher: str, count: int) -> Row:
+    progress(f"{shape}, {mesher}")
+    rng = np.random.default_rng(1)
+    stones = [_stone(shape, rng, f"S{k}") for k in range(count)]
+    _meshing(stones[:2], mesher)  # kernels are compiled and libraries loaded beforehand
+    _, row = _meshing(stones, mesher)
+    _, second = _meshing(stones, mesher, second=True)
+    return row | {"shape": shape, "quadratic_ms": second["ms"]}
+
+
+def _many(count: int, mesher: str) -> Row:
+    progress(f"{count} stones, {mesher}")
+    rng = np.random.default_rng(2)
+    stones = [_stone("leaning", rng, f"S{k}") for k in range(count)]
+    _meshing(stones[:2], mesher)
+    seconds, row = _meshing(stones, mesher)
+    return row | {"shape": "leaning", "seconds": seconds}
+
+
+if __name__ == "__main__":
+    guarded(main)
