@@ -64,7 +64,8 @@ def settle(vertices: Array, corner: Ints, plane: Ints) -> Settled:
             break
     for _ in range(_POLISH):
         network.start = network.x.copy()
-        network.step()
+        if network.step() <= _DONE * size:
+            break
     return Settled(network.x + centre, network.normal, network.distances())
 
 

@@ -74,22 +74,26 @@ def dome(rings: int = 3, around: int = 10, radius: float = 5.0, thickness: float
 
 
 def groin(
-    stones: int = 3, reach: float = 1.0, radius: float = 3.0, thickness: float = 0.4, turn: float = 0.4
+    stones: int = 3,
+    angles: tuple[float, float] = (0.5, 1.2),
+    radius: float = 3.0,
+    thickness: float = 0.4,
+    turn: float = 0.4,
 ) -> list[Solid]:
     """Where two barrel vaults meet: stones with an arm in each of them, mitred, and a straight stone at each arm.
 
-    All is turned about z by so many radians, so that rounding meets no plane by chance.
+    The angles are those of the lowest and the highest bed above level. All is turned about z by so many radians, so
+    that rounding meets no plane by chance.
     """
     out: list[Solid] = []
     c, s = np.cos(turn), np.sin(turn)
     frame = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    angles = np.linspace(0.5, 1.2, stones + 1)
-    for k, (low, high) in enumerate(pairwise(angles)):
+    for k, (low, high) in enumerate(pairwise(np.linspace(*angles, stones + 1))):
         profile = [(radius, low), (radius + thickness, low), (radius + thickness, high), (radius, high)]
         across = np.array([(r * np.cos(a), r * np.sin(a)) for r, a in profile])
         mitre = np.column_stack([across[:, 0], across[:, 0], across[:, 1]])
         # courses break joint along the arms
-        ends = [5.0 + reach * (1.0 + 0.5 * (k % 2)), 5.0 + reach * (2.0 + 0.5 * (k % 2))]
+        ends = [6.0 + 0.5 * (k % 2), 7.0 + 0.5 * (k % 2)]
         rings = []
         for arm in range(2):
             for end in ends:

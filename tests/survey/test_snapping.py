@@ -293,7 +293,7 @@ def cut_boxes(draw: st.DrawFn) -> list[Solid]:
     return out
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(cut_boxes())
 def test_boxes_cut_anyhow_and_rounded_keep_their_shape_and_meet(solids: list[Solid]) -> None:
     tolerance = 0.004
