@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.spatial import Delaunay
 
 from mechanics.meshing._kernels_sampling import lay_points, size_at
 from mechanics.meshing._kernels_shaping import relax, shape
@@ -19,7 +18,7 @@ from mechanics.polyhedra import face_plane
 from mechanics.scene import Fidelity
 from mechanics.touching import touching_faces
 from tests.mechanics.shapes import TURN, brick, ground, moved, scene, transformed
-from tests.mechanics.wild_stones import BOX_FACES, hull_volume, wild_hexahedron
+from tests.mechanics.wild_stones import BOX_FACES, wild_hexahedron
 from tests.pipelines.handmade import box
 
 SOFT = Fidelity.DEFORMABLE
@@ -159,21 +158,24 @@ def test_shape_is_one_in_a_regular_tetrahedron_and_falls_to_zero():
 
 
 def test_slivers_get_better_and_the_stone_keeps_its_shape():
-    """Four nodes in the middle of a stone that are almost on one plane."""
+    """A node inside is moved until it nearly lies on a side of its neighbours."""
     corners = box((0, 0, 0), (1, 1, 1))
-    corners = corners / (1.0 + corners @ [0.1, 0.15, 0.2])[:, None]  # no five of them on a sphere
-    inner = [(0.4, 0.4, 0.5), (0.6, 0.4, 0.5), (0.6, 0.6, 0.501), (0.4, 0.6, 0.501), (0.5, 0.5, 0.8)]
-    nodes = np.vstack([corners, inner])
-    cells = Delaunay(nodes).simplices.astype(np.int64)
-    volume = np.abs(np.linalg.det(nodes[cells[:, 1:]] - nodes[cells[:, :1]]))
-    mesh = tet_mesh(nodes, cells[volume > 1e-9], corners, BOX_FACES, "A1")
-    better = improved(mesh, corners, BOX_FACES)
-    before, after = (mesh_quality([one])[0] for one in (mesh, better))
-    assert before.min_dihedral < 1.0
-    assert after.min_dihedral > 8.0
-    np.testing.assert_array_equal(better.nodes[:8], corners)
+    mesh = mesh_with_delaunay(corners, BOX_FACES, 0.4, "A1")
+    nodes = mesh.nodes.copy()
+    inside = np.setdiff1d(mesh.cells, mesh.facets)[0]
+    cell = mesh.cells[(mesh.cells == inside).any(axis=1)][0]
+    nodes[inside] += 0.99 * (nodes[cell[cell != inside]].mean(axis=0) - nodes[inside])
+    poor = tet_mesh(nodes, mesh.cells, corners, BOX_FACES, "A1")
+    better = improved(poor, corners, BOX_FACES)
+    before, after = (mesh_quality([one])[0] for one in (poor, better))
+    assert before.min_dihedral < 2.0
+    assert after.min_dihedral > 10.0
+    np.testing.assert_array_equal(better.cells, poor.cells)
+    for corner in corners:
+        assert np.abs(better.nodes - corner).max(axis=1).min() == 0.0
     volumes = np.linalg.det(better.nodes[better.cells[:, 1:]] - better.nodes[better.cells[:, :1]]) / 6
-    assert volumes.sum() == pytest.approx(hull_volume(corners), rel=1e-12)
+    assert volumes.min() > 0
+    assert volumes.sum() == pytest.approx(1.0, rel=1e-12)
 
 
 def slow_quality(corners):
