@@ -19,7 +19,8 @@ def side_planes(solid: Solid) -> Array:
     rows = []
     for face in solid.faces:
         p = solid.vertices[list(face)]
-        normal = np.cross(p[2] - p[0], p[3] - p[1])
+        arms = p - p[0]
+        normal = np.cross(arms[1:-1], arms[2:]).sum(axis=0)
         normal /= np.linalg.norm(normal)
         rows.append([*normal, normal @ p.mean(axis=0)])
     return np.array(rows)
