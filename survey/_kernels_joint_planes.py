@@ -11,6 +11,12 @@ _ROUNDS = 30
 _HUBER = 1.5
 """Residuals beyond so many robust standard deviations lose weight."""
 
+_PLANE = 0.25
+"""Of the straightness: by so much the corners of a joint that opens like a wedge may be off its two planes (rms)."""
+
+_SHARP = 1e-4
+"""Metres below which a residual counts no more where their sum is to be least."""
+
 _WORN = 0.01
 """Weight of a corner that is worn, and so some 25 mm off where a sound one is 2.5 mm off."""
 
@@ -66,19 +72,66 @@ def _fit(points, hands, sound, scale, usual, straightness, plane, value):
     if above >= _OWN and number - above >= _OWN:
         open_, less = _huber(design, points[:, 2], sound, 6, prior, usual)
         wedge = math.sqrt(open_[4] ** 2 + open_[5] ** 2) / scale
-        if wedge > _WEDGE and less < 0.1 * left:
+        if wedge > _WEDGE and less < 0.1 * left and less < (_PLANE * straightness) ** 2:
             solution = open_
+    value[2], value[3] = _left_over(design, points[:, 2], sound, solution, straightness)
+    if value[3] > 0.0:
+        # a few corners that are far off, at an end even more, tilt the plane: find those by the least sum of residuals
+        flat = _least_sum(design, points[:, 2], sound)
+        near = sound.copy()
+        for i in range(k):
+            near[i] = sound[i] and abs(points[i, 2] - _value(design[i], flat)) <= straightness
+        again, _ = _huber(design, points[:, 2], near, 4, prior, usual)
+        largest, off = _left_over(design, points[:, 2], sound, again, straightness)
+        if off < value[3]:
+            solution, value[2], value[3] = again, largest, off
     plane[0], plane[1], plane[2] = solution[0], solution[1] / scale, solution[2] / scale
-    total, weight, largest, off = 0.0, 0.0, 0.0, 0
+    total, weight = 0.0, 0.0
     for i in range(k):
-        residual = abs(points[i, 2] - _value(design[i], solution))
         w = 1.0 if sound[i] else _WORN
-        total, weight = total + w * residual**2, weight + w
+        total, weight = total + w * (points[i, 2] - _value(design[i], solution)) ** 2, weight + w
+    value[0], value[1] = solution[3], math.sqrt(total / weight)
+
+
+@njit(cache=True)
+def _left_over(design, heights, sound, solution, straightness):
+    """Largest residual of sound corners, and the share of those that are off the joint."""
+    largest, off, number = 0.0, 0, 0
+    for i in range(design.shape[0]):
         if sound[i]:
-            largest = max(largest, residual)
+            residual = abs(heights[i] - _value(design[i], solution))
+            largest, number = max(largest, residual), number + 1
             off += residual > straightness
-    value[0], value[1], value[2] = solution[3], math.sqrt(total / weight), largest
-    value[3] = off / max(number, 1)
+    return largest, off / max(number, 1)
+
+
+@njit(cache=True)
+def _least_sum(design, heights, sound):
+    """The solution (6,), without opening, with the least sum of residuals of sound corners."""
+    k = design.shape[0]
+    solution, weights = np.zeros(6), np.empty(k)
+    for i in range(k):
+        weights[i] = 1.0 if sound[i] else 0.0
+    for _ in range(10 * _ROUNDS):
+        solution[:4] = np.linalg.solve(*_normal(design, heights, weights, 4))
+        for i in range(k):
+            if sound[i]:
+                weights[i] = 1.0 / max(abs(heights[i] - _value(design[i], solution)), _SHARP)
+    return solution
+
+
+@njit(cache=True)
+def _normal(design, heights, weights, unknowns):
+    """Matrix and right side of the normal equations; what nothing tells stays zero."""
+    matrix, right = np.zeros((unknowns, unknowns)), np.zeros(unknowns)
+    for i in range(design.shape[0]):
+        for c in range(unknowns):
+            right[c] += weights[i] * design[i, c] * heights[i]
+            for d in range(unknowns):
+                matrix[c, d] += weights[i] * design[i, c] * design[i, d]
+    for c in range(unknowns):
+        matrix[c, c] += 1e-12 * weights.sum()
+    return matrix, right
 
 
 @njit(cache=True)
@@ -99,16 +152,9 @@ def _huber(design, heights, sound, unknowns, prior, usual):
         weights[i] = 1.0 if sound[i] else _WORN
     left = 0.0
     for _ in range(_ROUNDS):
-        matrix, right = np.zeros((unknowns, unknowns)), np.zeros(unknowns)
-        for i in range(k):
-            for c in range(unknowns):
-                right[c] += weights[i] * design[i, c] * heights[i]
-                for d in range(unknowns):
-                    matrix[c, d] += weights[i] * design[i, c] * design[i, d]
+        matrix, right = _normal(design, heights, weights, unknowns)
         matrix[3, 3] += prior
         right[3] += prior * usual
-        for c in range(unknowns):  # what nothing tells stays zero
-            matrix[c, c] += 1e-12 * k
         previous[:] = solution
         solution[:unknowns] = np.linalg.solve(matrix, right)
         count, total, weight = 0, 0.0, 0.0

@@ -25,7 +25,8 @@ Bools = NDArray[np.bool_]
 
 _ROUNDS = 10  # in which single joints are left open; then all of a stone that is still moved too far
 _CONVEX = 1e-6  # of a stone's size: a corner that stands out of a face's plane by less does so by rounding
-_KEPT = "both stones keep their shape"
+_BOTH_KEPT = "both stones keep their shape"
+_KEPT = "one of the stones keeps its shape, and the other is led by its other joints"
 
 
 @dataclass(frozen=True)
@@ -120,7 +121,7 @@ def close_within_bounds(
         links = np.array([k for k, reason in enumerate(reasons) if not reason], np.int64)
         some = contact_planes(building.faces, some_links(facing, links), settings)
         for k in links[some.of_link < 0].tolist():
-            reasons[k] = _KEPT
+            reasons[k] = _BOTH_KEPT if building.faces.kept[facing.faces[k]].all() else _KEPT
         contact = _of_all(some, links, len(facing))
         planes, free = _stone_planes(building, facing, contact, known, settings)
         planes |= {i: building.planes[building.rows(i)] for i in unmended if free[i].all()}

@@ -107,7 +107,7 @@ def _joints(building: Building, facing: FacingFaces, cut: Cut, settings: JointSe
             Joint(
                 stones=(codes[pairs[k, 0]], codes[pairs[k, 1]]),
                 plane=plane if not reason else -1,
-                width=float(facing.gap[k]),
+                width=float(facing.gap[k]) if reason else _width(building, facing, cut, k),
                 opening=float(opening[k]),
                 area=area,
                 centroid=centroid + building.origin,
@@ -116,6 +116,20 @@ def _joints(building: Building, facing: FacingFaces, cut: Cut, settings: JointSe
             )
         )
     return joints
+
+
+def _width(building: Building, facing: FacingFaces, cut: Cut, link: int) -> float:
+    """How far the sound corners of the two faces lie apart, seen along the normal of their plane [m]."""
+    faces, plane = building.faces, int(cut.contact.of_link[link])
+    side, total = float(cut.contact.side[link]), 0.0
+    for face, out in zip(facing.faces[link].tolist(), (side, -side), strict=True):
+        corners = faces.corners(face)
+        sound = corners[faces.sound[corners]]
+        if not len(sound):
+            return float(facing.gap[link])
+        heights = faces.solids.vertices[sound] @ cut.contact.normals[plane] - cut.contact.offsets[plane]
+        total -= out * float(heights.mean())
+    return total
 
 
 def _contacts(cut: Cut, settings: JointSettings) -> dict[tuple[int, int], list[tuple[float, Array, Array]]]:

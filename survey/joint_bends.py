@@ -116,7 +116,7 @@ def _extents(solids: Polyhedra, bed: _Bed) -> dict[int, tuple[float, float]]:
 def _chains(place: Array, height: Array, tolerance: float) -> list[int]:
     """Ends (in the order along the bed) of the fewest straight chains that the links make, single odd ones apart."""
     order = np.argsort(place, kind="stable")
-    x, y = place[order], median_filter(height[order], size=5, mode="nearest")
+    x, y = place[order], median_filter(height[order], size=5, mode="mirror")
     count, start = 0, 0
     while start < len(x):
         stop = min(start + _LEAST, len(x))
@@ -210,7 +210,8 @@ def _fitted(
     residual: Array = np.zeros(len(corner))
     for _ in range(_ROUNDS):
         root = np.sqrt(weight)
-        solution = np.linalg.lstsq(design * root[:, None], local[:, 2] * root, rcond=None)[0]
+        fitted = np.linalg.lstsq(design * root[:, None], local[:, 2] * root, rcond=None)[0]
+        solution = fitted.astype(np.float64)
         residual = np.abs(local[:, 2] - design @ solution)
         spread = max(1.4826 * float(np.median(residual)), 1e-4)
         robust = np.minimum(1.0, 1.5 * spread / np.maximum(residual, 1e-300))

@@ -30,7 +30,7 @@ Bools = NDArray[np.bool_]
 
 _ALIKE = 0.985  # cosine of 10°: faces of neighbours that are turned by more do not continue each other
 _FEW = 0.25  # part of the corners of a joint that may be off it
-_SAME = 1e-9  # metres: faces of stones that keep their shape that are nearer lie in one plane
+_SAME = 1e-8  # metres: a face that has to stay and is as near as that to a plane lies in it
 
 
 @dataclass(frozen=True)
@@ -86,33 +86,47 @@ class _Groups:
 def contact_planes(faces: StoneFaces, facing: FacingFaces, settings: JointSettings) -> ContactPlanes:
     """Find the contact plane of each pair of facing faces.
 
+    Faces that have to stay where they are take no part in the fit. What meets nothing else is led to them; what has
+    other joints meets them only where these lie in their very plane.
+
     Parameters
     ----------
     faces : of all stones
     facing : the pairs
     settings : how far a corner may be off its side of a straight joint
     """
+    found = _Found(faces, facing, [], [], np.full(len(facing), -1))
+    kept = faces.kept[facing.faces]
+    movable = np.flatnonzero(~kept.any(axis=1))
+    _add_joints(found, movable, settings)
+    for link in np.flatnonzero(kept.any(axis=1)).tolist():
+        found.add_kept(link, kept[link])
+    return found.planes()
+
+
+def _add_joints(found: "_Found", links: Indices, settings: JointSettings) -> None:
+    """Planes of the joints that these links make."""
+    faces, facing = found.faces, some_links(found.facing, links)
     label = _joints(faces, facing, settings)
     count = int(label.max()) + 1 if len(label) else 0
     groups = _gathered(faces, facing, label, count)
     _, values = _fitted(faces, groups, -1.0, settings)
     usual = float(np.median(values[:, 0])) if count else 0.0
     planes, values = _fitted(faces, groups, usual, settings)
-    kept = _any_kept(faces, groups)
-    straight = (values[:, 2] <= settings.straightness) & ~kept
-    found = _Found(faces, facing, [], [], np.full(len(facing), -1))
-    found.add_many(planes[straight], np.cumsum(straight)[label] - 1, straight[label])
+    straight = values[:, 2] <= settings.straightness
+    found.add_many(
+        planes[straight], links[straight[label]], (np.cumsum(straight)[label] - 1)[straight[label]]
+    )
     order = np.argsort(label, kind="stable")
     first = np.searchsorted(label[order], np.arange(count + 1))
-    for joint in np.flatnonzero(~straight):
-        links = order[first[joint] : first[joint + 1]]
-        if not kept[joint] and found.add_bent(links, settings):
+    for joint in np.flatnonzero(~straight).tolist():
+        own = links[order[first[joint] : first[joint + 1]]]
+        if found.add_bent(own, settings):
             continue
-        if not kept[joint] and values[joint, 3] <= _FEW:
-            found.add_many(planes[[joint]], np.zeros(len(label), np.int64), label == joint)
+        if values[joint, 3] <= _FEW:
+            found.add_many(planes[[joint]], own, np.zeros(len(own), np.int64))
         else:
-            found.add_each(links, usual, settings)
-    return found.planes()
+            found.add_each(own, usual, settings)
 
 
 @dataclass
@@ -125,50 +139,53 @@ class _Found:
     offsets: list[float]
     of_link: Indices
 
-    def add_many(self, planes: Array, number: Indices, wanted: Bools) -> None:
-        """Planes (n, 4) whose numbers are given for each link that is wanted."""
-        start = len(self.normals)
+    def add_many(self, planes: Array, links: Indices, number: Indices) -> None:
+        """Planes (n, 4), and which of them (m,) each link has."""
+        self.of_link[links] = len(self.normals) + number
         self.normals += list(planes[:, :3])
         self.offsets += planes[:, 3].tolist()
-        self.of_link[wanted] = start + number[wanted]
 
     def add_bent(self, links: Indices, settings: JointSettings) -> bool:
         """A joint that is bent but not broken: several planes; False if that is not what it is."""
         found = bent(self.faces.solids, self.faces.planes, self.faces.sound, self.facing, links, settings)
         if found is None:
             return False
-        planes, number = found
-        wanted = np.zeros(len(self.of_link), np.bool_)
-        wanted[links] = True
-        spread = np.zeros(len(self.of_link), np.int64)
-        spread[links] = number
-        self.add_many(planes, spread, wanted)
+        self.add_many(found[0], links, found[1])
         return True
 
     def add_each(self, links: Indices, usual: float, settings: JointSettings) -> None:
-        """A plane for each pair; where one face has to stay, its plane."""
-        label = np.full(len(self.facing), -1)
-        label[links] = np.arange(len(links))
-        part = some_links(self.facing, links)
-        groups = _gathered(self.faces, part, np.arange(len(links)), len(links))
-        planes, _ = _fitted(self.faces, groups, usual, settings)
-        kept = self.faces.kept[part.faces]
-        for k in np.flatnonzero(kept.any(axis=1)):
-            face = int(part.faces[k, 0 if kept[k, 0] else 1])
-            planes[k] = [*self.faces.planes.normals[face], self.faces.planes.offsets[face]]
-        wanted = label >= 0
-        wanted[links[kept.all(axis=1) & ~self._coincide(part)]] = False
-        self.add_many(planes, label, wanted)
+        """A plane for each pair."""
+        part, number = some_links(self.facing, links), np.arange(len(links))
+        planes, _ = _fitted(self.faces, _gathered(self.faces, part, number, len(links)), usual, settings)
+        self.add_many(planes, links, number)
 
-    def _coincide(self, part: FacingFaces) -> Bools:
-        planes = self.faces.planes
-        first, second = part.faces.T
-        turned = np.linalg.norm(planes.normals[first] + planes.normals[second], axis=1)
-        size = np.sqrt(planes.areas[part.faces].max(axis=1))
-        out: Bools = (turned * size <= _SAME) & (np.abs(part.gap) <= _SAME)
-        return out
+    def add_kept(self, link: int, kept: Bools) -> None:
+        """A pair of which a face has to stay: its plane, if the other has it too or nothing else to meet."""
+        first, second = self.facing.faces[link].tolist()
+        stays, other = (first, second) if kept[0] else (second, first)
+        plane = np.array([*self.faces.planes.normals[stays], self.faces.planes.offsets[stays]])
+        if kept.all():
+            theirs = -np.array([*self.faces.planes.normals[other], self.faces.planes.offsets[other]])
+            if self._same(plane, theirs, stays):
+                self.add_many(plane[None], np.array([link]), np.zeros(1, np.int64))
+            return
+        beside = np.flatnonzero((self.facing.faces == other).any(axis=1) & (self.of_link >= 0))
+        planes = {int(self.of_link[k]) for k in beside}
+        if not planes:
+            self.add_many(plane[None], np.array([link]), np.zeros(1, np.int64))
+        for number in planes:
+            theirs = np.array([*self.normals[number], self.offsets[number]])
+            if self._same(plane, theirs, stays) or self._same(plane, -theirs, stays):
+                self.of_link[link] = number
+
+    def _same(self, plane: Array, other: Array, face: int) -> bool:
+        """Whether a face lies in another plane as well, but for rounding."""
+        corners = self.faces.solids.vertices[self.faces.corners(face)]
+        alike = float(plane[:3] @ other[:3]) > 0.0
+        return alike and bool(np.abs(corners @ other[:3] - other[3]).max() <= _SAME)
 
     def planes(self) -> ContactPlanes:
+        """All that were found, and on which side of them the first face of each pair lies."""
         normals = np.array(self.normals).reshape(-1, 3)
         outward = self.faces.planes.normals[self.facing.faces[:, 0]]
         linked = self.of_link >= 0
@@ -214,7 +231,7 @@ def _continuing(faces: StoneFaces, facing: FacingFaces, settings: JointSettings)
         (solids.vertices, solids.corners, solids.face_starts, solids.solid_starts),
         planes.normals,
         planes.offsets,
-        joined & ~faces.kept,
+        joined,
         _ALIKE,
         settings.straightness,
     )
@@ -235,12 +252,6 @@ def _gathered(faces: StoneFaces, facing: FacingFaces, label: Indices, count: int
     np.add.at(mean, joint, weight[:, None] * faces.planes.normals[face])
     mean /= np.linalg.norm(mean, axis=1)[:, None]
     return _Groups(face, hand, starts, mean)
-
-
-def _any_kept(faces: StoneFaces, groups: _Groups) -> Bools:
-    out = np.zeros(len(groups.normals), np.bool_)
-    np.logical_or.at(out, np.repeat(np.arange(len(out)), np.diff(groups.starts)), faces.kept[groups.faces])
-    return out
 
 
 def _fitted(faces: StoneFaces, groups: _Groups, usual: float, settings: JointSettings) -> tuple[Array, Array]:

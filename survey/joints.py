@@ -28,6 +28,7 @@ from survey.solids import Solid
 __all__ = ["ClosedStones", "close_joints"]
 
 _ROUNDS = 4  # in which closing joints shows further ones, beside worn corners
+_MEETS = 1e-6  # metres: faces that are nearer share a plane
 _AS_SURVEYED = "joints are left as surveyed"
 
 
@@ -96,10 +97,15 @@ def close_joints(
 
 
 def _as_surveyed(building: Building, facing: FacingFaces) -> Cut:
-    """All joints open, all stones as they are."""
+    """All stones as they are, and all joints open but for those whose faces share a plane already."""
     convex = np.flatnonzero(building.convex).tolist()
     planes = {i: building.planes[building.rows(i)] for i in convex}
     free = {i: np.ones(len(planes[i]), np.bool_) for i in convex}
-    count = len(facing)
-    contact = ContactPlanes(np.zeros((0, 3)), np.zeros(0), np.full(count, -1), np.ones(count, np.int64))
-    return Cut(contact, [_AS_SURVEYED] * count, list(building.solids), planes, free, {})
+    first, second = building.planes[facing.faces[:, 0]], building.planes[facing.faces[:, 1]]
+    size = np.sqrt(building.faces.planes.areas[facing.faces].max(axis=1))
+    turned = np.linalg.norm(first[:, :3] + second[:, :3], axis=1) * size
+    shared = (np.abs(facing.gap) <= _MEETS) & (turned <= _MEETS)
+    of_link = np.where(shared, np.arange(len(facing)), -1)
+    contact = ContactPlanes(first[:, :3], first[:, 3], of_link, np.ones(len(facing), np.int64))
+    reasons = ["" if one else _AS_SURVEYED for one in shared.tolist()]
+    return Cut(contact, reasons, list(building.solids), planes, free, {})
