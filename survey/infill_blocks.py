@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,7 @@ from survey.half_spaces import intersection
 from survey.infill_courses import Stretch, Strip, height_of, place_of, stretches, strips
 from survey.infill_facings import FacingStone, FacingWall
 from survey.infill_settings import InfillSettings
-from survey.solids import Solid, area_vector
+from survey.solids import Solid
 
 __all__ = ["CoreBlock", "core_blocks", "volume_of"]
 
@@ -74,9 +75,9 @@ def core_blocks(wall: FacingWall, settings: InfillSettings) -> tuple[CoreBlock, 
 
 def volume_of(solid: Solid) -> float:
     """Volume of a closed solid [m³]."""
-    origin = solid.vertices.mean(axis=0)
-    polygons = [solid.vertices[list(face)] - origin for face in solid.faces]
-    return sum(float(polygon[0] @ area_vector(polygon)) for polygon in polygons) / 3.0
+    fans = [(face[0], one, other) for face in solid.faces for one, other in pairwise(face[1:])]
+    local = solid.vertices - solid.vertices.mean(axis=0)
+    return float(np.linalg.det(local[np.array(fans)]).sum()) / 6.0
 
 
 def _cuts(sides: Iterable[Sequence[Stretch]]) -> list[_Cut]:

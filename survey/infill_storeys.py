@@ -212,6 +212,8 @@ def _grid(
     ]
     places = _places(here, covered)
     filled = np.zeros((max(len(places) - 1, 0), len(lines) - 1, len(planes) - 1), np.bool_)
+    along = np.array([one.along for one in here]).reshape(-1, 2)
+    above = np.array([[one.above(line) for one in here] for line in lines]).reshape(len(lines), -1, 2)
     for i, (left, right) in enumerate(pairwise(places)):
         middle = 0.5 * (left + right)
         for j, (lower, upper) in enumerate(pairwise(lines)):
@@ -220,11 +222,10 @@ def _grid(
                 k for k, one in enumerate(rows) if k + 1 == len(rows) or height < height_of(one.upper, middle)
             )
             filled[i, j] = any(start <= middle <= stop for start, stop in covered[row])
-            for one in here:
-                start, stop = one.along
-                reach = min(stop, right) - max(start, left)
-                if min(reach, one.above(lower)[1], -one.above(upper)[0]) > _TOUCHING:
-                    filled[i, j, one.cells] = False
+            reach = np.minimum(along[:, 1], right) - np.maximum(along[:, 0], left)
+            inside = np.minimum(above[j, :, 1], -above[j + 1, :, 0])
+            for k in np.flatnonzero(np.minimum(reach, inside) > _TOUCHING).tolist():
+                filled[i, j, here[k].cells] = False
     return CellGrid(np.array(places), np.array(lines), np.array(planes), filled)
 
 

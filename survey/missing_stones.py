@@ -17,7 +17,7 @@ from survey.missing_stones_arches import ArchGap, arch_gaps, voussoir_outlines
 from survey.missing_stones_codes import FreeCodes
 from survey.missing_stones_faces import MissingFace, stone_of
 from survey.missing_stones_gaps import CourseGap, Gaps, Hole, find_gaps, find_holes, opening_signs
-from survey.missing_stones_kinds import Filling, depth_of_kind, likeliest, split, usual_kinds
+from survey.missing_stones_kinds import Filling, UsualKind, depth_of_kind, likeliest, split, usual_kinds
 from survey.missing_stones_openings import FrameGap, frame_gaps
 from survey.missing_stones_settings import MissingSettings
 from survey.missing_stones_sides import Elevation, FlatStone, Line, elevations, meeting
@@ -186,7 +186,7 @@ def _of_courses(elevation: Elevation, settings: MissingSettings, codes: FreeCode
         for gap, filling in pairs[:1] if tall else pairs:
             if gap.width - 2.0 * joint >= settings.min_length:
                 upper = hole.gaps[-1].upper if tall else gap.upper
-                yield from _Fill(gap, filling, upper, joint, elevation, signs).stones(codes)
+                yield from _Fill(gap, filling, kinds, upper, joint, elevation, signs).stones(codes)
 
 
 def _frame_stone(frame: FrameGap, joint: float, elevation: Elevation, codes: FreeCodes) -> MissingStone:
@@ -247,6 +247,7 @@ class _Fill:
 
     gap: CourseGap
     filling: Filling
+    known: tuple[UsualKind, ...]
     upper: Line
     joint: float
     elevation: Elevation
@@ -255,7 +256,7 @@ class _Fill:
     def stones(self, codes: FreeCodes) -> Iterator[MissingStone]:
         """The stones of the gap, from left to right."""
         gap, count = self.gap, len(self.filling.kinds)
-        kinds, cuts = split(gap, self.filling, usual_kinds(self.elevation), self.elevation)
+        kinds, cuts = split(gap, self.filling, self.known, self.elevation)
         before = gap.left.block.code
         for kind, outline in zip(kinds, self._outlines(cuts), strict=True):
             kind = self._kind(kind)

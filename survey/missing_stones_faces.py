@@ -11,7 +11,6 @@ from survey.depth import Depth
 from survey.extrusion import SurveyedBlock, extrude
 from survey.faces import Provenance, face_on
 from survey.missing_stones_sides import Elevation, FlatStone
-from survey.neighbours import Neighbours
 from survey.planes import FaceFit
 from survey.records import BlockRecord
 from survey.shapes import FaceShape, ShapeKind
@@ -73,7 +72,7 @@ def stone_of(face: MissingFace, elevation: Elevation) -> SurveyedBlock:
 def _plane(corners: Array, beside: Sequence[FlatStone], elevation: Elevation) -> PlaneEstimate:
     """The common plane of the faces near an outline, else of all of the facade, else that of a neighbour."""
     faces = [stone.block.face for stone in elevation.stones]
-    around = Neighbours(faces)
+    around = elevation.neighbours
     near = around.near(corners, elevation.frame.axes[2])
     place = corners.mean(axis=0)
     if len(near) >= _ENOUGH:

@@ -95,8 +95,7 @@ class Hole:
 def find_gaps(elevation: Elevation, settings: MissingSettings) -> Gaps:
     """All gaps in the courses of a facade, course by course from below, from left to right."""
     stones = elevation.stones
-    low = np.array([stone.outline[:, 1].min() for stone in stones])
-    high = np.array([stone.outline[:, 1].max() for stone in stones])
+    low, high = elevation.boxes[:, 0, 1], elevation.boxes[:, 1, 1]
     courses: dict[tuple[str, int], list[FlatStone]] = {}
     for stone in stones:
         if stone.block.course is not None:
@@ -232,9 +231,11 @@ def _stones_at(elevation: Elevation, places: Array, bed: Line, above: float) -> 
     """Which stone is at places along a bed, some way above it; -1 where there is none."""
     found = np.full(len(places), -1, dtype=np.int64)
     points = np.array([[place, bed.at_place(place) + above] for place in places.tolist()])
-    for number, stone in enumerate(elevation.stones):
-        low, high = stone.outline.min(axis=0), stone.outline.max(axis=0)
-        for k in np.flatnonzero(((points > low) & (points < high)).all(axis=1) & (found < 0)).tolist():
+    boxes = elevation.boxes
+    near = (boxes[:, 0] < points.max(axis=0)) & (boxes[:, 1] > points.min(axis=0))
+    for number in np.flatnonzero(near.all(axis=1)).tolist():
+        stone = elevation.stones[number]
+        for k in np.flatnonzero(found < 0).tolist():
             if stone.contains(points[k]):
                 found[k] = number
     return found
@@ -242,12 +243,9 @@ def _stones_at(elevation: Elevation, places: Array, bed: Line, above: float) -> 
 
 def _on_the_ground(elevation: Elevation, lower: Line, start: float, stop: float) -> bool:
     """Whether no stone is known under a gap, however deep."""
-    return not any(
-        stone.outline[:, 0].max() > start
-        and stone.outline[:, 0].min() < stop
-        and stone.centre[1] < lower.at_place(0.5 * (start + stop))
-        for stone in elevation.stones
-    )
+    boxes = elevation.boxes
+    over = (boxes[:, 1, 0] > start) & (boxes[:, 0, 0] < stop)
+    return not bool((boxes[over, :, 1].mean(axis=1) < lower.at_place(0.5 * (start + stop))).any())
 
 
 def _lies_on(upper: CourseGap, lower: CourseGap) -> bool:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from survey.extrusion import SurveyedBlock
 from survey.facades import find_facades
+from survey.neighbours import Neighbours
 from survey.walls import WallPlane
 
 __all__ = ["Elevation", "FlatStone", "Line", "elevations", "line_through", "meeting"]
@@ -139,6 +140,16 @@ class Elevation:
 
     frame: WallPlane
     stones: tuple[FlatStone, ...]
+
+    @cached_property
+    def neighbours(self) -> Neighbours:
+        """The faces of its stones, to be searched by place."""
+        return Neighbours([stone.block.face for stone in self.stones])
+
+    @cached_property
+    def boxes(self) -> Array:
+        """Lower left and upper right corner of each stone's outline, (n, 2, 2) [m]."""
+        return np.array([[one.outline.min(axis=0), one.outline.max(axis=0)] for one in self.stones])
 
 
 def elevations(blocks: Sequence[SurveyedBlock]) -> tuple[Elevation, ...]:
