@@ -7,6 +7,13 @@ from numba import njit
 
 __all__ = ["improve", "relax", "shape"]
 
+# a node is tried at this part of its shortest edge from where it is, and at this part of that where nothing is better
+_REACH = 0.4
+# so many times
+_STEPS = 4
+# nodes whose projector has no larger entry than this on its diagonal are fixed
+_FIXED = 1e-12
+
 
 @njit(cache=True)
 def _six_volumes(nodes, a, b, c, d):
@@ -89,64 +96,77 @@ def _worst(nodes, cells, around, start, n, enough):
 
 
 @njit(cache=True)
+def _mark_bad(nodes, cells, good, marked):
+    """Mark the nodes of tetrahedra shaped worse than `good`; whether there are any."""
+    marked[:] = False
+    any_bad = False
+    for t in range(len(cells)):
+        if shape(nodes, cells[t, 0], cells[t, 1], cells[t, 2], cells[t, 3]) < good:
+            any_bad = True
+            for one in cells[t]:
+                marked[one] = True
+    return any_bad
+
+
+@njit(cache=True)
+def _shortest(nodes, cells, around, start, n):
+    """Length of the shortest edge at a node."""
+    least = 1e300
+    for j in range(start[n], start[n + 1]):
+        for one in cells[around[j]]:
+            if one != n:
+                least = min(least, _square(nodes, n, one))
+    return sqrt(least)
+
+
+@njit(cache=True)
+def _improve_node(nodes, cells, free, around, start, tries, n, least):
+    """Move one node to where the worst tetrahedron around it, shaped as `least`, is better; whether it was moved."""
+    reach = _REACH * _shortest(nodes, cells, around, start, n)
+    place = np.zeros(3)
+    moved = False
+    for _ in range(_STEPS):
+        best_x, best_y, best_z = nodes[n]
+        found = False
+        for i in range(3):
+            place[i] = nodes[n, i]
+        for k in range(len(tries)):
+            for i in range(3):
+                along = 0.0
+                for m in range(3):
+                    along += free[n, i, m] * tries[k, m]
+                nodes[n, i] = place[i] + reach * along
+            value = _worst(nodes, cells, around, start, n, least)
+            if value > least:
+                least, found = value, True
+                best_x, best_y, best_z = nodes[n]
+        nodes[n, 0], nodes[n, 1], nodes[n, 2] = best_x, best_y, best_z
+        if found:
+            moved = True
+        else:
+            reach *= _REACH
+    return moved
+
+
+@njit(cache=True)
 def improve(nodes, cells, free, around, start, tries, good, rounds):
     """Move the nodes of badly shaped tetrahedra, as far as this makes the worst tetrahedron around a node better.
 
     around, start : the tetrahedra of node n are around[start[n]:start[n + 1]]
+    free : (n, 3, 3) projectors on the directions in which a node may move
     tries : (k, 3) directions in which a node is moved
     good : tetrahedra shaped as well as this are left alone
     """
-    count = len(nodes)
-    marked = np.zeros(count, dtype=np.bool_)
-    place = np.zeros(3)
-    for _turn in range(rounds):
-        marked[:] = False
-        any_bad = False
-        for t in range(len(cells)):
-            if shape(nodes, cells[t, 0], cells[t, 1], cells[t, 2], cells[t, 3]) < good:
-                any_bad = True
-                for one in cells[t]:
-                    marked[one] = True
-        if not any_bad:
+    marked = np.zeros(len(nodes), dtype=np.bool_)
+    for _ in range(rounds):
+        if not _mark_bad(nodes, cells, good, marked):
             return
         moved = False
-        for n in range(count):
-            if not marked[n]:
-                continue
-            fixed = True
-            for i in range(3):
-                if free[n, i, i] > 1e-12:
-                    fixed = False
-            if fixed:
+        for n in range(len(nodes)):
+            if not marked[n] or max(free[n, 0, 0], free[n, 1, 1], free[n, 2, 2]) <= _FIXED:
                 continue
             least = _worst(nodes, cells, around, start, n, -2.0)
-            if least >= good:
-                continue
-            shortest = 1e300
-            for j in range(start[n], start[n + 1]):
-                for one in cells[around[j]]:
-                    if one != n:
-                        shortest = min(shortest, _square(nodes, n, one))
-            reach = 0.4 * sqrt(shortest)
-            for _ in range(4):
-                best_x, best_y, best_z = nodes[n]
-                found = False
-                for i in range(3):
-                    place[i] = nodes[n, i]
-                for k in range(len(tries)):
-                    for i in range(3):
-                        along = 0.0
-                        for m in range(3):
-                            along += free[n, i, m] * tries[k, m]
-                        nodes[n, i] = place[i] + reach * along
-                    value = _worst(nodes, cells, around, start, n, least)
-                    if value > least:
-                        least, found = value, True
-                        best_x, best_y, best_z = nodes[n]
-                nodes[n, 0], nodes[n, 1], nodes[n, 2] = best_x, best_y, best_z
-                if found:
-                    moved = True
-                else:
-                    reach *= 0.4
+            if least < good and _improve_node(nodes, cells, free, around, start, tries, n, least):
+                moved = True
         if not moved:
             return
