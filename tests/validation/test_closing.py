@@ -90,6 +90,7 @@ def test_planes_are_shared_and_no_two_stones_overlap(closing: Case) -> None:
 
 def test_stones_touch_over_the_area_over_which_they_truly_touch(closing: Case) -> None:
     verdict = closing.verdict
+    print(f"\n{len(closing.blocks)} stones: {verdict.line()}")
     assert verdict.found_share >= 0.95, verdict.line()
     assert verdict.beyond_share <= 0.05
     listed = {tuple(sorted(gap.stones)) for gap in closing.closed.report.gaps}

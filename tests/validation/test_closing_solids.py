@@ -34,6 +34,7 @@ def test_rounded_solids_are_closed_onto_common_planes(assembly: RoundedAssembly)
     parts = [part for solid in closed.solids for part in convex_parts(solid)]
     before = [simplify(block).solid for block in blocks]
     verdict = judge(closed, before, assembly.joints, parts)
+    print(f"\n{assembly.name}: {verdict.line()}")
     assert verdict.plane_error <= 1e-9, verdict.line()
     assert verdict.flatness <= 1e-9, verdict.line()
     assert verdict.overlap <= 1e-9, verdict.line()
@@ -42,4 +43,4 @@ def test_rounded_solids_are_closed_onto_common_planes(assembly: RoundedAssembly)
     assert verdict.moved <= 0.005
     for solid, true in zip(closed.solids, assembly.truth, strict=True):
         apart = np.linalg.norm(true.vertices[:, None] - solid.vertices[None], axis=2).min(axis=1)
-        assert apart.max() < 0.005, solid.code
+        assert apart.max() < 0.005 + 0.5e-3 * 3**0.5, solid.code  # the bound, and what was rounded off
