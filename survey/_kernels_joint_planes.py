@@ -17,6 +17,9 @@ _PLANE = 0.25
 _SHARP = 1e-4
 """Metres below which a residual counts no more where their sum is to be least."""
 
+_MANY = 12
+"""Sound corners of a joint of more than two stones."""
+
 _WORN = 0.01
 """Weight of a corner that is worn, and so some 25 mm off where a sound one is 2.5 mm off."""
 
@@ -147,9 +150,12 @@ def _huber(design, heights, sound, unknowns, prior, usual):
     """Least squares with less weight on large residuals; the solution (6,) and the weighted mean square left over."""
     k = design.shape[0]
     solution, previous = np.zeros(6), np.zeros(6)
-    weights, residuals = np.ones(k), np.empty(k)
+    weights = np.ones(k)
     for i in range(k):
         weights[i] = 1.0 if sound[i] else _WORN
+    if unknowns == 4 and sound.sum() >= _MANY:
+        # from least squares an odd stone at the end of a bed would never be found to be odd
+        _weigh(design, heights, sound, _least_sum(design, heights, sound), weights)
     left = 0.0
     for _ in range(_ROUNDS):
         matrix, right = _normal(design, heights, weights, unknowns)
@@ -157,18 +163,25 @@ def _huber(design, heights, sound, unknowns, prior, usual):
         right[3] += prior * usual
         previous[:] = solution
         solution[:unknowns] = np.linalg.solve(matrix, right)
-        count, total, weight = 0, 0.0, 0.0
-        for i in range(k):
-            residual = abs(heights[i] - _value(design[i], solution))
-            total, weight = total + weights[i] * residual**2, weight + weights[i]
-            if sound[i]:
-                residuals[count] = residual
-                count += 1
-        left = total / weight
-        spread = 1e-4 if count == 0 else max(1.4826 * np.median(residuals[:count]), 1e-4)
-        for i in range(k):
-            residual = abs(heights[i] - _value(design[i], solution))
-            weights[i] = min(1.0, _HUBER * spread / max(residual, 1e-300)) if sound[i] else _WORN
+        left = _weigh(design, heights, sound, solution, weights)
         if np.abs(solution - previous).max() < 1e-12:
             break
     return solution, left
+
+
+@njit(cache=True)
+def _weigh(design, heights, sound, solution, weights):
+    """Huber's weights of residuals in place of `weights`; the mean square left over by these."""
+    residuals, count, total = np.empty(design.shape[0]), 0, 0.0
+    for i in range(design.shape[0]):
+        residual = abs(heights[i] - _value(design[i], solution))
+        total += weights[i] * residual**2
+        if sound[i]:
+            residuals[count] = residual
+            count += 1
+    left = total / weights.sum()
+    spread = 1e-4 if count == 0 else max(1.4826 * np.median(residuals[:count]), 1e-4)
+    for i in range(design.shape[0]):
+        residual = abs(heights[i] - _value(design[i], solution))
+        weights[i] = min(1.0, _HUBER * spread / max(residual, 1e-300)) if sound[i] else _WORN
+    return left
