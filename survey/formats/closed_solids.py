@@ -132,7 +132,7 @@ class _Solids:
             return
         unit = self._options.unit
         metric = replace(raw, vertices=raw.vertices * unit, resolution=raw.resolution * unit)
-        found = list(closed_bodies(metric, self._options.snap))
+        found = list(closed_bodies(metric, max(self._options.flat, self._options.snap)))
         for number, body in enumerate(found, start=1):
             code = name if len(found) == 1 else f"{name}-{number}"
             if isinstance(body, GeometryError):

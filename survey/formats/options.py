@@ -22,6 +22,7 @@ class ReadingOptions:
     sigma : standard deviation of a coordinate, where the file does not say it [m]
     head : from a header file, for formats that have no head of their own
     unit : length of the unit in which solids are given [m]
+    flat : polygons of solids whose corners lie so near to a plane are taken for plane [m], and those as near as `snap`
     snap : faces of neighbouring solids that match but for so much are brought into one plane [m]; 0: none is
     """
 
@@ -30,6 +31,7 @@ class ReadingOptions:
     sigma: float = 0.003
     head: SurveyHead | None = None
     unit: float = 1.0
+    flat: float = 0.0
     snap: float = 0.0
 
     def head_for(self, path: Path) -> SurveyHead:
