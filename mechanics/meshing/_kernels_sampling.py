@@ -138,10 +138,14 @@ def _free(points, first, last, x, y, z, apart):
 
 
 @njit(cache=True)
-def _on_face(points, owner, count, corners, loop, plane, face, size, fine, growth, normals, offsets):
-    """Add points of triangular lattices inside a face.
+def _flat_face(corners, loop, plane):
+    """A face in its plane.
 
-    Lattices follow each other, each finer than the one before: coarse regions are filled first, and evenly.
+    Returns
+    -------
+    origin, u, v : its mean corner, and unit vectors along its longest side and across
+    walls : (m, 3) rows (p, q, d) of its sides, p s + q t ≤ d inside, at origin + s u + t v
+    far_u, far_v : how far it reaches from the origin along u and v
     """
     m = len(loop)
     origin, along = np.zeros(3), np.zeros(3)
@@ -153,7 +157,7 @@ def _on_face(points, owner, count, corners, loop, plane, face, size, fine, growt
             longest, along = side @ side, side
     u = along / sqrt(longest)
     v = np.cross(plane[:3], u)
-    walls = np.empty((m, 3))  # p s + q t ≤ d inside, at origin + s u + t v
+    walls = np.empty((m, 3))
     far_u, far_v = 0.0, 0.0
     for k in range(m):
         here = corners[loop[k]] - origin
@@ -163,10 +167,19 @@ def _on_face(points, owner, count, corners, loop, plane, face, size, fine, growt
         walls[k, 0], walls[k, 1] = p / length, q / length
         walls[k, 2] = (p * (here @ u) + q * (here @ v)) / length
         far_u, far_v = max(far_u, abs(here @ u)), max(far_v, abs(here @ v))
-    near, there = (
-        np.empty((count, 3)),
-        0,
-    )  # the points on its edges; those on the other side of a thin stone are no matter
+    return origin, u, v, walls, far_u, far_v
+
+
+@njit(cache=True)
+def _on_face(points, owner, count, corners, loop, plane, face, size, fine, growth, normals, offsets):
+    """Add points of triangular lattices inside a face.
+
+    Lattices follow each other, each finer than the one before: coarse regions are filled first, and evenly.
+    """
+    origin, u, v, walls, far_u, far_v = _flat_face(corners, loop, plane)
+    m = len(walls)
+    # the points on its edges; those on the other side of a thin stone are no matter
+    near, there = np.empty((count, 3)), 0
     for j in range(count):
         if abs(plane[:3] @ points[j] - plane[3]) < _ON_PLANE:
             near[there] = points[j]
