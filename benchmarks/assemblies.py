@@ -1,8 +1,8 @@
 """Rounded assemblies of solids: `python -m benchmarks.assemblies --case FILE SNAP SUPPORT [--case …] [--json]`.
 
 Each file (OBJ, PLY, STL, MSH) is read, snapped within SNAP metres, cut into convex parts, and simulated as rigid
-stones on those whose lowest corner is below SUPPORT metres, with friction 0.7, until it rests. Overlaps are those of the
-convex parts, found by what looks for them in closed walls, and not by what snaps.
+stones on those whose lowest corner is below SUPPORT metres, with friction 0.7, until it rests. Overlaps are those of
+the convex parts, found by what looks for them in closed walls, and not by what snaps.
 """
 
 import argparse
@@ -106,7 +106,7 @@ def _row(path: Path, tolerance: float, support: float, unit: float) -> Row:
         "area": sum(one.area for one in after) / sum(one.area for one in before),
         "overlap": _largest_overlap(parts),
         "snap_s": spent,
-        "part_ms": 1e3 * cutting / max(folded, 1),
+        "part_ms": 1e3 * cutting / folded if folded else None,
         **_mechanics(path.name, solids, parts, support),
     }
 
