@@ -23,7 +23,7 @@ USUAL = JointSettings()
 LENGTH, HEIGHT, GAP = 0.5, 0.3, 0.01
 
 
-STEEP = pytest.mark.xfail(strict=True, reason="a bend of more than 12 % is taken for more than one")
+STEEP = pytest.mark.xfail(strict=True, reason="a ridge of more than 12 % is taken for more than one")
 
 
 def course(tops, bottoms, starts, name):
@@ -100,7 +100,7 @@ def assert_all_touch(closed, bed, count=8):
 
 
 # valleys at a head joint of the lower course, so that the stone across gets two undersides; ridges at one of the upper
-@pytest.mark.parametrize("slope", [0.06, 0.12, pytest.param(0.15, marks=STEEP)])
+@pytest.mark.parametrize("slope", [0.06, 0.12, 0.15])
 def test_a_valley_is_two_planes_and_the_stone_across_it_has_two_undersides(slope):
     bed = bend(slope, 4 * LENGTH)
     solids = two_courses(bed)

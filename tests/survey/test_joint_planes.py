@@ -34,51 +34,77 @@ def corners(plane, width, opening=(0.0, 0.0), noise=0.0, rng=None, faces=2):
     return out, np.concatenate(hands)
 
 
+def scale_of(points):
+    return max(1.0, np.abs(points[:, :2]).max())
+
+
 def fit(points, hands, sound=None, usual=-1.0, straightness=0.02):
     """The kernel, of one joint: plane (3,) and values (4,)."""
     sound = np.ones(len(points), np.bool_) if sound is None else np.asarray(sound)
     planes, values = np.zeros((1, 3)), np.zeros((1, 4))
-    starts, scales = np.array([0, len(points)]), np.array([max(1.0, np.abs(points[:, :2]).max())])
+    starts, scales = np.array([0, len(points)]), np.array([scale_of(points)])
     fit_middle_planes(points, hands, sound, starts, scales, usual, straightness, planes, values)
     return planes[0], values[0]
 
 
-def twin_fit(points, hands, sound, usual, straightness):
-    """The same with numpy: robust least squares, once with parallel faces and once with faces that open."""
-    x, y, z = points.T
+def solved(design, heights, weight, prior=0.0, usual=0.0):
+    """Weighted least squares with the usual width as one more observation; what nothing tells stays zero."""
+    pull = np.diag(np.r_[np.zeros(3), prior, np.zeros(design.shape[1] - 4)])
+    matrix = design.T @ (weight[:, None] * design) + pull + 1e-12 * weight.sum() * np.eye(design.shape[1])
+    return np.linalg.solve(matrix, design.T @ (weight * heights) + pull.sum(axis=0) * usual)
+
+
+def robust(design, heights, sound, prior, usual):
+    """Huber's estimate, and the weighted mean square left over."""
+    weight, previous = np.where(sound, 1.0, 0.01), 0.0
+    for _ in range(30):
+        solution = solved(design, heights, weight, prior, usual)
+        residual = np.abs(heights - design @ solution)
+        left = (weight * residual**2).sum() / weight.sum()
+        spread = max(1.4826 * np.median(residual[sound]), 1e-4) if sound.any() else 1e-4
+        weight = np.where(sound, np.minimum(1.0, 1.5 * spread / np.maximum(residual, 1e-300)), 0.01)
+        if np.abs(solution - previous).max() < 1e-12:
+            break
+        previous = solution
+    return np.append(solution, np.zeros(6 - len(solution))), left
+
+
+def least_sum(design, heights, sound):
+    """The solution with the least sum of residuals of sound corners, those below 0.1 mm squared."""
+    weight = np.where(sound, 1.0, 0.0)
+    for _ in range(300):
+        solution = solved(design, heights, weight)
+        weight = np.where(sound, 1.0 / np.maximum(np.abs(heights - design @ solution), 1e-4), 0.0)
+    return solution
+
+
+def twin_fit(points, hands, sound, usual, straightness, scale):
+    """The same with numpy: with parallel faces, with faces that open, and without what is far off."""
+    (x, y), z = points[:, :2].T / scale, points[:, 2]
     above = int((sound & (hands > 0.0)).sum())
     below = int(sound.sum()) - above
     design = np.column_stack([np.ones(len(x)), x, y, hands / 2, hands / 2 * x, hands / 2 * y])
     prior = 0.25 if usual >= 0.0 and min(above, below) < 3 else 0.0
 
-    def solved(unknowns):
-        weight, previous = np.where(sound, 1.0, 0.01), np.zeros(unknowns)
-        for _ in range(30):
-            root = np.sqrt(weight)
-            rows = [design[:, :unknowns] * root[:, None], np.sqrt(prior) * np.eye(6)[3:4, :unknowns]]
-            solution = np.linalg.lstsq(
-                np.vstack(rows), np.append(z * root, np.sqrt(prior) * usual), rcond=None
-            )[0]
-            residual = np.abs(z - design[:, :unknowns] @ solution)
-            left = (weight * residual**2).sum() / weight.sum()
-            known = residual[sound]
-            spread = max(1.4826 * np.median(known), 1e-4) if len(known) else 1e-4
-            weight = np.where(sound, np.minimum(1.0, 1.5 * spread / np.maximum(residual, 1e-300)), 0.01)
-            if np.abs(solution - previous).max() < 1e-12:
-                break
-            previous = solution
-        return np.append(solution, np.zeros(6 - unknowns)), left
+    def off(solution):
+        residual = np.abs(z - design @ solution)[sound]
+        return residual.max(initial=0.0), (residual > straightness).sum() / max(len(residual), 1)
 
-    solution, left = solved(4)
+    solution, left = robust(design[:, :4], z, sound, prior, usual)
     if min(above, below) >= 4:
-        wedge, less = solved(6)
-        if np.hypot(*wedge[4:]) > 0.035 and less < 0.1 * left:
+        wedge, less = robust(design, z, sound, prior, usual)
+        opening = np.hypot(*wedge[4:]) / scale
+        if opening > 0.035 and less < 0.1 * left and np.sqrt(less) < 0.25 * straightness:
             solution = wedge
-    residual = np.abs(z - design @ solution)
+    if off(solution)[1] > 0.0:
+        flat = least_sum(design[:, :4], z, sound)
+        near = sound & (np.abs(z - design[:, :4] @ flat) <= straightness)
+        again, _ = robust(design[:, :4], z, near, prior, usual)
+        if off(again)[1] < off(solution)[1]:
+            solution = again
     weight = np.where(sound, 1.0, 0.01)
-    rms = np.sqrt((weight * residual**2).sum() / weight.sum())
-    beyond = (residual[sound] > straightness).sum() / max(sound.sum(), 1)
-    return solution[:3], [solution[3], rms, residual[sound].max(initial=0.0), beyond]
+    rms = np.sqrt((weight * (z - design @ solution) ** 2).sum() / weight.sum())
+    return solution[:3] / [1.0, scale, scale], [solution[3], rms, *off(solution)]
 
 
 small = st.floats(-0.05, 0.05)
@@ -93,16 +119,19 @@ small = st.floats(-0.05, 0.05)
     faces=st.integers(1, 5),
     worn=st.floats(0.0, 0.6),
     usual=st.sampled_from([-1.0, 0.0, 0.011]),
+    odd=st.booleans(),
 )
-def test_the_kernel_agrees_with_its_slow_twin(seed, plane, width, opening, faces, worn, usual):
+def test_the_kernel_agrees_with_its_slow_twin(seed, plane, width, opening, faces, worn, usual, odd):
     rng = np.random.default_rng(seed)
     points, hands = corners(plane, width, opening, 0.0015, rng, faces)
     sound = rng.random(len(points)) >= worn
     points[~sound, 2] += rng.uniform(0.0, 0.03, (~sound).sum()) * hands[~sound]
+    if odd and faces > 2:  # a face that lies too low
+        points[:4, 2] -= 0.05
     fitted, values = fit(points, hands, sound, usual)
-    expected, others = twin_fit(points, hands, sound, usual, 0.02)
-    np.testing.assert_allclose(fitted, expected, atol=1e-7)
-    np.testing.assert_allclose(values[:3], others[:3], atol=1e-7)
+    expected, others = twin_fit(points, hands, sound, usual, 0.02, scale_of(points))
+    np.testing.assert_allclose(fitted, expected, atol=1e-6)
+    np.testing.assert_allclose(values[:3], others[:3], atol=1e-6)
     assert values[3] == pytest.approx(others[3])
 
 
