@@ -37,8 +37,8 @@ class BlockyStone:
     extrusion : how its hidden side lies
     solid : closed, with planar faces. A hexahedron, wedge or prism has the visible corners first, counter-clockwise
         seen from outside, then the hidden ones in the same order
-    sound : (n,) whether each visible corner of the solid, or each corner of a POLYHEDRON that another program made,
-        is known from measurement; False: reconstructed, or worn
+    sound : (n,) whether the place of each visible corner of the solid, or of each corner of a POLYHEDRON that another
+        program made, is known: measured, or restored; False: worn, and left where it was measured
     shape : what it is
     report : what was changed
     """

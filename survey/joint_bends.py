@@ -5,6 +5,7 @@ stone that lies across it gets two undersides, and the planes change at a head j
 stone under it gets two tops, and they change at a head joint above. So all stones stay convex and touch all over.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,10 +22,11 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-_FINER = (0.5, 0.25, 0.125)  # of the straightness: how far the middle of a joint may be off its chain
+_FINE = 0.5  # of the straightness: how near to the chain corners are to be, if they can
 _FEW = 0.1  # part of the sound corners that may be off the chain
 _WORN = 0.01  # weight of a worn corner
 _LEAST = 3  # links that make a chain
+_MOST = 12  # chains of a bed
 _ROUNDS = 10
 
 
@@ -46,6 +48,29 @@ class _Bed:
     height: Array
     lower: Indices
     upper: Indices
+
+
+@dataclass(frozen=True)
+class _Chain:
+    """Planes one after the other.
+
+    Attributes
+    ----------
+    posts, heights : (n + 1,) where along the bed one follows another, and how high they are there [m]
+    slant : rise across the bed, of all [-]
+    residuals : of the sound corners [m]
+    number : (m,) the plane of each link
+    """
+
+    posts: Array
+    heights: Array
+    slant: float
+    residuals: Array
+    number: Indices
+
+    def off(self, far: float) -> float:
+        """Part of the sound corners that are farther than that from the chain [-]."""
+        return float((self.residuals > far).mean()) if len(self.residuals) else 0.0
 
 
 def bent(
@@ -70,18 +95,19 @@ def bent(
     """
     bed = _bed(planes, facing, links)
     extents = _extents(solids, bed)
-    for part in _FINER:
-        ends = _chains(bed.place, bed.height, part * settings.straightness)
-        if len(ends) <= 1:
-            continue
+    reach = [end for face in extents.values() for end in face]
+    found: list[tuple[float, _Chain]] = []
+    for ends in _chains(bed.place, bed.height):
         number, knots = _changes(bed, ends, extents)
-        reach = [end for face in extents.values() for end in face]
         posts = np.array([min(reach), *knots, max(reach)])
-        if (np.diff(posts) <= 0.0).any():
-            continue
-        heights, slant, off = _fitted(solids, sound, bed, posts, settings.straightness)
+        if (np.diff(posts) > 0.0).all():
+            chain = _fitted(solids, sound, bed, posts, number)
+            if chain.off(_FINE * settings.straightness) <= _FEW:
+                return _planes(bed, chain), number
+            found.append((chain.off(settings.straightness), chain))
+    for off, chain in found:
         if off <= _FEW:
-            return _planes(bed, posts, heights, slant), number
+            return _planes(bed, chain), chain.number
     return None
 
 
@@ -113,34 +139,31 @@ def _extents(solids: Polyhedra, bed: _Bed) -> dict[int, tuple[float, float]]:
     return out
 
 
-def _chains(place: Array, height: Array, tolerance: float) -> list[int]:
-    """Ends (in the order along the bed) of the fewest straight chains that the links make, single odd ones apart."""
+def _chains(place: Array, height: Array) -> Iterator[list[int]]:
+    """Ends (in the order along the bed) of two straight chains that the links make, of three, and so on.
+
+    Each has three links or more, and all together the least sum of squares off their lines (Bellman 1961); single odd
+    links do not count.
+    """
     order = np.argsort(place, kind="stable")
-    x, y = place[order], median_filter(height[order], size=5, mode="mirror")
-    count, start = 0, 0
-    while start < len(x):
-        stop = min(start + _LEAST, len(x))
-        while stop < len(x) and _off_line(x[start : stop + 1], y[start : stop + 1]) <= tolerance:
-            stop += 1
-        count, start = count + 1, stop
-    return _divided(x, y, min(count, len(x) // _LEAST))
-
-
-def _divided(x: Array, y: Array, count: int) -> list[int]:
-    """Ends of so many chains of three links or more with the least sum of squares off their lines (Bellman 1961)."""
-    n = len(x)
-    cost = _squares(x, y)
-    best = np.full((count + 1, n + 1), np.inf)
-    before = np.zeros((count + 1, n + 1), np.int64)
-    best[0, 0] = 0.0
-    for k in range(1, count + 1):
-        total = best[k - 1][:, None] + cost
-        before[k], best[k] = total.argmin(axis=0), total.min(axis=0)
-    ends, at = [], n
-    for k in range(count, 0, -1):
-        ends.append(at)
-        at = int(before[k, at])
-    return ends[::-1]
+    n = len(order)
+    most = min(n // _LEAST, _MOST)
+    if most < 2:
+        return
+    cost = _squares(place[order], median_filter(height[order], size=5, mode="mirror"))
+    best, before = [np.full(n + 1, np.inf)], [np.zeros(n + 1, np.int64)]
+    best[0][0] = 0.0
+    for count in range(1, most + 1):
+        total = best[-1][:, None] + cost
+        before.append(total.argmin(axis=0))
+        best.append(total.min(axis=0))
+        if count < 2:
+            continue
+        ends, at = [], n
+        for k in range(count, 0, -1):
+            ends.append(at)
+            at = int(before[k][at])
+        yield ends[::-1]
 
 
 def _squares(x: Array, y: Array) -> Array:
@@ -153,11 +176,6 @@ def _squares(x: Array, y: Array) -> Array:
     off = yy - np.where(xx > 1e-12, xy * xy / np.maximum(xx, 1e-12), 0.0)
     out: Array = np.where(n >= _LEAST, np.maximum(off, 0.0), np.inf)
     return out
-
-
-def _off_line(x: Array, y: Array) -> float:
-    slope, intercept = _line(x, y)
-    return float(np.abs(y - intercept - slope * x).max())
 
 
 def _line(x: Array, y: Array) -> tuple[float, float]:
@@ -192,10 +210,8 @@ def _changes(
     return of_link, knots
 
 
-def _fitted(
-    solids: Polyhedra, sound: Bools, bed: _Bed, posts: Array, straightness: float
-) -> tuple[Array, float, float]:
-    """Heights (n + 1,) of the chain at its posts, its slant across, and the part of corners off it."""
+def _fitted(solids: Polyhedra, sound: Bools, bed: _Bed, posts: Array, number: Indices) -> _Chain:
+    """The chain through posts that is nearest to the corners on either hand."""
     rows, hands = [], []
     for side, sign in ((bed.lower, -1.0), (bed.upper, 1.0)):
         for face in np.unique(side).tolist():
@@ -216,8 +232,7 @@ def _fitted(
         spread = max(1.4826 * float(np.median(residual)), 1e-4)
         robust = np.minimum(1.0, 1.5 * spread / np.maximum(residual, 1e-300))
         weight = np.where(sound[corner], robust, _WORN)
-    beyond = residual[sound[corner]] > straightness
-    return solution[:-2], float(solution[-2]), float(beyond.mean()) if len(beyond) else 0.0
+    return _Chain(posts, solution[:-2], float(solution[-2]), residual[sound[corner]], number)
 
 
 def _hats(x: Array, posts: Array) -> Array:
@@ -230,10 +245,10 @@ def _hats(x: Array, posts: Array) -> Array:
     return out
 
 
-def _planes(bed: _Bed, posts: Array, heights: Array, slant: float) -> Array:
+def _planes(bed: _Bed, chain: _Chain) -> Array:
     """The planes (n, 4) between posts, in the frame of the stones."""
-    slopes = np.diff(heights) / np.diff(posts)
-    across = np.column_stack([-slopes, np.full(len(slopes), -slant), np.ones(len(slopes))])
+    slopes = np.diff(chain.heights) / np.diff(chain.posts)
+    across = np.column_stack([-slopes, np.full(len(slopes), -chain.slant), np.ones(len(slopes))])
     normals = across / np.linalg.norm(across, axis=1)[:, None] @ bed.axes
-    through = bed.origin + np.outer(posts[:-1], bed.axes[0]) + np.outer(heights[:-1], bed.axes[2])
-    return np.column_stack([normals, (normals * through).sum(axis=1)])
+    along, up = np.outer(chain.posts[:-1], bed.axes[0]), np.outer(chain.heights[:-1], bed.axes[2])
+    return np.column_stack([normals, (normals * (bed.origin + along + up)).sum(axis=1)])

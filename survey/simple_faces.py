@@ -42,7 +42,8 @@ def simplify_face(block: SurveyedBlock, bounds: SimplifyBounds) -> SimpleSolid:
         farthest = min(bounds.max_restored, bounds.restored_share * squared.width)
         squared, count = restore_worn(squared, worn, (points - fit.centroid) @ axes.T, tolerance, farthest)
         solid, shape = _extruded(block, squared, axes), prism_shape(len(squared.corners))
-        sound = (squared.source >= 0) & ~worn[squared.source]
+        # restored corners are as near to the true ones as sound ones are
+        sound = (squared.source < 0) | ~worn[squared.source]
         reason = _said(squared, worn, count)
     old, new = about(block.solid, fit.centroid), about(solid, fit.centroid)
     same = solid is block.solid
