@@ -94,7 +94,6 @@ def test_a_gap_tells_the_area_over_which_stones_face_each_other():
         np.testing.assert_array_equal(gap.centroid, joint.centroid)
 
 
-@pytest.mark.xfail(strict=True, reason="contacts of no width are listed as gaps")
 def test_contacts_that_share_their_plane_already_are_no_gaps_as_surveyed():
     touching = [box("A", 0, 0.5, 0, 0.3), box("B", 0.5, 1, 0, 0.3)]
     report = close_joints(touching, JointSettings(mode=JointMode.AS_SURVEYED)).report
