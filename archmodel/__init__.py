@@ -4,7 +4,7 @@ Where things are::
 
     tables       base, entries, entities, structures, relations, knowledge, surveys, runs, registered → layout
     databases    database, sqlite, postgresql, bulk; migrating, migrations/
-    surveys in   records → rows, measures → store; remeasuring
+    surveys in   records → rows, measures → store; remeasuring; hypotheses
     runs in      run_records → run_rows → store_runs
     relations    relating, arch_rows → relation_store, composing, arches, computed_values; stone_columns
     saying       declaring, arranging, statements, correcting, withdrawing, registering; recording, finding, values

@@ -25,7 +25,7 @@ Interval = tuple[float, float]
 
 _OUT = np.array([0.0, 0.0, 1.0])
 _TOUCHING = 1e-9  # metres by which a stone may reach into a cell without taking it
-_SNAP = 0.03  # metres: sides of deeper stones that are nearer make one cut if they can
+_SNAP = 0.015  # metres: sides of deeper stones that are nearer make one cut if they can
 
 
 @dataclass(frozen=True)
@@ -68,6 +68,14 @@ class _Deep:
         return float(heights.min()), float(heights.max())
 
 
+@dataclass(frozen=True)
+class _Line:
+    """A bed plane (4,) that cuts the core, and by how much stones may reach across it."""
+
+    plane: Array
+    slack: float
+
+
 def core_storeys(wall: FacingWall, settings: InfillSettings) -> tuple[CoreStorey, ...]:
     """Fill the core of a wall with a continuum for each storey, from below.
 
@@ -90,8 +98,8 @@ def core_storeys(wall: FacingWall, settings: InfillSettings) -> tuple[CoreStorey
         courses = [rows[k].course for k in group]
         known = [course for course in courses if course is not None]
         lines = [
-            beds[group[0]][1],
-            *(plane for k in group[1:] for plane in _distinct(beds[k])),
+            beds[group[0]][-1],
+            *(line for k in group[1:] for line in beds[k]),
             beds[group[-1] + 1][0],
         ]
         grid = _grid(wall, [rows[k] for k in group], lines, planes, deep, settings)
@@ -164,18 +172,27 @@ def _facing_levels(
     return planes, level.tolist()
 
 
-def _beds(rows: Sequence[Strip], deep: Sequence[_Deep]) -> list[tuple[Array, Array]]:
-    """Of each bed the plane that ends what is below and the one that begins what is above: one if it can be."""
+def _beds(rows: Sequence[Strip], deep: Sequence[_Deep]) -> list[tuple[_Line, ...]]:
+    """Of each bed the plane that ends what is below and the one that begins what is above: one if it can be.
+
+    Of stones with open joints some may reach across the bed, by less than the joints are open: closing the joints
+    will take them back.
+    """
     planes = [rows[0].lower, *(row.upper for row in rows)]
     if not deep:
-        return [(plane, plane) for plane in planes]
+        return [(_Line(plane, _TOUCHING),) for plane in planes]
     spans = np.array([[one.above(plane) for one in deep] for plane in planes])
     lowest, highest = np.abs(spans[:, :, 0]).argmin(axis=0), np.abs(spans[:, :, 1]).argmin(axis=0)
-    found = []
+    found: list[tuple[_Line, ...]] = []
     for k, plane in enumerate(planes):
         ups, downs = spans[k, highest == k, 1], spans[k, lowest == k, 0]
         below, above = _one_or_two(downs, ups, 0.0)
-        found.append((_moved(plane, below), _moved(plane, above)))
+        if len(ups) and len(downs) and above - below < float(np.median(downs) - np.median(ups)):
+            across = 0.5 * (above - below)
+            found.append((_Line(_moved(plane, below + across), across + _TOUCHING),))
+        else:
+            heights = sorted({below, above})
+            found.append(tuple(_Line(_moved(plane, height), _TOUCHING) for height in heights))
     return found
 
 
@@ -193,14 +210,10 @@ def _moved(plane: Array, by: float) -> Array:
     return np.append(plane[:3], plane[3] + by)
 
 
-def _distinct(pair: tuple[Array, Array]) -> tuple[Array, ...]:
-    return pair[:1] if pair[0][3] == pair[1][3] else pair
-
-
 def _grid(
     wall: FacingWall,
     rows: Sequence[Strip],
-    lines: Sequence[Array],
+    lines: Sequence[_Line],
     planes: Sequence[Array],
     deep: Sequence[_Deep],
     settings: InfillSettings,
@@ -208,25 +221,27 @@ def _grid(
     """The cells of one storey, and which of them are of the core."""
     covered = [_covered(wall, row, settings) for row in rows]
     here = [
-        one for one in deep if one.above(lines[0])[1] > _TOUCHING and one.above(lines[-1])[0] < -_TOUCHING
+        one
+        for one in deep
+        if one.above(lines[0].plane)[1] > lines[0].slack and one.above(lines[-1].plane)[0] < -lines[-1].slack
     ]
     places = _places(here, covered)
     filled = np.zeros((max(len(places) - 1, 0), len(lines) - 1, len(planes) - 1), np.bool_)
     along = np.array([one.along for one in here]).reshape(-1, 2)
-    above = np.array([[one.above(line) for one in here] for line in lines]).reshape(len(lines), -1, 2)
+    above = np.array([[one.above(line.plane) for one in here] for line in lines]).reshape(len(lines), -1, 2)
     for i, (left, right) in enumerate(pairwise(places)):
         middle = 0.5 * (left + right)
         for j, (lower, upper) in enumerate(pairwise(lines)):
-            height = 0.5 * (height_of(lower, middle) + height_of(upper, middle))
+            height = 0.5 * (height_of(lower.plane, middle) + height_of(upper.plane, middle))
             row = next(
                 k for k, one in enumerate(rows) if k + 1 == len(rows) or height < height_of(one.upper, middle)
             )
             filled[i, j] = any(start <= middle <= stop for start, stop in covered[row])
             reach = np.minimum(along[:, 1], right) - np.maximum(along[:, 0], left)
-            inside = np.minimum(above[j, :, 1], -above[j + 1, :, 0])
-            for k in np.flatnonzero(np.minimum(reach, inside) > _TOUCHING).tolist():
+            inside = (above[j, :, 1] > lower.slack) & (-above[j + 1, :, 0] > upper.slack)
+            for k in np.flatnonzero((reach > _TOUCHING) & inside).tolist():
                 filled[i, j, here[k].cells] = False
-    return CellGrid(np.array(places), np.array(lines), np.array(planes), filled)
+    return CellGrid(np.array(places), np.array([line.plane for line in lines]), np.array(planes), filled)
 
 
 def _covered(wall: FacingWall, row: Strip, settings: InfillSettings) -> list[Interval]:

@@ -75,7 +75,9 @@ def test_the_core_of_a_surveyed_wall_is_nearly_whole_and_in_no_stone(closed, see
     corners = np.array([solid.vertices for solid in solids if len(solid.vertices) == 8])
     weights = rng.dirichlet(np.full(8, 0.3), size=(len(corners), 6))
     points = (weights @ corners).reshape(-1, 3)
-    points = corners.mean(axis=1).repeat(6, axis=0) * 1e-6 + points * (1.0 - 1e-6)
+    # surveyed stones may reach across a bed by a few millimetres, as long as their joints are open
+    shrunk = 1e-6 if closed else 0.05
+    points = corners.mean(axis=1).repeat(6, axis=0) * shrunk + points * (1.0 - shrunk)
     for one in core:
         check_watertight(one.solid)
         assert not contains(one.solid, points).any()
