@@ -41,7 +41,7 @@ def test_no_fold_leaves_a_polygon_that_is_folded_in() -> None:
 @given(st.integers(0, 10**6), st.integers(4, 9))
 def test_pieces_are_flat_and_share_their_sides_as_the_polygon_and_each_other(seed: int, count: int) -> None:
     random = np.random.default_rng(seed)
-    angles = np.sort(random.uniform(0.0, 2.0 * np.pi, count)) + 0.05 * np.arange(count)
+    angles = 2.0 * np.pi * (np.arange(count) + random.uniform(0.0, 0.6, count)) / count
     radius = random.uniform(0.5, 1.0, count)
     corners = np.column_stack(
         [radius * np.cos(angles), radius * np.sin(angles), random.uniform(-0.1, 0.1, count)]
