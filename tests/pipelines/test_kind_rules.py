@@ -2,17 +2,19 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from archmodel.database import open_database
 from archmodel.entities import Entity
 from moma.errors import QueryError, UsageError
+from moma.telling import ingest_lines
 from pipelines.ingest import ingest
 from pipelines.kind_rules import RULE_ATTRIBUTES, kind_rules
 from pipelines.reading_options import reading_options
 from survey.convex_parts import convex_parts
 from survey.solids import Solid
-from tests.survey.assemblies import dome, groin, obj, wall
+from tests.survey.assemblies import dome, groin, obj, prism, wall
 
 
 def kinds_of(
@@ -146,3 +148,23 @@ def test_tolerances_and_units_that_make_no_sense_are_refused() -> None:
         reading_options(snap=-1.0)
     with pytest.raises(UsageError, match="--unit: unknown unit 'yd'; units: m, dm, cm, mm, ft, in"):
         reading_options(unit="yd")
+
+
+def test_contacts_that_stay_open_are_listed(tmp_path: Path) -> None:
+    """Two stones of a course, 6 mm apart in height, under one that lies half-way between."""
+    path = tmp_path / "step.obj"
+    heights = {"A": (0.0, 1.0, 0.0, 1.0), "B": (1.2, 2.0, 0.0, 1.006), "C": (0.0, 2.0, 1.003, 2.0)}
+    stones = []
+    for code, (left, right, low, high) in heights.items():
+        front = np.array([(left, 0.0, low), (right, 0.0, low), (right, 0.0, high), (left, 0.0, high)])
+        stones.append(prism(code, front, front + np.array([0.0, 1.0, 0.0])))
+    path.write_text(obj(stones, 3))
+    report = ingest([path], f"sqlite:///{tmp_path / 's.db'}", "solids", options=reading_options(snap=0.002))
+    lines = [line.strip() for line in ingest_lines(report, verbose=False)]
+    assert "3 convex, 0 not" in lines
+    assert "1 contacts left as they are:" in lines
+    assert "B and C: others that share their planes are too far from a common one" in lines
+    solids = report.files[0].solids
+    assert solids is not None
+    assert "snapped within 0.002 m: corners moved by up to 0 m" in solids.remarks["B"][0]
+    assert f"B: {solids.remarks['B'][0]}" in [line.strip() for line in ingest_lines(report, verbose=True)]

@@ -174,6 +174,21 @@ def test_a_free_face_gives_way_before_a_contact_does() -> None:
     check_watertight(one)
 
 
+def test_a_stone_alone_and_round_ones_stay_as_they_are() -> None:
+    corners = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)])
+    tetrahedron = Solid("T", corners, ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)))
+    far = Solid("F", corners + 5.0, tetrahedron.faces)
+    for solids in ([tetrahedron], [tetrahedron, far]):
+        snapped, snapping = snap(solids, 0.002)
+        assert (snapping.contacts, snapping.planes, snapping.left_open) == (0, 0, ())
+        assert snapping.largest_movement == 0.0
+        for one, other in zip(snapped, solids, strict=True):
+            np.testing.assert_array_equal(one.vertices, other.vertices)
+            assert one.faces == other.faces
+    _, snapping = snap([box("B", (0, 0, 0), (1, 1, 1))], 0.002)
+    assert snapping.largest_movement < 1e-14
+
+
 # --- the least movement ---
 
 
