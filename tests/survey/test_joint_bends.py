@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from plain_blocks import as_stone, drawn, moved
 from scipy.spatial.transform import Rotation
-from statics import contacts, overlap_depth
+from statics import contacts, near_pairs, overlap_depth
 
 from survey.blocky import simplify
 from survey.closing import as_building
@@ -20,10 +20,7 @@ from survey.joints import close_joints
 from survey.watertight import check_watertight
 
 USUAL = JointSettings()
-LENGTH, HEIGHT, GAP = 0.5, 0.3, 0.01
-
-
-STEEP = pytest.mark.xfail(strict=True, reason="a ridge of more than 12 % is taken for more than one")
+LENGTH, GAP = 0.5, 0.01
 
 
 def course(tops, bottoms, starts, name):
@@ -41,8 +38,8 @@ def two_courses(bed, count=8):
     lower = LENGTH * np.arange(count + 1.0)
     upper = np.array([0.0, *(lower[:-1] + LENGTH / 2), lower[-1]])
     return [
-        *course(lambda x: bed(x) - GAP / 2, lambda x: -0.3, lower, "L"),
-        *course(lambda x: 0.6, lambda x: bed(x) + GAP / 2, upper, "U"),
+        *course(lambda x: bed(x) - GAP / 2, lambda x: -0.8, lower, "L"),
+        *course(lambda x: 0.9, lambda x: bed(x) + GAP / 2, upper, "U"),
     ]
 
 
@@ -84,23 +81,22 @@ def contact_area(one, two):
 
 
 def assert_all_touch(closed, bed, count=8):
-    solids = stones_of(closed)
     for solid in closed.solids:
         check_watertight(solid, convex=True)
-    lower, upper = ([one for code, one in sorted(solids.items()) if code[0] == row] for row in "LU")
-    total = sum(contact_area(a, b) for a in lower for b in upper)
+    total = 0.0
+    for i, j in near_pairs(closed.solids):
+        one, two = closed.solids[i], closed.solids[j]
+        assert overlap_depth(one, two) < 1e-9
+        total += contact_area(one, two) if one.code[0] != two.code[0] else 0.0
     x = np.linspace(GAP / 2, LENGTH * count - GAP / 2, 4001)  # as far as there are stones
     z = np.array([bed(one) for one in x])
     true = 0.4 * np.hypot(np.diff(x), np.diff(z)).sum()
     assert total == pytest.approx(true, rel=5e-4)
-    for a in lower:
-        for b in upper:
-            assert overlap_depth(a, b) < 1e-9
     assert closed.report.gaps == ()
 
 
 # valleys at a head joint of the lower course, so that the stone across gets two undersides; ridges at one of the upper
-@pytest.mark.parametrize("slope", [0.06, 0.12, 0.15])
+@pytest.mark.parametrize("slope", [0.06, 0.12, 0.2])
 def test_a_valley_is_two_planes_and_the_stone_across_it_has_two_undersides(slope):
     bed = bend(slope, 4 * LENGTH)
     solids = two_courses(bed)
@@ -117,7 +113,7 @@ def test_a_valley_is_two_planes_and_the_stone_across_it_has_two_undersides(slope
     assert set(faces.values()) == {6}
 
 
-@pytest.mark.parametrize("slope", [-0.06, -0.12, pytest.param(-0.15, marks=STEEP)])
+@pytest.mark.parametrize("slope", [-0.06, -0.12, -0.2])
 def test_a_ridge_is_two_planes_and_the_stone_under_it_has_two_tops(slope):
     bed = bend(slope, 3.5 * LENGTH)
     solids = two_courses(bed)
