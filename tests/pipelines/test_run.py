@@ -224,7 +224,8 @@ def test_a_static_start_is_told_and_a_warning_where_there_is_none(tmp_path):
     assert "Began in static equilibrium" in (tmp_path / "out/report.html").read_text(encoding="utf-8")
     # without the course that holds them up, the stones fall
     falling = (
-        text.replace('where = ["course <= 2"]', 'where = ["course in (1, 3)"]') + "[joints]\nmode = 'as-surveyed'\n"
+        text.replace('where = ["course <= 2"]', 'where = ["course in (1, 3)"]')
+        + "[joints]\nmode = 'as-surveyed'\n"
     )
     (tmp_path / "falling.toml").write_text(falling.replace('["W02-02"]', '["W03-02"]'), encoding="utf-8")
     done = run_scene(tmp_path / "falling.toml", url, tmp_path / "out2")
