@@ -59,6 +59,11 @@ def _solid_lines(solids: "SolidsReport", verbose: bool) -> list[str]:
         lines += [f"    {' and '.join(one.stones)}: {one.reason}" for one in shown]
         if len(shown) < len(snapping.left_open):
             lines.append(f"    and {len(snapping.left_open) - len(shown)} more, with -v")
+    elif solids.decimals is not None:
+        lines.append(
+            f"  coordinates have {solids.decimals} decimals: if they are rounded, --snap "
+            f"{2.0 * 10.0**-solids.decimals:g} brings faces that match into one plane"
+        )
     if verbose:
         lines += [f"  {code}: {'; '.join(texts)}" for code, texts in solids.remarks.items()]
     elif solids.remarks:

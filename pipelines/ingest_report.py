@@ -6,6 +6,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pipelines.frame_records import frame_record
 from survey.extrusion import SurveyedBlock
 from survey.measured import SurveyedStream
@@ -14,6 +17,10 @@ from survey.reflex_edges import is_convex
 from survey.snapping_report import Snapping
 
 __all__ = ["FileReport", "IngestReport", "Refusal", "SolidsReport", "Tally"]
+
+
+# coordinates that end so soon may be rounded; with fewer decimals they are whole centimetres by design
+_LEAST_DECIMALS, _MOST_DECIMALS = 3, 6
 
 
 @dataclass(frozen=True)
@@ -34,12 +41,14 @@ class SolidsReport:
     not_convex : codes of the others
     remarks : what was settled or moved to make them solids with plane faces, by code
     snapping : what bringing their faces into common planes has changed; None if that was not asked for
+    decimals : of all their coordinates in metres, 3 to 6 at most; None if they have fewer, or more
     """
 
     convex: int
     not_convex: tuple[str, ...]
     remarks: dict[str, tuple[str, ...]]
     snapping: Snapping | None
+    decimals: int | None = None
 
 
 @dataclass(frozen=True)
@@ -101,6 +110,7 @@ class Tally:
     convex: Counter[bool] = field(default_factory=Counter)
     not_convex: list[str] = field(default_factory=list)
     remarks: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    decimals: int = 0
 
     def count(self, block: SurveyedBlock) -> None:
         """One more stone that is taken in."""
@@ -122,12 +132,15 @@ class Tally:
             self.not_convex.append(block.code)
         if block.face.remarks:
             self.remarks[block.code] = block.face.remarks
+        while self.decimals <= _MOST_DECIMALS and not _has_decimals(block.solid.vertices, self.decimals):
+            self.decimals += 1
 
     def _solids(self) -> SolidsReport | None:
         if not self.convex:
             return None
         codes = tuple(self.not_convex)
-        return SolidsReport(self.convex[True], codes, self.remarks, self.stream.snapping)
+        decimals = self.decimals if _LEAST_DECIMALS <= self.decimals <= _MOST_DECIMALS else None
+        return SolidsReport(self.convex[True], codes, self.remarks, self.stream.snapping, decimals)
 
     def report(self, rejects: Path | None) -> FileReport:
         """What is told of the file; `rejects` is the file that holds the refused stones."""
@@ -145,3 +158,9 @@ class Tally:
             again=self.again,
             solids=self._solids(),
         )
+
+
+def _has_decimals(places: NDArray[np.float64], count: int) -> bool:
+    """Whether coordinates have no more decimals, but for what doubles leave of them."""
+    scaled = places * 10.0**count
+    return bool(np.abs(scaled - np.round(scaled)).max() <= 1e-6)

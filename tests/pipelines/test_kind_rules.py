@@ -168,3 +168,21 @@ def test_contacts_that_stay_open_are_listed(tmp_path: Path) -> None:
     assert solids is not None
     assert "snapped within 0.002 m: corners moved by up to 0 m" in solids.remarks["B"][0]
     assert f"B: {solids.remarks['B'][0]}" in [line.strip() for line in ingest_lines(report, verbose=True)]
+
+
+@pytest.mark.parametrize(
+    ("digits", "hint"), [(2, None), (3, "--snap 0.002"), (5, "--snap 2e-05"), (None, None)]
+)
+def test_coordinates_that_may_be_rounded_are_pointed_out(
+    tmp_path: Path, digits: int | None, hint: str | None
+) -> None:
+    (tmp_path / "wall.obj").write_text(obj(wall(2, 2), digits))
+    report = ingest([tmp_path / "wall.obj"], f"sqlite:///{tmp_path / 'w.db'}", "solids")
+    found = [line for line in ingest_lines(report, verbose=False) if "decimals" in line]
+    if hint is None:
+        assert found == []
+    else:
+        (line,) = found
+        assert line.strip().startswith(
+            f"coordinates have {digits} decimals: if they are rounded, {hint} brings"
+        )
