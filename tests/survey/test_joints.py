@@ -227,6 +227,26 @@ def test_a_stone_that_is_not_convex_keeps_its_shape_and_neighbours_are_led_to_it
     assert areas["L", "R"] == pytest.approx([0.3 * 0.4])
 
 
+def test_a_stone_that_keeps_its_shape_does_not_lead_a_bed_of_others() -> None:
+    # N lies on the L and on M beside it, whose tops are 4 mm apart: the bed is that of N and M
+    stones = [as_stone(CORNERED), box("M", 1.01, 1.5, 0.0, 0.296), box("N", 0.41, 1.5, 0.312, 0.6)]
+    closed = close_joints(stones)
+    assert closed.solids[0].vertices.tobytes() == CORNERED.vertices.tobytes()
+    beds = {frozenset(one.stones): one for one in closed.report.joints if abs(one.normal[2]) > 0.9}
+    assert beds[frozenset("MN")].centroid[2] == pytest.approx(0.304, abs=1e-9)
+    assert "keeps its shape" in beds[frozenset("LN")].left_open
+    (gap,) = closed.report.gaps
+    assert gap.stones == ("L", "N")
+    assert gap.width == pytest.approx(0.012)
+    assert gap.area == pytest.approx(0.59 * 0.4)
+    for code in "MN":
+        solid = closed.solids["LMN".index(code)]
+        check_watertight(solid, convex=True)
+    # the head joint of L and N, and that of L and M, are closed
+    assert closed.solids[2].vertices[:, 0].min() == pytest.approx(0.4, abs=1e-12)
+    assert closed.solids[1].vertices[:, 0].min() == pytest.approx(1.0, abs=1e-12)
+
+
 def test_two_stones_that_keep_their_shape_stay_apart() -> None:
     first = as_stone(CORNERED)
     second = as_stone(moved(replace(CORNERED, code="M"), np.eye(3), np.array([1.01, 0.0, 0.0])))
