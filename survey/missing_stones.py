@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from survey.extrusion import SurveyedBlock
 from survey.missing_stones_arches import ArchGap, arch_gaps, voussoir_outlines
 from survey.missing_stones_codes import FreeCodes
-from survey.missing_stones_faces import MissingFace, stone_of
+from survey.missing_stones_faces import MissingFace, is_plausible, stone_of
 from survey.missing_stones_gaps import CourseGap, Gaps, Hole, find_gaps, find_holes, opening_signs
 from survey.missing_stones_kinds import Filling, UsualKind, depth_of_kind, likeliest, split, usual_kinds
 from survey.missing_stones_openings import FrameGap, frame_gaps
@@ -121,7 +121,8 @@ def _voussoirs(elevation: Elevation, settings: MissingSettings, codes: FreeCodes
         left, right = gap.left.block.code, gap.right.block.code
         before = left
         outlines = voussoir_outlines(gap, joint)
-        if any(stone.contains(outline.mean(axis=0)) for outline in outlines for stone in elevation.stones):
+        there = any(stone.contains(one.mean(axis=0)) for one in outlines for stone in elevation.stones)
+        if there or not all(map(is_plausible, outlines)):
             continue
         for k, outline in enumerate(outlines):
             kind = "keystone" if k == gap.keystone else "voussoir"
@@ -132,7 +133,7 @@ def _voussoirs(elevation: Elevation, settings: MissingSettings, codes: FreeCodes
                 f"{np.degrees(gap.usual):.1f}°; intrados and extrados from theirs, joints of {joint * 1e3:.0f} mm"
             )
             code = codes.after(before, right)
-            sigma = _sigma(gap.left, gap.right, gap.count > 1)
+            sigma, along = _sigma(gap.left, gap.right), _SPLIT_SIGMA if gap.count > 1 else 0.0
             face = MissingFace(
                 code,
                 kind,
@@ -142,6 +143,7 @@ def _voussoirs(elevation: Elevation, settings: MissingSettings, codes: FreeCodes
                 (gap.left, gap.right),
                 depth,
                 sigma,
+                along,
                 evidence,
             )
             beside = (before, right)
@@ -163,9 +165,9 @@ def _usual_joint(gaps: Gaps) -> float:
     return float(np.median(gaps.joints)) if len(gaps.joints) else _USUAL_JOINT
 
 
-def _sigma(left: FlatStone, right: FlatStone, cut: bool) -> float:
+def _sigma(left: FlatStone, right: FlatStone) -> float:
     measured = max(stone.block.face.record.sigma for stone in (left, right))
-    return float(np.hypot(np.hypot(measured, _SCATTER), _SPLIT_SIGMA if cut else 0.0))
+    return float(np.hypot(measured, _SCATTER))
 
 
 def _of_courses(elevation: Elevation, settings: MissingSettings, codes: FreeCodes) -> Iterator[MissingStone]:
@@ -174,7 +176,7 @@ def _of_courses(elevation: Elevation, settings: MissingSettings, codes: FreeCode
     for hole in find_holes(gaps.gaps):
         signs = opening_signs(hole, elevation)
         for frame in frame_gaps(hole, signs, elevation, settings):
-            yield _frame_stone(frame, joint, elevation, codes)
+            yield from _frame_stone(frame, joint, elevation, codes)
         if len(signs) >= 2 or hole.courses > settings.max_courses or hole.bounded < settings.covered:
             continue
         fillings = [likeliest(gap.width, joint, kinds, settings) for gap in hole.gaps]
@@ -189,7 +191,9 @@ def _of_courses(elevation: Elevation, settings: MissingSettings, codes: FreeCode
                 yield from _Fill(gap, filling, kinds, upper, joint, elevation, signs).stones(codes)
 
 
-def _frame_stone(frame: FrameGap, joint: float, elevation: Elevation, codes: FreeCodes) -> MissingStone:
+def _frame_stone(
+    frame: FrameGap, joint: float, elevation: Elevation, codes: FreeCodes
+) -> Iterator[MissingStone]:
     """A jamb that ends where the others do, or a sill."""
     gap = frame.gap
     beside = (gap.left, gap.right)
@@ -198,6 +202,9 @@ def _frame_stone(frame: FrameGap, joint: float, elevation: Elevation, codes: Fre
         sides[k] if place is None else Line(np.array([place, 0.0]), _UPRIGHT)
         for k, place in enumerate((frame.start, frame.stop))
     ]
+    outline = _quadrilateral(lines[0], lines[1], gap.lower, gap.upper)
+    if not is_plausible(outline):
+        return
     if frame.kind == "sill":
         evidence = f"gap of {gap.width:.3f} m under an opening, beyond its jambs on both sides"
     else:
@@ -210,13 +217,14 @@ def _frame_stone(frame: FrameGap, joint: float, elevation: Elevation, codes: Fre
         frame.kind,
         gap.course,
         gap.zone,
-        _quadrilateral(lines[0], lines[1], gap.lower, gap.upper),
+        outline,
         beside,
         depth_of_kind(frame.kind, beside, elevation, None),
-        _sigma(*beside, False),
+        _sigma(*beside),
+        0.0,
         f"{evidence}, in course {gap.course} between {names[0]} and {names[1]}",
     )
-    return MissingStone(stone_of(face, elevation), names, ())
+    yield MissingStone(stone_of(face, elevation), names, ())
 
 
 def _sides(gap: CourseGap, upper: Line, joint: float) -> tuple[Line, Line]:
@@ -257,16 +265,18 @@ class _Fill:
         """The stones of the gap, from left to right."""
         gap, count = self.gap, len(self.filling.kinds)
         kinds, cuts = split(gap, self.filling, self.known, self.elevation)
-        before = gap.left.block.code
-        for kind, outline in zip(kinds, self._outlines(cuts), strict=True):
+        before, outlines = gap.left.block.code, list(self._outlines(cuts))
+        if not all(map(is_plausible, outlines)):
+            return
+        for kind, outline in zip(kinds, outlines, strict=True):
             kind = self._kind(kind)
             code = codes.after(before, gap.right.block.code)
             names, before = (before, gap.right.block.code), code
             depth = depth_of_kind(kind, (gap.left, gap.right), self.elevation, gap.course)
-            sigma = _sigma(gap.left, gap.right, count > 1)
+            sigma, along = _sigma(gap.left, gap.right), _SPLIT_SIGMA if count > 1 else 0.0
             beside = (gap.left, gap.right)
             face = MissingFace(
-                code, kind, gap.course, gap.zone, outline, beside, depth, sigma, self._evidence(kind)
+                code, kind, gap.course, gap.zone, outline, beside, depth, sigma, along, self._evidence(kind)
             )
             yield MissingStone(stone_of(face, self.elevation), names, self._notes())
 

@@ -1,7 +1,7 @@
 """From the outline of a missing stone in the elevation to a stone in space, with its evidence."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +15,11 @@ from survey.planes import FaceFit
 from survey.records import BlockRecord
 from survey.shapes import FaceShape, ShapeKind
 
-__all__ = ["MissingFace", "stone_of"]
+__all__ = ["MissingFace", "is_plausible", "stone_of"]
 
 Array = NDArray[np.float64]
 
+_SHORTEST = 0.05  # metres
 _ENOUGH = 3  # faces that have a common plane
 
 
@@ -33,6 +34,7 @@ class MissingFace:
     beside : its neighbours
     depth : with the evidence
     sigma : standard deviation of a corner in the plane of the facade [m]
+    along_sigma : the same of what is not known besides, along the facade: where two missing stones meet [m]
     evidence : of outline and kind, in words
     """
 
@@ -44,6 +46,7 @@ class MissingFace:
     beside: tuple[FlatStone, ...]
     depth: Depth
     sigma: float
+    along_sigma: float
     evidence: str
 
 
@@ -66,7 +69,17 @@ def stone_of(face: MissingFace, elevation: Elevation) -> SurveyedBlock:
     )
     shape = FaceShape(ShapeKind.UNTESTED, "nobody has seen it")
     made = face_on(_fit(plane, corners), corners, shape, Provenance("hypothesis", text), record)
-    return extrude(made, face.depth)
+    block = extrude(made, face.depth)
+    along = face.along_sigma * np.abs(frame.axes[0])
+    return replace(block, vertex_sigma=np.hypot(block.vertex_sigma, along))
+
+
+def is_plausible(outline: Array) -> bool:
+    """Whether corners (4, 2) make a stone: convex, counter-clockwise, no side shorter than 5 cm."""
+    run = np.roll(outline, -1, axis=0) - outline
+    after = np.roll(run, -1, axis=0)
+    turns = run[:, 0] * after[:, 1] - run[:, 1] * after[:, 0]
+    return bool((turns > 0.0).all() and (np.hypot(run[:, 0], run[:, 1]) >= _SHORTEST).all())
 
 
 def _plane(corners: Array, beside: Sequence[FlatStone], elevation: Elevation) -> PlaneEstimate:
