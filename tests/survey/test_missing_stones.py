@@ -228,3 +228,24 @@ def test_proposals_turn_with_the_wall(turn, shift):
     assert [one.block.code for one in here] == [one.block.code for one in there]
     for one, other in zip(here, there, strict=True):
         assert placed(one.block.face.outline) == pytest.approx(other.block.face.outline, abs=1e-6)
+
+
+@cache
+def arched():
+    """A wall with an arch."""
+    return blocks_of(wall(90, 5, arch=Arch.SEGMENTAL).survey)
+
+
+@settings(max_examples=12, deadline=None)
+@given(seed=st.integers(0, 10**6), share=st.sampled_from([0.1, 0.2, 0.4]))
+def test_whatever_is_missing_no_proposal_is_upon_a_stone(seed, share):
+    rng = Random(seed)
+    kept = [one for one in arched() if rng.random() > share]
+    found = propose_missing(kept)
+    codes = [one.block.code for one in found]
+    assert len(set(codes)) == len(codes)
+    for one in found:
+        check_watertight(one.block.solid)
+        centre = one.block.face.outline.mean(axis=0)
+        nearest = min(np.linalg.norm(other.face.outline.mean(axis=0) - centre) for other in kept)
+        assert nearest > 0.15
