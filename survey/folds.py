@@ -55,8 +55,8 @@ def fold(vertices: Array, polygon: Polygon, tolerance: float) -> list[Polygon]:
         own = (_ALIKE * size * round(left / (_ALIKE * size)) if np.isfinite(left) else left, across)
         if own < score:
             best, score = halves, own
-    if best is None:  # no diagonal lies within it
-        return [polygon]
+    if best is None:  # no diagonal lies within it: it crosses itself, or is seen from the side everywhere
+        return [(polygon[0], polygon[k], polygon[k + 1]) for k in range(1, len(polygon) - 1)]
     return [one for half in best for one in fold(vertices, half, tolerance)]
 
 
@@ -64,6 +64,8 @@ def _halves(vertices: Array, polygon: Polygon) -> Iterator[tuple[Polygon, Polygo
     """Both sides of each diagonal that runs within the polygon, as it is seen square to its mean plane."""
     corners = vertices[list(polygon)]
     normal = area_vector(corners)
+    if not float(np.linalg.norm(normal)) > 0.0:
+        return
     u = np.linalg.svd(normal[None, :])[2][1]
     flat = np.column_stack([corners @ u, corners @ np.cross(normal / np.linalg.norm(normal), u)])
     n = len(polygon)
