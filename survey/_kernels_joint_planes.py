@@ -51,7 +51,8 @@ def fit_middle_planes(points, hands, sound, starts, scales, usual, straightness,
     usual : usual width [m]; negative: not known
     straightness : residual of a sound corner above which it is off the joint [m]
     planes : (n, 3) into which a, b, c are written
-    values : (n, 4) into which width, rms, and of sound corners the largest residual and the share of those off
+    values : (n, 5), zero, for width, rms, and of sound corners the largest residual, the share of those off, and the
+        largest residual of the others
     """
     for j in range(starts.shape[0] - 1):
         rows = slice(starts[j], starts[j + 1])
@@ -77,7 +78,7 @@ def _fit(points, hands, sound, scale, usual, straightness, plane, value):
         wedge = math.sqrt(open_[4] ** 2 + open_[5] ** 2) / scale
         if wedge > _WEDGE and less < 0.1 * left and less < (_PLANE * straightness) ** 2:
             solution = open_
-    value[2], value[3] = _left_over(design, points[:, 2], sound, solution, straightness)
+    value[2], value[3], total = _left_over(design, points[:, 2], sound, solution, straightness)
     if value[3] > 0.0:
         # a few corners that are far off, at an end even more, tilt the plane: find those by the least sum of residuals
         flat = _least_sum(design, points[:, 2], sound)
@@ -85,27 +86,29 @@ def _fit(points, hands, sound, scale, usual, straightness, plane, value):
         for i in range(k):
             near[i] = sound[i] and abs(points[i, 2] - _value(design[i], flat)) <= straightness
         again, _ = _huber(design, points[:, 2], near, 4, prior, usual)
-        largest, off = _left_over(design, points[:, 2], sound, again, straightness)
-        if off < value[3]:
+        largest, off, less = _left_over(design, points[:, 2], sound, again, straightness)
+        if off < value[3] or (off == value[3] and less < total):
             solution, value[2], value[3] = again, largest, off
     plane[0], plane[1], plane[2] = solution[0], solution[1] / scale, solution[2] / scale
     total, weight = 0.0, 0.0
     for i in range(k):
-        w = 1.0 if sound[i] else _WORN
-        total, weight = total + w * (points[i, 2] - _value(design[i], solution)) ** 2, weight + w
+        w, residual = 1.0 if sound[i] else _WORN, abs(points[i, 2] - _value(design[i], solution))
+        total, weight = total + w * residual**2, weight + w
+        if sound[i] and residual <= straightness:
+            value[4] = max(value[4], residual)
     value[0], value[1] = solution[3], math.sqrt(total / weight)
 
 
 @njit(cache=True)
 def _left_over(design, heights, sound, solution, straightness):
-    """Largest residual of sound corners, and the share of those that are off the joint."""
-    largest, off, number = 0.0, 0, 0
+    """Largest residual of sound corners, the share of those that are off the joint, and the sum of residuals."""
+    largest, off, number, total = 0.0, 0, 0, 0.0
     for i in range(design.shape[0]):
         if sound[i]:
             residual = abs(heights[i] - _value(design[i], solution))
-            largest, number = max(largest, residual), number + 1
+            largest, number, total = max(largest, residual), number + 1, total + residual
             off += residual > straightness
-    return largest, off / max(number, 1)
+    return largest, off / max(number, 1), total
 
 
 @njit(cache=True)

@@ -27,6 +27,7 @@ _FEW = 0.1  # part of the sound corners that may be off the chain
 _WORN = 0.01  # weight of a worn corner
 _LEAST = 3  # links that make a chain
 _MOST = 12  # chains of a bed
+_TURNS = 3  # in which valleys and ridges of a chain are told apart
 _ROUNDS = 10
 
 
@@ -80,6 +81,7 @@ def bent(
     facing: FacingFaces,
     links: Indices,
     settings: JointSettings,
+    off: float,
 ) -> tuple[Array, Indices] | None:
     """Planes of a joint that one plane does not fit.
 
@@ -88,6 +90,7 @@ def bent(
     solids, planes, sound : the stones, the planes of their faces, and which of their corners are sound
     facing, links : which faces face each other, and the pairs of this joint
     settings : how far a sound corner may be off its plane
+    off : part of the sound corners that are off one plane; a chain leaves at most a quarter of them off
 
     Returns
     -------
@@ -96,19 +99,25 @@ def bent(
     bed = _bed(planes, facing, links)
     extents = _extents(solids, bed)
     reach = [end for face in extents.values() for end in face]
-    found: list[tuple[float, _Chain]] = []
+    most = min(_FEW, 0.25 * off)
+    coarse: list[_Chain] = []
     for ends in _chains(bed.place, bed.height):
-        number, knots = _changes(bed, ends, extents)
-        posts = np.array([min(reach), *knots, max(reach)])
-        if (np.diff(posts) > 0.0).all():
+        slopes = _slopes(bed, ends)
+        for _ in range(_TURNS):
+            number, knots = _changes(bed, ends, slopes, extents)
+            posts = np.array([min(reach), *knots, max(reach)])
+            if not (np.diff(posts) > 0.0).all():
+                break
             chain = _fitted(solids, sound, bed, posts, number)
-            if chain.off(_FINE * settings.straightness) <= _FEW:
-                return _planes(bed, chain), number
-            found.append((chain.off(settings.straightness), chain))
-    for off, chain in found:
-        if off <= _FEW:
-            return _planes(bed, chain), chain.number
-    return None
+            before, slopes = slopes, np.diff(chain.heights) / np.diff(posts)
+            # where a valley has turned out to be a ridge, its place is another
+            if ((np.diff(slopes) > 0.0) == (np.diff(before) > 0.0)).all():
+                if chain.off(settings.straightness) <= most:
+                    coarse.append(chain)
+                break
+        if coarse and coarse[-1].off(_FINE * settings.straightness) <= _FEW:
+            return _planes(bed, coarse[-1]), coarse[-1].number
+    return (_planes(bed, coarse[0]), coarse[0].number) if coarse else None
 
 
 def _bed(planes: FacePlanes, facing: FacingFaces, links: Indices) -> _Bed:
@@ -140,30 +149,28 @@ def _extents(solids: Polyhedra, bed: _Bed) -> dict[int, tuple[float, float]]:
 
 
 def _chains(place: Array, height: Array) -> Iterator[list[int]]:
-    """Ends (in the order along the bed) of two straight chains that the links make, of three, and so on.
-
-    Each has three links or more, and all together the least sum of squares off their lines (Bellman 1961); single odd
-    links do not count.
-    """
+    """Ends (in the order along the bed) of two straight chains that the links make, of three, and so on."""
     order = np.argsort(place, kind="stable")
-    n = len(order)
-    most = min(n // _LEAST, _MOST)
-    if most < 2:
-        return
-    cost = _squares(place[order], median_filter(height[order], size=5, mode="mirror"))
-    best, before = [np.full(n + 1, np.inf)], [np.zeros(n + 1, np.int64)]
-    best[0][0] = 0.0
-    for count in range(1, most + 1):
-        total = best[-1][:, None] + cost
-        before.append(total.argmin(axis=0))
-        best.append(total.min(axis=0))
-        if count < 2:
-            continue
-        ends, at = [], n
-        for k in range(count, 0, -1):
-            ends.append(at)
-            at = int(before[k][at])
-        yield ends[::-1]
+    x, y = place[order], median_filter(height[order], size=5, mode="mirror")
+    for count in range(2, min(len(x) // _LEAST, _MOST) + 1):
+        yield _divided(x, y, count)
+
+
+def _divided(x: Array, y: Array, count: int) -> list[int]:
+    """Ends of so many chains of three links or more with the least sum of squares off their lines (Bellman 1961)."""
+    n = len(x)
+    cost = _squares(x, y)
+    best = np.full(n + 1, np.inf)
+    best[0] = 0.0
+    before = np.zeros((count + 1, n + 1), np.int64)
+    for k in range(1, count + 1):
+        total = best[:, None] + cost
+        before[k], best = total.argmin(axis=0), total.min(axis=0)
+    ends, at = [], n
+    for k in range(count, 0, -1):
+        ends.append(at)
+        at = int(before[k, at])
+    return ends[::-1]
 
 
 def _squares(x: Array, y: Array) -> Array:
@@ -178,29 +185,32 @@ def _squares(x: Array, y: Array) -> Array:
     return out
 
 
-def _line(x: Array, y: Array) -> tuple[float, float]:
+def _slope(x: Array, y: Array) -> float:
     mean_x, mean_y = float(x.mean()), float(y.mean())
     square = float(((x - mean_x) ** 2).sum())
-    slope = float(((x - mean_x) * (y - mean_y)).sum()) / square if square > 1e-12 else 0.0
-    return slope, mean_y - slope * mean_x
+    return float(((x - mean_x) * (y - mean_y)).sum()) / square if square > 1e-12 else 0.0
+
+
+def _slopes(bed: _Bed, ends: list[int]) -> Array:
+    """Slopes (n,) of the lines of chains that end there [-]."""
+    order = np.argsort(bed.place, kind="stable")
+    x, y = bed.place[order], bed.height[order]
+    return np.array([_slope(x[a:b], y[a:b]) for a, b in zip([0, *ends[:-1]], ends, strict=True)])
 
 
 def _changes(
-    bed: _Bed, ends: list[int], extents: dict[int, tuple[float, float]]
+    bed: _Bed, ends: list[int], slopes: Array, extents: dict[int, tuple[float, float]]
 ) -> tuple[Indices, list[float]]:
     """Plane (m,) of each link, and where (n - 1) along the bed one plane follows another [m]."""
     order = np.argsort(bed.place, kind="stable")
-    x, y = bed.place[order], bed.height[order]
-    starts = [0, *ends[:-1]]
-    slopes = [_line(x[a:b], y[a:b])[0] for a, b in zip(starts, ends, strict=True)]
+    x = bed.place[order]
     middle = {face: 0.5 * (low + high) for face, (low, high) in extents.items()}
     number, knots = np.zeros(len(x), np.int64), []
     for k, end in enumerate(ends[:-1]):
         at = 0.5 * (x[end - 1] + x[end])
         valley = slopes[k + 1] > slopes[k]
         faces = (bed.lower if valley else bed.upper)[order]
-        centres = np.array([middle[int(face)] for face in faces])
-        after = centres > at
+        after = np.array([middle[int(face)] for face in faces]) > at
         number[after] = k + 1
         before_end = max((extents[int(f)][1] for f in faces[~after]), default=at)
         after_start = min((extents[int(f)][0] for f in faces[after]), default=at)

@@ -30,6 +30,9 @@ Bools = NDArray[np.bool_]
 
 _ALIKE = 0.985  # cosine of 10°: faces of neighbours that are turned by more do not continue each other
 _FEW = 0.25  # part of the corners of a joint that may be off it
+_FINE = (
+    0.5  # of the straightness: corners of a bed that is straight but for odd ones are as near to it as that
+)
 _SAME = 1e-8  # metres: a face that has to stay and is as near as that to a plane lies in it
 
 
@@ -113,7 +116,8 @@ def _add_joints(found: "_Found", links: Indices, settings: JointSettings) -> Non
     _, values = _fitted(faces, groups, -1.0, settings)
     usual = float(np.median(values[:, 0])) if count else 0.0
     planes, values = _fitted(faces, groups, usual, settings)
-    straight = values[:, 2] <= settings.straightness
+    few_are_odd = (values[:, 3] <= _FEW) & (values[:, 4] <= _FINE * settings.straightness)
+    straight = (values[:, 2] <= settings.straightness) | few_are_odd
     found.add_many(
         planes[straight], links[straight[label]], (np.cumsum(straight)[label] - 1)[straight[label]]
     )
@@ -121,7 +125,7 @@ def _add_joints(found: "_Found", links: Indices, settings: JointSettings) -> Non
     first = np.searchsorted(label[order], np.arange(count + 1))
     for joint in np.flatnonzero(~straight).tolist():
         own = links[order[first[joint] : first[joint + 1]]]
-        if found.add_bent(own, settings):
+        if found.add_bent(own, settings, float(values[joint, 3])):
             continue
         if values[joint, 3] <= _FEW:
             found.add_many(planes[[joint]], own, np.zeros(len(own), np.int64))
@@ -145,9 +149,11 @@ class _Found:
         self.normals += list(planes[:, :3])
         self.offsets += planes[:, 3].tolist()
 
-    def add_bent(self, links: Indices, settings: JointSettings) -> bool:
+    def add_bent(self, links: Indices, settings: JointSettings, off: float) -> bool:
         """A joint that is bent but not broken: several planes; False if that is not what it is."""
-        found = bent(self.faces.solids, self.faces.planes, self.faces.sound, self.facing, links, settings)
+        found = bent(
+            self.faces.solids, self.faces.planes, self.faces.sound, self.facing, links, settings, off
+        )
         if found is None:
             return False
         self.add_many(found[0], links, found[1])
@@ -255,7 +261,7 @@ def _gathered(faces: StoneFaces, facing: FacingFaces, label: Indices, count: int
 
 
 def _fitted(faces: StoneFaces, groups: _Groups, usual: float, settings: JointSettings) -> tuple[Array, Array]:
-    """Planes (n, 4) half-way between the two hands, and values (n, 4) as of the kernel."""
+    """Planes (n, 4) half-way between the two hands, and values (n, 5) as of the kernel."""
     count = len(groups.normals)
     solids = faces.solids
     sizes = np.diff(solids.face_starts)[groups.faces]
@@ -273,7 +279,7 @@ def _fitted(faces: StoneFaces, groups: _Groups, usual: float, settings: JointSet
     local = np.einsum("kij,kj->ki", axes[joint], x - centre[joint])
     scale = np.ones(count)
     np.maximum.at(scale, joint, np.abs(local[:, :2]).max(axis=1))
-    planes, values = np.zeros((count, 3)), np.zeros((count, 4))
+    planes, values = np.zeros((count, 3)), np.zeros((count, 5))
     fit_middle_planes(
         np.ascontiguousarray(local),
         np.repeat(groups.hands, sizes),
