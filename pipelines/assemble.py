@@ -19,17 +19,14 @@ from pipelines.selection import Groups, StoneModel, select_groups, select_stones
 from pipelines.stone_records import surveyed_block
 from survey.blocky import BlockyStone
 from survey.closing_report import ClosingReport
-from survey.convex_parts import convex_parts
 from survey.extrusion import SurveyedBlock
-from survey.infill_parts import grid_parts
 from survey.joints import close_joints
 from survey.solids import Solid
+from survey.stone_parts import stone_parts
 
 __all__ = ["Assembly", "assemble", "assemble_stones"]
 
 Array = NDArray[np.float64]
-
-_MANY = 40  # faces of a solid from which it is first looked at as a storey of infill
 
 
 @dataclass(frozen=True)
@@ -135,8 +132,8 @@ def _block(model: StoneModel, solid: Solid, mesh: MeshSettings) -> Block:
 
 
 def _parts(solid: Solid) -> tuple[Part, ...]:
-    """Convex parts of a stone that is not convex; of a storey of infill, which has hundreds, by its own grid."""
-    parts = (grid_parts(solid) if len(solid.faces) > _MANY else None) or convex_parts(solid)
+    """Convex parts of a stone that is not convex."""
+    parts = stone_parts(solid)
     return tuple(Part(one.vertices, one.faces) for one in parts) if len(parts) > 1 else ()
 
 

@@ -59,16 +59,21 @@ def closing_report(
         volume_change=dict(zip(codes, _volume_changes(building, cut), strict=True)),
         alone=tuple(code for code in codes if code not in joined),
         gaps=tuple(gaps),
-        overlaps=tuple(
-            Overlap(
-                (codes[one.pair[0]], codes[one.pair[1]]),
-                one.volume,
-                one.depth,
-                one.part.vertices.mean(axis=0) + building.origin,
-            )
-            for one in overlaps
-        ),
+        overlaps=_overlaps(building, overlaps),
     )
+
+
+def _overlaps(building: Building, found: list[Overlapping]) -> tuple[Overlap, ...]:
+    """One entry for each two stones; what parts of a stone share with another is added up."""
+    together: dict[tuple[str, str], list[Overlapping]] = defaultdict(list)
+    for one in found:
+        together[one.codes].append(one)
+    out = []
+    for codes, parts in together.items():
+        volume = sum(one.volume for one in parts)
+        place = sum((one.volume * one.part.vertices.mean(axis=0) for one in parts), np.zeros(3)) / volume
+        out.append(Overlap(codes, volume, max(one.depth for one in parts), place + building.origin))
+    return tuple(out)
 
 
 def _volume_changes(building: Building, cut: Cut) -> list[float]:

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from survey.blocky import BlockyStone, simplify
 from survey.closing import Building, Cut, as_building, close_within_bounds
@@ -22,10 +23,13 @@ from survey.facing import FacingFaces, find_facing
 from survey.joint_planes import ContactPlanes
 from survey.joint_settings import JointMode, JointSettings
 from survey.newly_facing import newly_facing
-from survey.overlaps import find_overlaps, part_stones
+from survey.overlaps import find_overlaps, part_stones, planes_of_solid
 from survey.solids import Solid
+from survey.stone_parts import stone_parts
 
 __all__ = ["ClosedStones", "close_joints"]
+
+Array = NDArray[np.float64]
 
 _ROUNDS = 4  # in which closing joints shows further ones, beside worn corners
 _MEETS = 1e-6  # metres: faces that are nearer share a plane
@@ -65,7 +69,7 @@ def close_joints(
     Raises
     ------
     GeometryError
-        naming the stone, if two have one code, or one is degenerate
+        naming the stone, if two have one code, one is degenerate, or one is of too many convex parts
     """
     settings = settings or JointSettings()
     blocky = tuple(stone if isinstance(stone, BlockyStone) else simplify(stone) for stone in stones)
@@ -75,18 +79,19 @@ def close_joints(
     facing = find_facing(building.faces.solids, building.faces.planes, settings)
     if settings.mode is JointMode.AS_SURVEYED:
         cut = _as_surveyed(building, facing)
-        overlaps = find_overlaps(cut.solids, cut.planes)
+        parts, planes = _kept_parts(building)
+        overlaps = find_overlaps([*cut.solids, *parts], cut.planes | planes)
     else:
-        cut = close_within_bounds(building, facing, settings, building.solids)
-        for _ in range(_ROUNDS):
-            before, facing = facing, newly_facing(building, facing, cut, settings)
-            cut = close_within_bounds(building, facing, settings, cut.solids)
-            if len(facing) == len(before):
-                break
+        cut, facing = _closed(building, facing, settings)
+        parts, planes = _kept_parts(building)
         parted, overlaps = part_stones(
-            building.solids, cut.solids, cut.planes, cut.free, settings.max_displacement
+            [*building.solids, *parts],
+            [*cut.solids, *parts],
+            cut.planes | planes,
+            cut.free,
+            settings.max_displacement,
         )
-        cut = replace(cut, solids=parted)
+        cut = replace(cut, solids=parted[: len(building.solids)])
     report = closing_report(building, facing, cut, overlaps, settings)
     placed = (replace(solid, vertices=solid.vertices + building.origin) for solid in cut.solids)
     changed = tuple(
@@ -94,6 +99,25 @@ def close_joints(
         for stone, old, solid, new in zip(blocky, building.solids, cut.solids, placed, strict=True)
     )
     return ClosedStones(changed, blocky, report)
+
+
+def _closed(building: Building, facing: FacingFaces, settings: JointSettings) -> tuple[Cut, FacingFaces]:
+    """All joints closed that can be, also those that show only then."""
+    cut = close_within_bounds(building, facing, settings, building.solids)
+    for _ in range(_ROUNDS):
+        before, facing = facing, newly_facing(building, facing, cut, settings)
+        cut = close_within_bounds(building, facing, settings, cut.solids)
+        if len(facing) == len(before):
+            break
+    return cut, facing
+
+
+def _kept_parts(building: Building) -> tuple[list[Solid], dict[int, Array]]:
+    """Convex parts of the stones that keep their shape, and their planes (n, 4), numbered after all stones."""
+    parts: list[Solid] = []
+    for i in np.flatnonzero(~building.convex).tolist():
+        parts += stone_parts(building.solids[i])
+    return parts, {len(building.solids) + k: planes_of_solid(part) for k, part in enumerate(parts)}
 
 
 def _as_surveyed(building: Building, facing: FacingFaces) -> Cut:

@@ -30,12 +30,14 @@ class Overlapping:
     Attributes
     ----------
     pair : their indices
+    codes : of their stones
     part : what both take
     volume : of it [m³]
     depth : by which one would have to move along a face's normal to be free [m]
     """
 
     pair: tuple[int, int]
+    codes: tuple[str, str]
     part: Solid
     volume: float
     depth: float
@@ -65,7 +67,10 @@ def volume_of(solid: Solid) -> float:
 
 
 def find_overlaps(solids: Sequence[Solid], planes: Mapping[int, Array]) -> list[Overlapping]:
-    """Pairs of solids that lie in each other, of those that `planes` names: convex ones, with their planes (n, 4)."""
+    """Pairs of solids that lie in each other, of those that `planes` names: convex ones, with their planes (n, 4).
+
+    Parts of one stone have one code, and do not count.
+    """
     chosen = sorted(planes)
     if len(chosen) < 2:
         return []
@@ -81,6 +86,8 @@ def find_overlaps(solids: Sequence[Solid], planes: Mapping[int, Array]) -> list[
         depth = deepest_overlaps(near, all_vertices, vertex_starts, all_planes, plane_starts, _LEAST)
         for k in np.flatnonzero(depth > _LEAST):
             i, j = sorted((chosen[near[k, 0]], chosen[near[k, 1]]))
+            if solids[i].code == solids[j].code:
+                continue
             found = _overlapping(i, j, solids[i], solids[j], planes, float(depth[k]))
             if found is not None:
                 out.append(found)
@@ -95,7 +102,7 @@ def _overlapping(
     part = common_part(planes[i], planes[j], 0.5 * (low + high), 2.0 * float((high - low).max()))
     if part is None or (volume := volume_of(part)) <= _LEAST_VOLUME:
         return None
-    return Overlapping((i, j), part, volume, depth)
+    return Overlapping((i, j), (first.code, second.code), part, volume, depth)
 
 
 @dataclass
@@ -130,7 +137,7 @@ class _Parting:
         It goes back as a whole, or turns about one of its edges, as an intrados does at the foot of an arch.
         """
         out = []
-        for p in np.flatnonzero(self.free[one]).tolist():
+        for p in np.flatnonzero(self.free[one]).tolist() if one in self.free else ():
             row = self.planes[one][p]
             low = float((self.solids[other].vertices @ row[:3]).min())
             out.append((float(row[3]) - low, one, p, np.array([*row[:3], low])))
@@ -148,12 +155,16 @@ class _Parting:
 
     def _beside(self, one: int, other: int) -> list[tuple[float, dict[int, Array]]]:
         """Ways to cut one stone along each face of another: what is lost [m³], and the plane."""
+        if one not in self.free:
+            return []
         return [(self._lost(one, -plane), {one: -plane}) for plane in self.planes[other]]
 
     def _between(self, found: Overlapping) -> list[tuple[float, dict[int, Array]]]:
         """Ways to cut both along a plane half-way between a face of each."""
         i, j = found.pair
         middle, ways = found.part.vertices.mean(axis=0), []
+        if i not in self.free or j not in self.free:
+            return []
         for a in self.planes[i]:
             for b in self.planes[j]:
                 normal = a[:3] - b[:3]
@@ -198,8 +209,9 @@ def part_stones(
     ----------
     originals : all stones before any was cut
     solids : as they are now
-    planes : of those that may be cut, (n, 4); the first belong to the faces of the originals, in order
-    free : of each of these, whether it is a face that touches no stone
+    planes : of all convex ones, (n, 4); the first belong to the faces of the originals, in order
+    free : of each of these, whether it is a face that touches no stone; those that are not named are not cut, as
+        parts of stones that keep their shape
     bound : farthest that a corner may move [m]
 
     Returns
