@@ -1,4 +1,4 @@
-"""Meshing, stone by stone: `python -m benchmarks.meshing [--stones 1000 10000] [--shapes N] [--json]`.
+"""Meshing, stone by stone: `python -m benchmarks.meshing [--stones 1000 10000] [--meshers M …] [--json]`.
 
 Time and quality of each mesher on boxes, voussoirs, slender, flat and leaning hexahedra of about 200 nodes, and
 processor time for many distinct stones. See benchmarks/README.md for what the columns mean.
@@ -62,16 +62,16 @@ _MANY: Table = (
 def main() -> None:
     """Run all shapes and sizes and print."""
     options = _options()
-    rows = [_shape(shape, mesher, options.shapes) for shape in _SIZES for mesher in _MESHERS]
-    many = [_many(count, mesher) for count in options.stones for mesher in _MESHERS]
+    rows = [_shape(shape, mesher, options.shapes) for shape in options.kinds for mesher in options.meshers]
+    many = [_many(count, mesher) for count in options.stones for mesher in options.meshers]
     if options.json:
         print_json(rows + many)
         return
     print(f"{machine()}; {environment('moma-masonry', 'gmsh', 'scipy', 'numpy')}\n")
-    print_table(rows, _TABLE)
-    if many:
-        print()
-        print_table(many, _MANY)
+    for found, table in ((rows, _TABLE), (many, _MANY)):
+        if found:
+            print_table(found, table)
+            print()
 
 
 def _options() -> argparse.Namespace:
@@ -80,6 +80,10 @@ def _options() -> argparse.Namespace:
         "--stones", type=int, nargs="*", default=[1000, 10_000], help="how many distinct stones"
     )
     parser.add_argument("--shapes", type=int, default=50, help="stones of each shape (50)")
+    parser.add_argument("--meshers", nargs="+", choices=_MESHERS, default=list(_MESHERS))
+    parser.add_argument(
+        "--kinds", nargs="*", choices=_SIZES, default=list(_SIZES), help="shapes of the first table"
+    )
     parser.add_argument("--json", action="store_true", help="print an array of objects, one for each row")
     return parser.parse_args()
 

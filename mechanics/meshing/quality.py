@@ -15,6 +15,9 @@ __all__ = ["MeshQuality", "cell_quality", "mesh_quality"]
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+# cells that are computed in one go: some 30 MB for each of a few arrays
+_BATCH = 100_000
+
 
 @dataclass(frozen=True)
 class MeshQuality:
@@ -36,18 +39,28 @@ class MeshQuality:
 
 
 def mesh_quality(meshes: Sequence[SolidMesh]) -> tuple[MeshQuality, ...]:
-    """The quality of each mesh; meshes of a kind are computed in one go."""
+    """The quality of each mesh; many meshes of a kind are computed in one go."""
     found: dict[int, MeshQuality] = {}
     for element in sorted({mesh.element.linear for mesh in meshes}):
         own = [k for k, mesh in enumerate(meshes) if mesh.element.linear is element]
-        corners = [meshes[k].nodes[meshes[k].cells[:, : element.corners]] for k in own]
-        starts = np.cumsum([0, *(len(one) for one in corners[:-1])])
-        angle, jacobian = cell_quality(element, np.concatenate(corners))
-        angles = np.minimum.reduceat(angle, starts).tolist()
-        worst = np.minimum.reduceat(jacobian, starts).tolist()
-        for k, *least in zip(own, angles, worst, strict=True):
-            found[k] = MeshQuality(len(meshes[k].nodes), len(meshes[k].cells), *least)
+        cells = np.cumsum([len(meshes[k].cells) for k in own])
+        for batch in np.split(own, np.flatnonzero(np.diff(cells // _BATCH)) + 1):
+            found |= _batch_quality(element, meshes, batch.tolist())
     return tuple(found[k] for k in range(len(meshes)))
+
+
+def _batch_quality(
+    element: Element, meshes: Sequence[SolidMesh], own: Sequence[int]
+) -> dict[int, MeshQuality]:
+    corners = [meshes[k].nodes[meshes[k].cells[:, : element.corners]] for k in own]
+    starts = np.cumsum([0, *(len(one) for one in corners[:-1])])
+    angle, jacobian = cell_quality(element, np.concatenate(corners))
+    angles = np.minimum.reduceat(angle, starts).tolist()
+    worst = np.minimum.reduceat(jacobian, starts).tolist()
+    return {
+        k: MeshQuality(len(meshes[k].nodes), len(meshes[k].cells), *least)
+        for k, *least in zip(own, angles, worst, strict=True)
+    }
 
 
 def cell_quality(element: Element, corners: Array) -> tuple[Array, Array]:

@@ -217,9 +217,11 @@ def test_quality_of_known_cells():
     assert jacobian[0] == pytest.approx(np.sqrt(0.5))
 
 
-def test_qualities_of_many_meshes_are_those_of_each():
+@pytest.mark.parametrize("batch", [1, 100, 100_000])
+def test_qualities_of_many_meshes_are_those_of_each(monkeypatch, batch):
+    monkeypatch.setattr("mechanics.meshing.quality._BATCH", batch)
     corners = box((0, 0, 0), (0.6, 0.4, 0.3))
-    meshes = [mesh_with_delaunay(corners, BOX_FACES, size, "A1") for size in (0.3, 0.1)]
+    meshes = [mesh_with_delaunay(corners, BOX_FACES, size, "A1") for size in (0.3, 0.1, 0.2)]
     meshes.insert(1, mesh_with_hexahedra(corners, BOX_FACES, 0.1, "A1"))
     together = mesh_quality(meshes)
     assert together == tuple(mesh_quality([one])[0] for one in meshes)
