@@ -144,7 +144,7 @@ def test_the_kernel_agrees_with_its_slow_twin(seed, plane, width, opening, faces
     points, hands = corners(plane, width, opening, 0.0015, rng, faces)
     sound = rng.random(len(points)) >= worn
     points[~sound, 2] += rng.uniform(0.0, 0.03, (~sound).sum()) * hands[~sound]
-    if odd and faces > 2:  # a face that lies too low
+    if odd and faces > 2 and np.hypot(*opening) < 0.05:  # a face that lies too low in a bed
         points[:4, 2] -= 0.05
     fitted, values = fit(points, hands, sound, usual)
     expected, others = twin_fit(points, hands, sound, usual, 0.02, scale_of(points))
