@@ -25,7 +25,7 @@ def through(point, normal):
 
 
 def true_volume(planes):
-    """By qhull's half-space intersection about the largest ball's centre; 0 where no ball of 1e-5 m fits: such slivers say nothing."""
+    """By qhull, about the centre of the largest ball; 0 where no ball of 1e-5 m fits: such slivers say nothing."""
     found = linprog(
         [0, 0, 0, -1],
         A_ub=np.column_stack([planes[:, :3], np.ones(len(planes))]),
