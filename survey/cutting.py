@@ -142,8 +142,10 @@ def _cut(solid: Solid, planes: Array) -> CutStone | None:
         thin = {
             of_face[f] for f, face in enumerate(cut.solid.faces) if _is_thin(cut.solid.vertices[list(face)])
         }
-        if not thin or len(wanted) - len(thin) < 4:
+        if not thin:
             return CutStone(cut.solid, of_face)
+        if len(wanted) - len(thin) < 4:
+            return None  # a splinter of rounding
         wanted = np.array([p for p in wanted if p not in thin])
 
 
