@@ -107,6 +107,14 @@ def _joint_lines(told: "JointsReport", verbose: bool) -> list[str]:
             f"  closing moved corners by {_mm(told.max_displacement)} at most (stone {told.worst_stone}), "
             f"and changed volumes by {100 * told.max_volume_change:.1f} % at most"
         )
+    into = [
+        f"    {' and '.join(one.stones)} were measured {_mm(-one.width)} into each other at {_place(one.place)}"
+        for one in told.measured_overlaps
+    ]
+    if into:
+        many = _count(len(into), "joint")
+        lines += [f"  {many} closed half-way between stones that overlap; look at their corners:"]
+        lines += _shortened(into, verbose)
     overlaps = [
         f"    {' and '.join(one.stones)} lie {_mm(one.depth)} in each other ({one.volume * 1e6:.3g} cm³) "
         f"at {_place(one.place)}"

@@ -22,6 +22,8 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
+_DEEP = 0.005  # metres: stones that were measured farther into each other want looking at
+
 
 @dataclass(frozen=True)
 class OutsideStone:
@@ -120,6 +122,7 @@ class JointsReport:
     max_volume_change : largest relative change of a volume [-]
     alone : stones without any joint
     displacement : largest movement of a corner of each stone [m]
+    measured_overlaps : closed joints of stones that were measured into each other, as gaps of negative width
     gaps, overlaps : what remains, the largest first
     """
 
@@ -134,6 +137,7 @@ class JointsReport:
     max_volume_change: float
     alone: tuple[str, ...]
     displacement: Mapping[str, float]
+    measured_overlaps: tuple[GapPlace, ...]
     gaps: tuple[GapPlace, ...]
     overlaps: tuple[OverlapPlace, ...]
 
@@ -184,6 +188,11 @@ def joints_report(closing: ClosingReport, origin: Array) -> JointsReport:
         max_volume_change=max((abs(change) for change in closing.volume_change.values()), default=0.0),
         alone=closing.alone,
         displacement=moved,
+        measured_overlaps=tuple(
+            GapPlace(one.stones, one.width, one.area, _place(one.centroid + origin), "closed half-way")
+            for one in sorted(closed, key=lambda one: one.width)
+            if one.width < -_DEEP
+        ),
         gaps=tuple(
             GapPlace(one.stones, one.width, one.area, _place(one.centroid + origin), one.reason)
             for one in sorted(closing.gaps, key=lambda one: -one.width * one.area)

@@ -1,5 +1,6 @@
 """Between the survey pillar's stones and the records that the database keeps of them."""
 
+from dataclasses import replace
 from typing import get_args
 
 import numpy as np
@@ -143,10 +144,11 @@ def _kept_face(stone: StoneRecord, measured: BlockRecord) -> Face:
     )
     # a lifted corner is on the plane but for rounding, and stays where it is
     corners = stone.vertices - np.outer(residuals, stone.normal) if on_solid else stone.vertices
-    return face_on(
+    face = face_on(
         fit,
         corners,
         FaceShape(ShapeKind(stone.shape), stone.shape_text),
         Provenance(_source(stone), stone.provenance_text),
         measured,
     )
+    return replace(face, remarks=stone.remarks)

@@ -21,7 +21,7 @@ from survey._kernels_adjacency import GROUPS, face_planes, touching_faces
 from survey._kernels_between import hidden, thinnest_of
 from survey.near_solids import boxes_of, near_pairs
 
-__all__ = ["Polyhedra", "PolyhedraBuilder", "Touching", "find_touching"]
+__all__ = ["Polyhedra", "PolyhedraBuilder", "Touching", "find_touching", "open_to_each_other"]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -151,20 +151,31 @@ def find_touching(
         count = touching_faces(near, solid, planes, limits, found, values)
         pairs.append(found[:count].copy())
         rows.append(values[:count].copy())
-    return _touching(*_seen(np.concatenate(pairs), np.concatenate(rows), solid, planes, width), origin)
+    all_pairs, all_rows = np.concatenate(pairs), np.concatenate(rows)
+    seen = open_to_each_other(all_pairs, all_rows, solid, planes, width)
+    return _touching(all_pairs[seen], all_rows[seen], origin)
 
 
-def _seen(pairs: Indices, rows: Array, solid: Any, planes: Any, width: float) -> tuple[Indices, Array]:
-    """The contacts between which no third, thinner solid lies."""
+def open_to_each_other(
+    pairs: Indices, rows: Array, solid: Any, planes: Any, width: float
+) -> NDArray[np.bool_]:
+    """Contacts (m,) between which no third, thinner solid lies.
+
+    Parameters
+    ----------
+    pairs, rows : solids (m, 2), and (m, 8) area, gap, place and normal of their contacts
+    solid, planes : as of the kernels
+    width : of the widest joint [m]
+    """
     thinnest = thinnest_of(solid, planes[0])
     if not (rows[:, 1] >= thinnest.min()).any():
-        return pairs, rows
+        return np.ones(len(pairs), np.bool_)
     both = np.concatenate([pairs, pairs[:, ::-1]])
     both = both[np.argsort(both[:, 0], kind="stable")]
     starts = np.searchsorted(both[:, 0], np.arange(len(thinnest) + 1))
     near = (starts, np.ascontiguousarray(both[:, 1]))
-    open_to_each_other = ~hidden(pairs, rows, near, solid, planes, thinnest, 0.5 * width)
-    return pairs[open_to_each_other], rows[open_to_each_other]
+    out: NDArray[np.bool_] = ~hidden(pairs, rows, near, solid, planes, thinnest, 0.5 * width)
+    return out
 
 
 def _touching(pairs: Indices, rows: Array, origin: Array) -> Touching:

@@ -48,7 +48,7 @@ def closing_report(
     gaps = [
         Gap(joint.stones, joint.width, facing_area[k], joint.centroid, joint.left_open or _BENT)
         for k, joint in enumerate(joints)
-        if joint.left_open or joint.area < _MOST_LOST * facing_area[k]
+        if (joint.left_open and joint.width > 0.0) or joint.area < _MOST_LOST * facing_area[k]
     ]
     return ClosingReport(
         mode=settings.mode,

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from survey._kernels_adjacency import face_planes, facing_faces
-from survey.adjacency import Polyhedra
+from survey.adjacency import Polyhedra, open_to_each_other
 from survey.joint_settings import JointSettings
 from survey.near_solids import boxes_of, near_pairs
 
@@ -105,6 +105,9 @@ def find_facing(solids: Polyhedra, planes: FacePlanes, settings: JointSettings) 
     pairs, row = np.concatenate(faces), np.concatenate(rows)
     wide = row[:, 0] >= settings.min_overlap * np.sqrt(planes.areas[pairs].min(axis=1))
     pairs, row = pairs[wide], row[wide]
+    stones = np.ascontiguousarray(planes.owner[pairs])
+    seen = open_to_each_other(stones, row, solid, kernel_planes, settings.max_width)
+    pairs, row = pairs[seen], row[seen]
     order = np.lexsort((pairs[:, 1], pairs[:, 0]))
     pairs, row = pairs[order], row[order]
     return FacingFaces(pairs, row[:, 0], row[:, 1], row[:, 2:5], row[:, 5:8])

@@ -149,6 +149,7 @@ class _Assembly:
         self._gone.add(face)
         self._faces += pieces
         self._owner += [self._owner[face]] * len(pieces)
+        self._plane += [-1] * len(pieces)  # until all get their planes anew
         self._folded[self._owner[face]] += 1
 
     def solids(self) -> tuple[Solid, ...]:

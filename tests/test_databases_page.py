@@ -81,7 +81,7 @@ def test_the_commands_for_postgresql(folder: Path, postgresql: Server) -> None:
 
 def test_the_commands_for_versions(folder: Path) -> None:
     up, relate, down = commands("Versions")
-    assert "from version 1 to 3" in run(up, folder)
+    assert "from version 1 to 4" in run(up, folder)
     assert "rests_on" in run(relate, folder)
     assert (folder / "old.db.v1.bak").exists()
     assert "W01-01" in run("moma query header --db sqlite:///old.db", folder)
