@@ -129,7 +129,9 @@ def _joint_lines(told: "JointsReport", verbose: bool) -> list[str]:
     ]
     if gaps:
         left_by = ", the largest first:" if len(gaps) > 1 else ":"
-        lines += [f"  {_count(len(gaps), 'gap')} left{left_by}", *_shortened(gaps, verbose)]
+        in_part = sum(one.reason not in told.left_open for one in told.gaps)
+        these = f" ({in_part} in joints that are closed on less than half of their area)" if in_part else ""
+        lines += [f"  {_count(len(gaps), 'gap')} left{these}{left_by}", *_shortened(gaps, verbose)]
     if told.alone:
         some = ", ".join(told.alone[:_SHOWN]) + (", …" if len(told.alone) > _SHOWN else "")
         lines.append(f"  {_count(len(told.alone), 'stone')} without any joint: {some}")

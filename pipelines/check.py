@@ -157,7 +157,7 @@ def check_scene(path: str | Path, url: str, pictures: Path | None = None) -> Che
     try:
         assembly = assemble_stones(scene, models, groups)
         problems += _unsound_solids(assembly.scene)
-        problems += _unclosed(assembly) + _overlapping(assembly)
+        problems += _unclosed(assembly) + _alone(assembly) + _overlapping(assembly)
         needs = plan(assembly.scene)
         problems += _unsupported(needs)
     except (GeometryError, MeshError) as error:
@@ -274,6 +274,24 @@ def _unclosed(assembly: Assembly) -> list[str]:
     return [
         f"no joint of these could be closed: {_some(sorted(left))}; of {first}, {left[first]}; look at the survey "
         "there, or allow more by max_displacement in [joints]"
+    ]
+
+
+def _alone(assembly: Assembly) -> list[str]:
+    """Stones that nothing throws or holds, and that face no other across a joint."""
+    if assembly.closing.mode is JointMode.AS_SURVEYED or len(assembly.models) == 1:
+        return []
+    alone = set(assembly.closing.alone)
+    loose = [
+        block.code
+        for block in assembly.scene.blocks
+        if block.code in alone and block.fidelity is not Fidelity.FIXED and not any(block.velocity)
+    ]
+    if not loose:
+        return []
+    return [
+        f"these face no other stone across a joint: {_some(sorted(loose))}; look at max_width, max_angle and "
+        "min_overlap in [joints], or leave them out"
     ]
 
 

@@ -91,6 +91,7 @@ _JOINTS = (
         "m",
         JointSettings.straightness,
         above=0,
+        at_most=0.1,
     ),
     Key(
         "max_displacement",

@@ -124,15 +124,24 @@ def _joints(building: Building, facing: FacingFaces, cut: Cut, settings: JointSe
 
 
 def _width(building: Building, facing: FacingFaces, cut: Cut, link: int) -> float:
-    """How far the sound corners of the two faces lie apart, seen along the normal of their plane [m]."""
+    """How far the sound corners of the two faces lie apart, seen along the normal of their plane [m].
+
+    Corners that were seen count; hidden ones follow from them, and open a joint like a wedge where faces are turned.
+    """
     faces, plane = building.faces, int(cut.contact.of_link[link])
     side, total = float(cut.contact.side[link]), 0.0
     for face, out in zip(facing.faces[link].tolist(), (side, -side), strict=True):
+        stone = int(faces.planes.owner[face])
+        rows = building.rows(stone)
+        begin, end = faces.solids.face_starts[[rows.start, rows.stop]]
+        first = int(faces.solids.corners[begin:end].min())
         corners = faces.corners(face)
         sound = corners[faces.sound[corners]]
-        if not len(sound):
+        seen = sound[sound < first + len(building.stones[stone].sound)]
+        known = seen if len(seen) else sound
+        if not len(known):
             return float(facing.gap[link])
-        heights = faces.solids.vertices[sound] @ cut.contact.normals[plane] - cut.contact.offsets[plane]
+        heights = faces.solids.vertices[known] @ cut.contact.normals[plane] - cut.contact.offsets[plane]
         total -= out * float(heights.mean())
     return total
 

@@ -86,5 +86,5 @@ def test_the_commands_for_versions(folder: Path) -> None:
     assert (folder / "old.db.v1.bak").exists()
     assert "W01-01" in run("moma query header --db sqlite:///old.db", folder)
     told = run(down, folder)
-    assert "from version 3 to 2" in told
+    assert "from version 4 to 2" in told
     assert "dropped: relations (" in told
