@@ -14,6 +14,7 @@ from mechanics.meshing.quadratic import with_middle_nodes
 from mechanics.meshing.quality import mesh_quality
 from mechanics.meshing.sizes import SizeField, as_field, graded
 from mechanics.meshing.soundness import check_meshable, is_convex
+from mechanics.polyhedra import mass_properties
 from mechanics.scene import Block
 from moma.errors import MeshError, MissingLibraryError
 
@@ -23,6 +24,8 @@ __all__ = ["Meshed", "mesh_block", "meshed_block"]
 _POOR = 0.005
 # a second attempt is that much finer
 _FINER = 0.7
+# cells in one stone: more than can be solved, and more than memory holds
+_MOST_CELLS = 1e6
 
 
 @dataclass(frozen=True)
@@ -76,6 +79,13 @@ def meshed_block(block: Block, contact: tuple[int, ...] = ()) -> Meshed:
             remedy="give metres greater than 0",
         )
     check_meshable(block.vertices, block.faces, block.code)
+    cells = mass_properties(block.vertices, block.faces, f"stone {block.code}").volume / block.mesh_size**3
+    if cells > _MOST_CELLS:
+        raise MeshError(
+            f"edges of {block.mesh_size:g} m would make some {cells:.1g} cells of it",
+            where=f"stone {block.code}",
+            remedy="give a larger mesh size, or make the stone rigid",
+        )
     size = as_field(block.mesh_size)
     if block.contact_size is not None:
         size = graded(block.mesh_size, block.contact_size, block.growth, block.vertices, block.faces, contact)
