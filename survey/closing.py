@@ -10,7 +10,7 @@ from moma.errors import GeometryError
 from survey._kernels_apart import highest_corners
 from survey.adjacency import Polyhedra
 from survey.blocky import BlockyStone
-from survey.cutting import cut_stones, moves
+from survey.cutting import cut_stones, joins_three, moves
 from survey.facing import FacingFaces, planes_of
 from survey.joint_planes import ContactPlanes, StoneFaces, contact_planes, some_links
 from survey.joint_settings import JointSettings
@@ -40,7 +40,8 @@ class Building:
     origin : (3,) [m]
     faces : of all solids
     planes : (nf, 4) of these
-    convex : (n,) whether a stone may be cut; others keep their shape
+    convex : (n,) whether a stone may be cut
+    notched : (n,) whether it is not convex, but its faces may be moved; others keep their shape
     """
 
     stones: tuple[BlockyStone, ...]
@@ -49,6 +50,7 @@ class Building:
     faces: StoneFaces
     planes: Array
     convex: Bools
+    notched: Bools
 
     def rows(self, stone: int) -> slice:
         """The faces of a stone."""
@@ -65,8 +67,8 @@ class Cut:
     contact : plane of each pair of facing faces
     reasons : why each pair stays open; empty for those that are closed
     solids : all stones
-    planes : of each convex stone (n, 4), those of its faces first
-    free : of each convex stone, which of its planes touch no stone
+    planes : of each stone that may be cut or moved (n, 4), those of its faces first
+    free : of each of these, which of its planes touch no stone
     of_face : of each stone that was cut, the plane of each face of its solid
     """
 
@@ -99,9 +101,10 @@ def as_building(stones: Sequence[BlockyStone]) -> Building:
     height, extent = highest_corners(*_arrays(gathered), planes.normals, planes.offsets)
     convex: Bools = height <= _CONVEX * extent
     sound = np.concatenate([_sound(stone) for stone in stones])
-    faces = StoneFaces(gathered, planes, sound, ~convex[planes.owner])
+    notched = ~convex & np.array([joins_three(solid.faces) for solid in solids])
+    faces = StoneFaces(gathered, planes, sound, ~(convex | notched)[planes.owner])
     rows = np.column_stack([planes.normals, planes.offsets])
-    return Building(tuple(stones), solids, origin, faces, rows, convex)
+    return Building(tuple(stones), solids, origin, faces, rows, convex, notched)
 
 
 def close_within_bounds(
@@ -116,6 +119,7 @@ def close_within_bounds(
     settings : bounds
     known : the stones with their joints closed, as far as is known by now
     """
+    notched = set(np.flatnonzero(building.notched).tolist())
     reasons, unmended = [""] * len(facing), set[int]()
     for number in range(_ROUNDS + len(building.stones)):
         links = np.array([k for k, reason in enumerate(reasons) if not reason], np.int64)
@@ -128,7 +132,7 @@ def close_within_bounds(
         touched = {i: rows for i, rows in planes.items() if _changed(building, i, rows)}
         solids, offended = list(building.solids), False
         of_face = {}
-        for i, stone in cut_stones(building.solids, touched).items():
+        for i, stone in cut_stones(building.solids, touched, notched).items():
             moved = np.inf if stone is None else float(moves(building.solids[i], stone.solid).max())
             if stone is not None and moved <= settings.max_displacement:
                 solids[i], of_face[i] = stone.solid, stone.of_face
@@ -189,7 +193,7 @@ def _stone_planes(
             else:
                 rows[face], taken[face] = side * row, True
     planes, free = {}, {}
-    for i in np.flatnonzero(building.convex).tolist():
+    for i in np.flatnonzero(building.convex | building.notched).tolist():
         more = np.array(further.get(i, [])).reshape(-1, 4)
         planes[i] = np.vstack([rows[building.rows(i)], more])
         free[i] = np.concatenate([~taken[building.rows(i)], np.zeros(len(more), np.bool_)])

@@ -1,15 +1,15 @@
 """Stones cut out by planes: of their own faces that are free, and of the joints that they share."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from survey._kernels_cutting import FULL, cut_out
-from survey.solids import Solid
+from survey.solids import Solid, area_vector
 
-__all__ = ["CutStone", "common_part", "cut_stones", "moves"]
+__all__ = ["CutStone", "common_part", "cut_stones", "joins_three", "moves"]
 
 Array = NDArray[np.float64]
 Faces = tuple[tuple[int, ...], ...]
@@ -34,14 +34,18 @@ class CutStone:
     of_face: tuple[int, ...]
 
 
-def cut_stones(solids: Sequence[Solid], planes: Mapping[int, Array]) -> dict[int, CutStone | None]:
+def cut_stones(
+    solids: Sequence[Solid], planes: Mapping[int, Array], notched: Container[int] = ()
+) -> dict[int, CutStone | None]:
     """Cut some stones out by new planes.
 
     Parameters
     ----------
-    solids : convex, as they were
+    solids : as they were
     planes : of those stones that change, (n, 4) outward unit normals and offsets n·x ≤ d; the first planes belong to
         the faces of the solid, in their order, and further ones may follow
+    notched : stones that are not convex, each corner of which joins three faces: their faces are moved, not cut, and
+        further planes do not count
 
     Returns
     -------
@@ -49,6 +53,9 @@ def cut_stones(solids: Sequence[Solid], planes: Mapping[int, Array]) -> dict[int
     others came; None where the planes leave nothing or do not close
     """
     out: dict[int, CutStone | None] = {}
+    for i in (i for i in planes if i in notched):
+        out[i] = _with_faces_moved(solids[i], planes[i][: len(solids[i].faces)])
+    planes = {i: own for i, own in planes.items() if i not in notched}
     for faces, members in _alike(solids, planes).items():
         moved, same = _moved(faces, np.array([planes[i] for i in members]))
         for k, i in enumerate(members):
@@ -59,6 +66,24 @@ def cut_stones(solids: Sequence[Solid], planes: Mapping[int, Array]) -> dict[int
         if i not in out:
             out[i] = _cut(solids[i], own)
     return out
+
+
+def joins_three(faces: Faces) -> bool:
+    """Whether each corner of a solid joins three faces, so that it stays closed when its planes move."""
+    return _meeting(faces) is not None
+
+
+def _with_faces_moved(solid: Solid, planes: Array) -> CutStone | None:
+    """A stone with the same corners and faces on new planes (nf, 4); None if an edge or a face would turn about."""
+    corners, wide = _crossings(solid.faces, planes[None])
+    if not wide[0].all():
+        return None
+    for face in solid.faces:
+        old, new = solid.vertices[list(face)], corners[0, list(face)]
+        along = ((np.roll(old, -1, axis=0) - old) * (np.roll(new, -1, axis=0) - new)).sum(axis=1)
+        if not (along > 0.0).all() or not area_vector(old) @ area_vector(new) > 0.0:
+            return None
+    return CutStone(Solid(solid.code, corners[0], solid.faces), tuple(range(len(solid.faces))))
 
 
 def moves(old: Solid, new: Solid) -> Array:
@@ -105,6 +130,18 @@ def _meeting(faces: Faces) -> NDArray[np.int64] | None:
 
 def _moved(faces: Faces, planes: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Corners (n, nv, 3) where the planes (n, nf, 4) of each one's faces cross, and whether these stay the faces."""
+    corners, wide = _crossings(faces, planes)
+    meeting = _meeting(faces)
+    assert meeting is not None
+    height = np.einsum("nfk,nvk->nvf", planes[:, :, :3], corners) - planes[:, None, :, 3]
+    own = np.zeros((len(meeting), len(faces)), np.bool_)
+    own[np.arange(len(meeting))[:, None], meeting] = True
+    below = np.where(own, -np.inf, height).max(axis=(1, 2)) < -_CLEAR
+    return corners, below & wide.all(axis=1)
+
+
+def _crossings(faces: Faces, planes: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Corners (n, nv, 3) where the planes (n, nf, 4) of each one's faces cross, and (n, nv) whether at wide angles."""
     meeting = _meeting(faces)
     assert meeting is not None
     origin = _middle(planes)
@@ -113,11 +150,7 @@ def _moved(faces: Faces, planes: Array) -> tuple[Array, NDArray[np.bool_]]:
     wide = np.abs(np.linalg.det(normals)) > 1e-3
     normals[~wide] = np.eye(3)
     corners = np.linalg.solve(normals, offsets[..., None])[..., 0]
-    height = np.einsum("nfk,nvk->nvf", planes[:, :, :3], corners) - local[:, None, :]
-    own = np.zeros((len(meeting), len(faces)), np.bool_)
-    own[np.arange(len(meeting))[:, None], meeting] = True
-    below = np.where(own, -np.inf, height).max(axis=(1, 2)) < -_CLEAR
-    return corners + origin[:, None, :], below & wide.all(axis=1)
+    return corners + origin[:, None, :], wide
 
 
 def _middle(planes: Array) -> Array:

@@ -79,16 +79,17 @@ def close_joints(
     facing = find_facing(building.faces.solids, building.faces.planes, settings)
     if settings.mode is JointMode.AS_SURVEYED:
         cut = _as_surveyed(building, facing)
-        parts, planes = _kept_parts(building)
+        parts, planes = _parts(building, cut)
         overlaps = find_overlaps([*cut.solids, *parts], cut.planes | planes)
     else:
         cut, facing = _closed(building, facing, settings)
-        parts, planes = _kept_parts(building)
+        parts, planes = _parts(building, cut)
+        convex = np.flatnonzero(building.convex).tolist()
         parted, overlaps = part_stones(
             [*building.solids, *parts],
             [*cut.solids, *parts],
-            cut.planes | planes,
-            cut.free,
+            {i: cut.planes[i] for i in convex} | planes,
+            {i: cut.free[i] for i in convex},
             settings.max_displacement,
         )
         cut = replace(cut, solids=parted[: len(building.solids)])
@@ -112,11 +113,11 @@ def _closed(building: Building, facing: FacingFaces, settings: JointSettings) ->
     return cut, facing
 
 
-def _kept_parts(building: Building) -> tuple[list[Solid], dict[int, Array]]:
-    """Convex parts of the stones that keep their shape, and their planes (n, 4), numbered after all stones."""
+def _parts(building: Building, cut: Cut) -> tuple[list[Solid], dict[int, Array]]:
+    """Convex parts of the stones that are not convex, and their planes (n, 4), numbered after all stones."""
     parts: list[Solid] = []
     for i in np.flatnonzero(~building.convex).tolist():
-        parts += stone_parts(building.solids[i])
+        parts += stone_parts(cut.solids[i])
     return parts, {len(building.solids) + k: planes_of_solid(part) for k, part in enumerate(parts)}
 
 
