@@ -177,6 +177,10 @@ def _with_pictures(report: CheckReport, assembly: Assembly, folder: Path) -> Che
     return report
 
 
+def _hypotheses(assembly: Assembly) -> frozenset[str]:
+    return frozenset(model.record.code for model in assembly.models if model.record.hypothesis)
+
+
 def _shapes(scene: str, assembly: Assembly) -> ClosingShapes:
     """What the pictures show, about the local origin of the scene."""
     records = [model.record for model in assembly.models]
@@ -188,7 +192,8 @@ def _shapes(scene: str, assembly: Assembly) -> ClosingShapes:
         simplified={one.code: one.report.displacement for one in assembly.simplified},
         closing=assembly.closing,
         faces=[one.outline - assembly.origin for one in records],
-        hypotheses=frozenset(one.code for one in records if one.hypothesis),
+        hypotheses=_hypotheses(assembly),
+        core=frozenset(one.code for one in records if one.kind == "infill"),
     )
 
 
@@ -214,7 +219,9 @@ def _report(
         meshes=() if assembly is None else _meshes(assembly.scene),
         mesh_quality=None if needs is None else _mesh_quality(needs.meshes),
         simplification=None if assembly is None else simplification_report(assembly.simplified),
-        joints=None if assembly is None else joints_report(assembly.closing, assembly.origin),
+        joints=None
+        if assembly is None
+        else joints_report(assembly.closing, assembly.origin, _hypotheses(assembly)),
         cost=None if assembly is None or needs is None else _cost(needs, assembly.scene),
         laws=tuple(describe(one.entry, groups) for one in scene.laws),
         loads=tuple(describe(entry, groups) for entry in (*scene.loads, *scene.throws)),

@@ -167,8 +167,10 @@ def simplification_report(stones: Sequence[BlockyStone]) -> SimplificationReport
     )
 
 
-def joints_report(closing: ClosingReport, origin: Array) -> JointsReport:
-    """What became of the joints, whose places are counted from `origin` (3,) [m]."""
+def joints_report(
+    closing: ClosingReport, origin: Array, hypotheses: frozenset[str] = frozenset()
+) -> JointsReport:
+    """What became of the joints, whose places are counted from `origin` (3,) [m]; nobody saw the `hypotheses`."""
     closed = [one for one in closing.joints if not one.left_open]
     areas = np.array([one.area for one in closing.joints])
     moved = {code: float(one.max(initial=0.0)) for code, one in closing.displacement.items()}
@@ -191,7 +193,7 @@ def joints_report(closing: ClosingReport, origin: Array) -> JointsReport:
         measured_overlaps=tuple(
             GapPlace(one.stones, one.width, one.area, _place(one.centroid + origin), "closed half-way")
             for one in sorted(closed, key=lambda one: one.width)
-            if one.width < -_DEEP
+            if one.width < -_DEEP and not hypotheses & set(one.stones)
         ),
         gaps=tuple(
             GapPlace(one.stones, one.width, one.area, _place(one.centroid + origin), one.reason)

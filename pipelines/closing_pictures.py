@@ -3,6 +3,7 @@
 import json
 import tempfile
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -99,11 +100,15 @@ def draw_in_space(folder: Path, shapes: ClosingShapes) -> tuple[str, ...]:
 
 def flat_facades(shapes: ClosingShapes) -> tuple[Facade, ...]:
     """The facades that elevations show truly, largest first: two of a corner; none of a vault, or of a dome."""
+    seen = np.array([k for k, one in enumerate(shapes.stones) if not one.core])
+    if not len(seen):
+        return ()
     normals = np.array([one.normal for one in shapes.stones])
-    areas = np.array([one.area for one in shapes.stones])
+    areas = np.array([0.0 if one.core else one.area for one in shapes.stones])
     centroids = np.array([one.centroid for one in shapes.stones])
     found = []
-    for facade in find_facades(normals, areas, centroids):
+    for own_facade in find_facades(normals[seen], areas[seen], centroids[seen]):
+        facade = replace(own_facade, members=seen[own_facade.members])
         out, own = facade.frame.axes[2], facade.members
         depth = float(np.ptp(centroids[own] @ out))
         reach = float(np.ptp(facade.frame.flatten(centroids[own]), axis=0).max()) + np.sqrt(areas[own].mean())

@@ -28,6 +28,7 @@ class DrawnStone:
     centroid : (3,) of its visible face [m]
     area : of its visible face [m²]
     hypothesis : nobody has seen it
+    core : it lies behind the stones of a facing
     """
 
     surveyed: Solid
@@ -39,6 +40,7 @@ class DrawnStone:
     centroid: Array
     area: float
     hypothesis: bool
+    core: bool = False
 
     @property
     def code(self) -> str:
@@ -104,6 +106,7 @@ def closing_shapes(
     closing: ClosingReport,
     faces: Sequence[Array],
     hypotheses: frozenset[str],
+    core: frozenset[str] = frozenset(),
 ) -> ClosingShapes:
     """What to draw of stones and of the report on their joints.
 
@@ -115,6 +118,7 @@ def closing_shapes(
     closing : what closing the joints changed
     faces : (nv, 3) outline of each stone's visible face, counter-clockwise seen from outside [m]
     hypotheses : codes of stones that nobody has seen
+    core : codes of what lies behind the stones of a facing
     """
     stones = tuple(
         DrawnStone(
@@ -127,6 +131,7 @@ def closing_shapes(
             centroid=face.mean(axis=0),
             area=float(np.linalg.norm(area_vector(face))),
             hypothesis=after.code in hypotheses,
+            core=after.code in core,
         )
         for before, between, after, face in zip(surveyed, simple, closed, faces, strict=True)
     )

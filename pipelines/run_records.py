@@ -142,7 +142,8 @@ def surveyed_widths(joints: JointResult, codes: Sequence[str], closing: ClosingR
         found = known.get(frozenset(codes[stone] for stone in stones))
         if found:
             alike = max(found, key=lambda one: abs(float(one.normal @ frame[0])))
-            widths[number] = alike.width
+            # stones that were measured into each other say nothing of the mortar between them
+            widths[number] = alike.width if alike.width >= 0.0 else np.nan
     return widths
 
 

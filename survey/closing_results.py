@@ -45,10 +45,12 @@ def closing_report(
     codes = [stone.code for stone in building.stones]
     joined = {code for joint in joints for code in joint.stones}
     facing_area = facing.area.tolist()
+    within = {frozenset(one.codes) for one in overlaps}
     gaps = [
-        Gap(joint.stones, joint.width, facing_area[k], joint.centroid, joint.left_open or _BENT)
+        Gap(joint.stones, max(joint.width, 0.0), facing_area[k], joint.centroid, joint.left_open or _BENT)
         for k, joint in enumerate(joints)
-        if (joint.left_open and joint.width > 0.0) or joint.area < _MOST_LOST * facing_area[k]
+        if (joint.left_open and frozenset(joint.stones) not in within)
+        or (not joint.left_open and joint.area < _MOST_LOST * facing_area[k])
     ]
     return ClosingReport(
         mode=settings.mode,

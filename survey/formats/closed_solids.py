@@ -24,6 +24,7 @@ from survey.formats.obj_bodies import obj_bodies
 from survey.formats.options import ReadingOptions
 from survey.formats.ply_bodies import ply_bodies
 from survey.formats.stl_bodies import stl_bodies
+from survey.overlaps import volume_of
 from survey.records import Reject, SolidRecord, SurveyStream
 from survey.snapping import snap
 from survey.snapping_report import Snapping
@@ -33,6 +34,7 @@ from survey.watertight import check_watertight
 __all__ = ["open_solids"]
 
 _CODES = "{block}:{kind}"
+_MOST_CHANGE = 0.1  # of its volume that snapping may take from a stone
 _BODIES: Mapping[str, Callable[[Path], Iterator[RawBody]]] = {
     ".obj": obj_bodies,
     ".ply": ply_bodies,
@@ -99,6 +101,7 @@ def _moved(record: SolidRecord, solid: Solid, snapping: Snapping, path: str) -> 
     try:
         with np.errstate(all="ignore"):  # a body without volume is found, and not warned of
             check_watertight(solid)
+            _check_volume(record, solid)
     except GeometryError as error:
         where = f"{path}:{record.line}" if record.line else path
         what = f"solid {record.code}: within {snapping.tolerance:g} m of its corners {error.what}"
@@ -108,6 +111,13 @@ def _moved(record: SolidRecord, solid: Solid, snapping: Snapping, path: str) -> 
     text = f"snapped within {snapping.tolerance:g} m: corners moved by up to {moved:.2g} m"
     more = (f"{folded} faces folded for that",) if folded else ()
     return replace(record, vertices=solid.vertices, faces=solid.faces, remarks=(*record.remarks, text, *more))
+
+
+def _check_volume(record: SolidRecord, solid: Solid) -> None:
+    before = volume_of(Solid(record.code, record.vertices, record.faces))
+    change = volume_of(solid) / before - 1.0
+    if abs(change) > _MOST_CHANGE:
+        raise GeometryError(f"its volume changes by {100.0 * change:.0f} %")
 
 
 class _Solids:
