@@ -27,7 +27,7 @@ def check_replaceable(folder: Path, index: str = _INDEX) -> None:
     ------
     UsageError : naming what is there
     """
-    place, remedy = str(folder), "name another folder with --out"
+    place, remedy = str(folder), "name another folder"
     if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
         raise UsageError("is not a folder", where=place, remedy=remedy)
     if not folder.exists():
@@ -51,7 +51,7 @@ def replacing(folder: Path, index: str = _INDEX) -> Iterator[Path]:
         fresh = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=parent))
     except OSError as error:
         raise UsageError(
-            f"cannot be written: {error.strerror}", where=str(parent), remedy="name another folder with --out"
+            f"cannot be written: {error.strerror}", where=str(parent), remedy="name another folder"
         ) from error
     try:
         yield fresh
