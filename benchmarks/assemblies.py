@@ -21,10 +21,10 @@ from survey.convex_parts import convex_parts
 from survey.formats.closed_solids import open_solids
 from survey.formats.options import ReadingOptions
 from survey.matching_faces import find_matches
-from survey.overlaps import find_overlaps, planes_of_solid
+from survey.overlaps import find_overlaps
 from survey.records import Reject
 from survey.snapping import snap
-from survey.solids import Solid
+from survey.solids import Solid, planes_of_solid
 
 __all__ = ["main"]
 

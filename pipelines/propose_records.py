@@ -10,10 +10,9 @@ from archmodel.records import StoneRecord
 from pipelines.stone_records import stone_record
 from survey.faces import Provenance
 from survey.infill import InfillProposal
-from survey.infill_blocks import volume_of
 from survey.records import SolidRecord
 from survey.solid_blocks import block_of_solid
-from survey.solids import Solid
+from survey.solids import Solid, volume_of
 from survey.watertight import triangulate
 
 __all__ = ["core_record", "is_known", "record_volume"]

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from moma.errors import GeometryError
 from survey.half_spaces import intersection
-from survey.reflex_edges import ReflexEdge, face_planes, flatness, is_convex, reflex_edges
-from survey.solids import Solid
+from survey.reflex_edges import ReflexEdge, flatness, is_convex, reflex_edges
+from survey.solids import Solid, planes_of_solid, volume_of
 from survey.watertight import triangulate
 
 __all__ = ["convex_parts"]
@@ -77,7 +77,7 @@ class _Cutter:
         self._size = float(np.linalg.norm(self._high - self._low))
         self._flat = flatness(solid)  # places so near to one another are the same
         self._on = 0.1 * self._flat
-        self._planes = [_plane(row) for row in face_planes(self._local).tolist()]
+        self._planes = [_plane(row) for row in planes_of_solid(self._local).tolist()]
 
     def parts(self) -> tuple[Solid, ...]:
         """The best of several ways to cut it."""
@@ -234,8 +234,8 @@ class _Cutter:
         return out
 
     def _is_filled(self, parts: Sequence[Solid]) -> bool:
-        whole = _volume(self._local)
-        return abs(sum(map(_volume, parts)) - whole) <= _SAME_VOLUME * whole
+        whole = volume_of(self._local)
+        return abs(sum(map(volume_of, parts)) - whole) <= _SAME_VOLUME * whole
 
 
 def _place(row: Sequence[float]) -> Place:
@@ -281,15 +281,5 @@ def _clipped(polygon: tuple[Place, ...], cut: Plane, on: float) -> tuple[Place, 
 
 def _width(solid: Solid) -> float:
     """Smallest extent along the normal of a face [m]."""
-    heights = solid.vertices @ face_planes(solid)[:, :3].T
+    heights = solid.vertices @ planes_of_solid(solid)[:, :3].T
     return float(np.ptp(heights, axis=0).min())
-
-
-def _volume(solid: Solid) -> float:
-    """[m³]."""
-    total = 0.0
-    for face in solid.faces:
-        polygon = solid.vertices[list(face)]
-        rest = np.cross(polygon[1:-1] - polygon[0], polygon[2:] - polygon[0]).sum(axis=0)
-        total += float(polygon[0] @ rest)
-    return total / 6.0

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from moma.errors import UsageError
-from survey.infill_blocks import core_blocks, volume_of
+from survey.infill_blocks import core_blocks
 from survey.infill_facings import FacingStone, FacingWall, find_walls, wall_between
 from survey.infill_settings import InfillSettings, InfillShape
 from survey.infill_storeys import core_storeys
-from survey.solids import Solid
+from survey.solids import Solid, volume_of
 
 __all__ = ["InfillProposal", "propose_infill"]
 

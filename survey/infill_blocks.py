@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +10,9 @@ from survey.half_spaces import intersection
 from survey.infill_courses import Stretch, Strip, height_of, place_of, stretches, strips
 from survey.infill_facings import FacingStone, FacingWall
 from survey.infill_settings import InfillSettings
-from survey.solids import Solid
+from survey.solids import Solid, volume_of
 
-__all__ = ["CoreBlock", "core_blocks", "volume_of"]
+__all__ = ["CoreBlock", "core_blocks"]
 
 Array = NDArray[np.float64]
 
@@ -71,13 +70,6 @@ def core_blocks(wall: FacingWall, settings: InfillSettings) -> tuple[CoreBlock, 
             if (block := cells.block(left, right)) is not None:
                 blocks.append(block)
     return tuple(blocks)
-
-
-def volume_of(solid: Solid) -> float:
-    """Volume of a closed solid [m³]."""
-    fans = [(face[0], one, other) for face in solid.faces for one, other in pairwise(face[1:])]
-    local = solid.vertices - solid.vertices.mean(axis=0)
-    return float(np.linalg.det(local[np.array(fans)]).sum()) / 6.0
 
 
 def _cuts(sides: Iterable[Sequence[Stretch]]) -> list[_Cut]:

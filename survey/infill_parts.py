@@ -10,8 +10,7 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
-from survey.infill_blocks import volume_of
-from survey.solids import Solid, area_vector
+from survey.solids import Solid, area_vector, volume_of
 from survey.watertight import triangulate
 
 __all__ = ["grid_parts"]

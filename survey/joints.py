@@ -23,8 +23,8 @@ from survey.facing import FacingFaces, find_facing
 from survey.joint_planes import ContactPlanes
 from survey.joint_settings import JointMode, JointSettings
 from survey.newly_facing import newly_facing
-from survey.overlaps import find_overlaps, part_stones, planes_of_solid
-from survey.solids import Solid
+from survey.overlaps import find_overlaps, part_stones
+from survey.solids import Solid, planes_of_solid
 from survey.stone_parts import stone_parts
 
 __all__ = ["ClosedStones", "close_joints"]

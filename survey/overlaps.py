@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from survey._kernels_apart import deepest_overlaps
 from survey.cutting import common_part, cut_stones, moves
 from survey.near_solids import boxes_of, near_pairs
-from survey.solids import Solid, area_vector
+from survey.solids import Solid, volume_of
 
-__all__ = ["Overlapping", "find_overlaps", "part_stones", "planes_of_solid", "volume_of"]
+__all__ = ["Overlapping", "find_overlaps", "part_stones"]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -41,29 +41,6 @@ class Overlapping:
     part: Solid
     volume: float
     depth: float
-
-
-def planes_of_solid(solid: Solid) -> Array:
-    """Planes (nf, 4) of a solid's faces: outward unit normals, and offsets d of n·x = d."""
-    rows = np.empty((len(solid.faces), 4))
-    for row, face in zip(rows, solid.faces, strict=True):
-        polygon = solid.vertices[list(face)]
-        normal = area_vector(polygon)
-        row[:3] = normal / np.linalg.norm(normal)
-        row[3] = row[:3] @ polygon.mean(axis=0)
-    return rows
-
-
-def volume_of(solid: Solid) -> float:
-    """Volume of a closed solid with planar faces, by the divergence theorem [m³]."""
-    centre = solid.vertices.mean(axis=0)
-    return (
-        sum(
-            float((solid.vertices[face[0]] - centre) @ area_vector(solid.vertices[list(face)]))
-            for face in solid.faces
-        )
-        / 3.0
-    )
 
 
 def find_overlaps(solids: Sequence[Solid], planes: Mapping[int, Array]) -> list[Overlapping]:

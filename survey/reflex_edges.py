@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from survey.solids import Solid, area_vector
+from survey.solids import Solid, planes_of_solid
 
-__all__ = ["ReflexEdge", "face_planes", "flatness", "is_convex", "reflex_edges"]
+__all__ = ["ReflexEdge", "flatness", "is_convex", "reflex_edges"]
 
 Array = NDArray[np.float64]
 
@@ -33,20 +33,9 @@ class ReflexEdge:
     second: int
 
 
-def face_planes(solid: Solid) -> Array:
-    """Planes (nf, 4) of the faces of a solid: unit outward normal, and offset n·x = d about the origin [m]."""
-    out = np.empty((len(solid.faces), 4))
-    for k, face in enumerate(solid.faces):
-        polygon = solid.vertices[list(face)]
-        vector = area_vector(polygon)
-        out[k, :3] = vector / np.linalg.norm(vector)
-        out[k, 3] = out[k, :3] @ polygon.mean(axis=0)
-    return out
-
-
 def flatness(solid: Solid) -> float:
     """Heights below this tell nothing of a solid: 1e-9 of its size, and some times what its faces are warped [m]."""
-    planes = face_planes(solid)
+    planes = planes_of_solid(solid)
     warp = max(
         float(np.abs(solid.vertices[list(face)] @ plane[:3] - plane[3]).max())
         for face, plane in zip(solid.faces, planes, strict=True)
@@ -63,7 +52,7 @@ def is_convex(solid: Solid, tolerance: float | None = None) -> bool:
     tolerance : by which a corner may [m]; `flatness` of the solid if None
     """
     tolerance = flatness(solid) if tolerance is None else tolerance
-    planes = face_planes(solid)
+    planes = planes_of_solid(solid)
     return bool((solid.vertices @ planes[:, :3].T - planes[:, 3]).max() <= tolerance)
 
 
@@ -74,7 +63,7 @@ def reflex_edges(solid: Solid) -> tuple[ReflexEdge, ...]:
     ----------
     solid : closed, with planar faces
     """
-    planes, tolerance = face_planes(solid), flatness(solid)
+    planes, tolerance = planes_of_solid(solid), flatness(solid)
     owner = {
         edge: k for k, face in enumerate(solid.faces) for edge in zip(face, (*face[1:], face[0]), strict=True)
     }

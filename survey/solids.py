@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Solid", "area_vector"]
+__all__ = ["Solid", "area_vector", "planes_of_solid", "volume_of"]
 
 
 @dataclass(frozen=True)
@@ -29,3 +29,23 @@ def area_vector(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
     corners = polygon - polygon[0]
     out: NDArray[np.float64] = 0.5 * np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
     return out
+
+
+def planes_of_solid(solid: Solid) -> NDArray[np.float64]:
+    """Planes (nf, 4) of a solid's faces: outward unit normals [-], and offsets d of n·x = d about the origin [m]."""
+    rows = np.empty((len(solid.faces), 4))
+    for row, face in zip(rows, solid.faces, strict=True):
+        polygon = solid.vertices[list(face)]
+        normal = area_vector(polygon)
+        row[:3] = normal / np.linalg.norm(normal)
+        row[3] = row[:3] @ polygon.mean(axis=0)
+    return rows
+
+
+def volume_of(solid: Solid) -> float:
+    """Volume of a closed solid with planar faces, by the divergence theorem; negative if seen from inside [m³]."""
+    centre = solid.vertices.mean(axis=0)
+    cones = (
+        (solid.vertices[face[0]] - centre) @ area_vector(solid.vertices[list(face)]) for face in solid.faces
+    )
+    return float(sum(cones)) / 3.0

@@ -24,11 +24,10 @@ from survey.formats.obj_bodies import obj_bodies
 from survey.formats.options import ReadingOptions
 from survey.formats.ply_bodies import ply_bodies
 from survey.formats.stl_bodies import stl_bodies
-from survey.overlaps import volume_of
 from survey.records import Reject, SolidRecord, SurveyStream
 from survey.snapping import snap
 from survey.snapping_report import Snapping
-from survey.solids import Solid
+from survey.solids import Solid, volume_of
 from survey.watertight import check_watertight
 
 __all__ = ["open_solids"]

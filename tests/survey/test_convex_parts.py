@@ -11,8 +11,8 @@ from scipy.spatial import ConvexHull
 
 from moma.errors import GeometryError
 from survey.convex_parts import convex_parts
-from survey.reflex_edges import face_planes, is_convex, reflex_edges
-from survey.solids import Solid
+from survey.reflex_edges import is_convex, reflex_edges
+from survey.solids import Solid, planes_of_solid
 from survey.watertight import check_watertight
 
 Array = NDArray[np.float64]
@@ -69,7 +69,7 @@ def check_parts(solid: Solid, volume: float) -> tuple[Solid, ...]:
     far = 4 * np.spacing(np.abs(solid.vertices).max()) / size
     for part in parts:
         check_watertight(part)
-        planes = face_planes(part)
+        planes = planes_of_solid(part)
         assert (part.vertices @ planes[:, :3].T - planes[:, 3]).max() <= (1e-12 + 8 * far) * size
     assert sum(map(hull_volume, parts)) == pytest.approx(volume, rel=1e-12 + 20 * far)
     return parts

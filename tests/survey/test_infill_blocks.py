@@ -12,12 +12,11 @@ from moma.errors import GeometryError, UsageError
 from pipelines.propose_records import core_record
 from pipelines.stone_records import surveyed_block
 from survey.infill import propose_infill
-from survey.infill_blocks import volume_of
 from survey.infill_facings import facing_stone
 from survey.infill_settings import InfillSettings
 from survey.joint_settings import JointSettings
 from survey.joints import close_joints
-from survey.solids import area_vector
+from survey.solids import area_vector, volume_of
 from survey.synthetic.facings import two_facings
 from survey.watertight import check_watertight
 

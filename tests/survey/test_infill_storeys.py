@@ -7,12 +7,11 @@ from hypothesis import strategies as st
 from two_facings_by_hand import contains, facing
 
 from survey.infill import propose_infill
-from survey.infill_blocks import volume_of
 from survey.infill_cells import CellGrid, grid_solids
 from survey.infill_facings import facing_stone
 from survey.infill_parts import grid_parts
 from survey.infill_settings import InfillSettings, InfillShape
-from survey.solids import Solid
+from survey.solids import Solid, volume_of
 from survey.synthetic.facings import two_facings
 from survey.watertight import check_watertight
 

@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 from statics import overlap_depth, side_planes
 
 from survey._kernels_apart import deepest_overlaps
-from survey.overlaps import find_overlaps, part_stones, planes_of_solid, volume_of
-from survey.solids import Solid
+from survey.overlaps import find_overlaps, part_stones
+from survey.solids import Solid, planes_of_solid, volume_of
 from survey.watertight import check_watertight
 
 BOUND = 0.08

@@ -19,10 +19,10 @@ from survey.half_spaces import intersection
 from survey.matching_faces import find_matches
 from survey.plane_network import settle
 from survey.records import Reject, SolidRecord
-from survey.reflex_edges import face_planes, is_convex
+from survey.reflex_edges import is_convex
 from survey.snapping import snap
 from survey.snapping_report import Snapping
-from survey.solids import Solid, area_vector
+from survey.solids import Solid, area_vector, planes_of_solid
 from survey.watertight import check_watertight
 from tests.survey.assemblies import dome, groin, obj, prism, rounded, wall
 
@@ -47,7 +47,7 @@ def out_of_plane(places: Array) -> float:
 
 def common_volume(one: Solid, other: Solid) -> float:
     """Of two convex solids; by linear programming and qhull."""
-    planes = np.concatenate([face_planes(one), face_planes(other)])
+    planes = np.concatenate([planes_of_solid(one), planes_of_solid(other)])
     rows = np.column_stack([planes[:, :3], np.ones(len(planes))])  # the largest ball within
     ball = linprog([0, 0, 0, -1], A_ub=rows, b_ub=planes[:, 3], bounds=[(None, None)] * 3 + [(0, None)])
     if ball.status != 0 or ball.x[3] < 1e-9:
