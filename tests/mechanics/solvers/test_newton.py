@@ -26,7 +26,7 @@ def pushed(law=None, friction=0.4):
     """An elastic stone that slides along the ground, and a rigid one on it that slides the other way."""
     one = scene(
         ground(),
-        brick("lower", (0, 0, 0), (0.6, 0.4, 0.3), SOFT, velocity=(0.3, 0.1, 0, 0, 0, 0), mesh_size=0.3),
+        brick("lower", (0, 0, 0), (0.6, 0.4, 0.3), SOFT, velocity=(0.3, 0.1, 0, 0, 0, 0), mesh_size=0.25),
         brick("upper", (0.1, 0, 0.3), (0.6, 0.4, 0.6), velocity=(-1.0, 0, 0, 0, 0, 0)),
         friction=friction,
     )
