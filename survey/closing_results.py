@@ -17,6 +17,8 @@ from survey.overlaps import Overlapping
 __all__ = ["closing_report"]
 
 Array = NDArray[np.float64]
+# area, centroid and normal of faces in contact, by the pair of stones
+_Contacts = dict[tuple[int, int], list[tuple[float, Array, Array]]]
 
 _MEETS = 1e-6  # metres: faces of two stones that are nearer are in contact
 _SAME_WAY = 0.999  # cosine: contacts of two stones that look so much alike are of one joint
@@ -41,7 +43,9 @@ def closing_report(
     overlaps : stones that lie in each other still
     settings : as they were closed
     """
-    joints = _joints(building, facing, cut, settings)
+    now = Polyhedra.gather((solid.vertices, solid.faces) for solid in cut.solids)
+    planes = planes_of(now)
+    joints = _joints(building, facing, cut, _contacts(now, planes, settings))
     codes = [stone.code for stone in building.stones]
     joined = {code for joint in joints for code in joint.stones}
     facing_area = facing.area.tolist()
@@ -58,7 +62,7 @@ def closing_report(
         displacement={
             code: moves(old, new) for code, old, new in zip(codes, building.solids, cut.solids, strict=True)
         },
-        volume_change=dict(zip(codes, _volume_changes(building, cut), strict=True)),
+        volume_change=dict(zip(codes, _volume_changes(building, cut, _volumes(now, planes)), strict=True)),
         alone=tuple(code for code in codes if code not in joined),
         gaps=tuple(gaps),
         overlaps=_overlaps(building, overlaps),
@@ -78,11 +82,10 @@ def _overlaps(building: Building, found: list[Overlapping]) -> tuple[Overlap, ..
     return tuple(out)
 
 
-def _volume_changes(building: Building, cut: Cut) -> list[float]:
-    """New volume over old, minus 1, of each stone; zero for one that is as it was."""
-    solids = Polyhedra.gather((solid.vertices, solid.faces) for solid in cut.solids)
+def _volume_changes(building: Building, cut: Cut, after: Array) -> list[float]:
+    """New volume (n,) over old, minus 1, of each stone; zero for one that is as it was."""
     before = _volumes(building.faces.solids, building.faces.planes)
-    out: list[float] = (_volumes(solids, planes_of(solids)) / before - 1.0).tolist()
+    out: list[float] = (after / before - 1.0).tolist()
     pairs = zip(building.solids, cut.solids, out, strict=True)
     return [0.0 if old is new else change for old, new, change in pairs]
 
@@ -94,11 +97,10 @@ def _volumes(solids: Polyhedra, planes: FacePlanes) -> Array:
     return out
 
 
-def _joints(building: Building, facing: FacingFaces, cut: Cut, settings: JointSettings) -> list[Joint]:
+def _joints(building: Building, facing: FacingFaces, cut: Cut, touching: _Contacts) -> list[Joint]:
     """All joints in the order of `facing`."""
     planes, codes = building.faces.planes, [stone.code for stone in building.stones]
     pairs = planes.owner[facing.faces]
-    touching = _contacts(cut, settings)
     cosines = -(planes.normals[facing.faces[:, 0]] * planes.normals[facing.faces[:, 1]]).sum(axis=1)
     opening = np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0)))
     joints = []
@@ -148,10 +150,8 @@ def _width(building: Building, facing: FacingFaces, cut: Cut, link: int) -> floa
     return total
 
 
-def _contacts(cut: Cut, settings: JointSettings) -> dict[tuple[int, int], list[tuple[float, Array, Array]]]:
-    """Area, centroid and normal of all faces that are in contact now, by the pair of stones."""
-    solids = Polyhedra.gather((solid.vertices, solid.faces) for solid in cut.solids)
-    planes = planes_of(solids)
+def _contacts(solids: Polyhedra, planes: FacePlanes, settings: JointSettings) -> _Contacts:
+    """All faces that are in contact now."""
     close = replace(settings, max_width=_MEETS, max_angle=0.01, min_overlap=0.0)
     found = find_facing(solids, planes, close)
     out = defaultdict(list)

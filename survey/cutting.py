@@ -2,6 +2,7 @@
 
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,16 +54,16 @@ def cut_stones(
     others came; None where the planes leave nothing or do not close
     """
     out: dict[int, CutStone | None] = {}
-    for i in (i for i in planes if i in notched):
+    cut = {i: own for i, own in planes.items() if i not in notched}
+    for i in (i for i in planes if i not in cut):
         out[i] = _with_faces_moved(solids[i], planes[i][: len(solids[i].faces)])
-    planes = {i: own for i, own in planes.items() if i not in notched}
-    for faces, members in _alike(solids, planes).items():
+    for faces, members in _alike(solids, cut).items():
         moved, same = _moved(faces, np.array([planes[i] for i in members]))
         for k, i in enumerate(members):
             if same[k]:
                 solid = Solid(solids[i].code, moved[k], faces)
                 out[i] = CutStone(solid, tuple(range(len(faces))))
-    for i, own in planes.items():
+    for i, own in cut.items():
         if i not in out:
             out[i] = _cut(solids[i], own)
     return out
@@ -118,6 +119,7 @@ def _alike(solids: Sequence[Solid], planes: Mapping[int, Array]) -> dict[Faces, 
     return {faces: members for faces, members in groups.items() if _meeting(faces) is not None}
 
 
+@lru_cache(maxsize=1024)
 def _meeting(faces: Faces) -> NDArray[np.int64] | None:
     """The three faces (nv, 3) that meet at each corner; None if there are other numbers of them."""
     count = max(max(face) for face in faces) + 1

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from survey.blockiness import face_vectors, from_edges
 from survey.solids import Solid
 
-__all__ = ["FlatSolid", "flatten", "highest_corner"]
+__all__ = ["FlatSolid", "flatten"]
 
 Array = NDArray[np.float64]
 Face = tuple[int, ...]
@@ -82,11 +82,6 @@ def flatten(solid: Solid, tolerance: float) -> FlatSolid | None:
         elif not around[i]:  # a corner of no face
             moved[i] = 0.0
     return FlatSolid(flat, moved) if moved.max() <= tolerance else None
-
-
-def highest_corner(solid: Solid, planes: Array) -> float:
-    """Largest height of any corner above the plane of any face [m]; planes (nf, 4) as normal and offset."""
-    return float((solid.vertices @ planes[:, :3].T - planes[:, 3]).max())
 
 
 def _plane_groups(solid: Solid, vectors: Array, tolerance: float) -> list[list[int]]:

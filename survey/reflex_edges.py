@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from survey.solids import Solid, planes_of_solid
+from survey.solids import Solid, highest_corner, planes_of_solid
 
 __all__ = ["ReflexEdge", "flatness", "is_convex", "reflex_edges"]
 
@@ -52,8 +52,7 @@ def is_convex(solid: Solid, tolerance: float | None = None) -> bool:
     tolerance : by which a corner may [m]; `flatness` of the solid if None
     """
     tolerance = flatness(solid) if tolerance is None else tolerance
-    planes = planes_of_solid(solid)
-    return bool((solid.vertices @ planes[:, :3].T - planes[:, 3]).max() <= tolerance)
+    return highest_corner(solid) <= tolerance
 
 
 def reflex_edges(solid: Solid) -> tuple[ReflexEdge, ...]:

@@ -4,14 +4,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from moma.errors import GeometryError
-from survey.blockiness import about, common_share, largest_skew, moved_corners, solid_planes, solid_volume
+from survey.blockiness import about, common_share, largest_skew, moved_corners, solid_volume
 from survey.extrusion import SurveyedBlock
-from survey.flattening import FlatSolid, flatten, highest_corner
+from survey.flattening import FlatSolid, flatten
 from survey.folds import fold, warp
 from survey.plane_network import settle
 from survey.prisms import as_prism, box_around
 from survey.simplified import BlockShape, SimpleSolid, Simplified, prism_shape
-from survey.solids import Solid
+from survey.solids import Solid, highest_corner
 from survey.squaring import SimplifyBounds
 
 __all__ = ["simplify_solid"]
@@ -68,7 +68,7 @@ def _check_full(solid: Solid) -> None:
 
 def _prism(solid: Solid, outward: Array, first: Array) -> Solid | None:
     """The solid as a convex prism, its visible corners first; None if it is none."""
-    return as_prism(solid, outward, first) if _rise(solid) <= _CONVEX * _size(solid) else None
+    return as_prism(solid, outward, first) if highest_corner(solid) <= _CONVEX * _size(solid) else None
 
 
 def _general(old: Solid, tolerance: float) -> Solid:
@@ -98,10 +98,6 @@ def _is_plane(solid: Solid) -> bool:
     return all(warp(solid.vertices[list(face)]) <= _PLANE for face in solid.faces)
 
 
-def _rise(solid: Solid) -> float:
-    return highest_corner(solid, solid_planes(solid))
-
-
 def _size(solid: Solid) -> float:
     return float(np.ptp(solid.vertices, axis=0).max())
 
@@ -118,7 +114,7 @@ def _said(old: Solid, new: Solid, found: FlatSolid) -> str:
 def _why_general(old: Solid, new: Solid) -> str:
     """Why a solid stays general, in words."""
     said = [f"stays general, with {len(new.faces)} faces"]
-    if (rise := _rise(new)) > _CONVEX * _size(old):
+    if (rise := highest_corner(new)) > _CONVEX * _size(old):
         said.append(f"not convex, a corner stands {rise * 1e3:.2g} mm above the plane of a face")
     else:
         said.append("convex, but no prism of which three planes meet in each corner")

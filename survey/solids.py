@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Solid", "area_vector", "planes_of_solid", "volume_of"]
+__all__ = ["Solid", "area_vector", "highest_corner", "planes_of_solid", "volume_of"]
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,14 @@ def planes_of_solid(solid: Solid) -> NDArray[np.float64]:
         row[:3] = normal / np.linalg.norm(normal)
         row[3] = row[:3] @ polygon.mean(axis=0)
     return rows
+
+
+def highest_corner(solid: Solid) -> float:
+    """How far a corner stands out of the plane of a face; next to nothing if the solid is convex [m]."""
+    # about a place among the corners: far from the origin rounding would raise some
+    local = Solid(solid.code, solid.vertices - solid.vertices.mean(axis=0), solid.faces)
+    planes = planes_of_solid(local)
+    return float((local.vertices @ planes[:, :3].T - planes[:, 3]).max())
 
 
 def volume_of(solid: Solid) -> float:

@@ -5,7 +5,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from moma.errors import GeometryError
-from survey.solids import Solid, area_vector
+from survey.solids import Solid, area_vector, highest_corner
 
 __all__ = ["check_watertight", "triangulate"]
 
@@ -39,7 +39,7 @@ def check_watertight(solid: Solid, *, convex: bool = False) -> None:
             f"its volume is {mesh.volume:.3g} m³: inside out or flat", where=where, remedy=remedy
         )
     tolerance = _CONVEX_TOLERANCE + 4.0 * np.spacing(np.abs(solid.vertices).max())
-    if convex and (height := _highest_corner(solid)) > tolerance:
+    if convex and (height := highest_corner(solid)) > tolerance:
         raise GeometryError(f"it is not convex: a corner is {height:.3g} m out", where=where, remedy=remedy)
 
 
@@ -79,14 +79,3 @@ def _is_ear(vertices: NDArray[np.float64], rest: list[int], k: int, normal: NDAr
     slack = _ON_A_SIDE * np.linalg.norm(inward, axis=1) * float(np.abs(corners - corners[0]).max())
     inside = ((others[:, None, :] - corners) * inward).sum(axis=2) >= -slack
     return not inside.all(axis=1).any()
-
-
-def _highest_corner(solid: Solid) -> float:
-    """Largest height of any corner above any face plane [m]."""
-    highest = 0.0
-    for face in solid.faces:
-        polygon = solid.vertices[list(face)]
-        normal = area_vector(polygon)
-        heights = (solid.vertices - polygon.mean(axis=0)) @ (normal / np.linalg.norm(normal))
-        highest = max(highest, float(heights.max()))
-    return highest
