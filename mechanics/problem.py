@@ -171,6 +171,7 @@ class ContactSolution:
     iterations : Gauss–Seidel sweeps, or the iterations of another method
     natural_map : η of `impulse`, as mechanics.residual computes it
     converged : η, and the error of the velocities where a solver looks at it, are within their tolerances
+    why : which method found it, and why that one was chosen; empty where there was no choice
     """
 
     impulse: Array
@@ -178,6 +179,7 @@ class ContactSolution:
     iterations: int
     natural_map: float
     converged: bool
+    why: str = ""
 
 
 def shifted_form(problem: ContactProblem, solver: str) -> ShiftedForm:

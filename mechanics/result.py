@@ -1,6 +1,7 @@
 """What a simulation gives back."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
@@ -207,6 +208,7 @@ class Result:
     history : one value per step
     wall_time : wall seconds by stage: mesh, start, assemble, detect, solve, advance, stress
     static : the search for the equilibrium in which the run began; None if it began at rest
+    solvers : in how many steps which method was chosen, and why, most frequent first
     """
 
     scene: Scene
@@ -225,3 +227,4 @@ class Result:
     history: History
     wall_time: dict[str, float]
     static: StaticStart | None = None
+    solvers: Mapping[str, int] = field(default_factory=dict)

@@ -1,5 +1,6 @@
 """Run a scene from its start to its outcome, with its history and error measures."""
 
+from collections import Counter
 from collections.abc import Callable
 
 import numpy as np
@@ -84,6 +85,7 @@ class _Log:
         self.penetration = 0.0
         self.unconverged = 0
         self.rows: list[tuple[float, ...]] = []
+        self.solvers: Counter[str] = Counter()
 
     def __call__(self, step: Step) -> Array:
         """Account for one step, and return the imbalance of each body (nb,)."""
@@ -92,6 +94,8 @@ class _Log:
         overlap = float(np.max(-step.gap, initial=0.0))
         self.penetration = max(self.penetration, overlap)
         self.unconverged += not solution.converged
+        if solution.why:
+            self.solvers[solution.why] += 1
         self.balance = balance = imbalance(model, step.after, step.contacts, step.force, step.kick.load)
         self.rows.append(
             (
@@ -165,4 +169,5 @@ def _result(
         history=history,
         wall_time=dict(clock.seconds),
         static=static,
+        solvers=dict(log.solvers.most_common()),
     )

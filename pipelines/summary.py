@@ -45,6 +45,7 @@ def summarise(result: Result, *, version: str, seconds: Mapping[str, float]) -> 
             "by_stage": dict(seconds),
         },
         "errors": asdict(result.errors),
+        "solver": {"method": str(result.scene.solver.method), "chosen": dict(result.solvers)},
         "static": None if result.static is None else asdict(result.static),
         "von_mises": None if stress is None else asdict(stress),
         "stress": _stress(result),
