@@ -15,8 +15,8 @@ __all__ = ["Overlay", "overlaid"]
 class Overlay:
     """Settings that replace those of a scene; None leaves what the scene says.
 
-    Selection, materials, laws, loads and supports are the scene's own. Lists of stones in [bodies] go before `fidelity`,
-    as they go before its `default`.
+    Selection, materials, laws, loads and supports are the scene's own. Lists of stones in [bodies] go before
+    `fidelity`, as they go before its `default`.
 
     Attributes
     ----------
