@@ -16,19 +16,23 @@ Array = NDArray[np.float64]
 class CondensedForm:
     """W + Θ, factorised by stones; where stones have more nodes than contacts, far smaller than a system of nodes.
 
+    Attributes
+    ----------
+    cliques : W as a sum of blocks
+
     Parameters
     ----------
     bodies : (nc, 2) of each contact
-    cliques : W as a sum of blocks
+    cliques : as above
     """
 
     def __init__(self, bodies: NDArray[np.int64], cliques: Cliques) -> None:
-        self._bodies, self._cliques = bodies, cliques
+        self._bodies, self.cliques = bodies, cliques
         self._relaxed: dict[float, Callable[[Array], Array]] = {}
 
     @cached_property
     def _fronts(self) -> Fronts:
-        return fronts(self._bodies, self._cliques.contacts)
+        return fronts(self._bodies, self.cliques.contacts)
 
     def shifted(self, theta: Array) -> Callable[[Array], Array]:
         """(W + Θ)⁻¹ as a function of b (3 nc,); `theta` (nc, 3, 3), not always symmetric [1/kg].
@@ -37,7 +41,7 @@ class CondensedForm:
         ------
         SolverError : if W + Θ is singular
         """
-        return self._fronts.factorise(self._cliques, theta).solve
+        return self._fronts.factorise(self.cliques, theta).solve
 
     def relaxed(self, sigma: float) -> Callable[[Array], Array]:
         """(W/σ + 1)⁻¹ as a function of b (3 nc,); its factors are kept for the next call."""

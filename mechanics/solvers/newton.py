@@ -5,15 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.problem import (
-    ContactProblem,
-    ContactSolution,
-    ContactStart,
-    ShiftedForm,
-    scale_of,
-    shifted_form,
-)
+from mechanics.problem import ContactProblem, ContactSolution, ContactStart, scale_of
 from mechanics.residual import Residual, project_on_cone, residual
+from mechanics.solvers.shifted_systems import ShiftedSystem, shifted_system
 from moma.errors import SolverError
 
 __all__ = ["Newton", "projection_derivative"]
@@ -54,9 +48,9 @@ class Newton:
 
         Raises
         ------
-        SolverError : if the problem has no form that can be factorised with a block for each contact
+        SolverError : if the problem has no form that can be factorised
         """
-        form, limits = shifted_form(problem, "Newton"), (self.tolerance, self.velocity_tolerance)
+        system, limits = shifted_system(problem, "Newton"), (self.tolerance, self.velocity_tolerance)
         # not put on the cones first: that would break the balance, by which they are told apart
         impulse = start.impulse
         left, count, daring = residual(problem, impulse), 0, 0
@@ -64,7 +58,7 @@ class Newton:
         while not left.within(*limits) and count < self.max_iterations and daring <= _DARING:
             count += 1
             try:
-                step = _step(problem, form, impulse)
+                step = _step(problem, system, impulse)
             except SolverError:
                 # singular, far from a solution: the best so far has to do
                 break
@@ -94,8 +88,8 @@ def _search(
     return None
 
 
-def _step(problem: ContactProblem, form: ShiftedForm, r: Array) -> Array:
-    scale = scale_of(problem.delassus)
+def _step(problem: ContactProblem, system: ShiftedSystem, r: Array) -> Array:
+    scale, unit = scale_of(problem.delassus), np.eye(r.shape[1])
     u = problem.delassus.apply(r) + problem.u_free
     slide = np.sqrt((u[:, 1:] ** 2).sum(axis=1))
     dual = u.copy()
@@ -103,28 +97,28 @@ def _step(problem: ContactProblem, form: ShiftedForm, r: Array) -> Array:
     point = r - dual / scale
     error = r - project_on_cone(point, problem.friction, problem.cohesion)
     derivative = projection_derivative(point, problem.friction, problem.cohesion)
-    derivative = (1.0 - _SOFT - _GIVE) * derivative + _SOFT * np.eye(3)
-    turn = np.tile(np.eye(3), (len(r), 1, 1))
+    derivative = (1.0 - _SOFT - _GIVE) * derivative + _SOFT * unit
+    turn = np.tile(unit, (len(r), 1, 1))
     turn[:, 0, 1:] = (problem.friction / np.maximum(slide, 1e-300))[:, None] * u[:, 1:]
     inverse = scale * np.linalg.inv(derivative @ turn)
-    solve = form.shifted(inverse @ (np.eye(3) - derivative))
-    step: Array = solve(-np.einsum("cij,cj->ci", inverse, error).ravel()).reshape(-1, 3)
+    solve = system(inverse @ (unit - derivative))
+    step: Array = solve(-np.einsum("cij,cj->ci", inverse, error).ravel()).reshape(r.shape)
     return step
 
 
 def projection_derivative(point: Array, friction: Array, cohesion: Array) -> Array:
-    """An element (nc, 3, 3) of the derivative of the projection on {r_N ≥ 0, ‖r_T‖ ≤ μ r_N + k}."""
-    n, size = point[:, 0], np.sqrt((point[:, 1:] ** 2).sum(axis=1))
+    """An element (nc, d, d) of the derivative of the projection on {r_N ≥ 0, ‖r_T‖ ≤ μ r_N + k}."""
+    n, size, d = point[:, 0], np.sqrt((point[:, 1:] ** 2).sum(axis=1)), point.shape[1]
     along = point[:, 1:] / np.maximum(size, 1e-300)[:, None]
-    across = np.eye(2) - along[:, :, None] * along[:, None, :]
+    across = np.eye(along.shape[1]) - along[:, :, None] * along[:, None, :]
     foot = (n + friction * (size - cohesion)) / (1.0 + friction**2)
     inside = (n >= 0) & (size <= friction * n + cohesion)
     below = ~inside & (n < 0) & (size <= cohesion)
     sliding = ~inside & ~below & (foot > 0)
     edge = ~inside & ~below & ~sliding & (cohesion > 0)
-    result = np.zeros((len(point), 3, 3))
-    result[inside] = np.eye(3)
-    result[below, 1:, 1:] = np.eye(2)
+    result = np.zeros((len(point), d, d))
+    result[inside] = np.eye(d)
+    result[below, 1:, 1:] = np.eye(d - 1)
     height = np.where(sliding, foot, 0.0)
     shrink = (friction * height + cohesion) / np.maximum(size, 1e-300)
     result[edge, 1:, 1:] = shrink[edge, None, None] * across[edge]

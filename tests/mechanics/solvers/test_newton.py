@@ -173,8 +173,21 @@ def test_where_it_fails_it_gives_back_its_best(seed, count):
     assert answer.natural_map >= Newton(1e-15, 0.0, count + 5)(problem, start).natural_map
 
 
-def test_a_problem_that_cannot_be_factorised_by_contacts_is_refused():
-    rigid = posed(scene(ground(), brick("a", (0, 0, 0), (1, 1, 1)))).problem
-    for problem in (replace(pushed(), sparse=None), rigid):
-        with pytest.raises(SolverError, match="Newton: the problem has no sparse form"):
-            Newton()(problem, cold(problem))
+def test_a_problem_that_cannot_be_factorised_is_refused():
+    with pytest.raises(SolverError, match="Newton: the problem has no sparse form"):
+        Newton()(replace(pushed(), sparse=None), cold(pushed()))
+
+
+def test_rigid_stones_on_more_contacts_than_they_have_freedoms():
+    """W is singular: a block on four points, of which it needs three, pushed along the ground."""
+    one = posed(
+        scene(ground(), brick("a", (0, 0, 0), (1, 1, 1), velocity=(1.0, 0, 0, 0, 0, 0)), friction=0.3)
+    )
+    problem = one.problem
+    nearly = NSGS(1e-3, 1.0)(problem, cold(problem))
+    answer = Newton(1e-12, 1.0)(problem, ContactStart(nearly.impulse, nearly.velocity))
+    assert answer.converged
+    # weight and friction over one step of 2 ms: r_N = m g h, and it slides on against μ r_N
+    weight = 2000.0 * 9.81 * 2e-3
+    total = np.einsum("cij,ci->j", one.contacts.frame, answer.impulse)
+    np.testing.assert_allclose(total, [-0.3 * weight, 0.0, weight], atol=1e-9 * weight)
