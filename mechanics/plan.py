@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from mechanics.amounts import Amounts, amounts
 from mechanics.meshing.report import MeshReport
 from mechanics.model import Model, build_model
 from mechanics.scene import Fidelity, Scene
@@ -36,6 +37,7 @@ class Plan:
     memory : estimate of the largest arrays, dense compliances above all [bytes]
     meshes : how the deformable blocks were meshed, and how well
     loose : codes of the blocks that no chain of touching blocks ties to a fixed one
+    amounts : of what the time of a run depends on (mechanics.cost)
     """
 
     bodies: Mapping[Fidelity, int]
@@ -45,6 +47,7 @@ class Plan:
     memory: int
     meshes: MeshReport
     loose: tuple[str, ...]
+    amounts: Amounts
 
 
 def plan(scene: Scene) -> Plan:
@@ -69,6 +72,7 @@ def plan(scene: Scene) -> Plan:
         memory=_memory(model, contacts.bodies),
         meshes=model.meshes,
         loose=tuple(codes[i] for i in _loose(pairs, model.fixed)),
+        amounts=amounts(model, contacts.bodies),
     )
 
 
