@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
+from mechanics.problem_checks import check_problem
 from moma.errors import SolverError
 
 __all__ = [
@@ -135,6 +136,10 @@ class ContactProblem:
     cohesion : (nc,) k, the tangential impulse carried at r_N = 0 [N s]
     sparse : gives W once more, for methods that factorise; None where it has no such form
     adhesion : (nc,) by which r_N is shifted, r̃ = r + s n; None where nothing is [N s]
+
+    Raises
+    ------
+    SolverError : if it cannot be solved: shapes that do not fit, NaN, contacts that do not give way, negative friction
     """
 
     delassus: Delassus
@@ -144,6 +149,16 @@ class ContactProblem:
     cohesion: Array
     sparse: Callable[[], Form] | None = None
     adhesion: Array | None = None
+
+    def __post_init__(self) -> None:
+        check_problem(
+            self.delassus.diagonal,
+            self.u_free,
+            bias=self.bias,
+            friction=self.friction,
+            cohesion=self.cohesion,
+            adhesion=self.adhesion,
+        )
 
 
 @dataclass(frozen=True)

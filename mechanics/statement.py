@@ -13,6 +13,7 @@ from mechanics.model import Model
 from mechanics.operators.mixed import MixedDelassus
 from mechanics.operators.rigid import RigidDelassus
 from mechanics.problem import ContactProblem, ContactStart, Form
+from mechanics.problem_checks import SMALLEST
 from mechanics.state import State
 from mechanics.stepping import Kick
 
@@ -93,6 +94,9 @@ def state_laws(
     if open_.any():
         never = _NEVER * (float(np.abs(u_free).max()) + 1e-300)
         terms = replace(terms, bias=np.where(open_, never, terms.bias))
+    if max(float(np.abs(one).max(initial=0.0)) for one in (u_free, terms.bias)) < SMALLEST:
+        # what is left of a motion that has died out, and could not be squared
+        u_free, terms = np.zeros_like(u_free), replace(terms, bias=np.zeros_like(terms.bias))
     problem = ContactProblem(
         operator, u_free, terms.bias, terms.friction, terms.cohesion, sparse, terms.adhesion
     )

@@ -53,6 +53,14 @@ class StoredDelassus:
             raise SolverError(
                 f"columns {self.indices.min()} to {self.indices.max()} for {nc} contacts", where="stored W"
             )
+        finite = np.isfinite(self.block).all(axis=(1, 2))
+        if not finite.all():
+            entry = int(np.argmin(finite))
+            raise SolverError(
+                f"block {entry}, in the column of contact {self.indices[entry]}, is not finite",
+                where="stored W",
+                remedy="correct what it was made from",
+            )
         lowest = np.linalg.eigvalsh(self._local())[:, 0]
         if (lowest <= 0).any():
             bad = int(np.argmin(lowest))

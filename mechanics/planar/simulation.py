@@ -199,9 +199,9 @@ class PlanarSimulation:
             pull = np.column_stack([terms.adhesion, np.zeros(len(contacts))])
             u_free -= operator.apply(pull)
         acting = np.isfinite(terms.bias)
-        problem = ContactProblem(
-            operator, u_free, terms.bias, terms.friction, terms.cohesion, operator.sparse
-        )
+        # those that do not act are left out of what is solved
+        bias = np.where(acting, terms.bias, 0.0)
+        problem = ContactProblem(operator, u_free, bias, terms.friction, terms.cohesion, operator.sparse)
         return _Stated(problem, acting, approach, terms, law)
 
     def _operator(self, contacts: PlanarContacts) -> PlanarDelassus:
