@@ -1,6 +1,7 @@
 """From a state to what is asked of it: positions, stresses, contact forces, joints."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,8 +116,8 @@ class Observer:
 
     def _frame(self, state: State, contacts: ContactResult) -> Frame:
         seen = [
-            (None, None) if stone is None else self._stress(b, stone, state)
-            for b, stone in enumerate(self._model.stones)
+            self._stress(b, stone, state) if stone is not None and block.stress else (None, None)
+            for b, (block, stone) in enumerate(zip(self._model.scene.blocks, self._model.stones, strict=True))
         ]
         return Frame(
             time=state.time,
@@ -164,9 +165,8 @@ class Observer:
         self, body: int, stone: Deformable, state: State, before: Array, balance: float
     ) -> BodyResult:
         model, block = self._model, self._model.scene.blocks[body]
-        stress, error = self._stress(body, stone, state)
         now, volume = state.node[model.nodes_of(body)], node_volumes(stone.mesh)
-        return BodyResult(
+        bare = BodyResult(
             code=block.code,
             fidelity=block.fidelity,
             reference=before,
@@ -174,14 +174,24 @@ class Observer:
             faces=surface_polygons(stone.mesh),
             element=stone.mesh.element,
             cells=stone.mesh.cells,
-            stress=stress,
-            von_mises=von_mises(stress),
-            principal=principal(stress)[0],
+            stress=None,
+            von_mises=None,
+            principal=None,
             node_volume=volume,
-            values=stress_values(stress, now, volume, stone.material, error),
+            values=None,
             volume=float(model.volume[body]),
             mass=float(model.mass[body]),
             balance=balance,
+        )
+        if not block.stress:
+            return bare
+        stress, error = self._stress(body, stone, state)
+        return replace(
+            bare,
+            stress=stress,
+            von_mises=von_mises(stress),
+            principal=principal(stress)[0],
+            values=stress_values(stress, now, volume, stone.material, error),
         )
 
 

@@ -69,11 +69,11 @@ class BodyResult:
     faces : outward polygons on those points (the corners' polygons, or parts of the mesh's boundary facets)
     element : kind of the finite elements; None if rigid
     cells : (nc, k) node indices of the finite elements, in VTK's order; empty for rigid and fixed blocks
-    stress : (n, 6) recovered nodal stress xx, yy, zz, xy, yz, zx in world axes [Pa]; None if rigid
-    von_mises : (n,) Von Mises stress of the recovered nodal stress [Pa]; None if rigid
-    principal : (n, 3) principal stresses of the same, largest first [Pa]; None if rigid
+    stress : (n, 6) recovered nodal stress xx, yy, zz, xy, yz, zx in world axes [Pa]; None if rigid, or not wanted
+    von_mises : (n,) Von Mises stress of the recovered nodal stress [Pa]; None without stress
+    principal : (n, 3) principal stresses of the same, largest first [Pa]; None without stress
     node_volume : (n,) volume that each node stands for [m³]; None if rigid
-    values : the stress in a few numbers; None if rigid
+    values : the stress in a few numbers; None without stress
     volume : [m³]
     mass : [kg]
     balance : unbalanced force, or moment over its smallest width, over its weight [-]
@@ -110,8 +110,8 @@ class Frame:
     time : [s]
     positions : of the points of each body, as in its BodyResult [m]
     velocities : (n, 3) of the same points [m/s]
-    stresses : (n, 6) as in BodyResult; None if rigid [Pa]
-    stress_errors : as StressValues.error; None if rigid [-]
+    stresses : (n, 6) as in BodyResult; None without stress [Pa]
+    stress_errors : as StressValues.error; None without stress [-]
     contacts : the contact points; joints of the start have the same numbers as at the end
     """
 

@@ -69,6 +69,7 @@ class Block:
     contact_size : target edge length at the faces that touch other blocks where the scene begins; None: as inside [m]
     growth : by how much edges get longer per metre away from these faces, up to the mesh size [-]
     mesher : of its tetrahedra
+    stress : whether the stress of a deformable block is wanted; if not, it is not computed
     """
 
     code: str
@@ -84,6 +85,7 @@ class Block:
     contact_size: float | None = None
     growth: float = 0.5
     mesher: Mesher = Mesher.AUTO
+    stress: bool = True
 
 
 class Placement(StrEnum):

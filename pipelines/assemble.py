@@ -1,6 +1,6 @@
 """From the database to a scene: selected stones → simplified solids → closed joints → blocks."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,11 +11,14 @@ from sqlalchemy.orm import Session
 from mechanics.meshing.choice import Mesher
 from mechanics.meshing.elements import Element
 from mechanics.scene import Block, Fidelity, Part, Scene
+from pipelines.effects import without_effect
+from pipelines.fidelity import Modelled, Wishes, modelled, neighbours
 from pipelines.joint_laws import law_rules
 from pipelines.local_frame import entry_about, local_origin, stone_about
+from pipelines.scene_keys import STRESS_PICTURES
 from pipelines.scene_loads import build_loads, thrown
 from pipelines.scenefile import MeshSettings, SceneFile
-from pipelines.selection import Groups, StoneModel, select_groups, select_stones
+from pipelines.selection import STRESS, Groups, StoneModel, select_groups, select_stones
 from pipelines.stone_records import surveyed_block
 from survey.blocky import BlockyStone
 from survey.closing_report import ClosingReport
@@ -24,7 +27,7 @@ from survey.joints import close_joints
 from survey.solids import Solid
 from survey.stone_parts import stone_parts
 
-__all__ = ["Assembly", "assemble", "assemble_stones"]
+__all__ = ["Assembly", "assemble", "assemble_stones", "wishes_of"]
 
 Array = NDArray[np.float64]
 
@@ -37,18 +40,22 @@ class Assembly:
     ----------
     scene : for `mechanics.simulate`, with places counted from `origin`
     models : the stones as surveyed, in the order of the scene's blocks
+    modelled : by code, how each is modelled, and why
     simplified : the stones before their joints were closed
     closing : what became of their joints
     towards : (3,) mean normal of the faces, from the wall to the observer [-]
     origin : (3,) of the scene, in the frame of the site [m]
+    idle : what the scene says that has no effect
     """
 
     scene: Scene
     models: tuple[StoneModel, ...]
+    modelled: Mapping[str, Modelled]
     simplified: tuple[BlockyStone, ...]
     closing: ClosingReport
     towards: Array
     origin: Array
+    idle: tuple[str, ...] = ()
 
 
 def assemble(scene: SceneFile, session: Session) -> Assembly:
@@ -68,18 +75,36 @@ def assemble_stones(scene: SceneFile, models: tuple[StoneModel, ...], groups: Gr
     origin = local_origin([model.record for model in models])
     stones = [surveyed_block(stone_about(model.record, origin)) for model in models]
     closed = close_joints(stones, scene.joints)
+    codes = [model.record.code for model in models]
+    chosen = modelled(codes, neighbours(closed.report.joints), wishes_of(scene, models, groups))
     meshes = _meshes(scene, groups)
     blocks = tuple(
-        _block(model, solid, meshes.get(solid.code, scene.mesh))
+        _block(model, chosen[solid.code], solid, meshes.get(solid.code, scene.mesh))
         for model, solid in zip(models, closed.solids, strict=True)
     )
     return Assembly(
         scene=_scene(scene, blocks, groups, origin),
         models=models,
+        modelled=chosen,
         simplified=closed.simplified,
         closing=closed.report,
         towards=_facing(stones),
         origin=origin,
+        idle=without_effect(scene, groups, chosen),
+    )
+
+
+def wishes_of(scene: SceneFile, models: Sequence[StoneModel], groups: Groups) -> Wishes:
+    """What the scene says of how its stones are modelled."""
+    asked = scene.output.pictures or ()
+    pushed = (groups[entry.path][0] for entry in scene.loads if entry.type == "force")
+    return Wishes(
+        named={one.record.code: one.listed for one in models if one.listed is not None},
+        default=scene.bodies.default,
+        stress=None if scene.output.stress is None else groups[STRESS][0],
+        pictures=tuple(name for name in asked if name in STRESS_PICTURES),
+        pushed=frozenset[str]().union(*pushed),
+        ring=scene.bodies.ring,
     )
 
 
@@ -115,19 +140,20 @@ def _meshes(scene: SceneFile, groups: Groups) -> dict[str, MeshSettings]:
     return meshes
 
 
-def _block(model: StoneModel, solid: Solid, mesh: MeshSettings) -> Block:
+def _block(model: StoneModel, chosen: Modelled, solid: Solid, mesh: MeshSettings) -> Block:
     return Block(
         code=solid.code,
         vertices=solid.vertices,
         faces=solid.faces,
         material=model.material,
-        fidelity=model.fidelity,
-        mesh_size=mesh.size if model.fidelity is Fidelity.DEFORMABLE else None,
+        fidelity=chosen.fidelity,
+        mesh_size=mesh.size if chosen.fidelity is Fidelity.DEFORMABLE else None,
         element=mesh.element,
         contact_size=mesh.contact_size,
         growth=mesh.growth,
         mesher=mesh.mesher,
         parts=_parts(solid),
+        stress=chosen.stress,
     )
 
 

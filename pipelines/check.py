@@ -10,7 +10,7 @@ from mechanics.meshing.report import MeshReport
 from mechanics.plan import Plan, plan
 from mechanics.scene import Fidelity, Scene
 from moma.errors import GeometryError, MeshError
-from pipelines.assemble import Assembly, assemble_stones
+from pipelines.assemble import Assembly, assemble_stones, wishes_of
 from pipelines.closing_check import (
     JointsReport,
     SimplificationReport,
@@ -20,6 +20,7 @@ from pipelines.closing_check import (
 from pipelines.closing_pictures import draw_closing
 from pipelines.closing_shapes import ClosingShapes, closing_shapes
 from pipelines.entries import describe
+from pipelines.fidelity import Modelled, modelled
 from pipelines.folder import check_replaceable, replacing
 from pipelines.scenefile import SceneFile, read_scene
 from pipelines.selection import Groups, StoneModel, select_groups, select_stones
@@ -110,7 +111,7 @@ class CheckReport:
     ----------
     simplification, joints : what became of the stones and of their joints; None if they could not be made
     files : pictures that were drawn
-    warnings : what could not be drawn
+    warnings : what has no effect, and what could not be drawn
     """
 
     scene: str
@@ -172,7 +173,7 @@ def _with_pictures(report: CheckReport, assembly: Assembly, folder: Path) -> Che
     """The report with its pictures, which lie in the folder, all of them or none."""
     with replacing(folder, _INDEX) as fresh:
         files, warnings = draw_closing(fresh, _shapes(report.scene, assembly))
-        report = replace(report, files=(*files, _INDEX), warnings=warnings)
+        report = replace(report, files=(*files, _INDEX), warnings=(*report.warnings, *warnings))
         (fresh / _INDEX).write_text(as_json(asdict(report)), encoding="utf-8")
     return report
 
@@ -207,7 +208,8 @@ def _report(
 ) -> CheckReport:
     """What is known: of stones that could not be assembled, or of a scene that could not be meshed, less."""
     kinds = Counter(model.record.kind for model in models)
-    bodies = Counter(str(model.fidelity) for model in models)
+    chosen = _modelled(scene, models, groups) if assembly is None else assembly.modelled
+    bodies = Counter(str(one.fidelity) for one in chosen.values())
     uses = Counter(model.material for model in models)
     return CheckReport(
         scene=scene.name,
@@ -226,7 +228,13 @@ def _report(
         laws=tuple(describe(one.entry, groups) for one in scene.laws),
         loads=tuple(describe(entry, groups) for entry in (*scene.loads, *scene.throws)),
         problems=problems,
+        warnings=() if assembly is None else assembly.idle,
     )
+
+
+def _modelled(scene: SceneFile, models: Sequence[StoneModel], groups: Groups) -> Mapping[str, Modelled]:
+    """How stones are modelled of which no joint is known."""
+    return modelled([one.record.code for one in models], {}, wishes_of(scene, models, groups))
 
 
 def _meshes(scene: Scene) -> tuple[MeshUse, ...]:

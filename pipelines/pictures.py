@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from mechanics.materials import Material
 from mechanics.result import BodyResult, Outcome, Result
+from mechanics.scene import Fidelity
 from mechanics.stress_values import volume_quantile
 from moma.errors import MissingLibraryError
 from pipelines.surfaces import FIELDS, save_surface, stone_fields, wall_surface
@@ -103,7 +104,8 @@ def missing(result: Result, name: str) -> str | None:
     if name in ("pressure", "resultants"):
         return None if result.joints.pressed.any() else "no joint is pressed"
     if name != "displacement" and not stressed:
-        return "no stone deforms"
+        deforms = any(body.fidelity is Fidelity.DEFORMABLE for body in result.bodies)
+        return "no stress was asked for" if deforms else "no stone deforms"
     if name == "utilisation" and all(one.utilisation is None for one in stressed):
         return "no material of a deformable stone has a strength"
     return None

@@ -100,7 +100,7 @@ def write_results(
 
     Pictures that cannot be drawn on this machine are a warning; everything else is written.
     """
-    warnings = []
+    warnings = list(assembly.idle)
     # a relaxed equilibrium counts by its end alone, whose steps are all solved
     relaxed = result.outcome is Outcome.EQUILIBRIUM and result.scene.time.relaxation
     if result.errors.unconverged_steps and not relaxed:

@@ -16,7 +16,13 @@ from pipelines.schema import Key, Kind
 from pipelines.stone_keys import MESH
 from survey.joint_settings import JointMode, JointSettings
 
-__all__ = ["PICTURES", "TABLES"]
+__all__ = ["AUTO", "PICTURES", "STRESS_PICTURES", "TABLES"]
+
+AUTO = "auto"
+"""[bodies] default: what the outputs need."""
+
+STRESS_PICTURES = ("von_mises", "principal_tension", "principal_compression", "utilisation", "error")
+"""Those that show nothing of rigid stones."""
 
 PICTURES = (
     "von_mises",
@@ -41,13 +47,21 @@ _BODIES = (
     Key(
         "default",
         Kind.TEXT,
-        "Model of stones that no list below names.",
-        default=Fidelity.DEFORMABLE.value,
-        choices=(Fidelity.RIGID.value, Fidelity.DEFORMABLE.value),
+        "Model of stones that no list below names; auto: rigid, but where an output needs their stress.",
+        default=AUTO,
+        choices=(AUTO, Fidelity.RIGID.value, Fidelity.DEFORMABLE.value),
     ),
     Key("rigid", Kind.TEXTS, "Codes or expressions of stones that move but do not deform.", default=()),
     Key("deformable", Kind.TEXTS, "Codes or expressions of stones with finite elements.", default=()),
     Key("fixed", Kind.TEXTS, "Codes or expressions of stones that never move: the supports.", default=()),
+    Key(
+        "ring",
+        Kind.INTEGER,
+        "With auto, stones within so many joints of one named by `stress` in `[output]` deform too.",
+        "",
+        1,
+        at_least=0,
+    ),
 )
 
 _JOINTS = (
@@ -259,6 +273,12 @@ _OUTPUT = (
         "",
         0,
         at_least=0,
+    ),
+    Key(
+        "stress",
+        Kind.TEXTS,
+        "Codes or expressions of the stones whose stress is wanted; else that of all that deform.",
+        default=None,
     ),
     Key(
         "pictures",

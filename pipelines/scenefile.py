@@ -28,7 +28,7 @@ from moma.errors import SceneError
 from pipelines.entries import Entry, read_entries
 from pipelines.entry_keys import ARRAYS
 from pipelines.joint_laws import BONDS, JointLaw, read_laws
-from pipelines.scene_keys import PICTURES, TABLES
+from pipelines.scene_keys import AUTO, PICTURES, TABLES
 from pipelines.scene_loads import read_loads, read_throws
 from pipelines.schema import Document, check_table, nearest
 from pipelines.stone_keys import MATERIAL_KEYS, MESH_KEYS, ORTHOTROPY_KEYS
@@ -66,12 +66,20 @@ class MaterialRule:
 
 @dataclass(frozen=True)
 class Fidelities:
-    """How stones are modelled: `fixed` goes before the other lists, `default` is for those in no list."""
+    """How stones are modelled: `fixed` goes before the other lists.
 
-    default: Fidelity
+    Attributes
+    ----------
+    default : of stones in no list; None: as their outputs need it
+    rigid, deformable, fixed : codes or expressions
+    ring : without a default, stones within so many joints of one whose stress is asked for deform too
+    """
+
+    default: Fidelity | None
     rigid: tuple[str, ...]
     deformable: tuple[str, ...]
     fixed: tuple[str, ...]
+    ring: int = 1
 
 
 @dataclass(frozen=True)
@@ -96,9 +104,17 @@ class MeshSettings:
 
 @dataclass(frozen=True)
 class Output:
-    """What to keep: a frame every so many steps (0: first and last), and the names of the pictures; None: the usual."""
+    """What to keep.
+
+    Attributes
+    ----------
+    frame_every : a frame every so many steps; 0: first and last
+    stress : codes or expressions of the stones whose stress is wanted; None: of all that deform
+    pictures : their names; None: the usual
+    """
 
     frame_every: int
+    stress: tuple[str, ...] | None
     pictures: tuple[str, ...] | None
 
 
@@ -160,7 +176,7 @@ def parse_scene(text: str, path: str) -> SceneFile:
         name=tables["scene"]["name"] or Path(path).stem,
         selection=Selection(**tables["select"]),
         materials=_materials(document, given),
-        bodies=Fidelities(**tables["bodies"] | {"default": Fidelity(tables["bodies"]["default"])}),
+        bodies=_fidelities(**tables["bodies"]),
         joints=_joints(document, laws, **tables["joints"]),
         contact=_contact(document, **tables["contact"]),
         gravity=_gravity(document, **tables["gravity"]),
@@ -173,6 +189,10 @@ def parse_scene(text: str, path: str) -> SceneFile:
         loads=read_loads(document, given),
         throws=read_throws(document, given),
     )
+
+
+def _fidelities(*, default: str, **lists: Any) -> Fidelities:
+    return Fidelities(default=None if default == AUTO else Fidelity(default), **lists)
 
 
 def _mesh(*, element: str, mesher: str, **sizes: Any) -> MeshSettings:
@@ -281,8 +301,10 @@ def _time(document: Document, values: dict[str, Any]) -> TimeSettings:
     return TimeSettings(**values | {"start": Start(values["start"])})
 
 
-def _output(document: Document, frame_every: int, pictures: tuple[str, ...] | None) -> Output:
+def _output(
+    document: Document, frame_every: int, stress: tuple[str, ...] | None, pictures: tuple[str, ...] | None
+) -> Output:
     for name in pictures or ():
         if name not in PICTURES:
             document.fail(f"unknown picture {name!r}", "output", "pictures", remedy=nearest(name, PICTURES))
-    return Output(frame_every, pictures)
+    return Output(frame_every, stress, pictures)

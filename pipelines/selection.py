@@ -16,22 +16,25 @@ from pipelines.scenefile import SceneFile
 from pipelines.schema import nearest
 from pipelines.toml_lines import Path
 
-__all__ = ["Groups", "StoneModel", "select_groups", "select_stones"]
+__all__ = ["STRESS", "Groups", "StoneModel", "select_groups", "select_stones"]
 
 _CODE = re.compile(r"[\w.:/+-]+")  # a text without blanks or comparison is meant as a code
 
 
-# the codes of each group of stones that a table of an array names, by the table's path
+STRESS = ("output", "stress")
+"""Where a scene names the stones whose stress is wanted."""
+
+# the codes of each group of stones that a table of an array names, by the table's path; and those of STRESS
 Groups = Mapping[Path, tuple[frozenset[str], ...]]
 
 
 @dataclass(frozen=True)
 class StoneModel:
-    """One stone of a scene: as surveyed, of what, and how it is modelled."""
+    """One stone of a scene: as surveyed, of what, and what a list of [bodies] makes it; None: no list names it."""
 
     record: StoneRecord
     material: Material
-    fidelity: Fidelity
+    listed: Fidelity | None
 
 
 def select_stones(scene: SceneFile, session: Session) -> tuple[StoneModel, ...]:
@@ -47,13 +50,12 @@ def select_stones(scene: SceneFile, session: Session) -> tuple[StoneModel, ...]:
     materials = _materials(scene, session, records)
     fidelities = _fidelities(scene, session, records)
     return tuple(
-        StoneModel(record, materials[code], fidelities.get(code, scene.bodies.default))
-        for code, record in records.items()
+        StoneModel(record, materials[code], fidelities.get(code)) for code, record in records.items()
     )
 
 
 def select_groups(scene: SceneFile, session: Session, models: Sequence[StoneModel]) -> Groups:
-    """Which of the selected stones the meshes, laws, loads and throws of a scene name.
+    """Which of the selected stones the meshes, laws, loads and throws of a scene name, and its output of stress.
 
     Raises
     ------
@@ -61,13 +63,15 @@ def select_groups(scene: SceneFile, session: Session, models: Sequence[StoneMode
     """
     records = {model.record.code: model.record for model in models}
     entries = (*scene.meshes, *(one.entry for one in scene.laws), *scene.loads, *scene.throws)
-    return {
+    groups: dict[Path, tuple[frozenset[str], ...]] = {
         entry.path: tuple(
             frozenset(_named(scene, session, records, (*entry.path, key), items))
             for key, items in entry.groups
         )
         for entry in entries
     }
+    groups[STRESS] = (frozenset(_named(scene, session, records, STRESS, scene.output.stress or ())),)
+    return groups
 
 
 def _selected(scene: SceneFile, session: Session) -> dict[str, StoneRecord]:

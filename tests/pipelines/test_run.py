@@ -64,8 +64,9 @@ def selected(text, session):
 
 
 def test_fixed_goes_before_the_other_lists_and_the_default_comes_last(session):
-    models = selected(LOW.replace('["W02-02"]', '["course = 1 and depth < 0.4", "W02-02"]'), session)
-    fidelity = {model.record.code: model.fidelity for model in models}
+    text = LOW.replace('["W02-02"]', '["course = 1 and depth < 0.4", "W02-02"]')
+    blocks = assemble(parse_scene(text, "scene.toml"), session).scene.blocks
+    fidelity = {block.code: block.fidelity for block in blocks}
     assert fidelity["W02-02"] is Fidelity.DEFORMABLE
     assert fidelity["W02-01"] is Fidelity.RIGID
     assert all((one is Fidelity.FIXED) == code.startswith("W01") for code, one in fidelity.items())
@@ -188,7 +189,9 @@ def test_a_picture_that_shows_nothing_is_a_warning(tmp_path):
     text = LOW.replace('deformable = ["W02-02"]\n', "") + '[output]\npictures = ["error", "resultants"]\n'
     (tmp_path / "low.toml").write_text(text, encoding="utf-8")
     done = run_scene(tmp_path / "low.toml", url, tmp_path / "out")
-    assert done.warnings == ("no picture error: no stone deforms",)
+    idle, omitted = done.warnings
+    assert "[mesh] has no effect: no stone deforms" in idle
+    assert omitted == "no picture error: no stone deforms"
     assert [name for name in done.summary["files"] if name.endswith(".png")] == ["resultants.png"]
 
 
@@ -201,7 +204,7 @@ def test_without_pictures_the_rest_is_written_and_a_warning_says_what_to_install
     ingest([SURVEY], url)
     (tmp_path / "low.toml").write_text(LOW.replace('deformable = ["W02-02"]\n', ""), encoding="utf-8")
     done = run_scene(tmp_path / "low.toml", url, tmp_path / "out")
-    assert done.warnings == ("no pictures: libGL.so.1: not there; apt-get install libgl1",)
+    assert done.warnings[1:] == ("no pictures: libGL.so.1: not there; apt-get install libgl1",)
     assert "apt-get install libgl1" in (tmp_path / "out/report.html").read_text(encoding="utf-8")
     assert (tmp_path / "out/results.pvd").exists()
 

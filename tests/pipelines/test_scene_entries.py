@@ -305,7 +305,7 @@ def test_every_key_of_the_arrays_is_documented_with_its_unit_and_default():
 def test_the_examples_of_the_documentation_are_valid():
     documented = (ROOT / "docs/scene.md").read_text(encoding="utf-8")
     examples = re.findall(r"^```toml\n(.*?)^```$", documented, re.MULTILINE | re.DOTALL)
-    assert len(examples) == 5
+    assert len(examples) == 6
     assert "[materials.sandstone.orthotropy]" in examples[1]
     material = (
         "[materials.sandstone]\ndensity = 2200\nyoung = 1e10\npoisson = 0.2\nstones = ['kind = sill']\n"

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from mechanics.laws.dry_joint import DryJoint
 from mechanics.meshing.elements import Element
-from mechanics.scene import ContactSettings, Fidelity, SolverSettings, Start, TimeSettings
+from mechanics.scene import ContactSettings, SolverSettings, Start, TimeSettings
 from moma.errors import MomaError, SceneError, UsageError
 from pipelines.record_file import parse_record
 from pipelines.scene_keys import TABLES
@@ -38,7 +38,8 @@ def test_the_smallest_scene_has_a_material_and_defaults_for_the_rest():
     scene = parse_scene(STONE, "dir/tower.toml")
     assert scene.name == "tower"
     assert scene.gravity == (0.0, 0.0, -9.81)
-    assert scene.bodies.default is Fidelity.DEFORMABLE
+    assert (scene.bodies.default, scene.bodies.ring) == (None, 1)  # as the outputs need it
+    assert scene.output.stress is None
     assert scene.materials[0].material.density == 2000.0
     assert scene.contact.law.friction == 0.6
 
@@ -92,7 +93,7 @@ def test_the_sample_scene_is_valid():
         ("[time]\n# slower\ntheta = 0.4\n", 3, "at least 0.5 and at most 1"),
         ("[time]\nstep = 0.1\nduration = 0.01\n", 3, "shorter than step"),
         ("[solver]\nmax_iterations = 1.5\n", 2, "not a whole number"),
-        ("[bodies]\ndefault = 'elastic'\n", 2, "known here: deformable, rigid"),
+        ("[bodies]\ndefault = 'elastic'\n", 2, "known here: auto, deformable, rigid"),
         ("[bodies]\nfixed = 'course = 1'\n", 2, "not a list of texts"),
         ("[gravity]\ndirection = [0, 0]\n", 2, "not a list of three numbers"),
         ("[gravity]\ndirection = [0, 0, 0]\n", 2, "direction has no length"),

@@ -1,0 +1,52 @@
+"""What a scene says that changes nothing, so that nobody waits for an effect of it."""
+
+from collections.abc import Iterator, Mapping
+
+from mechanics.scene import Fidelity
+from pipelines.fidelity import Modelled
+from pipelines.scenefile import SceneFile
+from pipelines.selection import STRESS, Groups
+
+__all__ = ["without_effect"]
+
+_STRESS = 'ask for their stress by stress in [output], or give default = "deformable" in [bodies]'
+
+
+def without_effect(scene: SceneFile, groups: Groups, modelled: Mapping[str, Modelled]) -> tuple[str, ...]:
+    """What has no effect, each with its place and what would give it one.
+
+    Parameters
+    ----------
+    scene : as its author wrote it
+    groups : which stones its tables name
+    modelled : by code, how each stone is modelled
+    """
+    soft = {code for code, one in modelled.items() if one.fidelity is Fidelity.DEFORMABLE}
+    return (*_of_meshes(scene, groups, soft), *_of_stress(scene, groups, modelled))
+
+
+def _of_meshes(scene: SceneFile, groups: Groups, soft: set[str]) -> Iterator[str]:
+    lines, where = scene.document.lines, scene.document.where
+    if ("mesh",) in lines and not soft:
+        yield f"{where('mesh')}: [mesh] has no effect: no stone deforms; {_STRESS}"
+    for entry in scene.meshes:
+        if not groups[entry.path][0] & soft:
+            yield f"{where(*entry.path)}: [[meshes]] has no effect: none of its stones deforms; {_STRESS}"
+
+
+def _of_stress(scene: SceneFile, groups: Groups, modelled: Mapping[str, Modelled]) -> Iterator[str]:
+    lines, where, asked = scene.document.lines, scene.document.where, groups[STRESS][0]
+    without = sorted(code for code in asked if modelled[code].fidelity is not Fidelity.DEFORMABLE)
+    if asked and len(without) == len(asked):
+        reason = modelled[without[0]].reason
+        yield f"{where(*STRESS)}: stress has no effect: none of its stones deforms ({without[0]}: {reason})"
+    else:
+        rigid = [code for code in without if modelled[code].fidelity is Fidelity.RIGID]
+        if rigid:
+            reason = modelled[rigid[0]].reason
+            yield f"{where(*STRESS)}: {len(rigid)} of the stones of stress have none: {rigid[0]} is rigid ({reason})"
+    ring = ("bodies", "ring")
+    if ring in lines and scene.bodies.default is not None:
+        yield f'{where(*ring)}: ring has no effect: it goes with default = "auto" and stress in [output]'
+    elif ring in lines and not any(one.stress for one in modelled.values() if asked):
+        yield f"{where(*ring)}: ring has no effect: no stress in [output] asks for that of a stone"

@@ -1,0 +1,158 @@
+"""How each stone of a scene is modelled, and why: as simple as what is asked of the run allows.
+
+The lists of [bodies] go first. With `default = "auto"` a stone deforms where an output needs its stress, and so do
+those within a few joints of it, which a rigid neighbour would hold too stiffly; all others are rigid.
+"""
+
+from collections import deque
+from collections.abc import Iterable, Mapping, Sequence, Set
+from dataclasses import dataclass, replace
+
+from mechanics.scene import Fidelity
+from survey.closing_report import Joint
+
+__all__ = ["Modelled", "Wishes", "modelled", "neighbours"]
+
+Neighbours = Mapping[str, Iterable[str]]
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What a scene says of its stones.
+
+    Attributes
+    ----------
+    named : by code, what a list of [bodies] says of it
+    default : of all others; None: what the outputs need
+    stress : codes of the stones whose stress is asked for; None: nothing is said of it
+    pictures : names of the pictures of stress that are asked for
+    pushed : codes of the stones on which forces act; they can act on rigid stones only
+    ring : stones within so many joints of one whose stress is asked for deform too
+    """
+
+    named: Mapping[str, Fidelity]
+    default: Fidelity | None
+    stress: Set[str] | None = None
+    pictures: tuple[str, ...] = ()
+    pushed: Set[str] = frozenset()
+    ring: int = 1
+
+
+@dataclass(frozen=True)
+class Modelled:
+    """How one stone is modelled.
+
+    Attributes
+    ----------
+    fidelity : fixed, rigid or deformable
+    reason : why
+    ring : joints to the nearest stone for whose stress it deforms; 0: not for that of another
+    stress : whether its stress is computed
+    """
+
+    fidelity: Fidelity
+    reason: str
+    ring: int = 0
+    stress: bool = False
+
+
+def modelled(codes: Sequence[str], neighbours: Neighbours, wishes: Wishes) -> dict[str, Modelled]:
+    """The model of each stone.
+
+    Parameters
+    ----------
+    codes : of all stones of the scene
+    neighbours : by code, the stones with which one has a joint; each of two names the other
+    wishes : what the scene says
+    """
+    chosen: dict[str, Modelled] = {}
+    for code in codes:
+        if code in wishes.named:
+            chosen[code] = _listed(wishes.named[code])
+        elif wishes.default is not None:
+            chosen[code] = Modelled(wishes.default, f'default = "{wishes.default}" in [bodies]')
+        elif (reason := _needed(code, wishes)) is not None:
+            chosen[code] = Modelled(Fidelity.DEFORMABLE, reason)
+    if wishes.default is None:
+        chosen |= _others(codes, chosen, neighbours, wishes)
+    return {
+        code: replace(chosen[code], stress=True) if _stressed(code, chosen[code], wishes) else chosen[code]
+        for code in codes
+    }
+
+
+def neighbours(joints: Iterable[Joint]) -> dict[str, set[str]]:
+    """By code, the stones that face a stone across a joint; those without one are left out."""
+    found: dict[str, set[str]] = {}
+    for joint in joints:
+        first, second = joint.stones
+        found.setdefault(first, set()).add(second)
+        found.setdefault(second, set()).add(first)
+    return found
+
+
+def _listed(fidelity: Fidelity) -> Modelled:
+    reason = (
+        "support: named in [bodies] fixed" if fidelity is Fidelity.FIXED else f"named in [bodies] {fidelity}"
+    )
+    return Modelled(fidelity, reason)
+
+
+def _needed(code: str, wishes: Wishes) -> str | None:
+    """Why the stress of a stone is needed; None if it is not."""
+    if wishes.stress is not None:
+        return "stress asked for by [output] stress" if code in wishes.stress else None
+    if wishes.pictures and code not in wishes.pushed:
+        return f"picture {wishes.pictures[0]} of [output] shows the stress of all stones"
+    return None
+
+
+def _stressed(code: str, model: Modelled, wishes: Wishes) -> bool:
+    if model.fidelity is not Fidelity.DEFORMABLE:
+        return False
+    return wishes.stress is None or code in wishes.stress
+
+
+def _others(
+    codes: Sequence[str], chosen: Mapping[str, Modelled], neighbours: Neighbours, wishes: Wishes
+) -> dict[str, Modelled]:
+    """The stones whose stress is not needed: deformable within the ring, else rigid."""
+    held = {code for code, model in chosen.items() if model.fidelity is Fidelity.FIXED}
+    region = [
+        code for code in codes if code in (wishes.stress or ()) and _stressed(code, chosen[code], wishes)
+    ]
+    near = _within(region, neighbours, wishes.ring, held)
+    others: dict[str, Modelled] = {}
+    for code in codes:
+        if code in chosen:
+            continue
+        if code in wishes.pushed:
+            others[code] = Modelled(Fidelity.RIGID, "a force acts on it, and forces act on rigid stones")
+        elif code in near:
+            distance, nearest = near[code]
+            reason = f"within {distance} joint{'' if distance == 1 else 's'} of {nearest}"
+            others[code] = Modelled(Fidelity.DEFORMABLE, reason, ring=distance)
+        else:
+            others[code] = Modelled(Fidelity.RIGID, "no output needs its stress")
+    return others
+
+
+def _within(
+    region: Sequence[str], neighbours: Neighbours, reach: int, held: Set[str]
+) -> dict[str, tuple[int, str]]:
+    """Stones within so many joints of a region: how many, and from which stone of it, the first of several.
+
+    What is held takes no load from one side of it to another, so the way does not go through it.
+    """
+    near = {code: (0, code) for code in region}
+    waiting = deque(region)
+    while waiting:
+        code = waiting.popleft()
+        distance, nearest = near[code]
+        if distance == reach:
+            continue
+        for other in sorted(neighbours.get(code, ())):
+            if other not in near and other not in held:
+                near[other] = distance + 1, nearest
+                waiting.append(other)
+    return near
