@@ -173,6 +173,10 @@ class Method(StrEnum):
     AUTO = "auto"
     NSGS = "nsgs"
     ADMM = "admm"
+    APGD = "apgd"
+    INTERIOR_POINT = "interior-point"
+    NEWTON = "newton"
+    CONE = "cone"
 
 
 @dataclass(frozen=True)
@@ -181,7 +185,8 @@ class SolverSettings:
 
     Attributes
     ----------
-    method : nsgs (Gauss–Seidel), admm, or auto: admm as soon as a block is deformable, else both in turn
+    method : auto chooses; nsgs (Gauss–Seidel), admm (alternating directions), apgd (accelerated projected gradients),
+        interior-point, newton, cone (cone programmes: the reference). docs/theory.md §3 says which suits what
     tolerance : natural map η (unit-free) at which a step counts as solved [-]
     velocity_tolerance : largest velocity by which a contact may still break its law, over the largest velocity that
         the contacts have to stop [-]

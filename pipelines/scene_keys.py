@@ -226,7 +226,8 @@ _SOLVER = (
     Key(
         "method",
         Kind.TEXT,
-        "nsgs: Gauss–Seidel; admm: alternating directions; auto: admm with a deformable stone, else both in turn.",
+        "auto chooses; nsgs: Gauss–Seidel; admm: alternating directions; apgd: accelerated gradients; interior-point; "
+        "newton; cone: cone programmes, the reference.",
         default=SolverSettings.method.value,
         choices=tuple(one.value for one in Method),
     ),

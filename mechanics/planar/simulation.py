@@ -12,10 +12,8 @@ from mechanics.planar.delassus import PlanarDelassus
 from mechanics.planar.model import PlanarModel, PlanarState
 from mechanics.planar.stepping import Drive, fly, load_velocity
 from mechanics.problem import ContactProblem, ContactSolution, ContactStart
-from mechanics.scene import Method
 from mechanics.simulation import Clock
-from mechanics.solvers.alternating import moving_admm
-from mechanics.solvers.nsgs import NSGS
+from mechanics.solvers.choice import choose_planar_solver
 from moma.errors import SolverError
 
 __all__ = ["PlanarSimulation", "PlanarStep"]
@@ -97,9 +95,7 @@ class PlanarSimulation:
         self.model, self.start, self.state, self.clock = model, start, start, clock
         self._drive = Drive(model, start)
         self._detector = PlanarDetector(model)
-        # a sweep over disks costs a tenth of an iteration of ADMM: where they flow, many sweeps are the cheaper way
-        limits = solver.tolerance, solver.velocity_tolerance, solver.max_iterations
-        self._solver = moving_admm(*limits) if solver.method == Method.ADMM else NSGS(*limits)
+        self._solver = choose_planar_solver(solver)
         self._memory = Memory(2)
         self._first = True
 

@@ -1,15 +1,20 @@
 """Which solver a scene gets."""
 
+from collections.abc import Callable, Mapping
 from typing import Protocol
 
 from mechanics.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.scene import Method, SolverSettings
 from mechanics.solvers.admm import ADMM
 from mechanics.solvers.alternating import Alternating, moving_admm
+from mechanics.solvers.apgd import APGD
+from mechanics.solvers.cone_program import ConeProgram
 from mechanics.solvers.elastic import Elastic
+from mechanics.solvers.interior_point import InteriorPoint
+from mechanics.solvers.newton import Newton
 from mechanics.solvers.nsgs import NSGS
 
-__all__ = ["Solver", "choose_solver"]
+__all__ = ["Solver", "choose_planar_solver", "choose_solver"]
 
 
 class Solver(Protocol):
@@ -19,6 +24,16 @@ class Solver(Protocol):
         """Solve from `start`."""
 
 
+# for which it makes no difference whether bodies are rigid; made of tolerance, velocity tolerance and iterations
+_EVERYWHERE: Mapping[Method, Callable[[float, float, int], Solver]] = {
+    Method.NSGS: NSGS,
+    Method.APGD: APGD,
+    Method.INTERIOR_POINT: InteriorPoint,
+    Method.NEWTON: Newton,
+    Method.CONE: ConeProgram,
+}
+
+
 def choose_solver(settings: SolverSettings, deformable: bool) -> Solver:
     """The solver that the settings ask for; *auto* never sweeps where a body is deformable.
 
@@ -26,10 +41,19 @@ def choose_solver(settings: SolverSettings, deformable: bool) -> Solver:
     heavy.
     """
     limits = settings.tolerance, settings.velocity_tolerance, settings.max_iterations
-    if settings.method == Method.ADMM and not deformable:
-        return moving_admm(*limits)
+    if settings.method in _EVERYWHERE:
+        return _EVERYWHERE[settings.method](*limits)
     if settings.method == Method.ADMM:
-        return ADMM(*limits)
-    if settings.method == Method.AUTO and deformable:
-        return Elastic(*limits)
-    return NSGS(*limits) if settings.method == Method.NSGS else Alternating(*limits)
+        return ADMM(*limits) if deformable else moving_admm(*limits)
+    return Elastic(*limits) if deformable else Alternating(*limits)
+
+
+def choose_planar_solver(settings: SolverSettings) -> Solver:
+    """The same for disks of the plane; *auto* sweeps.
+
+    A sweep over disks costs a tenth of an iteration of ADMM: where they flow, many sweeps are the cheaper way.
+    """
+    limits = settings.tolerance, settings.velocity_tolerance, settings.max_iterations
+    if settings.method == Method.AUTO:
+        return NSGS(*limits)
+    return choose_solver(settings, deformable=False)

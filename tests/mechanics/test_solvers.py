@@ -13,8 +13,12 @@ from mechanics.scene import ContactSettings, Fidelity, Method, Placement, Solver
 from mechanics.solvers.admm import ADMM
 from mechanics.solvers.alternating import Alternating
 from mechanics.solvers.anderson import Anderson
-from mechanics.solvers.choice import choose_solver
+from mechanics.solvers.apgd import APGD
+from mechanics.solvers.choice import choose_planar_solver, choose_solver
+from mechanics.solvers.cone_program import ConeProgram
 from mechanics.solvers.elastic import Elastic
+from mechanics.solvers.interior_point import InteriorPoint
+from mechanics.solvers.newton import Newton
 from mechanics.solvers.nsgs import NSGS
 from moma.errors import SolverError
 from tests.mechanics.shapes import brick, ground, posed, scene
@@ -188,12 +192,24 @@ def test_solving_in_turn_does_without_a_sparse_form():
         (Method.NSGS, True, NSGS),
         (Method.ADMM, False, ADMM),
         (Method.ADMM, True, ADMM),
+        (Method.APGD, False, APGD),
+        (Method.INTERIOR_POINT, True, InteriorPoint),
+        (Method.NEWTON, True, Newton),
+        (Method.CONE, False, ConeProgram),
     ],
 )
 def test_the_scene_chooses_the_solver(method, deformable, expected):
     solver = choose_solver(SolverSettings(method, 1e-5, 1e-3, 77), deformable)
     assert isinstance(solver, expected)
     assert (solver.tolerance, solver.velocity_tolerance, solver.max_iterations) == (1e-5, 1e-3, 77)
+
+
+@pytest.mark.parametrize("method", Method)
+def test_disks_of_the_plane_are_swept_where_nothing_else_is_asked_for(method):
+    solver = choose_planar_solver(SolverSettings(method, 1e-5, 1e-3, 77))
+    other = NSGS if method is Method.AUTO else type(choose_solver(SolverSettings(method), False))
+    assert isinstance(solver, other)
+    assert solver.max_iterations == 77
 
 
 # --- extrapolation ---
