@@ -75,6 +75,13 @@ class Memory:
         self._key, self._place = key, place
         self._values = np.hstack([solution.impulse, solution.velocity, state])
 
+    def take_up(self, key: Ints, solution: Array, state: Array, place: Array | None = None) -> None:
+        """Remember more contacts as if they had been in the last step: r and û (nc, 2d), internal variables, places."""
+        self._key = np.concatenate([self._key, key])
+        self._values = np.vstack([self._values, np.hstack([solution, state])])
+        if self._place is not None and place is not None:
+            self._place = np.vstack([self._place, place])
+
     def at_rest(self, factor: float) -> "Memory":
         """The same forces over a step that is `factor` times as long, in bodies that have come to rest."""
         d, other = self._dimension, Memory(self._dimension)

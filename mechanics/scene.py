@@ -154,6 +154,8 @@ class TimeSettings:
     balance_tolerance : unbalanced force of a block over its weight below which it is in balance [-]
     collapse_displacement : a block that moved by more than this fraction of its smallest dimension
         while still moving counts as collapsed [-]
+    sleep : unbalanced force over weight up to which a stone may sleep once it has come to rest; 0: none sleeps. Not in
+        relaxations, and not in scenes with deformable stones [-]
     """
 
     step: float = 1e-3
@@ -165,6 +167,7 @@ class TimeSettings:
     stop_at_equilibrium: bool = True
     balance_tolerance: float = 1e-4
     collapse_displacement: float = 0.5
+    sleep: float = 0.0
 
 
 class Method(StrEnum):

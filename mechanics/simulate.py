@@ -91,12 +91,17 @@ class _Log:
         """Account for one step, and return the imbalance of each body (nb,)."""
         model, solution = self._model, step.solution
         self.energy(step)
-        overlap = float(np.max(-step.gap, initial=0.0))
+        overlap = float(np.max(-step.active.gap, initial=0.0))
+        resting = 0
+        if step.borne is not None:
+            overlap, resting = max(overlap, float(-step.borne.gap.min(initial=0.0))), len(step.borne.contacts)
         self.penetration = max(self.penetration, overlap)
         self.unconverged += not solution.converged
         if solution.why:
             self.solvers[solution.why] += 1
-        self.balance = balance = imbalance(model, step.after, step.contacts, step.force, step.kick.load)
+        self.balance = balance = imbalance(
+            model, step.after, step.active.contacts, step.active.force, step.kick.load, step.resting
+        )
         self.rows.append(
             (
                 step.after.time,
@@ -105,7 +110,7 @@ class _Log:
                 float(balance.max()),
                 solution.natural_map,
                 solution.iterations,
-                len(step.contacts),
+                len(step.active.contacts) + resting,
                 overlap,
                 float(settlement(model, self._start, step.after)[~model.fixed].max(initial=0.0)),
             )

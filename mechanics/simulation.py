@@ -4,10 +4,12 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mechanics.bearing import Bearing, both
 from mechanics.contact.assembly import (
     local_velocity,
     mixed_delassus,
@@ -24,6 +26,7 @@ from mechanics.observers.equilibrium import displacement, speed
 from mechanics.operators.mixed import MixedDelassus
 from mechanics.operators.rigid import RigidDelassus, schedule
 from mechanics.problem import ContactSolution, Form
+from mechanics.sleeping import RINGS, Sleep, held_model
 from mechanics.solvers.choice import Solver, choose_solver
 from mechanics.state import State
 from mechanics.statement import Statement, state_laws
@@ -65,40 +68,68 @@ class Step:
 
     Attributes
     ----------
-    before, after : the states between which it lies; relaxation comes after them
+    before, after : the states between which it lies; what relaxation and sleep halt is halted after them
     predicted : at the instant of the kick, with the velocities just before it
     kick : velocities just after it
-    contacts : the contact points
-    solution : their impulses r̃, shifted where a law has adhesion
-    impulse : (nc, 3) r, local frame [N s]
-    force : (nc, 3) mean forces r/h on the candidates, world axes [N]
-    gap : (nc,) at the end of the step [m]
-    terms : the laws of the step, as shift and cone
-    internal : (nc, STATE) what the laws remember of each contact
+    solution : the impulses r̃ of the active contacts, shifted where a law has adhesion
+    active : contact points that were computed, and what they bear
+    borne : those between sleeping stones; None if there are none
+    resting : (nb, 6) forces and moments of these on their bodies; None if there are none [N], [N m]
     work : r·u_θ, the work of the contacts [J]
     driven : work that driven bodies put in through the contacts [J]
-    relaxed : kinetic energy that relaxation took out at the end of the step [J]
+    relaxed : kinetic energy that relaxation, or sleep, took out at the end of the step [J]
     """
 
     before: State
     after: State
     predicted: State
     kick: Kick
-    contacts: Contacts
     solution: ContactSolution
-    impulse: Array
-    force: Array
-    gap: Array
-    terms: Terms
-    internal: Array
+    active: Bearing
+    borne: Bearing | None
+    resting: Array | None
     work: float
     driven: float
     relaxed: float
 
+    @cached_property
+    def _all(self) -> Bearing:
+        return self.active if self.borne is None else both(self.active, self.borne)
+
+    @property
+    def contacts(self) -> Contacts:
+        """All contact points."""
+        return self._all.contacts
+
+    @property
+    def impulse(self) -> Array:
+        """r (nc, 3), local frame [N s]."""
+        return self._all.impulse
+
+    @property
+    def force(self) -> Array:
+        """Mean forces r/h (nc, 3) on the candidates, world axes [N]."""
+        return self._all.force
+
+    @property
+    def gap(self) -> Array:
+        """(nc,) at the end of the step [m]."""
+        return self._all.gap
+
+    @property
+    def terms(self) -> Terms:
+        """The laws of the step, as shift and cone."""
+        return self._all.terms
+
+    @property
+    def internal(self) -> Array:
+        """What the laws remember of each contact (nc, STATE)."""
+        return self._all.internal
+
 
 @dataclass(frozen=True)
 class _Touching:
-    """The contacts in force, their places and laws, W, and the configuration in which they were found."""
+    """The active contacts, their places and laws, W, and the configuration in which they were found."""
 
     contacts: Contacts
     place: Array
@@ -106,6 +137,17 @@ class _Touching:
     operator: RigidDelassus | MixedDelassus
     sparse: Callable[[], Form]
     configuration: State
+
+
+@dataclass(frozen=True)
+class _Solved:
+    """A step's contact problem and what came of it."""
+
+    touching: _Touching
+    statement: Statement
+    solution: ContactSolution
+    impulse: Array
+    kick: Kick
 
 
 class Simulation:
@@ -136,6 +178,10 @@ class Simulation:
         self._solve = solver or choose_solver(settings.solver, not model.rigid_only)
         self._elastic_scale = elastic_scale
         self._memory = Memory()
+        # what is held while it sleeps has no inverse mass in `_awake`
+        self._sleep, self._awake = Sleep.nobody(start), model
+        time = settings.time
+        self._may_sleep = time.sleep > 0 and not time.relaxation and model.rigid_only
         self._touching: _Touching | None = None
         self._kinetic = 0.0
         self._first = True
@@ -150,6 +196,7 @@ class Simulation:
         """Go on from where another run with the same bodies has ended, with its forces and what its laws remember."""
         self.state = replace(other.state, time=self.state.time)
         self._memory = other._memory.at_rest(self._step / other._step)
+        self._sleep = Sleep.nobody(self.state)
         self._first = False
 
     def step(self) -> Step:
@@ -162,11 +209,38 @@ class Simulation:
         h, theta, model = self._step, self._theta, self.model
         with self.clock("advance"):
             predicted = predict(model, self.start, self.state, h * (1 - theta))
-        before, touching = self.state, self._detect(predicted)
+        before, rings = self.state, RINGS
+        held = self._supports_rest(before, predicted)
+        if not held:
+            self._wake(self._sleep.asleep, predicted)
+        while True:
+            solved = self._solved(predicted)
+            restless = self._restless(predicted, solved)
+            if not restless.any():
+                break
+            # who wakes bears on others at once: the step is solved anew
+            self._wake(self._sleep.around(restless, rings), predicted)
+            rings *= 2
+        with self.clock("advance"):
+            after = advance(model, self.start, predicted, solved.kick, h * theta)
+        if not (np.isfinite(after.velocity).all() and np.isfinite(after.node_velocity).all()):
+            raise SolverError(
+                f"the velocities are not finite at t = {after.time:.6g} s",
+                where=model.scene.name,
+                remedy="use a smaller time step",
+            )
+        with self.clock("advance"):
+            return self._finish(before, predicted, after, solved, held)
+
+    def _solved(self, predicted: State) -> _Solved:
+        """State and solve the contact problem at the predicted configuration."""
+        h, theta, model, touching = self._step, self._theta, self.model, self._detect(predicted)
         contacts, operator = touching.contacts, touching.operator
         remembered, internal = self._memory.recall(contacts.key, touching.place)
         with self.clock("assemble"):
             free = free_kick(model, self.start, predicted, self._compliance, h, theta)
+            if self._sleep.asleep.any():
+                free = replace(free, velocity=np.where(self._sleep.asleep[:, None], 0.0, free.velocity))
             statement = state_laws(
                 model, predicted, contacts, gaps(contacts, predicted), touching.law,
                 operator, touching.sparse, free, internal, self._first,
@@ -178,55 +252,100 @@ class Simulation:
             kick = kicked(
                 model, free, touching.configuration.rotation, contacts, operator, impulse, self._compliance
             )
-            after = advance(model, self.start, predicted, kick, h * theta)
-        if not (np.isfinite(after.velocity).all() and np.isfinite(after.node_velocity).all()):
-            raise SolverError(
-                f"the velocities are not finite at t = {after.time:.6g} s",
-                where=model.scene.name,
-                remedy="use a smaller time step",
-            )
-        with self.clock("advance"):
-            return self._finish(before, predicted, kick, after, touching, statement, solution, impulse)
+        return _Solved(touching, statement, solution, impulse, kick)
 
-    def _finish(
-        self,
-        before: State,
-        predicted: State,
-        kick: Kick,
-        after: State,
-        touching: _Touching,
-        statement: Statement,
-        solution: ContactSolution,
-        impulse: Array,
-    ) -> Step:
-        """Let the laws see what came of them, remember, and account."""
-        contacts, operator, model = touching.contacts, touching.operator, self.model
+    def _finish(self, before: State, predicted: State, after: State, solved: _Solved, held: bool) -> Step:
+        """Let the laws see what came of them, remember, put to sleep, and account."""
+        kick, touching, statement, impulse = solved.kick, solved.touching, solved.statement, solved.impulse
+        contacts, operator, model, theta = touching.contacts, touching.operator, self.model, self._theta
         u = local_velocity(contacts, operator, kick.velocity, kick.node_velocity)
-        internal = model.laws.after(statement.law, statement.approach, solution.impulse, u)
-        self._memory.store(contacts.key, replace(solution, impulse=impulse), internal, touching.place)
+        internal = model.laws.after(statement.law, statement.approach, solved.solution.impulse, u)
+        self._memory.store(contacts.key, replace(solved.solution, impulse=impulse), internal, touching.place)
         self._first = False
+        active = self._bearing(solved, after, internal)
+        slept = self._sleep
         u_before = local_velocity(contacts, operator, predicted.velocity, predicted.node_velocity)
-        theta = self._theta
         mean = theta * kick.velocity + (1 - theta) * predicted.velocity
         driven = np.where(model.fixed[:, None], mean, 0.0)
         driving = local_velocity(contacts, operator, driven, np.zeros_like(after.node))
         self.state, relaxed = self._relax(after)
+        if self._may_sleep:
+            relaxed += self._put_to_sleep(active, kick, held)
         return Step(
             before=before,
             after=after,
             predicted=predicted,
             kick=kick,
-            contacts=contacts,
-            solution=solution,
-            impulse=impulse,
-            force=world_impulse(contacts, impulse) / self._step,
-            gap=gaps(contacts, after),
-            terms=statement.terms,
-            internal=internal,
+            solution=solved.solution,
+            active=active,
+            borne=slept.borne,
+            resting=None if slept.borne is None else slept.wrench,
             work=float(np.sum(impulse * (theta * u + (1 - theta) * u_before))),
             driven=-float(np.sum(impulse * driving)),
             relaxed=relaxed,
         )
+
+    def _bearing(self, solved: _Solved, state: State, internal: Array) -> Bearing:
+        touching, impulse = solved.touching, solved.impulse
+        contacts = touching.contacts
+        return Bearing(
+            contacts,
+            touching.law,
+            touching.place,
+            impulse,
+            solved.solution.velocity,
+            world_impulse(contacts, impulse) / self._step,
+            gaps(contacts, state),
+            solved.statement.terms,
+            internal,
+        )
+
+    def _supports_rest(self, before: State, predicted: State) -> bool:
+        """Whether no motion has moved its supports since the last instant."""
+        return all(
+            np.array_equal(before.centre[bodies], predicted.centre[bodies])
+            and np.array_equal(before.rotation[bodies], predicted.rotation[bodies])
+            for _, bodies in self.model.motions
+        )
+
+    def _restless(self, predicted: State, solved: _Solved) -> NDArray[np.bool_]:
+        """Sleeping bodies (nb,) that a solution of this step leaves out of balance."""
+        asleep = self._sleep.asleep
+        if not asleep.any():
+            return asleep
+        with self.clock("advance"):
+            touching = solved.touching
+            force = world_impulse(touching.contacts, solved.impulse) / self._step
+            return self._sleep.restless(self.model, predicted, solved.kick.load, touching.contacts, force)
+
+    def _wake(self, bodies: NDArray[np.bool_], state: State) -> None:
+        """Let bodies (nb,) take part again, with what they bore."""
+        if not bodies.any():
+            return
+        self._sleep, again = self._sleep.without(bodies, state)
+        if again is not None:
+            solution = np.hstack([again.impulse, again.dual])
+            self._memory.take_up(again.contacts.key, solution, again.internal, again.place)
+        self._hold()
+
+    def _put_to_sleep(self, active: Bearing, kick: Kick, held: bool) -> float:
+        """Who has rested for long enough falls asleep; the kinetic energy that this takes out [J]."""
+        asleep = self._sleep.asleep
+        self._sleep = self._sleep.later(self.model, self.state, active, kick.load, held)
+        new = self._sleep.asleep & ~asleep
+        if not new.any():
+            return 0.0
+        self._hold()
+        state = self.state
+        self.state = replace(state, velocity=np.where(new[:, None], 0.0, state.velocity))
+        return kinetic_energy(self.model, state) - kinetic_energy(self.model, self.state)
+
+    def _hold(self) -> None:
+        """Sleeping bodies answer no impulse, and contacts between them are left out."""
+        model, asleep = self.model, self._sleep.asleep
+        self._awake = held_model(model, asleep)
+        self._detector = replace(self._detector, fixed=model.fixed | asleep)
+        self._touching = None
 
     def _relax(self, after: State) -> tuple[State, float]:
         """Kinetic damping: bring all bodies to a halt once their kinetic energy has passed a peak (Cundall 1976)."""
@@ -242,7 +361,7 @@ class Simulation:
 
     def _detect(self, predicted: State) -> _Touching:
         """The contacts at the predicted configuration; found anew only when something has moved."""
-        model, known = self.model, self._touching
+        model, known = self._awake, self._touching
         if known is not None and not self._stale(known, predicted):
             return known
         with self.clock("detect"):

@@ -17,6 +17,7 @@ __all__ = [
     "settlement",
     "speed",
     "support_reaction",
+    "wrenches",
 ]
 
 Array = NDArray[np.float64]
@@ -41,20 +42,25 @@ class Support:
         return abs(self.reaction - self.weight) / self.weight if self.weight > 0 else 0.0
 
 
-def imbalance(model: Model, state: State, contacts: Contacts, force: Array, load: Array) -> Array:
+def imbalance(
+    model: Model, state: State, contacts: Contacts, force: Array, load: Array, borne: Array | None = None
+) -> Array:
     """Unbalanced force and moment of each body over its weight (nb,) [-]; zero for fixed bodies.
 
     The sum of the loads (nb, 6) on rigid bodies, weight included, and of the contact forces (nc, 3) [N], inertia left
     out: it is zero only for a body in static equilibrium. The moment, about the centre of mass, counts with the
     smallest width as its arm. Forces on elastic bodies act on their undeformed shape, as small strain has it; else high
     walls, whose lower stones carry many times their own weight, would seem out of balance by their strain. Without
-    gravity the largest contact force replaces the weight.
+    gravity the largest contact force replaces the weight. `borne` (nb, 6) are forces and moments of contacts that
+    are not among those given: those between stones that sleep.
     """
     points = material_points(contacts, replace(state, node=_undeformed(model, state)))
     count = len(model.mass)
-    resultant = _wrenches(state, contacts.bodies[:, 0], points[:, 0], force, count)
-    resultant -= _wrenches(state, contacts.bodies[:, 1], points[:, 1], force, count)
+    resultant = wrenches(state, contacts.bodies[:, 0], points[:, 0], force, count)
+    resultant -= wrenches(state, contacts.bodies[:, 1], points[:, 1], force, count)
     weight = model.mass[:, None] * model.gravity(state.time)
+    if borne is not None:
+        resultant += borne
     # the load on rigid bodies holds their weight
     resultant += np.where(model.elastic[:, None], np.hstack([weight, np.zeros_like(weight)]), load)
     scale = np.linalg.norm(weight, axis=1)
@@ -75,7 +81,7 @@ def _undeformed(model: Model, state: State) -> Array:
     return place
 
 
-def _wrenches(state: State, body: NDArray[np.int64], point: Array, force: Array, count: int) -> Array:
+def wrenches(state: State, body: NDArray[np.int64], point: Array, force: Array, count: int) -> Array:
     """Sums (count, 6) of forces and of their moments about the centres of the bodies."""
     wrench = np.column_stack([force, np.cross(point - state.centre[body], force)])
     # without contacts bincount forgets that forces are no integers
