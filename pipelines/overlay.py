@@ -1,14 +1,19 @@
 """One scene at other settings: what a profile, or a point of a study of speed against accuracy, changes of it."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from mechanics.meshing.elements import Element
-from mechanics.scene import Fidelity, Method, Placement
-from pipelines.scenefile import SceneFile
+import numpy as np
+from numpy.typing import NDArray
 
-__all__ = ["Overlay", "overlaid"]
+from mechanics.meshing.elements import Element
+from mechanics.polyhedra import smallest_width
+from mechanics.scene import Block, Fidelity, Method, Placement, Scene
+from pipelines.scenefile import SceneFile
+from pipelines.selection import StoneModel
+
+__all__ = ["Overlay", "overlaid", "overlaid_scene", "typical_width"]
 
 
 @dataclass(frozen=True)
@@ -22,7 +27,8 @@ class Overlay:
     ----------
     fidelity : of stones that no list names
     element : kind of finite elements
-    cells : their number along the typical (median) smallest width of the stones; stands for the size of the mesh [-]
+    cells : their number along the typical (median) smallest width of the stones; stands for the size of the mesh, and
+        for `contact_size` [-]
     points, placement : contact points of two flat faces
     step, theta : of the time integration [s], [-]
     method, tolerance, velocity_tolerance, max_iterations : of the solver
@@ -50,24 +56,62 @@ def overlaid(scene: SceneFile, overlay: Overlay, width: float) -> SceneFile:
     overlay : what replaces its settings
     width : typical smallest width of its stones, to which `cells` refers [m]
     """
-    bodies = {"default": overlay.fidelity}
-    mesh = {"element": overlay.element, "size": None if overlay.cells is None else width / overlay.cells}
-    contact = {"points": overlay.points, "placement": overlay.placement}
-    time = {"step": overlay.step, "theta": overlay.theta}
-    solver = {
-        "method": overlay.method,
-        "tolerance": overlay.tolerance,
-        "velocity_tolerance": overlay.velocity_tolerance,
-        "max_iterations": overlay.max_iterations,
-    }
+    # a scene's grading belongs to its own size
+    sizes: dict[str, Any] = (
+        {} if overlay.cells is None else {"size": width / overlay.cells, "contact_size": None}
+    )
+    contact, time, solver = _settings(overlay)
     return replace(
         scene,
-        bodies=replace(scene.bodies, **_given(bodies)),
-        mesh=replace(scene.mesh, **_given(mesh)),
-        contact=replace(scene.contact, **_given(contact)),
-        time=replace(scene.time, **_given(time)),
-        solver=replace(scene.solver, **_given(solver)),
+        bodies=replace(scene.bodies, **_given({"default": overlay.fidelity})),
+        mesh=replace(scene.mesh, **_given({"element": overlay.element}), **sizes),
+        contact=replace(scene.contact, **contact),
+        time=replace(scene.time, **time),
+        solver=replace(scene.solver, **solver),
     )
+
+
+def overlaid_scene(scene: Scene, overlay: Overlay, listed: frozenset[str] = frozenset()) -> Scene:
+    """As `overlaid`, of a scene that has been assembled; `listed` are the codes of blocks that keep their fidelity."""
+    size = None
+    if overlay.cells is not None:
+        size = _median_width((one.vertices, one.faces) for one in scene.blocks) / overlay.cells
+    contact, time, solver = _settings(overlay)
+    return replace(
+        scene,
+        blocks=tuple(_block(one, overlay, size, one.code in listed) for one in scene.blocks),
+        contact=replace(scene.contact, **contact),
+        time=replace(scene.time, **time),
+        solver=replace(scene.solver, **solver),
+    )
+
+
+def typical_width(models: Iterable[StoneModel]) -> float:
+    """Median of the smallest widths of surveyed stones [m]."""
+    return _median_width((one.record.solid_vertices, one.record.solid_faces) for one in models)
+
+
+def _median_width(solids: Iterable[tuple[NDArray[np.float64], tuple[tuple[int, ...], ...]]]) -> float:
+    return float(np.median([smallest_width(vertices, faces) for vertices, faces in solids]))
+
+
+def _block(block: Block, overlay: Overlay, size: float | None, listed: bool) -> Block:
+    keeps = listed or block.fidelity is Fidelity.FIXED
+    fidelity = block.fidelity if keeps or overlay.fidelity is None else overlay.fidelity
+    if fidelity is not Fidelity.DEFORMABLE:
+        return replace(block, fidelity=fidelity, mesh_size=None)
+    mesh: dict[str, Any] = {} if size is None else {"mesh_size": size, "contact_size": None}
+    return replace(block, fidelity=fidelity, **_given({"element": overlay.element}), **mesh)
+
+
+def _settings(overlay: Overlay) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
+    """Of contact, time and solver, those that the overlay gives."""
+    solver = ("method", "tolerance", "velocity_tolerance", "max_iterations")
+    contact, time, own = (
+        _given({name: getattr(overlay, name) for name in names})
+        for names in (("points", "placement"), ("step", "theta"), solver)
+    )
+    return contact, time, own
 
 
 def _given(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,0 +1,134 @@
+"""Profiles: named sets of settings, from a quick look to careful stresses, as `moma run --profile` applies them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any
+
+from mechanics.meshing.elements import Element
+from mechanics.scene import Fidelity, Method, Placement, TimeSettings
+from moma.errors import UsageError
+from pipelines.overlay import Overlay, overlaid
+from pipelines.scenefile import SceneFile
+from pipelines.schema import nearest
+
+__all__ = ["PROFILES", "Profile", "at_profile", "profile_named", "settings_of_profile"]
+
+
+@dataclass(frozen=True)
+class Profile:
+    """A named set of settings.
+
+    Attributes
+    ----------
+    name : on the command line
+    about : what it is for
+    rest : settings of scenes that seek an equilibrium or a collapse: θ = 1, or relaxation
+    step, theta : in their place where the scene wants the motion itself: θ < 1 without relaxation [s], [-]
+    """
+
+    name: str
+    about: str
+    rest: Overlay
+    step: float
+    theta: float
+
+    def overlay(self, time: TimeSettings) -> Overlay:
+        """What it changes of a scene with these settings of time."""
+        if time.relaxation or time.theta == 1.0:
+            return self.rest
+        return replace(self.rest, step=self.step, theta=self.theta)
+
+
+_FAST = Profile(
+    "fast",
+    "does it stand, and what do its joints bear: all stones rigid, no stress",
+    Overlay(
+        fidelity=Fidelity.RIGID,
+        element=Element.TET10,
+        cells=1.0,
+        points=4,
+        placement=Placement.CORNERS,
+        step=0.01,
+        theta=1.0,
+        method=Method.AUTO,
+        tolerance=1e-5,
+        velocity_tolerance=1e-4,
+        max_iterations=2000,
+    ),
+    step=0.002,
+    theta=0.55,
+)
+_BALANCED = Profile(
+    "balanced",
+    "stresses of the stones that the scene lets deform, one quadratic element across a typical stone",
+    Overlay(
+        element=Element.TET10,
+        cells=1.0,
+        points=4,
+        placement=Placement.CORNERS,
+        step=0.005,
+        theta=1.0,
+        method=Method.AUTO,
+        tolerance=1e-6,
+        velocity_tolerance=1e-4,
+        max_iterations=3000,
+    ),
+    step=0.001,
+    theta=0.51,
+)
+_ACCURATE = Profile(
+    "accurate",
+    "all stones deform, two quadratic elements across a typical stone",
+    Overlay(
+        fidelity=Fidelity.DEFORMABLE,
+        element=Element.TET10,
+        cells=2.0,
+        points=8,
+        placement=Placement.CORNERS,
+        step=0.002,
+        theta=1.0,
+        method=Method.AUTO,
+        tolerance=1e-7,
+        velocity_tolerance=1e-5,
+        max_iterations=5000,
+    ),
+    step=0.0005,
+    theta=0.5,
+)
+PROFILES: Mapping[str, Profile] = MappingProxyType({one.name: one for one in (_FAST, _BALANCED, _ACCURATE)})
+"""From the quickest to the most accurate."""
+
+
+def profile_named(name: str) -> Profile:
+    """The profile of this name.
+
+    Raises
+    ------
+    UsageError : there is none
+    """
+    if name not in PROFILES:
+        raise UsageError(f"unknown profile {name!r}", where="--profile", remedy=nearest(name, PROFILES))
+    return PROFILES[name]
+
+
+def at_profile(scene: SceneFile, profile: Profile, width: float) -> SceneFile:
+    """The scene with the settings of a profile, which go before its own; lists of [bodies] and [[meshes]] stay.
+
+    Parameters
+    ----------
+    scene : as its author wrote it
+    profile : to be applied
+    width : typical smallest width of its stones [m]
+    """
+    return overlaid(scene, profile.overlay(scene.time), width)
+
+
+def settings_of_profile(profile: Profile, time: TimeSettings) -> dict[str, Any]:
+    """What a profile sets in a scene with these settings of time, by the names of `Overlay`; texts and numbers."""
+    values = vars(profile.overlay(time))
+    return {
+        key: value if isinstance(value, int | float) else str(value)
+        for key, value in values.items()
+        if value is not None
+    }
