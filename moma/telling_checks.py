@@ -24,12 +24,14 @@ _NOTHING = 5e-5
 """Movements below are rounding [m]."""
 
 
-def check_lines(report: "CheckReport", verbose: bool) -> list[str]:
-    """The plan of a scene, what becomes of its stones and joints, and its problems."""
+def check_lines(report: "CheckReport", verbose: bool, explain: bool = False) -> list[str]:
+    """The plan of a scene, what becomes of its stones and joints, and its problems; `explain`: each stone's model."""
     lines = [
         f"{report.scene}: {sum(report.kinds.values())} stones "
         f"({', '.join(f'{count} {kind}' for kind, count in report.kinds.items())})",
         f"  models: {', '.join(f'{count} {name}' for name, count in report.bodies.items())}",
+        *_stress_lines(report),
+        *(_explanation(report) if explain else []),
         *(
             f"  material {one.name}: {one.stones} stones, ρ {one.density:g} kg/m³, "
             f"E {one.young / 1e9:g} GPa, ν {one.poisson:g}"
@@ -55,6 +57,21 @@ def check_lines(report: "CheckReport", verbose: bool) -> list[str]:
     if not report.problems:
         lines.append("sound: it can be run")
     return lines
+
+
+def _stress_lines(report: "CheckReport") -> list[str]:
+    """Of how many stones the stress is computed, where not all that move deform."""
+    asked = sum(one.stress for one in report.stones)
+    if not report.bodies["deformable"] or (not report.bodies["rigid"] and not report.ring):
+        return []
+    ring = f"; {report.ring} around them deform too" if report.ring else ""
+    return [f"  stress of {_count(asked, 'stone')}{ring}"]
+
+
+def _explanation(report: "CheckReport") -> list[str]:
+    """Each stone's model and its reason, in columns."""
+    wide = max(len(one.code) for one in report.stones)
+    return [f"    {one.code:{wide}}  {one.fidelity:10}  {one.reason}" for one in report.stones]
 
 
 def _mesh_lines(quality: "MeshQualityReport") -> list[str]:

@@ -29,7 +29,15 @@ from survey.joint_settings import JointMode
 from survey.solids import Solid
 from survey.watertight import check_watertight
 
-__all__ = ["CheckReport", "Cost", "MaterialUse", "MeshQualityReport", "MeshUse", "check_scene"]
+__all__ = [
+    "CheckReport",
+    "Cost",
+    "MaterialUse",
+    "MeshQualityReport",
+    "MeshUse",
+    "StoneModelling",
+    "check_scene",
+]
 
 _INDEX = "check.json"
 _DEEP = 0.005  # metres: less than that is noise of a survey, which the contacts take up
@@ -45,6 +53,16 @@ class MaterialUse:
     young: float
     poisson: float
     stones: int
+
+
+@dataclass(frozen=True)
+class StoneModelling:
+    """How one stone is modelled, why, and whether its stress is computed."""
+
+    code: str
+    fidelity: str
+    reason: str
+    stress: bool
 
 
 @dataclass(frozen=True)
@@ -109,6 +127,8 @@ class CheckReport:
 
     Attributes
     ----------
+    ring : stones that deform for the sake of another one's stress
+    stones : how each stone is modelled, and why; where joints could not be closed, as if there were none
     simplification, joints : what became of the stones and of their joints; None if they could not be made
     files : pictures that were drawn
     warnings : what has no effect, and what could not be drawn
@@ -117,6 +137,8 @@ class CheckReport:
     scene: str
     kinds: Mapping[str, int]
     bodies: Mapping[str, int]
+    ring: int
+    stones: tuple[StoneModelling, ...]
     materials: tuple[MaterialUse, ...]
     meshes: tuple[MeshUse, ...]
     mesh_quality: MeshQualityReport | None
@@ -215,6 +237,10 @@ def _report(
         scene=scene.name,
         kinds=dict(sorted(kinds.items())),
         bodies={str(one): bodies[str(one)] for one in Fidelity},
+        ring=sum(one.ring > 0 for one in chosen.values()),
+        stones=tuple(
+            StoneModelling(code, str(one.fidelity), one.reason, one.stress) for code, one in chosen.items()
+        ),
         materials=tuple(
             MaterialUse(one.name, one.density, one.young, one.poisson, count) for one, count in uses.items()
         ),

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from sqlalchemy.orm import Session
 
-from archmodel.query import find
+from archmodel.query import MAX_EXPRESSIONS, find, find_rows
 from archmodel.records import StoneRecord
 from archmodel.store import load_stones
 from mechanics.materials import Material
@@ -88,12 +88,13 @@ def _selected(scene: SceneFile, session: Session) -> dict[str, StoneRecord]:
             "select",
             remedy="try the selection with: moma query",
         )
-    records = {record.code: record for record in load_stones(session, entities)}
-    out = _named(scene, session, records, ("select", "exclude"), selection.exclude)
-    left = {code: record for code, record in records.items() if code not in out}
+    out = _named(
+        scene, session, {one.code: one for one in entities}, ("select", "exclude"), selection.exclude
+    )
+    left = [one for one in entities if one.code not in out]
     if not left:
         document.fail("all selected stones are excluded", "select", "exclude", remedy="exclude fewer")
-    return left
+    return {record.code: record for record in load_stones(session, left)}
 
 
 def _materials(scene: SceneFile, session: Session, records: Mapping[str, StoneRecord]) -> dict[str, Material]:
@@ -145,9 +146,9 @@ def _fidelities(
 
 
 def _named(
-    scene: SceneFile, session: Session, records: Mapping[str, StoneRecord], key: Path, items: Sequence[str]
+    scene: SceneFile, session: Session, records: Mapping[str, object], key: Path, items: Sequence[str]
 ) -> set[str]:
-    """Codes of the selected stones that any of the items, codes or expressions, names."""
+    """Codes of the selected stones, the keys of `records`, that any of the items, codes or expressions, names."""
     codes: set[str] = set()
     for item in items:
         if item in records:
@@ -160,7 +161,7 @@ def _named(
                 remedy=nearest(item, records),
             )
         try:
-            matching = {entity.code for entity in find(session, "entity", [item])} & records.keys()
+            matching = _matching(scene, session, item) & records.keys()
         except UsageError as error:
             scene.document.fail(f"{key[-1]}: {error.what}", *key, remedy=error.remedy)
         if not matching:
@@ -169,3 +170,11 @@ def _named(
             )
         codes |= matching
     return codes
+
+
+def _matching(scene: SceneFile, session: Session, item: str) -> set[str]:
+    """Codes of the stones that satisfy an expression and the selection, so that no others are read."""
+    selection = scene.selection
+    where = [*selection.where[: MAX_EXPRESSIONS - 1], item]
+    rows = find_rows(session, selection.kind, where, columns=("code",))
+    return {str(row["code"]) for row in rows}

@@ -23,6 +23,9 @@ def check(
             help="Draw into DIR how far corners were moved, how wide joints were, and what does not meet.",
         ),
     ] = None,
+    explain: Annotated[
+        bool, typer.Option("--explain", help="Say of each stone how it is modelled, and why.")
+    ] = False,
     db: Db = DEFAULT_DB,
     json: Json = False,
     verbose: Verbose = False,
@@ -35,7 +38,7 @@ def check(
     report = check_scene(scene, db, pictures)
     for warning in report.warnings:
         say(f"warning: {warning}")
-    lines = check_lines(report, verbose)
+    lines = check_lines(report, verbose, explain)
     if pictures is not None:
         lines += [f"  {pictures / name}" for name in report.files]
     print(as_json(asdict(report)) if json else "\n".join(lines))
