@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from mechanics.checks import LARGEST, sane
 from moma.errors import SceneError
 
 __all__ = ["Material", "Orthotropy", "fourth_order"]
@@ -64,11 +65,11 @@ class Material:
 
     def __post_init__(self) -> None:
         for quantity, ok, remedy in (
-            ("density", self.density > 0, "give kg/m³ greater than 0"),
-            ("young", self.young > 0, "give pascals greater than 0"),
+            ("density", sane(self.density), "give kg/m³ greater than 0"),
+            ("young", sane(self.young), "give pascals greater than 0"),
             ("poisson", 0 <= self.poisson < 0.5, "give a ratio from 0 up to, but not including, 0.5"),
-            ("mass_damping", self.mass_damping >= 0, "give 1/s, 0 or greater"),
-            ("stiffness_damping", self.stiffness_damping >= 0, "give seconds, 0 or greater"),
+            ("mass_damping", 0 <= self.mass_damping <= LARGEST, "give 1/s, 0 or greater"),
+            ("stiffness_damping", 0 <= self.stiffness_damping <= LARGEST, "give seconds, 0 or greater"),
             ("tensile_strength", _unknown_or_positive(self.tensile_strength), "give pascals greater than 0"),
             (
                 "compressive_strength",
@@ -139,7 +140,7 @@ def _check_orthotropy(orthotropy: Orthotropy, where: str) -> None:
         ("poisson", -np.inf, "give three ratios"),
     ):
         values = getattr(orthotropy, quantity)
-        if len(values) != 3 or not all(value > least for value in values):
+        if len(values) != 3 or not all(least < value <= LARGEST for value in values):
             raise SceneError(f"orthotropy {quantity} = {values!r}", where=where, remedy=remedy)
     axes = np.array(orthotropy.axes, dtype=float)
     if axes.shape != (3, 3) or not np.allclose(axes @ axes.T, np.eye(3), rtol=0, atol=_ORTHONORMAL):

@@ -5,14 +5,12 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from mechanics.checks import LARGEST, SMALLEST
 from moma.errors import SolverError
 
-__all__ = ["LARGEST", "SMALLEST", "check_compliance", "check_problem", "require_finite"]
+__all__ = ["check_compliance", "check_problem", "require_finite"]
 
 Array = NDArray[np.float64]
-
-# velocities and compliances between these bounds: their quotients, the impulses, can still be squared and summed up
-LARGEST, SMALLEST = 1e75, 1e-75
 
 _WHERE = "contact problem"
 _UNITS = "take units in which they are nearer to 1"

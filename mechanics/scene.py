@@ -6,6 +6,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from mechanics.checks import check_corners, finite, refuse_unless, sane
 from mechanics.laws.dry_joint import DryJoint
 from mechanics.laws.law import Law
 from mechanics.loads.load import Loads
@@ -87,6 +88,27 @@ class Block:
     mesher: Mesher = Mesher.AUTO
     stress: bool = True
 
+    def __post_init__(self) -> None:
+        where, metres = f"stone {self.code}", "give metres greater than 0"
+        check_corners(where, self.vertices)
+        for part in self.parts:
+            check_corners(where, part.vertices)
+        refuse_unless(
+            where,
+            (
+                ("velocity", self.velocity, finite(self.velocity, 6), "give six numbers"),
+                ("mesh_size", self.mesh_size, self.mesh_size is None or sane(self.mesh_size), metres),
+                (
+                    "contact_size",
+                    self.contact_size,
+                    self.contact_size is None or sane(self.contact_size),
+                    metres,
+                ),
+                ("growth", self.growth, sane(self.growth), "give a number greater than 0"),
+                ("radius", self.radius, self.radius is None or sane(self.radius), metres),
+            ),
+        )
+
 
 class Placement(StrEnum):
     """Where the contact points of two flat faces lie."""
@@ -125,8 +147,13 @@ class ContactSettings:
     placement: Placement = Placement.CORNERS
 
     def __post_init__(self) -> None:
-        if self.points not in _POINTS:
-            raise SceneError(f"points = {self.points!r}", where="contact", remedy="give 1, 3, 4 or 8")
+        refuse_unless(
+            "contact",
+            (
+                ("points", self.points, self.points in _POINTS, "give 1, 3, 4 or 8"),
+                ("alert_distance", self.alert_distance, sane(self.alert_distance), "give more than 0"),
+            ),
+        )
 
 
 class Start(StrEnum):
@@ -169,6 +196,28 @@ class TimeSettings:
     collapse_displacement: float = 0.5
     sleep: float = 0.0
 
+    def __post_init__(self) -> None:
+        refuse_unless(
+            "time",
+            (
+                ("step", self.step, sane(self.step), "give seconds greater than 0"),
+                ("theta", self.theta, 0.5 <= self.theta <= 1, "give from 0.5 to 1"),
+                ("duration", self.duration, sane(self.duration), "give seconds greater than 0"),
+                (
+                    "balance_tolerance",
+                    self.balance_tolerance,
+                    self.balance_tolerance > 0,
+                    "give a number greater than 0",
+                ),
+                (
+                    "collapse_displacement",
+                    self.collapse_displacement,
+                    self.collapse_displacement > 0,
+                    "give a number greater than 0",
+                ),
+            ),
+        )
+
 
 class Method(StrEnum):
     """How the contact problem of a step is solved."""
@@ -204,6 +253,22 @@ class SolverSettings:
     max_iterations: int = 2000
     threads: int = 1
 
+    def __post_init__(self) -> None:
+        refuse_unless(
+            "solver",
+            (
+                ("tolerance", self.tolerance, 0 < self.tolerance < 1, "give a number between 0 and 1"),
+                (
+                    "velocity_tolerance",
+                    self.velocity_tolerance,
+                    self.velocity_tolerance > 0,
+                    "give a number greater than 0",
+                ),
+                ("max_iterations", self.max_iterations, self.max_iterations >= 1, "give 1 or more"),
+                ("threads", self.threads, self.threads >= 1, "give 1 or more"),
+            ),
+        )
+
 
 @dataclass(frozen=True)
 class Scene:
@@ -235,3 +300,10 @@ class Scene:
         repeated = sorted({code for code in codes if codes.count(code) > 1})
         if repeated:
             raise SceneError(f"block codes used twice: {', '.join(repeated)}", where=self.name)
+        refuse_unless(
+            self.name,
+            (
+                ("gravity", self.gravity, finite(self.gravity, 3), "give three numbers"),
+                ("frame_every", self.frame_every, self.frame_every >= 0, "give 0 or a number of steps"),
+            ),
+        )

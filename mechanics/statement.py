@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from mechanics.checks import SMALLEST
 from mechanics.contact.assembly import local_velocity
 from mechanics.contact.contacts import Contacts
 from mechanics.laws.law import Approach, Terms
@@ -13,7 +14,6 @@ from mechanics.model import Model
 from mechanics.operators.mixed import MixedDelassus
 from mechanics.operators.rigid import RigidDelassus
 from mechanics.problem import ContactProblem, ContactStart, Form
-from mechanics.problem_checks import SMALLEST
 from mechanics.state import State
 from mechanics.stepping import Kick
 

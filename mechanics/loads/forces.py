@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mechanics.checks import finite, refuse_unless
 from mechanics.loads.history import History
 from moma.errors import SceneError
 
@@ -35,6 +36,7 @@ class StoneForce:
             raise SceneError(
                 f"a force of {self.force.components} components", where="force", remedy="give x, y and z"
             )
+        refuse_unless("force", [("arm", self.arm, finite(self.arm, 3), "give x, y and z")])
 
     @property
     def until(self) -> float:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from mechanics.checks import finite
 from mechanics.loads.history import History
 from mechanics.loads.load import Pose
 from moma.errors import SceneError
@@ -52,6 +53,7 @@ class ImposedMotion:
             (self.velocity.components == 3, "a velocity without three components", "give x, y and z"),
             (self.spin.value.ndim == 1, "a spin that is a vector", "give one number a time, and an axis"),
             (np.isfinite(self.axis).all() and any(self.axis), f"axis = {self.axis!r}", "give a direction"),
+            (finite(self.pivot, 3), f"pivot = {self.pivot!r}", "give x, y and z"),
         ):
             if not ok:
                 raise SceneError(what, where="motion", remedy=remedy)

@@ -1,0 +1,79 @@
+"""Refusals of values that make no sense, where scenes are made: NaN, zero lengths, negative steps."""
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from moma.errors import SceneError
+
+__all__ = ["LARGEST", "SMALLEST", "Rule", "check_corners", "finite", "refuse_unless", "sane"]
+
+# numbers between these bounds, and their quotients, can still be squared and summed up
+LARGEST, SMALLEST = 1e75, 1e-75
+# widths of a stone whose moments of inertia, of the fifth order, are numbers as well [m]
+_WIDEST, _NARROWEST = 1e25, 1e-25
+# of its width: by so much rounding may move a stone's corners for being far from the origin
+_ROUNDED = 1e-6
+
+# quantity, its value, whether that is right, remedy
+Rule = tuple[str, object, bool, str]
+
+
+def refuse_unless(where: str, rules: Iterable[Rule]) -> None:
+    """Refuse the first value that is not right.
+
+    Raises
+    ------
+    SceneError : naming the place, the quantity, its value and a remedy
+    """
+    for quantity, value, right, remedy in rules:
+        if not right:
+            raise SceneError(f"{quantity} = {value!r}", where=where, remedy=remedy)
+
+
+def sane(value: float) -> bool:
+    """Whether a number is greater than zero and can be computed with."""
+    return bool(SMALLEST <= value <= LARGEST)
+
+
+def finite(values: ArrayLike, count: int) -> bool:
+    """Whether these are so many numbers that can be computed with."""
+    return np.shape(values) == (count,) and bool((np.abs(values) <= LARGEST).all())
+
+
+def check_corners(where: str, vertices: NDArray[np.float64]) -> None:
+    """Refuse corners (nv, 3) that are no numbers, no wider than a point, or too far away for their width [m].
+
+    Raises
+    ------
+    SceneError : naming the corner, or the width
+    """
+    if np.ndim(vertices) != 2 or np.shape(vertices)[1] != 3 or len(vertices) < 4:
+        raise SceneError(
+            f"corners of shape {np.shape(vertices)}",
+            where=where,
+            remedy="give x, y, z of four corners or more",
+        )
+    sound = np.isfinite(vertices).all(axis=1)
+    if not sound.all():
+        corner = int(np.argmin(sound))
+        raise SceneError(
+            f"corner {corner} is at {np.asarray(vertices)[corner].tolist()}",
+            where=where,
+            remedy="give numbers",
+        )
+    far = float(np.abs(vertices).max())
+    wide = float(np.ptp(vertices, axis=0).max()) if far <= _WIDEST else far
+    if not _NARROWEST <= wide <= _WIDEST:
+        raise SceneError(
+            f"it is {wide:.3g} m wide",
+            where=where,
+            remedy="give lengths in metres, of stones that can be built",
+        )
+    if np.finfo(float).eps * far > _ROUNDED * wide:
+        raise SceneError(
+            f"it is {wide:.3g} m wide, {far:.3g} m from the origin: rounding would move its corners",
+            where=where,
+            remedy="shift the scene to the origin",
+        )
