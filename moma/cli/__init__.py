@@ -13,6 +13,7 @@ from moma.cli.relations import load_path, relate
 from moma.cli.runs import runs
 from moma.cli.scenes import check, run
 from moma.cli.surveys import ingest, survey_report
+from moma.cli.trade import trade
 
 __all__ = ["app", "main"]
 
@@ -60,6 +61,7 @@ _COMMANDS = (
     load_path,
     check,
     run,
+    trade,
     runs,
     export,
     import_,

@@ -1,0 +1,55 @@
+"""The command that measures speed against accuracy."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from moma.cli.options import DEFAULT_DB, Db, Json, SceneArgument, Verbose
+from moma.console import progress_bars, reporting
+
+__all__ = ["trade"]
+
+
+@reporting
+def trade(
+    scene: SceneArgument,
+    budget: Annotated[
+        float,
+        typer.Option(
+            "--budget", metavar="MINUTES", help="Time of all runs, those of earlier calls included."
+        ),
+    ] = 10.0,
+    error: Annotated[
+        float, typer.Option("--error", metavar="E", help="Recommend the cheapest setting below this error.")
+    ] = 0.05,
+    of: Annotated[
+        str | None,
+        typer.Option(
+            "--of",
+            metavar="QUANTITY",
+            help="What the error is of: von_mises_p99, support_reactions, …; see docs/howto/trade.md.",
+        ),
+    ] = None,
+    jobs: Annotated[
+        int, typer.Option("--jobs", metavar="N", help="Runs at a time, at most one per core.")
+    ] = 1,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Folder of the study; else out/SCENE-trade."),
+    ] = None,
+    db: Db = DEFAULT_DB,
+    json: Json = False,
+    verbose: Verbose = False,
+) -> None:
+    """Run a scene at many settings: what does each cost, and how far is it from the finest?"""
+    from moma.listing import as_json
+    from moma.telling_trade import trade_lines
+    from pipelines.trade import Asked, run_trade
+
+    asked = Asked(60.0 * budget, jobs, error, of)
+    with progress_bars() as listener:
+        done = run_trade(scene, db, out or Path("out") / f"{scene.stem}-trade", asked, listener)
+    print(as_json(done.record) if json else "\n".join(trade_lines(done, verbose)))
+    if done.record["reference"] is None:
+        raise typer.Exit(1)
