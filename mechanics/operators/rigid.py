@@ -6,10 +6,10 @@ from functools import cached_property
 import numba
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import block_diag, csr_array
 
 from mechanics.operators import _kernels_rigid as kernel
-from mechanics.problem import GaussSeidel, SparseForm
+from mechanics.operators.body_form import BodyForm
+from mechanics.problem import GaussSeidel
 from mechanics.solvers.colouring import greedy_colours
 
 __all__ = ["RigidDelassus", "Schedule", "schedule"]
@@ -114,29 +114,9 @@ class RigidDelassus:
         return relative
 
     @cached_property
-    def sparse(self) -> SparseForm:
-        """The same W with sparse matrices: six velocities for each body that moves, world axes."""
-        moving = np.flatnonzero(self.inertia[:, 0] > 0)
-        upper = self.inertia[moving][:, [1, 2, 3, 2, 4, 5, 3, 5, 6]].reshape(-1, 3, 3)
-        blocks = np.zeros((len(moving), 6, 6))
-        blocks[:, [0, 1, 2], [0, 1, 2]] = 1.0 / self.inertia[moving, :1]
-        blocks[:, 3:, 3:] = np.linalg.inv(upper)
-        return SparseForm(block_diag(list(blocks), format="csc"), self._lift(moving).T.tocsc())
-
-    def _lift(self, moving: Ints) -> "csr_array[np.float64]":
-        """Hᵀ (3 nc, 6 nm)."""
-        place = np.full(len(self.inertia), -1)
-        place[moving] = np.arange(len(moving))
-        frame = self.geometry[:, None, :9].reshape(-1, 1, 3, 3)
-        arm = self.geometry[:, 9:].reshape(-1, 2, 1, 3)
-        # row · (ω × arm) = (arm × row) · ω
-        rows = np.concatenate([np.broadcast_to(frame, (*arm.shape[:2], 3, 3)), np.cross(arm, frame)], axis=-1)
-        rows[:, 1] *= -1.0
-        c, s = np.nonzero(place[self.body] >= 0)
-        row = 3 * c[:, None, None] + np.arange(3)[:, None] + np.zeros(6, dtype=np.int64)
-        column = 6 * place[self.body[c, s]][:, None, None] + np.zeros((3, 1), dtype=np.int64) + np.arange(6)
-        shape = (3 * len(self.body), 6 * len(moving))
-        return csr_array((rows[c, s].ravel(), (row.ravel(), column.ravel())), shape=shape)
+    def sparse(self) -> BodyForm:
+        """The same W for methods that factorise: six velocities for each body that moves, world axes."""
+        return BodyForm(self.body, self.geometry, self.inertia)
 
     def gauss_seidel(self, shift: Array, friction: Array, cohesion: Array) -> GaussSeidel:
         """Sweeps in the order of the schedule; the same bits for any number of threads.
