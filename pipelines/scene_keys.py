@@ -220,6 +220,15 @@ _TIME = (
         TimeSettings.collapse_displacement,
         above=0,
     ),
+    Key(
+        "sleep",
+        Kind.NUMBER,
+        "Unbalanced force of a stone over its weight up to which it may sleep once it rests; 0: none sleeps.",
+        "-",
+        TimeSettings.sleep,
+        at_least=0,
+        at_most=0.1,
+    ),
 )
 
 _SOLVER = (
