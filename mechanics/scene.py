@@ -215,6 +215,7 @@ class TimeSettings:
                     self.collapse_displacement > 0,
                     "give a number greater than 0",
                 ),
+                ("sleep", self.sleep, 0 <= self.sleep < 1, "give from 0 up to 1"),
             ),
         )
 
