@@ -14,6 +14,7 @@ Array = NDArray[np.float64]
 
 # of the impulse that would stop the fastest contact: less than this is none
 _NOTHING = 1e-8
+_EPSILON = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,8 @@ class Residual:
     Attributes
     ----------
     natural_map : η [-]
-    velocity : largest velocity by which a contact breaks its law, over the largest of u_free [-]
+    velocity : largest velocity by which a contact breaks its law, or that rounding hides, over the largest of u_free;
+        over that of the bias where u_free is zero [-]
     error : (nc,) ‖e_α‖ of each contact [N s]
     dual : (nc, d) û, the velocity that is dual to r [m/s]
     """
@@ -44,7 +46,8 @@ def residual(problem: ContactProblem, impulse: Array) -> Residual:
     The de Saxcé form of Signorini–Coulomb (de Saxcé & Feng 1991; docs/theory.md §4), whatever the units. With adhesion
     ‖r‖ is that of the real impulses, without the shift. Zero without contacts. Where no impulse is given but one is
     needed, the size of P_K(-ρ û) replaces ‖r‖, so η is 1; where none is needed, rounding counts against 10⁻⁸ of the
-    impulse that would stop the fastest u_free.
+    impulse that would stop the fastest u_free. Where contacts contradict each other impulses grow without bound, and η
+    falls with them; then the velocities tell, and once W r is so large that its rounding is larger than they are, that.
     """
     if len(impulse) == 0:
         return Residual(0.0, 0.0, np.zeros(0), np.zeros_like(impulse))
@@ -65,10 +68,25 @@ def residual(problem: ContactProblem, impulse: Array) -> Residual:
     return Residual(
         # what is not a number is no solution
         0.0 if scale == 0 else whole / scale,
-        largest / rho / pace if pace > 0 else 0.0,
+        _broken_velocity(problem, impulse, largest / rho, pace),
         error,
         u,
     )
+
+
+def _broken_velocity(problem: ContactProblem, impulse: Array, largest: float, pace: float) -> float:
+    """The largest velocity that breaks a law [m/s], or its rounding, over what there is to stop."""
+    bias = float(np.abs(problem.bias).max())
+    slowest = pace or bias
+    if slowest == 0:
+        return 0.0
+    diagonal = problem.delassus.diagonal
+    hidden = _EPSILON * float(diagonal.max()) * float(np.abs(impulse).max()) / max(pace, bias)
+    if hidden > _NOTHING:
+        # that was the most of all contacts; no contact may feel both
+        own = np.einsum("cij,cj->ci", np.abs(diagonal), np.abs(impulse))
+        hidden = _EPSILON * float(own.max()) / max(pace, bias)
+    return max(largest / slowest, hidden)
 
 
 def natural_map(problem: ContactProblem, impulse: Array) -> float:
