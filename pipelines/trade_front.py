@@ -1,5 +1,6 @@
 """What a study of speed against accuracy says: errors against the finest run, the front, and what to choose."""
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -162,8 +163,9 @@ def _bound(one: Judged, reference: Reference, quantity: str) -> float | None:
 
 def _fineness(setting: Setting, run: Measured) -> tuple[float, ...]:
     """Smaller is finer."""
+    stressed = run.quantities is not None and run.quantities.stress_error is not None
     return (
-        setting.coarseness,
+        setting.coarseness if stressed else math.inf,
         setting.step,
         setting.tolerance,
         -setting.points,

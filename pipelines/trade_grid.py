@@ -10,6 +10,7 @@ import numpy as np
 from mechanics.meshing.elements import Element
 from mechanics.scene import Block, Fidelity, Method, Placement
 from pipelines.overlay import Overlay
+from pipelines.profiles import PROFILES
 from pipelines.scenefile import SceneFile
 
 __all__ = ["Setting", "grid", "setting_name"]
@@ -25,6 +26,7 @@ _CELLS = {
 _RIGID = Overlay(fidelity=Fidelity.RIGID)
 _PLAIN = (Overlay(), _RIGID)
 _LOOSER, _TIGHTER = 100.0, 0.01
+_PROFILE = "profile"  # the first word of their names
 _LOOSEST = 1e-2  # of a tolerance: beyond it, contacts do not obey their laws at all
 
 
@@ -78,9 +80,9 @@ def grid(
     models = _models(scene, moving, width, stress)
     settings = [
         *models,
-        *chain(*(_of_solver(scene, one) for one in models)),
+        *chain(*(_of_solver(scene, one) for one in models if not one.name.startswith(_PROFILE))),
         *chain(*(_of_time(scene, one) for one in models)),
-        *chain(*(_of_points(scene, one) for one in models if one.element is None)),
+        *chain(*(_of_points(scene, one) for one in models if one.element is None and one.overlay in _PLAIN)),
     ]
     return tuple({one.name: one for one in reversed(settings)}.values())[::-1]
 
@@ -126,7 +128,20 @@ def _models(scene: SceneFile, moving: Sequence[Block], width: float, stress: boo
         if element.is_tetrahedron or all(map(_suits_hexahedra, soft)):
             meshes = [replace(plain, element=element, cells=float(cells)) for cells in counts]
             found += [_model(scene, one, moving, soft, width) for one in meshes]
+    found += _profiles(scene, moving, () if plain is all_soft else soft, width)
     return sorted(found, key=lambda one: one.unknowns)
+
+
+def _profiles(
+    scene: SceneFile, moving: Sequence[Block], soft: Sequence[Block], width: float
+) -> Iterator[Setting]:
+    """The named profiles; where no stone deforms, without those in which all do."""
+    for profile in PROFILES.values():
+        overlay = profile.overlay(scene.time)
+        if overlay.fidelity is Fidelity.DEFORMABLE and not soft:
+            continue  # the scene asks for no stress
+        deformed = {None: soft, Fidelity.RIGID: (), Fidelity.DEFORMABLE: moving}[overlay.fidelity]
+        yield replace(_model(scene, overlay, moving, deformed, width), name=f"{_PROFILE} {profile.name}")
 
 
 def _of_solver(scene: SceneFile, model: Setting) -> Iterator[Setting]:
@@ -184,9 +199,9 @@ def _model(
         element=element if soft else None,
         edge=edge,
         coarseness=(edge / width / element.order) ** element.order if soft else math.inf,
-        step=scene.time.step,
-        tolerance=scene.solver.tolerance,
-        points=scene.contact.points,
+        step=overlay.step or scene.time.step,
+        tolerance=overlay.tolerance or scene.solver.tolerance,
+        points=overlay.points or scene.contact.points,
     )
 
 
