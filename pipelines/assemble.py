@@ -136,6 +136,8 @@ def _meshes(scene: SceneFile, groups: Groups) -> dict[str, MeshSettings]:
         given = {key: value for key, value in entry.values.items() if value is not None and key != "stones"}
         kinds: dict[str, Callable[[str], Any]] = {"element": Element, "mesher": Mesher}
         own = {key: kinds[key](value) if key in kinds else value for key, value in given.items()}
+        if "size" in own:
+            own["ring_size"] = own["size"]  # what is said of a stone holds in a ring too
         meshes |= dict.fromkeys(groups[entry.path][0], replace(scene.mesh, **own))
     return meshes
 
@@ -147,7 +149,7 @@ def _block(model: StoneModel, chosen: Modelled, solid: Solid, mesh: MeshSettings
         faces=solid.faces,
         material=model.material,
         fidelity=chosen.fidelity,
-        mesh_size=mesh.size if chosen.fidelity is Fidelity.DEFORMABLE else None,
+        mesh_size=mesh.size_of(chosen.ring) if chosen.fidelity is Fidelity.DEFORMABLE else None,
         element=mesh.element,
         contact_size=mesh.contact_size,
         growth=mesh.growth,

@@ -22,7 +22,11 @@ def without_effect(scene: SceneFile, groups: Groups, modelled: Mapping[str, Mode
     modelled : by code, how each stone is modelled
     """
     soft = {code for code, one in modelled.items() if one.fidelity is Fidelity.DEFORMABLE}
-    return (*_of_meshes(scene, groups, soft), *_of_stress(scene, groups, modelled))
+    return (
+        *_of_meshes(scene, groups, soft),
+        *_of_stress(scene, groups, modelled),
+        *_of_ring(scene, modelled),
+    )
 
 
 def _of_meshes(scene: SceneFile, groups: Groups, soft: set[str]) -> Iterator[str]:
@@ -34,8 +38,21 @@ def _of_meshes(scene: SceneFile, groups: Groups, soft: set[str]) -> Iterator[str
             yield f"{where(*entry.path)}: [[meshes]] has no effect: none of its stones deforms; {_STRESS}"
 
 
+def _of_ring(scene: SceneFile, modelled: Mapping[str, Modelled]) -> Iterator[str]:
+    where, ringed = scene.document.where, any(one.ring for one in modelled.values())
+    for path in (("bodies", "ring"), ("mesh", "ring_size")):
+        if path not in scene.document.lines:
+            continue
+        if scene.bodies.default is not None:
+            yield f'{where(*path)}: {path[1]} has no effect: it goes with default = "auto" and stress in [output]'
+        elif path[1] == "ring_size" and not ringed:
+            yield f"{where(*path)}: ring_size has no effect: no stone deforms for the stress of another"
+        elif not any(one.stress for one in modelled.values()) or scene.output.stress is None:
+            yield f"{where(*path)}: ring has no effect: no stress in [output] asks for that of a stone"
+
+
 def _of_stress(scene: SceneFile, groups: Groups, modelled: Mapping[str, Modelled]) -> Iterator[str]:
-    lines, where, asked = scene.document.lines, scene.document.where, groups[STRESS][0]
+    where, asked = scene.document.where, groups[STRESS][0]
     without = sorted(code for code in asked if modelled[code].fidelity is not Fidelity.DEFORMABLE)
     if asked and len(without) == len(asked):
         reason = modelled[without[0]].reason
@@ -45,8 +62,3 @@ def _of_stress(scene: SceneFile, groups: Groups, modelled: Mapping[str, Modelled
         if rigid:
             reason = modelled[rigid[0]].reason
             yield f"{where(*STRESS)}: {len(rigid)} of the stones of stress have none: {rigid[0]} is rigid ({reason})"
-    ring = ("bodies", "ring")
-    if ring in lines and scene.bodies.default is not None:
-        yield f'{where(*ring)}: ring has no effect: it goes with default = "auto" and stress in [output]'
-    elif ring in lines and not any(one.stress for one in modelled.values() if asked):
-        yield f"{where(*ring)}: ring has no effect: no stress in [output] asks for that of a stone"

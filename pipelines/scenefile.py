@@ -47,6 +47,10 @@ __all__ = [
 ]
 
 
+_COARSER = 2.0
+"""Edges of the ring over those of the stones for whose sake it deforms: docs/accuracy.md, section 13."""
+
+
 @dataclass(frozen=True)
 class Selection:
     """Which stones take part: of this kind, satisfying all of `where`, named by none of `exclude`."""
@@ -93,6 +97,7 @@ class MeshSettings:
     contact_size : target edge length at faces that touch other stones; None: as everywhere [m]
     growth : by how much edges get longer per metre away from these faces [-]
     mesher : of tetrahedra
+    ring_size : target edge length of stones that deform for the stress of others; None: twice `size` [m]
     """
 
     size: float
@@ -100,6 +105,13 @@ class MeshSettings:
     contact_size: float | None = None
     growth: float = Block.growth
     mesher: Mesher = Block.mesher
+    ring_size: float | None = None
+
+    def size_of(self, ring: int) -> float:
+        """Target edge length of a stone that is so many joints from those whose stress is wanted [m]."""
+        if ring == 0:
+            return self.size
+        return _COARSER * self.size if self.ring_size is None else self.ring_size
 
 
 @dataclass(frozen=True)

@@ -99,6 +99,14 @@ MESH = (
         default=Block.mesher.value,
         choices=_MESHERS,
     ),
+    Key(
+        "ring_size",
+        Kind.NUMBER,
+        "Target edge length of stones that deform for the stress of others (`ring` in `[bodies]`); else twice `size`.",
+        "m",
+        None,
+        above=0,
+    ),
 )
 
 MESH_KEYS = (

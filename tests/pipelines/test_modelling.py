@@ -103,6 +103,22 @@ def test_the_region_deforms_with_its_ring_and_only_its_stress_is_computed(sessio
     assert alone.idle == ()
 
 
+def test_the_ring_is_meshed_coarser_unless_the_scene_says_how(session):
+    def sizes(text):
+        blocks = assemble(parse_scene(text, "scene.toml"), session).scene.blocks
+        return {block.code: block.mesh_size for block in blocks if block.mesh_size is not None}
+
+    usual = sizes(REGION)
+    assert usual.pop("W03-04") == 0.5
+    assert set(usual.values()) == {1.0}
+    given = sizes(
+        REGION.replace("[mesh]", "[mesh]\nring_size = 0.7")
+        + '[[meshes]]\nstones = ["W03-05"]\nsize = 0.4\n[[meshes]]\nstones = ["course = 2"]\nelement = "hex8"\n'
+    )
+    assert (given.pop("W03-04"), given.pop("W03-05")) == (0.5, 0.4)
+    assert set(given.values()) == {0.7}
+
+
 def test_stress_of_no_stone_is_computed_where_none_is_asked_for(session):
     scene = parse_scene(
         LOW.replace("[mesh]", 'default = "deformable"\n[mesh]').replace("<= 4", "<= 2")
@@ -190,6 +206,16 @@ def test_the_command_explains(url, tmp_path):
             "ring has no effect: no stress in [output] asks for that of a stone",
         ),
         (REGION.replace("[mesh]", "ring = 2\n[mesh]"), None, None),
+        (
+            REGION.replace("[mesh]", "ring = 0\n[mesh]\nring_size = 1.0"),
+            14,
+            "ring_size has no effect: no stone deforms for the stress of another",
+        ),
+        (
+            REGION.replace("[mesh]", 'default = "deformable"\n[mesh]\nring_size = 1.0'),
+            14,
+            "ring_size has no effect: it goes with default",
+        ),
     ],
 )  # fmt: skip
 def test_what_has_no_effect_is_told_with_its_line(session, text, line, said):
