@@ -5,9 +5,11 @@ the table. Stones are rigid, as in the references; with `--elastic` they deform,
 """
 
 import argparse
+import json
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from benchmarks.masonry import courses, running_bond, semicircular_arch
 from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
@@ -18,12 +20,14 @@ from mechanics.simulate import simulate
 from pipelines.overlay import overlaid_scene
 from pipelines.profiles import PROFILES, Profile
 
-__all__ = ["CASES", "Case", "Found", "hold", "main", "search"]
+__all__ = ["CASES", "Case", "Found", "errors", "hold", "main", "search"]
 
 _GRAVITY = 9.81
 # of its width: a stone that has moved so far, and moves on, falls
 _FALLS = 0.05
 _DURATION = 5.0
+# of the reference: where a search ends
+_WIDTH = 0.01
 
 
 @dataclass(frozen=True)
@@ -136,7 +140,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.collapse", description=__doc__)
     parser.add_argument("--cases", nargs="+", choices=[one.name for one in CASES], default=None)
     parser.add_argument("--profiles", nargs="+", choices=list(PROFILES), default=list(PROFILES))
-    parser.add_argument("--width", type=float, default=0.005, help="where a search ends, relative (0.005)")
+    parser.add_argument(
+        "--width", type=float, default=_WIDTH, help=f"where a search ends, relative ({_WIDTH})"
+    )
     parser.add_argument("--elastic", action="store_true", help="let the stones deform, but in fast")
     parser.add_argument("--json", action="store_true", help="print an array of objects, one for each search")
     options = parser.parse_args()
@@ -153,7 +159,7 @@ def main() -> None:
     print_table(rows, _TABLE)
 
 
-def search(case: Case, profile: Profile, width: float = 0.005, elastic: bool = False) -> Found:
+def search(case: Case, profile: Profile, width: float = _WIDTH, elastic: bool = False) -> Found:
     """Halve the range between a value that stands and one that falls until it is `width` of the reference wide."""
     begun = time.process_time()
     stood, fell = (1.1, 0.9) if case.stands_above else (0.8, 1.1)
@@ -168,6 +174,24 @@ def search(case: Case, profile: Profile, width: float = 0.005, elastic: bool = F
         else:
             fell = value
     return Found(stood, fell, holds, undecided, unsolved, time.process_time() - begun)
+
+
+def errors(records: Path | None = None) -> dict[str, float]:
+    """By profile, the largest relative error of all cases; half of what a search leaves open counts as error."""
+    largest = dict.fromkeys(PROFILES, 0.0)
+    for case in CASES:
+        for name, profile in PROFILES.items():
+            path = (
+                None if records is None else records / f"collapse_{case.name}_{name}.json".replace(" ", "_")
+            )
+            if path is not None and path.is_file():
+                row: Row = json.loads(path.read_text(encoding="utf-8"))
+            else:
+                row = _row(case, profile, _WIDTH, elastic=False)
+                if path is not None:
+                    path.write_text(json.dumps(row), encoding="utf-8")
+            largest[name] = max(largest[name], abs(row["error"]) + row["width"] / row["reference"])
+    return largest
 
 
 def hold(case: Case, value: float, profile: Profile, elastic: bool = False) -> tuple[Outcome, int]:

@@ -39,15 +39,25 @@ def box(code: str, low: Sequence[float], high: Sequence[float], fidelity: Fideli
 
 
 def running_bond(
-    rows: Sequence[Sequence[float]], length: float, height: float, depth: float
+    rows: Sequence[Sequence[float]], length: float, height: float, depth: float, grounded: bool = False
 ) -> tuple[Block, ...]:
-    """Courses from bottom to top, lists of stone lengths over `length`; negative ones are left open."""
+    """Courses from bottom to top, lists of stone lengths over `length`; negative ones are left open.
+
+    They stand on a fixed slab, or, with `grounded`, on their lowest course, which is fixed.
+    """
     wide = length * sum(map(abs, rows[0]))
-    blocks = [box("base", (0, -depth / 2, -height), (wide, depth / 2, 0), Fidelity.FIXED)]
+    slab = box("base", (0, -depth / 2, -height), (wide, depth / 2, 0), Fidelity.FIXED)
+    blocks = [] if grounded else [slab]
     for row, course in enumerate(rows):
+        fidelity = Fidelity.FIXED if grounded and row == 0 else Fidelity.RIGID
         ends = length * np.concatenate([[0.0], np.cumsum(np.abs(course))])
         blocks += [
-            box(f"{row + 1}-{k + 1}", (a, -depth / 2, row * height), (b, depth / 2, (row + 1) * height))
+            box(
+                f"{row + 1}-{k + 1}",
+                (a, -depth / 2, row * height),
+                (b, depth / 2, (row + 1) * height),
+                fidelity,
+            )
             for k, (a, b) in enumerate(pairwise(ends))
             if course[k] > 0
         ]
@@ -135,23 +145,22 @@ def pier(rows: int = 6) -> tuple[Block, ...]:
     return (*stones, box("load", (0.05, 0.1, top + 0.25), (0.55, 0.5, top + 0.85)))
 
 
-def column(drums: int = 6, foot: float = 0.8, top: float = 0.6, height: float = 0.5) -> tuple[Block, ...]:
-    """Drums of eight sides whose diameter shrinks from `foot` to `top`, on a fixed one."""
-    angle = 2 * np.pi * np.arange(8) / 8
+def column(
+    drums: int = 6, foot: float = 0.8, top: float = 0.6, height: float = 0.5, sides: int = 8
+) -> tuple[Block, ...]:
+    """Drums of so many sides whose diameter shrinks from `foot` to `top`, on a fixed one."""
+    angle = 2 * np.pi * np.arange(sides) / sides
     ring = 0.5 * np.column_stack([np.cos(angle), np.sin(angle)])
-    faces = (
-        tuple(range(7, -1, -1)),
-        tuple(range(8, 16)),
-        *((k, (k + 1) % 8, 8 + (k + 1) % 8, 8 + k) for k in range(8)),
-    )
+    walls = ((k, (k + 1) % sides, sides + (k + 1) % sides, sides + k) for k in range(sides))
+    faces = (tuple(range(sides - 1, -1, -1)), tuple(range(sides, 2 * sides)), *walls)
     blocks = []
     for number in range(-1, drums):
-        wide = [foot + (top - foot) * max(k, 0) / drums for k in (number, number + 1)]
-        levels = [
-            np.column_stack([w * ring, np.full(8, k * height)])
-            for w, k in zip(wide, (number, number + 1), strict=True)
+        levels = (number, number + 1)
+        wide = [foot + (top - foot) * max(k, 0) / drums for k in levels]
+        rings = [
+            np.column_stack([w * ring, np.full(sides, k * height)]) for w, k in zip(wide, levels, strict=True)
         ]
         fidelity = Fidelity.FIXED if number < 0 else Fidelity.RIGID
         code = "base" if number < 0 else f"drum {number + 1}"
-        blocks.append(Block(code, np.vstack(levels), faces, _STONE, fidelity))
+        blocks.append(Block(code, np.vstack(rings), faces, _STONE, fidelity))
     return tuple(blocks)

@@ -121,6 +121,7 @@ def run_lines(report: "RunReport", verbose: bool) -> list[str]:
             f"their kern, largest opening {joints['largest_opening'] * 1e3:.3g} mm, "
             f"largest sliding {joints['largest_sliding'] * 1e3:.3g} mm"
         )
+    lines += _profile_lines(summary["profile"])
     errors = {name: value for name, value in summary["errors"].items() if value is not None}
     lines.append("  errors: " + ", ".join(f"{name} {_short(value)}" for name, value in errors.items()))
     if verbose:
@@ -129,6 +130,24 @@ def run_lines(report: "RunReport", verbose: bool) -> list[str]:
     pictures = [name for name in summary["files"] if name.endswith(".png")]
     shown = (*pictures, "report.html", "results.pvd", "summary.json")
     return [*lines, *(f"  {report.folder / name}" for name in shown)]
+
+
+def _profile_lines(profile: dict[str, Any] | None) -> list[str]:
+    """Which profile has run, and what error it is to be expected to have; nothing without one."""
+    if profile is None:
+        return []
+    lines = [f"  profile {profile['name']}: {profile['about']}"]
+    if profile["expected"]:
+        told = (
+            f"{name} {'up to ' if one['bound'] else ''}{_part(one['value'])}"
+            for name, one in profile["expected"].items()
+        )
+        return [*lines, "  expected errors, as measured on other scenes: " + ", ".join(told)]
+    return [*lines, "  what error to expect was measured on scenes at rest only"]
+
+
+def _part(value: float) -> str:
+    return f"{100.0 * value:.2g} %"
 
 
 def survey_report_lines(report: "SurveyReport", verbose: bool) -> list[str]:

@@ -22,6 +22,7 @@ from pipelines.closing_shapes import ClosingShapes, closing_shapes
 from pipelines.entries import describe
 from pipelines.fidelity import Modelled, modelled
 from pipelines.folder import check_replaceable, replacing
+from pipelines.profiles import with_profile
 from pipelines.scenefile import SceneFile, read_scene
 from pipelines.selection import Groups, StoneModel, select_groups, select_stones
 from pipelines.summary import as_json
@@ -152,7 +153,9 @@ class CheckReport:
     warnings: tuple[str, ...] = ()
 
 
-def check_scene(path: str | Path, url: str, pictures: Path | None = None) -> CheckReport:
+def check_scene(
+    path: str | Path, url: str, pictures: Path | None = None, profile: str | None = None
+) -> CheckReport:
     """Check a scene file against a database, without running anything.
 
     What is wrong with the file itself is raised; what is wrong with the stones is in the report.
@@ -162,18 +165,20 @@ def check_scene(path: str | Path, url: str, pictures: Path | None = None) -> Che
     path : of the scene file
     url : of the database
     pictures : folder for pictures of the stones and their joints, and for the report as ``check.json``; None: none
+    profile : name of the profile whose settings go before the scene's; None: the scene as it is written
 
     Raises
     ------
     SceneError : the file is wrong, or an expression names no stone
     DatabaseError : the database cannot be read
-    UsageError : the folder holds something else
+    UsageError : the folder holds something else, or there is no such profile
     """
     if pictures is not None:
         check_replaceable(pictures, _INDEX)
     scene = read_scene(path)
     with open_database(url, create=False) as database, database.session(read_only=True) as session:
         models = select_stones(scene, session)
+        scene = with_profile(scene, profile, models)
         groups = select_groups(scene, session, models)
     problems: list[str] = []
     assembly, needs = None, None

@@ -1,6 +1,6 @@
 """Profiles: named sets of settings, from a quick look to careful stresses, as `moma run --profile` applies them."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
@@ -8,11 +8,12 @@ from typing import Any
 from mechanics.meshing.elements import Element
 from mechanics.scene import Fidelity, Method, Placement, TimeSettings
 from moma.errors import UsageError
-from pipelines.overlay import Overlay, overlaid
+from pipelines.overlay import Overlay, overlaid, typical_width
 from pipelines.scenefile import SceneFile
 from pipelines.schema import nearest
+from pipelines.selection import StoneModel
 
-__all__ = ["PROFILES", "Profile", "at_profile", "profile_named", "settings_of_profile"]
+__all__ = ["PROFILES", "Profile", "profile_named", "settings_of_profile", "with_profile"]
 
 
 @dataclass(frozen=True)
@@ -112,16 +113,24 @@ def profile_named(name: str) -> Profile:
     return PROFILES[name]
 
 
-def at_profile(scene: SceneFile, profile: Profile, width: float) -> SceneFile:
-    """The scene with the settings of a profile, which go before its own; lists of [bodies] and [[meshes]] stay.
+def with_profile(scene: SceneFile, name: str | None, models: Iterable[StoneModel]) -> SceneFile:
+    """The scene with the settings of a profile, which go before its own; without a name, as it is.
+
+    Its lists of [bodies], its [[meshes]] and all that says what is asked for stay.
 
     Parameters
     ----------
     scene : as its author wrote it
-    profile : to be applied
-    width : typical smallest width of its stones [m]
+    name : of the profile
+    models : the stones of the scene, whose typical smallest width sets the size of the mesh
+
+    Raises
+    ------
+    UsageError : there is no such profile
     """
-    return overlaid(scene, profile.overlay(scene.time), width)
+    if name is None:
+        return scene
+    return overlaid(scene, profile_named(name).overlay(scene.time), typical_width(models))
 
 
 def settings_of_profile(profile: Profile, time: TimeSettings) -> dict[str, Any]:

@@ -32,6 +32,11 @@ _ERRORS = (
     ("reaction", "Balance of the whole", "Supports' reaction minus weight, over the weight."),
     ("energy", "Energy", "Energy that no term of the balance explains, over the run's reference energy."),
     ("unconverged_steps", "Unsolved steps", "Steps that the solver left above its tolerance."),
+    (
+        "stress",
+        "Stress",
+        "Relative error of the stress of all stones that deform, estimated from its jumps between finite elements.",
+    ),
 )
 
 _GREY = "Rigid and fixed stones are grey: no stress was computed in them."
@@ -78,6 +83,7 @@ def write_report(
         table(_summary_rows(summary)),
         "<h2>How far it can be trusted</h2>",
         table((name, scientific(summary["errors"][key]), words) for key, name, words in _ERRORS),
+        *_profile(summary["profile"]),
         *_stressed(stones),
         *_pulled(stones),
         *_uncertain(stones),
@@ -120,6 +126,29 @@ def _summary_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("Simulated", f"{time['simulated']:.4g} s in {summary['steps']} steps, {time['wall']:.1f} s of work")
     )
     return rows
+
+
+def _profile(profile: Mapping[str, Any] | None) -> list[str]:
+    """The settings that a profile gave the run, and the errors to expect of it; nothing without one."""
+    if profile is None:
+        return []
+    settings = ", ".join(f"{name} {value}" for name, value in profile["settings"].items())
+    words = (
+        f"<h2>Profile: {escape(profile['name'])}</h2>"
+        f"<p>{escape(profile['about'].capitalize())}. Its settings went before those of the scene: "
+        f"{escape(settings)}.</p>"
+    )
+    if not profile["expected"]:
+        return [words, "<p>What error to expect was measured on scenes at rest only.</p>"]
+    rows = [
+        (one["of"].capitalize(), f"{'up to ' if one['bound'] else ''}{percent(one['value'])}")
+        for one in profile["expected"].values()
+    ]
+    note = (
+        "<p>Errors to expect against a much finer model, from what was measured on other scenes and this run's own "
+        "estimates. The largest Von Mises stress has none: at the edges of joints it grows with every finer mesh.</p>"
+    )
+    return [words, note, table(rows, ("Quantity", "Error to expect"))]
 
 
 def _stressed(stones: Sequence[StoneResult]) -> list[str]:

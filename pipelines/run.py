@@ -3,7 +3,7 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -15,14 +15,17 @@ from archmodel.store_runs import store_run
 from mechanics.result import Outcome, Result
 from mechanics.simulate import simulate
 from moma.errors import DatabaseError, MissingLibraryError
-from pipelines.assemble import Assembly, assemble
+from pipelines.assemble import Assembly, assemble_stones
 from pipelines.folder import check_replaceable, replacing
 from pipelines.joint_table import write_joints
 from pipelines.pictures import draw_pictures, missing
+from pipelines.profile_report import ProfileReport, profile_report
+from pipelines.profiles import with_profile
 from pipelines.progress import Listener, Progress, silent
 from pipelines.report import write_report
 from pipelines.run_records import run_record
 from pipelines.scenefile import SceneFile, read_scene
+from pipelines.selection import select_groups, select_stones
 from pipelines.stone_values import stone_results
 from pipelines.summary import as_json, summarise
 from pipelines.vtk_output import write_frames
@@ -50,7 +53,13 @@ class RunReport:
     run: int
 
 
-def run_scene(path: str | Path, url: str, folder: str | Path, progress: Listener = silent) -> RunReport:
+def run_scene(
+    path: str | Path,
+    url: str,
+    folder: str | Path,
+    progress: Listener = silent,
+    profile: str | None = None,
+) -> RunReport:
     """Run a scene file on the stones of a database, and write the results into a folder.
 
     Parameters
@@ -59,10 +68,11 @@ def run_scene(path: str | Path, url: str, folder: str | Path, progress: Listener
     url : of the database
     folder : of the results; earlier results there are replaced when the new ones are complete
     progress : told of every stage
+    profile : name of the profile whose settings go before the scene's; None: the scene as it is written
 
     Raises
     ------
-    UsageError : the folder holds other things
+    UsageError : the folder holds other things, or there is no such profile
     SceneError, GeometryError, MeshError, SolverError : see `assemble` and `mechanics.simulate`
     DatabaseError : the database cannot be read, or not written at the end; the folder is complete then
     """
@@ -71,12 +81,16 @@ def run_scene(path: str | Path, url: str, folder: str | Path, progress: Listener
     check_replaceable(folder)
     with open_database(url, create=False) as database:
         with _timed(seconds, "blocks"), database.session(read_only=True) as session:
-            as_of, assembly = latest_entry(session), assemble(scene, session)
+            as_of, models = latest_entry(session), select_stones(scene, session)
+            scene = with_profile(scene, profile, models)
+            assembly = assemble_stones(scene, models, select_groups(scene, session, models))
         result = simulate(assembly.scene, progress)
         seconds |= result.wall_time
-        stones = stone_results(result)
+        stones, reached = stone_results(result), profile_report(profile, scene, result)
         with replacing(folder) as fresh:
-            summary, warnings = write_results(result, stones, scene, assembly, fresh, seconds, progress)
+            summary, warnings = write_results(
+                result, stones, scene, assembly, fresh, seconds, progress, reached
+            )
         record = run_record(result, stones, scene, assembly, summary, as_of)
         try:
             with database.session() as session:
@@ -95,6 +109,7 @@ def write_results(
     folder: Path,
     seconds: dict[str, float],
     progress: Listener = silent,
+    profile: ProfileReport | None = None,
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Write all files of a run into an empty folder; the summary, and what could not be done.
 
@@ -126,7 +141,8 @@ def write_results(
         except MissingLibraryError as error:
             warnings.append(f"no pictures: {error}")
     progress(Progress("write", 2, 3, "report.html"))
-    summary = summarise(result, version=version("moma-masonry"), seconds=seconds)
+    told = None if profile is None else asdict(profile)
+    summary = summarise(result, version=version("moma-masonry"), seconds=seconds) | {"profile": told}
     write_report(folder / "report.html", result, summary, stones, warnings)
     (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
     summary["origin"] = assembly.origin.tolist()

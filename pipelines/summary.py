@@ -11,6 +11,7 @@ import numpy as np
 from mechanics.contact_result import JointResult
 from mechanics.result import Result
 from mechanics.scene import Fidelity
+from pipelines.quantities import quantities
 from pipelines.stone_values import stress_statistics
 
 __all__ = ["as_json", "summarise"]
@@ -44,7 +45,7 @@ def summarise(result: Result, *, version: str, seconds: Mapping[str, float]) -> 
             "wall": sum(seconds.values()),
             "by_stage": dict(seconds),
         },
-        "errors": asdict(result.errors),
+        "errors": asdict(result.errors) | {"stress": quantities(result).stress_error},
         "solver": {"method": str(result.scene.solver.method), "chosen": dict(result.solvers)},
         "static": None if result.static is None else asdict(result.static),
         "von_mises": None if stress is None else asdict(stress),

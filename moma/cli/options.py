@@ -16,6 +16,8 @@ __all__ = [
     "Kind",
     "KindWhere",
     "ListFormat",
+    "Profile",
+    "ProfileName",
     "SceneArgument",
     "Sigma",
     "Snap",
@@ -48,6 +50,14 @@ class ListFormat(StrEnum):
     GEOJSON = "geojson"
 
 
+class ProfileName(StrEnum):
+    """Those of pipelines.profiles, which is not loaded for a help text."""
+
+    FAST = "fast"
+    BALANCED = "balanced"
+    ACCURATE = "accurate"
+
+
 Db = Annotated[
     str,
     typer.Option(
@@ -55,6 +65,13 @@ Db = Annotated[
         metavar="URL",
         envvar="MOMA_DB",
         help="Entity database: sqlite:///FILE, or postgresql://USER@HOST/NAME.",
+    ),
+]
+Profile = Annotated[
+    ProfileName | None,
+    typer.Option(
+        "--profile",
+        help="Settings by name, which go before the scene's own; see docs/runs.md. Else the scene as it is written.",
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")]

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from moma.cli.options import DEFAULT_DB, Db, Json, SceneArgument, Verbose
+from moma.cli.options import DEFAULT_DB, Db, Json, Profile, SceneArgument, Verbose
 from moma.console import progress_bars, reporting, say
 
 __all__ = ["check", "run"]
@@ -26,6 +26,7 @@ def check(
     explain: Annotated[
         bool, typer.Option("--explain", help="Say of each stone how it is modelled, and why.")
     ] = False,
+    profile: Profile = None,
     db: Db = DEFAULT_DB,
     json: Json = False,
     verbose: Verbose = False,
@@ -35,7 +36,7 @@ def check(
     from moma.telling_checks import check_lines
     from pipelines.check import check_scene
 
-    report = check_scene(scene, db, pictures)
+    report = check_scene(scene, db, pictures, profile)
     for warning in report.warnings:
         say(f"warning: {warning}")
     lines = check_lines(report, verbose, explain)
@@ -52,6 +53,7 @@ def run(
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results; else out/SCENE.")
     ] = None,
+    profile: Profile = None,
     db: Db = DEFAULT_DB,
     json: Json = False,
     verbose: Verbose = False,
@@ -62,7 +64,7 @@ def run(
     from pipelines.run import run_scene
 
     with progress_bars() as listener:
-        done = run_scene(scene, db, out or Path("out") / scene.stem, listener)
+        done = run_scene(scene, db, out or Path("out") / scene.stem, listener, profile)
     for warning in done.warnings:
         say(f"warning: {warning}")
     print(as_json(done.summary) if json else "\n".join(run_lines(done, verbose)))

@@ -1,0 +1,53 @@
+"""The scenes on which the errors of profiles are measured, and others on which they must hold."""
+
+from collections.abc import Callable, Mapping
+
+from benchmarks.masonry import column, courses, pier, running_bond, semicircular_arch, two_spans
+from mechanics.laws.dry_joint import DryJoint
+from mechanics.scene import Block, ContactSettings, Scene, Start, TimeSettings
+
+__all__ = ["HELD_OUT", "REFERENCE"]
+
+_GRAVITY, _FRICTION = 9.81, 0.65
+# an opening of one stone, three courses high, under a lintel of two
+_OPENING: list[list[float]] = [
+    [0.5, 1, 1, 1, 0.5],
+    [1, 1, 1, 1],
+    [0.5, 1, -1, 1, 0.5],
+    [0.75, 0.75, -1, 0.75, 0.75],
+    [0.5, 1, -1, 1, 0.5],
+    [1, 2, 1],
+    [0.5, 1, 1, 1, 0.5],
+    [1, 1, 1, 1],
+]
+
+
+def _scene(name: str, blocks: tuple[Block, ...], sideways: float = 0.0) -> Scene:
+    """At rest from the start; `sideways` is a part of the weight that pushes along x."""
+    return Scene(
+        name,
+        blocks,
+        gravity=(sideways * _GRAVITY, 0.0, -_GRAVITY),
+        contact=ContactSettings(DryJoint(_FRICTION)),
+        time=TimeSettings(start=Start.EQUILIBRIUM, relaxation=True),
+    )
+
+
+REFERENCE: Mapping[str, Callable[[], Scene]] = {
+    "running bond": lambda: _scene(
+        "running bond", running_bond(courses(4, 6), 0.5, 0.25, 0.3, grounded=True), 0.15
+    ),
+    "pier": lambda: _scene("pier", pier()),
+    "two spans": lambda: _scene("two spans", two_spans()),
+    "pinnacle": lambda: _scene("pinnacle", column(4, 0.7, 0.35, 0.45, sides=6), 0.08),
+}
+"""Those that the estimates were fitted to."""
+
+HELD_OUT: Mapping[str, Callable[[], Scene]] = {
+    "arch": lambda: _scene("arch", semicircular_arch(11, 0.3, 1.2)),
+    "wall with opening": lambda: _scene(
+        "wall with opening", running_bond(_OPENING, 0.6, 0.3, 0.4, grounded=True)
+    ),
+    "column": lambda: _scene("column", column(), 0.05),
+}
+"""Those that nothing was fitted to."""
