@@ -24,6 +24,7 @@ class Bearing:
     law : (nc,) index of the law of each
     place : (nc, 3) in the axes of one of the two bodies [m]
     impulse : (nc, 3) r, local frame [N s]
+    shifted : (nc, 3) r̃, by which an open or sliding contact is told: exact at the limits of its cone [N s]
     dual : (nc, 3) û, as the solver left it [m/s]
     force : (nc, 3) mean forces r/h on the candidates, world axes [N]
     gap : (nc,) at the end of the step [m]
@@ -35,6 +36,7 @@ class Bearing:
     law: Ints
     place: Array
     impulse: Array
+    shifted: Array
     dual: Array
     force: Array
     gap: Array
@@ -49,6 +51,7 @@ class Bearing:
             self.law[rows],
             self.place[rows],
             self.impulse[rows],
+            self.shifted[rows],
             self.dual[rows],
             self.force[rows],
             self.gap[rows],
@@ -66,7 +69,7 @@ def both(one: Bearing, other: Bearing) -> Bearing:
     return Bearing(
         joined([one.contacts, other.contacts]),
         np.concatenate([one.law, other.law]),
-        *(after(name) for name in ("place", "impulse", "dual", "force", "gap")),
+        *(after(name) for name in ("place", "impulse", "shifted", "dual", "force", "gap")),
         Terms(
             *(
                 np.concatenate([getattr(one.terms, name), getattr(other.terms, name)])

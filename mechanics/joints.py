@@ -154,7 +154,7 @@ def _patches(contacts: ContactResult, own: Ints) -> Array:
 
 def _bearing(model: Model, step: Step) -> Array:
     """(nc,) shear force that friction and cohesion can bear in each contact of a step [N]."""
-    limit = step.terms.friction * step.solution.impulse[:, 0] + step.terms.cohesion
+    limit = step.terms.friction * step.shifted[:, 0] + step.terms.cohesion
     bearing: Array = limit / model.scene.time.step
     return bearing
 

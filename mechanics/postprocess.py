@@ -149,7 +149,7 @@ class Observer:
             pressure=pressure,
             opening=opening,
             slide=np.linalg.norm(slide, axis=1),
-            status=contact_status(step.internal, step.terms, step.solution.impulse),
+            status=contact_status(step.internal, step.terms, step.shifted),
             joint=interfaces.joint,
         )
 

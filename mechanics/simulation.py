@@ -107,6 +107,11 @@ class Step:
         return self._all.impulse
 
     @property
+    def shifted(self) -> Array:
+        """r̃ (nc, 3), shifted where a law has adhesion [N s]."""
+        return self._all.shifted
+
+    @property
     def force(self) -> Array:
         """Mean forces r/h (nc, 3) on the candidates, world axes [N]."""
         return self._all.force
@@ -185,6 +190,11 @@ class Simulation:
         self._touching: _Touching | None = None
         self._kinetic = 0.0
         self._first = True
+
+    @property
+    def asleep(self) -> NDArray[np.bool_]:
+        """Which bodies sleep (nb,)."""
+        return self._sleep.asleep
 
     def halt(self, time: float) -> None:
         """Bring all bodies to a halt, and set the clock of the scene to `time` [s]."""
@@ -293,6 +303,7 @@ class Simulation:
             touching.law,
             touching.place,
             impulse,
+            solved.solution.impulse,
             solved.solution.velocity,
             world_impulse(contacts, impulse) / self._step,
             gaps(contacts, state),
