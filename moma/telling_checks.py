@@ -7,7 +7,7 @@ if TYPE_CHECKING:
     from pipelines.check import CheckReport, MeshQualityReport
     from pipelines.closing_check import JointsReport, SimplificationReport
 
-__all__ = ["check_lines"]
+__all__ = ["check_lines", "duration"]
 
 _SHOWN = 5
 """Stones and places that are named if no more is asked for."""
@@ -52,6 +52,9 @@ def check_lines(report: "CheckReport", verbose: bool, explain: bool = False) -> 
             f"  {cost.pairs} touching pairs, {cost.contacts} contact points at the start",
             f"  {cost.unknowns} unknowns, about {max(1, round(cost.memory / 2**20))} MiB of arrays",
             f"  at most {cost.steps} steps of {cost.step:g} s",
+            f"  expected: {duration(cost.seconds[1])} of one processor ({duration(cost.seconds[0])} to "
+            f"{duration(cost.seconds[2])}; {duration(cost.longest)} if nothing comes to rest), "
+            f"{max(1, round(cost.peak / 2**20))} MiB in all",
         ]
     lines += [f"problem: {problem}" for problem in report.problems]
     if not report.problems:
@@ -163,6 +166,16 @@ def _shortened(lines: Sequence[str], verbose: bool) -> list[str]:
     if verbose or len(lines) <= _SHOWN:
         return list(lines)
     return [*lines[:_SHOWN], f"    and {len(lines) - _SHOWN} more, with -v"]
+
+
+def duration(seconds: float) -> str:
+    """A time in the unit in which one thinks of it, to two digits."""
+    value, unit = seconds, "s"
+    for step, longer in ((60.0, "min"), (60.0, "h"), (24.0, "days")):
+        if value < 2.0 * step:
+            break
+        value, unit = value / step, longer
+    return f"{value:.0f} {unit}" if value >= 10.0 else f"{value:.2g} {unit}"
 
 
 def _count(number: int, what: str) -> str:

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from archmodel.database import open_database
+from mechanics.cost import expected_cost, machine_slowness
 from mechanics.meshing.report import MeshReport
 from mechanics.plan import Plan, plan
 from mechanics.scene import Fidelity, Scene
@@ -109,9 +110,12 @@ class Cost:
     pairs : touching pairs of stones
     contacts : contact points at the start
     unknowns : velocities
-    memory : [bytes], estimated
+    memory : of the largest arrays [bytes], estimated
     steps : at most
     step : [s]
+    seconds : of one processor until the scene rests: low, likely and high, on this machine
+    longest : if it does not come to rest before its duration is over [s]
+    peak : memory of the whole program [bytes], estimated
     """
 
     pairs: int
@@ -120,6 +124,9 @@ class Cost:
     memory: int
     steps: int
     step: float
+    seconds: tuple[float, float, float]
+    longest: float
+    peak: int
 
 
 @dataclass(frozen=True)
@@ -356,6 +363,7 @@ def _some(codes: Sequence[str]) -> str:
 
 
 def _cost(needs: Plan, scene: Scene) -> Cost:
+    expected = expected_cost(needs, scene, machine_slowness())
     return Cost(
         pairs=len(needs.pairs),
         contacts=needs.contacts,
@@ -363,6 +371,9 @@ def _cost(needs: Plan, scene: Scene) -> Cost:
         memory=needs.memory,
         steps=max(1, round(scene.time.duration / scene.time.step)),
         step=scene.time.step,
+        seconds=expected.seconds,
+        longest=expected.longest,
+        peak=expected.memory,
     )
 
 

@@ -58,7 +58,9 @@ def overlaid(scene: SceneFile, overlay: Overlay, width: float) -> SceneFile:
     """
     # a scene's grading belongs to its own size
     sizes: dict[str, Any] = (
-        {} if overlay.cells is None else {"size": width / overlay.cells, "contact_size": None}
+        {}
+        if overlay.cells is None
+        else {"size": width / overlay.cells, "contact_size": None, "ring_size": None}
     )
     contact, time, solver = _settings(overlay)
     return replace(

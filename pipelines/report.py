@@ -39,7 +39,7 @@ _ERRORS = (
     ),
 )
 
-_GREY = "Rigid and fixed stones are grey: no stress was computed in them."
+_GREY = "Grey stones are fixed or rigid, or their stress was not asked for."
 _CAPTIONS = {
     "von_mises.png": "Von Mises stress on the stones' surface, in MPa. The scale ends at the stress that 1 % "
     f"of the volume exceeds, rounded up. {_GREY}",

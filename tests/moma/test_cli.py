@@ -212,6 +212,10 @@ def test_check_tells_the_plan(scene, database):
     assert plan["bodies"]["rigid"] + plan["bodies"]["fixed"] == sum(plan["kinds"].values())
     assert plan["cost"]["unknowns"] == 6 * plan["bodies"]["rigid"]
     assert plan["cost"]["contacts"] >= 3 * plan["bodies"]["rigid"]
+    low, likely, high = plan["cost"]["seconds"]
+    assert 0.0 < low <= likely <= high
+    assert plan["cost"]["peak"] > plan["cost"]["memory"] > 0
+    assert "of one processor" in text.stdout
     assert plan["joints"]["max_displacement"] < 0.1
     assert plan["problems"] == []
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from moma.errors import UsageError
-from moma.telling_checks import check_lines
+from moma.telling_checks import check_lines, duration
 from pipelines.check import check_scene
 from pipelines.closing_check import joints_report, simplification_report
 from pipelines.ingest import ingest
@@ -151,3 +151,18 @@ def test_pictures_and_the_report_lie_in_a_folder_of_their_own(scene, url, tmp_pa
     with pytest.raises(UsageError, match=r"notes\.txt"):
         check_scene(scene, url, folder)
     assert (folder / "notes.txt").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("seconds", "told"),
+    [
+        (0.123, "0.12 s"),
+        (9.96, "10 s"),
+        (100.0, "100 s"),
+        (121.0, "2 min"),
+        (7000.0, "117 min"),
+        (7300.0, "2 h"),
+    ],
+)
+def test_times_are_told_in_the_unit_in_which_one_thinks_of_them(seconds, told):
+    assert duration(seconds) == told
