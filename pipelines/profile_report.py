@@ -140,7 +140,8 @@ def measure(quantity: str, stress_error: float | None, free: float) -> float:
     free : part of the joints that statics leaves free: no error of a model changes the forces in the others
     """
     if stress_error is None:
-        return 1.0 if quantity in _MOVEMENTS else free
+        # of forces of which a part is arbitrary, the root mean square goes with the root of that part
+        return 1.0 if quantity in _MOVEMENTS else math.sqrt(free)
     return stress_error * (free if quantity in _FORCES else 1.0)
 
 

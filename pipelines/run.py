@@ -3,7 +3,7 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -141,8 +141,7 @@ def write_results(
         except MissingLibraryError as error:
             warnings.append(f"no pictures: {error}")
     progress(Progress("write", 2, 3, "report.html"))
-    told = None if profile is None else asdict(profile)
-    summary = summarise(result, version=version("moma-masonry"), seconds=seconds) | {"profile": told}
+    summary = summarise(result, version=version("moma-masonry"), seconds=seconds, profile=profile)
     write_report(folder / "report.html", result, summary, stones, warnings)
     (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
     summary["origin"] = assembly.origin.tolist()

@@ -11,13 +11,16 @@ import numpy as np
 from mechanics.contact_result import JointResult
 from mechanics.result import Result
 from mechanics.scene import Fidelity
+from pipelines.profile_report import ProfileReport
 from pipelines.quantities import quantities
 from pipelines.stone_values import stress_statistics
 
 __all__ = ["as_json", "summarise"]
 
 
-def summarise(result: Result, *, version: str, seconds: Mapping[str, float]) -> dict[str, Any]:
+def summarise(
+    result: Result, *, version: str, seconds: Mapping[str, float], profile: ProfileReport | None = None
+) -> dict[str, Any]:
     """The contents of summary.json, in SI units.
 
     Parameters
@@ -25,6 +28,7 @@ def summarise(result: Result, *, version: str, seconds: Mapping[str, float]) -> 
     result : of the simulation
     version : of MOMA
     seconds : wall time by stage, of the simulation and of what went before and after it [s]
+    profile : at which it ran
 
     Numbers that are not finite become None: JSON has no word for them.
     """
@@ -55,6 +59,7 @@ def summarise(result: Result, *, version: str, seconds: Mapping[str, float]) -> 
         "displacement": {"max": displacement},
         "settlement": {"max": float(result.history.settlement[-1])},
         "reaction": {"total_vertical": result.reaction, "weight": result.weight},
+        "profile": None if profile is None else asdict(profile),
         "version": version,
     }
     return {key: _finite(value) for key, value in summary.items()}
