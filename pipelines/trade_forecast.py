@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.scene import Fidelity
 from pipelines.trade_child import SHORT
 from pipelines.trade_grid import Setting
 from pipelines.trade_store import Measured, Status
@@ -14,7 +13,7 @@ from pipelines.trade_store import Measured, Status
 __all__ = ["Choice", "Forecast", "left_out", "next_run"]
 
 _USUAL_POWER = 1.5
-_POWERS = (1.0, 2.2)  # of the unknowns, by which time grows; sparse factors of walls and of solid masonry
+_POWERS = (1.0, 2.5)  # of the unknowns, by which time grows; sparse factors of walls and of solid masonry
 _MEMORY_POWER = 1.3
 _START = 3.0  # seconds: a process begins, and reads what it needs; until it has been measured
 _MODELS_SHARE = 0.7  # of the budget for models of the stones, before their variants take what is left
@@ -47,8 +46,9 @@ class Forecast:
         near = self._nearest(setting)
         if near is None:
             return None
-        grown: float = (setting.unknowns / self.settings[near.name].unknowns) ** self._power()
-        return start + _twice(grown * max(near.wall, 1e-3))
+        known = self.settings[near.name]
+        grown: float = (setting.unknowns / known.unknowns) ** self._power()
+        return start + _twice(grown * setting.effort / known.effort * max(near.wall, 1e-3))
 
     def memory(self, setting: Setting) -> float | None:
         """Expected memory of the process [bytes]."""
@@ -67,22 +67,26 @@ class Forecast:
         return max(float(np.median(spent)), 0.5) if spent else _START
 
     def _nearest(self, setting: Setting) -> Measured | None:
-        """The model of the same element, or else of any, whose number of unknowns is nearest."""
-        models = [
-            one
-            for one in self.ended.values()
-            if one.status is not Status.FAILED
-            and self.settings[one.name].varied is None
-            and (self._rigid(self.settings[one.name]) == self._rigid(setting))
-        ]
-        alike = [one for one in models if one.overlay.element is setting.overlay.element]
-        return min(alike or models, key=lambda one: self._apart(setting, one), default=None)
+        """The model of the same element, or else of any, whose number of unknowns is nearest.
+
+        One that was stopped says something of the same element with more unknowns only.
+        """
+        alike, others = [], []
+        for one in self.ended.values():
+            known = self.settings[one.name]
+            if known.varied is not None or (known.element is None) != (setting.element is None):
+                continue
+            if known.element is setting.element:
+                if one.status is Status.DONE or (
+                    one.status is Status.STOPPED and known.unknowns <= setting.unknowns
+                ):
+                    alike.append(one)
+            elif one.status is Status.DONE:
+                others.append(one)
+        return min(alike or others, key=lambda one: self._apart(setting, one), default=None)
 
     def _apart(self, setting: Setting, run: Measured) -> float:
         return abs(math.log(setting.unknowns / self.settings[run.name].unknowns))
-
-    def _rigid(self, setting: Setting) -> bool:
-        return setting.overlay.fidelity is Fidelity.RIGID
 
     def _power(self) -> float:
         """By which time grows with the unknowns, of elements of one kind with the other."""
@@ -93,7 +97,7 @@ class Forecast:
                 both = (
                     one.status is Status.DONE and other.status is Status.DONE and a.varied is b.varied is None
                 )
-                same = one.overlay.element is other.overlay.element is not None
+                same = a.element is b.element is not None
                 if both and same and b.unknowns > 1.5 * a.unknowns and one.wall > 0.0 and other.wall > 0.0:
                     slopes.append(math.log(other.wall / one.wall) / math.log(b.unknowns / a.unknowns))
         return float(np.clip(np.median(slopes), *_POWERS)) if slopes else _USUAL_POWER
@@ -169,7 +173,7 @@ def _refusal(forecast: Forecast, setting: Setting, left: float, memory: float) -
 
 def _order(forecast: Forecast, setting: Setting) -> tuple[float, float]:
     expected = forecast.seconds(setting)
-    return (0.0 if expected is None else expected, setting.unknowns)
+    return (0.0 if expected is None else expected, setting.effort * setting.unknowns)
 
 
 def _patience(expected: float | None, budget: float) -> float:

@@ -25,6 +25,9 @@ _CELLS = {
 
 _RIGID = Overlay(fidelity=Fidelity.RIGID)
 _PLAIN = (Overlay(), _RIGID)
+_LINEAR = (
+    4.0  # times as long as elements of the second order: with them contacts take more iterations to find
+)
 _LOOSER, _TIGHTER = 100.0, 0.01
 _PROFILE = "profile"  # the first word of their names
 _LOOSEST = 1e-2  # of a tolerance: beyond it, contacts do not obey their laws at all
@@ -44,7 +47,8 @@ class Setting:
         smallest width of the stones; infinite without finite elements [-]
     step, tolerance, points : of the run, changed or not [s], [-], [-]
     varied : the setting of which this one changes one thing more; None of those that change the model of the stones
-    effort : expected time over that of `varied` [-]
+    effort : expected time over that of `varied`; of models, over that of one with as many unknowns that are velocities
+        of rigid stones or of finite elements of the second order [-]
     """
 
     name: str
@@ -129,7 +133,7 @@ def _models(scene: SceneFile, moving: Sequence[Block], width: float, stress: boo
             meshes = [replace(plain, element=element, cells=float(cells)) for cells in counts]
             found += [_model(scene, one, moving, soft, width) for one in meshes]
     found += _profiles(scene, moving, () if plain is all_soft else soft, width)
-    return sorted(found, key=lambda one: one.unknowns)
+    return sorted(found, key=lambda one: one.effort * one.unknowns)
 
 
 def _profiles(
@@ -202,6 +206,7 @@ def _model(
         step=overlay.step or scene.time.step,
         tolerance=overlay.tolerance or scene.solver.tolerance,
         points=overlay.points or scene.contact.points,
+        effort=_LINEAR if soft and element.order == 1 else 1.0,
     )
 
 
