@@ -13,6 +13,7 @@ from mechanics.solvers.elastic import Elastic
 from mechanics.solvers.interior_point import InteriorPoint
 from mechanics.solvers.newton import Newton
 from mechanics.solvers.nsgs import NSGS
+from moma.errors import SolverError
 
 __all__ = ["Solver", "choose_planar_solver", "choose_solver"]
 
@@ -52,7 +53,17 @@ def choose_planar_solver(settings: SolverSettings) -> Solver:
     """The same for disks of the plane; *auto* sweeps.
 
     A sweep over disks costs a tenth of an iteration of ADMM: where they flow, many sweeps are the cheaper way.
+
+    Raises
+    ------
+    SolverError : if the method is one for three dimensions alone
     """
+    if settings.method == Method.INTERIOR_POINT:
+        raise SolverError(
+            "the method interior-point is for three dimensions",
+            where="planar scene",
+            remedy='use "newton" or "cone"',
+        )
     limits = settings.tolerance, settings.velocity_tolerance, settings.max_iterations
     if settings.method == Method.AUTO:
         return NSGS(*limits)
