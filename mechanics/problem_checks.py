@@ -66,7 +66,13 @@ def check_problem(diagonal: Array, u_free: Array, **each: Array | None) -> None:
 
 def check_compliance(diagonal: Array) -> None:
     """Refuse contacts that do not give way (nc, d, d), or by no number."""
-    require_finite(W=diagonal)
+    sound = np.isfinite(diagonal).all(axis=(1, 2))
+    if not sound.all():
+        raise SolverError(
+            f"W of contact {int(np.argmin(sound))} is not finite",
+            where=_WHERE,
+            remedy="correct its bodies: masses and moments of inertia greater than 0, places that are numbers",
+        )
     own = np.einsum("cii->ci", diagonal)
     if not (own > 0).all():
         contact, axis = (int(i) for i in np.argwhere(~(own > 0))[0])

@@ -1,0 +1,1 @@
+"""Numerical stability at the extremes: every method on every row of a matrix, judged from outside."""

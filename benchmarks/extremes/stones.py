@@ -1,0 +1,158 @@
+"""Stones of the matrix, their scenes, and the contact problem of a scene's first step."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.laws.dry_joint import DryJoint
+from mechanics.laws.law import Law
+from mechanics.materials import Material
+from mechanics.meshing.elements import Element
+from mechanics.model import build_model
+from mechanics.problem import ContactProblem, ContactSolution, ContactStart
+from mechanics.scene import Block, ContactSettings, Fidelity, Scene, TimeSettings
+from mechanics.simulation import Clock, Simulation
+
+__all__ = [
+    "G",
+    "box",
+    "column",
+    "elastic_column",
+    "first_problem",
+    "ground",
+    "moved",
+    "slabs",
+    "standing",
+    "volume",
+    "wall",
+]
+
+Array = NDArray[np.float64]
+
+G = 9.81
+_FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
+_CORNERS = np.array(
+    [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], dtype=float
+)
+
+
+def box(
+    code: str,
+    low: Sequence[float],
+    high: Sequence[float],
+    density: float = 2400.0,
+    fidelity: Fidelity = Fidelity.RIGID,
+    young: float = 1e9,
+    mesh_size: float | None = None,
+) -> Block:
+    """An axis-parallel stone from corner `low` (3,) to corner `high` (3,) [m]."""
+    first, last = np.array(low, dtype=float), np.array(high, dtype=float)
+    material = Material(f"{code}'s", density, young, 0.2)
+    return Block(code, first + _CORNERS * (last - first), _FACES, material, fidelity, mesh_size, Element.HEX8)
+
+
+def ground(half: float = 5.0, depth: float = 1.0) -> Block:
+    """A fixed stone whose top is z = 0."""
+    return box("ground", [-half, -half, -depth], [half, half, 0.0], fidelity=Fidelity.FIXED)
+
+
+def column(count: int, ratio: float = 1.0, size: float = 1.0) -> tuple[Block, ...]:
+    """Equal stones on the ground; the topmost is `ratio` times as heavy as the lowest, in equal steps."""
+    wide, high = 0.5 * size, 0.25 * size
+    heavy = 2400.0 * ratio ** (np.arange(count) / max(count - 1, 1))
+    stones = (
+        box(f"B{i}", [0, 0, i * high], [wide, wide, (i + 1) * high], float(heavy[i])) for i in range(count)
+    )
+    return (ground(5.0 * size, size), *stones)
+
+
+def wall(columns: int, courses: int) -> tuple[Block, ...]:
+    """Bricks of 0.3 m × 0.15 m × 0.1 m in running bond on the ground."""
+    blocks = [ground()]
+    for row in range(courses):
+        ends = [*range(columns + 1)] if row % 2 == 0 else [0, *(np.arange(columns) + 0.5), columns]
+        blocks += [
+            box(f"{row}-{k}", [0.3 * a, 0, 0.1 * row], [0.3 * b, 0.15, 0.1 * (row + 1)])
+            for k, (a, b) in enumerate(pairwise(ends))
+        ]
+    return tuple(blocks)
+
+
+def slabs(count: int) -> tuple[Block, ...]:
+    """Slabs of 1 m × 1 m × 1 cm on each other, each turned by 17° against the one below."""
+    blocks = [ground()]
+    for i in range(count):
+        co, si = np.cos(np.radians(17.0 * i)), np.sin(np.radians(17.0 * i))
+        one = box(f"S{i}", [-0.5, -0.5, 0.01 * i], [0.5, 0.5, 0.01 * (i + 1)])
+        corners = one.vertices.copy()
+        corners[:, :2] = corners[:, :2] @ np.array([[co, si], [-si, co]])
+        blocks.append(replace(one, vertices=corners))
+    return tuple(blocks)
+
+
+def elastic_column(young: float, size: float = 1.0, density: float = 2000.0) -> tuple[Block, ...]:
+    """Two deformable stones on the ground, 0.4 m wide and 0.3 m high, times a size."""
+    half, high = 0.2 * size, 0.3 * size
+    return (
+        ground(size, size),
+        *(
+            box(
+                f"E{i}",
+                [-half, -half, high * i],
+                [half, half, high * (i + 1)],
+                density,
+                Fidelity.DEFORMABLE,
+                young,
+                half,
+            )
+            for i in range(2)
+        ),
+    )
+
+
+def moved(blocks: Sequence[Block], shift: Sequence[float]) -> tuple[Block, ...]:
+    """All stones, shifted (3,) [m]."""
+    return tuple(replace(block, vertices=block.vertices + np.array(shift)) for block in blocks)
+
+
+def volume(block: Block) -> float:
+    """Of a parallelepiped whose first corner is joined to corners 1, 3 and 4 [m³]."""
+    return float(abs(np.linalg.det(block.vertices[[1, 3, 4]] - block.vertices[0])))
+
+
+def standing(
+    blocks: Sequence[Block],
+    *,
+    friction: float = 0.6,
+    slope: float = 0.0,
+    law: Law | None = None,
+    steps: int = 20,
+    **time: Any,
+) -> Scene:
+    """A scene under its weight, that ends when it rests; `slope` tilts gravity about y [°]."""
+    angle = np.radians(slope)
+    settings = TimeSettings(**{"step": 2e-3, "theta": 1.0} | time)
+    return Scene(
+        "extreme",
+        tuple(blocks),
+        gravity=(G * float(np.sin(angle)), 0.0, -G * float(np.cos(angle))),
+        contact=ContactSettings(law or DryJoint(friction)),
+        time=replace(settings, duration=steps * settings.step),
+    )
+
+
+def first_problem(scene: Scene) -> ContactProblem:
+    """The contact problem of the first step of a scene."""
+    taken: list[ContactProblem] = []
+
+    def take(problem: ContactProblem, start: ContactStart) -> ContactSolution:
+        taken.append(problem)
+        return ContactSolution(start.impulse, start.velocity, 0, 0.0, True)
+
+    model, start = build_model(scene)
+    Simulation(model, start, Clock(), take).step()
+    return taken[0]
