@@ -18,7 +18,7 @@ from mechanics.operators.stored import StoredDelassus
 from mechanics.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.residual import project_on_cone
 from mechanics.solvers.admm import ADMM
-from mechanics.solvers.alternating import Alternating
+from mechanics.solvers.auto import Auto
 from mechanics.solvers.nsgs import NSGS
 from moma.errors import UsageError
 
@@ -26,7 +26,7 @@ __all__ = ["main", "read_problem", "siconos_error"]
 
 Array = NDArray[np.float64]
 
-_SOLVERS = {"auto": Alternating, "nsgs": NSGS, "admm": ADMM}
+_SOLVERS = {"auto": Auto, "nsgs": NSGS, "admm": ADMM}
 # η begins at this, or at the tolerance times that, and goes down by this factor, to rounding at most
 _LOOSEST, _LOOSER, _TIGHTER, _SMALLEST = 1e-2, 1e5, 10.0, 1e-14
 # solves between an η that suffices and one that does not

@@ -6,10 +6,10 @@ from typing import Protocol
 from mechanics.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.scene import Method, SolverSettings
 from mechanics.solvers.admm import ADMM
-from mechanics.solvers.alternating import Alternating, moving_admm
+from mechanics.solvers.alternating import moving_admm
 from mechanics.solvers.apgd import APGD
+from mechanics.solvers.auto import Auto
 from mechanics.solvers.cone_program import ConeProgram
-from mechanics.solvers.elastic import Elastic
 from mechanics.solvers.interior_point import InteriorPoint
 from mechanics.solvers.newton import Newton
 from mechanics.solvers.nsgs import NSGS
@@ -36,17 +36,13 @@ _EVERYWHERE: Mapping[Method, Callable[[float, float, int], Solver]] = {
 
 
 def choose_solver(settings: SolverSettings, deformable: bool) -> Solver:
-    """The solver that the settings ask for; *auto* never sweeps where a body is deformable.
-
-    Deformable bodies make Gauss–Seidel slow: their contacts are many, and each is far stiffer than the stone is
-    heavy.
-    """
+    """The solver that the settings ask for."""
     limits = settings.tolerance, settings.velocity_tolerance, settings.max_iterations
     if settings.method in _EVERYWHERE:
         return _EVERYWHERE[settings.method](*limits)
     if settings.method == Method.ADMM:
         return ADMM(*limits) if deformable else moving_admm(*limits)
-    return Elastic(*limits) if deformable else Alternating(*limits)
+    return Auto(*limits)
 
 
 def choose_planar_solver(settings: SolverSettings) -> Solver:
