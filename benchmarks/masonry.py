@@ -12,7 +12,18 @@ from numpy.typing import NDArray
 from mechanics.materials import Material
 from mechanics.scene import Block, Fidelity
 
-__all__ = ["arch_on", "box", "column", "courses", "pier", "running_bond", "semicircular_arch", "two_spans"]
+__all__ = [
+    "arch_on",
+    "box",
+    "column",
+    "courses",
+    "flying_arch",
+    "pier",
+    "running_bond",
+    "semicircular_arch",
+    "trilith",
+    "two_spans",
+]
 
 Array = NDArray[np.float64]
 # a sound limestone
@@ -105,7 +116,10 @@ def arch_on(
 
 
 def two_spans() -> tuple[Block, ...]:
-    """Two segmental arches of seven voussoirs over 1.5 m on a pier and two abutments, each of three courses."""
+    """Two segmental arches of seven voussoirs over 1.5 m on a pier and two abutments, each of three courses.
+
+    The lowest course is fixed.
+    """
     centre, low, high = 1.2, np.radians(40.0), np.radians(140.0)
     (x0, z0), (x1, z1) = ((r * np.cos(low), r * np.sin(low)) for r in (1.0, 1.3))
     inner, outer, edge = centre + x0, centre + x1, centre + x0 + 0.9
@@ -119,30 +133,62 @@ def two_spans() -> tuple[Block, ...]:
     ]
     for name, a, b in (("P", -at, at), ("R", inner, edge), ("L", -edge, -inner)):
         stones += [
-            box(f"{name}{k + 1}", (a, -0.15, 0.4 * k - 0.5), (b, 0.15, 0.4 * k - 0.1)) for k in range(2)
+            box(f"{name}1", (a, -0.15, -0.5), (b, 0.15, -0.1), Fidelity.FIXED),
+            box(f"{name}2", (a, -0.15, -0.1), (b, 0.15, 0.3)),
         ]
-    base = box("base", (-edge, -0.15, -0.9), (edge, 0.15, -0.5), Fidelity.FIXED)
     spans = (
         arch_on(name, (x, 0.0), (1.0, 1.3), (float(low), float(high)), 7, 0.3)
         for name, x in (("A", -centre), ("B", centre))
     )
-    return (base, *stones, *(stone for span in spans for stone in span))
+    return (*stones, *(stone for span in spans for stone in span))
 
 
 def pier(rows: int = 6) -> tuple[Block, ...]:
-    """Courses of two stones that cross those below, a slab on them, and a stone in one corner of it."""
+    """Courses of two stones that cross those below, a slab on them, and a stone in one corner of it.
+
+    The lowest course is fixed.
+    """
     wide, height = 0.8, 0.35
-    stones = [box("base", (0, 0, -0.3), (wide, wide, 0), Fidelity.FIXED)]
+    stones: list[Block] = []
     for row in range(rows):
         for k in (0, 1):
             x = (0.0, wide) if row % 2 else (k * wide / 2, (k + 1) * wide / 2)
             y = (k * wide / 2, (k + 1) * wide / 2) if row % 2 else (0.0, wide)
-            stones.append(
-                box(f"{row + 1}-{k + 1}", (x[0], y[0], row * height), (x[1], y[1], (row + 1) * height))
-            )
+            low, high = (x[0], y[0], row * height), (x[1], y[1], (row + 1) * height)
+            fidelity = Fidelity.RIGID if row else Fidelity.FIXED
+            stones.append(box(f"{row + 1}-{k + 1}", low, high, fidelity))
     top = rows * height
     stones.append(box("slab", (0, 0, top), (wide, wide, top + 0.25)))
     return (*stones, box("load", (0.05, 0.1, top + 0.25), (0.55, 0.5, top + 0.85)))
+
+
+def flying_arch() -> tuple[Block, ...]:
+    """Six voussoirs of a sixth of a circle that lean from a fixed foot against a wall of three stones with a coping."""
+    low, high, centre = float(np.radians(30.0)), float(np.radians(90.0)), (0.0, 0.0)
+    on = [(r * np.cos(low), r * np.sin(low)) for r in (1.5, 1.8)]
+    (x0, z0), (x1, z1) = on
+    foot = prism(
+        "foot",
+        [(x0, z0 - 0.4), (x1 + 0.3, z0 - 0.4), (x1 + 0.3, z1), (x1, z1), (x0, z0)],
+        0.3,
+        Fidelity.FIXED,
+    )
+    wall = [box("wall 1", (-1.0, -0.2, 0.7), (0.0, 0.2, 1.1), Fidelity.FIXED)]
+    wall += [box(f"wall {k + 2}", (-1.0, -0.2, 1.1 + 0.4 * k), (0.0, 0.2, 1.5 + 0.4 * k)) for k in range(2)]
+    coping = box("coping", (-1.0, -0.2, 1.9), (-0.1, 0.2, 2.2))
+    return (foot, *wall, coping, *arch_on("V", centre, (1.5, 1.8), (low, high), 6, 0.3))
+
+
+def trilith() -> tuple[Block, ...]:
+    """Two posts of two stones each, of which the lower is fixed, a lintel on them, and a stone on one half of it."""
+    stones = []
+    for name, x in (("L", 0.0), ("R", 1.5)):
+        stones += [
+            box(f"{name}1", (x, 0, 0), (x + 0.45, 0.4, 0.6), Fidelity.FIXED),
+            box(f"{name}2", (x, 0, 0.6), (x + 0.45, 0.4, 1.3)),
+        ]
+    lintel = box("lintel", (-0.1, 0, 1.3), (2.05, 0.4, 1.7))
+    return (*stones, lintel, box("load", (0.3, 0.05, 1.7), (0.9, 0.35, 2.2)))
 
 
 def column(

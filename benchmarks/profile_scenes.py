@@ -2,7 +2,16 @@
 
 from collections.abc import Callable, Mapping
 
-from benchmarks.masonry import column, courses, pier, running_bond, semicircular_arch, two_spans
+from benchmarks.masonry import (
+    column,
+    courses,
+    flying_arch,
+    pier,
+    running_bond,
+    semicircular_arch,
+    trilith,
+    two_spans,
+)
 from mechanics.laws.dry_joint import DryJoint
 from mechanics.scene import Block, ContactSettings, Scene, Start, TimeSettings
 
@@ -39,6 +48,8 @@ REFERENCE: Mapping[str, Callable[[], Scene]] = {
     ),
     "pier": lambda: _scene("pier", pier()),
     "two spans": lambda: _scene("two spans", two_spans()),
+    "flying arch": lambda: _scene("flying arch", flying_arch()),
+    "trilith": lambda: _scene("trilith", trilith()),
     "pinnacle": lambda: _scene("pinnacle", column(4, 0.7, 0.35, 0.45, sides=6), 0.08),
 }
 """Those that the estimates were fitted to."""

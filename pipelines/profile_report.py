@@ -27,10 +27,11 @@ __all__ = [
     "profile_report",
 ]
 
-TYPICAL = ("stone_von_mises_mean", "stone_von_mises_p99", "joint_forces")
+TYPICAL = ("stone_von_mises_p99", "joint_forces")
 """Quantities of many stones or joints, in the mean of which chance has little part: a typical error is told."""
 
 BOUNDS = (
+    "stone_von_mises_mean",
     "von_mises_mean",
     "von_mises_p99",
     "support_reactions",
