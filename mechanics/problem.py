@@ -67,11 +67,16 @@ class Delassus(Protocol):
 
 
 def scale_of(delassus: Delassus) -> float:
-    """What u over r is measured against [1/kg]: the mean diagonal of W, if the operator does not say otherwise."""
+    """What u over r is measured against [1/kg]: the mean diagonal of W, if the operator does not say otherwise.
+
+    1 without contacts.
+    """
     given = getattr(delassus, "scale", None)
     if given is not None:
         return float(given)
     diagonal = delassus.diagonal
+    if len(diagonal) == 0:
+        return 1.0
     return float(np.einsum("cii->", diagonal) / (len(diagonal) * diagonal.shape[1]))
 
 
