@@ -360,8 +360,10 @@ class Simulation:
 
     def _relax(self, after: State) -> tuple[State, float]:
         """Kinetic damping: bring all bodies to a halt once their kinetic energy has passed a peak (Cundall 1976)."""
+        if not self.model.scene.time.relaxation:
+            return after, 0.0
         kinetic, last = kinetic_energy(self.model, after), self._kinetic
-        if not self.model.scene.time.relaxation or kinetic >= last:
+        if kinetic >= last:
             self._kinetic = kinetic
             return after, 0.0
         self._kinetic = 0.0

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from mechanics.contact.contacts import Contacts, material_points
 from mechanics.model import Model
+from mechanics.observers._kernels import largest_displacement, largest_speed
 from mechanics.state import State
 
 __all__ = [
@@ -128,24 +129,21 @@ def seen_from_supports(model: Model, start: State, state: State) -> State:
 
 def displacement(model: Model, start: State, state: State) -> Array:
     """Largest displacement of a corner or node of each body since `start` (nb,) [m]."""
-    corner = model.surfaces.body_of_vertex
-    moved = np.einsum("vij,vj->vi", (state.rotation - start.rotation)[corner], model.surfaces.vertex)
-    moved += (state.centre - start.centre)[corner]
-    largest = np.maximum.reduceat(np.linalg.norm(moved, axis=1), model.surfaces.body_vptr[:-1])
+    own = model.surfaces
+    largest = largest_displacement(
+        own.body_vptr, own.vertex, state.centre, state.rotation, start.centre, start.rotation
+    )
     return _with_nodes(model, largest, np.linalg.norm(state.node - start.node, axis=1))
 
 
 def speed(model: Model, state: State) -> Array:
     """Largest speed of a corner or node of each body (nb,) [m/s]."""
-    corner = model.surfaces.body_of_vertex
-    arm = np.einsum("vij,vj->vi", state.rotation[corner], model.surfaces.vertex)
-    v = state.velocity[corner, :3] + np.cross(state.velocity[corner, 3:], arm)
-    largest = np.maximum.reduceat(np.linalg.norm(v, axis=1), model.surfaces.body_vptr[:-1])
+    own = model.surfaces
+    largest = largest_speed(own.body_vptr, own.vertex, state.rotation, state.velocity)
     return _with_nodes(model, largest, np.linalg.norm(state.node_velocity, axis=1))
 
 
 def _with_nodes(model: Model, largest: Array, of_nodes: Array) -> Array:
-    for b, stone in enumerate(model.stones):
-        if stone is not None:
-            largest[b] = of_nodes[model.nodes_of(b)].max()
+    for group in model.elastic_stones.groups:
+        largest[group.bodies] = of_nodes[group.nodes].max(axis=1)
     return largest
