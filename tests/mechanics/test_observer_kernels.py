@@ -1,5 +1,7 @@
 """How far and how fast corners are: the kernels beside readable numpy."""
 
+import itertools
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -18,7 +20,7 @@ def test_displacement_is_that_of_the_corner_that_went_farthest():
     corner, centre, turn, centre_then, turn_then = bodies(1)
     expected = [
         np.linalg.norm(corner[a:b] @ (turn[k] - turn_then[k]).T + centre[k] - centre_then[k], axis=1).max()
-        for k, (a, b) in enumerate(zip(FIRST, FIRST[1:], strict=False))
+        for k, (a, b) in enumerate(itertools.pairwise(FIRST))
     ]
     found = largest_displacement(FIRST, corner, centre, turn, centre_then, turn_then)
     np.testing.assert_allclose(found, expected, rtol=1e-13)
@@ -30,7 +32,7 @@ def test_speed_is_that_of_the_fastest_corner():
     velocity[1] = 0.0
     expected = [
         np.linalg.norm(velocity[k, :3] + np.cross(velocity[k, 3:], corner[a:b] @ turn[k].T), axis=1).max()
-        for k, (a, b) in enumerate(zip(FIRST, FIRST[1:], strict=False))
+        for k, (a, b) in enumerate(itertools.pairwise(FIRST))
     ]
     found = largest_speed(FIRST, corner, turn, velocity)
     np.testing.assert_allclose(found, expected, rtol=1e-13)
