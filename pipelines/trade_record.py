@@ -67,7 +67,7 @@ def study_record(goal: Goal, forecast: Forecast, left: float, limits: Limits) ->
             reason = left_out(forecast, setting, left, limits.memory / limits.jobs)
             run = Measured(name, setting.overlay, Status.NOT_BEGUN, 0.0, limits.budget, reason)
         if run.status is not Status.DONE:
-            rows.append(_row(Judged(run, dict.fromkeys(QUANTITIES))) | {"front": False})
+            rows.append(_row(Judged(run, {})) | {"front": False})
     return {
         "scene": goal.scene,
         "version": version("moma-masonry"),

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from moma.cli.options import DEFAULT_DB, Db, Json, SceneArgument, Verbose
-from moma.console import progress_bars, reporting
+from moma.console import progress_bars, reporting, say
 
 __all__ = ["trade"]
 
@@ -48,8 +48,13 @@ def trade(
     from pipelines.trade import Asked, run_trade
 
     asked = Asked(60.0 * budget, jobs, error, of)
-    with progress_bars() as listener:
-        done = run_trade(scene, db, out or Path("out") / f"{scene.stem}-trade", asked, listener)
+    folder = out or Path("out") / f"{scene.stem}-trade"
+    try:
+        with progress_bars() as listener:
+            done = run_trade(scene, db, folder, asked, listener)
+    except KeyboardInterrupt:
+        say(f"stopped; what has ended is kept in {folder}, and the same command goes on from there")
+        raise typer.Exit(1) from None
     print(as_json(done.record) if json else "\n".join(trade_lines(done, verbose)))
     if done.record["reference"] is None:
         raise typer.Exit(1)
