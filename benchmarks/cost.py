@@ -32,23 +32,35 @@ _FIT = (
     *(Case("wall", n) for n in (50, 500, 2000)),
     *(Case("pillars", n) for n in (60, 600)),
     *(Case("leaves", n) for n in (60, 150)),
+    *(Case("portals", n) for n in (40, 250)),
+    *(Case("vault", n) for n in (60, 240)),
     *(Case("wall", n, mode="relaxation") for n in (100, 1000)),
-    *(Case(kind, n, mode="relaxation") for kind, n in (("leaves", 100), ("pillars", 240))),
-    *(Case("wall", n, mode="motion") for n in (100, 1000)),
-    *(Case(kind, n, mode="motion") for kind, n in (("leaves", 100), ("pillars", 240))),
+    *(
+        Case(kind, n, mode="relaxation")
+        for kind, n in (("leaves", 100), ("pillars", 240), ("portals", 100), ("vault", 120))
+    ),
+    *(Case("wall", n, mode="motion") for n in (100, 800)),
+    *(
+        Case(kind, n, mode="motion")
+        for kind, n in (("leaves", 100), ("pillars", 240), ("portals", 100), ("vault", 120))
+    ),
     Case("pillars", 24, "hex8"),
     Case("pillars", 60, "tet10", 0.2),
     Case("wall", 30, "hex8"),
     Case("wall", 30, "tet10"),
     Case("wall", 20, "hex8", 0.08),
-    Case("wall", 100, "tet4", 0.2),
+    Case("wall", 80, "tet4", 0.2),
     Case("leaves", 30, "hex8", 0.2),
+    Case("portals", 30, "tet4", 0.2),
+    Case("vault", 30, "hex8", 0.25),
     Case("pillars", 24, "tet4", 0.12, "relaxation"),
     Case("wall", 30, "hex8", mode="relaxation"),
     Case("wall", 60, "tet4", 0.2, "relaxation"),
     Case("wall", 20, "tet10", 0.2, "relaxation"),
+    Case("vault", 30, "tet4", 0.3, "relaxation"),
     Case("wall", 20, "hex8", mode="motion"),
     Case("wall", 30, "tet4", 0.2, "motion"),
+    Case("pillars", 24, "hex8", mode="motion"),
 )
 _TRY = (
     *(Case("arch", n) for n in (50, 500)),

@@ -28,7 +28,7 @@ class Case:
 
     Attributes
     ----------
-    kind : wall, leaves, pillars, arch, opening or column
+    kind : a name among `KINDS`
     stones : about how many
     element : of deformable stones; empty: rigid ones
     size : of the mesh [m]
@@ -128,6 +128,43 @@ def _pillars(stones: int) -> list[tuple[Array, bool]]:
     return [_ground(2 * count * length, depth), *drums]
 
 
+def _portals(stones: int) -> list[tuple[Array, bool]]:
+    """Storeys of pillars of three drums, with lintels from the middle of one to that of the next."""
+    count = max(2, round(np.sqrt(stones / 3)))
+    storeys = max(1, round(stones / (4 * count - 1)))
+    length, depth, height = _BRICK
+    solids = [_ground(3 * count * length, depth)]
+    for storey in range(storeys):
+        foot = 4 * storey * height
+        for k in range(count):
+            left, middle = 3 * k * length, (3 * k + 0.5) * length
+            solids += [
+                (_box((left, 0.0, foot + i * height), (left + length, depth, foot + (i + 1) * height)), False)
+                for i in range(3)
+            ]
+            if k + 1 < count:
+                # the outer ones lie on the whole of their pillar
+                start = left if k == 0 else middle
+                end = middle + 3 * length + (0.5 * length if k + 2 == count else 0.0)
+                top = foot + 3 * height
+                solids.append((_box((start, 0.0, top), (end, depth, top + height)), False))
+    return solids
+
+
+def _vault(stones: int) -> list[tuple[Array, bool]]:
+    """A barrel vault: rings of 15 stones that touch each other, every other turned by half a stone."""
+    count, solids = max(1, round(stones / 15)), []
+    for k in range(count):
+        cuts = [-0.2, *np.pi * np.arange(16) / 15, np.pi + 0.2]
+        if k % 2:
+            cuts = [-0.2, 0.0, *np.pi * (np.arange(15) + 0.5) / 15, np.pi, np.pi + 0.2]
+        solids += [
+            (_voussoir(a, b, 0.5 * k, (2.2, 2.7)), i in (0, len(cuts) - 2))
+            for i, (a, b) in enumerate(pairwise(cuts))
+        ]
+    return solids
+
+
 def _arch(stones: int) -> list[tuple[Array, bool]]:
     """Semicircular arches of 25 voussoirs, each on its own springers, thickness 0.2 of the mean radius."""
     count = max(1, round(stones / 25))
@@ -140,8 +177,8 @@ def _arch(stones: int) -> list[tuple[Array, bool]]:
     return solids
 
 
-def _voussoir(start: float, end: float, y: float) -> Array:
-    inner, outer = 1.8, 2.2
+def _voussoir(start: float, end: float, y: float, radii: tuple[float, float] = (1.8, 2.2)) -> Array:
+    inner, outer = radii
     rays = [(inner, end), (inner, start), (outer, end), (outer, start)]
     places = np.array([[r * np.cos(a), r * np.sin(a)] for r, a in rays])
     # bit 0 from end to start, bit 1 along y, bit 2 outwards
@@ -193,6 +230,8 @@ KINDS: Mapping[str, Callable[[int], list[tuple[Array, bool]]]] = {
     "wall": _wall,
     "leaves": _leaves,
     "pillars": _pillars,
+    "portals": _portals,
+    "vault": _vault,
     "arch": _arch,
     "opening": _opening,
     "column": _column,

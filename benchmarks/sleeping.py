@@ -169,8 +169,8 @@ def _cuboid(
 
 def _long_wall() -> Scene:
     """A stone is thrown across the face of a long wall, at its end."""
-    shot = _cuboid("shot", (0.1, -0.5, 0.42), (0.25, -0.35, 0.57), (0.0, 6.0, 0.5, 0.0, 0.0, 0.0))
-    return _scene("long wall", [*_wall(80, 6), shot], 0.6)
+    shot = _cuboid("shot", (0.1, -0.5, 0.32), (0.25, -0.35, 0.47), (0.0, 6.0, 0.5, 0.0, 0.0, 0.0))
+    return _scene("long wall", [*_wall(60, 5), shot], 0.4)
 
 
 def _pile() -> Scene:
@@ -184,7 +184,7 @@ def _pile() -> Scene:
         Fidelity.FIXED,
     )
     cubes = []
-    for n in range(24):
+    for n in range(12):
         at = np.array([4.0 * (n % 2), 0.0, 0.05 + 0.32 * (n // 2) % 2.0]) + 0.6 * rng.uniform(-1, 1, 3) * [
             1,
             1,
@@ -192,14 +192,14 @@ def _pile() -> Scene:
         ]
         at[2] += 0.4 * (n // 2 // 6)
         cubes.append(_cuboid(f"c{n}", tuple(at), tuple(at + 0.25)))
-    return _scene("pile", [ground, *cubes], 1.2)
+    return _scene("pile", [ground, *cubes], 0.8)
 
 
 def _pulse() -> Scene:
     """The ground of a wall moves to and fro once, and rests."""
     rate = History(np.array([0.0, 0.05, 0.15, 0.2]), np.outer([0.0, 0.3, -0.3, 0.0], [0.3, 1.0, 0.0]))
     motion = ImposedMotion(frozenset({"b0"}), rate)
-    return _scene("pulse", _wall(8, 6), 0.8, Loads(motions=(motion,)))
+    return _scene("pulse", _wall(6, 5), 0.6, Loads(motions=(motion,)))
 
 
 SCENES: Mapping[str, Callable[[], Scene]] = {"long wall": _long_wall, "pile": _pile, "pulse": _pulse}
