@@ -35,10 +35,10 @@ _GAP, _KAPPA = 1e-12, 1e-14
 # past shifts from which the next one is extrapolated
 _DEPTH = 5
 # η at which Newton's method may end it, and how much smaller it must have become before that is tried again
-_NEAR, _NEARER = 3e-2, 0.3
+_NEAR, _NEARER = 0.1, 0.7
 _NEWTON_STEPS = 40
 # programmes in a row that gain nothing, after which rounding has won
-_IN_VAIN = 12
+_IN_VAIN = 30
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class ConeProgram:
         if best.converged:
             return best
         programme, shifts = _Programme(problem), Anderson(_DEPTH)
-        shift, asked, vain = _shift(problem, start.impulse), _NEAR, 0
+        shift, asked, vain, last, bold = _shift(problem, start.impulse), _NEAR, 0, np.inf, True
         while not best.converged and vain < _IN_VAIN and programme.iterations < self.max_iterations:
             r = programme(shift, self.max_iterations - programme.iterations)
             found, vain = self._judged(problem, r), vain + 1
@@ -85,8 +85,10 @@ class ConeProgram:
                 programme.iterations += ended.iterations
                 best = ended if ended.natural_map < best.natural_map else best
             image = _shift(problem, r)
-            next_shift = shifts(shift, image)
-            shift = image if next_shift is None else np.maximum(next_shift, 0.0)
+            # where friction is much, extrapolations lead astray
+            bold = bold and found.natural_map <= last
+            bolder = shifts(shift, image) if bold else None
+            shift, last = image if bolder is None else np.maximum(bolder, 0.0), found.natural_map
         return replace(best, iterations=programme.iterations)
 
     def _judged(self, problem: ContactProblem, impulse: Array) -> ContactSolution:
