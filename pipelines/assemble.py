@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session
 from mechanics.meshing.choice import Mesher
 from mechanics.meshing.elements import Element
 from mechanics.scene import Block, Fidelity, Part, Scene
-from pipelines.effects import without_effect
+from pipelines.effects import remarks
 from pipelines.fidelity import Modelled, Wishes, modelled, neighbours
 from pipelines.joint_laws import law_rules
 from pipelines.local_frame import entry_about, local_origin, stone_about
@@ -45,7 +45,7 @@ class Assembly:
     closing : what became of their joints
     towards : (3,) mean normal of the faces, from the wall to the observer [-]
     origin : (3,) of the scene, in the frame of the site [m]
-    idle : what the scene says that has no effect
+    remarks : what the scene says that has no effect, and how far its stresses reach
     """
 
     scene: Scene
@@ -55,7 +55,7 @@ class Assembly:
     closing: ClosingReport
     towards: Array
     origin: Array
-    idle: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
 
 
 def assemble(scene: SceneFile, session: Session) -> Assembly:
@@ -90,7 +90,7 @@ def assemble_stones(scene: SceneFile, models: tuple[StoneModel, ...], groups: Gr
         closing=closed.report,
         towards=_facing(stones),
         origin=origin,
-        idle=without_effect(scene, groups, chosen),
+        remarks=remarks(scene, groups, chosen),
     )
 
 

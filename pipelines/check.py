@@ -139,7 +139,7 @@ class CheckReport:
     stones : how each stone is modelled, and why; where joints could not be closed, as if there were none
     simplification, joints : what became of the stones and of their joints; None if they could not be made
     files : pictures that were drawn
-    warnings : what has no effect, and what could not be drawn
+    warnings : what has no effect, how far stresses reach, and what could not be drawn
     """
 
     scene: str
@@ -266,7 +266,7 @@ def _report(
         laws=tuple(describe(one.entry, groups) for one in scene.laws),
         loads=tuple(describe(entry, groups) for entry in (*scene.loads, *scene.throws)),
         problems=problems,
-        warnings=() if assembly is None else assembly.idle,
+        warnings=() if assembly is None else assembly.remarks,
     )
 
 

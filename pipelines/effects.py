@@ -1,4 +1,4 @@
-"""What a scene says that changes nothing, so that nobody waits for an effect of it."""
+"""What the author of a scene should know of it: what it says without effect, and how far to trust its stresses."""
 
 from collections.abc import Iterator, Mapping
 
@@ -7,13 +7,13 @@ from pipelines.fidelity import Modelled
 from pipelines.scenefile import SceneFile
 from pipelines.selection import STRESS, Groups
 
-__all__ = ["without_effect"]
+__all__ = ["remarks"]
 
 _STRESS = 'ask for their stress by stress in [output], or give default = "deformable" in [bodies]'
 
 
-def without_effect(scene: SceneFile, groups: Groups, modelled: Mapping[str, Modelled]) -> tuple[str, ...]:
-    """What has no effect, each with its place and what would give it one.
+def remarks(scene: SceneFile, groups: Groups, modelled: Mapping[str, Modelled]) -> tuple[str, ...]:
+    """What has no effect, with its place and what would give it one; and whether stresses are beside rigid stones.
 
     Parameters
     ----------
@@ -26,6 +26,7 @@ def without_effect(scene: SceneFile, groups: Groups, modelled: Mapping[str, Mode
         *_of_meshes(scene, groups, soft),
         *_of_stress(scene, groups, modelled),
         *_of_ring(scene, modelled),
+        *_of_surroundings(scene, modelled),
     )
 
 
@@ -62,3 +63,13 @@ def _of_stress(scene: SceneFile, groups: Groups, modelled: Mapping[str, Modelled
         if rigid:
             reason = modelled[rigid[0]].reason
             yield f"{where(*STRESS)}: {len(rigid)} of the stones of stress have none: {rigid[0]} is rigid ({reason})"
+
+
+def _of_surroundings(scene: SceneFile, modelled: Mapping[str, Modelled]) -> Iterator[str]:
+    rigid = sum(one.fidelity is Fidelity.RIGID for one in modelled.values())
+    if scene.bodies.default is None and rigid and any(one.stress for one in modelled.values()):
+        yield (
+            f"{scene.document.where('bodies')}: {rigid} stones are rigid and spread forces otherwise than elastic "
+            f"ones, so stresses may be off by a tenth, in arches by more; a wider ring than {scene.bodies.ring} in "
+            "[bodies] lets more of them deform, see docs/accuracy.md, section 13"
+        )

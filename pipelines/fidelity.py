@@ -35,7 +35,7 @@ class Wishes:
     stress: Set[str] | None = None
     pictures: tuple[str, ...] = ()
     pushed: Set[str] = frozenset()
-    ring: int = 1
+    ring: int = 0
 
 
 @dataclass(frozen=True)

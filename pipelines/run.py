@@ -115,7 +115,7 @@ def write_results(
 
     Pictures that cannot be drawn on this machine are a warning; everything else is written.
     """
-    warnings = list(assembly.idle)
+    warnings = list(assembly.remarks)
     # a relaxed equilibrium counts by its end alone, whose steps are all solved
     relaxed = result.outcome is Outcome.EQUILIBRIUM and result.scene.time.relaxation
     if result.errors.unconverged_steps and not relaxed:

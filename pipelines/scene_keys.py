@@ -59,7 +59,7 @@ _BODIES = (
         Kind.INTEGER,
         "With auto, stones within so many joints of one named by `stress` in `[output]` deform too.",
         "",
-        1,
+        3,
         at_least=0,
     ),
 )

@@ -83,7 +83,7 @@ class Fidelities:
     rigid: tuple[str, ...]
     deformable: tuple[str, ...]
     fixed: tuple[str, ...]
-    ring: int = 1
+    ring: int
 
 
 @dataclass(frozen=True)

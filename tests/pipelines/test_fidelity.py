@@ -15,9 +15,9 @@ ROW = {one: {*CODES[max(n - 1, 0) : n], *CODES[n + 1 : n + 2]} for n, one in enu
 """Ten stones side by side."""
 
 
-def said(wishes, graph=ROW):
+def said(wishes):
     """What each stone of the row is, in one letter, and reasons by code."""
-    found = modelled(CODES, graph, wishes)
+    found = modelled(CODES, ROW, wishes)
     letters = "".join(str(found[one].fidelity)[0] for one in CODES)
     return letters, {code: one.reason for code, one in found.items()}
 
@@ -44,23 +44,23 @@ def test_a_picture_of_stress_wants_that_of_all_stones_unless_some_are_named():
 
 def test_lists_go_first_and_a_default_leaves_nothing_to_outputs():
     lists = {"D": RIGID, "J": DEFORMABLE}
-    assert said(Wishes(lists, None, frozenset("E")))[0] == "rrrrddrrrd"
-    assert said(Wishes(lists, RIGID, frozenset("E")))[0] == "rrrrrrrrrd"
-    letters, reasons = said(Wishes(lists, DEFORMABLE, frozenset("E")))
+    assert said(Wishes(lists, None, frozenset("E"), ring=1))[0] == "rrrrddrrrd"
+    assert said(Wishes(lists, RIGID, frozenset("E"), ring=1))[0] == "rrrrrrrrrd"
+    letters, reasons = said(Wishes(lists, DEFORMABLE, frozenset("E"), ring=1))
     assert letters == "dddrdddddd"
     assert reasons["A"] == 'default = "deformable" in [bodies]'
 
 
 def test_a_stone_under_a_force_stays_rigid_unless_its_own_stress_is_asked_for():
-    letters, reasons = said(Wishes({}, None, frozenset("E"), pushed=frozenset("EF")))
+    letters, reasons = said(Wishes({}, None, frozenset("E"), pushed=frozenset("EF"), ring=1))
     assert letters == "rrrddrrrrr"  # that E is deformable is refused where the force is given
     assert "forces act on rigid stones" in reasons["F"]
     assert said(Wishes({}, None, pictures=("von_mises",), pushed=frozenset("F")))[0] == "dddddrdddd"
 
 
 def test_a_fixed_or_rigid_stone_whose_stress_is_asked_for_has_no_ring():
-    assert said(Wishes({"E": FIXED}, None, frozenset("E")))[0] == "rrrrfrrrrr"
-    assert said(Wishes({"E": RIGID}, None, frozenset("E")))[0] == "rrrrrrrrrr"
+    assert said(Wishes({"E": FIXED}, None, frozenset("E"), ring=1))[0] == "rrrrfrrrrr"
+    assert said(Wishes({"E": RIGID}, None, frozenset("E"), ring=1))[0] == "rrrrrrrrrr"
 
 
 def test_stress_is_of_those_who_are_asked_or_of_all_that_deform():

@@ -38,7 +38,7 @@ def test_the_smallest_scene_has_a_material_and_defaults_for_the_rest():
     scene = parse_scene(STONE, "dir/tower.toml")
     assert scene.name == "tower"
     assert scene.gravity == (0.0, 0.0, -9.81)
-    assert (scene.bodies.default, scene.bodies.ring) == (None, 1)  # as the outputs need it
+    assert (scene.bodies.default, scene.bodies.ring) == (None, 3)  # as the outputs need it
     assert scene.output.stress is None
     assert scene.materials[0].material.density == 2000.0
     assert scene.contact.law.friction == 0.6
