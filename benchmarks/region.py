@@ -68,6 +68,7 @@ def main() -> None:
     """Run every region of every structure with every ring, and print."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.region", description=__doc__)
     parser.add_argument("--structures", nargs="+", choices=list(_STRUCTURES), default=list(_STRUCTURES))
+    parser.add_argument("--regions", nargs="+", help="their names, e.g. keystone (all)")
     parser.add_argument("--rings", nargs="+", type=int, default=_RINGS, help="joints (0 1 2 3)")
     parser.add_argument(
         "--size", type=float, default=0.3, help="edge length of the finite elements [m] (0.3)"
@@ -148,6 +149,8 @@ def _rows(name: str, options: argparse.Namespace) -> Iterator[Row]:
     codes = [solid.code for solid in structure.solids]
     held = dict.fromkeys(structure.ground, Fidelity.FIXED)
     for region, stones in structure.regions.items():
+        if options.regions is not None and region not in options.regions:
+            continue
         reference = quantities(replace(whole, bodies=tuple(_seen(one, stones) for one in whole.bodies)))
         for ring in options.rings:
             for coarser in options.coarser if ring else options.coarser[:1]:
