@@ -13,7 +13,7 @@ from mechanics.operators import _kernels_bodies as kernel
 from mechanics.problem import SparseForm
 from moma.errors import SolverError
 
-__all__ = ["BodyForm"]
+__all__ = ["BodyForm", "scaled_frames"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -74,6 +74,15 @@ class BodyForm(SparseForm):
         self._bodies = len(inertia)
         self._factors = {}
         self._relaxed: dict[float, Callable[[Array], Array]] = {}
+
+    def scaled(self, unit: Array) -> "BodyForm":
+        """D W D with the units (nc,) on the diagonal of D; the pattern is shared."""
+        other = BodyForm.__new__(BodyForm)
+        other._body, other._geometry = self._body, scaled_frames(self._geometry, unit)
+        other._moving, other._mass, other._bodies = self._moving, self._mass, self._bodies
+        other._factors, other._relaxed = {}, {}
+        other.__dict__["_pattern"] = self._pattern
+        return other
 
     @cached_property
     def inertia(self) -> "csc_array[np.float64]":
@@ -206,6 +215,13 @@ class _Factors:
                 break
         result: Array = r.ravel()
         return result
+
+
+def scaled_frames(geometry: Array, unit: Array) -> Array:
+    """Geometry (nc, 15) with each frame in a unit (nc,) of its own: W becomes D W D."""
+    scaled = geometry.copy()
+    scaled[:, :9] *= unit[:, None]
+    return scaled
 
 
 def _least_degree(pairs: Ints, count: int) -> Ints:

@@ -1,6 +1,6 @@
 """W between rigid bodies, matrix-free: 15 numbers for each contact, 7 for each body."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numba
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechanics.operators import _kernels_rigid as kernel
-from mechanics.operators.body_form import BodyForm
+from mechanics.operators.body_form import BodyForm, scaled_frames
 from mechanics.problem import GaussSeidel
 from mechanics.solvers.colouring import greedy_colours
 
@@ -117,6 +117,14 @@ class RigidDelassus:
     def sparse(self) -> BodyForm:
         """The same W for methods that factorise: six velocities for each body that moves, world axes."""
         return BodyForm(self.body, self.geometry, self.inertia)
+
+    def scaled(self, unit: Array) -> "RigidDelassus":
+        """D W D with the units (nc,) of the contacts on the diagonal of D; what is known for factors is shared."""
+        other = replace(self, geometry=scaled_frames(self.geometry, unit))
+        # the kernel for the diagonal takes frames for what they are: of length one
+        other.__dict__["diagonal"] = self.diagonal * (unit**2)[:, None, None]
+        other.__dict__["sparse"] = self.sparse.scaled(unit)
+        return other
 
     def gauss_seidel(self, shift: Array, friction: Array, cohesion: Array) -> GaussSeidel:
         """Sweeps in the order of the schedule; the same bits for any number of threads.

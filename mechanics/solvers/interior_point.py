@@ -17,16 +17,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.problem import (
-    ContactProblem,
-    ContactSolution,
-    ContactStart,
-    scale_of,
-    shifted_form,
-)
+from mechanics.problem import ContactProblem, ContactSolution, ContactStart, scale_of
 from mechanics.residual import residual
+from mechanics.solvers.equilibrated import equilibrated
 from mechanics.solvers.newton import Newton
 from mechanics.solvers.second_order_cones import Scaling, divide, product, reach, scaling
+from mechanics.solvers.shifted_systems import ShiftedSystem, shifted_system
 from moma.errors import SolverError
 
 __all__ = ["InteriorPoint"]
@@ -46,15 +42,25 @@ _BACK_OFF, _SHORT = 0.98, 0.1
 _INSIDE = 10.0
 # complementarities, relative to where it began, at which Newton's method on the natural map tries to end it
 _TRIES = (1e-7, 1e-9, 1e-11)
-# short steps in a row, near the end, after which rounding has won
-_STUCK = 3
+# steps of Newton's in a try
+_LAST_STEPS = 12
+# short steps in a row, once η and velocities in even units are this small, after which it gets nowhere, and iterations
+# after the last try that gain less than this: Newton's method has the last word
+_STUCK, _NEARLY, _IDLE, _GAIN = 5, (1e-3, 1e-3), 3, 0.9
+# Newton's steps in one try, and how much further than asked for it goes at last, since even units weigh light stones
+# less
+_NEWTON, _FURTHER = 12, (1.0, 1e-3)
+# what holds the impulses that have no effect on any velocity, over the scale of W: without it they wander
+_GIVE = 1e-10
 
 
 @dataclass(frozen=True)
 class InteriorPoint:
-    """Follows the central path until Newton's method on the natural map takes over; both factorise W + Θ in each step.
+    """Follows the central path until the laws hold or Newton's method on the natural map takes over.
 
-    A start from earlier impulses is given to Newton's method at once.
+    Both factorise W + Θ in each iteration, in units in which all contacts yield alike (`equilibrated`): masses may
+    differ by any factor. W may be singular, as between rigid stones that touch in more points than they need. A start
+    from earlier impulses is given to Newton's method at once.
 
     Attributes
     ----------
@@ -73,17 +79,20 @@ class InteriorPoint:
         ------
         SolverError : if the problem has no form that can be factorised with a block for each contact
         """
-        shifted_form(problem, _NAME)
+        shifted_system(problem, _NAME)
         if len(start.impulse) == 0:
             return ContactSolution(start.impulse, start.velocity, 0, 0.0, True)
-        newton = Newton(self.tolerance, self.velocity_tolerance)
+        end = _End(problem, self.tolerance, self.velocity_tolerance)
         # also without impulses: where no load acts, none are needed
-        best = newton(problem, start) if start.impulse.any() else _as_it_is(problem, start, newton)
-        if best.converged:
-            return best
-        path, tries, stuck = _Path(problem), list(_TRIES), 0
-        count = best.iterations
-        while tries and stuck < _STUCK and count < self.max_iterations:
+        best = end.looked(start.impulse, 0)
+        if start.impulse.any() and not best.converged:
+            best = end.ended(start.impulse, self.max_iterations)
+        return best if best.converged else self._along_path(end, best)
+
+    def _along_path(self, end: "_End", best: ContactSolution) -> ContactSolution:
+        count, tries, short, idle = best.iterations, list(_TRIES), 0, 0
+        path = _Path(end.even)
+        while short < _STUCK and idle < _IDLE and count < self.max_iterations:
             try:
                 length = path.advance()
             except SolverError:
@@ -92,24 +101,53 @@ class InteriorPoint:
             count += 1
             if not np.isfinite(path.complementarity):
                 break
-            near = path.complementarity < tries[0]
-            stuck = stuck + 1 if length < _SHORT and len(tries) < len(_TRIES) else 0
-            if near or stuck == _STUCK or count == self.max_iterations:
-                while tries and path.complementarity < tries[0]:
-                    del tries[0]
-                found = newton(problem, ContactStart(path.impulse, start.velocity))
-                count += found.iterations
-                if found.natural_map < best.natural_map:
-                    best = found
-                if found.converged:
-                    break
+            impulse = path.impulse * end.unit[:, None]
+            found = end.looked(impulse, 0)
+            slow = length < _SHORT and residual(end.even, path.impulse).within(*_NEARLY)
+            short = short + 1 if slow else 0
+            near = bool(tries) and path.complementarity < tries[0]
+            if not found.converged and (near or short == _STUCK):
+                tries = [one for one in tries if not path.complementarity < one]
+                ended = end.ended(impulse, self.max_iterations - count)
+                count += ended.iterations
+                found = min(found, ended, key=_left)
+            idle = 0 if tries or found.natural_map < _GAIN * best.natural_map else idle + 1
+            best = min(best, found, key=_left)
+            if best.converged:
+                break
         return replace(best, iterations=count)
 
 
-def _as_it_is(problem: ContactProblem, start: ContactStart, newton: Newton) -> ContactSolution:
-    left = residual(problem, start.impulse)
-    within = left.within(newton.tolerance, newton.velocity_tolerance)
-    return ContactSolution(start.impulse, left.dual, 0, left.natural_map, within)
+def _left(solution: ContactSolution) -> tuple[bool, float]:
+    return not solution.converged, solution.natural_map
+
+
+class _End:
+    """Newton's method on the natural map in even units, judged in the problem's own."""
+
+    def __init__(self, problem: ContactProblem, tolerance: float, velocity_tolerance: float) -> None:
+        self.problem, self.limits = problem, (tolerance, velocity_tolerance)
+        self.even, self.unit = equilibrated(problem)
+
+    def looked(self, impulse: Array, iterations: int) -> ContactSolution:
+        """What is left with these impulses (nc, d)."""
+        left = residual(self.problem, impulse)
+        return ContactSolution(impulse, left.dual, iterations, left.natural_map, left.within(*self.limits))
+
+    def ended(self, impulse: Array, most: int) -> ContactSolution:
+        """From these impulses on, ever further while that converges, until the problem itself is solved."""
+        unit, count = self.unit[:, None], 0
+        found = self.looked(impulse, 0)
+        for further in _FURTHER:
+            if count >= most or found.converged:
+                break
+            newton = Newton(further * self.limits[0], further * self.limits[1], _NEWTON)
+            even = newton(self.even, ContactStart(found.impulse / unit, found.velocity))
+            count += even.iterations
+            found = min(found, self.looked(even.impulse * unit, 0), key=_left)
+            if not even.converged:
+                break
+        return replace(found, iterations=count)
 
 
 @dataclass
@@ -149,11 +187,18 @@ class _Cone:
         return u
 
 
+def _unchecked(problem: ContactProblem) -> ShiftedSystem:
+    """(W + Θ)⁻¹ as the form itself gives it: a direction a little wrong costs less than another factorisation."""
+    form = None if problem.sparse is None else problem.sparse()
+    own: ShiftedSystem | None = getattr(form, "shifted", None)
+    return own or shifted_system(problem, _NAME)
+
+
 class _Path:
     """The iterates, on their way along the central path."""
 
     def __init__(self, problem: ContactProblem) -> None:
-        self._problem, self._form = problem, shifted_form(problem, _NAME)
+        self._problem, self._system = problem, _unchecked(problem)
         scale = scale_of(problem.delassus)
         self._free = problem.u_free.copy()
         self._free[:, 0] += problem.bias
@@ -163,7 +208,7 @@ class _Path:
         self._hold = np.zeros((len(mu), 3, 3))
         self._hold[self._smooth[:, None], [1, 2], [1, 2]] = _RIGID * scale
         theta = self._hold + scale * np.eye(3)
-        self._r = self._form.shifted(theta)(-self._free.ravel()).reshape(-1, 3)
+        self._r = self._system(theta)(-self._free.ravel()).reshape(-1, 3)
         size = float(np.sqrt((self._r**2).mean())) or 1.0
         self._unit = size * size * scale
         slack = mu[cone, None] * self._r[cone] * [1.0, 0.0, 0.0] + self._r[cone] * [0.0, 1.0, 1.0]
@@ -243,10 +288,10 @@ class _Newton:
         self._scaling: Scaling = scaling(cone.slack, cone.dual)
         self._lambda = self._scaling(cone.dual)
         self._square, self._back = self._scaling.inverse_squared, cone.transpose()
-        theta = path._hold.copy()
+        theta = path._hold + _GIVE * scale_of(problem.delassus) * np.eye(3)
         theta[cone.rows] += self._back @ self._square * cone.diagonal[:, None, :]
         theta[side.rows, 0, 0] += side.dual / side.slack
-        self._solve = path._form.shifted(theta)
+        self._solve = path._system(theta)
 
     def towards_boundary(self) -> tuple[Array, Array]:
         """The right side of the predictor: s ∘ z = 0."""

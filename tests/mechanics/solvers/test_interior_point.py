@@ -254,24 +254,26 @@ def test_few_iterations_are_counted_and_the_best_is_given_back():
 
 
 def test_of_many_failures_the_best_is_given_back(monkeypatch):
-    """Newton's method is tried ever nearer to the solution, and fails: the second time least."""
-    left = iter([3e-3, 1e-3, 5e-3, 7e-3, 9e-3])
+    """Newton's method is tried ever nearer to the solution, and fails: the path's own iterates count."""
+    tried = []
 
     class Failing:
         def __init__(self, *settings):
-            self.tolerance, self.velocity_tolerance, *_ = settings
+            self.settings = settings
 
         def __call__(self, problem, start):
-            eta = next(left)
-            return ContactSolution(np.full_like(start.impulse, eta), start.velocity, 2, eta, False)
+            tried.append(natural_map(problem, start.impulse))
+            return ContactSolution(2.0 * start.impulse, start.velocity, 2, 0.0, False)
 
     monkeypatch.setattr(interior_point, "Newton", Failing)
     problem = problem_of("elastic on rigid")
-    answer = InteriorPoint(1e-8, 1e-6)(problem, cold(problem))
-    assert answer.natural_map == 1e-3
-    np.testing.assert_array_equal(answer.impulse, 1e-3)
+    answer = InteriorPoint(1e-30, 1e-30)(problem, cold(problem))
+    assert len(tried) >= 3
     assert not answer.converged
-    assert next(left) > 5e-3  # so it was tried again after the best
+    # what Newton's method says of itself does not count
+    assert answer.natural_map == natural_map(problem, answer.impulse)
+    assert answer.natural_map <= 10 * min(tried)
+    assert answer.natural_map < 1e-6
 
 
 def test_impulses_that_are_no_numbers_never_count_as_solved():
@@ -308,8 +310,7 @@ def test_stones_that_nothing_presses_are_left_alone():
         assert np.abs(answer.impulse).max() < 1e-10 * 2e-3 * 9.81 * one.model.mass[1]
 
 
-def test_a_problem_that_cannot_be_factorised_by_contacts_is_refused():
-    rigid = posed(scene(ground(), brick("a", (0, 0, 0), (1, 1, 1)))).problem
-    for problem in (replace(problem_of("sliding"), sparse=None), rigid):
-        with pytest.raises(SolverError, match="interior point: the problem has no sparse form"):
-            InteriorPoint()(problem, cold(problem))
+def test_a_problem_that_cannot_be_factorised_is_refused():
+    problem = replace(problem_of("sliding"), sparse=None)
+    with pytest.raises(SolverError, match="interior point: the problem has no sparse form"):
+        InteriorPoint()(problem, cold(problem))
