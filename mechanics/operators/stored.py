@@ -70,7 +70,7 @@ class StoredDelassus:
                 remedy="a contact needs a body that gives way in every direction",
             )
 
-    @property
+    @cached_property
     def diagonal(self) -> Array:
         """W_αα (nc, 3, 3) [1/kg]; zero where it is not stored."""
         nc = len(self.indptr) - 1

@@ -7,6 +7,7 @@ import numpy as np
 from mechanics.operators.rigid import RigidDelassus
 from mechanics.operators.stored import StoredDelassus
 from mechanics.problem import ContactProblem, ContactSolution, ContactStart
+from mechanics.residual import residual
 from mechanics.solvers import _kernels_portfolio as portfolio
 from mechanics.solvers.alternating import Alternating
 from mechanics.solvers.elastic import Elastic
@@ -73,6 +74,9 @@ class Auto:
             self.max_iterations,
         )
         within = eta <= self.tolerance and velocity <= self.velocity_tolerance
+        if within and np.isfinite(self.velocity_tolerance):
+            # impulses without bound can hide velocities in their rounding
+            within = residual(problem, impulse).within(self.tolerance, self.velocity_tolerance)
         found = ContactSolution(impulse, dual, count, eta, within, _ENDED[ended])
         if within or count >= self.max_iterations:
             return found

@@ -1,0 +1,110 @@
+"""Newton's method between rigid bodies: its equations against dense ones, and what others cannot solve."""
+
+import numpy as np
+import pytest
+
+from mechanics.materials import Material
+from mechanics.model import build_model
+from mechanics.operators.stored import StoredDelassus
+from mechanics.problem import ContactProblem, ContactStart
+from mechanics.scene import Scene
+from mechanics.simulation import Clock, Simulation
+from mechanics.solvers import _kernels_body_newton as bodies
+from mechanics.solvers.nsgs import NSGS
+from mechanics.solvers.proximal_newton import ProximalNewton, _System
+from moma.errors import SolverError
+from tests.mechanics.shapes import brick, ground
+
+def column(heights, densities):
+    """Cubes of these heights, one upon the other."""
+    blocks, level = [ground()], 0.0
+    for i, (height, density) in enumerate(zip(heights, densities, strict=True)):
+        blocks.append(
+            brick(
+                f"b{i}",
+                (0.0, 0.0, level),
+                (0.5, 0.5, level + height),
+                material=Material(f"m{i}", density, 1e10, 0.2),
+            )
+        )
+        level += height
+    return Scene("column", tuple(blocks))
+
+
+def first_problem(scene):
+    """The contact problem of the first step."""
+    model, start = build_model(scene)
+    seen = []
+
+    def solver(problem, start):
+        seen.append(problem)
+        return NSGS(max_iterations=1)(problem, start)
+
+    Simulation(model, start, Clock(), solver).step()
+    return seen[0]
+
+
+def nothing(problem):
+    return ContactStart(np.zeros_like(problem.u_free), np.zeros_like(problem.u_free))
+
+
+def dense_lift(problem):
+    form = problem.delassus.sparse
+    return form.inertia.toarray(), form.lift.toarray()
+
+
+def test_equations_of_the_bodies_are_those_of_the_contacts():
+    problem = first_problem(column([0.5, 0.3, 0.4], [2000.0, 1500.0, 2500.0]))
+    rng, nc = np.random.default_rng(1), len(problem.friction)
+    first, second = rng.normal(size=(2, nc, 3, 3)) + 3.0 * np.eye(3)
+    error, alpha = rng.normal(size=(nc, 3)), 0.7
+    step = _System(problem.delassus).step(first, second, error, alpha)
+    inertia, lift = dense_lift(problem)
+    compliance = lift.T @ np.linalg.solve(inertia, lift) + alpha * np.eye(3 * nc)
+    big_first, big_second = np.zeros((2, nc, 3, nc, 3))
+    big_first[np.arange(nc), :, np.arange(nc)], big_second[np.arange(nc), :, np.arange(nc)] = first, second
+    size = 3 * nc
+    matrix = big_first.reshape(size, size) + big_second.reshape(size, size) @ compliance
+    wanted = np.linalg.solve(matrix, -error.ravel()).reshape(-1, 3)
+    assert step == pytest.approx(wanted, rel=1e-9, abs=1e-9 * np.abs(wanted).max())
+
+
+def test_blocks_are_inverted_one_by_one():
+    rng = np.random.default_rng(2)
+    first, second = rng.normal(size=(2, 20, 3, 3))
+    inverse, gain = np.empty((2, 20, 3, 3))
+    assert bodies.inverse_blocks(first, second, 0.3, inverse, gain)
+    assert inverse == pytest.approx(np.linalg.inv(first + 0.3 * second), rel=1e-9)
+    assert gain == pytest.approx(inverse @ second, rel=1e-9)
+    assert not bodies.inverse_blocks(0 * first, 0 * second, 0.3, inverse, gain)
+
+
+def test_a_column_of_100_takes_a_few_steps_from_nothing():
+    problem = first_problem(column([0.25] * 100, [2000.0] * 100))
+    solution = ProximalNewton(1e-9, 1e-7)(problem, nothing(problem))
+    assert solution.converged
+    assert solution.iterations <= 12
+    weight = 2000.0 * 0.5 * 0.5 * 0.25 * 9.81 * 1e-3
+    borne = np.sort([joint.sum() for joint in solution.impulse[:, 0].reshape(100, 4)])
+    assert borne == pytest.approx(weight * np.arange(1, 101), rel=1e-7)
+
+
+@pytest.mark.parametrize("heavy", [0, 4, 9])
+def test_a_mass_ratio_of_a_million_is_solved_to_rounding(heavy):
+    densities = [2.0] * 10
+    densities[heavy] = 2e6
+    problem = first_problem(column([0.5] * 10, densities))
+    solution = ProximalNewton(1e-8, 1e-8)(problem, nothing(problem))
+    assert solution.converged
+    assert solution.iterations <= 20
+    borne = np.array([joint.sum() for joint in solution.impulse[:, 0].reshape(10, 4)])
+    above = np.cumsum(densities[::-1])[::-1] * 0.125 * 9.81e-3
+    assert np.sort(borne) == pytest.approx(np.sort(above), rel=1e-6)
+
+
+def test_other_operators_are_refused():
+    operator = StoredDelassus(np.eye(3)[None], np.arange(1), np.arange(2))
+    none = np.zeros(1)
+    problem = ContactProblem(operator, np.array([[-1.0, 0.0, 0.0]]), none, none, none, operator.sparse)
+    with pytest.raises(SolverError, match="not all rigid"):
+        ProximalNewton()(problem, nothing(problem))
