@@ -24,7 +24,7 @@ __all__ = ["CASES", "Case", "Found", "errors", "hold", "main", "search"]
 
 _GRAVITY = 9.81
 # of its width: a stone that has moved so far, and moves on, falls
-_FALLS = 0.05
+_FALLS = 0.02
 _DURATION = 5.0
 # of the reference: where a search ends
 _WIDTH = 0.01
@@ -162,8 +162,9 @@ def main() -> None:
 def search(case: Case, profile: Profile, width: float = _WIDTH, elastic: bool = False) -> Found:
     """Halve the range between a value that stands and one that falls until it is `width` of the reference wide."""
     begun = time.process_time()
-    stood, fell = (1.1, 0.9) if case.stands_above else (0.8, 1.1)
-    stood, fell = stood * case.reference, fell * case.reference
+    # a search that ends at one of these is outside the band
+    ends = 0.98 * case.low, 1.02 * case.high
+    stood, fell = ends[::-1] if case.stands_above else ends
     holds = undecided = unsolved = 0
     while abs(fell - stood) > width * case.reference:
         value = 0.5 * (stood + fell)

@@ -1,0 +1,78 @@
+"""The errors that profiles tell hold on scenes that nothing was fitted to, and so do loads of collapse."""
+
+import pytest
+
+from benchmarks import collapse
+from benchmarks.profile_scenes import HELD_OUT, REFERENCE
+from benchmarks.profiles import measured_rows, ratios
+from pipelines.profile_errors import COLLAPSE
+from pipelines.profile_report import BOUNDS, TYPICAL
+from pipelines.profiles import PROFILES
+
+# less is what solver and balance leave
+LEAST = 1e-4
+CASES = {case.name: case for case in collapse.CASES}
+
+
+def beyond_a_factor_of_two(row):
+    """Typical errors that are twice as large as told, or half, and others that are twice as large."""
+    wrong = []
+    for quantity in (*TYPICAL, *BOUNDS):
+        error, said = row[quantity], row[f"{quantity}_expected"]
+        if error is None or said is None:
+            continue
+        low = 0.5 * said if quantity in TYPICAL and said > LEAST else 0.0
+        if not low <= error <= 2.0 * said:
+            wrong.append(f"{row['scene']} at {row['profile']}: {quantity} {error:.2g}, told {said:.2g}")
+    return wrong
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow) for name in HELD_OUT])
+def test_the_errors_told_hold_within_a_factor_of_two_where_nothing_was_fitted(name):
+    rows = measured_rows(name, HELD_OUT[name]())
+    assert [row["profile"] for row in rows] == list(PROFILES)
+    assert [row["outcome"] for row in rows] == ["equilibrium"] * 3
+    assert [wrong for row in rows for wrong in beyond_a_factor_of_two(row)] == []
+
+
+def test_held_out_scenes_are_none_of_those_that_the_errors_were_fitted_to():
+    assert not set(HELD_OUT) & set(REFERENCE)
+    sizes = {name: len(make().blocks) for name, make in (REFERENCE | HELD_OUT).items()}
+    assert len(set(sizes.values())) == len(sizes), sizes
+
+
+def test_ratios_are_means_of_typical_errors_and_the_largest_of_bounds():
+    quantity, bound = TYPICAL[0], BOUNDS[0]
+    names = (*TYPICAL, *BOUNDS)
+    nothing = {key: None for name in names for key in (name, f"{name}_measure")}
+    rows = [
+        nothing
+        | {"profile": "balanced", quantity: error, bound: error}
+        | {f"{quantity}_measure": 0.1, f"{bound}_measure": 0.1}
+        for error in (0.01, 0.04)
+    ]
+    found = ratios(rows)["balanced"]
+    assert found == {
+        quantity: pytest.approx((0.2, 0.01, 0.04)),  # √(0.1 · 0.4)
+        bound: pytest.approx((0.4, 0.01, 0.04)),
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "profile"),
+    [
+        pytest.param(
+            name, profile, marks=() if (name, profile) == ("arch of 7", "fast") else pytest.mark.slow
+        )
+        for name in CASES
+        for profile in PROFILES
+    ],
+)
+def test_loads_of_collapse_lie_in_their_bands(name, profile):
+    """W01, W02: 0.97 non-associative to 1.01 associative; A02: 0.97 to 1.03 of the least thickness."""
+    case = CASES[name]
+    found = collapse.search(case, PROFILES[profile])
+    assert case.low <= min(found.stood, found.fell)
+    assert max(found.stood, found.fell) <= case.high
+    assert found.undecided == 0
+    assert abs(found.value / case.reference - 1.0) <= COLLAPSE[profile]
