@@ -191,7 +191,7 @@ def _module(rows: Sequence[Row]) -> str:
         lines.append(f"    ({kind!r}, {stage!r}): {rate},")
     lines += ["}", "", "MEMORY: Mapping[str, Rate] = {"]
     for kind, names in _BYTES.items():
-        own_rows = [row for row in rows if _kind(row) == kind and row["memory"] > 1e6]
+        own_rows = [row for row in rows if _kind(row) == kind and (row["memory"] or 0) > 1e6]
         work = [measures(Amounts(**row["amounts"])) for row in own_rows]
         rate = fitted(work, np.array([row["memory"] for row in own_rows], dtype=float), names)
         program = float(np.median([row["program"] for row in own_rows]))

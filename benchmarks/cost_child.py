@@ -6,10 +6,12 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, replace
+from unittest.mock import patch
 
 import mechanics.simulate
 from benchmarks.cost_scenes import Case
 from benchmarks.memory import peak_bytes
+from benchmarks.report import Row
 from mechanics.plan import plan
 from mechanics.simulation import Clock
 
@@ -35,7 +37,11 @@ class _ProcessorClock(Clock):
 def main() -> None:
     """`python -m benchmarks.cost_child JSON` with the attributes of a `Case`."""
     case = Case(**json.loads(sys.argv[1]))
-    mechanics.simulate.Clock = _ProcessorClock  # type: ignore[misc]
+    with patch.object(mechanics.simulate, "Clock", _ProcessorClock):
+        print(json.dumps(_measured(case)))
+
+
+def _measured(case: Case) -> Row:
     mechanics.simulate.simulate(replace(case, stones=_FEW, size=1.0).scene())
     before, scene = peak_bytes(), case.scene()
     start = time.process_time()
@@ -44,7 +50,7 @@ def main() -> None:
     after = peak_bytes()
     start = time.process_time()
     amounts = plan(scene).amounts
-    row = asdict(case) | {
+    return asdict(case) | {
         "amounts": asdict(amounts),
         "plan": time.process_time() - start,
         "seconds": seconds,
@@ -56,7 +62,6 @@ def main() -> None:
         "memory": None if after is None or before is None else after - before,
         "program": before,
     }
-    print(json.dumps(row))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Contact points together with what they bear."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,19 +62,16 @@ class Bearing:
 
 def both(one: Bearing, other: Bearing) -> Bearing:
     """The contact points of both, those of the first before those of the other."""
-
-    def after(name: str) -> Array:
-        return np.concatenate([getattr(one, name), getattr(other, name)])
-
+    terms = one.terms, other.terms
     return Bearing(
         joined([one.contacts, other.contacts]),
         np.concatenate([one.law, other.law]),
-        *(after(name) for name in ("place", "impulse", "shifted", "dual", "force", "gap")),
-        Terms(
-            *(
-                np.concatenate([getattr(one.terms, name), getattr(other.terms, name)])
-                for name in ("bias", "friction", "cohesion", "adhesion")
-            )
-        ),
-        after("internal"),
+        np.concatenate([one.place, other.place]),
+        np.concatenate([one.impulse, other.impulse]),
+        np.concatenate([one.shifted, other.shifted]),
+        np.concatenate([one.dual, other.dual]),
+        np.concatenate([one.force, other.force]),
+        np.concatenate([one.gap, other.gap]),
+        Terms(*(np.concatenate([getattr(own, name.name) for own in terms]) for name in fields(Terms))),
+        np.concatenate([one.internal, other.internal]),
     )
