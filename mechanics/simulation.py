@@ -341,6 +341,7 @@ class Simulation:
 
     def _put_to_sleep(self, active: Bearing, kick: Kick, held: bool) -> float:
         """Who has rested for long enough falls asleep; the kinetic energy that this takes out [J]."""
+        self._wake(self._sleep.uneasy(self.model, self.state, active, kick.load), self.state)
         asleep = self._sleep.asleep
         self._sleep = self._sleep.later(self.model, self.state, active, kick.load, held)
         new = self._sleep.asleep & ~asleep

@@ -88,6 +88,22 @@ class Sleep:
             self, asleep=asleep, borne=borne, wrench=_resultants(state, borne.contacts, borne.force)
         ), again
 
+    def uneasy(self, model: Model, state: State, active: Bearing, load: Array) -> Bools:
+        """Sleeping stones (nb,) that alone keep a scene from its equilibrium: looked for where nothing else moves.
+
+        They are within `sleep`, but not within the tolerance to which a scene must be in balance to end.
+        """
+        nobody = np.zeros_like(self.asleep)
+        if self.steps + 1 < _STEPS or not (model.scene.time.stop_at_equilibrium and self.asleep.any()):
+            return nobody
+        if (speed(model, state)[model.inertia.moving] > _pace(model, state)).any():
+            return nobody
+        out = _out_of_balance(
+            model, state, load + self.wrench + _resultants(state, active.contacts, active.force)
+        )
+        found: Bools = self.asleep & (out > model.scene.time.balance_tolerance)
+        return found
+
     def later(self, model: Model, state: State, active: Bearing, load: Array, held: bool) -> "Sleep":
         """After one more step: who has rested for long enough falls asleep, unless supports move (`held` false)."""
         if not held:
@@ -106,15 +122,17 @@ class Sleep:
 
     def _tired(self, model: Model, state: State, active: Bearing, load: Array) -> Bools:
         """Who has not moved since it is watched, does not move now, and is in balance (nb,)."""
-        settings = model.scene.time
-        pace = settings.sleep * _gravity(model, state.time) * settings.step
+        settings, pace = model.scene.time, _pace(model, state)
+        limit = settings.sleep
+        if settings.stop_at_equilibrium:
+            limit = min(limit, settings.balance_tolerance)
         out = _out_of_balance(
             model, state, load + self.wrench + _resultants(state, active.contacts, active.force)
         )
         return (
             model.inertia.moving
             & ~self.asleep
-            & (out <= _CALMER * settings.sleep)
+            & (out <= _CALMER * limit)
             & (speed(model, state) <= pace)
             & (displacement(model, self.watched, state) <= pace * settings.step * _STEPS)
         )
@@ -146,6 +164,12 @@ def _out_of_balance(model: Model, state: State, resultant: Array) -> Array:
     )
     out: Array = np.maximum(*parts) / (model.mass * _gravity(model, state.time))
     return out
+
+
+def _pace(model: Model, state: State) -> float:
+    """Below which a stone is at rest: what `sleep` as a part of gravity gives in one step [m/s]."""
+    settings = model.scene.time
+    return settings.sleep * _gravity(model, state.time) * settings.step
 
 
 def _gravity(model: Model, time: float) -> float:

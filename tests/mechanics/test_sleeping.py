@@ -13,6 +13,7 @@ from mechanics.loads.load import Loads
 from mechanics.loads.motions import settlement
 from mechanics.model import build_model
 from mechanics.observers.equilibrium import imbalance, support_reaction
+from mechanics.result import Outcome
 from mechanics.scene import ContactSettings, Scene, TimeSettings
 from mechanics.simulate import simulate
 from mechanics.simulation import Clock, Simulation
@@ -228,3 +229,14 @@ def test_energy_and_history_count_those_asleep():
     assert len(result.contacts.gap) == len(awake.contacts.gap)
     for one, other in zip(result.bodies, awake.bodies, strict=True):
         np.testing.assert_allclose(one.position, other.position, atol=2e-5)
+
+
+def test_sleep_does_not_keep_a_scene_from_its_equilibrium():
+    """A slab is dropped on one of two stacks that sleep: the run ends in balance to the scene's own tolerance."""
+    slab = box("slab", (0.0, 0.0, 0.43), (0.4, 0.4, 0.63))
+    one = scene(*stack(2), *stack(2, 1.0), slab, duration=1.0, sleep=1e-2)
+    result = simulate(replace(one, time=replace(one.time, stop_at_equilibrium=True)))
+    assert result.outcome is Outcome.EQUILIBRIUM
+    assert result.time > np.sqrt(2 * 0.03 / G)
+    assert result.errors.balance <= one.time.balance_tolerance
+    assert result.errors.reaction <= 1e-3
