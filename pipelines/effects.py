@@ -70,6 +70,6 @@ def _of_surroundings(scene: SceneFile, modelled: Mapping[str, Modelled]) -> Iter
     if scene.bodies.default is None and rigid and any(one.stress for one in modelled.values()):
         yield (
             f"{scene.document.where('bodies')}: {rigid} stones are rigid and spread forces otherwise than elastic "
-            f"ones, so stresses may be off by a tenth, in arches by more; a wider ring than {scene.bodies.ring} in "
-            "[bodies] lets more of them deform, see docs/accuracy.md, section 13"
+            "ones, so stresses may be off by tens of per cent; ring = 99 in [bodies] lets all of them deform, "
+            "coarsely (docs/accuracy.md, section 13)"
         )
