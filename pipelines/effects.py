@@ -40,16 +40,19 @@ def _of_meshes(scene: SceneFile, groups: Groups, soft: set[str]) -> Iterator[str
 
 
 def _of_ring(scene: SceneFile, modelled: Mapping[str, Modelled]) -> Iterator[str]:
-    where, ringed = scene.document.where, any(one.ring for one in modelled.values())
-    for path in (("bodies", "ring"), ("mesh", "ring_size")):
-        if path not in scene.document.lines:
+    region = scene.output.stress is not None and any(one.stress for one in modelled.values())
+    ringed = any(one.ring for one in modelled.values())
+    for table, key, used, reason in (
+        ("bodies", "ring", region, "no stress in [output] asks for that of a stone"),
+        ("mesh", "ring_size", ringed, "no stone deforms for the stress of another"),
+    ):
+        if (table, key) not in scene.document.lines:
             continue
         if scene.bodies.default is not None:
-            yield f'{where(*path)}: {path[1]} has no effect: it goes with default = "auto" and stress in [output]'
-        elif path[1] == "ring_size" and not ringed:
-            yield f"{where(*path)}: ring_size has no effect: no stone deforms for the stress of another"
-        elif not any(one.stress for one in modelled.values()) or scene.output.stress is None:
-            yield f"{where(*path)}: ring has no effect: no stress in [output] asks for that of a stone"
+            reason = 'it goes with default = "auto" and stress in [output]'
+        elif used:
+            continue
+        yield f"{scene.document.where(table, key)}: {key} has no effect: {reason}"
 
 
 def _of_stress(scene: SceneFile, groups: Groups, modelled: Mapping[str, Modelled]) -> Iterator[str]:
