@@ -24,7 +24,6 @@ __all__ = ["ADMM"]
 
 Array = NDArray[np.float64]
 
-_OVER_RELAXATION = 1.6
 # looks between two balances of the penalty, by how much it may change at a time, and its bounds over W
 _BALANCE_LOOKS, _LEAST_CHANGE, _MOST_CHANGE, _BOUNDS = 2, 2.0, 5.0, (1e-4, 1.0)
 
@@ -44,6 +43,8 @@ class ADMM:
     patience : give up after a look that finds η less than this many times smaller than two looks before; 0: never
     hold : iterations for which the de Saxcé shift is held; held longer, it is steadier where much slides
     balanced : let the penalty follow the ratio of dual and primal residual (He, Yang & Wang 2000)
+    over_relaxation : by how much r overshoots; 1: not at all, where a small penalty finds r nearly at once and an
+        overshoot is what is left
     """
 
     tolerance: float = 1e-6
@@ -54,6 +55,7 @@ class ADMM:
     patience: float = 0.0
     hold: int = 1
     balanced: bool = False
+    over_relaxation: float = 1.6
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from `start`; its velocity, û = -σ y, lets the iteration go on where it stopped.
@@ -74,7 +76,8 @@ class ADMM:
         if left.within(*limits):
             # where nothing is left to do, nothing is factorised
             return ContactSolution(impulse, start.velocity, 0, left.natural_map, True)
-        run = _Run(problem, start, self.penalty * scale_of(problem.delassus), self.hold)
+        sigma = self.penalty * scale_of(problem.delassus)
+        run = _Run(problem, start, sigma, self.hold, self.over_relaxation)
         best = left, run.z.copy(), run.velocity
         while not left.within(*limits) and run.iterations < self.max_iterations:
             if looks[-2] < self.patience * left.natural_map:
@@ -95,10 +98,12 @@ class ADMM:
 class _Run:
     """The iterates of one solution."""
 
-    def __init__(self, problem: ContactProblem, start: ContactStart, sigma: float, hold: int) -> None:
+    def __init__(
+        self, problem: ContactProblem, start: ContactStart, sigma: float, hold: int, over: float
+    ) -> None:
         assert problem.sparse is not None
         self._problem, self._form, self._hold = problem, problem.sparse(), hold
-        self._scale = scale_of(problem.delassus)
+        self._scale, self._over = scale_of(problem.delassus), over
         self._shift = problem.u_free.copy()
         self._shift[:, 0] += problem.bias
         self._sigma, self._relaxed = sigma, self._form.relaxed(sigma)
@@ -122,7 +127,7 @@ class _Run:
             admm_right_side(self.z, self._y, self._shift, self._lag, sigma, self._right)
             self._r = self._relaxed(self._right.ravel()).reshape(self._right.shape)
             self._last = self.z.copy()
-            admm_update(self._r, self.z, self._y, problem.friction, problem.cohesion, _OVER_RELAXATION)
+            admm_update(self._r, self.z, self._y, problem.friction, problem.cohesion, self._over)
             self.iterations += 1
 
     def balance(self) -> None:

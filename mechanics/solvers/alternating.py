@@ -1,26 +1,38 @@
-"""Gauss–Seidel and ADMM in turn: each is quick where the other is slow."""
+"""For rigid scenes: sweeps, ADMM, Newton's method, the interior point; each is quick where another is slow."""
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mechanics.operators.rigid import RigidDelassus
 from mechanics.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.residual import residual
 from mechanics.solvers.admm import ADMM
+from mechanics.solvers.equilibrated import equilibrated
+from mechanics.solvers.interior_point import InteriorPoint
 from mechanics.solvers.nsgs import NSGS
+from mechanics.solvers.proximal_newton import ProximalNewton
 
 __all__ = ["Alternating", "moving_admm"]
 
-# sweeps with which every solution begins: near a solution they suffice
+# sweeps with which every solution begins that is not the first: near a solution they suffice
 _FIRST_SWEEPS = 20
 # sweeps between two extrapolations, and from how many iterates
 _LOOK, _DEPTH = 5, 10
-# a small penalty finds the forces in stones that stay in touch within a few dozen iterations, or never
-_STATIC_PENALTY, _STATIC_ITERATIONS, _STATIC_PATIENCE = 1e-3, 60, 3.0
+# a small penalty finds the forces in stones that stay in touch within a dozen iterations, or never
+_STATIC_PENALTY, _STATIC_ITERATIONS, _STATIC_PATIENCE, _STATIC_LOOK = 1e-4, 40, 3.0, 5
 # it is then driven further than asked for, which costs little and spares the next steps any work
 _FURTHER = 0.03
-# where contacts open and slide: a larger penalty, balanced, and a shift that is held; for this share of the iterations
-_MOVING_PENALTY, _MOVING_HOLD, _MOVING_SHARE = 0.03, 10, 0.8
+# Newton's method has converged within so many steps, or it wanders: between rigid stones most often where much slides
+_NEWTON_STEPS = 20
+# where contacts open and slide: a larger penalty, balanced, and a shift that is held; so many iterations cost what the
+# interior point takes in all
+_MOVING_PENALTY, _MOVING_HOLD, _MOVING_ITERATIONS = 0.03, 10, 400
+# iterations of the interior point, and of ADMM from where that stood, with a penalty that is right for what still moves
+_INTERIOR, _LAST_PENALTY, _LAST_ITERATIONS = 60, 0.3, 300
+
+_Solver = Callable[[ContactProblem, ContactStart], ContactSolution]
 
 
 def moving_admm(tolerance: float, velocity_tolerance: float, max_iterations: int) -> ADMM:
@@ -32,12 +44,14 @@ def moving_admm(tolerance: float, velocity_tolerance: float, max_iterations: int
 
 @dataclass(frozen=True)
 class Alternating:
-    """For rigid scenes: sweeps, ADMM with a small penalty, ADMM with a balanced one, sweeps; the best of all counts.
+    """For rigid scenes: one method after the other until one has solved the problem; the best of all counts.
 
-    Gauss–Seidel carries news by one stone in a sweep, so the first steps of a tall wall cost it thousands of sweeps;
-    ADMM with a small penalty solves the motion of all stones at once, and needs some 30 iterations as long as
-    few contacts open or slide. Where many do, a larger penalty and a steadier shift are better
-    (docs/decisions/006-alternating-solver.md has the measurements).
+    Gauss–Seidel carries news by one stone in a sweep, so it has the first word only where the forces of the last step
+    are known. ADMM with a small penalty solves the motion of all stones at once, and needs a dozen iterations as long
+    as few contacts open or slide. Newton's method tells by a few factorisations which do. From a cold start the
+    interior point comes next, which no height, no mass and no redundant contact holds up; in a motion, ADMM with a
+    balanced penalty first. Methods that factorise work in units in which all contacts yield alike (`equilibrated`).
+    docs/decisions/006-alternating-solver.md and 022-tall-and-heavy.md have the measurements.
 
     Attributes
     ----------
@@ -50,40 +64,90 @@ class Alternating:
     max_iterations: int = 2000
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
-        """Solve from `start`."""
+        """Solve from `start`; `why` says which method did, and what the one before left."""
+        best = ContactSolution(start.impulse, start.velocity, 0, np.inf, False, "nothing: no contacts")
+        if len(start.impulse) == 0:
+            return replace(best, natural_map=0.0, converged=True)
+        warm = bool(start.impulse.any())
+        before = "warm start" if warm else f"cold start, {len(start.impulse):,} contacts"
+        for name, solve, from_best in self._stages(problem, warm):
+            count = self.max_iterations - best.iterations
+            if best.converged or count <= 0:
+                break
+            begin = ContactStart(best.impulse, best.velocity) if from_best else start
+            found = self._judged(problem, solve(count)(problem, begin), f"{name}: {before}")
+            before = f"{name} stood at η {found.natural_map:.0e}"
+            best = _better(best, found)
+        return best
+
+    def _stages(
+        self, problem: ContactProblem, warm: bool
+    ) -> Iterator[tuple[str, Callable[[int], _Solver], bool]]:
+        """Names, solvers of so many iterations at most, and whether each begins with the best of those before."""
         limits = self.tolerance, self.velocity_tolerance
-        best = ContactSolution(start.impulse, start.velocity, 0, np.inf, False)
         # from nothing, sweeps would leave much of the friction where they happen to begin
-        if start.impulse.any() or problem.sparse is None:
-            best = NSGS(*limits, min(_FIRST_SWEEPS, self.max_iterations), _LOOK, _DEPTH)(problem, start)
-        if best.converged or problem.sparse is None:
-            return best if best.converged else self._rest(problem, best)
-        # not from the sweeps: they end near a solution, but with velocities that lead a small penalty astray
-        cold = ContactStart(start.impulse, np.zeros_like(start.velocity))
-        static = ADMM(
-            _FURTHER * limits[0],
-            _FURTHER * limits[1],
-            min(_STATIC_ITERATIONS, self.max_iterations),
+        if warm or problem.sparse is None:
+            yield "sweeps", lambda most: NSGS(*limits, min(_FIRST_SWEEPS, most), _LOOK, _DEPTH), False
+        if problem.sparse is not None:
+            yield "admm, small penalty", self._static, False
+            later = [("admm, balanced penalty", self._moving, False)]
+            if isinstance(problem.delassus, RigidDelassus):
+                yield "Newton", self._newton, False
+                interior = [("interior point", self._interior, False), ("admm", self._last, True)]
+                later = later + interior if warm else interior + later
+            yield from later
+        yield "sweeps", lambda most: NSGS(*limits, most, _LOOK, _DEPTH), True
+
+    def _static(self, most: int) -> _Solver:
+        solver = ADMM(
+            _FURTHER * self.tolerance,
+            _FURTHER * self.velocity_tolerance,
+            min(_STATIC_ITERATIONS, most),
             _STATIC_PENALTY,
-            patience=_STATIC_PATIENCE,
+            _STATIC_LOOK,
+            _STATIC_PATIENCE,
+            over_relaxation=1.0,
         )
-        best = self._better(best, static(problem, cold), problem)
-        if not best.converged and self.max_iterations > best.iterations:
-            count = int(_MOVING_SHARE * (self.max_iterations - best.iterations))
-            moving = moving_admm(*limits, count)
-            best = self._better(best, moving(problem, start), problem)
-        return best if best.converged else self._rest(problem, best)
+        # not from the velocities of sweeps: they end near a solution, but lead a small penalty astray
+        return _even(lambda p, s: solver(p, ContactStart(s.impulse, np.zeros_like(s.velocity))))
 
-    def _rest(self, problem: ContactProblem, best: ContactSolution) -> ContactSolution:
-        """Sweeps for what is left of the iterations."""
-        count = max(self.max_iterations - best.iterations, 0)
-        sweep = NSGS(self.tolerance, self.velocity_tolerance, count, _LOOK, _DEPTH)
-        return self._better(best, sweep(problem, ContactStart(best.impulse, best.velocity)), problem)
+    def _newton(self, most: int) -> _Solver:
+        tight = _FURTHER * self.tolerance, _FURTHER * self.velocity_tolerance
+        return _even(ProximalNewton(*tight, min(_NEWTON_STEPS, most)))
 
-    def _better(
-        self, one: ContactSolution, other: ContactSolution, problem: ContactProblem
-    ) -> ContactSolution:
-        """The one with the smaller η, with the iterations of both."""
-        best = other if other.natural_map < one.natural_map else one
-        within = residual(problem, best.impulse).within(self.tolerance, self.velocity_tolerance)
-        return replace(best, iterations=one.iterations + other.iterations, converged=within)
+    def _moving(self, most: int) -> _Solver:
+        return moving_admm(self.tolerance, self.velocity_tolerance, min(_MOVING_ITERATIONS, most))
+
+    def _interior(self, most: int) -> _Solver:
+        solver = InteriorPoint(self.tolerance, self.velocity_tolerance, min(_INTERIOR, most))
+        # its Newton's method has had its try
+        return lambda p, s: solver(p, ContactStart(np.zeros_like(s.impulse), s.velocity))
+
+    def _last(self, most: int) -> _Solver:
+        tight = _FURTHER * self.tolerance, _FURTHER * self.velocity_tolerance
+        return _even(ADMM(*tight, min(_LAST_ITERATIONS, most), _LAST_PENALTY))
+
+    def _judged(self, problem: ContactProblem, found: ContactSolution, why: str) -> ContactSolution:
+        left = residual(problem, found.impulse)
+        within = left.within(self.tolerance, self.velocity_tolerance)
+        return replace(found, natural_map=left.natural_map, converged=within, why=why)
+
+
+def _even(solver: _Solver) -> _Solver:
+    """The solver, in units in which the contacts of rigid bodies yield alike."""
+
+    def solve(problem: ContactProblem, start: ContactStart) -> ContactSolution:
+        if not isinstance(problem.delassus, RigidDelassus):
+            return solver(problem, start)
+        even, each = equilibrated(problem)
+        unit = each[:, None]
+        found = solver(even, ContactStart(start.impulse / unit, start.velocity * unit))
+        return replace(found, impulse=found.impulse * unit, velocity=found.velocity / unit)
+
+    return solve
+
+
+def _better(one: ContactSolution, other: ContactSolution) -> ContactSolution:
+    """The one that is solved or has the smaller η, with the iterations of both."""
+    best = min(one, other, key=lambda solution: (not solution.converged, solution.natural_map))
+    return replace(best, iterations=one.iterations + other.iterations)

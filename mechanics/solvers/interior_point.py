@@ -17,10 +17,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from mechanics.operators.rigid import RigidDelassus
 from mechanics.problem import ContactProblem, ContactSolution, ContactStart, scale_of
 from mechanics.residual import residual
 from mechanics.solvers.equilibrated import equilibrated
 from mechanics.solvers.newton import Newton
+from mechanics.solvers.proximal_newton import ProximalNewton
 from mechanics.solvers.second_order_cones import Scaling, divide, product, reach, scaling
 from mechanics.solvers.shifted_systems import ShiftedSystem, shifted_system
 from moma.errors import SolverError
@@ -141,7 +143,9 @@ class _End:
         for further in _FURTHER:
             if count >= most or found.converged:
                 break
-            newton = Newton(further * self.limits[0], further * self.limits[1], _NEWTON)
+            limits = further * self.limits[0], further * self.limits[1]
+            rigid = isinstance(self.even.delassus, RigidDelassus)
+            newton = ProximalNewton(*limits, _NEWTON) if rigid else Newton(*limits, _NEWTON)
             even = newton(self.even, ContactStart(found.impulse / unit, found.velocity))
             count += even.iterations
             found = min(found, self.looked(even.impulse * unit, 0), key=_left)
