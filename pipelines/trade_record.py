@@ -19,7 +19,7 @@ from pipelines.trade_plot import Panel, Point, trade_png
 from pipelines.trade_runs import Limits
 from pipelines.trade_store import INDEX, Measured, Status, Store
 
-__all__ = ["MAIN", "Goal", "study_record", "write_study"]
+__all__ = ["MAIN", "Goal", "study_png", "study_record", "write_study"]
 
 MAIN = (
     "von_mises_p99",
@@ -89,7 +89,7 @@ def write_study(store: Store, record: Mapping[str, Any]) -> None:
     """Write the files of a study; each appears whole or not at all, the index last."""
     store.write("trade.csv", _as_csv(record["rows"]).encode("utf-8"))
     if record["reference"] is not None:
-        store.write("trade.png", trade_png(_title(record), _panels(record), record["asked_error"]))
+        store.write("trade.png", study_png(record))
     store.write(INDEX, as_json(record).encode("utf-8"))
 
 
@@ -140,8 +140,10 @@ def _as_csv(rows: Sequence[Mapping[str, Any]]) -> str:
     return out.getvalue()
 
 
-def _title(record: Mapping[str, Any]) -> str:
-    return f"{record['scene']}: error against the finest affordable run ({record['reference']['name']})"
+def study_png(record: Mapping[str, Any]) -> bytes:
+    """The picture of a study, of the contents of its trade.json."""
+    title = f"{record['scene']}: error against the finest affordable run ({record['reference']['name']})"
+    return trade_png(title, _panels(record), record["asked_error"])
 
 
 def _panels(record: Mapping[str, Any]) -> list[Panel]:

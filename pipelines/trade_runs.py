@@ -55,7 +55,12 @@ def carry_out(
     Every run is kept in the store as soon as it has ended. Whatever ends this function ends its runs.
     """
     by_name = {one.name: one for one in settings}
-    ended = {name: run for name, run in store.load().items() if name in by_name}
+    # a name may have come to mean another setting, as that of a profile
+    ended = {
+        name: run
+        for name, run in store.load().items()
+        if name in by_name and run.overlay == by_name[name].overlay
+    }
     end = time.monotonic() + limits.budget - sum(run.elapsed for run in ended.values()) / limits.jobs
     with _Runs(job, limits) as runs:
         while True:
