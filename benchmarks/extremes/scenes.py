@@ -233,56 +233,58 @@ def _sliding() -> list[SceneRow]:
     ]
 
 
-def _bumping(scale: float) -> Scene:
-    """A block that falls askew on another, slides off and rocks; times go as the root of lengths (Froude)."""
-    half = np.radians(12.0)
-    turn = np.array([[np.cos(half), 0, np.sin(half)], [0, 1, 0], [-np.sin(half), 0, np.cos(half)]])
-    lower, upper = box("lower", [0, 0, 0], [0.5, 0.4, 0.3]), box("upper", [0, 0, 0], [0.3, 0.3, 0.4])
-    upper = replace(upper, vertices=upper.vertices @ turn.T + [0.15, 0.06, 0.37])
+def _turned(block: Block, degrees: Sequence[float]) -> Block:
+    """A stone turned about y and then about x [°]."""
+    (cy, sy), (cx, sx) = ((np.cos(a), np.sin(a)) for a in np.radians(degrees))
+    turn = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]]) @ np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    return replace(block, vertices=block.vertices @ turn.T)
+
+
+def _scaled(stones: Sequence[Block], scale: float, friction: float, steps: int) -> Scene:
+    """The stones in motion, lengths times `scale`, times as its root (Froude)."""
     time = float(np.sqrt(scale))
-    velocity = (0.5 * time, 0.1 * time, 0.0, 0.0, 0.0, 0.4 / time)
-    stones = (ground(3.0), lower, replace(upper, velocity=velocity))
-    scaled = [replace(stone, vertices=scale * stone.vertices) for stone in stones]
-    return _moving(standing(scaled, friction=0.3), 200, 1e-3 * time)
+    factors = [time] * 3 + [1.0 / time] * 3
+    scaled = [
+        replace(
+            stone,
+            vertices=scale * stone.vertices,
+            velocity=tuple(f * v for f, v in zip(factors, stone.velocity, strict=True)),
+        )
+        for stone in stones
+    ]
+    return _moving(standing(scaled, friction=friction), steps, 1e-3 * time)
+
+
+def _bumping(scale: float) -> Scene:
+    """A block that falls askew on another, slides off and rocks; without friction, so that velocities are unique."""
+    lower, upper = box("lower", [0, 0, 0], [0.5, 0.4, 0.3]), box("upper", [0, 0, 0], [0.3, 0.3, 0.4])
+    upper = moved([_turned(upper, (12.0, 0.0))], (0.15, 0.06, 0.37))[0]
+    upper = replace(upper, velocity=(0.5, 0.1, 0.0, 0.0, 0.0, 0.4))
+    return _scaled((ground(3.0), lower, upper), scale, 0.0, 200)
+
+
+def _skidding(scale: float) -> Scene:
+    """A block that lands on one corner and skids, μ = 0.3: one contact, so that velocities are unique."""
+    block = _turned(box("block", [0, 0, 0], [0.3, 0.3, 0.4]), (30.0, 25.0))
+    block = moved([block], (0.0, 0.0, 1e-3 - float(block.vertices[:, 2].min())))[0]
+    return _scaled((ground(3.0), replace(block, velocity=(1.0, 0.5, 0.0, 0.0, 0.0, 0.4))), scale, 0.3, 150)
 
 
 def _similar() -> list[SceneRow]:
-    one = _bumping(1.0)
-
     def moves(scale: float) -> Check:
         """It is a motion worth comparing."""
-        return lambda result: 0.05 * scale / float(np.abs(result.bodies[2].displacement).max())
+        return lambda result: 0.05 * scale / float(np.abs(result.bodies[-1].displacement).max())
 
-    far = replace(one, blocks=moved(one.blocks, (1e7, 1e7, 0.0)))
-    return [
-        *(
-            SceneRow(
-                "size",
-                f"motion at {scale:g} m as at 1 m",
-                _bumping(scale),
-                moves(scale),
-                one,
-                scale,
-                1e-11,
-                1e-9,
-                300,
-                quick=False,
-            )
-            for scale in (1e-3, 1e4)
-        ),
-        SceneRow(
-            "far",
-            "motion 1e7 m away as at the origin",
-            far,
-            moves(1.0),
-            one,
-            1.0,
-            1e-11,
-            1e-9,
-            300,
-            quick=False,
-        ),
-    ]
+    def row(group: str, name: str, scene: Scene, one: Scene, scale: float) -> SceneRow:
+        return SceneRow(group, name, scene, moves(scale), one, scale, 1e-11, 1e-9, 300, quick=False)
+
+    rows = []
+    for name, make in (("bump, μ = 0", _bumping), ("skid on a corner", _skidding)):
+        one = replace(make(1.0), name=name)
+        rows += [row("size", f"{name}: {scale:g} m as 1 m", make(scale), one, scale) for scale in (1e-3, 1e4)]
+        far = replace(one, blocks=moved(one.blocks, (1e7, 1e7, 0.0)))
+        rows.append(row("far", f"{name}: 1e7 m away as at the origin", far, one, 1.0))
+    return rows
 
 
 def _elastic() -> list[SceneRow]:
