@@ -48,7 +48,8 @@ def choose_solver(settings: SolverSettings, deformable: bool) -> Solver:
 def choose_planar_solver(settings: SolverSettings) -> Solver:
     """The same for disks of the plane; *auto* sweeps.
 
-    A sweep over disks costs a tenth of an iteration of ADMM: where they flow, many sweeps are the cheaper way.
+    A sweep over disks costs a tenth of an iteration of ADMM, and of an extrapolation: where they flow, many plain sweeps
+    are the cheaper way.
 
     Raises
     ------
@@ -61,6 +62,6 @@ def choose_planar_solver(settings: SolverSettings) -> Solver:
             remedy='use "newton" or "cone"',
         )
     limits = settings.tolerance, settings.velocity_tolerance, settings.max_iterations
-    if settings.method == Method.AUTO:
-        return NSGS(*limits)
+    if settings.method in (Method.AUTO, Method.NSGS):
+        return NSGS(*limits, check_every=20, depth=0)
     return choose_solver(settings, deformable=False)

@@ -32,6 +32,10 @@ Array = NDArray[np.float64]
 _NAME = "cone programme"
 # gap and feasibility that Clarabel is asked for: what it can just reach; η is about the root of it
 _GAP, _KAPPA = 1e-12, 1e-14
+# of the fastest velocity: opening at more counts as at this; where that were wrong, η would tell
+_FAR = 100.0
+# and the slowest that velocities are measured against, of the fastest
+_LEAST = 1e-3
 # past shifts from which the next one is extrapolated
 _DEPTH = 5
 # η at which Newton's method may end it, and how much smaller it must have become before that is tried again
@@ -111,14 +115,16 @@ def _shift(problem: ContactProblem, impulse: Array) -> Array:
 class _Programme:
     """The programme of one problem, for one shift after the other; the pattern is analysed once.
 
-    Unknowns are y and r in units in which the largest free velocity and the mean diagonal of W are 1. A contact without
-    friction has r_N only.
+    Unknowns are y and r in units in which the largest closing velocity and the mean diagonal of W are 1. A contact
+    without friction has r_N only.
     """
 
     def __init__(self, problem: ContactProblem) -> None:
         clarabel = _clarabel()
         self._problem, self.iterations = problem, 0
-        self._pace = float(max(np.abs(problem.u_free).max(), 1e-300))
+        pushed = -(problem.u_free[:, 0] + problem.bias)
+        # what opens may slide far faster than what has to be stopped
+        self._pace = float(max(pushed.max(), _LEAST * np.abs(problem.u_free).max(), 1e-300))
         self._scale = scale_of(problem.delassus)
         rough = (problem.friction > 0) | (problem.cohesion > 0)
         d = problem.u_free.shape[1]
@@ -146,7 +152,8 @@ class _Programme:
         """The impulses r (nc, d) of the programme with one shift (nc,), within so many iterations."""
         problem = self._problem
         free = problem.u_free.copy()
-        free[:, 0] += problem.bias + shift
+        # what is far from closing is as good as a little nearer, and far numbers would hide the near ones
+        free[:, 0] = np.minimum(free[:, 0] + problem.bias, _FAR * self._pace) + shift
         linear = np.concatenate([np.zeros(self._extra), free.ravel()[self._kept] / self._pace])
         self._settings.max_iter = min(most, self._most)
         self._solver.update(q=linear, settings=self._settings)

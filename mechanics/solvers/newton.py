@@ -21,8 +21,8 @@ _SOFT, _GIVE = 1e-7, 1e-9
 _PROXIMAL, _FLOOR = 0.3, 1e-6
 # shortest fraction of a step; what a step must gain; on how many of the last iterates, the worst of them counts
 _SHORTEST, _GAIN, _MEMORY = 0.005, 1e-4, 5
-# how many steps that gain nothing are taken all the same, and how many iterates may bring nothing better
-_DARING, _PATIENCE = 10, 40
+# how many steps that gain nothing are taken all the same, and how many iterates may bring no η that is this much better
+_DARING, _PATIENCE, _BETTER = 10, 40, 0.7
 # of the mean diagonal of W: the smallest that a contact's own counts for
 _LEAST = 1e-12
 
@@ -60,6 +60,8 @@ class Newton:
         SolverError : if the problem has no form that can be factorised
         """
         system, limits = shifted_system(problem, "Newton"), (self.tolerance, self.velocity_tolerance)
+        if len(start.impulse) == 0:
+            return ContactSolution(start.impulse, start.velocity, 0, 0.0, True)
         natural, daring, count, since = _Map(problem), 0, 0, 0
         # not put on the cones first: that would break the balance, by which they are told apart
         here, left = natural(start.impulse), residual(problem, start.impulse)
@@ -83,8 +85,9 @@ class Newton:
             here = found
             merits.append(here.size)
             left = residual(problem, here.impulse)
+            since = 0 if left.natural_map < _BETTER * best[0].natural_map else since
             if left.natural_map < best[0].natural_map:
-                best, since = (left, here.impulse), 0
+                best = left, here.impulse
         return _solution(*best, count, limits)
 
 

@@ -13,10 +13,8 @@ __all__ = ["NSGS"]
 
 Array = NDArray[np.float64]
 
-# an extrapolation this many times worse than the sweeps alone makes the old iterates worthless
+# an extrapolation this many times worse than the sweeps alone is not kept, and the old iterates are worthless
 _BAD = 10.0
-# so many extrapolations in a row in vain, and it is no longer tried
-_IN_VAIN = 20
 
 
 @dataclass(frozen=True)
@@ -29,15 +27,15 @@ class NSGS:
     velocity_tolerance : and the largest velocity by which a contact may break its law, over that of u_free [-]
     max_iterations : sweeps after which it is given up
     check_every : sweeps between two looks at η
-    depth : past iterates from which Anderson's method extrapolates at each look; an extrapolation is kept only where
-        its η is the smaller one. 0: plain sweeps
+    depth : past iterates from which Anderson's method extrapolates at each look; an extrapolation is kept unless its
+        η is ten times that of the sweeps alone: what looks worse at first mostly leads on. 0: plain sweeps
     """
 
     tolerance: float = 1e-6
     velocity_tolerance: float = 1e-5
     max_iterations: int = 2000
-    check_every: int = 20
-    depth: int = 0
+    check_every: int = 5
+    depth: int = 20
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from the impulses of `start`; the best of all looks is given back."""
@@ -49,7 +47,7 @@ class NSGS:
             shift = problem.u_free.copy()
             shift[:, 0] += problem.bias
             sweep = problem.delassus.gauss_seidel(shift, problem.friction, problem.cohesion)
-            look = _Look(problem, sweep, self.depth)
+            look = _Look(problem, sweep, self.depth, limits)
             while not left.within(*limits) and sweeps < self.max_iterations:
                 count = min(self.check_every, self.max_iterations - sweeps)
                 impulse, left = look(impulse, count)
@@ -64,28 +62,26 @@ class NSGS:
 class _Look:
     """Some sweeps, a look at what is left, and maybe an extrapolation."""
 
-    def __init__(self, problem: ContactProblem, sweep: GaussSeidel, depth: int) -> None:
-        self._problem, self._sweep = problem, sweep
+    def __init__(
+        self, problem: ContactProblem, sweep: GaussSeidel, depth: int, limits: tuple[float, float]
+    ) -> None:
+        self._problem, self._sweep, self._limits = problem, sweep, limits
         self._anderson = Anderson(depth) if depth else None
-        self._in_vain = 0
 
     def __call__(self, impulse: Array, count: int) -> tuple[Array, Residual]:
         """The next iterate and its residual; `impulse` may be overwritten."""
-        if self._anderson is None or self._in_vain >= _IN_VAIN:
+        if self._anderson is None:
             self._sweep(impulse, count)
             return impulse, residual(self._problem, impulse)
         swept = impulse.copy()
         self._sweep(swept, count)
         left = residual(self._problem, swept)
         candidate = self._anderson(impulse, swept)
-        if candidate is None:
+        if candidate is None or left.within(*self._limits):
             return swept, left
         candidate = project_on_cone(candidate, self._problem.friction, self._problem.cohesion)
         bold = residual(self._problem, candidate)
-        if np.isfinite(bold.natural_map) and bold.natural_map < left.natural_map:
-            self._in_vain = 0
+        if bold.natural_map < _BAD * left.natural_map:
             return candidate, bold
-        self._in_vain += 1
-        if not bold.natural_map < _BAD * left.natural_map:
-            self._anderson.forget()
+        self._anderson.forget()
         return swept, left

@@ -14,9 +14,9 @@ from mechanics.solvers.admm import ADMM
 from mechanics.solvers.alternating import Alternating
 from mechanics.solvers.anderson import Anderson
 from mechanics.solvers.apgd import APGD
+from mechanics.solvers.auto import Auto
 from mechanics.solvers.choice import choose_planar_solver, choose_solver
 from mechanics.solvers.cone_program import ConeProgram
-from mechanics.solvers.elastic import Elastic
 from mechanics.solvers.interior_point import InteriorPoint
 from mechanics.solvers.newton import Newton
 from mechanics.solvers.nsgs import NSGS
@@ -186,8 +186,8 @@ def test_solving_in_turn_does_without_a_sparse_form():
 @pytest.mark.parametrize(
     ("method", "deformable", "expected"),
     [
-        (Method.AUTO, False, Alternating),
-        (Method.AUTO, True, Elastic),
+        (Method.AUTO, False, Auto),
+        (Method.AUTO, True, Auto),
         (Method.NSGS, False, NSGS),
         (Method.NSGS, True, NSGS),
         (Method.ADMM, False, ADMM),

@@ -69,6 +69,25 @@ def test_a_column_of_blocks_is_solved_whatever_the_masses():
     assert answer.natural_map == natural_map(problem, answer.impulse)
 
 
+@pytest.mark.parametrize("bias", [7.6, 1e6])
+def test_what_opens_fast_hides_nothing_of_what_closes_slowly(bias):
+    """Two contacts press at 1 cm/s, a third slides by at 0.6 m/s, far from touching."""
+    slow = alone(bias=np.array([0.0, 0.0, bias]))
+    u_free = np.array([[-0.01, 0.0, 0.0], [-0.01, 1.0, 0.0], [-4e-7, 0.56, 0.14]])
+    problem = replace(slow, u_free=u_free)
+    answer = ConeProgram(1e-10, 1.0)(problem, cold(problem))
+    assert answer.converged
+    exact = [[0.01, 0.0, 0.0], [0.01, -0.001, 0.0], [0.0, 0.0, 0.0]]
+    np.testing.assert_allclose(answer.impulse, exact, atol=1e-11)
+
+
+def test_a_contact_that_is_pushed_out_fast_is_solved():
+    problem = alone(bias=np.full(3, -1e9), friction=np.zeros(3))
+    answer = ConeProgram(1e-10, 1.0)(problem, cold(problem))
+    assert answer.converged
+    np.testing.assert_allclose(answer.impulse[:, 0], 1e9, rtol=1e-8)
+
+
 def test_where_a_start_is_the_solution_nothing_is_done():
     problem = alone()
     first = ConeProgram(1e-10, 1.0)(problem, cold(problem))

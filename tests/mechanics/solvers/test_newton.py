@@ -173,6 +173,13 @@ def test_where_it_fails_it_gives_back_its_best(seed, count):
     assert answer.natural_map >= Newton(1e-15, 0.0, count + 5)(problem, start).natural_map
 
 
+def test_no_contacts_are_no_work():
+    problem = posed(scene(ground(), brick("a", (0, 0, 5), (1, 1, 6)))).problem
+    answer = Newton()(problem, cold(problem))
+    assert answer.converged
+    assert answer.iterations == 0
+
+
 def test_a_problem_that_cannot_be_factorised_is_refused():
     with pytest.raises(SolverError, match="Newton: the problem has no sparse form"):
         Newton()(replace(pushed(), sparse=None), cold(pushed()))
