@@ -195,11 +195,22 @@ def _partner(
     """A run to estimate the error of the finest by, and how much coarser it is; None if all have its mesh and step."""
     fine = settings[finest.name]
     alike = [one for one in others if settings[one.name].element is fine.element]
-    for size in ("edge", "step"):
-        for one in alike:
-            ratio = getattr(settings[one.name], size) / getattr(fine, size)
-            if ratio > _COARSER:
-                return one, ratio
-    # of another element, a looser tolerance, fewer points: as if it were half as fine
-    elements = [one for one in others if settings[one.name].element not in (None, fine.element)]
-    return next(((one, 2.0) for one in (elements if fine.element else others)), None)
+    meshes = [one for one in others if settings[one.name].element not in (None, fine.element)]
+    by_edge = _coarser(settings, fine, alike, "edge") if fine.element else None
+    if by_edge is None and fine.element and meshes:
+        return meshes[0], 2.0  # of another element: as if it were half as fine
+    found = by_edge or _coarser(settings, fine, alike, "step")
+    if found is None and fine.element is None and others:
+        return others[0], 2.0  # a looser tolerance, fewer points
+    return found
+
+
+def _coarser(
+    settings: Mapping[str, Setting], fine: Setting, runs: Sequence[Measured], size: str
+) -> tuple[Measured, float] | None:
+    """The first of the runs that is coarser in the size of its cells or steps, and by how much."""
+    for one in runs:
+        ratio = getattr(settings[one.name], size) / getattr(fine, size)
+        if ratio > _COARSER:
+            return one, ratio
+    return None

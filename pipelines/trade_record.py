@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from typing import Any
 
+from mechanics.scene import Fidelity
 from pipelines.quantities import QUANTITIES
 from pipelines.summary import as_json
 from pipelines.trade_child import overlay_record
@@ -172,4 +173,6 @@ def _panels(record: Mapping[str, Any]) -> list[Panel]:
 def _kind(row: Mapping[str, Any]) -> str:
     """By what the points of a plot are coloured."""
     overlay = row["overlay"]
+    if overlay.get("fidelity") == Fidelity.RIGID:
+        return str(Fidelity.RIGID)
     return str(overlay.get("element") or overlay.get("fidelity") or "as written")

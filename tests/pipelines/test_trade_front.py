@@ -188,6 +188,14 @@ def test_a_variant_of_the_same_mesh_tells_nothing_of_the_error_of_the_mesh():
     assert found.errors["natural_map"] == 1e-7
 
 
+def test_another_step_tells_less_of_a_mesh_than_another_element():
+    slow = replace(FINE, name="h 5 ms", step=5e-3, varied="t10/2")
+    found, _ = judge(*study((FINE, 20.0, 1.0), (slow, 3.0, 1.0), (LINEAR, 9.0, 0.7)))
+    assert (found.name, found.partner, found.ratio) == ("t10/2", "t4/2", 2.0)
+    found, _ = judge(*study((FINE, 20.0, 1.0), (slow, 3.0, 1.0)))
+    assert (found.partner, found.ratio) == ("h 5 ms", 5.0)
+
+
 def test_a_run_without_stress_is_never_the_reference_of_those_with():
     settings, runs = study((STIFF, 1.0, None), (COARSE, 2.0, 1.0))
     found, rows = judge(settings, runs)
