@@ -7,7 +7,7 @@ if TYPE_CHECKING:
     from pipelines.run import RunReport
     from pipelines.survey_report import SurveyReport
 
-__all__ = ["ingest_lines", "run_lines", "survey_report_lines"]
+__all__ = ["ingest_lines", "profile_lines", "run_lines", "survey_report_lines"]
 
 _SHOWN = 20  # lines of a list; the report has them all
 
@@ -132,6 +132,20 @@ def run_lines(report: "RunReport", verbose: bool) -> list[str]:
     return [*lines, *(f"  {report.folder / name}" for name in shown)]
 
 
+def profile_lines(name: str) -> list[str]:
+    """What a profile is, and the errors it had on the reference scenes."""
+    from pipelines.profile_errors import ERRORS
+    from pipelines.profiles import PROFILES
+
+    ranges = (
+        f"{quantity} {_part(low)} to {_part(high)}" for quantity, (_, low, high) in ERRORS[name].items()
+    )
+    return [
+        f"  profile {name}: {PROFILES[name].about}",
+        f"  its errors on the scenes on which it was measured: {', '.join(ranges)}",
+    ]
+
+
 def _profile_lines(profile: dict[str, Any] | None) -> list[str]:
     """Which profile has run, and what error it is to be expected to have; nothing without one."""
     if profile is None:
@@ -147,7 +161,7 @@ def _profile_lines(profile: dict[str, Any] | None) -> list[str]:
 
 
 def _part(value: float) -> str:
-    return f"{100.0 * value:.2g} %"
+    return f"{100.0 * value:.{1 if value < 0.0995 else 0}f} %"
 
 
 def survey_report_lines(report: "SurveyReport", verbose: bool) -> list[str]:

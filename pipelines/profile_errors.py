@@ -39,8 +39,8 @@ ERRORS: Mapping[str, Mapping[str, tuple[float, float, float]]] = {
 and the largest error of the reference scenes."""
 
 COLLAPSE: Mapping[str, float] = {
-    "fast": 0.01,
-    "balanced": 0.01,
-    "accurate": 0.01,
+    "fast": 0.0129,
+    "balanced": 0.00595,
+    "accurate": 0.00595,
 }
 """By profile: the largest error of a load of collapse, or of a least thickness (benchmarks.collapse)."""

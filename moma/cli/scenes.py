@@ -33,6 +33,7 @@ def check(
 ) -> None:
     """Say whether a scene is sound and what it will cost; run nothing."""
     from moma.listing import as_json
+    from moma.telling import profile_lines
     from moma.telling_checks import check_lines
     from pipelines.check import check_scene
 
@@ -40,6 +41,8 @@ def check(
     for warning in report.warnings:
         say(f"warning: {warning}")
     lines = check_lines(report, verbose, explain)
+    if profile is not None:
+        lines[1:1] = profile_lines(profile)
     if pictures is not None:
         lines += [f"  {pictures / name}" for name in report.files]
     print(as_json(asdict(report)) if json else "\n".join(lines))

@@ -1,5 +1,9 @@
 """The errors that profiles tell hold on scenes that nothing was fitted to, and so do loads of collapse."""
 
+import itertools
+import re
+from pathlib import Path
+
 import pytest
 
 from benchmarks import collapse
@@ -9,6 +13,7 @@ from pipelines.profile_errors import COLLAPSE
 from pipelines.profile_report import BOUNDS, TYPICAL
 from pipelines.profiles import PROFILES
 
+ROOT = Path(__file__).resolve().parents[2]
 # less is what solver and balance leave
 LEAST = 1e-4
 CASES = {case.name: case for case in collapse.CASES}
@@ -76,3 +81,38 @@ def test_loads_of_collapse_lie_in_their_bands(name, profile):
     assert max(found.stood, found.fell) <= case.high
     assert found.undecided == 0
     assert abs(found.value / case.reference - 1.0) <= COLLAPSE[profile]
+
+
+def published(heading):
+    """Rows of the table of docs/accuracy.md §12 that begins with this heading; cells as texts."""
+    section = (ROOT / "docs/accuracy.md").read_text(encoding="utf-8").split("## 12. Profiles", 1)[1]
+    lines = section.split(f"| {heading} |", 1)[1].splitlines()[2:]
+    rows = itertools.takewhile(lambda line: line.startswith("|"), lines)
+    return [[cell.strip() for cell in row.strip("|").split("|")] for row in rows]
+
+
+def test_the_page_shows_every_scene_and_profile_and_keeps_its_word():
+    rows = published("scene")
+    shown = [(row[0].strip("*"), row[1]) for row in rows]
+    assert shown == [(name, profile) for name in (*REFERENCE, *HELD_OUT) for profile in PROFILES]
+    for name, profile, *cells in rows:
+        assert name.startswith("*") == (name.strip("*") in HELD_OUT)
+        for error, said in re.findall(r"([\d.]+) \(([\d.]+)\)", " ".join(cells)):
+            # as rounded
+            assert float(error) <= 2.0 * float(said) + 0.05, (name, profile, error, said)
+
+
+def test_the_errors_of_loads_of_collapse_are_those_of_the_page():
+    rows = published("case")
+    assert [(row[0], row[3]) for row in rows] == [(name, profile) for name in CASES for profile in PROFILES]
+    largest = dict.fromkeys(PROFILES, 0.0)
+    for name, reference, allowed, profile, found, error, _ in rows:
+        value, width = map(float, found.split(" ± "))
+        low, high = map(float, allowed.split(" to "))
+        assert low <= value <= high
+        case = CASES[name]
+        assert float(reference) == case.reference
+        assert (low, high) == (pytest.approx(case.low, abs=5e-4), pytest.approx(case.high, abs=5e-4))
+        assert float(error.split()[0]) / 100 == pytest.approx(value / case.reference - 1.0, abs=6e-4)
+        largest[profile] = max(largest[profile], abs(value / case.reference - 1.0) + width / case.reference)
+    assert largest == {profile: pytest.approx(value, abs=1.5e-3) for profile, value in COLLAPSE.items()}

@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 
 from moma.cli import app
 from pipelines.ingest import ingest
+from pipelines.profile_errors import ERRORS
 
 SURVEY = Path(__file__).resolve().parents[2] / "data/samples/window/window.moma"
 SCENE = """
@@ -90,6 +91,15 @@ def test_check_counts_what_the_profile_needs(place):
     assert accurate["bodies"]["rigid"] == 0
     assert accurate["cost"]["unknowns"] > 3 * plain["cost"]["unknowns"]
     assert (plain["cost"]["step"], accurate["cost"]["step"]) == (0.05, 0.002)
+
+
+def test_check_says_how_a_profile_was_measured(place):
+    done = invoke("check", place, "--profile", "balanced")
+    assert done.exit_code == 0, done.output
+    (line,) = (one for one in done.stdout.splitlines() if one.startswith("  its errors on the scenes"))
+    _, low, high = ERRORS["balanced"]["stone_von_mises_p99"]
+    assert f"stone_von_mises_p99 {100 * low:.1f} % to {100 * high:.0f} %" in line
+    assert "profile" not in invoke("check", place).stdout
 
 
 def test_a_wrong_name_is_told_with_the_right_ones(place):
