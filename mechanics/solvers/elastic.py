@@ -31,12 +31,15 @@ class Elastic:
     max_iterations: int = 2000
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
-        """Solve from `start`."""
+        """Solve from `start`; `why` says which of the two did."""
         limits = self.tolerance, self.velocity_tolerance
+        warm = "warm start" if start.impulse.any() else f"cold start, {len(start.impulse):,} contacts"
         first = ADMM(*limits, min(_ADMM, self.max_iterations))(problem, start)
+        first = replace(first, why=f"admm: {warm}")
         if first.converged or self.max_iterations <= first.iterations:
             return first
         other = InteriorPoint(*limits, min(100, self.max_iterations - first.iterations))
         second = other(problem, ContactStart(first.impulse, first.velocity))
+        second = replace(second, why=f"interior point: admm stood at η {first.natural_map:.0e}")
         best = second if second.natural_map < first.natural_map or second.converged else first
         return replace(best, iterations=first.iterations + second.iterations)

@@ -49,6 +49,8 @@ _LAST_STEPS = 12
 # short steps in a row, once η and velocities in even units are this small, after which it gets nowhere, and iterations
 # after the last try that gain less than this: Newton's method has the last word
 _STUCK, _NEARLY, _IDLE, _GAIN = 5, (1e-3, 1e-3), 3, 0.9
+# impulses, in even units, that only contradictions cause
+_WORTHLESS = 1e30
 # Newton's steps in one try, and how much further than asked for it goes at last, since even units weigh light stones
 # less
 _NEWTON, _FURTHER = 12, (1.0, 1e-3)
@@ -96,12 +98,14 @@ class InteriorPoint:
         path = _Path(end.even)
         while short < _STUCK and idle < _IDLE and count < self.max_iterations:
             try:
-                length = path.advance()
+                # where the laws contradict each other impulses grow without bound, until they are no numbers
+                with np.errstate(all="ignore"):
+                    length = path.advance()
             except SolverError:
                 # rounding has won
                 break
             count += 1
-            if not np.isfinite(path.complementarity):
+            if not (np.isfinite(path.complementarity) and np.abs(path.impulse).max() < _WORTHLESS):
                 break
             impulse = path.impulse * end.unit[:, None]
             found = end.looked(impulse, 0)
