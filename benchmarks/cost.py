@@ -8,7 +8,7 @@ mechanics/cost_rates.py.
 import argparse
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -39,11 +39,14 @@ _FIT = (
         Case(kind, n, mode="relaxation")
         for kind, n in (("leaves", 100), ("pillars", 240), ("portals", 100), ("vault", 120))
     ),
-    *(Case("wall", n, mode="motion") for n in (100, 800)),
+    *(Case("wall", n, mode="motion") for n in (8, 100, 800)),
+    Case("pillars", 12, mode="motion"),
+    *(Case("wall", 8, mode=mode) for mode in ("static", "relaxation")),
     *(
         Case(kind, n, mode="motion")
         for kind, n in (("leaves", 100), ("pillars", 240), ("portals", 100), ("vault", 120))
     ),
+    *(Case("wall", n, mode="asleep") for n in (100, 400, 1600)),
     Case("pillars", 24, "hex8"),
     Case("pillars", 60, "tet10", 0.2),
     Case("wall", 30, "hex8"),
@@ -86,6 +89,7 @@ _MEASURES: Mapping[tuple[str, str], tuple[str, ...]] = {
     ("rigid", "settled"): ("one", "contacts"),
     ("rigid", "relaxing"): ("one", "contacts", "tangle"),
     ("rigid", "moving"): ("one", "contacts", "tangle"),
+    ("rigid", "asleep"): ("one", "stones"),
     ("rigid", "stress"): ("stones", "contacts"),
     ("elastic", "mesh"): ("one", "stones", "distinct_nodes", "nodes"),
     ("elastic", "assemble"): ("one", "contacts", "condensed", "blocks"),
@@ -99,7 +103,7 @@ _BYTES: Mapping[str, tuple[str, ...]] = {
     "rigid": ("contacts", "stones"),
     "elastic": ("contacts", "nodes", "blocks", "factor"),
 }
-_PACE = {"static": "settled", "relaxation": "relaxing", "motion": "moving"}
+_PACE = {"static": "settled", "relaxation": "relaxing", "motion": "moving", "asleep": "asleep"}
 # stages of the clock that are part of every step
 _STEP = ("detect", "solve", "advance", "observe")
 # of the logarithm of time over expectation: so many standard deviations make the spread
@@ -163,20 +167,23 @@ def _measured(case: Case, kept: Path | None) -> Row | None:
 
 
 def fitted(work: Sequence[Mapping[str, float]], seconds: Array, names: Sequence[str]) -> Rate:
-    """Rates, none negative, with the least relative error, and the factor within which most measured values lie."""
+    """Rates, none negative, with the least relative error, and the factors within which most measured values lie."""
     table = np.array([[one[name] for name in names] for one in work])
     rates, _ = nnls(table / seconds[:, None], np.ones(len(seconds)))
     ratio = np.log(seconds / np.maximum(table @ rates, 1e-12))
     # by the median ratio: a few slow runs would drag the sum of squares
     middle = float(np.median(ratio))
-    spread = float(np.exp(_DEVIATIONS * np.sqrt(np.mean((ratio - middle) ** 2))))
+    below, above = (
+        float(np.exp(_DEVIATIONS * np.sqrt(np.mean(np.maximum(side, 0.0) ** 2) * 2.0)))
+        for side in (middle - ratio, ratio - middle)
+    )
     per = {
         name: float(f"{rate * np.exp(middle):.3g}")
         for name, rate in zip(names, rates, strict=True)
         if rate > 0
     }
     least = _LEAST_OF_FEW if len(seconds) < _FEW else _LEAST
-    return Rate(per, float(f"{max(spread, least):.2f}"))
+    return Rate(per, *(float(f"{max(one, least):.2f}") for one in (below, above)))
 
 
 def _module(rows: Sequence[Row]) -> str:
@@ -195,7 +202,7 @@ def _module(rows: Sequence[Row]) -> str:
         work = [measures(Amounts(**row["amounts"])) for row in own_rows]
         rate = fitted(work, np.array([row["memory"] for row in own_rows], dtype=float), names)
         program = float(np.median([row["program"] for row in own_rows]))
-        lines.append(f"    {kind!r}: {Rate(dict(rate.per) | {'one': float(f'{program:.3g}')}, rate.spread)},")
+        lines.append(f"    {kind!r}: {replace(rate, per=dict(rate.per) | {'one': float(f'{program:.3g}')})},")
     lines += ["}", "", f"CALIBRATION: Mapping[str, float] = {calibration()}"]
     return "\n".join(lines)
 
@@ -209,6 +216,8 @@ def _seconds(row: Row, stage: str) -> float | None:
     stages: Mapping[str, float] = row["stages"]
     if stage in _PACE.values():
         steps = [*_STEP, *(["assemble"] if _kind(row) == "rigid" else [])]
+        if stage == "asleep":
+            return stages.get(stage)
         took = sum(stages.get(one, 0.0) for one in steps) / row["steps"]
         return took if _PACE[row["mode"]] == stage else None
     return stages.get(stage)

@@ -12,13 +12,21 @@ import mechanics.simulate
 from benchmarks.cost_scenes import Case
 from benchmarks.memory import peak_bytes
 from benchmarks.report import Row
+from mechanics.amounts import Amounts
+from mechanics.model import build_model
+from mechanics.observers.energy import EnergyBalance
+from mechanics.observers.equilibrium import imbalance
+from mechanics.outcome import Watch
 from mechanics.plan import plan
-from mechanics.simulation import Clock
+from mechanics.simulation import Clock, Simulation
+from moma.errors import SolverError
 
 __all__ = ["main"]
 
 # stones of the scene that compiles, or loads, every kernel
 _FEW = 12
+# steps until all sleep, and steps that are timed then
+_UNTIL_ASLEEP, _ASLEEP = 60, 20
 
 
 class _ProcessorClock(Clock):
@@ -41,7 +49,32 @@ def main() -> None:
         print(json.dumps(_measured(case)))
 
 
+def _asleep(case: Case) -> Row:
+    """Seconds of one step, observers and all, in which all stones sleep."""
+    scene = case.scene()
+    model, start = build_model(scene)
+    simulation, watch = Simulation(model, start, Clock()), Watch(model, start)
+    energy, begun = EnergyBalance(model, start), 0.0
+    for count in range(_UNTIL_ASLEEP + _ASLEEP):
+        if count == _UNTIL_ASLEEP:
+            begun = time.process_time()
+        step = simulation.step()
+        energy(step)
+        active = step.active
+        out = imbalance(model, step.after, active.contacts, active.force, step.kick.load, step.resting)
+        watch(step.after, out, step.solution)
+    took = (time.process_time() - begun) / _ASLEEP
+    if not simulation.asleep[model.inertia.moving].all():
+        raise SolverError("not all sleep", where=scene.name)
+    amounts = asdict(Amounts(len(scene.blocks), len(step.contacts)))
+    return asdict(case) | {
+        "amounts": amounts, "seconds": took, "stages": {"asleep": took}, "steps": 1, "memory": None
+    }  # fmt: skip
+
+
 def _measured(case: Case) -> Row:
+    if case.mode == "asleep":
+        return _asleep(case)
     mechanics.simulate.simulate(replace(case, stones=_FEW, size=1.0).scene())
     before, scene = peak_bytes(), case.scene()
     start = time.process_time()

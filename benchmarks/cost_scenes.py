@@ -32,7 +32,8 @@ class Case:
     stones : about how many
     element : of deformable stones; empty: rigid ones
     size : of the mesh [m]
-    mode : *static*: from the static equilibrium; *relaxation*: kinetic relaxation; *motion*: 60 steps of free motion
+    mode : *static*: from the static equilibrium; *relaxation*: kinetic relaxation; *motion*: 60 steps of free motion;
+        *asleep*: steps in which all sleep
     """
 
     kind: str
@@ -61,7 +62,8 @@ class Case:
             return TimeSettings(1e-3, 1.0, 1.0, start=Start.EQUILIBRIUM)
         if self.mode == "relaxation":
             return TimeSettings(1e-2, 1.0, 2.0, relaxation=True)
-        return TimeSettings(1e-3, 0.5, 0.06, stop_at_equilibrium=False)
+        sleep = 1e-2 if self.mode == "asleep" else 0.0
+        return TimeSettings(1e-3, 0.5, 0.06, stop_at_equilibrium=False, sleep=sleep)
 
 
 def _box(low: tuple[float, float, float], high: tuple[float, float, float]) -> Array:

@@ -35,6 +35,8 @@ class ExpectedCost:
     seconds : low, likely and high, of one processor
     longest : if no stone comes to rest before the duration is over [s]
     memory : most of the whole program [bytes]
+    asleep : likely seconds if nearly all stones slept in its steps (`[time] sleep`); None where none may, or where a
+        run ends as soon as they would
     by_stage : likely seconds of mesh, assemble, start, steps and stress; stages that there will not be are left out
     steps : least, likely and largest number of steps
     """
@@ -42,6 +44,7 @@ class ExpectedCost:
     seconds: tuple[float, float, float]
     longest: float
     memory: int
+    asleep: float | None
     by_stage: Mapping[str, float]
     steps: tuple[int, int, int]
 
@@ -62,7 +65,7 @@ def expected_cost(plan: Plan, scene: Scene, slowness: float = 1.0) -> ExpectedCo
         del stages["start"]
     work, steps = measures(amounts), _steps(time_, scene.loads.until)
     step = RATES[kind, _pace(time_)]
-    low = likely = high = moving = 0.0
+    low = likely = high = 0.0
     by_stage = {}
     for stage in stages:
         rate = RATES.get((kind, stage))
@@ -70,20 +73,21 @@ def expected_cost(plan: Plan, scene: Scene, slowness: float = 1.0) -> ExpectedCo
             continue
         seconds = slowness * rate(work)
         by_stage[stage] = seconds
-        low, likely, high = low + seconds / rate.spread, likely + seconds, high + seconds * rate.spread
+        low, likely, high = low + seconds / rate.below, likely + seconds, high + seconds * rate.above
     one = slowness * step(work)
     by_stage["steps"] = steps[1] * one
     total = max(1, round(time_.duration / time_.step))
     moving = high + total * slowness * RATES[kind, "moving"](work)
     seconds_range = (
-        low + steps[0] * one / step.spread,
+        low + steps[0] * one / step.below,
         likely + steps[1] * one,
-        high + steps[2] * one * step.spread,
+        high + steps[2] * one * step.above,
     )
     return ExpectedCost(
         seconds_range,
         max(moving, seconds_range[1]),
         int(MEMORY[kind](work)),
+        _asleep(kind, time_, likely, slowness * steps[1] * RATES["rigid", "asleep"](work)),
         by_stage,
         steps,
     )
@@ -93,6 +97,12 @@ def measures(amounts: Amounts) -> dict[str, float]:
     """What rates refer to: the amounts; *one*; *tangle*, contacts times the root of the number of stones."""
     own = {name: float(value) for name, value in asdict(amounts).items()}
     return own | {"one": 1.0, "tangle": own["contacts"] * own["stones"] ** 0.5}
+
+
+def _asleep(kind: str, time_: TimeSettings, rest: float, steps: float) -> float | None:
+    """Seconds with sleep: `rest` of the other stages, `steps` of the steps."""
+    useless = kind == "elastic" or time_.relaxation or time_.stop_at_equilibrium
+    return None if useless else rest + steps
 
 
 def _pace(time_: TimeSettings) -> str:

@@ -92,7 +92,7 @@ def test_no_run_ends_before_its_loads_do():
 def test_rates_are_found_again_from_times_that_they_made():
     truth = {"stones": 2e-3, "contacts": 3e-5}
     work = [measures(Amounts(stones, contacts)) for stones, contacts in ((10, 40), (50, 900), (400, 2000))]
-    seconds = np.array([Rate(truth, 1.0)(one) for one in work])
+    seconds = np.array([Rate(truth, 1.0, 1.0)(one) for one in work])
     rate = fitted(work, seconds, ("one", "stones", "contacts"))
     assert rate.per == pytest.approx(truth, rel=1e-2)
 
@@ -105,15 +105,15 @@ def test_the_spread_holds_most_of_what_was_measured():
     rate = fitted(work, seconds, ("stones",))
     ratio = seconds / [rate(one) for one in work]
     assert rate.per["stones"] == pytest.approx(1e-3, rel=0.3)
-    assert np.mean((ratio < rate.spread) & (ratio > 1 / rate.spread)) > 0.75
-    assert rate.spread < 2.5
+    assert np.mean((ratio < rate.above) & (ratio > 1 / rate.below)) > 0.75
+    assert max(rate.below, rate.above) < 2.5
 
 
 def test_every_stage_has_a_rate_and_a_spread():
     for rate in RATES.values():
         assert rate.per
         assert all(value > 0 for value in rate.per.values())
-        assert rate.spread >= 1.2
+        assert min(rate.below, rate.above) >= 1.2
 
 
 def test_this_machine_is_of_this_age():
@@ -125,3 +125,16 @@ def test_scenes_that_are_measured_stand_on_something(kind):
     needs = plan(Case(kind, 30).scene())
     assert not needs.loose
     assert 15 <= sum(needs.bodies.values()) <= 80
+
+
+def test_what_sleep_would_save_is_told_where_it_can():
+    scene = cubes(Fidelity.RIGID, 20, stop_at_equilibrium=False)
+    cost = expected_cost(plan(scene), scene)
+    assert cost.asleep is not None
+    assert cost.asleep < cost.seconds[1]
+    for other in (
+        cubes(Fidelity.RIGID, 2),
+        cubes(Fidelity.RIGID, 2, stop_at_equilibrium=False, relaxation=True),
+        cubes(Fidelity.DEFORMABLE, 1, stop_at_equilibrium=False),
+    ):
+        assert expected_cost(plan(other), other).asleep is None
