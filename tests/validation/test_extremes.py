@@ -256,22 +256,12 @@ def test_trajectories_are_the_same_at_every_scale(scale, friction):
 @pytest.mark.parametrize("ratio", [1.0, 1e3, 1e6])
 @pytest.mark.parametrize("friction", [0.1, 1.0, 10.0])
 @pytest.mark.parametrize("step", [1e-5, 1e-3, 1e-1])
-def test_columns_stand_in_every_corner_of_the_matrix(count, ratio, friction, step, request):
+def test_columns_stand_in_every_corner_of_the_matrix(count, ratio, friction, step):
     """S05: mass ratio × height × friction × step: a column stands, solved to 1e-12, the weight on the ground. Statics.
 
-    A hundred blocks that grow to 10⁶ times their weight are beyond doubles at that tolerance: there the run must say
-    that steps were not solved, and must not say that anything fell. Elsewhere nothing moves by more than 1e-4 of a free
-    fall for one step.
+    Nothing moves by more than 1e-4 of a free fall for one step.
     """
-    if (count, ratio, step) == (100, 1e6, 1e-1):
-        reason = (
-            "no step is solved, and what the solver leaves moves the light stones enough to count as a fall"
-        )
-        request.applymarker(pytest.mark.xfail(reason=reason, strict=True))
-    scene = resting("matrix", column(count, ratio=ratio), friction=friction, step=step, duration=20 * step)
-    result = simulate(scene)
-    if count == 100 and ratio == 1e6:
-        assert result.outcome is not Outcome.COLLAPSED
-        assert result.outcome is Outcome.EQUILIBRIUM or result.errors.unconverged_steps > 0
-    else:
-        check_rests(result, still=1e-6 + 1e-4 * G * step**2)
+    result = simulate(
+        resting("matrix", column(count, ratio=ratio), friction=friction, step=step, duration=20 * step)
+    )
+    check_rests(result, still=1e-6 + 1e-4 * G * step**2)
