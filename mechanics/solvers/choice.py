@@ -48,8 +48,8 @@ def choose_solver(settings: SolverSettings, deformable: bool) -> Solver:
 def choose_planar_solver(settings: SolverSettings) -> Solver:
     """The same for disks of the plane; *auto* sweeps.
 
-    A sweep over disks costs a tenth of an iteration of ADMM, and of an extrapolation: where they flow, many plain sweeps
-    are the cheaper way.
+    A sweep over disks costs a tenth of an iteration of ADMM, and of an extrapolation: where they flow, many plain
+    sweeps are the cheaper way.
 
     Raises
     ------
