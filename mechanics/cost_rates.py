@@ -37,20 +37,18 @@ RATES: Mapping[tuple[str, str], Rate] = {
     ("rigid", "moving"): Rate(per={"one": 0.00103, "tangle": 1.62e-07}, below=1.29, above=1.7),
     ("rigid", "asleep"): Rate(per={"one": 0.000722, "stones": 1.12e-06}, below=2.0, above=2.0),
     ("rigid", "stress"): Rate(per={"stones": 8.35e-05, "contacts": 1.96e-05}, below=1.25, above=1.91),
-    ("elastic", "mesh"): Rate(
-        per={"one": 0.00142, "stones": 0.00145, "distinct_nodes": 5.61e-05}, below=1.25, above=1.29
-    ),
+    ("elastic", "mesh"): Rate(per={"stones": 0.00149, "distinct_nodes": 7.06e-05}, below=1.25, above=1.35),
     ("elastic", "assemble"): Rate(
-        per={"one": 0.00797, "contacts": 4.69e-05, "condensed": 1.09e-07}, below=1.62, above=1.96
+        per={"one": 0.0111, "contacts": 4.38e-05, "condensed": 1.18e-07}, below=1.67, above=2.35
     ),
     ("elastic", "start"): Rate(
         per={"fronts": 0.00613, "condensed": 6.37e-07, "flops": 4.71e-09}, below=4.52, above=5.97
     ),
     ("elastic", "settled"): Rate(per={"fronts": 0.000261, "flops": 1.08e-10}, below=1.31, above=2.39),
-    ("elastic", "relaxing"): Rate(per={"flops": 1.26e-09}, below=2.0, above=2.0),
-    ("elastic", "moving"): Rate(per={"fronts": 0.00605}, below=2.0, above=2.0),
+    ("elastic", "relaxing"): Rate(per={"fronts": 0.00234, "flops": 8.82e-10}, below=2.0, above=2.0),
+    ("elastic", "moving"): Rate(per={"fronts": 0.00578}, below=2.0, above=2.0),
     ("elastic", "stress"): Rate(
-        per={"stones": 3.81e-05, "nodes": 1.14e-05, "contacts": 9.4e-05}, below=1.25, above=1.33
+        per={"stones": 0.000247, "nodes": 1.13e-05, "contacts": 8.57e-05}, below=1.25, above=1.31
     ),
 }
 
@@ -62,7 +60,7 @@ MEMORY: Mapping[str, Rate] = {
 }
 
 CALIBRATION: Mapping[str, float] = {
-    "loops": 0.0018538030000001537,
-    "passes": 0.005199640999999922,
-    "products": 0.03091812500000013,
+    "loops": 0.0019607619999999493,
+    "passes": 0.004918503999999935,
+    "products": 0.03172349899999993,
 }
