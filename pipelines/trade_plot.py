@@ -81,8 +81,8 @@ def _draw(axes: Any, panel: Panel, asked: float) -> None:
 
     axes.set_xscale("log")
     axes.set_yscale("log")
-    for axis, parts in ((axes.xaxis, (1.0, 2.0, 5.0)), (axes.yaxis, (1.0,))):
-        axis.set_major_locator(LogLocator(subs=parts))
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.set_minor_locator(NullLocator())
         axis.set_major_formatter(StrMethodFormatter("{x:g}"))
     front = [panel.points[number] for number in panel.front]
