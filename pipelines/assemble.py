@@ -17,7 +17,8 @@ from pipelines.joint_laws import law_rules
 from pipelines.local_frame import entry_about, local_origin, stone_about
 from pipelines.scene_keys import STRESS_PICTURES
 from pipelines.scene_loads import build_loads, thrown
-from pipelines.scenefile import MeshSettings, SceneFile
+from pipelines.scene_settings import MeshSettings
+from pipelines.scenefile import SceneFile
 from pipelines.selection import STRESS, Groups, StoneModel, select_groups, select_stones
 from pipelines.stone_records import surveyed_block
 from survey.blocky import BlockyStone

@@ -15,7 +15,8 @@ from mechanics.scene import ContactSettings, SolverSettings, Start, TimeSettings
 from moma.errors import MomaError, SceneError, UsageError
 from pipelines.record_file import parse_record
 from pipelines.scene_keys import TABLES
-from pipelines.scenefile import MeshSettings, parse_scene, read_scene
+from pipelines.scene_settings import MeshSettings
+from pipelines.scenefile import parse_scene, read_scene
 from pipelines.schema import REQUIRED
 from pipelines.stone_keys import MATERIAL_KEYS, ORTHOTROPY_KEYS
 from pipelines.toml_lines import key_lines
