@@ -75,7 +75,7 @@ def study_record(goal: Goal, forecast: Forecast, left: float, limits: Limits) ->
         "machine": {"processor": platform.processor() or platform.machine(), "cores": os.cpu_count()},
         "budget": limits.budget,
         "jobs": limits.jobs,
-        "spent": sum(run.elapsed for run in forecast.ended.values()),
+        "spent": sum(run.elapsed for run in forecast.ended.values()) / limits.jobs,
         "quantities": dict(QUANTITIES),
         "quantity": quantity,
         "asked_error": goal.error,
