@@ -78,7 +78,8 @@ def measured_rows(name: str, scene: Scene, records: Path | None = None) -> list[
         if overlay.fidelity is None:
             overlay = replace(overlay, fidelity=Fidelity.DEFORMABLE)
         found, free, seconds = _kept(f"{name} {profile.name}", scene, overlay, records)
-        apart, expected = differences(found, truth), expected_errors(profile.name, found, free)
+        apart = differences(found, truth)
+        expected = expected_errors(profile.name, found, free, rigid=overlay.fidelity is Fidelity.RIGID)
         row: Row = {"scene": name, "profile": profile.name, "cpu_s": seconds, "free": free}
         row |= {"stress_error": found.stress_error, "outcome": found.outcome}
         for quantity in (*TYPICAL, *BOUNDS):

@@ -40,7 +40,7 @@ and the largest error of the reference scenes."""
 
 COLLAPSE: Mapping[str, float] = {
     "fast": 0.0129,
-    "balanced": 0.00595,
+    "balanced": 0.0129,
     "accurate": 0.00595,
 }
 """By profile: the largest error of a load of collapse, or of a least thickness (benchmarks.collapse)."""

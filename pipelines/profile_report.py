@@ -86,15 +86,16 @@ def profile_report(name: str | None, scene: SceneFile, result: Result) -> Profil
     if name is None:
         return None
     profile, found = profile_named(name), quantities(result)
+    rigid = any(body.fidelity is Fidelity.RIGID for body in result.bodies)
     return ProfileReport(
         name,
         profile.about,
         settings_of_profile(profile, scene.time),
-        expected_errors(name, found, loops(result)),
+        expected_errors(name, found, loops(result), rigid=rigid),
     )
 
 
-def expected_errors(name: str, found: Quantities, free: float) -> dict[str, Expected]:
+def expected_errors(name: str, found: Quantities, free: float, *, rigid: bool) -> dict[str, Expected]:
     """The errors to expect of a run at a profile.
 
     Parameters
@@ -102,10 +103,10 @@ def expected_errors(name: str, found: Quantities, free: float) -> dict[str, Expe
     name : of the profile
     found : what the run gave
     free : part of its joints that statics leaves free, as `loops` has it
+    rigid : whether some of its stones are
     """
     if found.outcome != Outcome.EQUILIBRIUM:
         return {}
-    rigid = any(one.von_mises_mean is None for one in found.stones.values())
     expected = {}
     for quantity in (*TYPICAL, *BOUNDS):
         value = _expected(name, quantity, found.stress_error, free, rigid)
@@ -117,7 +118,9 @@ def expected_errors(name: str, found: Quantities, free: float) -> dict[str, Expe
 
 
 def _expected(name: str, quantity: str, stress_error: float | None, free: float, rigid: bool) -> float | None:
-    """One expected error; None if it was not measured. `rigid`: some stones are."""
+    """One expected error; None if there is nothing by which to tell it."""
+    if stress_error is None and (not rigid or quantity not in (*_FORCES, *_MOVEMENTS)):
+        return None
     # elastic stones of fast have the mesh of balanced
     elastic = ERRORS["balanced" if name == "fast" else name]
     if quantity in _FORCES:
@@ -127,8 +130,6 @@ def _expected(name: str, quantity: str, stress_error: float | None, free: float,
     if quantity in _MOVEMENTS:
         ratio, _, _ = (ERRORS["fast"] if rigid else elastic)[quantity]
         return ratio * measure(quantity, None if rigid else stress_error, free)
-    if stress_error is None:
-        return None
     value = elastic[quantity][0] * measure(quantity, stress_error, free)
     if not rigid:
         return value
