@@ -16,7 +16,7 @@ def published(page: str) -> Mapping[tuple[str, str], Mapping[str, str]]:
         cells = [cell.strip() for cell in line.strip("|").split("|")]
         if line.startswith("| extreme |"):
             methods = cells[2:]
-        elif line.startswith("| ") and methods:
+        elif line.startswith("| ") and not line.startswith("| ---") and methods:
             found[cells[0], cells[1]] = dict(zip(methods, cells[2:], strict=True))
         elif not line.startswith("|"):
             methods = []
