@@ -129,7 +129,9 @@ def test_a_study_that_is_done_is_printed_again_and_nothing_runs(study, monkeypat
     arguments, first = study
     monkeypatch.setattr(trade_module, "grid", few_settings)
     monkeypatch.setattr(subprocess, "Popen", None)  # no process can be begun
-    again = invoke(*arguments, "--error", "0.5", "--budget", "20", "--of", "support_reactions")
+    again = invoke(
+        *arguments, "--error", "0.5", "--budget", "20", "--of", "support_reactions", "--jobs", JOBS
+    )
     assert again.exit_code == 0, again.output
     assert again.stdout == first.stdout
     told = json.loads(invoke(*arguments, "--budget", "20", "--of", "support_reactions", "--json").stdout)
