@@ -184,7 +184,7 @@ def _pile() -> Scene:
         Fidelity.FIXED,
     )
     cubes = []
-    for n in range(12):
+    for n in range(24):
         at = np.array([4.0 * (n % 2), 0.0, 0.05 + 0.32 * (n // 2) % 2.0]) + 0.6 * rng.uniform(-1, 1, 3) * [
             1,
             1,
@@ -192,7 +192,7 @@ def _pile() -> Scene:
         ]
         at[2] += 0.4 * (n // 2 // 6)
         cubes.append(_cuboid(f"c{n}", tuple(at), tuple(at + 0.25)))
-    return _scene("pile", [ground, *cubes], 0.8)
+    return _scene("pile", [ground, *cubes], 1.2)
 
 
 def _pulse() -> Scene:
