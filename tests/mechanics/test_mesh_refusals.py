@@ -29,7 +29,6 @@ def changed(corner, place):
 
 BOW = profile("B1", [(0, 0), (1, 1), (1, 0), (0, 1)], ())
 REFUSED = {
-    "no number": (changed(6, (1, 1, np.nan)), BOX_FACES, "a corner is no number.*measure it again"),
     "one place": (changed(6, CUBE[5]), BOX_FACES, "corners 5 and 6 lie in one place"),
     "bent": (changed(6, (1.2, 1.1, 1.3)), BOX_FACES, r"face \d is not planar: its corner \d lies 0.* m off"),
     "bent by 10 µm": (changed(6, (1, 1, 1.00001)), BOX_FACES, "face 1 is not planar"),
@@ -52,6 +51,12 @@ def test_a_stone_is_refused_with_its_name_the_reason_and_a_remedy(mesher, vertic
     with pytest.raises(MeshError, match=f"^stone A7: .*({said})") as caught:
         meshed_block(block)
     assert caught.value.remedy
+
+
+def test_a_corner_that_is_no_number_is_refused():
+    """A block with such a corner cannot even be made."""
+    with pytest.raises(MeshError, match="stone A7: a corner is no number.*measure it again"):
+        check_meshable(changed(6, (1, 1, np.nan)), BOX_FACES, "A7")
 
 
 def test_a_stone_that_passes_through_itself_is_refused():
