@@ -55,7 +55,7 @@ def test_a_stone_is_refused_with_its_name_the_reason_and_a_remedy(mesher, vertic
 
 def test_a_corner_that_is_no_number_is_refused():
     """A block with such a corner cannot even be made."""
-    with pytest.raises(MeshError, match="stone A7: a corner is no number.*measure it again"):
+    with pytest.raises(MeshError, match=r"stone A7: a corner is no number.*measure it again"):
         check_meshable(changed(6, (1, 1, np.nan)), BOX_FACES, "A7")
 
 
