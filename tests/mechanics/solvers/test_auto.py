@@ -18,7 +18,9 @@ def problem_of(seed, bodies, contacts, friction=0.6, cohesion=0.0, bias=0.0):
     pairs = rng.integers(0, bodies, (contacts, 2))
     # no body touches itself; body 0 does not move
     pairs[:, 1] = np.where(pairs[:, 0] == pairs[:, 1], (pairs[:, 1] + 1) % bodies, pairs[:, 1])
-    inverse = np.concatenate([rng.uniform(0.5, 2.0, (bodies, 1)).repeat(3, 1), rng.uniform(5, 20, (bodies, 3))], 1)
+    inverse = np.concatenate(
+        [rng.uniform(0.5, 2.0, (bodies, 1)).repeat(3, 1), rng.uniform(5, 20, (bodies, 3))], 1
+    )
     inverse[0] = 0.0
     lift = np.zeros((contacts, 3, bodies, 6))
     for c, (i, j) in enumerate(pairs):
@@ -30,7 +32,9 @@ def problem_of(seed, bodies, contacts, friction=0.6, cohesion=0.0, bias=0.0):
     couple = np.abs(matrix).max(axis=(1, 3)) > 0
     indptr = np.concatenate([[0], np.cumsum(couple.sum(axis=1))]).astype(np.int64)
     rows, columns = np.nonzero(couple)
-    operator = StoredDelassus(np.ascontiguousarray(matrix[rows, :, columns]), columns.astype(np.int64), indptr)
+    operator = StoredDelassus(
+        np.ascontiguousarray(matrix[rows, :, columns]), columns.astype(np.int64), indptr
+    )
     # what bodies that are pressed together would do: u_free is in the image of Hᵀ
     velocity = rng.normal(size=(bodies, 6))
     velocity[0] = 0.0
@@ -97,7 +101,9 @@ def test_three_spheres_of_the_examples():
     problem = ContactProblem(operator, u_free, np.zeros(3), mu, np.zeros(3), operator.sparse)
     solution = Auto(1e-12, 1e-9)(problem, nothing(problem))
     assert solution.converged
-    assert solution.impulse == pytest.approx(np.tile([1.0, -0.1 / 10**0.5, -0.3 / 10**0.5], (3, 1)), abs=1e-12)
+    assert solution.impulse == pytest.approx(
+        np.tile([1.0, -0.1 / 10**0.5, -0.3 / 10**0.5], (3, 1)), abs=1e-12
+    )
     assert solution.why.startswith("sweeps")
 
 
@@ -118,7 +124,9 @@ def stack(count, sides=4):
     couple = np.abs(matrix).max(axis=(1, 3)) > 0
     indptr = np.concatenate([[0], np.cumsum(couple.sum(axis=1))]).astype(np.int64)
     rows, columns = np.nonzero(couple)
-    operator = StoredDelassus(np.ascontiguousarray(matrix[rows, :, columns]), columns.astype(np.int64), indptr)
+    operator = StoredDelassus(
+        np.ascontiguousarray(matrix[rows, :, columns]), columns.astype(np.int64), indptr
+    )
     velocity = np.zeros((count + 1, 6))
     velocity[1:, 2] = -9.81e-3
     u_free = np.einsum("cibk,bk->ci", lift, velocity)

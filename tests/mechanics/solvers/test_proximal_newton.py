@@ -15,6 +15,7 @@ from mechanics.solvers.proximal_newton import ProximalNewton, _System
 from moma.errors import SolverError
 from tests.mechanics.shapes import brick, ground
 
+
 def column(heights, densities):
     """Cubes of these heights, one upon the other."""
     blocks, level = [ground()], 0.0
