@@ -22,7 +22,7 @@ _FIRST_SWEEPS = 20
 _LOOK, _DEPTH = 5, 10
 # a small penalty finds the forces in stones that stay in touch within a dozen iterations, or never
 _STATIC_PENALTY, _STATIC_ITERATIONS, _STATIC_PATIENCE, _STATIC_LOOK = 1e-4, 40, 3.0, 5
-# it is then driven further than asked for, which costs little and spares the next steps any work
+# all are driven further than asked for, which costs little and spares the next steps any work
 _FURTHER = 0.03
 # Newton's method has converged within so many steps, or it wanders: between rigid stones most often where much slides
 _NEWTON_STEPS = 20
@@ -87,7 +87,7 @@ class Alternating:
         limits = self.tolerance, self.velocity_tolerance
         # from nothing, sweeps would leave much of the friction where they happen to begin
         if warm or problem.sparse is None:
-            yield "sweeps", lambda most: NSGS(*limits, min(_FIRST_SWEEPS, most), _LOOK, _DEPTH), False
+            yield "sweeps", self._first, False
         if problem.sparse is not None:
             yield "admm, small penalty", self._static, False
             later = [("admm, balanced penalty", self._moving, False)]
@@ -98,10 +98,24 @@ class Alternating:
             yield from later
         yield "sweeps", lambda most: NSGS(*limits, most, _LOOK, _DEPTH), True
 
+    def _first(self, most: int) -> _Solver:
+        limits, tight = (self.tolerance, self.velocity_tolerance), self._tight
+
+        def solve(problem: ContactProblem, start: ContactStart) -> ContactSolution:
+            # what η does not see in a tall stack would add up from step to step, so sweeps go further than asked for;
+            # but where nothing has changed since, nothing is done
+            goal = limits if residual(problem, start.impulse).within(*limits) else tight
+            return NSGS(*goal, min(_FIRST_SWEEPS, most), _LOOK, _DEPTH)(problem, start)
+
+        return solve
+
+    @property
+    def _tight(self) -> tuple[float, float]:
+        return _FURTHER * self.tolerance, _FURTHER * self.velocity_tolerance
+
     def _static(self, most: int) -> _Solver:
         solver = ADMM(
-            _FURTHER * self.tolerance,
-            _FURTHER * self.velocity_tolerance,
+            *self._tight,
             min(_STATIC_ITERATIONS, most),
             _STATIC_PENALTY,
             _STATIC_LOOK,
@@ -112,8 +126,7 @@ class Alternating:
         return _even(lambda p, s: solver(p, ContactStart(s.impulse, np.zeros_like(s.velocity))))
 
     def _newton(self, most: int) -> _Solver:
-        tight = _FURTHER * self.tolerance, _FURTHER * self.velocity_tolerance
-        return _even(ProximalNewton(*tight, min(_NEWTON_STEPS, most)))
+        return _even(ProximalNewton(*self._tight, min(_NEWTON_STEPS, most)))
 
     def _moving(self, most: int) -> _Solver:
         return moving_admm(self.tolerance, self.velocity_tolerance, min(_MOVING_ITERATIONS, most))
@@ -124,8 +137,7 @@ class Alternating:
         return lambda p, s: solver(p, ContactStart(np.zeros_like(s.impulse), s.velocity))
 
     def _last(self, most: int) -> _Solver:
-        tight = _FURTHER * self.tolerance, _FURTHER * self.velocity_tolerance
-        return _even(ADMM(*tight, min(_LAST_ITERATIONS, most), _LAST_PENALTY))
+        return _even(ADMM(*self._tight, min(_LAST_ITERATIONS, most), _LAST_PENALTY))
 
     def _judged(self, problem: ContactProblem, found: ContactSolution, why: str) -> ContactSolution:
         left = residual(problem, found.impulse)

@@ -113,7 +113,9 @@ def test_a_block_that_falls_a_millimetre_lands_and_rests(step, friction):
     path = follow(dynamic("drop", (ground(), block), friction=friction, step=step, duration=duration))
     assert np.abs(path.velocity[-1]).max() < 1e-9
     assert path.centre[-1, 1] == pytest.approx([0.25, 0.2, 0.15], abs=1e-9 * 0.3)
-    assert path.support[-1, 2] == pytest.approx(path.model.mass[1] * G, rel=1e-9)
+    # a place is known to rounding, of 0.3 m, and a step closes what is open: that much of g h may be left in forces
+    rounding = np.finfo(float).eps * 0.3 / (G * step**2)
+    assert path.support[-1, 2] == pytest.approx(path.model.mass[1] * G, rel=1e-9 + rounding)
     assert path.gap.min() > -1e-9 * 0.3
 
 
