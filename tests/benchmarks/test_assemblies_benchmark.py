@@ -12,6 +12,7 @@ from tests.survey.assemblies import groin, obj
 ROOT = Path(__file__).resolve().parents[2]
 
 
+@pytest.mark.slow
 def test_it_tells_what_snapping_and_the_run_made_of_a_file(tmp_path: Path) -> None:
     """Two courses of a groin, each a stone with two arms and two straight ones; beds slant by 0.3 rad at most."""
     path = tmp_path / "groin.obj"

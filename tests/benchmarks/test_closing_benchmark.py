@@ -17,6 +17,7 @@ def rows(*options):
     return json.loads(done.stdout)
 
 
+@pytest.mark.slow
 def test_each_stage_of_each_wall_has_its_row():
     found = rows("--stones", "70", "140")
     assert [row["stage"] for row in found] == ["simplify", "close joints"] * 2

@@ -16,7 +16,7 @@ from mechanics.meshing.quadratic import with_middle_nodes
 from mechanics.meshing.shape_functions import integration, jacobians, reference_points, tabulated
 from mechanics.polyhedra import face_plane, mass_properties
 from mechanics.scene import Block, Fidelity
-from moma.errors import MeshError
+from moma.errors import MeshError, SceneError
 from tests.mechanics.shapes import LIMESTONE, TETRAHEDRON_FACES, TURN, hexahedra, prism, profile
 from tests.pipelines.handmade import BOX_FACES, box
 
@@ -253,5 +253,5 @@ def test_a_mesh_that_leaves_out_a_cell_is_refused_by_its_volume():
 
 @pytest.mark.parametrize("size", [0.0, -1.0])
 def test_a_mesh_size_that_is_not_positive_is_refused(size):
-    with pytest.raises(MeshError, match="stone S1: mesh_size"):
+    with pytest.raises(SceneError, match="stone S1: mesh_size"):
         mesh_block(brick(Element.HEX8, size))

