@@ -132,8 +132,8 @@ def test_a_rocking_block_tends_to_the_rigid_one():
 def test_a_sliding_stack_moves_as_the_rigid_one():
     """Two stones that slide and hold on an incline: places after 0.1 s tend to the rigid ones, to 1e-7 m.
 
-    The way of the centres falls with 1/E; what friction locks into elastic stones where they stop falls more slowly, and
-    shows below 1e-8 m (solved to η ≤ 1e-10 and 1e-12 the places differ by 1e-13 m).
+    The way of the centres falls with 1/E; what friction locks into elastic stones where they stop falls more slowly,
+    and shows below 1e-8 m (solved to η ≤ 1e-10 and 1e-12 the places differ by 1e-13 m).
     """
     material = Material("stone", DENSITY, 1e10, 0.2)
     blocks = [
