@@ -20,6 +20,7 @@ _COLOURS = {
 _OTHER = "#8e6c8a"
 _FRONT, _BAND = "#555555", "#dddddd"
 _LEAST = 1e-7  # a logarithmic axis has no zero
+_HIDDEN = 0.1  # of the error of the reference: what is smaller is drawn here
 _COLUMNS = 3
 
 
@@ -85,15 +86,21 @@ def _draw(axes: Any, panel: Panel, asked: float) -> None:
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.set_minor_locator(NullLocator())
         axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    # far below the error of the reference nothing can be told apart: there the axis ends
+    least = max(_LEAST, _HIDDEN * (panel.reference_error or 0.0))
+
+    def seen(error: float) -> float:
+        return 100.0 * max(error, least)
+
     front = [panel.points[number] for number in panel.front]
     axes.plot(
-        [one.cpu for one in front], [_seen(one.error) for one in front], color=_FRONT, linewidth=1.0, zorder=1
+        [one.cpu for one in front], [seen(one.error) for one in front], color=_FRONT, linewidth=1.0, zorder=1
     )
     for one in panel.points:
         estimated = one.setting == panel.reference
         axes.plot(
             one.cpu,
-            _seen(one.error),
+            seen(one.error),
             marker="D" if estimated else "o",
             markersize=5.5 if one in front else 3.5,
             color=_COLOURS.get(one.kind, _OTHER),
@@ -102,19 +109,19 @@ def _draw(axes: Any, panel: Panel, asked: float) -> None:
             zorder=2,
         )
         if one.setting == panel.recommended:
-            axes.plot(one.cpu, _seen(one.error), "o", markersize=13, color="#c4302b", fillstyle="none")
+            axes.plot(one.cpu, seen(one.error), "o", markersize=13, color="#c4302b", fillstyle="none")
     for number, one in enumerate(front):
         axes.annotate(
             one.setting,
-            (one.cpu, _seen(one.error)),
+            (one.cpu, seen(one.error)),
             xytext=(4, 5 if number % 2 else -9),
             textcoords="offset points",
             fontsize=6.5,
         )
-    axes.axhline(_seen(asked), color="#c4302b", linewidth=0.8, linestyle="--", zorder=0)
+    axes.axhline(seen(asked), color="#c4302b", linewidth=0.8, linestyle="--", zorder=0)
     if panel.reference_error:
         bottom = axes.get_ylim()[0]
-        axes.axhspan(bottom, _seen(panel.reference_error), color=_BAND, zorder=-1)
+        axes.axhspan(bottom, seen(panel.reference_error), color=_BAND, zorder=-1)
         axes.set_ylim(bottom=bottom)
     axes.margins(x=0.15)
     axes.set_title(panel.title, fontsize=9)
@@ -143,8 +150,3 @@ def _legend(figure: Any, panels: Sequence[Panel]) -> None:
     figure.legend(
         handles=handles, loc="outside lower center", ncols=min(len(handles), 6), fontsize=8, frameon=False
     )
-
-
-def _seen(error: float) -> float:
-    """In percent, as far as a logarithmic axis can show it."""
-    return 100.0 * max(error, _LEAST)

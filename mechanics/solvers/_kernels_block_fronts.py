@@ -80,25 +80,11 @@ def _members(row, found):
         while word != zero:
             low = word & (~word + one)
             # the place of the only bit that is set
-            place = 0
-            rest = low
-            if rest >> np.uint64(32) != zero:
-                place += 32
-                rest >>= np.uint64(32)
-            if rest >> np.uint64(16) != zero:
-                place += 16
-                rest >>= np.uint64(16)
-            if rest >> np.uint64(8) != zero:
-                place += 8
-                rest >>= np.uint64(8)
-            if rest >> np.uint64(4) != zero:
-                place += 4
-                rest >>= np.uint64(4)
-            if rest >> np.uint64(2) != zero:
-                place += 2
-                rest >>= np.uint64(2)
-            if rest >> np.uint64(1) != zero:
-                place += 1
+            place, rest = 0, low
+            for half in (32, 16, 8, 4, 2, 1):
+                if rest >> np.uint64(half) != zero:
+                    place += half
+                    rest >>= np.uint64(half)
             found[number] = 64 * w + place
             number += 1
             word ^= low
