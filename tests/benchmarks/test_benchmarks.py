@@ -138,6 +138,7 @@ def test_problems_are_solved_beside_the_figures_of_siconos(tmp_path):
     assert (row["siconos_nsgs_cpu"], row["siconos_nsgs_iterations"]) == (0.5, 3)
 
 
+@pytest.mark.slow
 def test_cost_is_given_for_each_size():
     first, *_ = found = rows("scaling", "--largest", 350, "--threads", 2)
     assert [row["kind"] for row in found] == ["wall", "disks", "disks"]
@@ -147,6 +148,7 @@ def test_cost_is_given_for_each_size():
     assert 0 < first["bytes_kept"] < 10_000
 
 
+@pytest.mark.slow
 def test_deformable_bricks_are_timed_and_judged():
     """The wall as LMGC90 was timed on it: 28 bodies with 4 × 2 × 2 linear hexahedra a brick."""
     (row,) = rows("deformable_wall", "--steps", 4, "--warm-up", 1, "--starts", "rest")

@@ -15,6 +15,7 @@ def run(*options):
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
 
 
+@pytest.mark.slow
 def test_each_mesher_meshes_each_shape_with_about_as_many_nodes():
     rows = json.loads(run("--stones", "3", "--json"))
     assert len(rows) == 3 * 5 + 3
