@@ -8,7 +8,7 @@ by the largest tension, so that r_N ≥ 0 (mechanics/laws/law.py).
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, cast
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,6 @@ from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
 from mechanics.problem_checks import check_problem
-from moma.errors import SolverError
 
 __all__ = [
     "ContactProblem",
@@ -28,7 +27,6 @@ __all__ = [
     "ShiftedForm",
     "SparseForm",
     "scale_of",
-    "shifted_form",
 ]
 
 Array = NDArray[np.float64]
@@ -165,6 +163,15 @@ class ContactProblem:
             adhesion=self.adhesion,
         )
 
+    @property
+    def biased(self) -> Array:
+        """u_free with the bias in its normal part (nc, d), not to be written [m/s]."""
+        if not self.bias.any():
+            return self.u_free
+        velocity = self.u_free.copy()
+        velocity[:, 0] += self.bias
+        return velocity
+
 
 @dataclass(frozen=True)
 class ContactStart:
@@ -200,16 +207,3 @@ class ContactSolution:
     natural_map: float
     converged: bool
     why: str = ""
-
-
-def shifted_form(problem: ContactProblem, solver: str) -> ShiftedForm:
-    """The form of a problem to which blocks can be added.
-
-    Raises
-    ------
-    SolverError : if it has none, in the name of the solver that asks
-    """
-    form = None if problem.sparse is None else problem.sparse()
-    if form is None or not hasattr(form, "shifted"):
-        raise SolverError("the problem has no sparse form", where=solver, remedy='use the method "nsgs"')
-    return cast(ShiftedForm, form)

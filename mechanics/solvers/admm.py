@@ -104,8 +104,7 @@ class _Run:
         assert problem.sparse is not None
         self._problem, self._form, self._hold = problem, problem.sparse(), hold
         self._scale, self._over = scale_of(problem.delassus), over
-        self._shift = problem.u_free.copy()
-        self._shift[:, 0] += problem.bias
+        self._shift = problem.biased
         self._sigma, self._relaxed = sigma, self._form.relaxed(sigma)
         self.z = project_on_cone(start.impulse, problem.friction, problem.cohesion)
         self._y = -start.velocity / sigma

@@ -73,8 +73,7 @@ class _Run:
 
     def __init__(self, problem: ContactProblem, start: ContactStart) -> None:
         self._problem = problem
-        self._shift = problem.u_free.copy()
-        self._shift[:, 0] += problem.bias
+        self._shift = problem.biased
         own = problem.delassus.diagonal
         mean = np.einsum("cii->c", own) / own.shape[1]
         self._weight = np.maximum(mean, _LEAST * scale_of(problem.delassus))

@@ -56,16 +56,12 @@ class Auto:
     ) -> ContactSolution:
         if len(start.impulse) == 0:
             return ContactSolution(start.impulse, start.velocity, 0, 0.0, True, "nothing: no contacts")
-        shift = problem.u_free
-        if problem.bias.any():
-            shift = shift.copy()
-            shift[:, 0] += problem.bias
         impulse = start.impulse.copy()
         eta, velocity, dual, count, _, ended = portfolio.solve_stored(
             operator.block,
             operator.indices.astype(np.int64, copy=False),
             operator.indptr.astype(np.int64, copy=False),
-            shift,
+            problem.biased,
             problem.friction,
             problem.cohesion,
             impulse,

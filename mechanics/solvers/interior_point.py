@@ -208,8 +208,7 @@ class _Path:
     def __init__(self, problem: ContactProblem) -> None:
         self._problem, self._system = problem, _unchecked(problem)
         scale = scale_of(problem.delassus)
-        self._free = problem.u_free.copy()
-        self._free[:, 0] += problem.bias
+        self._free = problem.biased
         mu, k = problem.friction, problem.cohesion
         cone, side = np.flatnonzero((mu > _SMOOTH) | (k > 0)), np.flatnonzero((mu <= _SMOOTH) | (k > 0))
         self._smooth = np.flatnonzero((mu <= _SMOOTH) & (k <= 0))

@@ -44,8 +44,7 @@ class NSGS:
         best, sweeps = (impulse, left), 0
         limits = self.tolerance, self.velocity_tolerance
         if not left.within(*limits):
-            shift = problem.u_free.copy()
-            shift[:, 0] += problem.bias
+            shift = problem.biased
             sweep = problem.delassus.gauss_seidel(shift, problem.friction, problem.cohesion)
             look = _Look(problem, sweep, self.depth, limits)
             while not left.within(*limits) and sweeps < self.max_iterations:

@@ -86,8 +86,7 @@ class _Run:
     def __init__(self, problem: ContactProblem, impulse: Array) -> None:
         assert isinstance(problem.delassus, RigidDelassus)
         self._problem, self._delassus = problem, problem.delassus
-        self._free = problem.u_free.copy()
-        self._free[:, 0] += problem.bias
+        self._free = problem.biased
         self._scale = scale_of(problem.delassus)
         diagonal = problem.delassus.diagonal
         self._rho = np.column_stack([1.0 / diagonal[:, 0, 0], 2.0 / (diagonal[:, 1, 1] + diagonal[:, 2, 2])])
