@@ -9,7 +9,7 @@ VENV := .venv
 MOMA := $(VENV)/bin/moma
 SAMPLE := data/samples/window
 OUT := out
-KERNELS := $(shell find survey mechanics -name "_kernels*.py")
+KERNELS := $(shell find survey mechanics -path "*/_kernels*" -name "*.py")
 
 .DEFAULT_GOAL := help
 .PHONY: help demo test clean

@@ -17,14 +17,14 @@ from mechanics.laws.dry_joint import DryJoint
 from mechanics.materials import Material
 from mechanics.scene import Block, ContactSettings, Fidelity, Part, Scene, Start, TimeSettings
 from mechanics.simulate import simulate
-from survey.convex_parts import convex_parts
-from survey.formats.closed_solids import open_solids
 from survey.formats.options import ReadingOptions
-from survey.matching_faces import find_matches
-from survey.overlaps import find_overlaps
-from survey.records import Reject
-from survey.snapping import snap
-from survey.solids import Solid, planes_of_solid
+from survey.formats.solids.reader import open_solids
+from survey.geometry.convex_parts import convex_parts
+from survey.geometry.solids import Solid, planes_of_solid
+from survey.joints.overlaps import find_overlaps
+from survey.joints.snapping.matching_faces import find_matches
+from survey.joints.snapping.snapping import snap
+from survey.records.survey import Reject
 
 __all__ = ["main"]
 

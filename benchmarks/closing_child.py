@@ -14,13 +14,13 @@ from mechanics.materials import Material
 from mechanics.meshing.elements import Element
 from mechanics.meshing.mesher import mesh_block
 from mechanics.scene import Block, Fidelity
-from survey.blocky import BlockyStone, simplify
-from survey.extrusion import SurveyedBlock
-from survey.joint_settings import JointSettings
-from survey.joints import ClosedStones, close_joints
-from survey.solids import Solid
-from survey.synthetic.openings import Arch
-from survey.synthetic.walls import wall
+from survey.extrusion.extrusion import SurveyedBlock
+from survey.geometry.solids import Solid
+from survey.joints.close import ClosedStones, close_joints
+from survey.joints.settings import JointSettings
+from survey.simplify.simplify import BlockyStone, simplify
+from survey.synthetic.buildings.openings import Arch
+from survey.synthetic.buildings.walls import wall
 
 __all__ = ["main"]
 

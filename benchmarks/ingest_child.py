@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from benchmarks.memory import arrays_bytes, peak_bytes
 from moma.errors import SurveyError
 from pipelines.ingest import ingest
-from survey.extrusion import SurveyedBlock
+from survey.extrusion.extrusion import SurveyedBlock
 from survey.formats.reading import open_survey
-from survey.measured import survey_stones
-from survey.records import BlockRecord
+from survey.records.survey import BlockRecord
+from survey.stones import survey_stones
 
 __all__ = ["main"]
 

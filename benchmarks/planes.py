@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
 from moma.errors import MomaError
-from survey.planes import fit_plane
+from survey.faces.planes import fit_plane
 
 __all__ = ["main"]
 

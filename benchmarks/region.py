@@ -20,15 +20,15 @@ from mechanics.scene import Block, Fidelity, Scene, SolverSettings, Start, TimeS
 from mechanics.simulate import simulate
 from pipelines.fidelity import Wishes, modelled, neighbours
 from pipelines.quantities import Quantities, differences, quantities
-from survey.closing_report import Joint
-from survey.extrusion import SurveyedBlock
+from survey.extrusion.extrusion import SurveyedBlock
 from survey.formats.reading import open_survey
-from survey.joints import close_joints
-from survey.measured import survey_stones
-from survey.solids import Solid
-from survey.synthetic.openings import Arch
-from survey.synthetic.vaults import semicircular_arch
-from survey.synthetic.walls import wall
+from survey.geometry.solids import Solid
+from survey.joints.close import close_joints
+from survey.joints.report import Joint
+from survey.stones import survey_stones
+from survey.synthetic.buildings.openings import Arch
+from survey.synthetic.buildings.vaults import semicircular_arch
+from survey.synthetic.buildings.walls import wall
 
 __all__ = ["main"]
 

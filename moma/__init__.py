@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from pipelines.scenefile import read_scene
     from pipelines.survey_report import report_surveys
     from survey.formats.reading import ReadingOptions, open_survey
-    from survey.measured import survey_stones
+    from survey.stones import survey_stones
 
 __all__ = [
     "Block",
@@ -78,7 +78,7 @@ _HOMES = {
     "report_surveys": "pipelines.survey_report",
     "run_scene": "pipelines.run",
     "simulate": "mechanics.simulate",
-    "survey_stones": "survey.measured",
+    "survey_stones": "survey.stones",
     "trace": "archmodel.trace",
 }
 

@@ -204,7 +204,7 @@ def survey_report_lines(report: "SurveyReport", verbose: bool) -> list[str]:
 
 def _course_lines(report: "SurveyReport", verbose: bool) -> list[str]:
     """Courses that are not level and straight; with -v, all of them."""
-    from survey.courses import SIGNIFICANT
+    from survey.quality.courses import SIGNIFICANT
 
     courses = report.study.courses
     lines = []

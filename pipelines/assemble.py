@@ -21,12 +21,12 @@ from pipelines.scene_settings import MeshSettings
 from pipelines.scenefile import SceneFile
 from pipelines.selection import STRESS, Groups, StoneModel, select_groups, select_stones
 from pipelines.stone_records import surveyed_block
-from survey.blocky import BlockyStone
-from survey.closing_report import ClosingReport
-from survey.extrusion import SurveyedBlock
-from survey.joints import close_joints
-from survey.solids import Solid
-from survey.stone_parts import stone_parts
+from survey.extrusion.extrusion import SurveyedBlock
+from survey.geometry.solids import Solid
+from survey.geometry.stone_parts import stone_parts
+from survey.joints.close import close_joints
+from survey.joints.report import ClosingReport
+from survey.simplify.simplify import BlockyStone
 
 __all__ = ["Assembly", "assemble", "assemble_stones", "wishes_of"]
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.sheets import FLAG, INK, PALE, PLAIN, new_sheet, save_sheet
-from survey.courses import SIGNIFICANT, CourseLine
+from survey.quality.courses import SIGNIFICANT, CourseLine
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -33,9 +33,9 @@ from pipelines.profiles import with_profile
 from pipelines.scenefile import SceneFile, read_scene
 from pipelines.selection import Groups, StoneModel, select_groups, select_stones
 from pipelines.summary import as_json
-from survey.joint_settings import JointMode
-from survey.solids import Solid
-from survey.watertight import check_watertight
+from survey.geometry.solids import Solid
+from survey.geometry.watertight import check_watertight
+from survey.joints.settings import JointMode
 
 __all__ = ["check_scene"]
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from survey.blocky import BlockyStone
-from survey.closing_report import ClosingReport
+from survey.joints.report import ClosingReport
+from survey.simplify.simplify import BlockyStone
 
 __all__ = [
     "GapPlace",

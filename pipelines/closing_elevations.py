@@ -11,9 +11,9 @@ from pipelines.closing_shapes import ClosingShapes, DrawnStone
 from pipelines.elevations import CODES, elevated, extent, frame_elevation, palette, sheet_size, write_codes
 from pipelines.picture_parts import nice_ceiling
 from pipelines.sheets import INK, PALE, new_sheet, save_sheet
-from survey.facades import Facade
-from survey.solids import Solid, area_vector
-from survey.watertight import triangulate
+from survey.geometry.solids import Solid, area_vector
+from survey.geometry.watertight import triangulate
+from survey.quality.facades import Facade
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -17,9 +17,9 @@ from pipelines.closing_shapes import ClosingShapes, DrawnJoint
 from pipelines.joint_elevations import draw_joints
 from pipelines.picture_parts import OBLIQUELY
 from pipelines.pictures import draw_apart
-from survey.facades import Facade, find_facades
-from survey.solids import Solid
-from survey.watertight import triangulate
+from survey.geometry.solids import Solid
+from survey.geometry.watertight import triangulate
+from survey.quality.facades import Facade, find_facades
 
 __all__ = ["closing_surface", "draw_closing", "draw_elevations", "draw_in_space", "flat_facades", "viewpoint"]
 

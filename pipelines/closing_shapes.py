@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.joint_polygons import joint_polygon
-from survey.closing_report import ClosingReport, Joint
-from survey.solids import Solid, area_vector
+from survey.geometry.solids import Solid, area_vector
+from survey.joints.report import ClosingReport, Joint
 
 __all__ = ["ClosingShapes", "DrawnJoint", "DrawnStone", "Place", "closing_shapes", "places"]
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.sheets import INK
-from survey.facades import Facade
+from survey.quality.facades import Facade
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 
 from mechanics.scene import Fidelity
-from survey.closing_report import Joint
+from survey.joints.report import Joint
 
 __all__ = ["Modelled", "Wishes", "modelled", "neighbours"]
 

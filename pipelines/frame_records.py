@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from survey.frames import SiteTransform
+from survey.registration.site_frame import SiteTransform
 
 __all__ = ["frame_record"]
 

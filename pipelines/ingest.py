@@ -23,10 +23,10 @@ from pipelines.rejects import check_targets, default_path, rejects_text
 from pipelines.relate import KnownSolids, relate
 from pipelines.spool import Spool
 from pipelines.stone_records import stone_record
-from survey.extrusion import SurveyedBlock
+from survey.extrusion.extrusion import SurveyedBlock
 from survey.formats.reading import ReadingOptions, open_survey
-from survey.measured import survey_stones
-from survey.records import Reject
+from survey.records.survey import Reject
+from survey.stones import survey_stones
 
 __all__ = ["ingest"]
 

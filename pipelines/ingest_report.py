@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.frame_records import frame_record
-from survey.extrusion import SurveyedBlock
-from survey.measured import SurveyedStream
-from survey.records import Reject
-from survey.reflex_edges import is_convex
-from survey.snapping_report import Snapping
+from survey.extrusion.extrusion import SurveyedBlock
+from survey.geometry.convexity import is_convex
+from survey.records.snapping import Snapping
+from survey.records.survey import Reject
+from survey.stones import SurveyedStream
 
 __all__ = ["FileReport", "IngestReport", "Refusal", "SolidsReport", "Tally"]
 

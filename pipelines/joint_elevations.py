@@ -13,7 +13,7 @@ from pipelines.closing_shapes import ClosingShapes, DrawnJoint, Place
 from pipelines.elevations import elevated, extent, frame_elevation, sheet_size
 from pipelines.picture_parts import nice_ceiling
 from pipelines.sheets import FLAG, PALE, new_sheet, save_sheet
-from survey.facades import Facade
+from survey.quality.facades import Facade
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -15,8 +15,8 @@ from archmodel.entities import kind_named
 from archmodel.grammar import All, AnyOf, Call, Comparison, IsNull, Like, Membership, Node, Not, parse
 from archmodel.tokens import Token, complaint
 from moma.errors import UsageError
-from survey.extrusion import SurveyedBlock
-from survey.solids import area_vector
+from survey.extrusion.extrusion import SurveyedBlock
+from survey.geometry.solids import area_vector
 
 __all__ = ["RULE_ATTRIBUTES", "KindRule", "check_kinds", "kind_rules", "ruled"]
 

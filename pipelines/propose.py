@@ -16,11 +16,11 @@ from moma.errors import UsageError
 from pipelines.propose_records import core_record, is_known, record_volume
 from pipelines.relate import relate
 from pipelines.stone_records import stone_record, surveyed_block
-from survey.infill import propose_infill
-from survey.infill_facings import facing_stone
-from survey.infill_settings import InfillSettings
-from survey.missing_stones import propose_missing
-from survey.missing_stones_settings import MissingSettings
+from survey.unseen.core.facings import facing_stone
+from survey.unseen.core.propose import propose_infill
+from survey.unseen.core.settings import InfillSettings
+from survey.unseen.missing.propose import propose_missing
+from survey.unseen.missing.settings import MissingSettings
 
 __all__ = ["Facings", "Proposal", "ProposalReport", "Recording", "propose_core", "propose_stones"]
 

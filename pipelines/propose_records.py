@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 
 from archmodel.records import StoneRecord
 from pipelines.stone_records import stone_record
-from survey.faces import Provenance
-from survey.infill import InfillProposal
-from survey.records import SolidRecord
-from survey.solid_blocks import block_of_solid
-from survey.solids import Solid, volume_of
-from survey.watertight import triangulate
+from survey.extrusion.imported_solids import block_of_solid
+from survey.faces.faces import Provenance
+from survey.geometry.solids import Solid, volume_of
+from survey.geometry.watertight import triangulate
+from survey.records.survey import SolidRecord
+from survey.unseen.core.propose import InfillProposal
 
 __all__ = ["core_record", "is_known", "record_volume"]
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from moma.errors import UsageError
-from survey.records import Reject
+from survey.records.survey import Reject
 
 __all__ = ["MARK", "check_targets", "default_path", "rejects_text"]
 

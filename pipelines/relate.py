@@ -22,7 +22,7 @@ from archmodel.stone_columns import (
     stone_columns,
     stone_shapes,
 )
-from survey.adjacency import Polyhedra, PolyhedraBuilder, find_touching
+from survey.geometry.adjacency import Polyhedra, PolyhedraBuilder, find_touching
 
 __all__ = ["KnownSolids", "RelationReport", "relate"]
 

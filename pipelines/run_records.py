@@ -27,7 +27,7 @@ from mechanics.scene import Scene
 from pipelines.assemble import Assembly
 from pipelines.joint_table import normal_and_shear
 from pipelines.scenefile import SceneFile
-from survey.closing_report import ClosingReport, Joint
+from survey.joints.report import ClosingReport, Joint
 
 __all__ = [
     "contact_arrays",

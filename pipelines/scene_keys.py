@@ -14,7 +14,7 @@ from mechanics.scene import (
 )
 from pipelines.schema import Key, Kind
 from pipelines.stone_keys import MESH
-from survey.joint_settings import JointMode, JointSettings
+from survey.joints.settings import JointMode, JointSettings
 
 __all__ = ["AUTO", "PICTURES", "STRESS_PICTURES", "TABLES"]
 

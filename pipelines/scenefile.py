@@ -33,7 +33,7 @@ from pipelines.scene_settings import Fidelities, MaterialRule, MeshSettings, Out
 from pipelines.schema import Document, check_table, nearest
 from pipelines.stone_keys import MATERIAL_KEYS, MESH_KEYS, ORTHOTROPY_KEYS
 from pipelines.toml_lines import key_lines, parse_toml, read_text
-from survey.joint_settings import JointMode, JointSettings
+from survey.joints.settings import JointMode, JointSettings
 
 __all__ = ["SceneFile", "parse_scene", "read_scene"]
 

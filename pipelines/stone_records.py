@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from archmodel.records import StoneRecord
-from survey.depth import Depth, Origin
-from survey.extrusion import SurveyedBlock, extrude
-from survey.faces import Face, Provenance, Source, face_on, outline_face
-from survey.planes import FaceFit
-from survey.records import BlockRecord, Extrusion
-from survey.shapes import FaceShape, ShapeKind
-from survey.solids import Solid
+from survey.extrusion.depth import Depth, Origin
+from survey.extrusion.extrusion import SurveyedBlock, extrude
+from survey.faces.faces import Face, Provenance, Source, face_on, outline_face
+from survey.faces.planes import FaceFit
+from survey.faces.shapes import FaceShape, ShapeKind
+from survey.geometry.solids import Solid
+from survey.records.survey import BlockRecord, Extrusion
 
 __all__ = ["stone_record", "surveyed_block"]
 

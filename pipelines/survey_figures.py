@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from pipelines.elevations import CODES, elevated, extent, frame_elevation, palette, sheet_size, write_codes
 from pipelines.picture_parts import nice_ceiling
 from pipelines.sheets import FLAG, INK, PALE, new_sheet, save_sheet
-from survey.facades import Facade
-from survey.quality import Histogram, StoneQuality
+from survey.quality.facades import Facade
+from survey.quality.precision import Histogram, StoneQuality
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

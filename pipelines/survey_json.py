@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from pipelines.survey_study import SurveyFile, SurveyStudy
-from survey.courses import CourseLine
-from survey.facades import Facade
-from survey.quality import StoneQuality, SurveyQuality
+from survey.quality.courses import CourseLine
+from survey.quality.facades import Facade
+from survey.quality.precision import StoneQuality, SurveyQuality
 
 __all__ = ["survey_json", "write_survey_json"]
 

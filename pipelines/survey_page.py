@@ -8,9 +8,9 @@ from pathlib import Path
 from pipelines.html_page import figure, page
 from pipelines.html_tables import table
 from pipelines.survey_study import SurveyFile, SurveyStudy
-from survey.canon import Deviation
-from survey.courses import CourseHeight, CourseLine
-from survey.quality import StoneQuality
+from survey.quality.canon import Deviation
+from survey.quality.courses import CourseHeight, CourseLine
+from survey.quality.precision import StoneQuality
 
 __all__ = ["write_survey_page"]
 

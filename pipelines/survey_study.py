@@ -10,18 +10,18 @@ from archmodel.entities import kind_named
 from moma.errors import UsageError
 from pipelines.progress import Listener, Progress, silent
 from pipelines.reading_options import check_survey_file
-from survey.canon import Deviation, KindStandard, deviations, standards
-from survey.contradictions import Contradiction, contradictions
-from survey.courses import CourseHeight, CourseLine, course_heights, measure_courses
-from survey.extrusion import SurveyedBlock
-from survey.facades import Facade, find_facades
+from survey.extrusion.extrusion import SurveyedBlock
 from survey.formats.options import ReadingOptions
 from survey.formats.reading import open_survey
-from survey.frames import SiteTransform
-from survey.measured import survey_stones
-from survey.quality import StoneQuality, SurveyQuality, appraise, judge_survey
-from survey.records import Canon, DepthRule, Reject, SurveyHead
-from survey.remeasure import Remeasure, list_remeasures
+from survey.quality.canon import Deviation, KindStandard, deviations, standards
+from survey.quality.contradictions import Contradiction, contradictions
+from survey.quality.courses import CourseHeight, CourseLine, course_heights, measure_courses
+from survey.quality.facades import Facade, find_facades
+from survey.quality.precision import StoneQuality, SurveyQuality, appraise, judge_survey
+from survey.quality.remeasure import Remeasure, list_remeasures
+from survey.records.survey import Canon, DepthRule, Reject, SurveyHead
+from survey.registration.site_frame import SiteTransform
+from survey.stones import survey_stones
 
 __all__ = ["SurveyFile", "SurveyStudy", "study_surveys"]
 

@@ -48,7 +48,7 @@ def test_the_import_rule_holds():
             "survey.formats.reading",
             ("sqlalchemy", "numba", "typer", "vtkmodules", "trimesh", "meshio", "scipy"),
         ),
-        ("survey.joints", ("sqlalchemy", "typer", "vtkmodules")),
+        ("survey.joints.close", ("sqlalchemy", "typer", "vtkmodules")),
         ("pipelines.run", ("typer", "vtkmodules", "matplotlib")),
     ],
 )

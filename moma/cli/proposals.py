@@ -71,7 +71,7 @@ def propose(
     """Propose stones that are missing, or the core between two facings; see docs/unseen.md."""
     from moma.listing import as_json
     from pipelines.propose import Recording, propose_core, propose_stones
-    from survey.infill_settings import InfillSettings, InfillShape
+    from survey.unseen.core.settings import InfillSettings, InfillShape
 
     given = {"--as": shape, "--storey-height": storey_height, "--facings": facings}
     _refuse_others(what, given, shape, record, author, source)

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from moma.errors import UsageError
-from survey.records import BlockRecord, Reject, Survey, SurveyHead, SurveyStream
+from survey.records.survey import BlockRecord, Reject, Survey, SurveyHead, SurveyStream
 
 __all__ = ["ReadingOptions", "whole"]
 

@@ -4,11 +4,11 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from moma.errors import UsageError
-from survey.formats.csv_points import open_csv
-from survey.formats.moma_ascii import open_moma, read_head, with_header
+from survey.formats.native.reader import open_moma, read_head, with_header
 from survey.formats.options import ReadingOptions, whole
-from survey.formats.point_lists import open_penzd, open_pnezd
-from survey.records import Survey, SurveyStream
+from survey.formats.points.csv import open_csv
+from survey.formats.points.pnezd import open_penzd, open_pnezd
+from survey.records.survey import Survey, SurveyStream
 
 __all__ = [
     "FORMATS",
@@ -25,7 +25,7 @@ Reader = Callable[[Path, ReadingOptions], SurveyStream]
 
 
 def _open_solids(path: Path, options: ReadingOptions) -> SurveyStream:
-    from survey.formats.closed_solids import (
+    from survey.formats.solids.reader import (
         open_solids,
     )  # which needs trimesh: half a second that others are spared
 

@@ -7,11 +7,11 @@ from random import Random
 import numpy as np
 from numpy.typing import NDArray
 
-from survey.depth import depth_for
-from survey.extrusion import SurveyedBlock, extrude, prism
-from survey.faces import outline_face
-from survey.records import OBSERVER, BlockRecord, DepthRule, Station, Survey, SurveyHead
-from survey.solids import Solid
+from survey.extrusion.depth import depth_for
+from survey.extrusion.extrusion import SurveyedBlock, extrude, prism
+from survey.faces.faces import outline_face
+from survey.geometry.solids import Solid
+from survey.records.survey import OBSERVER, BlockRecord, DepthRule, Station, Survey, SurveyHead
 from survey.synthetic.bond import PlannedStone
 from survey.synthetic.frame import TrueStone, WallFrame
 from survey.synthetic.measure import HALF_JOINT, SIGMA, measure_stone

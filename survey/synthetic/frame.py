@@ -7,8 +7,8 @@ from random import Random
 import numpy as np
 from numpy.typing import NDArray
 
-from survey.extrusion import prism
-from survey.solids import Solid
+from survey.extrusion.extrusion import prism
+from survey.geometry.solids import Solid
 from survey.synthetic.bond import PlannedStone
 
 __all__ = ["TrueStone", "WallFrame", "build_stone", "wall_frame"]

@@ -7,7 +7,7 @@ from random import Random
 import numpy as np
 from numpy.typing import NDArray
 
-from survey.records import BlockRecord
+from survey.records.survey import BlockRecord
 from survey.synthetic.bond import Line, crossing
 from survey.synthetic.frame import TrueStone, WallFrame
 

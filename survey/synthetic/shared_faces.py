@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from survey.solids import Solid, area_vector
+from survey.geometry.solids import Solid, area_vector
 
 __all__ = ["TrueJoint", "true_joints"]
 

@@ -16,11 +16,11 @@ from archmodel.store import load_stones
 from archmodel.surveys import Measurement
 from moma.errors import DatabaseError, UsageError
 from pipelines.stone_records import stone_record, surveyed_block
-from survey.depth import depth_for
-from survey.extrusion import extrude
-from survey.faces import outline_face
-from survey.missing_stones import propose_missing
-from survey.synthetic.sample import make_sample
+from survey.extrusion.depth import depth_for
+from survey.extrusion.extrusion import extrude
+from survey.faces.faces import outline_face
+from survey.synthetic.window_bay.sample import make_sample
+from survey.unseen.missing.propose import propose_missing
 
 
 @pytest.fixture(scope="module")

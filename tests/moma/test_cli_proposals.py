@@ -7,9 +7,9 @@ import pytest
 from typer.testing import CliRunner
 
 from moma.cli import app
-from survey.formats.moma_writer import write_moma
-from survey.synthetic.facings import two_facings
-from survey.synthetic.sample import make_sample
+from survey.formats.native.writer import write_moma
+from survey.synthetic.buildings.facings import two_facings
+from survey.synthetic.window_bay.sample import make_sample
 
 
 def invoke(*arguments):

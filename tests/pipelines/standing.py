@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from archmodel.store import store_survey
-from survey.solids import area_vector
+from survey.geometry.solids import area_vector
 from tests.archmodel.stones import box_stone, hash_of
 from tests.validation import masonry
 

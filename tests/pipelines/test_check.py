@@ -12,10 +12,10 @@ from moma.telling_checks import check_lines, duration
 from pipelines.check import check_scene
 from pipelines.closing_check import joints_report, simplification_report
 from pipelines.ingest import ingest
-from survey.blocky import simplify
-from survey.closing_report import ClosingReport, Gap, Joint, Overlap
-from survey.joint_settings import JointMode
-from survey.synthetic.walls import wall
+from survey.joints.report import ClosingReport, Gap, Joint, Overlap
+from survey.joints.settings import JointMode
+from survey.simplify.simplify import simplify
+from survey.synthetic.buildings.walls import wall
 
 SURVEY = Path(__file__).parents[2] / "data/samples/window/window.moma"
 PLACE, UP = np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.0, 1.0])

@@ -16,11 +16,11 @@ from pipelines.closing_pictures import (
 )
 from pipelines.closing_shapes import closing_shapes, places
 from pipelines.sheets import FLAG
-from survey.closing_report import ClosingReport, Gap, Joint, Overlap
-from survey.joint_settings import JointMode
-from survey.solids import Solid, area_vector
-from survey.synthetic.quoins import corner
-from survey.synthetic.vaults import barrel_vault
+from survey.geometry.solids import Solid, area_vector
+from survey.joints.report import ClosingReport, Gap, Joint, Overlap
+from survey.joints.settings import JointMode
+from survey.synthetic.buildings.quoins import corner
+from survey.synthetic.buildings.vaults import barrel_vault
 from tests.pipelines.handmade import BOX_FACES, box
 
 AWAY = np.array([0.0, -1.0, 0.0])

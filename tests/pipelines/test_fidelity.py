@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from mechanics.scene import Fidelity
 from pipelines.fidelity import Wishes, modelled, neighbours
-from survey.closing_report import Joint
+from survey.joints.report import Joint
 
 FIXED, RIGID, DEFORMABLE = Fidelity.FIXED, Fidelity.RIGID, Fidelity.DEFORMABLE
 CODES = tuple("ABCDEFGHIJ")

@@ -12,13 +12,13 @@ from moma.cli import app
 from pipelines.joint_table import JOINT_COLUMNS
 from pipelines.summary import summarise
 from pipelines.vtk_output import body_cells, body_grid, contact_grid, joint_grid
-from survey.formats import moma_ascii
-from survey.formats.csv_points import NEEDED, OPTIONAL
-from survey.formats.moma_head import HeadReader
-from survey.formats.moma_stone import STONE_WORDS
+from survey.formats.native import reader as moma_ascii
+from survey.formats.native.header import HeadReader
+from survey.formats.native.stone import STONE_WORDS
+from survey.formats.points.csv import NEEDED, OPTIONAL
 from survey.formats.reading import FORMATS, ReadingOptions, open_survey, with_header
-from survey.records import Reject
-from survey.solids import Solid
+from survey.geometry.solids import Solid
+from survey.records.survey import Reject
 from tests.pipelines.handmade import deformable_body, result_of, rigid_body
 from tests.survey.assemblies import dome, obj
 

@@ -8,7 +8,7 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection
 from scipy.spatial.transform import Rotation
 
 from pipelines.joint_polygons import joint_polygon
-from survey.solids import Solid, area_vector
+from survey.geometry.solids import Solid, area_vector
 from tests.pipelines.handmade import BOX_FACES, box
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -12,8 +12,8 @@ from moma.telling import ingest_lines
 from pipelines.ingest import ingest
 from pipelines.kind_rules import RULE_ATTRIBUTES, kind_rules
 from pipelines.reading_options import reading_options
-from survey.convex_parts import convex_parts
-from survey.solids import Solid
+from survey.geometry.convex_parts import convex_parts
+from survey.geometry.solids import Solid
 from tests.survey.assemblies import dome, groin, obj, prism, wall
 
 

@@ -20,7 +20,7 @@ from pipelines.scenefile import parse_scene, read_scene
 from pipelines.schema import REQUIRED
 from pipelines.stone_keys import MATERIAL_KEYS, ORTHOTROPY_KEYS
 from pipelines.toml_lines import key_lines
-from survey.joint_settings import JointSettings
+from survey.joints.settings import JointSettings
 
 ROOT = Path(__file__).resolve().parents[2]
 SAMPLE = ROOT / "data/samples/window/window.toml"

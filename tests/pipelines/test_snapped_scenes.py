@@ -12,7 +12,7 @@ from pipelines.kind_rules import kind_rules
 from pipelines.reading_options import reading_options
 from pipelines.run import run_scene
 from pipelines.scenefile import parse_scene
-from survey.solids import Solid
+from survey.geometry.solids import Solid
 from tests.survey.assemblies import dome, groin, obj
 
 SCENE = """

@@ -12,7 +12,7 @@ from pipelines.check import check_scene
 from pipelines.ingest import ingest
 from pipelines.run import run_scene
 from pipelines.scenefile import parse_scene
-from survey.joint_settings import JointMode
+from survey.joints.settings import JointMode
 
 SCENE = """
 [scene]

@@ -11,10 +11,10 @@ from archmodel.query import find
 from archmodel.store import load_stones
 from pipelines.ingest import ingest
 from pipelines.stone_records import stone_record, surveyed_block
-from survey.faces import Provenance
+from survey.faces.faces import Provenance
 from survey.formats.reading import open_survey
-from survey.measured import survey_stones
-from survey.records import Reject
+from survey.records.survey import Reject
+from survey.stones import survey_stones
 
 HEAD = """\
 moma-survey 1

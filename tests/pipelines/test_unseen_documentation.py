@@ -9,11 +9,11 @@ import pytest
 from typer.testing import CliRunner
 
 from moma.cli import app
-from survey.formats.moma_writer import write_moma
-from survey.infill_settings import InfillSettings
-from survey.missing_stones_settings import MissingSettings
-from survey.synthetic.facings import two_facings
-from survey.synthetic.sample import make_sample
+from survey.formats.native.writer import write_moma
+from survey.synthetic.buildings.facings import two_facings
+from survey.synthetic.window_bay.sample import make_sample
+from survey.unseen.core.settings import InfillSettings
+from survey.unseen.missing.settings import MissingSettings
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs/unseen.md").read_text(encoding="utf-8")

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from survey.solids import Solid, area_vector
+from survey.geometry.solids import Solid, area_vector
 
 Array = NDArray[np.float64]
 Polygon = tuple[int, ...]

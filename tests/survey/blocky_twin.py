@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
-from survey.solids import Solid
-from survey.watertight import triangulate
+from survey.geometry.solids import Solid
+from survey.geometry.watertight import triangulate
 
 
 def edges_of(solid: Solid) -> list[tuple[int, int]]:

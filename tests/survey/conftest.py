@@ -4,12 +4,12 @@ from typing import Any
 
 import pytest
 
-from survey.depth import depth_for
-from survey.extrusion import SurveyedBlock, extrude
-from survey.faces import outline_face
-from survey.formats.moma_ascii import read_moma
-from survey.joints import ClosedStones, close_joints
-from survey.records import Survey
+from survey.extrusion.depth import depth_for
+from survey.extrusion.extrusion import SurveyedBlock, extrude
+from survey.faces.faces import outline_face
+from survey.formats.native.reader import read_moma
+from survey.joints.close import ClosedStones, close_joints
+from survey.records.survey import Survey
 
 SAMPLE = Path(__file__).parents[2] / "data" / "samples" / "window"
 

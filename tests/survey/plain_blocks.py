@@ -7,12 +7,12 @@ import numpy as np
 from assemblies import prism
 from numpy.typing import NDArray
 
-from survey.depth import Depth
-from survey.extrusion import SurveyedBlock, extrude
-from survey.faces import outline_face
-from survey.records import BlockRecord, SolidRecord
-from survey.solid_blocks import block_of_solid
-from survey.solids import Solid
+from survey.extrusion.depth import Depth
+from survey.extrusion.extrusion import SurveyedBlock, extrude
+from survey.extrusion.imported_solids import block_of_solid
+from survey.faces.faces import outline_face
+from survey.geometry.solids import Solid
+from survey.records.survey import BlockRecord, SolidRecord
 
 Array = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from survey.quality import StoneQuality
+from survey.quality.precision import StoneQuality
 
 SIGMA = 0.002
 

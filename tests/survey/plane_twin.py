@@ -1,4 +1,4 @@
-"""The plane of a face without its blunders, as `survey.planes` finds it, in slow and readable numpy."""
+"""The plane of a face without its blunders, as `survey.faces.planes` finds it, in slow and readable numpy."""
 
 import math
 from dataclasses import dataclass

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 from scipy.sparse import coo_array
 
-from survey.solids import Solid
+from survey.geometry.solids import Solid
 
 Array = NDArray[np.float64]
 FACETS = 8  # of the friction cone; a pyramid inside the cone, so that what it allows Coulomb allows

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from survey.adjacency import Polyhedra, find_touching
+from survey.geometry.adjacency import Polyhedra, find_touching
 from tests.survey.touching_twin import touching
 from tests.validation import masonry
 

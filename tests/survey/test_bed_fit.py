@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from survey.bed_fit import BedCorners, BedScatter, fit_bed, pool, scatter_of
+from survey.quality.bed_fit import BedCorners, BedScatter, fit_bed, pool, scatter_of
 
 
 def beds(rng: np.random.Generator, stones: int, tau: float, kappa: float) -> BedCorners:

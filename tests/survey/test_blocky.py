@@ -12,13 +12,13 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from moma.errors import GeometryError
-from survey.blocky import BlockShape, BlockyStone, SimplifyBounds, simplify
-from survey.depth import Depth
-from survey.extrusion import SurveyedBlock, extrude
-from survey.faces import outline_face
-from survey.records import BlockRecord, Extrusion
-from survey.solids import Solid
-from survey.watertight import check_watertight
+from survey.extrusion.depth import Depth
+from survey.extrusion.extrusion import SurveyedBlock, extrude
+from survey.faces.faces import outline_face
+from survey.geometry.solids import Solid
+from survey.geometry.watertight import check_watertight
+from survey.records.survey import BlockRecord, Extrusion
+from survey.simplify.simplify import BlockShape, BlockyStone, SimplifyBounds, simplify
 
 DEPTH = Depth(0.4, None, "test", "kind", 1)
 TRAPEZIUM = np.array([[0, 0], [0.2, 0], [0.35, 0.6], [-0.1, 0.55]])  # a voussoir

@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
 from moma.errors import GeometryError
-from survey.blocky import BlockShape, BlockyStone, simplify
-from survey.extrusion import SurveyedBlock
-from survey.records import SolidRecord
-from survey.solid_blocks import block_of_solid
-from survey.solids import Solid
-from survey.watertight import check_watertight, triangulate
+from survey.extrusion.extrusion import SurveyedBlock
+from survey.extrusion.imported_solids import block_of_solid
+from survey.geometry.solids import Solid
+from survey.geometry.watertight import check_watertight, triangulate
+from survey.records.survey import SolidRecord
+from survey.simplify.simplify import BlockShape, BlockyStone, simplify
 
 SEEDS = st.integers(0, 2**32 - 1)
 RING = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], dtype=float)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from plain_stones import SIGMA, rectangle
 
-from survey.canon import deviations, standards
-from survey.quality import StoneQuality
-from survey.records import Canon
+from survey.quality.canon import deviations, standards
+from survey.quality.precision import StoneQuality
+from survey.records.survey import Canon
 
 
 def stretchers(rng: np.random.Generator, count: int, scatter: float, **changes: object) -> list[StoneQuality]:

@@ -6,12 +6,12 @@ import pytest
 import trimesh
 
 from moma.errors import MomaError, SurveyError, UsageError
-from survey.formats.closed_solids import open_solids
-from survey.formats.msh_file import MshFile
 from survey.formats.options import ReadingOptions
-from survey.records import Reject, SolidRecord
-from survey.solids import Solid
-from survey.watertight import check_watertight, triangulate
+from survey.formats.solids.msh.sections import MshFile
+from survey.formats.solids.reader import open_solids
+from survey.geometry.solids import Solid
+from survey.geometry.watertight import check_watertight, triangulate
+from survey.records.survey import Reject, SolidRecord
 from tests.survey.survey_files import EXAMPLES, SQUARES, moved
 
 SOLIDS = [name for name, one in EXAMPLES.items() if one.format == "solids"]

@@ -8,9 +8,9 @@ from plain_blocks import as_stone, bond, box, drawn
 from scipy.spatial import ConvexHull
 from statics import area_of, contacts
 
-from survey.closing_report import ClosingReport
-from survey.joint_settings import JointMode, JointSettings
-from survey.joints import close_joints
+from survey.joints.close import close_joints
+from survey.joints.report import ClosingReport
+from survey.joints.settings import JointMode, JointSettings
 
 THREE = [box("A", 0, 0.495, 0, 0.3), box("B", 0.505, 1, 0, 0.3), box("C", 0, 1, 0.312, 0.6)]
 

@@ -4,8 +4,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
-from survey.common_planes import common_plane
-from survey.planes import FaceFit
+from survey.faces.common_planes import common_plane
+from survey.faces.planes import FaceFit
 
 Array = NDArray[np.float64]
 

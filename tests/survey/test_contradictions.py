@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from plain_stones import SIGMA, polygon_stone, rectangle
 
-from survey.contradictions import Contradiction, contradictions
-from survey.facades import find_facades
-from survey.quality import StoneQuality
+from survey.quality.contradictions import Contradiction, contradictions
+from survey.quality.facades import find_facades
+from survey.quality.precision import StoneQuality
 
 
 def found(stones: list[StoneQuality]) -> tuple[Contradiction, ...]:

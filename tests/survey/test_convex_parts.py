@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from moma.errors import GeometryError
-from survey.convex_parts import convex_parts
-from survey.reflex_edges import is_convex, reflex_edges
-from survey.solids import Solid, planes_of_solid
-from survey.watertight import check_watertight
+from survey.geometry.convex_parts import convex_parts
+from survey.geometry.convexity import is_convex, reflex_edges
+from survey.geometry.solids import Solid, planes_of_solid
+from survey.geometry.watertight import check_watertight
 
 Array = NDArray[np.float64]
 Cell = tuple[int, ...]

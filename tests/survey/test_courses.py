@@ -7,9 +7,9 @@ import pytest
 from plain_stones import polygon_stone, rectangle
 from scipy.stats import kstest
 
-from survey.courses import CourseLine, course_heights, lower_corners, measure_courses
-from survey.facades import Facade, find_facades
-from survey.quality import StoneQuality
+from survey.quality.courses import CourseLine, course_heights, lower_corners, measure_courses
+from survey.quality.facades import Facade, find_facades
+from survey.quality.precision import StoneQuality
 
 
 def facades_of(stones: list[StoneQuality]) -> tuple[Facade, ...]:

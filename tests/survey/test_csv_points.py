@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from moma.errors import SurveyError
-from survey.formats.csv_points import open_csv, read_csv
 from survey.formats.options import ReadingOptions
-from survey.records import BlockRecord, Reject, Station, Survey, SurveyHead
+from survey.formats.points.csv import open_csv, read_csv
+from survey.records.survey import BlockRecord, Reject, Station, Survey, SurveyHead
 
 HEAD = "block,kind,course,role,x,y,z\n"
 ROWS = "A,header,1,vertex,0,0,0\nA,header,1,vertex,1,0,0\nA,header,1,vertex,1,1,0\n"

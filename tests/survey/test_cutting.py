@@ -9,9 +9,9 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 from statics import side_planes
 
-from survey.cutting import common_part, cut_stones, moves
-from survey.solids import Solid
-from survey.watertight import check_watertight
+from survey.geometry.cutting import common_part, cut_stones, moves
+from survey.geometry.solids import Solid
+from survey.geometry.watertight import check_watertight
 
 BOX = cuboid("S", (0.0, 0.0, 0.0), (1.0, 0.5, 0.4))
 PLANES = side_planes(BOX)

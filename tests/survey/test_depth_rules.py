@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from moma.errors import SurveyError
-from survey.depth import depth_for
-from survey.records import BlockRecord, DepthRule
+from survey.extrusion.depth import depth_for
+from survey.records.survey import BlockRecord, DepthRule
 
 CORNERS = np.array([[0.0, 0.0, 0.0], [0.6, 0.0, 0.0], [0.6, 0.0, 0.3]])
 

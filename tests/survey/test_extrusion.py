@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from moma.errors import GeometryError
-from survey.depth import Depth
-from survey.extrusion import extrude
-from survey.faces import outline_face
-from survey.records import BlockRecord, Extrusion
-from survey.watertight import check_watertight
+from survey.extrusion.depth import Depth
+from survey.extrusion.extrusion import extrude
+from survey.faces.faces import outline_face
+from survey.geometry.watertight import check_watertight
+from survey.records.survey import BlockRecord, Extrusion
 
 OBSERVER = np.array([0.3, -5.0, 0.2])
 S = 0.003

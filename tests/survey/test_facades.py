@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from survey.facades import WIDEST, find_facades
+from survey.quality.facades import WIDEST, find_facades
 
 
 def looking(degrees, tilt=0.0):

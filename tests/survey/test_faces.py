@@ -4,11 +4,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from moma.errors import GeometryError, SurveyError
-from survey.depth import depth_for
-from survey.extrusion import extrude
-from survey.faces import outline_face
-from survey.records import BlockRecord, DepthRule
-from survey.watertight import check_watertight
+from survey.extrusion.depth import depth_for
+from survey.extrusion.extrusion import extrude
+from survey.faces.faces import outline_face
+from survey.geometry.watertight import check_watertight
+from survey.records.survey import BlockRecord, DepthRule
 
 SQUARE = np.array([[0, 0, 0], [0.6, 0, 0], [0.6, 0.3, 0], [0, 0.3, 0]], dtype=float)
 ABOVE = np.array([0.3, 0.1, 4.0])

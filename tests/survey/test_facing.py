@@ -9,10 +9,10 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 from touching_twin import _contact
 
-from survey.adjacency import Polyhedra
-from survey.facing import find_facing, planes_of
-from survey.joint_settings import JointSettings
-from survey.solids import area_vector
+from survey.geometry.adjacency import Polyhedra
+from survey.geometry.solids import area_vector
+from survey.joints.facing import find_facing, planes_of
+from survey.joints.settings import JointSettings
 
 USUAL = JointSettings()
 

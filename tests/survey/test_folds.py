@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from survey.folds import fold, warp
-from survey.solids import area_vector
+from survey.geometry.folds import fold, warp
+from survey.geometry.solids import area_vector
 
 
 def test_a_hexagon_is_folded_along_its_ridge() -> None:

@@ -8,8 +8,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from moma.errors import SurveyError
-from survey.frames import SiteTransform, fit_similarity, record_to_site, to_site
-from survey.records import (
+from survey.records.survey import (
     BlockRecord,
     ControlPoint,
     Extrusion,
@@ -19,7 +18,8 @@ from survey.records import (
     Station,
     SurveyHead,
 )
-from survey.similarity import best_similarity
+from survey.registration.similarity import best_similarity
+from survey.registration.site_frame import SiteTransform, fit_similarity, record_to_site, to_site
 
 Array = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ from scipy.optimize import least_squares
 from scipy.stats import chi2
 
 from moma.errors import GeometryError
-from survey.homography import fit_homography
+from survey.registration.homography import fit_homography
 
 Array = NDArray[np.float64]
 

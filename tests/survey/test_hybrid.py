@@ -6,11 +6,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from moma.errors import GeometryError, MomaError, SurveyError
-from survey.hybrid import LiftedFace, lift, lift_faces, plane_of_wall
-from survey.marked_walls import MarkedWall, wall_of_marks
-from survey.neighbours import Neighbours
-from survey.planes import FaceFit, fit_plane
-from survey.records import BlockRecord, Photograph, PhotoMark, Station, SurveyHead
+from survey.faces.neighbours import Neighbours
+from survey.faces.planes import FaceFit, fit_plane
+from survey.records.survey import BlockRecord, Photograph, PhotoMark, Station, SurveyHead
+from survey.registration.marked_walls import MarkedWall, wall_of_marks
+from survey.registration.photographed_stones import LiftedFace, lift, lift_faces, plane_of_wall
 
 Array = NDArray[np.float64]
 

@@ -11,14 +11,14 @@ from two_facings_by_hand import HALF, boxes_meet, contains, depth_of_overlap, fa
 from moma.errors import GeometryError, UsageError
 from pipelines.propose_records import core_record
 from pipelines.stone_records import surveyed_block
-from survey.infill import propose_infill
-from survey.infill_facings import facing_stone
-from survey.infill_settings import InfillSettings
-from survey.joint_settings import JointSettings
-from survey.joints import close_joints
-from survey.solids import area_vector, volume_of
-from survey.synthetic.facings import two_facings
-from survey.watertight import check_watertight
+from survey.geometry.solids import area_vector, volume_of
+from survey.geometry.watertight import check_watertight
+from survey.joints.close import close_joints
+from survey.joints.settings import JointSettings
+from survey.synthetic.buildings.facings import two_facings
+from survey.unseen.core.facings import facing_stone
+from survey.unseen.core.propose import propose_infill
+from survey.unseen.core.settings import InfillSettings
 
 BEDS = [0.0, 0.3, 0.62, 0.9]
 FRONT = [

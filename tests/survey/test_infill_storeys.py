@@ -6,14 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from two_facings_by_hand import contains, facing
 
-from survey.infill import propose_infill
-from survey.infill_cells import CellGrid, grid_solids
-from survey.infill_facings import facing_stone
-from survey.infill_parts import grid_parts
-from survey.infill_settings import InfillSettings, InfillShape
-from survey.solids import Solid, volume_of
-from survey.synthetic.facings import two_facings
-from survey.watertight import check_watertight
+from survey.geometry.infill_parts import grid_parts
+from survey.geometry.solids import Solid, volume_of
+from survey.geometry.watertight import check_watertight
+from survey.synthetic.buildings.facings import two_facings
+from survey.unseen.core.cells import CellGrid, grid_solids
+from survey.unseen.core.facings import facing_stone
+from survey.unseen.core.propose import propose_infill
+from survey.unseen.core.settings import InfillSettings, InfillShape
 
 STOREYS = InfillSettings(shape=InfillShape.STOREYS)
 BEDS = [0.0, 0.3, 0.62, 0.9, 1.2]

@@ -10,14 +10,14 @@ from plain_blocks import as_stone, drawn, moved
 from scipy.spatial.transform import Rotation
 from statics import contacts, near_pairs, overlap_depth
 
-from survey.blocky import simplify
-from survey.closing import as_building
-from survey.facing import find_facing
-from survey.joint_bends import _chains, _squares
-from survey.joint_planes import contact_planes
-from survey.joint_settings import JointSettings
-from survey.joints import close_joints
-from survey.watertight import check_watertight
+from survey.geometry.watertight import check_watertight
+from survey.joints.bent_beds import _chains, _squares
+from survey.joints.bounded_closing import as_building
+from survey.joints.close import close_joints
+from survey.joints.contact_planes import contact_planes
+from survey.joints.facing import find_facing
+from survey.joints.settings import JointSettings
+from survey.simplify.simplify import simplify
 
 USUAL = JointSettings()
 LENGTH, GAP = 0.5, 0.01

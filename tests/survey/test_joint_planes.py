@@ -7,14 +7,14 @@ from hypothesis import strategies as st
 from plain_blocks import as_stone, bond, cuboid, drawn, moved
 from scipy.spatial.transform import Rotation
 
-from survey._kernels_continuing import continuing_faces
-from survey._kernels_joint_planes import fit_middle_planes
-from survey.blocky import simplify
-from survey.closing import as_building, close_within_bounds
-from survey.facing import find_facing
-from survey.joint_planes import contact_planes
-from survey.joint_settings import JointSettings
-from survey.solids import Solid
+from survey.geometry.solids import Solid
+from survey.joints._kernels import fit_middle_planes
+from survey.joints._kernels_continuing import continuing_faces
+from survey.joints.bounded_closing import as_building, close_within_bounds
+from survey.joints.contact_planes import contact_planes
+from survey.joints.facing import find_facing
+from survey.joints.settings import JointSettings
+from survey.simplify.simplify import simplify
 
 USUAL = JointSettings()
 SQUARE = np.array([(-0.5, -0.2), (0.5, -0.2), (0.5, 0.2), (-0.5, 0.2)])

@@ -13,16 +13,16 @@ from plain_blocks import DEPTH, as_stone, box, cuboid, drawn, moved, stone
 from statics import contacts, near_pairs, overlap_depth, side_planes
 
 from moma.errors import GeometryError
-from survey.blocky import BlockShape, simplify
-from survey.depth import Depth
-from survey.extrusion import SurveyedBlock, extrude
-from survey.faces import outline_face
-from survey.joint_settings import JointMode, JointSettings
-from survey.joints import ClosedStones, close_joints
-from survey.records import BlockRecord
-from survey.solids import Solid
-from survey.synthetic.sample import make_sample
-from survey.watertight import check_watertight
+from survey.extrusion.depth import Depth
+from survey.extrusion.extrusion import SurveyedBlock, extrude
+from survey.faces.faces import outline_face
+from survey.geometry.solids import Solid
+from survey.geometry.watertight import check_watertight
+from survey.joints.close import ClosedStones, close_joints
+from survey.joints.settings import JointMode, JointSettings
+from survey.records.survey import BlockRecord
+from survey.simplify.simplify import BlockShape, simplify
+from survey.synthetic.window_bay.sample import make_sample
 
 # two stones with a 10 mm head joint, a long one above them across a 12 mm bed joint
 THREE = [box("A", 0, 0.495, 0, 0.3), box("B", 0.505, 1, 0, 0.3), box("C", 0, 1, 0.312, 0.6)]

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from plain_blocks import as_stone, bond, moved
 from scipy.spatial.transform import Rotation
 
-from survey.blocky import BlockyStone
-from survey.joints import ClosedStones, close_joints
+from survey.joints.close import ClosedStones, close_joints
+from survey.simplify.simplify import BlockyStone
 
 
 def as_it_was(closed: ClosedStones) -> list[BlockyStone]:

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from moma.errors import GeometryError, SurveyError
-from survey.extrusion import SurveyedBlock
+from survey.extrusion.extrusion import SurveyedBlock
 from survey.formats.reading import open_survey
-from survey.measured import survey_stones
-from survey.records import (
+from survey.records.survey import (
     BlockRecord,
     ControlPoint,
     DepthRule,
@@ -23,6 +22,7 @@ from survey.records import (
     SurveyHead,
     SurveyStream,
 )
+from survey.stones import survey_stones
 
 RULES = (DepthRule(None, 0.4, 0.05, "thickness", 2),)
 OBSERVER = Station("observer", np.array([2.0, -9.0, 1.5]), 3)

@@ -9,16 +9,16 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from survey.depth import depth_for
-from survey.extrusion import extrude
-from survey.faces import outline_face
-from survey.missing_stones import propose_missing
-from survey.missing_stones_settings import MissingSettings
-from survey.synthetic.facings import two_facings
-from survey.synthetic.openings import Arch
-from survey.synthetic.sample import make_sample
-from survey.synthetic.walls import wall
-from survey.watertight import check_watertight
+from survey.extrusion.depth import depth_for
+from survey.extrusion.extrusion import extrude
+from survey.faces.faces import outline_face
+from survey.geometry.watertight import check_watertight
+from survey.synthetic.buildings.facings import two_facings
+from survey.synthetic.buildings.openings import Arch
+from survey.synthetic.buildings.walls import wall
+from survey.synthetic.window_bay.sample import make_sample
+from survey.unseen.missing.propose import propose_missing
+from survey.unseen.missing.settings import MissingSettings
 
 
 def blocks_of(survey):

@@ -9,9 +9,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from moma.errors import SurveyError, UsageError
-from survey.formats.moma_ascii import open_moma, read_head, read_moma, with_header, write_moma
+from survey.formats.native.reader import open_moma, read_head, read_moma, with_header, write_moma
 from survey.formats.options import ReadingOptions
-from survey.records import (
+from survey.records.survey import (
     OBSERVER,
     BlockRecord,
     Canon,

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from moma.errors import GeometryError
-from survey import outline as module
-from survey.outline import level_direction, measure_outline, outline_polygon
+from survey.faces import outline as module
+from survey.faces.outline import level_direction, measure_outline, outline_polygon
 
 LEVEL = np.array([1.0, 0.0])
 RECTANGLE = np.array([[0.0, 0.0], [0.6, 0.0], [0.6, 0.3], [0.0, 0.3]])

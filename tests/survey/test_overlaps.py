@@ -10,10 +10,10 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection
 from scipy.spatial.transform import Rotation
 from statics import overlap_depth, side_planes
 
-from survey._kernels_apart import deepest_overlaps
-from survey.overlaps import find_overlaps, part_stones
-from survey.solids import Solid, planes_of_solid, volume_of
-from survey.watertight import check_watertight
+from survey.geometry._kernels.convexity import deepest_overlaps
+from survey.geometry.solids import Solid, planes_of_solid, volume_of
+from survey.geometry.watertight import check_watertight
+from survey.joints.overlaps import find_overlaps, part_stones
 
 BOUND = 0.08
 

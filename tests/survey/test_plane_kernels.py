@@ -7,10 +7,10 @@ import pytest
 from numpy.typing import NDArray
 from plane_twin import accepted_points, compact, plane_of, triple_planes
 
-from survey._kernels_blunders import fit_face
-from survey._kernels_planes import leverages, weighted_plane
-from survey._kernels_shapes import fit_columns, fit_two_planes, grow_columns, truncated_sum
-from survey._kernels_triples import beside_the_rest, search_triples, smallest
+from survey.faces._kernels.planes import leverages, weighted_plane
+from survey.faces._kernels.robust_fit import fit_face
+from survey.faces._kernels.shapes import fit_columns, fit_two_planes, grow_columns, truncated_sum
+from survey.faces._kernels.triples import beside_the_rest, search_triples, smallest
 
 Array = NDArray[np.float64]
 SIGMA = 0.002

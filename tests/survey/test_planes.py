@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from moma.errors import GeometryError
-from survey.planes import fit_plane
+from survey.faces.planes import fit_plane
 
 Array = NDArray[np.float64]
 

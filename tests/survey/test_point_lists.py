@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from moma.errors import SurveyError, UsageError
-from survey.formats.code_template import CodeFields, CodeTemplate
 from survey.formats.options import ReadingOptions
-from survey.formats.point_lists import open_penzd, open_pnezd
+from survey.formats.points.code_template import CodeFields, CodeTemplate
+from survey.formats.points.pnezd import open_penzd, open_pnezd
 from survey.formats.reading import read_survey
-from survey.records import BlockRecord, Reject, Station, SurveyHead
+from survey.records.survey import BlockRecord, Reject, Station, SurveyHead
 from tests.survey.survey_files import PNEZD
 
 ROWS = "1,5000.5,1000.25,10.125,A:v\n2,5000.5,1001.25,10.125,A:v\n3,5000.5,1001.25,11.125,A:v\n4,5000.5,1001,10.5,A:p\n"

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from survey.depth import Depth
-from survey.extrusion import extrude
-from survey.faces import outline_face
-from survey.quality import StoneQuality, appraise, judge_survey
-from survey.records import BlockRecord
+from survey.extrusion.depth import Depth
+from survey.extrusion.extrusion import extrude
+from survey.faces.faces import outline_face
+from survey.quality.precision import StoneQuality, appraise, judge_survey
+from survey.records.survey import BlockRecord
 
 DEPTH = Depth(0.4, 0.03, "guess", "kind", 3)
 FRONT = np.array([0.0, -10.0, 0.0])

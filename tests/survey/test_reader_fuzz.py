@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from moma.errors import MomaError, SurveyError
 from survey.formats.reading import open_survey, read_survey
-from survey.records import BlockRecord, Reject, SolidRecord
-from survey.solids import Solid
-from survey.watertight import check_watertight
+from survey.geometry.solids import Solid
+from survey.geometry.watertight import check_watertight
+from survey.records.survey import BlockRecord, Reject, SolidRecord
 from tests.survey.survey_files import EXAMPLES, Example
 
 NUMBERS = [

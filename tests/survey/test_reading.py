@@ -7,7 +7,7 @@ import pytest
 
 from moma.errors import UsageError
 from survey.formats.reading import FORMATS, ReadingOptions, open_survey, read_head, read_survey
-from survey.records import BlockRecord
+from survey.records.survey import BlockRecord
 from tests.survey.survey_files import CSV, EXAMPLES, MOMA, PNEZD
 
 

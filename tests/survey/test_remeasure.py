@@ -5,10 +5,10 @@ import pytest
 from plain_stones import rectangle
 
 from moma.errors import SurveyError
-from survey.contradictions import Contradiction
-from survey.quality import StoneQuality, judge_survey
-from survey.records import Reject
-from survey.remeasure import Remeasure, Urgency, list_remeasures
+from survey.quality.contradictions import Contradiction
+from survey.quality.precision import StoneQuality, judge_survey
+from survey.quality.remeasure import Remeasure, Urgency, list_remeasures
+from survey.records.survey import Reject
 
 
 def listed(

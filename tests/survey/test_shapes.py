@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from survey.planes import fit_plane
-from survey.shapes import FaceShape, ShapeKind, judge_shape
+from survey.faces.planes import fit_plane
+from survey.faces.shapes import FaceShape, ShapeKind, judge_shape
 
 Array = NDArray[np.float64]
 SIGMA = 0.002

@@ -12,18 +12,18 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog, minimize
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
-from survey.convex_parts import convex_parts
-from survey.formats.closed_solids import open_solids
 from survey.formats.options import ReadingOptions
-from survey.half_spaces import intersection
-from survey.matching_faces import find_matches
-from survey.plane_network import settle
-from survey.records import Reject, SolidRecord
-from survey.reflex_edges import is_convex
-from survey.snapping import snap
-from survey.snapping_report import Snapping
-from survey.solids import Solid, area_vector, planes_of_solid
-from survey.watertight import check_watertight
+from survey.formats.solids.reader import open_solids
+from survey.geometry.convex_parts import convex_parts
+from survey.geometry.convexity import is_convex
+from survey.geometry.half_spaces import intersection
+from survey.geometry.plane_network import settle
+from survey.geometry.solids import Solid, area_vector, planes_of_solid
+from survey.geometry.watertight import check_watertight
+from survey.joints.snapping.matching_faces import find_matches
+from survey.joints.snapping.snapping import snap
+from survey.records.snapping import Snapping
+from survey.records.survey import Reject, SolidRecord
 from tests.survey.assemblies import dome, groin, obj, prism, rounded, wall
 
 Array = NDArray[np.float64]
@@ -351,7 +351,7 @@ def test_a_solid_that_snapping_would_spoil_is_refused(
         flat = [Solid(one.code, one.vertices * [1.0, 1.0, 0.0], one.faces) for one in solids]
         return flat, Snapping(tolerance, 0, 0, {one.code: 1.0 for one in solids}, {}, ())
 
-    monkeypatch.setattr("survey.formats.closed_solids.snap", flattened)
+    monkeypatch.setattr("survey.formats.solids.reader.snap", flattened)
     path = tmp_path / "a.obj"
     path.write_text(obj([box("A", (0, 0, 0), (1, 1, 1))]))
     (found,) = open_solids(path, ReadingOptions(snap=0.01)).blocks

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from moma.errors import GeometryError
-from survey.records import SolidRecord
-from survey.solid_blocks import block_of_solid
+from survey.extrusion.imported_solids import block_of_solid
+from survey.records.survey import SolidRecord
 
 RING = [(0, 0), (1, 0), (1, 1), (0, 1)]
 BOX = np.array([(x, y, z) for z in (0, 1) for x, y in RING], dtype=float)

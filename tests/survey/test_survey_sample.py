@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from statics import area_of, can_stand, contacts, near_pairs, overlap_depth, side_planes
 
-from survey.extrusion import SurveyedBlock
-from survey.joints import ClosedStones
-from survey.records import Survey
-from survey.solids import Solid
-from survey.synthetic.sample import make_sample, write_sample
-from survey.watertight import check_watertight
+from survey.extrusion.extrusion import SurveyedBlock
+from survey.geometry.solids import Solid
+from survey.geometry.watertight import check_watertight
+from survey.joints.close import ClosedStones
+from survey.records.survey import Survey
+from survey.synthetic.window_bay.sample import make_sample, write_sample
 
 Truth = dict[str, dict[str, Any]]
 SAMPLE = Path(__file__).parents[2] / "data" / "samples" / "window"

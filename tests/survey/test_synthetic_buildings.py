@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from statics import area_of, centroid, contacts, near_pairs, overlap_depth
 
-from survey.solids import area_vector
-from survey.synthetic.assemblies import angled_pier, hexagonal_dome
+from survey.geometry.solids import area_vector
+from survey.geometry.watertight import check_watertight
 from survey.synthetic.building import Building
-from survey.synthetic.facings import two_facings
-from survey.synthetic.openings import Arch
-from survey.synthetic.quoins import corner
-from survey.synthetic.vaults import barrel_vault, semicircular_arch
-from survey.synthetic.walls import wall
-from survey.watertight import check_watertight
+from survey.synthetic.buildings.assemblies import angled_pier, hexagonal_dome
+from survey.synthetic.buildings.facings import two_facings
+from survey.synthetic.buildings.openings import Arch
+from survey.synthetic.buildings.quoins import corner
+from survey.synthetic.buildings.vaults import barrel_vault, semicircular_arch
+from survey.synthetic.buildings.walls import wall
 
 BUILDINGS = {
     "wall": lambda: wall(20),

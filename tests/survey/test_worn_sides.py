@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 from plain_blocks import drawn, moved
 from scipy.spatial.transform import Rotation
 
-from survey.adjacency import Polyhedra
-from survey.facing import planes_of
-from survey.joint_planes import StoneFaces
-from survey.solids import Solid
-from survey.worn_sides import mended_planes
+from survey.geometry.adjacency import Polyhedra
+from survey.geometry.solids import Solid
+from survey.joints.contact_planes import StoneFaces
+from survey.joints.facing import planes_of
+from survey.joints.worn_sides import mended_planes
 
 REACH = 0.08
 # seen from the front: the upper right corner is worn, 20 mm along and 30 mm down

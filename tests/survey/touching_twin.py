@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 from scipy.spatial import ConvexHull, Delaunay
 
-from survey.solids import area_vector
+from survey.geometry.solids import area_vector
 
 
 def touching(solids, width=0.04, angle=12.0, overlap=0.02, share=0.03):

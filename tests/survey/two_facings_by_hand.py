@@ -5,10 +5,10 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from survey.extrusion import prism
-from survey.infill_facings import FacingStone
-from survey.solids import Solid
-from survey.watertight import triangulate
+from survey.extrusion.extrusion import prism
+from survey.geometry.solids import Solid
+from survey.geometry.watertight import triangulate
+from survey.unseen.core.facings import FacingStone
 
 HALF = 0.5  # of the thickness of the wall [m]
 

@@ -8,10 +8,10 @@ import numpy as np
 from convex_overlap import overlaps
 from numpy.typing import NDArray
 
-from survey.joints import ClosedStones
-from survey.solids import Solid, area_vector
+from survey.geometry.solids import Solid, area_vector
+from survey.geometry.watertight import check_watertight
+from survey.joints.close import ClosedStones
 from survey.synthetic.shared_faces import TrueJoint, true_joints
-from survey.watertight import check_watertight
 
 Array = NDArray[np.float64]
 Pair = tuple[str, str]

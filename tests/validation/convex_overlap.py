@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from survey.solids import Solid, area_vector
+from survey.geometry.solids import Solid, area_vector
 
 Array = NDArray[np.float64]
 

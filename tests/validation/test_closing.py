@@ -12,19 +12,19 @@ import numpy as np
 import pytest
 from closing_truth import Verdict, judge
 
-from survey.blocky import simplify
-from survey.depth import depth_for
-from survey.extrusion import SurveyedBlock, extrude
-from survey.faces import outline_face
-from survey.formats.moma_ascii import read_moma
-from survey.joint_settings import JointMode, JointSettings
-from survey.joints import ClosedStones, close_joints
-from survey.synthetic.openings import Arch
-from survey.synthetic.quoins import corner
-from survey.synthetic.sample import make_sample
+from survey.extrusion.depth import depth_for
+from survey.extrusion.extrusion import SurveyedBlock, extrude
+from survey.faces.faces import outline_face
+from survey.formats.native.reader import read_moma
+from survey.joints.close import ClosedStones, close_joints
+from survey.joints.settings import JointMode, JointSettings
+from survey.simplify.simplify import simplify
+from survey.synthetic.buildings.openings import Arch
+from survey.synthetic.buildings.quoins import corner
+from survey.synthetic.buildings.vaults import barrel_vault, semicircular_arch
+from survey.synthetic.buildings.walls import wall
 from survey.synthetic.shared_faces import TrueJoint, true_joints
-from survey.synthetic.vaults import barrel_vault, semicircular_arch
-from survey.synthetic.walls import wall
+from survey.synthetic.window_bay.sample import make_sample
 
 SAMPLE = Path(__file__).resolve().parents[2] / "data/samples/window/window.moma"
 SETTINGS = JointSettings()

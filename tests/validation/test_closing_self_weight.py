@@ -16,11 +16,11 @@ from mechanics.meshing.elements import Element
 from mechanics.result import Outcome
 from mechanics.scene import Block, ContactSettings, Fidelity, Scene, SolverSettings, Start, TimeSettings
 from mechanics.simulate import simulate
-from survey.joints import close_joints
-from survey.synthetic.openings import Arch
-from survey.synthetic.quoins import corner
-from survey.synthetic.vaults import barrel_vault, semicircular_arch
-from survey.synthetic.walls import wall
+from survey.joints.close import close_joints
+from survey.synthetic.buildings.openings import Arch
+from survey.synthetic.buildings.quoins import corner
+from survey.synthetic.buildings.vaults import barrel_vault, semicircular_arch
+from survey.synthetic.buildings.walls import wall
 
 STONE = Material("stone", density=2400.0, young=10e9, poisson=0.2)
 RIGID = {

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from closing_truth import judge
 
-from survey.blocky import simplify
-from survey.convex_parts import convex_parts
-from survey.joint_settings import JointSettings
-from survey.joints import close_joints
-from survey.records import SolidRecord
-from survey.solid_blocks import block_of_solid
-from survey.synthetic.assemblies import RoundedAssembly, angled_pier, hexagonal_dome
+from survey.extrusion.imported_solids import block_of_solid
+from survey.geometry.convex_parts import convex_parts
+from survey.joints.close import close_joints
+from survey.joints.settings import JointSettings
+from survey.records.survey import SolidRecord
+from survey.simplify.simplify import simplify
+from survey.synthetic.buildings.assemblies import RoundedAssembly, angled_pier, hexagonal_dome
 
 ASSEMBLIES = {
     "dome": lambda: hexagonal_dome(60),

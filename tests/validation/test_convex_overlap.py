@@ -6,7 +6,7 @@ from convex_overlap import common_volume, overlaps
 from scenes import CORNERS, FACES, rotation
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
-from survey.solids import Solid
+from survey.geometry.solids import Solid
 
 
 def box(code, low, high, turn=None):

@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from survey.canon import deviations, standards
-from survey.contradictions import contradictions
-from survey.courses import measure_courses
-from survey.depth import Depth
-from survey.extrusion import extrude
-from survey.facades import find_facades
-from survey.faces import outline_face
-from survey.quality import appraise
-from survey.records import BlockRecord
+from survey.extrusion.depth import Depth
+from survey.extrusion.extrusion import extrude
+from survey.faces.faces import outline_face
+from survey.quality.canon import deviations, standards
+from survey.quality.contradictions import contradictions
+from survey.quality.courses import measure_courses
+from survey.quality.facades import find_facades
+from survey.quality.precision import appraise
+from survey.records.survey import BlockRecord
 
 SIGMA, BED = 0.002, 0.003
 STONES, LENGTH, HEIGHT = 18, 0.55, 0.3

@@ -16,15 +16,15 @@ from typer.testing import CliRunner
 from moma.cli import app
 from pipelines.check import check_scene
 from pipelines.ingest import ingest
-from survey.depth import depth_for
-from survey.extrusion import SurveyedBlock, extrude
-from survey.faces import outline_face
-from survey.formats.moma_ascii import read_moma, write_moma
+from survey.extrusion.depth import depth_for
+from survey.extrusion.extrusion import SurveyedBlock, extrude
+from survey.faces.faces import outline_face
+from survey.formats.native.reader import read_moma, write_moma
 from survey.formats.reading import open_survey
-from survey.joints import close_joints
-from survey.measured import survey_stones
-from survey.records import ControlPoint, Survey
-from survey.watertight import check_watertight
+from survey.geometry.watertight import check_watertight
+from survey.joints.close import close_joints
+from survey.records.survey import ControlPoint, Survey
+from survey.stones import survey_stones
 
 SAMPLE = Path(__file__).parents[2] / "data" / "samples" / "window" / "window.moma"
 LAMBERT = np.array([650_000.0, 6_860_000.0, 300.0])

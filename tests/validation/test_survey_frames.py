@@ -13,10 +13,10 @@ from scipy.spatial.transform import Rotation
 from stone_faces import NINTHS, THIRDS, turned
 
 from moma.errors import GeometryError, SurveyError
-from survey.frames import fit_similarity
-from survey.homography import fit_homography
-from survey.records import ControlPoint
-from survey.similarity import best_similarity
+from survey.records.survey import ControlPoint
+from survey.registration.homography import fit_homography
+from survey.registration.similarity import best_similarity
+from survey.registration.site_frame import fit_similarity
 
 TRIALS = 2000
 LAMBERT = np.array([650_000.0, 6_860_000.0, 300.0])

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from stone_faces import face, turned
 
-from survey.depth import Depth
-from survey.extrusion import extrude
-from survey.faces import outline_face
-from survey.records import BlockRecord, Extrusion
+from survey.extrusion.depth import Depth
+from survey.extrusion.extrusion import extrude
+from survey.faces.faces import outline_face
+from survey.records.survey import BlockRecord, Extrusion
 
 STONES = 2500
 DEPTH, DEPTH_SIGMA = 0.5, 0.02

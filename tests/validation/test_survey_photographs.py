@@ -9,9 +9,9 @@ deviations (variance 1 ± 0.15; the scatter of eight neighbours is itself known 
 import numpy as np
 import pytest
 
-from survey.faces import outline_face
-from survey.hybrid import LiftedFace, lift_faces
-from survey.records import BlockRecord, Photograph, PhotoMark, Station, SurveyHead
+from survey.faces.faces import outline_face
+from survey.records.survey import BlockRecord, Photograph, PhotoMark, Station, SurveyHead
+from survey.registration.photographed_stones import LiftedFace, lift_faces
 
 SIGMA, PIXEL, RELIEF, TILT = 0.002, 1.0, 0.003, 0.004
 CAMERA = np.array([-1.5, -7.0, 1.7])  # seen 12° from square

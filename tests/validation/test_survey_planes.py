@@ -16,7 +16,7 @@ import pytest
 from scipy import stats
 from stone_faces import NINTHS, THIRDS, face, precise_plane, turned
 
-from survey.planes import fit_plane
+from survey.faces.planes import fit_plane
 
 FACES = 2000
 SIGMA = 0.003

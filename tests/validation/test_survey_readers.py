@@ -14,7 +14,7 @@ import trimesh
 
 from moma.errors import MomaError
 from survey.formats.reading import ReadingOptions, open_survey
-from survey.records import BlockRecord, Reject, SolidRecord
+from survey.records.survey import BlockRecord, Reject, SolidRecord
 
 CORNERS = [(10.0, 2.0, 0.5), (10.6, 2.0, 0.5), (10.6, 2.0, 0.8), (10.0, 2.0, 0.8)]
 INSIDE = [(10.1, 2.003, 0.6), (10.4, 1.998, 0.7)]

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from stone_faces import turned
 
-from survey.planes import fit_plane
-from survey.shapes import ShapeKind, judge_shape
+from survey.faces.planes import fit_plane
+from survey.faces.shapes import ShapeKind, judge_shape
 
 SIGMA, FACES = 0.003, 400
 CORNERS = np.array([[-0.3, -0.15], [0.3, -0.15], [0.3, 0.15], [-0.3, 0.15]])

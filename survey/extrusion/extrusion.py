@@ -1,0 +1,142 @@
+"""The hidden side: a face moved into the wall by the stone's depth, and how well it is known."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from moma.errors import GeometryError
+from survey.extrusion._kernels import corner_deviations
+from survey.extrusion.depth import Depth
+from survey.faces.faces import Face
+from survey.geometry.solids import Solid
+from survey.records.survey import Extrusion
+
+__all__ = ["SurveyedBlock", "extrude", "hidden_side", "prism"]
+
+Array = NDArray[np.float64]
+
+_STRAIGHT = Extrusion()
+_FLATTEST = np.cos(np.radians(60.0))  # a direction farther from the normal leaves a sliver, not a stone
+
+
+@dataclass(frozen=True)
+class SurveyedBlock:
+    """A stone as measured, with its hidden half.
+
+    Attributes
+    ----------
+    code, kind, course : as in the survey
+    face : its visible face
+    depth : its depth, with the evidence
+    extrusion : how its hidden side lies
+    solid : between the face and the hidden face; the nv visible corners first, then the hidden ones
+    vertex_sigma : (2 nv, 3) standard deviations of the solid's corners along x, y and z [m]; NaN where the
+        depth's is not known
+    """
+
+    code: str
+    kind: str
+    course: int | None
+    face: Face
+    depth: Depth
+    extrusion: Extrusion
+    solid: Solid
+    vertex_sigma: Array
+
+
+def extrude(face: Face, depth: Depth, extrusion: Extrusion = _STRAIGHT) -> SurveyedBlock:
+    """Give a face its hidden side.
+
+    Parameters
+    ----------
+    face : visible face
+    depth : how deep the stone is, along the direction of extrusion
+    extrusion : direction, and size of the tail; by default square to the face and as large as it
+
+    Returns
+    -------
+    SurveyedBlock whose solid has the nv visible corners first, then the nv hidden ones, in the same order
+
+    Raises
+    ------
+    GeometryError
+        if the direction does not lead from the face into the wall
+    """
+    hidden = hidden_side(face.outline, face.fit.normal, depth.value, extrusion)
+    return SurveyedBlock(
+        code=face.code,
+        kind=face.kind,
+        course=face.course,
+        face=face,
+        depth=depth,
+        extrusion=extrusion,
+        solid=prism(face.code, face.outline, hidden),
+        vertex_sigma=_vertex_sigma(face, depth, extrusion, hidden),
+    )
+
+
+def hidden_side(corners: Array, normal: Array, depth: float, extrusion: Extrusion) -> Array:
+    """Hidden corners (nv, 3) behind visible ones: mean + tail · (corner - mean) + depth · direction [m]."""
+    hidden = corners + depth * _direction(normal, extrusion)
+    if extrusion.tail != 1.0:
+        hidden -= (1.0 - extrusion.tail) * (corners - corners.mean(axis=0))
+    return hidden
+
+
+def prism(code: str, front: Array, back: Array) -> Solid:
+    """Join two polygons of equal count, the front counter-clockwise seen from outside, to a closed solid."""
+    return Solid(code, np.concatenate([front, back]), _prism_faces(len(front)))
+
+
+@lru_cache
+def _prism_faces(count: int) -> tuple[tuple[int, ...], ...]:
+    sides = tuple((j, i, i + count, j + count) for i, j in ((i, (i + 1) % count) for i in range(count)))
+    return (tuple(range(count)), tuple(range(2 * count - 1, count - 1, -1)), *sides)
+
+
+def _direction(normal: Array, extrusion: Extrusion) -> Array:
+    """Unit vector from the face into the wall."""
+    if extrusion.direction is None:
+        return -normal
+    direction: Array = extrusion.direction / np.linalg.norm(extrusion.direction)
+    if not -(direction @ normal) >= _FLATTEST:
+        angle = float(np.degrees(np.arccos(np.clip(-(direction @ normal), -1.0, 1.0))))
+        raise GeometryError(
+            f"its direction of extrusion is {angle:.0f}° from square to its face",
+            remedy="give a direction that leads from the face into the wall, less than 60° from square",
+        )
+    return direction
+
+
+def _vertex_sigma(face: Face, depth: Depth, extrusion: Extrusion, hidden: Array) -> Array:
+    """First-order propagation of the errors of corner, plane and depth, which are independent.
+
+    In the plane a corner is as precise as it was measured; square to it, it is as precise as the plane is
+    there: tilts θ and height η of the plane raise the place (u₁, u₂) by η + θ₁ u₁ + θ₂ u₂. Behind the face,
+    a hidden corner moves along by the error of the depth, and, where the direction is square to the face, by
+    depth · θ as the normal turns.
+    """
+    fit, tail, count = face.fit, extrusion.tail, len(face.outline)
+    direction = _direction(fit.normal, extrusion)
+    square_to_face = extrusion.direction is None
+    out: Array = corner_deviations(
+        face.outline,
+        hidden,
+        # the height of a slanting tail is that of the visible place it lies behind
+        np.zeros(3) if square_to_face else depth.value * direction,
+        square_to_face,
+        face.record.vertex_sigmas[list(face.corner_of)],
+        fit.normal,
+        fit.centroid,
+        fit.axes,
+        fit.covariance,
+        # the tail of a corner also moves with the mean of all of them
+        tail + (1.0 - tail) / count,
+        (1.0 - tail) / count,
+        np.nan if depth.sigma is None else depth.sigma**2,
+        depth.value,
+        direction,
+    )
+    return out

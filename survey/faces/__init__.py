@@ -1,0 +1,1 @@
+"""Stone faces: measured points → robust plane → outline."""

@@ -1,0 +1,1 @@
+"""Compiled loops of plane fits, outlines and shape models."""

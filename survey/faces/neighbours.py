@@ -1,0 +1,116 @@
+"""Measured faces, searched by place: the neighbours of a stone, and the faces of its wall."""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from survey.faces.planes import FaceFit
+
+__all__ = ["MeasuredFace", "Neighbours"]
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+_SAME_WAY = float(np.cos(np.radians(30.0)))  # faces turned farther belong to another wall
+_ENOUGH = 3  # neighbours that it takes to speak of their plane
+_REACH = 0.5  # how near a neighbour has to come, in sizes of the stone
+_LEANING = 0.03  # how far a wall may leave the plane of the marks, per distance from them
+
+
+class MeasuredFace(Protocol):
+    """What has to be known of a face: its code, its plane and its outline (nv, 3) [m]."""
+
+    @property
+    def code(self) -> str:
+        """Code of the stone."""
+
+    @property
+    def fit(self) -> FaceFit:
+        """Its plane."""
+
+    @property
+    def outline(self) -> Array:
+        """(nv, 3) corners in order [m]."""
+
+
+class Neighbours:
+    """Measured faces, to be searched by place.
+
+    Parameters
+    ----------
+    faces : in any order
+    """
+
+    def __init__(self, faces: Sequence[MeasuredFace]) -> None:
+        self.codes = tuple(face.code for face in faces)
+        self._fits = [face.fit for face in faces]
+        self._normals = np.array([face.fit.normal for face in faces]).reshape(-1, 3)
+        self._corners = np.concatenate([face.outline for face in faces] or [np.empty((0, 3))])
+        self._next = np.concatenate(
+            [np.roll(face.outline, -1, axis=0) for face in faces] or [np.empty((0, 3))]
+        )
+        self._counts = np.array([len(face.outline) for face in faces], dtype=np.intp)
+        self._starts = np.cumsum(self._counts) - self._counts
+        self._centres = np.array([face.outline.mean(axis=0) for face in faces]).reshape(-1, 3)
+        owner = np.repeat(np.arange(len(faces)), self._counts)
+        self._radii = np.zeros(len(faces))
+        np.maximum.at(self._radii, owner, np.linalg.norm(self._corners - self._centres[owner], axis=1))
+        self._tree = cKDTree(self._centres) if faces else None
+
+    def near(self, outline: Array, normal: Array) -> Indices:
+        """Faces that face the same way and come within half the size of an outline (nv, 3), if three do."""
+        if self._tree is None:
+            return np.empty(0, dtype=np.intp)
+        centre = outline.mean(axis=0)
+        reach = _REACH * float(np.linalg.norm(outline[:, None] - outline[None], axis=2).max())
+        around = float(np.linalg.norm(outline - centre, axis=1).max()) + reach
+        found = np.sort(self._tree.query_ball_point(centre, around + float(self._radii.max()))).astype(
+            np.intp
+        )
+        apart = np.linalg.norm(self._centres[found] - centre, axis=1)
+        found = found[(apart <= around + self._radii[found]) & (self._normals[found] @ normal >= _SAME_WAY)]
+        if len(found) < _ENOUGH:
+            return np.empty(0, dtype=np.intp)
+        near: Indices = found[self._distances(outline, found) <= reach]
+        return near if len(near) >= _ENOUGH else near[:0]
+
+    def _distances(self, outline: Array, found: Indices) -> Array:
+        """Distance of each of some faces from an outline: that of the nearest corner from an edge, (k,) [m]."""
+        counts = self._counts[found]
+        first = np.cumsum(counts) - counts
+        rows = np.repeat(self._starts[found] - first, counts) + np.arange(counts.sum())
+        one = _to_segments(outline, self._corners[rows], self._next[rows]).min(axis=0)
+        other = _to_segments(self._corners[rows], outline, np.roll(outline, -1, axis=0)).min(axis=1)
+        out: Array = np.minimum.reduceat(np.minimum(one, other), first)
+        return out
+
+    def on_wall(self, centre: Array, normal: Array, size: float) -> Indices:
+        """Faces of the wall that goes through a place: same way, and near its plane, if three do."""
+        arms = self._centres - centre
+        heights = np.abs(arms @ normal)
+        along = np.sqrt(np.maximum((arms**2).sum(axis=1) - heights**2, 0.0))
+        same = (self._normals @ normal >= _SAME_WAY) & (heights <= np.maximum(size, _LEANING * along))
+        found: Indices = np.flatnonzero(same)
+        return found if len(found) >= _ENOUGH else found[:0]
+
+    def outward(self, centre: Array, normal: Array, size: float) -> Array:
+        """The normal of a wall through a place, turned the way most faces look that lie on it."""
+        ahead, behind = self.on_wall(centre, normal, size), self.on_wall(centre, -normal, size)
+        return -normal if len(behind) > len(ahead) else normal
+
+    def fits(self, found: Indices) -> list[FaceFit]:
+        """Planes of some faces."""
+        return [self._fits[i] for i in found]
+
+
+def _to_segments(points: Array, starts: Array, ends: Array) -> Array:
+    """Distances of points (p, 3) from segments (e, 3) to (e, 3), (p, e) [m]."""
+    run = ends - starts
+    length = np.maximum((run**2).sum(axis=1), 1e-300)
+    from_start = points[:, None] - starts[None]
+    part = np.clip((from_start * run).sum(axis=2) / length, 0.0, 1.0)
+    out: Array = np.linalg.norm(from_start - part[..., None] * run, axis=2)
+    return out

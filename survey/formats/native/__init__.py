@@ -1,0 +1,1 @@
+"""The native survey format (`.moma`): reader and writer."""

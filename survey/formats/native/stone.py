@@ -1,0 +1,181 @@
+"""One stone of the native survey format, line by line."""
+
+import math
+import re
+
+import numpy as np
+from numpy.typing import NDArray
+
+from survey.formats.fields import FARTHEST
+from survey.formats.native.cursor import Cursor
+from survey.formats.native.header import missing, read_extrusion
+from survey.records.survey import BlockRecord, Extrusion, SurveyHead
+
+__all__ = ["STONE_WORDS", "StoneReader"]
+
+STONE_WORDS = ("vertex", "point", "photo", "pixel", "station", "extrude", "sigma", "depth", "note", "end")
+"""What a line of a stone can begin with."""
+
+_FEWEST_CORNERS = 3
+_PLACE = re.compile(
+    r"[ \t]*(vertex|point)[ \t]+([-+.0-9eE]+)[ \t]+([-+.0-9eE]+)[ \t]+([-+.0-9eE]+)[ \t]*"
+).fullmatch  # what is a number to `float` and made of these characters is a number here
+
+
+class StoneReader:
+    """A stone that is being read.
+
+    Parameters
+    ----------
+    cursor : in its first line, behind ``stone``
+    line : number of that line
+    head : of the survey
+    sigma : of the survey, for coordinates that do not say their own [m]; None if it has none
+
+    Attributes
+    ----------
+    code : its name
+    """
+
+    def __init__(self, cursor: Cursor, line: int, head: SurveyHead, sigma: float | None) -> None:
+        self.code = cursor.code()
+        self._kind = cursor.kind()
+        self._course = cursor.course() if cursor.keyword("course") else None
+        self._zone = cursor.name("zone") if cursor.keyword("zone") else None
+        cursor.end("write: stone CODE KIND [course N] [zone NAME]")
+        self._line, self._head, self._head_sigma = line, head, sigma
+        self._places: dict[str, list[tuple[float, ...]]] = {"vertex": [], "point": []}
+        self._sigmas: dict[tuple[str, int], float] = {}  # of places that say their own
+        self._pixels: list[tuple[float, ...]] = []
+        self._sigma: float | None = None
+        self._depth: tuple[float, float | None, str] | None = None
+        self._notes: dict[str, str] = {}
+        self._photograph: str | None = None
+        self._station: str | None = None
+        self._extrusion: Extrusion | None = None
+
+    def take_place(self, line: str) -> bool:
+        """Read a line of a vertex or point if it is a plain one: the short way for most of a file."""
+        found = _PLACE(line)
+        if found is None:
+            return False
+        word, a, b, c = found.groups()
+        try:
+            x, y, z = float(a), float(b), float(c)
+        except ValueError:
+            return False
+        if not (-FARTHEST <= x <= FARTHEST and -FARTHEST <= y <= FARTHEST and -FARTHEST <= z <= FARTHEST):
+            return False
+        self._places[word].append((x, y, z))
+        return True
+
+    def take(self, word: str, cursor: Cursor) -> None:
+        """Read one line, from behind its first word, which is one of a stone but not ``end``."""
+        match word:
+            case "vertex" | "point":
+                self._take_place(word, cursor)
+            case "sigma":
+                _first(self._sigma, word, cursor)
+                self._sigma = cursor.length("sigma")
+                cursor.end("write: sigma 0.003")
+            case "depth":
+                _first(self._depth, word, cursor)
+                self._depth = cursor.length("depth"), cursor.sigma("depth"), cursor.source("depth")
+            case "note":
+                self._take_note(cursor)
+            case "photo":
+                _first(self._photograph, word, cursor)
+                self._photograph = self._known("photo", [one.name for one in self._head.photographs], cursor)
+            case "pixel":
+                self._pixels.append(cursor.row("pixel", "uv"))
+                cursor.end("write: pixel U V")
+            case "station":
+                _first(self._station, word, cursor)
+                self._station = self._known("station", [one.name for one in self._head.stations], cursor)
+            case _:
+                _first(self._extrusion, word, cursor)
+                self._extrusion = read_extrusion(cursor)
+
+    def finish(self, cursor: Cursor, line: int) -> BlockRecord:
+        """Put the stone together; the cursor is behind its ``end``."""
+        cursor.end("put 'end' on a line of its own")
+        self._check_corners(cursor)
+        sigma = self._sigma or self._head_sigma
+        if sigma is None:
+            raise cursor.fail(
+                f"stone {self.code} has no sigma", "write 'sigma 0.003' (metres) before the stones"
+            )
+        sigmas = self._all_sigmas(sigma)
+        depth, depth_sigma, source = self._depth or (None, None, None)
+        return BlockRecord(
+            code=self.code,
+            kind=self._kind,
+            course=self._course,
+            vertices=_array(self._places["vertex"], 3),
+            points=_array(self._places["point"], 3),
+            sigma=sigma if sigmas is None else math.sqrt(float(sigmas @ sigmas) / len(sigmas)),
+            depth=depth,
+            depth_sigma=depth_sigma,
+            depth_source=source,
+            line=self._line,
+            notes=self._notes,
+            zone=self._zone,
+            station=self._station,
+            photograph=self._photograph,
+            image=_array(self._pixels, 2),
+            sigmas=sigmas,
+            extrusion=self._extrusion,
+            spans=(range(self._line, line + 1),),
+        )
+
+    def _take_place(self, word: str, cursor: Cursor) -> None:
+        place, sigma = cursor.row(word), cursor.sigma(word)
+        cursor.end(f"write: {word} X Y Z [sigma S]")
+        if sigma is not None:
+            self._sigmas[word, len(self._places[word])] = sigma
+        self._places[word].append(place)
+
+    def _take_note(self, cursor: Cursor) -> None:
+        key = cursor.key()
+        if not key or key in self._notes:
+            raise cursor.fail(
+                f"note {key[:40]!r} is missing or repeated", "write: note KEY TEXT, one per key"
+            )
+        self._notes[key] = cursor.text(f"note {key}")
+
+    def _known(self, what: str, names: list[str], cursor: Cursor) -> str:
+        name = cursor.name(what)
+        if name not in names:
+            raise missing(what, name, names, cursor.where)
+        cursor.end(f"write: {what} NAME")
+        return name
+
+    def _check_corners(self, cursor: Cursor) -> None:
+        corners = len(self._places["vertex"])
+        if self._photograph is None and self._pixels:
+            raise cursor.fail(f"stone {self.code} has pixels, but no photo", "write: photo NAME")
+        if self._photograph is not None and corners:
+            raise cursor.fail(
+                f"stone {self.code} has both vertices and a photo", "keep one of the two outlines"
+            )
+        if self._photograph is not None and len(self._pixels) < _FEWEST_CORNERS:
+            raise cursor.fail(
+                f"stone {self.code} has {len(self._pixels)} pixels", "a face needs 3 pixels or more"
+            )
+        if self._photograph is None and corners < _FEWEST_CORNERS:
+            raise cursor.fail(f"stone {self.code} has {corners} vertices", "a face needs 3 vertices or more")
+
+    def _all_sigmas(self, common: float) -> NDArray[np.float64] | None:
+        if not self._sigmas:
+            return None
+        order = [(word, k) for word in ("point", "vertex") for k in range(len(self._places[word]))]
+        return np.array([self._sigmas.get(one, common) for one in order])
+
+
+def _first(value: object, word: str, cursor: Cursor) -> None:
+    if value is not None:
+        raise cursor.fail(f"a second {word!r}", f"keep one {word!r} line")
+
+
+def _array(rows: list[tuple[float, ...]], columns: int) -> NDArray[np.float64]:
+    return np.array(rows, dtype=np.float64).reshape(-1, columns)

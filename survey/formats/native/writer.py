@@ -1,0 +1,163 @@
+"""Writing the native survey format, as `survey.formats.native.reader` reads it."""
+
+from collections import Counter
+from collections.abc import Iterable
+from pathlib import Path
+
+from moma.errors import SurveyError
+from survey.formats.fields import CODE, FARTHEST
+from survey.records.survey import (
+    OBSERVER,
+    BlockRecord,
+    ControlPoint,
+    DepthRule,
+    Extrusion,
+    Photograph,
+    Survey,
+    SurveyHead,
+)
+
+__all__ = ["MAGIC", "write_moma"]
+
+MAGIC = "moma-survey 1"
+
+
+def write_moma(survey: Survey, path: Path) -> None:
+    """Write a survey in the native format; what is read back is equal to the last bit.
+
+    The numbers that an instrument gave to points are left out: the format has no place for them.
+
+    Parameters
+    ----------
+    survey : what to write, with one stone or more
+    path : the file; it is replaced
+
+    Raises
+    ------
+    SurveyError
+        if a name, note or source has characters that do not fit on a line, or a number cannot be written
+    """
+    if not survey.blocks:
+        raise SurveyError(
+            "the survey has no stones", where=str(path), remedy="write surveys of one stone or more"
+        )
+    counts = Counter(block.sigma for block in survey.blocks if block.sigmas is None) or Counter([0.003])
+    common = max(sorted(counts), key=counts.__getitem__)
+    try:
+        lines = [MAGIC, *_head_lines(survey.head), f"sigma {_number(common)}"]
+        for block in survey.blocks:
+            lines += ["", *_stone_lines(block, common)]
+    except SurveyError as error:
+        raise error.at(str(path)) from error
+    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+
+
+def _head_lines(head: SurveyHead) -> list[str]:
+    lines = [f"name {_text(head.name)}"]
+    for station in head.stations:
+        word = OBSERVER if station.name == OBSERVER else f"station {_name(station.name)}"
+        lines.append(f"{word} {_row(station.position)}")
+    lines += [_control_line(one) for one in head.control]
+    for photograph in head.photographs:
+        lines += _photograph_lines(photograph)
+    lines += [_rule_line(rule) for rule in head.depth_rules]
+    for one in head.canons:
+        size = f"{_number(one.length)} {_number(one.height)} sigma {_number(one.sigma)}"
+        lines.append(f"canon {one.kind} {size} source {_text(one.source)}")
+    if head.extrusion.direction is not None or head.extrusion.tail != 1.0:
+        lines.append(_extrusion_line(head.extrusion))
+    return lines
+
+
+def _control_line(one: ControlPoint) -> str:
+    measured = f"{_row(one.measured)} sigma {_number(one.measured_sigma)}"
+    return f"control {_name(one.name)} {measured} site {_row(one.site)} sigma {_number(one.site_sigma)}"
+
+
+def _photograph_lines(one: Photograph) -> list[str]:
+    name = _name(one.name)
+    station = "" if one.station is None else f" station {_name(one.station)}"
+    lines = [f"photo {name} sigma {_number(one.sigma)}{station}"]
+    for mark in one.marks:
+        at = f"{_row(mark.position)} sigma {_number(mark.sigma)}"
+        lines.append(f"mark {name} {_row(mark.image)} at {at}")
+    return lines
+
+
+def _rule_line(rule: DepthRule) -> str:
+    which = rule.kind or "*"
+    if rule.courses is not None:
+        first, last = rule.courses
+        which += f" course {first}" if first == last else f" course {first}-{last}"
+    if rule.zone is not None:
+        which += f" zone {_name(rule.zone)}"
+    return f"depth {which} {_depth_text(rule.depth, rule.sigma, rule.source)}"
+
+
+def _stone_lines(block: BlockRecord, common_sigma: float) -> list[str]:
+    course = "" if block.course is None else f" course {block.course}"
+    zone = "" if block.zone is None else f" zone {_name(block.zone)}"
+    lines = [f"stone {block.code} {block.kind}{course}{zone}"]
+    if block.sigmas is None and block.sigma != common_sigma:
+        lines.append(f"  sigma {_number(block.sigma)}")
+    if block.station is not None:
+        lines.append(f"  station {_name(block.station)}")
+    if block.extrusion is not None:
+        lines.append(f"  {_extrusion_line(block.extrusion)}")
+    if block.depth is not None:
+        source = block.depth_source or "not stated"
+        lines.append(f"  depth {_depth_text(block.depth, block.depth_sigma, source)}")
+    lines += [f"  note {_key(key)} {_text(text)}" for key, text in block.notes.items()]
+    if block.photograph is not None:
+        lines.append(f"  photo {_name(block.photograph)}")
+        lines += [f"  pixel {_row(one)}" for one in block.image]
+    precisions = [""] * (len(block.points) + len(block.vertices))
+    if block.sigmas is not None:
+        precisions = [f" sigma {_number(sigma)}" for sigma in block.sigmas]
+    count = len(block.points)
+    lines += [f"  vertex {_row(one)}{p}" for one, p in zip(block.vertices, precisions[count:], strict=True)]
+    lines += [f"  point {_row(one)}{p}" for one, p in zip(block.points, precisions[:count], strict=True)]
+    return [*lines, "end"]
+
+
+def _extrusion_line(one: Extrusion) -> str:
+    along = "" if one.direction is None else f" along {_row(one.direction)}"
+    return f"extrude{along}" if along and one.tail == 1.0 else f"extrude{along} tail {_number(one.tail)}"
+
+
+def _depth_text(depth: float, sigma: float | None, source: str) -> str:
+    precision = "" if sigma is None else f" sigma {_number(sigma)}"
+    return f"{_number(depth)}{precision} source {_text(source)}"
+
+
+def _row(values: Iterable[float]) -> str:
+    return " ".join(_number(value) for value in values)
+
+
+def _number(value: float) -> str:
+    """Shortest of: four decimals when they say it all, else every digit."""
+    if not abs(value) <= FARTHEST:
+        raise SurveyError(f"{value} cannot be written", remedy="coordinates are in metres, and finite")
+    fixed = f"{value:.4f}"
+    return fixed if float(fixed) == value else repr(float(value))
+
+
+def _text(text: str) -> str:
+    """Text to the end of a line."""
+    if not text or not text.isprintable() or text != text.strip():
+        raise SurveyError(f"{text[:60]!r} cannot be written", remedy="keep names and notes to one line")
+    return text
+
+
+def _name(text: str) -> str:
+    if CODE.fullmatch(text):
+        return text
+    if '"' in text or len(text) > 64:
+        raise SurveyError(f"{text[:60]!r} cannot be written", remedy="give it a name of 64 letters at most")
+    return f'"{_text(text)}"'
+
+
+def _key(text: str) -> str:
+    if not text or not text.isprintable() or " " in text:
+        raise SurveyError(f"note {text[:60]!r} cannot be written", remedy="give a note one word as its key")
+    return text

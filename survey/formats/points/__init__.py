@@ -1,0 +1,1 @@
+"""Point lists: CSV, PNEZD and PENZD."""

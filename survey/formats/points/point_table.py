@@ -1,0 +1,195 @@
+"""The stones of a table of points, gathered line by line, wherever their lines lie."""
+
+import math
+from array import array
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from moma.errors import SurveyError
+from survey.formats.fields import shown
+from survey.records.survey import BlockRecord, Reject, SurveyHead
+
+__all__ = ["PointTable", "TableStone", "check_station"]
+
+_FEWEST_CORNERS = 3
+_HOPELESS = 1000
+
+
+@dataclass(slots=True)
+class TableStone:
+    """The lines of one stone that have been read.
+
+    Attributes
+    ----------
+    code, kind, course, zone, station : as in BlockRecord
+    line : the first of its lines
+    error : why it cannot be a stone; None so far
+    depth, depth_sigma, depth_source : as in BlockRecord
+    """
+
+    code: str
+    kind: str
+    course: int | None
+    line: int
+    zone: str | None = None
+    station: str | None = None
+    error: SurveyError | None = None
+    depth: float | None = None
+    depth_sigma: float | None = None
+    depth_source: str | None = None
+    vertices: "array[float]" = field(default_factory=lambda: array("d"))
+    points: "array[float]" = field(default_factory=lambda: array("d"))
+    vertex_sigmas: "array[float]" = field(default_factory=lambda: array("d"))
+    point_sigmas: "array[float]" = field(default_factory=lambda: array("d"))
+    vertex_names: list[str] = field(default_factory=list)
+    point_names: list[str] = field(default_factory=list)
+    runs: list[int] = field(default_factory=list)
+
+    def add_line(self, line: int) -> None:
+        """Note that a line belongs to the stone; first and next of every run are kept."""
+        if self.runs and self.runs[-1] == line:
+            self.runs[-1] = line + 1
+        else:
+            self.runs += (line, line + 1)
+
+    def add_place(self, is_vertex: bool, place: tuple[float, float, float], sigma: float, name: str) -> None:
+        """Add a corner, or a point on the face; sigma is NaN and the name empty if the table has none."""
+        if is_vertex:
+            self.vertices.extend(place)
+            self.vertex_sigmas.append(sigma)
+            if name:
+                self.vertex_names.append(name)
+        else:
+            self.points.extend(place)
+            self.point_sigmas.append(sigma)
+            if name:
+                self.point_names.append(name)
+
+    def spans(self) -> tuple[range, ...]:
+        """Lines of the file that it was read from."""
+        return tuple(range(*self.runs[i : i + 2]) for i in range(0, len(self.runs), 2))
+
+
+class PointTable:
+    """The stones of a table, and the lines that belong to none.
+
+    Parameters
+    ----------
+    path : of the table, for errors
+    sigma : standard deviation of a coordinate whose line does not say it [m]
+
+    Attributes
+    ----------
+    stones : by code, in the order of the file
+    """
+
+    def __init__(self, path: str, sigma: float) -> None:
+        self._path, self._sigma = path, sigma
+        self.stones: dict[str, TableStone] = {}
+        self._astray: list[tuple[int, SurveyError]] = []
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether no line has been read."""
+        return not (self.stones or self._astray)
+
+    def refuse(self, code: str | None, error: SurveyError, line: int) -> None:
+        """Note a line that is wrong: it spoils its stone, if it is known which that is.
+
+        Raises
+        ------
+        SurveyError
+            the first of these errors, if a thousand lines have been read and none says which stone it is of
+        """
+        if code is not None:
+            stone = self.stones.setdefault(code, TableStone(code, "", None, line))
+            stone.error = stone.error or error
+            stone.add_line(line)
+            return
+        self._astray.append((line, error))
+        if not self.stones and len(self._astray) >= _HOPELESS:
+            raise self._astray[0][1]
+
+    def records(self) -> Iterator[BlockRecord | Reject]:
+        """Go through the stones, and what is none, in the order of the lines that they begin on; once."""
+        astray, at = self._astray, 0
+        for code in list(self.stones):
+            stone = self.stones.pop(code)  # each leaves as it is handed out: memory need not hold both
+            while at < len(astray) and astray[at][0] < stone.line:
+                yield _reject(*astray[at])
+                at += 1
+            yield self._record(stone)
+        for one in astray[at:]:
+            yield _reject(*one)
+
+    def _record(self, stone: TableStone) -> BlockRecord | Reject:
+        count = len(stone.vertices) // 3
+        if stone.error is None and count < _FEWEST_CORNERS:
+            stone.error = SurveyError(
+                f"block {stone.code} has {count} vertices",
+                where=f"{self._path}:{stone.line}",
+                remedy="a face needs 3 lines of role vertex or more",
+            )
+        if stone.error is None and stone.depth is None and (stone.depth_sigma or stone.depth_source):
+            stone.error = SurveyError(
+                f"block {stone.code} has precision or source of a depth, but no depth",
+                where=f"{self._path}:{stone.line}",
+                remedy="fill the column depth",
+            )
+        if stone.error is not None:
+            return Reject(stone.code, stone.error, stone.spans())
+        sigma, sigmas = self._precision(stone)
+        source = stone.depth_source or (None if stone.depth is None else "column depth of the table")
+        return BlockRecord(
+            code=stone.code,
+            kind=stone.kind,
+            course=stone.course,
+            vertices=_rows(stone.vertices),
+            points=_rows(stone.points),
+            sigma=sigma,
+            depth=stone.depth,
+            depth_sigma=stone.depth_sigma,
+            depth_source=source,
+            line=stone.line,
+            zone=stone.zone,
+            station=stone.station,
+            sigmas=sigmas,
+            names=(*stone.point_names, *stone.vertex_names),
+            spans=stone.spans(),
+        )
+
+    def _precision(self, stone: TableStone) -> tuple[float, NDArray[np.float64] | None]:
+        """Of the stone, and of its points if they differ."""
+        sigmas = np.array([*stone.point_sigmas, *stone.vertex_sigmas])
+        sigmas[np.isnan(sigmas)] = self._sigma
+        if (sigmas == sigmas[0]).all():
+            return float(sigmas[0]), None
+        return math.sqrt(float(sigmas @ sigmas) / len(sigmas)), sigmas
+
+
+def _rows(flat: "array[float]") -> NDArray[np.float64]:
+    return np.array(flat, dtype=np.float64).reshape(-1, 3)
+
+
+def _reject(line: int, error: SurveyError) -> Reject:
+    return Reject(None, error, (range(line, line + 1),))
+
+
+def check_station(name: str, head: SurveyHead, where: str) -> None:
+    """Check that the head has a station of this name.
+
+    Raises
+    ------
+    SurveyError
+        if not
+    """
+    names = [one.name for one in head.stations]
+    if name not in names:
+        raise SurveyError(
+            f"no station {shown(name)}",
+            where=where,
+            remedy=f"stations of the header file: {', '.join(names) or 'none'}",
+        )

@@ -1,0 +1,1 @@
+"""Closed solids: OBJ, PLY, STL and MSH."""

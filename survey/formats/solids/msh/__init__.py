@@ -1,0 +1,1 @@
+"""gmsh MSH files, versions 2.2 and 4.1."""

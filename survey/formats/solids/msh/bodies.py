@@ -1,0 +1,76 @@
+"""gmsh MSH: the boundary of each volume."""
+
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from moma.errors import SurveyError
+from survey.formats.fields import FARTHEST
+from survey.formats.solids.bodies import RawBody
+from survey.formats.solids.msh.sections import MshFile
+
+__all__ = ["msh_bodies"]
+
+_TETRA = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
+_HEXA = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
+_WEDGE = ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5))
+_PYRAMID = ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4))
+_FACES = {  # of gmsh's types of the first and second order, their corners counter-clockwise seen from outside
+    **dict.fromkeys((4, 11), _TETRA),
+    **dict.fromkeys((5, 12, 17), _HEXA),
+    **dict.fromkeys((6, 13, 18), _WEDGE),
+    **dict.fromkeys((7, 14, 19), _PYRAMID),
+}
+
+Cells = list[tuple[int, NDArray[np.int64]]]
+
+
+def msh_bodies(path: Path) -> Iterator[RawBody]:
+    """Go through the volumes of a mesh: physical ones, and the others by their entity.
+
+    Raises
+    ------
+    SurveyError
+        if the file cannot be read as a mesh
+    """
+    mesh = MshFile(path)
+    if not (np.abs(mesh.points) <= FARTHEST).all():
+        raise SurveyError(
+            f"a node is not finite, or beyond {FARTHEST:g} m",
+            where=str(path),
+            remedy="coordinates are in metres",
+        )
+    for name, blocks in _volumes(mesh).items():
+        boundary = _boundary(blocks)
+        used = sorted({i for polygon in boundary for i in polygon})
+        new = {old: k for k, old in enumerate(used)}
+        yield RawBody(name, mesh.points[used], [tuple(new[i] for i in polygon) for polygon in boundary])
+
+
+def _volumes(mesh: MshFile) -> dict[str, Cells]:
+    """The elements of each volume, by type."""
+    volumes: dict[str, Cells] = defaultdict(list)
+    for one in mesh.elements:
+        if one.type not in _FACES:
+            continue
+        both = np.column_stack([one.physical, one.entity])
+        for group, entity in np.unique(both, axis=0).tolist():
+            name = mesh.names.get(group) or (f"physical-{group}" if group else f"volume-{entity}")
+            volumes[name].append((one.type, one.nodes[(both == (group, entity)).all(axis=1)]))
+    return volumes
+
+
+def _boundary(blocks: Cells) -> list[tuple[int, ...]]:
+    """Faces that belong to one element only, as triangles, which merge to the planes of the stone."""
+    once: dict[frozenset[int], tuple[int, ...] | None] = {}
+    for kind, cells in blocks:
+        for cell in cells.tolist():
+            for face in _FACES[kind]:
+                polygon = tuple(cell[k] for k in face)
+                key = frozenset(polygon)
+                once[key] = None if key in once else polygon
+    polygons = [polygon for polygon in once.values() if polygon is not None]
+    return [(one[0], one[k], one[k + 1]) for one in polygons for k in range(1, len(one) - 1)]

@@ -1,0 +1,123 @@
+"""Wavefront OBJ: the polygons of each object, line by line."""
+
+import re
+from array import array
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from moma.errors import SurveyError
+from survey.formats.fields import parse_number, shown
+from survey.formats.solids.bodies import RawBody
+from survey.formats.text_lines import TextLines
+
+__all__ = ["obj_bodies"]
+
+_CORNER = re.compile(r"(-?[0-9]{1,9})(?:/-?[0-9]*){0,2}").fullmatch
+_PASSED_OVER = {"vt", "vn", "vp", "s", "usemtl", "mtllib", "l", "p"}
+_NOWHERE = float("nan")
+
+
+@dataclass
+class _Object:
+    name: str
+    line: int
+    polygons: list[tuple[int, ...]] = field(default_factory=list)
+    error: SurveyError | None = None
+
+
+def obj_bodies(path: Path) -> Iterator[RawBody]:
+    """Go through the objects of a file; where it has none, through its groups.
+
+    Raises
+    ------
+    SurveyError
+        if the file is not text
+    """
+    lines = TextLines(path)
+    reader = _ObjReader(str(path))
+    current, objects = _Object(path.stem, 1), False
+    for number, line in lines:
+        word, _, rest = line.strip().partition(" ")
+        if word in ("o", "g"):
+            if word == "g" and objects:
+                continue
+            objects = word == "o"
+            if current.polygons or current.error is not None:
+                yield reader.body(current, number)
+            current = _Object(rest.strip() or path.stem, number)
+        elif word and not word.startswith("#"):
+            try:
+                reader.take(word, rest.split("#", 1)[0].split(), current, number)
+            except SurveyError as error:
+                current.error = current.error or error
+    if current.polygons or current.error is not None:
+        yield reader.body(current, lines.end + 1)
+
+
+class _ObjReader:
+    """The vertices that have been read; objects may share them."""
+
+    def __init__(self, path: str) -> None:
+        self._path = path
+        self._places = array("d")
+        self._wrong: dict[int, SurveyError] = {}  # vertices that cannot be read
+
+    def take(self, word: str, words: list[str], current: _Object, number: int) -> None:
+        """Read a line of a vertex or face."""
+        where = f"{self._path}:{number}"
+        if word == "v":
+            self._take_vertex(words, where)
+        elif word == "f":
+            current.polygons.append(self._polygon(words, where))
+        elif word not in _PASSED_OVER:
+            raise SurveyError(
+                f"unknown word {shown(word)}", where=where, remedy="write o, g, v and f lines of polygons"
+            )
+
+    def _take_vertex(self, words: list[str], where: str) -> None:
+        try:
+            if len(words) not in (3, 4, 6, 7):  # with a weight, with colours
+                raise SurveyError(f"a vertex of {len(words)} numbers", where=where, remedy="write: v X Y Z")
+            numbers = [parse_number(one, "coordinate", where) for one in words]
+            if len(words) in (4, 7) and numbers[3] != 1.0:
+                raise SurveyError(f"weight {words[3]}", where=where, remedy="write: v X Y Z")
+            self._places.extend(numbers[:3])
+        except SurveyError as error:
+            self._wrong[len(self._places) // 3] = error
+            self._places.extend((_NOWHERE, _NOWHERE, _NOWHERE))
+
+    def _polygon(self, words: list[str], where: str) -> tuple[int, ...]:
+        count, corners = len(self._places) // 3, []
+        for word in words:
+            found = _CORNER(word)
+            index = 0 if found is None else int(found[1])
+            index = index - 1 if index > 0 else count + index if index < 0 else -1
+            if not 0 <= index < count:
+                raise SurveyError(
+                    f"corner {shown(word)} of a face, after {count} vertices",
+                    where=where,
+                    remedy="count vertices from 1 through the whole file",
+                )
+            corners.append(index)
+        if len(corners) < 3:
+            raise SurveyError(f"a face of {len(corners)} corners", where=where, remedy="write: f 1 2 3 …")
+        return tuple(corners)
+
+    def body(self, current: _Object, end: int) -> RawBody:
+        """The polygons of an object with the vertices that they use."""
+        used = sorted({i for polygon in current.polygons for i in polygon})
+        new = {old: k for k, old in enumerate(used)}
+        error = current.error
+        if self._wrong and error is None:
+            error = next((self._wrong[i] for i in used if i in self._wrong), None)
+        return RawBody(
+            current.name,
+            np.array([self._places[3 * i : 3 * i + 3] for i in used]).reshape(-1, 3),
+            [tuple(new[i] for i in polygon) for polygon in current.polygons],
+            current.line,
+            end,
+            error=error,
+        )

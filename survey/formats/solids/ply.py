@@ -1,0 +1,213 @@
+"""PLY: vertices and polygons, from text or binary files."""
+
+import struct
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from moma.errors import SurveyError
+from survey.formats.fields import FARTHEST, parse_number, shown
+from survey.formats.solids.bodies import RawBody
+from survey.formats.text_lines import TextLines
+
+__all__ = ["ply_bodies"]
+
+_TYPES = {  # by name: how struct calls them
+    **dict.fromkeys(("char", "int8"), "b"),
+    **dict.fromkeys(("uchar", "uint8"), "B"),
+    **dict.fromkeys(("short", "int16"), "h"),
+    **dict.fromkeys(("ushort", "uint16"), "H"),
+    **dict.fromkeys(("int", "int32"), "i"),
+    **dict.fromkeys(("uint", "uint32"), "I"),
+    **dict.fromkeys(("float", "float32"), "f"),
+    **dict.fromkeys(("double", "float64"), "d"),
+}
+_INTEGERS = "bBhHiI"
+_LISTS = ("vertex_indices", "vertex_index")
+_SINGLE = 2.0**-23  # relative resolution of single precision
+_LONGEST_HEADER = 1 << 16
+_REMEDY = "export the PLY again"
+
+Row = dict[str, tuple[float, ...]]
+
+
+@dataclass(frozen=True)
+class _Property:
+    """One value per row, of type `kind`; or a list of them, with a count of type `count` before."""
+
+    name: str
+    kind: str
+    count: str | None = None
+
+
+@dataclass(frozen=True)
+class _Element:
+    name: str
+    length: int
+    properties: list[_Property] = field(default_factory=list)
+
+
+def ply_bodies(path: Path) -> Iterator[RawBody]:
+    """Read a file: one body, or several that do not touch.
+
+    Raises
+    ------
+    SurveyError
+        if the file is no PLY, or is not whole
+    """
+    start = _read(path, _LONGEST_HEADER)
+    if not start.startswith((b"ply\n", b"ply\r\n")):
+        raise SurveyError("this is not a PLY", where=f"{path}:1", remedy="the first line must be 'ply'")
+    stop = start.find(b"end_header")
+    stop = start.find(b"\n", stop) + 1 if stop >= 0 else 0
+    if not stop:
+        raise SurveyError("the header has no end", where=f"{path}:1", remedy=_REMEDY)
+    order, elements = _header(start[:stop].decode("latin-1").splitlines(), str(path))
+    if order is None:
+        lines = TextLines(path)
+        rows = _TextRows(lines, start[:stop].count(b"\n"))
+        return iter([_body(elements, rows, path, f"{path}:{lines.end}", lines.end + 1)])
+    return iter([_body(elements, _BinaryRows(_read(path, -1), stop, order, str(path)), path, str(path), 0)])
+
+
+def _read(path: Path, size: int) -> bytes:
+    try:
+        with path.open("rb") as handle:
+            return handle.read(size)
+    except OSError as error:
+        raise SurveyError(
+            f"cannot be read: {error.strerror or error}", where=str(path), remedy="give an existing file"
+        ) from error
+
+
+def _header(lines: list[str], path: str) -> tuple[str | None, list[_Element]]:
+    """Byte order, None for text, and what comes in what order."""
+    orders = {"ascii": None, "binary_little_endian": "<", "binary_big_endian": ">"}
+    order: str | None = ""
+    elements: list[_Element] = []
+    for number, line in enumerate(lines[1:], start=2):
+        match line.split():
+            case [] | ["comment" | "obj_info", *_] | ["end_header"]:
+                continue
+            case ["format", name, "1.0"] if name in orders and order == "":
+                order = orders[name]
+            case ["element", name, count] if count.isascii() and count.isdigit() and len(count) < 10:
+                elements.append(_Element(name, int(count)))
+            case ["property", kind, name] if kind in _TYPES and elements:
+                elements[-1].properties.append(_Property(name, _TYPES[kind]))
+            case ["property", "list", count, kind, name] if (
+                kind in _TYPES and elements and (_TYPES.get(count, "f") in _INTEGERS)
+            ):
+                elements[-1].properties.append(_Property(name, _TYPES[kind], _TYPES[count]))
+            case _:
+                raise SurveyError(f"cannot read {shown(line)}", where=f"{path}:{number}", remedy=_REMEDY)
+    if order == "":
+        raise SurveyError("the header has no format", where=f"{path}:1", remedy=_REMEDY)
+    return order, elements
+
+
+class _TextRows:
+    """The rows of a text file, one per line."""
+
+    def __init__(self, lines: TextLines, header: int) -> None:
+        self._lines, self._path = lines, lines.path
+        self._rows = ((number, line) for number, line in lines if number > header and line.strip())
+
+    def row(self, properties: Sequence[_Property]) -> Row:
+        """Read the next row."""
+        number, line = next(self._rows, (self._lines.end, ""))
+        words, at, row = line.split(), 0, Row()
+        where = f"{self._path}:{number}"
+        for one in properties:
+            length = 1
+            if one.count is not None:
+                length = int(self._numbers(words, at, 1, "i", where)[0])
+                at += 1
+            row[one.name] = self._numbers(words, at, length, one.kind, where)
+            at += length
+        if at != len(words):
+            raise SurveyError(f"{len(words)} numbers for {at}", where=where, remedy=_REMEDY)
+        return row
+
+    def _numbers(self, words: list[str], at: int, length: int, kind: str, where: str) -> tuple[float, ...]:
+        some = words[at : at + length]
+        if length < 0 or len(some) < length:
+            raise SurveyError(f"{len(words)} numbers are too few", where=where, remedy=_REMEDY)
+        for word in some:
+            if kind in _INTEGERS and not (word.isascii() and word.removeprefix("-").isdigit()):
+                raise SurveyError(f"{shown(word)} is not a whole number", where=where, remedy=_REMEDY)
+        return tuple(parse_number(word, "number", where) for word in some)
+
+    def check_end(self) -> None:
+        """Nothing may follow."""
+        number, _ = next(self._rows, (0, ""))
+        if number:
+            raise self._lines.fail(number, "more rows than the header has", _REMEDY)
+
+
+class _BinaryRows:
+    """The rows of a binary file."""
+
+    def __init__(self, data: bytes, start: int, order: str, path: str) -> None:
+        self._data, self._at, self._order, self._path = data, start, order, path
+
+    def row(self, properties: Sequence[_Property]) -> Row:
+        """Read the next row."""
+        row = Row()
+        for one in properties:
+            length = 1 if one.count is None else int(self._take(one.count, 1)[0])
+            row[one.name] = self._take(one.kind, length)
+        return row
+
+    def _take(self, kind: str, length: int) -> tuple[float, ...]:
+        size = struct.calcsize(kind) * length
+        if length < 0 or self._at + size > len(self._data):
+            raise SurveyError("the file is cut short", where=self._path, remedy=_REMEDY)
+        out: tuple[float, ...] = struct.unpack_from(f"{self._order}{length}{kind}", self._data, self._at)
+        self._at += size
+        return out
+
+    def check_end(self) -> None:
+        """Nothing may follow."""
+        if self._data[self._at :].strip():
+            raise SurveyError("more rows than the header has", where=self._path, remedy=_REMEDY)
+
+
+def _body(
+    elements: list[_Element], rows: _TextRows | _BinaryRows, path: Path, where: str, end: int
+) -> RawBody:
+    places: list[tuple[float, float, float]] = []
+    polygons: list[tuple[int, ...]] = []
+    resolution = 0.0
+    for element in elements:
+        if not element.properties:
+            continue
+        names = [one.name for one in element.properties]
+        if element.name == "vertex":
+            if not {"x", "y", "z"} <= set(names):
+                raise SurveyError("vertices without x, y and z", where=where, remedy=_REMEDY)
+            resolution = (
+                _SINGLE if any(one.kind == "f" for one in element.properties if one.name in "xyz") else 0.0
+            )
+        lists = [name for name in names if name in _LISTS]
+        for _ in range(element.length):
+            row = rows.row(element.properties)
+            if element.name == "vertex":
+                places.append((row["x"][0], row["y"][0], row["z"][0]))
+            elif element.name == "face" and lists:
+                polygons.append(tuple(int(one) for one in row[lists[0]]))
+    rows.check_end()
+    vertices = np.array(places, dtype=np.float64).reshape(-1, 3)
+    if not (np.abs(vertices) <= FARTHEST).all():
+        raise SurveyError(
+            f"a corner is not finite, or beyond {FARTHEST:g} m",
+            where=where,
+            remedy="coordinates are in metres",
+        )
+    if any(not 0 <= index < len(vertices) for polygon in polygons for index in polygon):
+        raise SurveyError("a face with a corner that there is not", where=where, remedy=_REMEDY)
+    line = 1 if end else 0
+    scale = float(np.abs(vertices).max(initial=0.0))
+    return RawBody(path.stem, vertices, polygons, line, end, resolution * scale)

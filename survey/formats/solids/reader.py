@@ -1,0 +1,178 @@
+"""Closed solids that other programs made: OBJ, PLY, STL and gmsh MSH, one stone per object.
+
+An object is an ``o`` (or ``g``) of OBJ, a ``solid`` of STL, a volume of MSH, the whole of a PLY. Where one has several
+bodies, each is a stone: NAME-1, NAME-2, … The name is taken apart by the code template,
+{block}:{kind} by default; if it does not fit, it is the code itself, blanks replaced by "_".
+
+Coordinates stay as they are in the file unless snapping is asked for: then faces of neighbours that match but for a
+tolerance are brought into common planes (`survey.joints.snapping.snapping`), for which all stones of the file must be
+there at once.
+"""
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from moma.errors import GeometryError, SurveyError, UsageError
+from survey.formats.fields import CODE, shown
+from survey.formats.options import ReadingOptions
+from survey.formats.points.code_template import CodeTemplate
+from survey.formats.solids.bodies import ClosedBody, RawBody, closed_bodies
+from survey.formats.solids.msh.bodies import msh_bodies
+from survey.formats.solids.obj import obj_bodies
+from survey.formats.solids.ply import ply_bodies
+from survey.formats.solids.stl import stl_bodies
+from survey.geometry.solids import Solid, volume_of
+from survey.geometry.watertight import check_watertight
+from survey.joints.snapping.snapping import snap
+from survey.records.snapping import Snapping
+from survey.records.survey import Reject, SolidRecord, SurveyStream
+
+__all__ = ["open_solids"]
+
+_CODES = "{block}:{kind}"
+_MOST_CHANGE = 0.1  # of its volume that snapping may take from a stone
+_BODIES: Mapping[str, Callable[[Path], Iterator[RawBody]]] = {
+    ".obj": obj_bodies,
+    ".ply": ply_bodies,
+    ".stl": stl_bodies,
+    ".msh": msh_bodies,
+}
+
+
+def open_solids(path: Path, options: ReadingOptions | None = None) -> SurveyStream:
+    """Begin to read a file of closed solids; its stones come one by one.
+
+    Parameters
+    ----------
+    path : the file; its ending says what it is
+    options : the code template of names; kind of stones whose names do not say it; the unit; the tolerance of snapping;
+        the head of another file
+
+    Raises
+    ------
+    SurveyError
+        naming the file, and the line if it is text, if it is wrong as a whole
+    UsageError
+        if the ending is not known, or the code template has what a solid does not
+    """
+    options, path = options or ReadingOptions(), Path(path)
+    template = CodeTemplate(options.codes or _CODES)
+    for field in ("role", "zone"):
+        if field in template.fields:
+            raise UsageError(
+                f"code template {template.text!r} has a {field}, which solids have not",
+                remedy="write e.g. {block}:{kind}",
+            )
+    bodies = _BODIES.get(path.suffix.lower())
+    if bodies is None:
+        raise UsageError(
+            f"ending {path.suffix!r} is none of solids",
+            where=str(path),
+            remedy=f"endings: {', '.join(_BODIES)}",
+        )
+    raw = bodies(path)
+    first = next(raw, None)
+    if first is None:
+        raise SurveyError("the file has no solids", where=str(path), remedy="export closed surfaces")
+    head, records = options.head_for(path), _Solids(path, template, options).records(first, raw)
+    if not options.snap > 0.0:
+        return SurveyStream(head, records)
+    snapped, snapping = _snapped(list(records), options.snap, str(path))
+    return SurveyStream(head, iter(snapped), snapping)
+
+
+def _snapped(
+    found: list[SolidRecord | Reject], tolerance: float, path: str
+) -> tuple[list[SolidRecord | Reject], Snapping]:
+    """The same stones with the planes of their faces in common."""
+    records = [one for one in found if isinstance(one, SolidRecord)]
+    given = [Solid(one.code, one.vertices, one.faces) for one in records]
+    solids, snapping = snap(given, tolerance)
+    made = {one.code: _moved(one, solid, snapping, path) for one, solid in zip(records, solids, strict=True)}
+    return [made[one.code] if isinstance(one, SolidRecord) else one for one in found], snapping
+
+
+def _moved(record: SolidRecord, solid: Solid, snapping: Snapping, path: str) -> SolidRecord | Reject:
+    """The stone as it is now, if it is one still."""
+    try:
+        with np.errstate(all="ignore"):  # a body without volume is found, and not warned of
+            check_watertight(solid)
+            _check_volume(record, solid)
+    except GeometryError as error:
+        where = f"{path}:{record.line}" if record.line else path
+        what = f"solid {record.code}: within {snapping.tolerance:g} m of its corners {error.what}"
+        remedy = "give a smaller tolerance with --snap"
+        return Reject(record.code, SurveyError(what, where=where, remedy=remedy), record.spans)
+    moved, folded = snapping.moved[record.code], snapping.folded.get(record.code, 0)
+    text = f"snapped within {snapping.tolerance:g} m: corners moved by up to {moved:.2g} m"
+    more = (f"{folded} faces folded for that",) if folded else ()
+    return replace(record, vertices=solid.vertices, faces=solid.faces, remarks=(*record.remarks, text, *more))
+
+
+def _check_volume(record: SolidRecord, solid: Solid) -> None:
+    before = volume_of(Solid(record.code, record.vertices, record.faces))
+    change = volume_of(solid) / before - 1.0
+    if abs(change) > _MOST_CHANGE:
+        raise GeometryError(f"its volume changes by {100.0 * change:.0f} %")
+
+
+class _Solids:
+    """The solids of a file, and those that are none."""
+
+    def __init__(self, path: Path, template: CodeTemplate, options: ReadingOptions) -> None:
+        self._path, self._template, self._options = path, template, options
+        self._known: set[str] = set()
+
+    def records(self, first: RawBody, others: Iterator[RawBody]) -> Iterator[SolidRecord | Reject]:
+        """Go through the bodies of a file."""
+        yield from self._stones(first)
+        for raw in others:
+            yield from self._stones(raw)
+
+    def _stones(self, raw: RawBody) -> Iterator[SolidRecord | Reject]:
+        parsed = self._template.parse(raw.name)
+        name = re.sub(r"\s+", "_", raw.name) if parsed is None else parsed.block
+        kind, course = (None, None) if parsed is None else (parsed.kind, parsed.course)
+        if raw.error is not None:
+            yield self._reject(name, raw, raw.error)
+            return
+        unit = self._options.unit
+        metric = replace(raw, vertices=raw.vertices * unit, resolution=raw.resolution * unit)
+        found = list(closed_bodies(metric, max(self._options.flat, self._options.snap)))
+        for number, body in enumerate(found, start=1):
+            code = name if len(found) == 1 else f"{name}-{number}"
+            if isinstance(body, GeometryError):
+                yield self._reject(code, raw, self._error(code, raw, body.what, body.remedy))
+            elif CODE.fullmatch(code) is None:
+                remedy = "use letters, digits and . + / : - _, at most 64"
+                yield self._reject(code, raw, self._error(code, raw, "that is not a code", remedy))
+            elif code in self._known:
+                remedy = "give every stone a name of its own"
+                yield self._reject(code, raw, self._error(code, raw, "a second of that name", remedy))
+            else:
+                self._known.add(code)
+                vertices, faces = body.solid.vertices, body.solid.faces
+                own = kind or self._options.kind
+                yield SolidRecord(code, own, course, vertices, faces, raw.line, remarks=_remarks(body))
+
+    def _error(self, code: str, raw: RawBody, what: str, remedy: str | None) -> SurveyError:
+        where = f"{self._path}:{raw.line}" if raw.line else str(self._path)
+        return SurveyError(f"solid {shown(code)}: {what}", where=where, remedy=remedy)
+
+    def _reject(self, code: str, raw: RawBody, error: SurveyError) -> Reject:
+        spans = (range(raw.line, raw.end),) if raw.line else ()
+        return Reject(code if CODE.fullmatch(code) else None, error, spans)
+
+
+def _remarks(body: ClosedBody) -> tuple[str, ...]:
+    """What was settled of its faces."""
+    out = []
+    if body.doubled:
+        out.append(f"{body.doubled} faces were there twice")
+    if body.folded:
+        out.append(f"{body.folded} faces that are not plane were folded")
+    return tuple(out)

@@ -1,0 +1,1 @@
+"""Closed solids with planar faces: cutting, convex parts, adjacency, folds."""

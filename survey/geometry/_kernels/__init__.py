@@ -1,0 +1,1 @@
+"""Compiled loops over faces, edges and corners of solids."""

@@ -1,0 +1,189 @@
+"""Which solids touch: faces of two stones that face each other across an open joint and overlap.
+
+Two faces touch if their normals are opposite but for `angle`, if what they share, seen square to the joint
+between them, is more than `share` of the smaller face, and if the mean distance of their planes over that shared
+area is at most `width`; surveyed stones may also overlap a little. The joint's normal is the mean of
+the two faces' normals; nothing is assumed of a wall or of what is up.
+
+Between two planes the distance is linear along the joint, so that its mean over an area is its value at the
+area's centroid: area and centroid of what two polygons share say all.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from itertools import chain
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from survey.geometry._kernels.adjacency import GROUPS, face_planes, touching_faces
+from survey.geometry._kernels.between import hidden, thinnest_of
+from survey.geometry.near_solids import boxes_of, near_pairs
+
+__all__ = ["Polyhedra", "PolyhedraBuilder", "Touching", "find_touching", "open_to_each_other"]
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Polyhedra:
+    """Many closed solids with planar faces, one after the other.
+
+    Attributes
+    ----------
+    vertices : (nv, 3) of all solids [m]
+    corners : (nc,) indices into `vertices`, face by face, counter-clockwise seen from outside
+    face_starts : (nf + 1,) where the corners of each face begin, and where those of the last one end
+    solid_starts : (n + 1,) where the faces of each solid begin, and where those of the last one end
+    """
+
+    vertices: Array
+    corners: Indices
+    face_starts: Indices
+    solid_starts: Indices
+
+    def __len__(self) -> int:
+        return len(self.solid_starts) - 1
+
+    @classmethod
+    def gather(cls, solids: Iterable[tuple[Array, Sequence[Sequence[int]]]]) -> "Polyhedra":
+        """Put solids, each as its vertices (nv, 3) and its faces, one after the other."""
+        builder = PolyhedraBuilder()
+        for vertices, faces in solids:
+            builder.add(vertices, tuple(tuple(face) for face in faces))
+        return builder.build()
+
+
+@dataclass
+class PolyhedraBuilder:
+    """Solids as they come by; what is kept of each is its numbers."""
+
+    _vertices: bytearray = field(default_factory=bytearray)
+    _corners: bytearray = field(default_factory=bytearray)
+    _face_counts: bytearray = field(default_factory=bytearray)
+    _solid_counts: list[int] = field(default_factory=list)
+    _known: dict[tuple[tuple[int, ...], ...], tuple[Indices, bytes]] = field(default_factory=dict)
+
+    def add(self, vertices: Array, faces: tuple[tuple[int, ...], ...]) -> None:
+        """One more solid: vertices (nv, 3), and faces counter-clockwise seen from outside."""
+        if (known := self._known.get(faces)) is None:
+            corners = np.fromiter(chain.from_iterable(faces), dtype=np.int64)
+            known = corners, np.array([len(face) for face in faces], dtype=np.int64).tobytes()
+            self._known[faces] = known
+        start = len(self._vertices) // 24
+        self._vertices += np.ascontiguousarray(vertices, dtype=np.float64).tobytes()
+        self._corners += (known[0] + start).tobytes()
+        self._face_counts += known[1]
+        self._solid_counts.append(len(faces))
+
+    def build(self) -> Polyhedra:
+        """All solids so far."""
+        counts = np.frombuffer(bytes(self._face_counts), dtype=np.int64)
+        return Polyhedra(
+            np.frombuffer(bytes(self._vertices)).reshape(-1, 3),
+            np.frombuffer(bytes(self._corners), dtype=np.int64),
+            np.concatenate([[0], np.cumsum(counts)]),
+            np.cumsum([0, *self._solid_counts], dtype=np.int64),
+        )
+
+
+@dataclass(frozen=True)
+class Touching:
+    """Contacts of solids, in the order of their pairs; a pair that touches in two directions comes twice.
+
+    Attributes
+    ----------
+    pairs : (m, 2) indices of the solids, smaller first
+    area : (m,) that they share, seen square to the joint [m²]
+    gap : (m,) mean width of the joint, negative where they overlap [m]
+    normal : (m, 3) unit normal of the joint, from the second to the first [-]
+    centroid : (m, 3) of the shared area, half-way between the two faces [m]
+    """
+
+    pairs: Indices
+    area: Array
+    gap: Array
+    normal: Array
+    centroid: Array
+
+    def __len__(self) -> int:
+        return len(self.pairs)
+
+
+def find_touching(
+    solids: Polyhedra,
+    width: float = 0.04,
+    angle: float = 12.0,
+    *,
+    overlap: float = 0.02,
+    share: float = 0.03,
+    among: NDArray[np.bool_] | None = None,
+) -> Touching:
+    """Find the solids that face each other across a joint.
+
+    Parameters
+    ----------
+    solids : closed, with planar faces of any number of corners, convex or not
+    width : of the widest open joint [m]; at most half the thickness of either stone, and no third stone in it
+    angle : by which the two faces may be out of parallel [degrees]
+    overlap : by which solids may lie in each other [m]
+    share : least part of the smaller face that the other covers [-]; below, they meet at an edge but for noise
+    among : (n,) solids of which one at least must be in a pair; None: all
+
+    Returns
+    -------
+    Touching, the same for the same solids wherever they stand, but for rounding
+    """
+    wanted = np.ones(len(solids), np.bool_) if among is None else np.asarray(among, np.bool_)
+    if len(solids) == 0 or not wanted.any():
+        return _touching(np.zeros((0, 2), np.int64), np.zeros((0, 8)), np.zeros(3))
+    origin = solids.vertices.min(axis=0)
+    local = np.ascontiguousarray(solids.vertices - origin)
+    planes = face_planes(local, solids.corners, solids.face_starts)
+    solid = (local, solids.corners, solids.face_starts, solids.solid_starts)
+    limits = (width, overlap, float(np.cos(np.radians(angle))), share, False)
+    pairs, rows = [np.zeros((0, 2), np.int64)], [np.zeros((0, 8))]
+    for near in near_pairs(boxes_of(planes[2], solids.solid_starts, width), wanted):
+        room = GROUPS * len(near)
+        found, values = np.empty((room, 2), np.int64), np.empty((room, 8))
+        count = touching_faces(near, solid, planes, limits, found, values)
+        pairs.append(found[:count].copy())
+        rows.append(values[:count].copy())
+    all_pairs, all_rows = np.concatenate(pairs), np.concatenate(rows)
+    seen = open_to_each_other(all_pairs, all_rows, solid, planes, width)
+    return _touching(all_pairs[seen], all_rows[seen], origin)
+
+
+def open_to_each_other(
+    pairs: Indices, rows: Array, solid: Any, planes: Any, width: float
+) -> NDArray[np.bool_]:
+    """Contacts (m,) between which no third, thinner solid lies.
+
+    Parameters
+    ----------
+    pairs, rows : solids (m, 2), and (m, 8) area, gap, place and normal of their contacts
+    solid, planes : as of the kernels
+    width : of the widest joint [m]
+    """
+    thinnest = thinnest_of(solid, planes[0])
+    if not (rows[:, 1] >= thinnest.min()).any():
+        return np.ones(len(pairs), np.bool_)
+    both = np.concatenate([pairs, pairs[:, ::-1]])
+    both = both[np.argsort(both[:, 0], kind="stable")]
+    starts = np.searchsorted(both[:, 0], np.arange(len(thinnest) + 1))
+    near = (starts, np.ascontiguousarray(both[:, 1]))
+    out: NDArray[np.bool_] = ~hidden(pairs, rows, near, solid, planes, thinnest, 0.5 * width)
+    return out
+
+
+def _touching(pairs: Indices, rows: Array, origin: Array) -> Touching:
+    order = np.lexsort((pairs[:, 1], pairs[:, 0]))
+    return Touching(
+        pairs=pairs[order],
+        area=rows[order, 0],
+        gap=rows[order, 1],
+        normal=rows[order, 5:8],
+        centroid=rows[order, 2:5] + origin,
+    )

@@ -1,0 +1,285 @@
+"""A stone that is not convex, cut into convex parts.
+
+Where the stone is folded in, along a reflex edge, it is cut by a plane through the edge that leaves less than 180°
+on either side. The boundary of the stone is carried along in pieces: a region between cuts is convex as soon as no
+piece of the boundary lies in front of the plane of another; it is then what the half-spaces of its pieces and of
+its cuts have in common. No region is ever represented in any other way, so that there are no cut faces with holes
+to go wrong.
+
+A cut is the better the fewer reflex edges it leaves, so that planes through two of them come before the
+continuation of a face, and this before the bisector; of the ways to begin, the one is taken that ends in the fewest
+parts, and of these the one whose thinnest part is thickest.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from moma.errors import GeometryError
+from survey.geometry.convexity import ReflexEdge, flatness, is_convex, reflex_edges
+from survey.geometry.half_spaces import intersection
+from survey.geometry.solids import Solid, planes_of_solid, volume_of
+from survey.geometry.watertight import triangulate
+
+__all__ = ["convex_parts"]
+
+Array = NDArray[np.float64]
+Place = tuple[float, float, float]
+Plane = tuple[float, float, float, float]
+
+_SAME_VOLUME = 1e-6  # of the stone's volume: by more the parts do not differ, if its faces are planes
+_BEGINNINGS = 8  # first cuts that are followed to the end
+
+
+@dataclass(frozen=True)
+class _Region:
+    """What lies between some cuts: half-spaces of the cuts, pieces (face, polygon) of the boundary, reflex edges."""
+
+    cuts: tuple[Plane, ...]
+    pieces: tuple[tuple[int, tuple[Place, ...]], ...]
+    edges: tuple[ReflexEdge, ...]
+
+
+def convex_parts(solid: Solid, most: int = 32) -> tuple[Solid, ...]:
+    """Cut a solid into convex parts that fill it without overlap.
+
+    Parameters
+    ----------
+    solid : closed, with planar faces
+    most : parts
+
+    Returns
+    -------
+    The parts, all under the solid's code; the solid itself if it is convex. The same solid always gives the same
+    parts
+
+    Raises
+    ------
+    GeometryError
+        if it would take more parts, or its faces are no planes
+    """
+    if is_convex(solid):
+        return (solid,)
+    cutter = _Cutter(solid, most)
+    return cutter.parts()
+
+
+class _Cutter:
+    """One solid that is being cut; places are counted from its middle."""
+
+    def __init__(self, solid: Solid, most: int) -> None:
+        self._solid, self._most = solid, most
+        self._low, self._high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
+        self._origin = 0.5 * (self._low + self._high)
+        self._local = replace(solid, vertices=solid.vertices - self._origin)
+        self._size = float(np.linalg.norm(self._high - self._low))
+        self._flat = flatness(solid)  # places so near to one another are the same
+        self._on = 0.1 * self._flat
+        self._planes = [_plane(row) for row in planes_of_solid(self._local).tolist()]
+
+    def parts(self) -> tuple[Solid, ...]:
+        """The best of several ways to cut it."""
+        whole = _Region((), tuple(self._pieces()), reflex_edges(self._local))
+        ranked = sorted(self._ranked(whole), key=lambda one: one[0])
+        beginnings = [cut for rank, cut in ranked if rank[0] == ranked[0][0][0]][:_BEGINNINGS]
+        starts: list[Plane | None] = [*beginnings] or [None]
+        found = [parts for parts in (self._follow(whole, first) for first in starts) if parts is not None]
+        if not found:
+            raise GeometryError(
+                f"it is not convex, and would take more than {self._most} convex parts",
+                where=f"stone {self._solid.code}",
+                remedy="simplify it, or make several stones of it",
+            )
+        filling = [parts for parts in found if self._is_filled(parts)]
+        if not filling:
+            raise GeometryError(
+                "its convex parts do not fill it: its faces are not quite planes",
+                where=f"stone {self._solid.code}",
+                remedy="make them planes: moma ingest --snap",
+            )
+        best = max(filling, key=self._worth)
+        return tuple(replace(part, vertices=self._placed(part.vertices)) for part in best)
+
+    def _worth(self, parts: Sequence[Solid]) -> tuple[int, float]:
+        """The fewer parts, and the thicker the thinnest, the better."""
+        return -len(parts), round(min(map(_width, parts)) / self._size, 9)
+
+    def _pieces(self) -> Iterator[tuple[int, tuple[Place, ...]]]:
+        """Faces as convex polygons."""
+        corners = [_place(row) for row in self._local.vertices.tolist()]
+        for k, face in enumerate(self._local.faces):
+            if _turns_left(self._local.vertices[list(face)], np.array(self._planes[k][:3])):
+                yield k, tuple(corners[i] for i in face)
+            else:
+                for triangle in triangulate(replace(self._local, faces=(face,))).tolist():
+                    a, b, c = self._local.vertices[triangle]
+                    longest = max(float(np.linalg.norm(one)) for one in (b - a, c - b, a - c))
+                    if float(np.linalg.norm(np.cross(b - a, c - a))) > self._flat * longest:
+                        yield k, tuple(corners[i] for i in triangle)
+
+    def _follow(self, whole: _Region, first: Plane | None) -> list[Solid] | None:
+        """Cut until all is convex; None if that takes too many parts."""
+        waiting = list(self._halves(whole, first)) if first is not None else [whole]
+        done: list[Solid] = []
+        while waiting:
+            region = waiting.pop()
+            if len(waiting) + len(done) >= self._most:
+                return None
+            if not region.pieces or self._is_convex(region):
+                part = self._part(region)
+                if part is not None:
+                    done.append(part)
+                continue
+            ranked = list(self._ranked(region))
+            if not ranked:
+                return None
+            waiting += self._halves(region, min(ranked, key=lambda one: one[0])[1])
+        return done
+
+    def _is_convex(self, region: _Region) -> bool:
+        places = np.array([place for _, polygon in region.pieces for place in polygon])
+        planes = np.array([self._planes[k] for k in dict(region.pieces)])
+        return bool((places @ planes[:, :3].T - planes[:, 3]).max() <= self._flat)
+
+    def _part(self, region: _Region) -> Solid | None:
+        planes = [*dict.fromkeys(self._planes[k] for k, _ in region.pieces), *region.cuts]
+        margin = 0.01 * self._size
+        low, high = self._low - self._origin - margin, self._high - self._origin + margin
+        part = intersection(self._solid.code, planes, low, high, self._on)
+        if part is None or (not region.pieces and not self._holds(part.vertices.mean(axis=0))):
+            return None
+        return part
+
+    def _holds(self, place: Array) -> bool:
+        """Whether a place is within the stone: the solid angle of all its faces about it (Oosterom & Strackee 1983)."""
+        a, b, c = (self._local.vertices[triangulate(self._local)[:, k]] - place for k in range(3))
+        p, q, r = (np.linalg.norm(one, axis=1) for one in (a, b, c))
+        over = (a * np.cross(b, c)).sum(axis=1)
+        under = p * q * r + (a * b).sum(axis=1) * r + (b * c).sum(axis=1) * p + (c * a).sum(axis=1) * q
+        return bool(np.arctan2(over, under).sum() > np.pi)
+
+    def _ranked(self, region: _Region) -> Iterator[tuple[tuple[int, int, int], Plane]]:
+        """Cuts that divide a region, with the reflex edges and pieces that they leave; the fewer, the better."""
+        for order, cut in enumerate(self._cuts(region)):
+            halves = self._halves(region, cut)
+            if all(half.pieces for half in halves):
+                edges = sum(len(half.edges) for half in halves)
+                pieces = sum(len(half.pieces) for half in halves)
+                if edges < len(region.edges) or not region.edges:
+                    yield (edges, pieces, order), cut
+
+    def _cuts(self, region: _Region) -> Iterator[Plane]:
+        """Planes through two reflex edges, continuations of faces, bisectors."""
+        edges = region.edges
+        for k, one in enumerate(edges):
+            for other in edges[k + 1 :]:
+                plane = self._through(one, other)
+                if plane is not None and self._divides(plane, one) and self._divides(plane, other):
+                    yield plane
+        if edges:
+            yield from dict.fromkeys(self._planes[k] for one in edges for k in (one.first, one.second))
+            for one in edges:
+                normal = np.array(self._planes[one.first][:3]) - self._planes[one.second][:3]
+                yield _plane_through(normal, one.start)
+        else:  # pieces that do not hang together
+            yield from (self._planes[k] for k in dict(region.pieces))
+
+    def _through(self, one: ReflexEdge, other: ReflexEdge) -> Plane | None:
+        """The plane of two edges, if they lie in one."""
+        places = np.array([one.start, one.stop, other.start, other.stop])
+        centred = places - places.mean(axis=0)
+        _, extents, axes = np.linalg.svd(centred)
+        if extents[2] > self._on or extents[1] < self._flat:
+            return None
+        return _plane_through(axes[2], one.start)
+
+    def _divides(self, plane: Plane, edge: ReflexEdge) -> bool:
+        """Whether a plane through an edge leaves no more than 180° on either side."""
+        along = np.cross(np.subtract(edge.stop, edge.start), plane[:3])
+        first = float(np.dot(self._planes[edge.first][:3], along))
+        second = float(np.dot(self._planes[edge.second][:3], along))
+        slack = 1e-9 * float(np.linalg.norm(along))
+        return min(first, second) >= -slack or max(first, second) <= slack
+
+    def _halves(self, region: _Region, cut: Plane) -> tuple[_Region, _Region]:
+        """What lies behind a plane, and what in front of it."""
+        other = (-cut[0], -cut[1], -cut[2], -cut[3])
+        return self._behind(region, cut), self._behind(region, other)
+
+    def _behind(self, region: _Region, cut: Plane) -> _Region:
+        pieces = []
+        for k, polygon in region.pieces:
+            left = _clipped(polygon, cut, self._on)
+            if left is None:  # it lies in the cut, and belongs to the side of which it is the boundary
+                plane = self._planes[k]
+                if plane[0] * cut[0] + plane[1] * cut[1] + plane[2] * cut[2] > 0.0:
+                    pieces.append((k, polygon))
+            elif len(left) > 2:
+                pieces.append((k, left))
+        edges = []
+        for edge in region.edges:
+            left = _clipped((edge.start, edge.stop), cut, self._on)
+            if left is not None and len(left) == 2:
+                edges.append(replace(edge, start=left[0], stop=left[1]))
+        return _Region((*region.cuts, cut), tuple(pieces), tuple(edges))
+
+    def _placed(self, vertices: Array) -> Array:
+        """Corners in the frame of the stone; those that are its own to the last digit."""
+        away = np.linalg.norm(vertices[:, None] - self._local.vertices, axis=2)
+        nearest = away.argmin(axis=1)
+        own = away[np.arange(len(vertices)), nearest] <= self._flat
+        out: Array = np.where(own[:, None], self._solid.vertices[nearest], vertices + self._origin)
+        return out
+
+    def _is_filled(self, parts: Sequence[Solid]) -> bool:
+        whole = volume_of(self._local)
+        return abs(sum(map(volume_of, parts)) - whole) <= _SAME_VOLUME * whole
+
+
+def _place(row: Sequence[float]) -> Place:
+    return row[0], row[1], row[2]
+
+
+def _plane(row: Sequence[float]) -> Plane:
+    return row[0], row[1], row[2], row[3]
+
+
+def _plane_through(normal: Array, place: Place) -> Plane:
+    n = normal / np.linalg.norm(normal)
+    a, b, c = n.tolist()
+    return a, b, c, a * place[0] + b * place[1] + c * place[2]
+
+
+def _turns_left(polygon: Array, normal: Array) -> bool:
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    turns = np.cross(edges, np.roll(edges, -1, axis=0)) @ normal
+    return bool(turns.min() >= -1e-12 * float((edges**2).sum()))
+
+
+def _clipped(polygon: tuple[Place, ...], cut: Plane, on: float) -> tuple[Place, ...] | None:
+    """What of a convex polygon, or of an edge, lies behind a plane; None if all of it lies in the plane."""
+    a, b, c, d = cut
+    heights = [a * x + b * y + c * z - d for x, y, z in polygon]
+    if max(heights) <= on:
+        return polygon if min(heights) < -on else None
+    if min(heights) >= -on:
+        return ()
+    left = []
+    for i, place in enumerate(polygon):
+        k = (i + 1) % len(polygon)
+        h, g = heights[i], heights[k]
+        if h <= on:
+            left.append(place)
+        if (h < -on and g > on) or (h > on and g < -on):
+            t, following = h / (h - g), polygon[k]
+            x, y, z = (p + t * (q - p) for p, q in zip(place, following, strict=True))
+            left.append((x, y, z))
+    return tuple(left[:2]) if len(polygon) == 2 else tuple(left)
+
+
+def _width(solid: Solid) -> float:
+    """Smallest extent along the normal of a face [m]."""
+    heights = solid.vertices @ planes_of_solid(solid)[:, :3].T
+    return float(np.ptp(heights, axis=0).min())

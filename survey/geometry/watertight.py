@@ -1,0 +1,81 @@
+"""Are the solids closed? Checked with trimesh, nothing repaired."""
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from moma.errors import GeometryError
+from survey.geometry.solids import Solid, area_vector, highest_corner
+
+__all__ = ["check_watertight", "triangulate"]
+
+_CONVEX_TOLERANCE = 1e-9  # metres that a corner may stand in front of a face plane
+_ON_A_SIDE = 1e-12  # of a triangle's size: corners so near to it are on its side
+
+
+def check_watertight(solid: Solid, *, convex: bool = False) -> None:
+    """Check that a solid is closed, consistently wound and of positive volume.
+
+    Parameters
+    ----------
+    solid : what to check
+    convex : check also that it is convex, within 1e-9 m and what rounding leaves of its coordinates
+
+    Raises
+    ------
+    GeometryError
+        naming the stone and what is wrong with it
+    """
+    where, remedy = f"stone {solid.code}", "look at its corners in the survey"
+    if not np.isfinite(solid.vertices).all():
+        raise GeometryError("a corner is not finite", where=where, remedy=remedy)
+    mesh = trimesh.Trimesh(solid.vertices, triangulate(solid), process=False)
+    if not mesh.is_watertight:
+        raise GeometryError("the solid is not closed", where=where, remedy=remedy)
+    if not mesh.is_winding_consistent:
+        raise GeometryError("its faces are not all seen from outside", where=where, remedy=remedy)
+    if not mesh.volume > 0.0:
+        raise GeometryError(
+            f"its volume is {mesh.volume:.3g} m³: inside out or flat", where=where, remedy=remedy
+        )
+    tolerance = _CONVEX_TOLERANCE + 4.0 * np.spacing(np.abs(solid.vertices).max())
+    if convex and (height := highest_corner(solid)) > tolerance:
+        raise GeometryError(f"it is not convex: a corner is {height:.3g} m out", where=where, remedy=remedy)
+
+
+def triangulate(solid: Solid) -> NDArray[np.intp]:
+    """Split the faces into triangles, wound like them, by cutting ears.
+
+    Returns
+    -------
+    (nt, 3) vertex indices
+    """
+    triangles = [triangle for face in solid.faces for triangle in _ears(solid.vertices, face)]
+    return np.array(triangles, dtype=np.intp)
+
+
+def _ears(vertices: NDArray[np.float64], face: tuple[int, ...]) -> list[tuple[int, int, int]]:
+    if len(face) == 3:
+        return [(face[0], face[1], face[2])]
+    rest, triangles = list(face), []
+    polygon = vertices[rest]
+    normal = area_vector(polygon)
+    while len(rest) > 3:
+        ear = next((k for k in range(len(rest)) if _is_ear(vertices, rest, k, normal)), 0)
+        triangles.append((rest[ear - 1], rest[ear], rest[(ear + 1) % len(rest)]))
+        del rest[ear]
+    triangles.append((rest[0], rest[1], rest[2]))
+    return triangles
+
+
+def _is_ear(vertices: NDArray[np.float64], rest: list[int], k: int, normal: NDArray[np.float64]) -> bool:
+    ids = (rest[k - 1], rest[k], rest[(k + 1) % len(rest)])
+    corners = vertices[list(ids)]
+    inward = np.cross(normal, np.roll(corners, -1, axis=0) - corners)
+    if inward[0] @ (corners[2] - corners[0]) <= 0.0:
+        return False
+    others = vertices[[i for i in rest if i not in ids]]
+    # a corner on the side that would be cut is in the way, also where rounding puts it just outside
+    slack = _ON_A_SIDE * np.linalg.norm(inward, axis=1) * float(np.abs(corners - corners[0]).max())
+    inside = ((others[:, None, :] - corners) * inward).sum(axis=2) >= -slack
+    return not inside.all(axis=1).any()

@@ -1,0 +1,1 @@
+"""Joint closing: one plane for every two faces that meet."""

@@ -1,0 +1,264 @@
+"""Beds that are not straight: several planes that meet at head joints.
+
+A course that has sagged is still a course. Its bed is taken as a chain of planes. Where two of them make a valley, the
+stone that lies across it gets two undersides, and the planes change at a head joint below; where they make a ridge, the
+stone under it gets two tops, and they change at a head joint above. So all stones stay convex and touch all over.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from survey.geometry.adjacency import Polyhedra
+from survey.joints.facing import FacePlanes, FacingFaces
+from survey.joints.settings import JointSettings
+
+__all__ = ["bent"]
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+_FINE = 0.5  # of the straightness: how near to the chain corners are to be, if they can
+_FEW = 0.1  # part of the sound corners that may be off the chain
+_WORN = 0.01  # weight of a worn corner
+_LEAST = 3  # links that make a chain
+_MOST = 12  # chains of a bed
+_TURNS = 3  # in which valleys and ridges of a chain are told apart
+_ROUNDS = 10
+
+
+@dataclass(frozen=True)
+class _Bed:
+    """A joint seen from the side: its links in order along it.
+
+    Attributes
+    ----------
+    axes : (3, 3) rows: along, square to it in the joint, across it
+    origin : (3,)
+    place, height : (m,) along and across of the middle of each link [m]
+    lower, upper : (m,) faces of each link
+    """
+
+    axes: Array
+    origin: Array
+    place: Array
+    height: Array
+    lower: Indices
+    upper: Indices
+
+
+@dataclass(frozen=True)
+class _Chain:
+    """Planes one after the other.
+
+    Attributes
+    ----------
+    posts, heights : (n + 1,) where along the bed one follows another, and how high they are there [m]
+    slant : rise across the bed, of all [-]
+    residuals : of the sound corners [m]
+    number : (m,) the plane of each link
+    """
+
+    posts: Array
+    heights: Array
+    slant: float
+    residuals: Array
+    number: Indices
+
+    def off(self, far: float) -> float:
+        """Part of the sound corners that are farther than that from the chain [-]."""
+        return float((self.residuals > far).mean()) if len(self.residuals) else 0.0
+
+
+def bent(
+    solids: Polyhedra,
+    planes: FacePlanes,
+    sound: Bools,
+    facing: FacingFaces,
+    links: Indices,
+    settings: JointSettings,
+    off: float,
+) -> tuple[Array, Indices] | None:
+    """Planes of a joint that one plane does not fit.
+
+    Parameters
+    ----------
+    solids, planes, sound : the stones, the planes of their faces, and which of their corners are sound
+    facing, links : which faces face each other, and the pairs of this joint
+    settings : how far a sound corner may be off its plane
+    off : part of the sound corners that are off one plane; a chain leaves at most a quarter of them off
+
+    Returns
+    -------
+    planes (n, 4) as n·x = d, and the plane (m,) of each link; None if a chain of planes does not fit either
+    """
+    bed = _bed(planes, facing, links)
+    extents = _extents(solids, bed)
+    reach = [end for face in extents.values() for end in face]
+    most = min(_FEW, 0.25 * off)
+    coarse: list[_Chain] = []
+    for ends in _chains(bed.place, bed.height):
+        slopes = _slopes(bed, ends)
+        for _ in range(_TURNS):
+            number, knots = _changes(bed, ends, slopes, extents)
+            posts = np.array([min(reach), *knots, max(reach)])
+            if not (np.diff(posts) > 0.0).all():
+                break
+            chain = _fitted(solids, sound, bed, posts, number)
+            before, slopes = slopes, np.diff(chain.heights) / np.diff(posts)
+            # where a valley has turned out to be a ridge, its place is another
+            if ((np.diff(slopes) > 0.0) == (np.diff(before) > 0.0)).all():
+                if chain.off(settings.straightness) <= most:
+                    coarse.append(chain)
+                break
+        if coarse and coarse[-1].off(_FINE * settings.straightness) <= _FEW:
+            return _planes(bed, coarse[-1]), coarse[-1].number
+    return (_planes(bed, coarse[0]), coarse[0].number) if coarse else None
+
+
+def _bed(planes: FacePlanes, facing: FacingFaces, links: Indices) -> _Bed:
+    pairs, centroid = facing.faces[links], facing.centroid[links]
+    reference = planes.normals[pairs[int(facing.area[links].argmax()), 0]]
+    out_of_first = (planes.normals[pairs[:, 0]] * reference).sum(axis=1) > 0.0
+    up = (np.where(out_of_first, 1.0, -1.0)[:, None] * -facing.normal[links]).sum(axis=0)
+    up /= np.linalg.norm(up)
+    origin = centroid.mean(axis=0)
+    flat = (centroid - origin) - np.outer((centroid - origin) @ up, up)
+    along = np.linalg.svd(flat, full_matrices=False)[2][0]
+    along = along - (along @ up) * up
+    along /= np.linalg.norm(along)
+    axes = np.array([along, np.cross(up, along), up])
+    lower = np.where(out_of_first, pairs[:, 0], pairs[:, 1])
+    upper = np.where(out_of_first, pairs[:, 1], pairs[:, 0])
+    local = (centroid - origin) @ axes.T
+    return _Bed(axes, origin, local[:, 0], local[:, 2], lower, upper)
+
+
+def _extents(solids: Polyhedra, bed: _Bed) -> dict[int, tuple[float, float]]:
+    """From where to where each face reaches along the bed [m]."""
+    out = {}
+    for face in np.unique(np.concatenate([bed.lower, bed.upper])).tolist():
+        corners = solids.corners[solids.face_starts[face] : solids.face_starts[face + 1]]
+        along = (solids.vertices[corners] - bed.origin) @ bed.axes[0]
+        out[face] = float(along.min()), float(along.max())
+    return out
+
+
+def _chains(place: Array, height: Array) -> Iterator[list[int]]:
+    """Ends (in the order along the bed) of two straight chains that the links make, of three, and so on."""
+    order = np.argsort(place, kind="stable")
+    x, y = place[order], median_filter(height[order], size=5, mode="mirror")
+    for count in range(2, min(len(x) // _LEAST, _MOST) + 1):
+        yield _divided(x, y, count)
+
+
+def _divided(x: Array, y: Array, count: int) -> list[int]:
+    """Ends of so many chains of three links or more with the least sum of squares off their lines (Bellman 1961)."""
+    n = len(x)
+    cost = _squares(x, y)
+    best = np.full(n + 1, np.inf)
+    best[0] = 0.0
+    before = np.zeros((count + 1, n + 1), np.int64)
+    for k in range(1, count + 1):
+        total = best[:, None] + cost
+        before[k], best = total.argmin(axis=0), total.min(axis=0)
+    ends, at = [], n
+    for k in range(count, 0, -1):
+        ends.append(at)
+        at = int(before[k, at])
+    return ends[::-1]
+
+
+def _squares(x: Array, y: Array) -> Array:
+    """Sum of squares (n + 1, n + 1) off the line of links i to j - 1; infinite where there are too few."""
+    x, y = x - x.mean(), y - y.mean()
+    sums = [np.concatenate([[0.0], np.cumsum(term)]) for term in (np.ones_like(x), x, y, x * x, x * y, y * y)]
+    n, sx, sy, sxx, sxy, syy = (one[None, :] - one[:, None] for one in sums)
+    safe = np.maximum(n, 1.0)
+    xx, xy, yy = sxx - sx * sx / safe, sxy - sx * sy / safe, syy - sy * sy / safe
+    off = yy - np.where(xx > 1e-12, xy * xy / np.maximum(xx, 1e-12), 0.0)
+    out: Array = np.where(n >= _LEAST, np.maximum(off, 0.0), np.inf)
+    return out
+
+
+def _slope(x: Array, y: Array) -> float:
+    mean_x, mean_y = float(x.mean()), float(y.mean())
+    square = float(((x - mean_x) ** 2).sum())
+    return float(((x - mean_x) * (y - mean_y)).sum()) / square if square > 1e-12 else 0.0
+
+
+def _slopes(bed: _Bed, ends: list[int]) -> Array:
+    """Slopes (n,) of the lines of chains that end there [-]."""
+    order = np.argsort(bed.place, kind="stable")
+    x, y = bed.place[order], bed.height[order]
+    return np.array([_slope(x[a:b], y[a:b]) for a, b in zip([0, *ends[:-1]], ends, strict=True)])
+
+
+def _changes(
+    bed: _Bed, ends: list[int], slopes: Array, extents: dict[int, tuple[float, float]]
+) -> tuple[Indices, list[float]]:
+    """Plane (m,) of each link, and where (n - 1) along the bed one plane follows another [m]."""
+    order = np.argsort(bed.place, kind="stable")
+    x = bed.place[order]
+    middle = {face: 0.5 * (low + high) for face, (low, high) in extents.items()}
+    number, knots = np.zeros(len(x), np.int64), []
+    for k, end in enumerate(ends[:-1]):
+        at = 0.5 * (x[end - 1] + x[end])
+        valley = slopes[k + 1] > slopes[k]
+        faces = (bed.lower if valley else bed.upper)[order]
+        after = np.array([middle[int(face)] for face in faces]) > at
+        number[after] = k + 1
+        before_end = max((extents[int(f)][1] for f in faces[~after]), default=at)
+        after_start = min((extents[int(f)][0] for f in faces[after]), default=at)
+        knots.append(0.5 * (before_end + after_start))
+    of_link = np.empty(len(x), np.int64)
+    of_link[order] = number
+    return of_link, knots
+
+
+def _fitted(solids: Polyhedra, sound: Bools, bed: _Bed, posts: Array, number: Indices) -> _Chain:
+    """The chain through posts that is nearest to the corners on either hand."""
+    rows, hands = [], []
+    for side, sign in ((bed.lower, -1.0), (bed.upper, 1.0)):
+        for face in np.unique(side).tolist():
+            corners = solids.corners[solids.face_starts[face] : solids.face_starts[face + 1]]
+            rows.append(corners)
+            hands.append(np.full(len(corners), sign))
+    corner, hand = np.concatenate(rows), np.concatenate(hands)
+    local = (solids.vertices[corner] - bed.origin) @ bed.axes.T
+    design = np.column_stack([_hats(local[:, 0], posts), local[:, 1], 0.5 * hand])
+    weight = np.where(sound[corner], 1.0, _WORN)
+    solution: Array = np.zeros(design.shape[1])
+    residual: Array = np.zeros(len(corner))
+    for _ in range(_ROUNDS):
+        root = np.sqrt(weight)
+        fitted = np.linalg.lstsq(design * root[:, None], local[:, 2] * root, rcond=None)[0]
+        solution = fitted.astype(np.float64)
+        residual = np.abs(local[:, 2] - design @ solution)
+        spread = max(1.4826 * float(np.median(residual)), 1e-4)
+        robust = np.minimum(1.0, 1.5 * spread / np.maximum(residual, 1e-300))
+        weight = np.where(sound[corner], robust, _WORN)
+    return _Chain(posts, solution[:-2], float(solution[-2]), residual[sound[corner]], number)
+
+
+def _hats(x: Array, posts: Array) -> Array:
+    """Weights (k, n + 1) with which heights at the posts make the height at each place of the chain."""
+    piece = np.clip(np.searchsorted(posts, x, side="right") - 1, 0, len(posts) - 2)
+    share = (x - posts[piece]) / (posts[piece + 1] - posts[piece])
+    out = np.zeros((len(x), len(posts)))
+    out[np.arange(len(x)), piece] = 1.0 - share
+    out[np.arange(len(x)), piece + 1] = share
+    return out
+
+
+def _planes(bed: _Bed, chain: _Chain) -> Array:
+    """The planes (n, 4) between posts, in the frame of the stones."""
+    slopes = np.diff(chain.heights) / np.diff(chain.posts)
+    across = np.column_stack([-slopes, np.full(len(slopes), -chain.slant), np.ones(len(slopes))])
+    normals = across / np.linalg.norm(across, axis=1)[:, None] @ bed.axes
+    along, up = np.outer(chain.posts[:-1], bed.axes[0]), np.outer(chain.heights[:-1], bed.axes[2])
+    return np.column_stack([normals, (normals * (bed.origin + along + up)).sum(axis=1)])

@@ -1,0 +1,237 @@
+"""Which joints of a building can be closed, and the stones that come of it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from moma.errors import GeometryError
+from survey.geometry._kernels.convexity import highest_corners
+from survey.geometry.adjacency import Polyhedra
+from survey.geometry.cutting import cut_stones, joins_three, moves
+from survey.geometry.solids import Solid
+from survey.joints.contact_planes import ContactPlanes, StoneFaces, contact_planes, some_links
+from survey.joints.facing import FacingFaces, planes_of
+from survey.joints.settings import JointSettings
+from survey.joints.worn_sides import mended_planes
+from survey.simplify.simplify import BlockyStone
+
+__all__ = ["Building", "Cut", "as_building", "close_within_bounds"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+_ROUNDS = 10  # in which single joints are left open; then all of a stone that is still moved too far
+_CONVEX = 1e-6  # of a stone's size: a corner that stands out of a face's plane by less does so by rounding
+_BOTH_KEPT = "both stones keep their shape"
+_KEPT = "one of the stones keeps its shape, and the other is led by its other joints"
+
+
+@dataclass(frozen=True)
+class Building:
+    """All stones, about a place among them.
+
+    Attributes
+    ----------
+    stones : simplified
+    solids : theirs, about `origin`
+    origin : (3,) [m]
+    faces : of all solids
+    planes : (nf, 4) of these
+    convex : (n,) whether a stone may be cut
+    notched : (n,) whether it is not convex, but its faces may be moved; others keep their shape
+    """
+
+    stones: tuple[BlockyStone, ...]
+    solids: tuple[Solid, ...]
+    origin: Array
+    faces: StoneFaces
+    planes: Array
+    convex: Bools
+    notched: Bools
+
+    def rows(self, stone: int) -> slice:
+        """The faces of a stone."""
+        starts = self.faces.solids.solid_starts
+        return slice(int(starts[stone]), int(starts[stone + 1]))
+
+
+@dataclass(frozen=True)
+class Cut:
+    """Stones whose joints are closed where they can be.
+
+    Attributes
+    ----------
+    contact : plane of each pair of facing faces
+    reasons : why each pair stays open; empty for those that are closed
+    solids : all stones
+    planes : of each stone that may be cut or moved (n, 4), those of its faces first
+    free : of each of these, which of its planes touch no stone
+    of_face : of each stone that was cut, the plane of each face of its solid
+    """
+
+    contact: ContactPlanes
+    reasons: list[str]
+    solids: list[Solid]
+    planes: dict[int, Array]
+    free: dict[int, Bools]
+    of_face: dict[int, tuple[int, ...]]
+
+
+def as_building(stones: Sequence[BlockyStone]) -> Building:
+    """Put the stones about a place among them.
+
+    Raises
+    ------
+    GeometryError : if two stones have one code
+    """
+    known: set[str] = set()
+    for stone in stones:
+        if stone.code in known:
+            raise GeometryError(
+                "two stones have this code", where=f"stone {stone.code}", remedy="rename one of them"
+            )
+        known.add(stone.code)
+    origin = stones[0].solid.vertices.mean(axis=0)
+    solids = tuple(replace(one.solid, vertices=one.solid.vertices - origin) for one in stones)
+    gathered = Polyhedra.gather((solid.vertices, solid.faces) for solid in solids)
+    planes = planes_of(gathered)
+    height, extent = highest_corners(*_arrays(gathered), planes.normals, planes.offsets)
+    convex: Bools = height <= _CONVEX * extent
+    sound = np.concatenate([_sound(stone) for stone in stones])
+    notched = ~convex & np.array([joins_three(solid.faces) for solid in solids])
+    faces = StoneFaces(gathered, planes, sound, ~(convex | notched)[planes.owner])
+    rows = np.column_stack([planes.normals, planes.offsets])
+    return Building(tuple(stones), solids, origin, faces, rows, convex, notched)
+
+
+def close_within_bounds(
+    building: Building, facing: FacingFaces, settings: JointSettings, known: Sequence[Solid]
+) -> Cut:
+    """Close the joints of a building, but for those that would move a corner farther than the bound.
+
+    Parameters
+    ----------
+    building : the stones
+    facing : pairs of faces that face each other
+    settings : bounds
+    known : the stones with their joints closed, as far as is known by now
+    """
+    notched = set(np.flatnonzero(building.notched).tolist())
+    reasons, unmended = [""] * len(facing), set[int]()
+    for number in range(_ROUNDS + len(building.stones)):
+        links = np.array([k for k, reason in enumerate(reasons) if not reason], np.int64)
+        some = contact_planes(building.faces, some_links(facing, links), settings)
+        for k in links[some.of_link < 0].tolist():
+            reasons[k] = _BOTH_KEPT if building.faces.kept[facing.faces[k]].all() else _KEPT
+        contact = _of_all(some, links, len(facing))
+        planes, free = _stone_planes(building, facing, contact, known, settings)
+        planes |= {i: building.planes[building.rows(i)] for i in unmended if free[i].all()}
+        touched = {i: rows for i, rows in planes.items() if _changed(building, i, rows)}
+        solids, offended = list(building.solids), False
+        of_face = {}
+        for i, stone in cut_stones(building.solids, touched, notched).items():
+            moved = np.inf if stone is None else float(moves(building.solids[i], stone.solid).max())
+            if stone is not None and moved <= settings.max_displacement:
+                solids[i], of_face[i] = stone.solid, stone.of_face
+            else:
+                offended = True
+                if free[i].all():
+                    unmended.add(i)
+                else:
+                    _leave_open(building, facing, contact, i, moved, settings, reasons, number >= _ROUNDS)
+        if not offended:
+            break
+    return Cut(contact, reasons, solids, planes, free, of_face)
+
+
+def _sound(stone: BlockyStone) -> Bools:
+    """Which corners of the solid are known from measurement; a hidden one as well as the one it lies behind."""
+    count, known = len(stone.solid.vertices), np.array(stone.sound, np.bool_)
+    return np.tile(known, -(-count // len(known)))[:count]
+
+
+def _arrays(solids: Polyhedra) -> tuple[Array, Ints, Ints, Ints]:
+    return solids.vertices, solids.corners, solids.face_starts, solids.solid_starts
+
+
+def _of_all(some: ContactPlanes, links: Ints, count: int) -> ContactPlanes:
+    """The planes of some pairs, as planes of all."""
+    of_link, side = np.full(count, -1), np.ones(count, np.int64)
+    of_link[links], side[links] = some.of_link, some.side
+    return ContactPlanes(some.normals, some.offsets, of_link, side)
+
+
+def _stone_planes(
+    building: Building,
+    facing: FacingFaces,
+    contact: ContactPlanes,
+    known: Sequence[Solid],
+    settings: JointSettings,
+) -> tuple[dict[int, Array], dict[int, Bools]]:
+    """Planes of each convex stone: of its faces in order, those of joints or its own, then further ones of joints."""
+    taken = np.zeros(len(building.planes), np.bool_)
+    taken[facing.faces[contact.of_link >= 0]] = True
+    neighbours = building.faces.planes.owner[facing.faces[contact.of_link >= 0]]
+    rows = mended_planes(
+        building.faces, building.planes, ~taken, neighbours, known, settings.max_displacement
+    )
+    taken[:] = False
+    further: dict[int, list[Array]] = {}
+    placed: set[tuple[int, int]] = set()
+    for k in np.flatnonzero(contact.of_link >= 0).tolist():
+        plane = int(contact.of_link[k])
+        row = np.array([*contact.normals[plane], contact.offsets[plane]])
+        for face, side in zip(facing.faces[k].tolist(), (contact.side[k], -contact.side[k]), strict=True):
+            if (face, plane) in placed:
+                continue
+            placed.add((face, plane))
+            if taken[face]:
+                further.setdefault(int(building.faces.planes.owner[face]), []).append(side * row)
+            else:
+                rows[face], taken[face] = side * row, True
+    planes, free = {}, {}
+    for i in np.flatnonzero(building.convex | building.notched).tolist():
+        more = np.array(further.get(i, [])).reshape(-1, 4)
+        planes[i] = np.vstack([rows[building.rows(i)], more])
+        free[i] = np.concatenate([~taken[building.rows(i)], np.zeros(len(more), np.bool_)])
+    return planes, free
+
+
+def _changed(building: Building, stone: int, planes: Array) -> bool:
+    """Whether a stone has other planes than those of its faces."""
+    own = building.planes[building.rows(stone)]
+    return len(planes) != len(own) or not np.array_equal(planes, own)
+
+
+def _leave_open(
+    building: Building,
+    facing: FacingFaces,
+    contact: ContactPlanes,
+    stone: int,
+    moved: float,
+    settings: JointSettings,
+    reasons: list[str],
+    all_of_it: bool,
+) -> None:
+    """Give up the joint of a stone whose plane is farthest from the face it replaces, or all of its joints."""
+    mine = building.faces.planes.owner[facing.faces] == stone
+    own = np.flatnonzero(mine.any(axis=1) & (contact.of_link >= 0))
+    if np.isinf(moved):
+        why = f"closing its joints would leave nothing of {building.stones[stone].code}"
+    else:
+        why = (
+            f"it would move a corner of {building.stones[stone].code} by {moved * 1e3:.0f} mm, more than "
+            f"{settings.max_displacement * 1e3:.0f} mm"
+        )
+    distance = np.zeros(len(own))
+    for n, k in enumerate(own.tolist()):
+        face = int(facing.faces[k][mine[k]][0])
+        corners = building.faces.solids.vertices[building.faces.corners(face)]
+        plane = int(contact.of_link[k])
+        distance[n] = np.abs(corners @ contact.normals[plane] - contact.offsets[plane]).max()
+    least = 0.0 if all_of_it else float(distance.max()) - 1e-12
+    for k in own[distance >= least].tolist():
+        reasons[k] = why

@@ -1,0 +1,136 @@
+"""Closing the joints: surveyed stones, a centimetre apart, become solids that share contact planes.
+
+Every two faces that face each other get one plane (`survey.joints.contact_planes`), which both stones hold to the
+last bit: one keeps to its one side, the other to the other. A stone is then cut out anew by the planes of its joints
+and of those of its own faces that touch nothing (`survey.geometry.cutting`). So no two stones that share a joint
+overlap, wherever the joint runs: beds of a course, head joints, skewbacks, the radial joints of a vault that was seen
+from below. Stones that still overlap without sharing a joint, at the foot of an arch for instance, are parted
+(`survey.joints.overlaps`). What would move a corner farther than the bound stays open, and is listed.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from survey.extrusion.extrusion import SurveyedBlock
+from survey.geometry.solids import Solid, planes_of_solid
+from survey.geometry.stone_parts import stone_parts
+from survey.joints.bounded_closing import Building, Cut, as_building, close_within_bounds
+from survey.joints.closing_results import closing_report
+from survey.joints.contact_planes import ContactPlanes
+from survey.joints.facing import FacingFaces, find_facing
+from survey.joints.newly_facing import newly_facing
+from survey.joints.overlaps import find_overlaps, part_stones
+from survey.joints.report import ClosingReport
+from survey.joints.settings import JointMode, JointSettings
+from survey.simplify.simplify import BlockyStone, simplify
+
+__all__ = ["ClosedStones", "close_joints"]
+
+Array = NDArray[np.float64]
+
+_ROUNDS = 4  # in which closing joints shows further ones, beside worn corners
+_MEETS = 1e-6  # metres: faces that are nearer share a plane
+_AS_SURVEYED = "joints are left as surveyed"
+
+
+@dataclass(frozen=True)
+class ClosedStones:
+    """Stones whose joints are closed, or left as they are.
+
+    Attributes
+    ----------
+    solids : in the order given
+    simplified : the stones before their joints were closed
+    report : what was changed, and what remains
+    """
+
+    solids: tuple[Solid, ...]
+    simplified: tuple[BlockyStone, ...]
+    report: ClosingReport
+
+
+def close_joints(
+    stones: Sequence[SurveyedBlock | BlockyStone], settings: JointSettings | None = None
+) -> ClosedStones:
+    """Close the joints of a building, so that neighbours share contact planes.
+
+    Parameters
+    ----------
+    stones : surveyed or simplified stones; of one wall or several, of arches and vaults
+    settings : what counts as a joint, what becomes of it, and bounds; None: JointSettings()
+
+    Returns
+    -------
+    ClosedStones; convex stones with joints are cut anew, others stay as they are
+
+    Raises
+    ------
+    GeometryError
+        naming the stone, if two have one code, one is degenerate, or one is of too many convex parts
+    """
+    settings = settings or JointSettings()
+    blocky = tuple(stone if isinstance(stone, BlockyStone) else simplify(stone) for stone in stones)
+    if not blocky:
+        return ClosedStones((), (), ClosingReport(settings.mode, (), {}, {}, (), (), ()))
+    building = as_building(blocky)
+    facing = find_facing(building.faces.solids, building.faces.planes, settings)
+    if settings.mode is JointMode.AS_SURVEYED:
+        cut = _as_surveyed(building, facing)
+        parts, planes = _parts(building, cut)
+        overlaps = find_overlaps([*cut.solids, *parts], cut.planes | planes)
+    else:
+        cut, facing = _closed(building, facing, settings)
+        parts, planes = _parts(building, cut)
+        convex = np.flatnonzero(building.convex).tolist()
+        parted, overlaps = part_stones(
+            [*building.solids, *parts],
+            [*cut.solids, *parts],
+            {i: cut.planes[i] for i in convex} | planes,
+            {i: cut.free[i] for i in convex},
+            settings.max_displacement,
+        )
+        cut = replace(cut, solids=parted[: len(building.solids)])
+    report = closing_report(building, facing, cut, overlaps, settings)
+    placed = (replace(solid, vertices=solid.vertices + building.origin) for solid in cut.solids)
+    changed = tuple(
+        stone.solid if solid is old else new
+        for stone, old, solid, new in zip(blocky, building.solids, cut.solids, placed, strict=True)
+    )
+    return ClosedStones(changed, blocky, report)
+
+
+def _closed(building: Building, facing: FacingFaces, settings: JointSettings) -> tuple[Cut, FacingFaces]:
+    """All joints closed that can be, also those that show only then."""
+    cut = close_within_bounds(building, facing, settings, building.solids)
+    for _ in range(_ROUNDS):
+        before, facing = facing, newly_facing(building, facing, cut, settings)
+        cut = close_within_bounds(building, facing, settings, cut.solids)
+        if len(facing) == len(before):
+            break
+    return cut, facing
+
+
+def _parts(building: Building, cut: Cut) -> tuple[list[Solid], dict[int, Array]]:
+    """Convex parts of the stones that are not convex, and their planes (n, 4), numbered after all stones."""
+    parts: list[Solid] = []
+    for i in np.flatnonzero(~building.convex).tolist():
+        parts += stone_parts(cut.solids[i])
+    return parts, {len(building.solids) + k: planes_of_solid(part) for k, part in enumerate(parts)}
+
+
+def _as_surveyed(building: Building, facing: FacingFaces) -> Cut:
+    """All stones as they are, and all joints open but for those whose faces share a plane already."""
+    convex = np.flatnonzero(building.convex).tolist()
+    planes = {i: building.planes[building.rows(i)] for i in convex}
+    free = {i: np.ones(len(planes[i]), np.bool_) for i in convex}
+    first, second = building.planes[facing.faces[:, 0]], building.planes[facing.faces[:, 1]]
+    size = np.sqrt(building.faces.planes.areas[facing.faces].max(axis=1))
+    turned = np.linalg.norm(first[:, :3] + second[:, :3], axis=1) * size
+    shared = (np.abs(facing.gap) <= _MEETS) & (turned <= _MEETS)
+    of_link = np.where(shared, np.arange(len(facing)), -1)
+    contact = ContactPlanes(first[:, :3], first[:, 3], of_link, np.ones(len(facing), np.int64))
+    reasons = ["" if one else _AS_SURVEYED for one in shared.tolist()]
+    return Cut(contact, reasons, list(building.solids), planes, free, {})

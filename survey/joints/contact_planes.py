@@ -1,0 +1,305 @@
+"""The contact planes of a building's joints: one for each straight bed, whatever the bond.
+
+Faces that face each other in turn make one joint: the tops of a course and the undersides of the next, the two
+sides of a head joint, springers and voussoir at a skewback. So do faces of neighbours that continue each other, where
+four stones meet at a cross. All of them are fitted together, so that a course stays a course. Where a bed is not
+straight it is taken as several planes that meet at head joints (`survey.joints.bent_beds`). Where that does not do
+either, the few stones that are off are led to the plane of the others; if they are not few, each two stones have a
+plane of their own.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from survey.geometry.adjacency import Polyhedra
+from survey.joints._kernels import fit_middle_planes
+from survey.joints._kernels_continuing import continuing_faces
+from survey.joints.bent_beds import bent
+from survey.joints.facing import FacePlanes, FacingFaces
+from survey.joints.settings import JointSettings
+
+__all__ = ["ContactPlanes", "StoneFaces", "contact_planes", "some_links"]
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+_ALIKE = 0.985  # cosine of 10°: faces of neighbours that are turned by more do not continue each other
+_FEW = 0.25  # part of the corners of a joint that may be off it
+_FINE = (
+    0.5  # of the straightness: corners of a bed that is straight but for odd ones are as near to it as that
+)
+_SAME = 1e-8  # metres: a face that has to stay and is as near as that to a plane lies in it
+
+
+@dataclass(frozen=True)
+class StoneFaces:
+    """The faces of all stones, and what is known of them.
+
+    Attributes
+    ----------
+    solids : as they were surveyed, about a place among them
+    planes : of their faces
+    sound : (nv,) whether a corner is known from measurement
+    kept : (nf,) whether a face has to stay where it is
+    """
+
+    solids: Polyhedra
+    planes: FacePlanes
+    sound: Bools
+    kept: Bools
+
+    def corners(self, face: int) -> Indices:
+        """Indices of a face's corners."""
+        starts = self.solids.face_starts
+        return self.solids.corners[starts[face] : starts[face + 1]]
+
+
+@dataclass(frozen=True)
+class ContactPlanes:
+    """The planes n·x = d of joints, and which joint has which.
+
+    Attributes
+    ----------
+    normals, offsets : (np, 3) unit [-], (np,) [m]
+    of_link : (m,) plane of each pair of facing faces; -1 for one that has none
+    side : (m,) +1 if the plane's normal leads out of the first of the two faces, -1 if into it
+    """
+
+    normals: Array
+    offsets: Array
+    of_link: Indices
+    side: Indices
+
+
+@dataclass(frozen=True)
+class _Groups:
+    """Faces of several joints, one after the other: (k,) face, hand ±1; (n + 1,) starts; normals (n, 3)."""
+
+    faces: Indices
+    hands: Array
+    starts: Indices
+    normals: Array
+
+
+def contact_planes(faces: StoneFaces, facing: FacingFaces, settings: JointSettings) -> ContactPlanes:
+    """Find the contact plane of each pair of facing faces.
+
+    Faces that have to stay where they are take no part in the fit. What meets nothing else is led to them; what has
+    other joints meets them only where these lie in their very plane.
+
+    Parameters
+    ----------
+    faces : of all stones
+    facing : the pairs
+    settings : how far a corner may be off its side of a straight joint
+    """
+    found = _Found(faces, facing, [], [], np.full(len(facing), -1))
+    kept = faces.kept[facing.faces]
+    movable = np.flatnonzero(~kept.any(axis=1))
+    _add_joints(found, movable, settings)
+    for link in np.flatnonzero(kept.any(axis=1)).tolist():
+        found.add_kept(link, kept[link])
+    return found.planes()
+
+
+def _add_joints(found: "_Found", links: Indices, settings: JointSettings) -> None:
+    """Planes of the joints that these links make."""
+    faces, facing = found.faces, some_links(found.facing, links)
+    label = _joints(faces, facing, settings)
+    count = int(label.max()) + 1 if len(label) else 0
+    groups = _gathered(faces, facing, label, count)
+    _, values = _fitted(faces, groups, -1.0, settings)
+    usual = float(np.median(values[:, 0])) if count else 0.0
+    planes, values = _fitted(faces, groups, usual, settings)
+    few_are_odd = (values[:, 3] <= _FEW) & (values[:, 4] <= _FINE * settings.straightness)
+    straight = (values[:, 2] <= settings.straightness) | few_are_odd
+    found.add_many(
+        planes[straight], links[straight[label]], (np.cumsum(straight)[label] - 1)[straight[label]]
+    )
+    order = np.argsort(label, kind="stable")
+    first = np.searchsorted(label[order], np.arange(count + 1))
+    for joint in np.flatnonzero(~straight).tolist():
+        own = links[order[first[joint] : first[joint + 1]]]
+        if found.add_bent(own, settings, float(values[joint, 3])):
+            continue
+        if values[joint, 3] <= _FEW:
+            found.add_many(planes[[joint]], own, np.zeros(len(own), np.int64))
+        else:
+            found.add_each(own, usual, settings)
+
+
+@dataclass
+class _Found:
+    """Planes found so far."""
+
+    faces: StoneFaces
+    facing: FacingFaces
+    normals: list[Array]
+    offsets: list[float]
+    of_link: Indices
+
+    def add_many(self, planes: Array, links: Indices, number: Indices) -> None:
+        """Planes (n, 4), and which of them (m,) each link has."""
+        self.of_link[links] = len(self.normals) + number
+        self.normals += list(planes[:, :3])
+        self.offsets += planes[:, 3].tolist()
+
+    def add_bent(self, links: Indices, settings: JointSettings, off: float) -> bool:
+        """A joint that is bent but not broken: several planes; False if that is not what it is."""
+        found = bent(
+            self.faces.solids, self.faces.planes, self.faces.sound, self.facing, links, settings, off
+        )
+        if found is None:
+            return False
+        self.add_many(found[0], links, found[1])
+        return True
+
+    def add_each(self, links: Indices, usual: float, settings: JointSettings) -> None:
+        """A plane for each pair."""
+        part, number = some_links(self.facing, links), np.arange(len(links))
+        planes, _ = _fitted(self.faces, _gathered(self.faces, part, number, len(links)), usual, settings)
+        self.add_many(planes, links, number)
+
+    def add_kept(self, link: int, kept: Bools) -> None:
+        """A pair of which a face has to stay: its plane, if the other has it too or nothing else to meet."""
+        first, second = self.facing.faces[link].tolist()
+        stays, other = (first, second) if kept[0] else (second, first)
+        plane = np.array([*self.faces.planes.normals[stays], self.faces.planes.offsets[stays]])
+        if kept.all():
+            theirs = -np.array([*self.faces.planes.normals[other], self.faces.planes.offsets[other]])
+            if self._same(plane, theirs, stays):
+                self.add_many(plane[None], np.array([link]), np.zeros(1, np.int64))
+            return
+        beside = np.flatnonzero((self.facing.faces == other).any(axis=1) & (self.of_link >= 0))
+        planes = {int(self.of_link[k]) for k in beside}
+        if not planes:
+            self.add_many(plane[None], np.array([link]), np.zeros(1, np.int64))
+        for number in planes:
+            theirs = np.array([*self.normals[number], self.offsets[number]])
+            if self._same(plane, theirs, stays) or self._same(plane, -theirs, stays):
+                self.of_link[link] = number
+
+    def _same(self, plane: Array, other: Array, face: int) -> bool:
+        """Whether a face lies in another plane as well, but for rounding."""
+        corners = self.faces.solids.vertices[self.faces.corners(face)]
+        alike = float(plane[:3] @ other[:3]) > 0.0
+        return alike and bool(np.abs(corners @ other[:3] - other[3]).max() <= _SAME)
+
+    def planes(self) -> ContactPlanes:
+        """All that were found, and on which side of them the first face of each pair lies."""
+        normals = np.array(self.normals).reshape(-1, 3)
+        outward = self.faces.planes.normals[self.facing.faces[:, 0]]
+        linked = self.of_link >= 0
+        side = np.ones(len(self.of_link), np.int64)
+        side[linked] = np.where((normals[self.of_link[linked]] * outward[linked]).sum(axis=1) > 0.0, 1, -1)
+        return ContactPlanes(normals, np.array(self.offsets), self.of_link, side)
+
+
+def some_links(facing: FacingFaces, links: Indices) -> FacingFaces:
+    """Only these pairs."""
+    return replace(
+        facing,
+        faces=facing.faces[links],
+        area=facing.area[links],
+        gap=facing.gap[links],
+        centroid=facing.centroid[links],
+        normal=facing.normal[links],
+    )
+
+
+def _joints(faces: StoneFaces, facing: FacingFaces, settings: JointSettings) -> Indices:
+    """Number (m,) of the joint that each pair belongs to, in the order of their first pair."""
+    if not len(facing):
+        return np.zeros(0, np.int64)
+    count = len(faces.planes.areas)
+    pairs = np.concatenate([facing.faces, _continuing(faces, facing, settings)])
+    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    _, label = connected_components(graph, directed=False)
+    _, first, number = np.unique(label[facing.faces[:, 0]], return_index=True, return_inverse=True)
+    rank = np.empty(len(first), np.int64)
+    rank[np.argsort(first, kind="stable")] = np.arange(len(first))
+    out: Indices = rank[number]
+    return out
+
+
+def _continuing(faces: StoneFaces, facing: FacingFaces, settings: JointSettings) -> Indices:
+    """Faces (m, 2) of neighbours that lie in one plane."""
+    solids, planes = faces.solids, faces.planes
+    joined = np.zeros(len(planes.areas), np.bool_)
+    joined[facing.faces] = True
+    found: Indices = continuing_faces(
+        planes.owner[facing.faces],
+        (solids.vertices, solids.corners, solids.face_starts, solids.solid_starts),
+        planes.normals,
+        planes.offsets,
+        joined,
+        _ALIKE,
+        settings.straightness,
+    )
+    return found
+
+
+def _gathered(faces: StoneFaces, facing: FacingFaces, label: Indices, count: int) -> _Groups:
+    """The faces of each joint, each once, and on which hand of it they are."""
+    of_face = np.repeat(label, 2) * len(faces.planes.areas) + facing.faces.ravel()
+    unique = np.unique(of_face)
+    joint, face = np.divmod(unique, len(faces.planes.areas))
+    starts = np.searchsorted(joint, np.arange(count + 1))
+    largest = np.lexsort((face, -faces.planes.areas[face], joint))[starts[:-1]]
+    reference = faces.planes.normals[face[largest]]
+    hand = np.where((faces.planes.normals[face] * reference[joint]).sum(axis=1) > 0.0, -1.0, 1.0)
+    weight = -hand * faces.planes.areas[face]
+    mean = np.zeros((count, 3))
+    np.add.at(mean, joint, weight[:, None] * faces.planes.normals[face])
+    mean /= np.linalg.norm(mean, axis=1)[:, None]
+    return _Groups(face, hand, starts, mean)
+
+
+def _fitted(faces: StoneFaces, groups: _Groups, usual: float, settings: JointSettings) -> tuple[Array, Array]:
+    """Planes (n, 4) half-way between the two hands, and values (n, 5) as of the kernel."""
+    count = len(groups.normals)
+    solids = faces.solids
+    sizes = np.diff(solids.face_starts)[groups.faces]
+    begin = np.repeat(solids.face_starts[groups.faces], sizes)
+    within = np.arange(len(begin)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+    corner = solids.corners[begin + within]
+    face_joint = np.repeat(np.arange(count), np.diff(groups.starts))
+    joint = np.repeat(face_joint, sizes)
+    starts = np.searchsorted(joint, np.arange(count + 1))
+    x = solids.vertices[corner]
+    centre = np.zeros((count, 3))
+    np.add.at(centre, joint, x)
+    centre /= np.diff(starts)[:, None]
+    axes = _frames(groups.normals)
+    local = np.einsum("kij,kj->ki", axes[joint], x - centre[joint])
+    scale = np.ones(count)
+    np.maximum.at(scale, joint, np.abs(local[:, :2]).max(axis=1))
+    planes, values = np.zeros((count, 3)), np.zeros((count, 5))
+    fit_middle_planes(
+        np.ascontiguousarray(local),
+        np.repeat(groups.hands, sizes),
+        faces.sound[corner],
+        starts,
+        scale,
+        usual,
+        settings.straightness,
+        planes,
+        values,
+    )
+    normal = axes[:, 2] - planes[:, 1:2] * axes[:, 0] - planes[:, 2:3] * axes[:, 1]
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    offset = (normal * (centre + planes[:, :1] * axes[:, 2])).sum(axis=1)
+    return np.column_stack([normal, offset]), values
+
+
+def _frames(normals: Array) -> Array:
+    """Right-handed frames (n, 3, 3) whose last row is the normal."""
+    least = np.eye(3)[np.abs(normals).argmin(axis=1)] if len(normals) else np.zeros((0, 3))
+    first = np.cross(least, normals)
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    return np.stack([first, np.cross(normals, first), normals], axis=1)

@@ -1,0 +1,229 @@
+"""Stones that lie in each other, and how they are parted."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from survey.geometry._kernels.convexity import deepest_overlaps
+from survey.geometry.cutting import common_part, cut_stones, moves
+from survey.geometry.near_solids import boxes_of, near_pairs
+from survey.geometry.solids import Solid, volume_of
+
+__all__ = ["Overlapping", "find_overlaps", "part_stones"]
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+_LEAST = 1e-10  # metres: solids that share a plane lie so deep in each other by rounding
+_ON_PLANE = 1e-8  # metres
+_LEAST_VOLUME = 1e-12  # cubic metres
+_ALIKE = 0.3  # normals of two faces that differ by less have no plane between them
+_SHALLOW = 0.01  # metres by which a free face rather gives way than that a stone gets a further face
+
+
+@dataclass(frozen=True)
+class Overlapping:
+    """Two convex solids that lie in each other.
+
+    Attributes
+    ----------
+    pair : their indices
+    codes : of their stones
+    part : what both take
+    volume : of it [m³]
+    depth : by which one would have to move along a face's normal to be free [m]
+    """
+
+    pair: tuple[int, int]
+    codes: tuple[str, str]
+    part: Solid
+    volume: float
+    depth: float
+
+
+def find_overlaps(solids: Sequence[Solid], planes: Mapping[int, Array]) -> list[Overlapping]:
+    """Pairs of solids that lie in each other, of those that `planes` names: convex ones, with their planes (n, 4).
+
+    Parts of one stone have one code, and do not count.
+    """
+    chosen = sorted(planes)
+    if len(chosen) < 2:
+        return []
+    vertices = [solids[i].vertices for i in chosen]
+    rows = [planes[i] for i in chosen]
+    boxes = np.array([[*v.min(axis=0), *v.max(axis=0)] for v in vertices])
+    starts = np.arange(len(chosen) + 1)
+    vertex_starts = np.cumsum([0, *map(len, vertices)])
+    plane_starts = np.cumsum([0, *map(len, rows)])
+    all_vertices, all_planes = np.concatenate(vertices), np.concatenate(rows)
+    out = []
+    for near in near_pairs(boxes_of(boxes, starts, 0.0), np.ones(len(chosen), np.bool_)):
+        depth = deepest_overlaps(near, all_vertices, vertex_starts, all_planes, plane_starts, _LEAST)
+        for k in np.flatnonzero(depth > _LEAST):
+            i, j = sorted((chosen[near[k, 0]], chosen[near[k, 1]]))
+            if solids[i].code == solids[j].code:
+                continue
+            found = _overlapping(i, j, solids[i], solids[j], planes, float(depth[k]))
+            if found is not None:
+                out.append(found)
+    return sorted(out, key=lambda one: one.pair)
+
+
+def _overlapping(
+    i: int, j: int, first: Solid, second: Solid, planes: Mapping[int, Array], depth: float
+) -> Overlapping | None:
+    """What two solids have in common; None if that is nothing but rounding."""
+    low, high = first.vertices.min(axis=0), first.vertices.max(axis=0)
+    part = common_part(planes[i], planes[j], 0.5 * (low + high), 2.0 * float((high - low).max()))
+    if part is None or (volume := volume_of(part)) <= _LEAST_VOLUME:
+        return None
+    return Overlapping((i, j), (first.code, second.code), part, volume, depth)
+
+
+@dataclass
+class _Parting:
+    """Stones while they are parted: what each was, is now, its planes, and which of these are free to move."""
+
+    originals: Sequence[Solid]
+    solids: list[Solid]
+    planes: dict[int, Array]
+    free: dict[int, NDArray[np.bool_]]
+    bound: float
+
+    def part(self, found: Overlapping) -> None:
+        """Part two stones by the cheapest way that moves no corner farther than the bound."""
+        i, j = found.pair
+        current = _overlapping(i, j, self.solids[i], self.solids[j], self.planes, found.depth)
+        if current is None:
+            return
+        ways = [*self._retreats(i, j, current), *self._retreats(j, i, current)]
+        for _, stone, plane, row in sorted(
+            (way for way in ways if way[0] <= _SHALLOW), key=lambda way: way[:3]
+        ):
+            new = self.planes[stone].copy()
+            new[plane] = row
+            if self._cut({stone: new}):
+                return
+        self._divide(current)
+
+    def _retreats(self, one: int, other: int, found: Overlapping) -> list[tuple[float, int, int, Array]]:
+        """Ways in which a free face of a stone goes back to free another: how far, stone, plane, its new place.
+
+        It goes back as a whole, or turns about one of its edges, as an intrados does at the foot of an arch.
+        """
+        out = []
+        for p in np.flatnonzero(self.free[one]).tolist() if one in self.free else ():
+            row = self.planes[one][p]
+            low = float((self.solids[other].vertices @ row[:3]).min())
+            out.append((float(row[3]) - low, one, p, np.array([*row[:3], low])))
+            polygon = _face_on(self.solids[one], row)
+            out += [(far, one, p, turned) for far, turned in _turns(row, polygon, found.part.vertices)]
+        return out
+
+    def _divide(self, found: Overlapping) -> None:
+        """Cut one along a face of the other, or both through the middle of what they share: where least is lost."""
+        i, j = found.pair
+        ways = [*self._beside(i, j), *self._beside(j, i), *self._between(found)]
+        for _, cuts in sorted(ways, key=lambda way: way[0]):
+            if self._cut({k: np.vstack([self.planes[k], plane]) for k, plane in cuts.items()}):
+                return
+
+    def _beside(self, one: int, other: int) -> list[tuple[float, dict[int, Array]]]:
+        """Ways to cut one stone along each face of another: what is lost [m³], and the plane."""
+        if one not in self.free:
+            return []
+        return [(self._lost(one, -plane), {one: -plane}) for plane in self.planes[other]]
+
+    def _between(self, found: Overlapping) -> list[tuple[float, dict[int, Array]]]:
+        """Ways to cut both along a plane half-way between a face of each."""
+        i, j = found.pair
+        middle, ways = found.part.vertices.mean(axis=0), []
+        if i not in self.free or j not in self.free:
+            return []
+        for a in self.planes[i]:
+            for b in self.planes[j]:
+                normal = a[:3] - b[:3]
+                if (length := float(np.linalg.norm(normal))) < _ALIKE:
+                    continue
+                plane = np.array([*(normal / length), float(middle @ normal) / length])
+                ways.append((self._lost(i, plane) + self._lost(j, -plane), {i: plane, j: -plane}))
+        return ways
+
+    def _lost(self, stone: int, plane: Array) -> float:
+        """What of a stone lies over a plane [m³]."""
+        solid = self.solids[stone]
+        low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
+        over = common_part(
+            self.planes[stone], -plane[None], 0.5 * (low + high), 2.0 * float((high - low).max())
+        )
+        return 0.0 if over is None else volume_of(over)
+
+    def _cut(self, planes: dict[int, Array]) -> bool:
+        """Cut stones anew, all or none, if no corner moves farther than the bound."""
+        cut = {i: stone.solid for i, stone in cut_stones(self.originals, planes).items() if stone is not None}
+        if len(cut) < len(planes) or any(moves(self.originals[i], cut[i]).max() > self.bound for i in cut):
+            return False
+        for i, solid in cut.items():
+            self.solids[i] = solid
+            further = len(planes[i]) - len(self.free[i])
+            self.planes[i] = planes[i]
+            self.free[i] = np.concatenate([self.free[i], np.zeros(further, np.bool_)])
+        return True
+
+
+def part_stones(
+    originals: Sequence[Solid],
+    solids: Sequence[Solid],
+    planes: Mapping[int, Array],
+    free: Mapping[int, NDArray[np.bool_]],
+    bound: float,
+) -> tuple[list[Solid], list[Overlapping]]:
+    """Part stones that lie in each other; a stone only gets smaller, so that no new overlap comes about.
+
+    Parameters
+    ----------
+    originals : all stones before any was cut
+    solids : as they are now
+    planes : of all convex ones, (n, 4); the first belong to the faces of the originals, in order
+    free : of each of these, whether it is a face that touches no stone; those that are not named are not cut, as
+        parts of stones that keep their shape
+    bound : farthest that a corner may move [m]
+
+    Returns
+    -------
+    the stones, and the pairs that still lie in each other
+    """
+    own = {i: rows.copy() for i, rows in planes.items()}
+    state = _Parting(originals, list(solids), own, dict(free), bound)
+    for found in find_overlaps(state.solids, own):
+        state.part(found)
+    return state.solids, find_overlaps(state.solids, own)
+
+
+def _face_on(solid: Solid, plane: Array) -> Array:
+    """Corners (n, 3) of the face of a solid that lies on a plane; none if there is no such face."""
+    for face in solid.faces:
+        polygon = solid.vertices[list(face)]
+        if np.abs(polygon @ plane[:3] - plane[3]).max() <= _ON_PLANE:
+            return polygon
+    return np.zeros((0, 3))
+
+
+def _turns(plane: Array, polygon: Array, part: Array) -> list[tuple[float, Array]]:
+    """A face turned about each of its edges until what it shared (n, 3) lies before it: how far it goes, its plane."""
+    out = []
+    for k in range(len(polygon)):
+        start, along = polygon[k - 1], polygon[k] - polygon[k - 1]
+        normals = np.cross(along, part - start)
+        lengths = np.linalg.norm(normals, axis=1)
+        normals = normals[lengths > 1e-9 * float(along @ along)]
+        normals /= np.linalg.norm(normals, axis=1)[:, None]
+        normals *= np.where(normals @ plane[:3] < 0.0, -1.0, 1.0)[:, None]
+        for normal in normals:
+            if ((part - start) @ normal).min() >= -_LEAST:
+                far = float(((polygon - start) @ normal).max())
+                out.append((far, np.array([*normal, float(start @ normal)])))
+                break
+    return out

@@ -1,0 +1,1 @@
+"""Snapping of imported solids: faces that match get one plane."""

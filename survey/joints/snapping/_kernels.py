@@ -1,0 +1,146 @@
+"""Numba kernels of faces that match: that two solids turn to each other, in one plane but for a tolerance.
+
+Solids are held as in `survey.geometry.adjacency.Polyhedra`, in coordinates about a place among them.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from survey.geometry._kernels.adjacency import _basis, _flatten, _shared
+
+__all__ = ["matching_faces", "near_pairs"]
+
+_OPPOSITE = -0.9
+"""Cosine of faces that look at each other: heights over the common plane decide, but for small faces."""
+
+
+@njit(cache=True)
+def near_pairs(boxes, order, margin, out):
+    """Pairs (…, 2) of boxes (n, 6) that come nearer than a margin, into `out` as long as it has room; how many.
+
+    `order` sorts the boxes by their lower x.
+    """
+    count = 0
+    for a in range(order.shape[0]):
+        i = order[a]
+        for b in range(a + 1, order.shape[0]):
+            j = order[b]
+            if boxes[j, 0] > boxes[i, 3] + margin:
+                break
+            apart = False
+            for k in range(1, 3):
+                if boxes[i, k] > boxes[j, 3 + k] + margin or boxes[j, k] > boxes[i, 3 + k] + margin:
+                    apart = True
+            if not apart:
+                if count < out.shape[0]:
+                    out[count, 0], out[count, 1] = min(i, j), max(i, j)
+                count += 1
+    return count
+
+
+@njit(cache=True)
+def _perimeter(polygon, n):
+    total = 0.0
+    for i in range(n):
+        k = (i + 1) % n
+        total += math.hypot(polygon[k, 0] - polygon[i, 0], polygon[k, 1] - polygon[i, 1])
+    return total
+
+
+@njit(cache=True)
+def _grow(polygon, n, factor):
+    """Enlarge a polygon about the mean of its corners."""
+    for k in range(2):
+        mean = 0.0
+        for i in range(n):
+            mean += polygon[i, k] / n
+        for i in range(n):
+            polygon[i, k] = mean + factor * (polygon[i, k] - mean)
+
+
+@njit(cache=True)
+def _spread(vertices, first, second, n):
+    """Half the extent along n of the corners of two faces."""
+    low, high = math.inf, -math.inf
+    for ring in (first, second):
+        for i in range(ring.shape[0]):
+            along = 0.0
+            for k in range(3):
+                along += vertices[ring[i], k] * n[k]
+            low, high = min(low, along), max(high, along)
+    return 0.5 * (high - low)
+
+
+@njit(cache=True)
+def matching_faces(pairs, solid, planes, tolerance, out, measures):
+    """Faces of pairs of solids that lie in one plane, into `out` and `measures`, as far as there is room; how many.
+
+    Parameters
+    ----------
+    pairs : (n, 2) solids
+    solid : vertices, corners, face_starts, solid_starts of `Polyhedra`
+    planes : as from `face_planes`
+    tolerance : within which the corners of both faces lie in their common plane [m]
+    out, measures : (…, 2) the two faces; (…, 2) how far their corners lie from the plane [m], and what they share [m²]:
+        negative if that is a seam no wider than the tolerance, or they come only so near
+    """
+    vertices, corners, face_starts, solid_starts = solid
+    normals, sizes, boxes, convex = planes
+    longest = 0
+    for f in range(face_starts.shape[0] - 1):
+        longest = max(longest, face_starts[f + 1] - face_starts[f])
+    buffers = np.empty((4, 2 * longest + 8, 2))
+    n, u, v = np.empty(3), np.empty(3), np.empty(3)
+    count = 0
+    for pair in range(pairs.shape[0]):
+        one, two = pairs[pair]
+        for i in range(solid_starts[one], solid_starts[one + 1]):
+            for j in range(solid_starts[two], solid_starts[two + 1]):
+                facing = (
+                    normals[i, 0] * normals[j, 0]
+                    + normals[i, 1] * normals[j, 1]
+                    + normals[i, 2] * normals[j, 2]
+                )
+                if (
+                    facing > _OPPOSITE
+                    or _apart(boxes, i, j, 2.0 * tolerance)
+                    or not min(sizes[i], sizes[j]) > 0.0
+                ):
+                    continue
+                # the larger face knows its normal better
+                a, b = sizes[i] / (sizes[i] + sizes[j]), sizes[j] / (sizes[i] + sizes[j])
+                size = math.sqrt(a * a + b * b - 2.0 * a * b * facing)
+                for k in range(3):
+                    n[k] = (b * normals[j, k] - a * normals[i, k]) / size
+                first = corners[face_starts[i] : face_starts[i + 1]]
+                second = corners[face_starts[j] : face_starts[j + 1]]
+                spread = _spread(vertices, first, second, n)
+                if spread > tolerance:
+                    continue
+                _basis(n, u, v)
+                origin = vertices[first[0]]
+                ni = _flatten(vertices, first, origin, u, v, True, buffers[0])
+                nj = _flatten(vertices, second, origin, u, v, False, buffers[1])
+                both = convex[i] and convex[j]
+                area = _shared(buffers[0], ni, buffers[1], nj, both, buffers)[0]
+                seam = 0.5 * tolerance * min(_perimeter(buffers[0], ni), _perimeter(buffers[1], nj))
+                if area <= seam:
+                    _grow(buffers[0], ni, 1.0 + 8.0 * tolerance / math.sqrt(sizes[i]))
+                    if not _shared(buffers[0], ni, buffers[1], nj, both, buffers)[0] > 0.0:
+                        continue
+                    area = -1.0
+                if count < out.shape[0]:
+                    out[count, 0], out[count, 1] = i, j
+                    measures[count, 0], measures[count, 1] = spread, area
+                count += 1
+    return count
+
+
+@njit(cache=True)
+def _apart(boxes, i, j, margin):
+    for k in range(3):  # noqa: SIM110  (numba has no any())
+        if boxes[i, k] > boxes[j, 3 + k] + margin or boxes[j, k] > boxes[i, 3 + k] + margin:
+            return True
+    return False

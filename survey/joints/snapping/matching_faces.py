@@ -1,0 +1,148 @@
+"""Faces of neighbours that are meant to lie in one plane: which match, and which planes all of them are.
+
+Two faces match where they look at each other and the corners of both lie within a tolerance of one plane. What is
+matched is one plane for all: a bed on which many stones stand is not stone by stone another. Faces that meet at a
+seam alone, such as those of stones that stand across a corner from each other, join a plane as well if it can be
+theirs too; else such stones would be a tolerance deep in each other.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from survey.geometry._kernels.adjacency import face_planes
+from survey.geometry.adjacency import Polyhedra
+from survey.geometry.solids import Solid, area_vector
+from survey.joints.snapping._kernels import matching_faces, near_pairs
+
+__all__ = ["Match", "common_planes", "find_matches"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Match:
+    """Faces of two solids that lie in one plane but for a tolerance.
+
+    Attributes
+    ----------
+    faces : numbers of the two, counted through all solids
+    solids : numbers of the two
+    spread : how far their corners lie from that plane [m]
+    area : that they share [m²]; 0 if they meet at a seam alone
+    """
+
+    faces: tuple[int, int]
+    solids: tuple[int, int]
+    spread: float
+    area: float
+
+
+def find_matches(solids: Sequence[Solid], tolerance: float) -> tuple[Match, ...]:
+    """Find the faces that match, those that do so best first, and seams last.
+
+    Parameters
+    ----------
+    solids : closed
+    tolerance : within which the corners of both faces lie in one plane [m]; faces that are twice as far apart match
+    """
+    all_ = Polyhedra.gather((one.vertices, one.faces) for one in solids)
+    local = np.ascontiguousarray(all_.vertices - all_.vertices.min(axis=0))
+    planes = face_planes(local, all_.corners, all_.face_starts)
+    starts = all_.solid_starts[:-1]
+    boxes = np.column_stack(
+        [
+            np.minimum.reduceat(planes[2][:, :3], starts, axis=0),
+            np.maximum.reduceat(planes[2][:, 3:], starts, axis=0),
+        ]
+    )
+    order, margin = np.argsort(boxes[:, 0], kind="stable"), 2.0 * tolerance
+    pairs = np.empty((near_pairs(boxes, order, margin, np.empty((0, 2), np.int64)), 2), np.int64)
+    near_pairs(boxes, order, margin, pairs)
+    solid = (local, all_.corners, all_.face_starts, all_.solid_starts)
+    count = matching_faces(pairs, solid, planes, tolerance, np.empty((0, 2), np.int64), np.empty((0, 2)))
+    faces, measures = np.empty((count, 2), np.int64), np.empty((count, 2))
+    matching_faces(pairs, solid, planes, tolerance, faces, measures)
+    owner = np.searchsorted(all_.solid_starts, faces, side="right") - 1
+    spread, area = measures.T
+    ranked = np.lexsort((faces[:, 1], faces[:, 0], -area, np.round(spread / tolerance, 3), area <= 0.0))
+    return tuple(
+        Match(
+            (int(faces[k, 0]), int(faces[k, 1])),
+            (int(owner[k, 0]), int(owner[k, 1])),
+            float(spread[k]),
+            max(float(area[k]), 0.0),
+        )
+        for k in ranked
+    )
+
+
+@dataclass
+class _Plane:
+    """Faces that are to lie in one plane: their corners, and which way each stone looks at it."""
+
+    corners: Array
+    looks: dict[int, Array]
+
+    def joined(self, other: "_Plane") -> "_Plane":
+        return _Plane(np.concatenate([self.corners, other.corners]), {**other.looks, **self.looks})
+
+    def flattens(self, other: "_Plane") -> bool:
+        """Whether a stone would have both its sides in the plane."""
+        both = self.looks.keys() & other.looks.keys()
+        return any(float(self.looks[one] @ other.looks[one]) < 0.0 for one in both)
+
+
+def common_planes(
+    corners: Sequence[Array], owner: Sequence[int], matches: Sequence[Match], tolerance: float
+) -> tuple[list[int], list[Match]]:
+    """Join matching faces to planes, as long as the corners of all of a plane lie in it.
+
+    Parameters
+    ----------
+    corners : (n, 3) of each face [m]
+    owner : number of its solid
+    matches : in the order in which they are to be joined
+    tolerance : within which corners lie in a plane [m]
+
+    Returns
+    -------
+    for each face a face by which its plane is known: itself if it matches none; and the matches with a shared area
+    that could not be joined
+    """
+    root = list(range(len(corners)))
+    planes: dict[int, _Plane] = {}
+    apart: list[Match] = []
+    for match in matches:
+        for face in match.faces:
+            if face not in planes and root[face] == face:
+                planes[face] = _Plane(corners[face], {owner[face]: area_vector(corners[face])})
+        one, two = sorted(_find(root, face) for face in match.faces)
+        if one == two:
+            continue
+        both = planes[one].joined(planes[two])
+        if not planes[one].flattens(planes[two]) and _spread(both.corners) <= tolerance:
+            root[two] = one
+            planes[one] = both
+            del planes[two]
+        elif match.area > 0.0:
+            apart.append(match)
+    return [_find(root, face) for face in range(len(corners))], apart
+
+
+def _find(root: list[int], face: int) -> int:
+    while root[face] != face:
+        root[face] = root[root[face]]
+        face = root[face]
+    return face
+
+
+def _spread(places: Array) -> float:
+    """Half the extent of places across the plane that fits them best."""
+    centred = places - places.mean(axis=0)
+    normal = np.linalg.eigh(centred.T @ centred)[1][:, 0]
+    heights = centred @ normal
+    return 0.5 * float(heights.max() - heights.min())

@@ -1,0 +1,186 @@
+"""Solids whose coordinates were rounded: faces of neighbours that match but for a tolerance come to lie in one plane.
+
+Which faces belong together is found first (`survey.joints.snapping.matching_faces`); then corners and planes are
+moved together (`survey.geometry.plane_network`), each stone keeping its corners, edges and faces, all faces of which
+become plane to the last digit. Where a corner would have to move farther than the tolerance, what ties it is let go,
+one thing after the other until it stays: first corners of folds (`survey.joints.snapping.meeting_corners`) and planes
+that are common only at a seam, then the planeness of a free face, which is folded, and last the contact itself, which
+is left open and listed.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from survey.geometry.folds import fold
+from survey.geometry.plane_network import Settled, settle
+from survey.geometry.solids import Solid
+from survey.joints.snapping.matching_faces import Match, common_planes, find_matches
+from survey.joints.snapping.meeting_corners import meeting_corners
+from survey.records.snapping import OpenContact, Snapping
+
+__all__ = ["snap"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Polygon = tuple[int, ...]
+
+_EXACT = 1e-12  # of the size of all: farther from its planes no corner may stay
+
+
+def snap(solids: Sequence[Solid], tolerance: float) -> tuple[tuple[Solid, ...], Snapping]:
+    """Bring matching faces of solids into common planes.
+
+    Parameters
+    ----------
+    solids : closed, their faces plane within the tolerance
+    tolerance : farther than this no corner moves, and faces that are farther out of one plane do not match [m]
+
+    Returns
+    -------
+    the solids, with the same corners in the same order, and what was changed
+    """
+    assembly = _Assembly(solids, tolerance)
+    assembly.settle()
+    return assembly.solids(), assembly.report()
+
+
+class _Assembly:
+    """All solids with their corners and faces numbered through, and what ties them."""
+
+    def __init__(self, solids: Sequence[Solid], tolerance: float) -> None:
+        self._given, self._tolerance = solids, tolerance
+        starts = np.cumsum([0, *(len(one.vertices) for one in solids)])
+        self._starts = starts
+        self._vertices = np.concatenate([one.vertices for one in solids])
+        self._size = float(np.abs(self._vertices - self._vertices.mean(axis=0)).max())
+        self._faces: list[Polygon] = [
+            tuple(int(starts[k]) + i for i in face) for k, one in enumerate(solids) for face in one.faces
+        ]
+        self._owner = [k for k, one in enumerate(solids) for _ in one.faces]
+        self._folded: Counter[int] = Counter()
+        self._gone: set[int] = set()  # faces that were folded: their pieces follow at the end
+        self._matches = list(find_matches(solids, tolerance))
+        touching = {k for one in self._matches if one.area > 0.0 for k in one.faces}
+        self._folds = meeting_corners(solids, touching, 2.0 * tolerance)
+        self._open: list[tuple[Match, str]] = []
+        self._plane: list[int] = []
+        self._settled = Settled(self._vertices, np.empty((0, 3)), np.empty(0))
+
+    def settle(self) -> None:
+        """Move corners onto their planes; let go what would move one too far."""
+        while True:  # each round lets go of something, and triangles on their own stay where they are
+            self._join()
+            corner, plane = self._incidences()
+            if not len(corner):
+                return
+            self._settled = settle(self._vertices, corner, plane)
+            moved = np.linalg.norm(self._settled.vertices - self._vertices, axis=1)
+            np.maximum.at(moved, corner[np.abs(self._settled.residual) > _EXACT * self._size], np.inf)
+            if moved.max() <= self._tolerance:
+                return
+            self._let_go(moved)
+
+    def _join(self) -> None:
+        """Give each face its plane."""
+        corners = [self._vertices[list(face)] for face in self._faces]
+        self._plane, apart = common_planes(corners, self._owner, self._matches, self._tolerance)
+        for match in apart:
+            self._matches.remove(match)
+            self._open.append((match, "others that share their planes are too far from a common one"))
+
+    def _incidences(self) -> tuple[Ints, Ints]:
+        """Which corner lies on which plane; a triangle of its own has no need of one."""
+        count = Counter(self._plane[k] for k in self._present())
+        planes: dict[int, set[int]] = {}
+        for k in self._present():
+            if len(self._faces[k]) > 3 or count[self._plane[k]] > 1:
+                for i in self._faces[k]:
+                    planes.setdefault(i, set()).add(self._plane[k])
+        for i, others in self._folds.items():
+            planes[i] |= {p for j in others for p in planes.get(j, ()) if count[p] > 1}
+        known: dict[int, int] = {}
+        rows = [(i, known.setdefault(p, len(known))) for i in sorted(planes) for p in sorted(planes[i])]
+        table = np.array(rows, dtype=np.int64).reshape(-1, 2)
+        return table[:, 0], table[:, 1]
+
+    def _present(self) -> Iterator[int]:
+        return (k for k in range(len(self._faces)) if k not in self._gone)
+
+    def _let_go(self, moved: Array) -> None:
+        """At the corners that move too far, one tie each; of corners with a common plane only the worst."""
+        at: dict[int, list[int]] = {}
+        for k in self._present():
+            for i in self._faces[k]:
+                at.setdefault(i, []).append(k)
+        touched: set[int] = set()
+        for i in np.argsort(-moved, kind="stable").tolist():
+            if moved[i] <= self._tolerance:
+                return
+            planes = {self._plane[k] for k in at[i]}
+            if not planes & touched:
+                touched |= planes
+                self._loosen(i, at[i], planes, float(moved[i]))
+
+    def _loosen(self, corner: int, faces: list[int], planes: set[int], moved: float) -> None:
+        turned = {i for k in self._present() if self._plane[k] in planes for i in self._faces[k]}
+        folds = {corner} & self._folds.keys() or turned & self._folds.keys()
+        if folds:
+            self._folds = {i: others for i, others in self._folds.items() if i not in folds}
+            return
+        seams = [one for one in self._matches if not one.area > 0.0 and self._plane[one.faces[0]] in planes]
+        if seams:
+            self._matches = [one for one in self._matches if one not in seams]
+            return
+        tied = {k for one in self._matches for k in one.faces}
+        free = [k for k in faces if k not in tied and len(self._faces[k]) > 3]
+        if free:
+            self._fold(max(free, key=lambda k: len(self._faces[k])))
+            return
+        own = [one for one in self._matches if set(one.faces) & set(faces)]
+        worst = max(own, key=lambda one: one.spread)
+        self._matches.remove(worst)
+        self._open.append((worst, f"it would move a corner by {moved:.3g} m"))
+
+    def _fold(self, face: int) -> None:
+        pieces = fold(self._vertices, self._faces[face], -1.0)
+        self._gone.add(face)
+        self._faces += pieces
+        self._owner += [self._owner[face]] * len(pieces)
+        self._plane += [-1] * len(pieces)  # until all get their planes anew
+        self._folded[self._owner[face]] += 1
+
+    def solids(self) -> tuple[Solid, ...]:
+        """The solids as they are now."""
+        faces: list[list[Polygon]] = [[] for _ in self._given]
+        for k in self._present():
+            owner = self._owner[k]
+            faces[owner].append(tuple(i - int(self._starts[owner]) for i in self._faces[k]))
+        return tuple(
+            replace(one, vertices=self._settled.vertices[start:stop].copy(), faces=tuple(faces[k]))
+            for k, (one, start, stop) in enumerate(
+                zip(self._given, self._starts[:-1], self._starts[1:], strict=True)
+            )
+        )
+
+    def report(self) -> Snapping:
+        """What was changed."""
+        moved = np.linalg.norm(self._settled.vertices - self._vertices, axis=1)
+        shared = {self._plane[one.faces[0]] for one in self._matches if one.area > 0.0}
+        return Snapping(
+            self._tolerance,
+            sum(one.area > 0.0 for one in self._matches),
+            len(shared),
+            {
+                one.code: float(moved[start:stop].max())
+                for one, start, stop in zip(self._given, self._starts[:-1], self._starts[1:], strict=True)
+            },
+            {self._given[k].code: count for k, count in sorted(self._folded.items())},
+            tuple(
+                OpenContact((self._given[one.solids[0]].code, self._given[one.solids[1]].code), one.area, why)
+                for one, why in self._open
+            ),
+        )

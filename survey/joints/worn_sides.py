@@ -1,0 +1,117 @@
+"""Sides that touch no stone and whose corner is worn: the foot of a wall, its end, a reveal, an intrados.
+
+The measured corner lies back from where the stone's was, so that the plane through it is not the stone's. If three
+sound corners are left they tell the plane. Else the side is led to the nearest corner of a neighbour, as at the foot of
+an arch; where there is none, neighbours that continue the side tell its plane; and where there are none either, it is
+made parallel to the opposite side, if it is about so.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from survey.geometry.solids import Solid
+from survey.joints.contact_planes import StoneFaces
+
+__all__ = ["mended_planes"]
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+_ALIKE = 0.985  # cosine of 10°
+_NEAR = 0.03  # metres by which a neighbour's corner may be off a side that it continues
+
+
+def mended_planes(
+    faces: StoneFaces,
+    rows: Array,
+    free: Bools,
+    neighbours: NDArray[np.int64],
+    solids: Sequence[Solid],
+    reach: float,
+) -> Array:
+    """Planes of all faces, those of free sides with worn corners mended.
+
+    Parameters
+    ----------
+    faces : of all stones
+    rows : (nf, 4) their planes as measured
+    free : (nf,) which of them belong to no joint
+    neighbours : (n, 2) pairs of stones that share a joint
+    solids : all stones, their joints closed as far as is known
+    reach : of a worn corner to that of a neighbour [m]
+    """
+    worn = np.add.reduceat(~faces.sound[faces.solids.corners], faces.solids.face_starts[:-1]) > 0
+    beside: dict[int, list[int]] = {}
+    for one, two in neighbours.tolist():
+        beside.setdefault(one, []).append(two)
+        beside.setdefault(two, []).append(one)
+    out = rows.copy()
+    for face in np.flatnonzero(worn & free & ~faces.kept).tolist():
+        near = sorted(set(beside.get(int(faces.planes.owner[face]), [])))
+        points = _sound(faces, face)
+        if len(points) not in (1, 2):  # three tell the plane as it was measured, and without any nothing does
+            continue
+        points = np.vstack([points, _nearest(faces, face, [solids[i].vertices for i in near], reach)])
+        if _through(points, rows[face]) is None:
+            points = np.vstack([points, _continuing(faces, rows, free, face, near)])
+        mended = _through(points, rows[face])
+        if mended is None:
+            mended = _parallel(faces, rows, face, points)
+        if mended is not None:
+            out[face] = mended
+    return out
+
+
+def _continuing(faces: StoneFaces, rows: Array, free: Bools, face: int, beside: list[int]) -> Array:
+    """Sound corners (n, 3) of free sides of neighbours in the plane of a side's own sound corners."""
+    own, starts = _sound(faces, face), faces.solids.solid_starts
+    found = [np.zeros((0, 3))]
+    for stone in beside:
+        for other in range(int(starts[stone]), int(starts[stone + 1])):
+            alike = free[other] and rows[other, :3] @ rows[face, :3] > _ALIKE
+            if alike and np.abs(own @ rows[other, :3] - rows[other, 3]).max() <= _NEAR:
+                found.append(_sound(faces, other))
+    return np.concatenate(found)
+
+
+def _nearest(faces: StoneFaces, face: int, beside: list[Array], reach: float) -> Array:
+    """The nearest corner (n, 3) of a neighbour to each worn one of a side."""
+    corners = faces.corners(face)
+    worn = faces.solids.vertices[corners[~faces.sound[corners]]]
+    known = np.concatenate([np.zeros((0, 3)), *beside])
+    if not len(known):
+        return known
+    apart = np.linalg.norm(worn[:, None] - known[None], axis=2)
+    out: Array = known[apart.argmin(axis=1)][apart.min(axis=1) <= reach]
+    return out
+
+
+def _parallel(faces: StoneFaces, rows: Array, face: int, points: Array) -> Array | None:
+    """The plane through points that is parallel to the opposite side, if that is about so."""
+    stone, starts = int(faces.planes.owner[face]), faces.solids.solid_starts
+    mine = rows[int(starts[stone]) : int(starts[stone + 1])]
+    opposite = mine[int((mine[:, :3] @ rows[face, :3]).argmin()), :3]
+    if -(opposite @ rows[face, :3]) < _ALIKE:
+        return None
+    return np.array([*-opposite, float(-(points @ opposite).mean())])
+
+
+def _sound(faces: StoneFaces, face: int) -> Array:
+    """Sound corners (n, 3) of a face."""
+    corners = faces.corners(face)
+    out: Array = faces.solids.vertices[corners[faces.sound[corners]]]
+    return out
+
+
+def _through(points: Array, like: Array) -> Array | None:
+    """Least-squares plane of points that spread in two directions, facing like another plane; else None."""
+    if len(points) < 3:
+        return None
+    centre = points.mean(axis=0)
+    _, spread, axes = np.linalg.svd(points - centre, full_matrices=False)
+    if spread[1] < 0.2 * spread[0]:
+        return None
+    normal = axes[2] if axes[2] @ like[:3] > 0.0 else -axes[2]
+    return np.array([*normal, float(normal @ centre)])

@@ -1,0 +1,1 @@
+"""The survey report: precision, courses, contradictions, points to measure again."""

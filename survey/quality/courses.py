@@ -1,0 +1,320 @@
+"""Deformation of courses: how far their bed lines are from level and from straight, and how well that is known.
+
+The bed line of a course is drawn through the lower corners of its stones: z against the distance s along the
+facade. The corners of one stone are not independent witnesses of the course, since its bed lies a little high
+or low as a whole; least squares that took them so would promise too much by up to √2. So the beds' own scatter
+is estimated with the line (`survey.quality.bed_fit`). Slope and sag are tested with Student's t and the number of
+stones, not of corners. Courses of fewer than five stones borrow the scatter of the others.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtr
+
+from survey.quality.bed_fit import BedCorners, BedScatter, fit_bed, pool, scatter_of
+from survey.quality.facades import Facade
+from survey.quality.precision import StoneQuality
+from survey.quality.walls import WallPlane
+
+__all__ = [
+    "ENOUGH",
+    "SIGNIFICANT",
+    "CourseHeight",
+    "CourseLine",
+    "course_heights",
+    "lower_corners",
+    "measure_courses",
+]
+
+Array = NDArray[np.float64]
+
+ENOUGH = 5
+"""Stones from which the scatter of a course's beds can be estimated: with fewer, τ is uncertain by half."""
+
+SIGNIFICANT = 0.01
+"""A slope or sag that chance would exceed less often than this is called one."""
+
+_LEVEL = math.tan(math.radians(30.0))  # a lower side steeper than this is a worn or bevelled corner, no bed
+
+
+@dataclass(frozen=True)
+class CourseLine:
+    """The bed line of one course on one facade.
+
+    Attributes
+    ----------
+    facade, zone, course : where it is
+    stones : codes of its stones that have a bed, in order along the wall
+    codes : (n,) stone of each corner
+    along : (n,) place of each corner along the facade, to the right of the viewer [m]
+    height : (n,) its z [m]
+    sigma : (n,) standard deviation of its z as measured [m]
+    left_out : lower corners that do not count: worn, or of unknown precision
+    middle : half-way between the ends, along the facade [m]
+    level : z of the line there [m]; it and `slope` have the covariance
+    slope : rise to the right over length [-]; None if one corner alone is left
+    covariance : (2, 2) of level [m] and slope [-], in the frame of the survey
+    frame_sigma : standard deviation of a slope that comes from the frame itself, common to all courses [-]
+    slope_probability : that chance alone makes such a slope in a level course; None if the scatter of beds is
+        not known
+    sag : height of mid-span above the chord of the best parabola, negative where it sags [m]; None with fewer
+        than five stones
+    sag_sigma : its standard deviation [m]
+    sag_probability : that chance alone makes such a sag in a straight course
+    deviations : (n,) of the corners from the straight line, upwards [m]
+    rms : of the deviations [m]
+    scatter : τ, standard deviation of a stone's bed about the line [m]
+    roughness : κ, how much more than measured the corners of one stone scatter [-]
+    evidence : where τ and κ come from: "own", "other courses", or "none" if both are unknown
+    """
+
+    facade: str
+    zone: str | None
+    course: int
+    stones: tuple[str, ...]
+    codes: tuple[str, ...]
+    along: Array
+    height: Array
+    sigma: Array
+    left_out: int
+    middle: float
+    level: float
+    slope: float | None
+    covariance: Array
+    frame_sigma: float
+    slope_probability: float | None
+    sag: float | None
+    sag_sigma: float | None
+    sag_probability: float | None
+    deviations: Array
+    rms: float
+    scatter: float
+    roughness: float
+    evidence: str
+
+    @property
+    def slope_sigma(self) -> float | None:
+        """Standard deviation of the slope against level, that of the frame included [-]."""
+        return None if self.slope is None else math.hypot(math.sqrt(self.covariance[1, 1]), self.frame_sigma)
+
+    @property
+    def span(self) -> float:
+        """Distance of its first from its last corner [m]."""
+        return float(self.along[-1] - self.along[0])
+
+    @property
+    def worst(self) -> tuple[str, float]:
+        """Stone with the corner farthest from the line, and how far that is [m]."""
+        i = int(np.abs(self.deviations).argmax())
+        return self.codes[i], float(self.deviations[i])
+
+    @property
+    def finding(self) -> str:
+        """What the numbers mean, in words."""
+        if self.slope is None:
+            return "not determined: one corner is left"
+        if self.slope_probability is None:
+            return "not tested: too few stones to know the scatter of beds"
+        said = []
+        if self.slope_probability < SIGNIFICANT:
+            said.append(f"{'rises' if self.slope > 0.0 else 'falls'} to the right")
+        if self.sag is not None and self.sag_probability is not None and self.sag_probability < SIGNIFICANT:
+            said.append("hogs" if self.sag > 0.0 else "sags")
+        return " and ".join(said) or ("level and straight" if self.sag is not None else "level")
+
+
+@dataclass(frozen=True)
+class CourseHeight:
+    """From the bed of a course to that of the next.
+
+    Attributes
+    ----------
+    facade, zone, course : of the lower course
+    along : where along the facade it is taken: the middle of what the two courses share [m]
+    height : with its bed joint [m]
+    sigma : standard deviation [m]
+    """
+
+    facade: str
+    zone: str | None
+    course: int
+    along: float
+    height: float
+    sigma: float
+
+
+@dataclass(frozen=True)
+class _Course:
+    """The lower corners of one course, and whose they are."""
+
+    facade: str
+    zone: str | None
+    course: int
+    codes: tuple[str, ...]
+    left_out: int
+    bed: BedCorners
+    frame_sigma: float
+
+
+def measure_courses(
+    stones: Sequence[StoneQuality], facades: Iterable[Facade], tilts: Sequence[Array] = ()
+) -> tuple[CourseLine, ...]:
+    """Fit the bed line of every course of every standing facade.
+
+    Parameters
+    ----------
+    stones : all stones of the survey
+    facades : which stones face one way; level ones have no bed lines
+    tilts : (3, 3) covariances of small rotations about x, y and z with which the frames of the survey were
+        levelled by control points [rad²], of which the worst holds; none: the instrument levelled itself
+
+    Returns
+    -------
+    One line per facade, zone and course that has any sound lower corner, in that order
+    """
+    standing = [facade for facade in facades if facade.azimuth is not None]
+    courses = [one for facade in standing for one in _courses(stones, facade, _tilt(facade, tilts))]
+    own = {k: scatter_of(one.bed, 2) for k, one in enumerate(courses) if one.bed.count >= ENOUGH}
+    pooled = pool(list(own.values()))
+    return tuple(_line(one, own.get(k), pooled) for k, one in enumerate(courses))
+
+
+def course_heights(lines: Sequence[CourseLine]) -> tuple[CourseHeight, ...]:
+    """Height of every course whose next one lies above part of it."""
+    found = []
+    by_place = {(line.facade, line.zone, line.course): line for line in lines}
+    for (facade, zone, course), line in by_place.items():
+        above = by_place.get((facade, zone, course + 1))
+        if above is None or line.slope is None or above.slope is None:
+            continue
+        left, right = max(line.along[0], above.along[0]), min(line.along[-1], above.along[-1])
+        if left >= right:
+            continue
+        place = float(left + right) / 2.0
+        (low, low_variance), (high, high_variance) = (_at(one, place) for one in (line, above))
+        sigma = math.sqrt(low_variance + high_variance)
+        found.append(CourseHeight(facade, zone, course, place, high - low, sigma))
+    return tuple(found)
+
+
+def lower_corners(outline: Array, frame: WallPlane) -> list[int]:
+    """Indices of the corners of a face on which it is bedded: the ends of its lower, nearly level sides.
+
+    Parameters
+    ----------
+    outline : (nv, 3) counter-clockwise seen from outside [m]
+    frame : elevation of the facade
+    """
+    flat = frame.flatten(outline)
+    run = np.roll(flat, -1, axis=0) - flat
+    # counter-clockwise, the lower sides run to the right
+    bedded = (run[:, 0] > 0.0) & (np.abs(run[:, 1]) <= _LEVEL * run[:, 0])
+    return sorted({k for i in np.flatnonzero(bedded).tolist() for k in (i, (i + 1) % len(flat))})
+
+
+def _tilt(facade: Facade, tilts: Sequence[Array]) -> float:
+    """Standard deviation of a slope along a facade: the rotation ω raises s·u by (ω × u)_z s."""
+    along = facade.frame.axes[0]
+    lever = np.array([along[1], -along[0], 0.0])
+    return max((math.sqrt(float(lever @ one @ lever)) for one in tilts), default=0.0)
+
+
+def _courses(stones: Sequence[StoneQuality], facade: Facade, frame_sigma: float) -> list[_Course]:
+    """Lower corners of a facade, by zone and course."""
+    groups: dict[tuple[str, int], list[StoneQuality]] = {}
+    for i in facade.members.tolist():
+        course = stones[i].course
+        if course is not None:
+            groups.setdefault((stones[i].zone or "", course), []).append(stones[i])
+    courses = [_course(groups[key], facade, frame_sigma) for key in sorted(groups)]
+    return [one for one in courses if one is not None]
+
+
+def _course(stones: Sequence[StoneQuality], facade: Facade, frame_sigma: float) -> _Course | None:
+    codes: list[str] = []
+    parts: list[Array] = []
+    left_out = 0
+    for stone in stones:
+        lower = lower_corners(stone.outline, facade.frame)
+        known = np.isfinite(stone.corner_sigma[:, 2])
+        sound = [k for k in lower if k not in stone.worn_corners and known[k]]
+        left_out += len(lower) - len(sound)
+        along = (stone.outline[sound] - facade.frame.origin) @ facade.frame.axes[0]
+        parts.append(np.column_stack([along, stone.outline[sound, 2], stone.corner_sigma[sound, 2]]))
+        codes += [stone.code] * len(sound)
+    if not codes:
+        return None
+    table = np.concatenate(parts)
+    order = np.argsort(table[:, 0], kind="stable")
+    names = [codes[i] for i in order.tolist()]
+    number = {code: k for k, code in enumerate(dict.fromkeys(names))}
+    course = stones[0].course
+    assert course is not None
+    numbers = np.array([number[code] for code in names], dtype=np.intp)
+    along, height, sigma = (np.ascontiguousarray(column) for column in table[order].T)
+    bed = BedCorners(numbers, along, height, sigma)
+    return _Course(facade.name, stones[0].zone, course, tuple(names), left_out, bed, frame_sigma)
+
+
+def _line(course: _Course, own: BedScatter | None, pooled: BedScatter | None) -> CourseLine:
+    bed = course.bed
+    evidence = "own" if own else "other courses" if pooled else "none"
+    scatter = own or pooled or BedScatter(0.0, 1.0, 0)
+    sloped = bed.along[-1] > bed.along[0]
+    values, covariance = fit_bed(bed, scatter, 2 if sloped else 1)
+    slope = float(values[1]) if sloped else None
+    if not sloped:
+        covariance = np.array([[covariance[0, 0], 0.0], [0.0, math.nan]])
+    deviations = bed.height - values[0] - (slope or 0.0) * (bed.along - bed.middle)
+    sag = _sag(bed) if own and sloped else (None, None, None)
+    return CourseLine(
+        facade=course.facade,
+        zone=course.zone,
+        course=course.course,
+        stones=tuple(dict.fromkeys(course.codes)),
+        codes=course.codes,
+        along=bed.along,
+        height=bed.height,
+        sigma=bed.sigma,
+        left_out=course.left_out,
+        middle=bed.middle,
+        level=float(values[0]),
+        slope=slope,
+        covariance=covariance,
+        frame_sigma=course.frame_sigma,
+        slope_probability=None
+        if slope is None
+        else _chance(slope, math.hypot(math.sqrt(covariance[1, 1]), course.frame_sigma), scatter.freedom),
+        sag=sag[0],
+        sag_sigma=sag[1],
+        sag_probability=sag[2],
+        deviations=deviations,
+        rms=math.sqrt(float((deviations**2).mean())),
+        scatter=scatter.tau,
+        roughness=scatter.kappa,
+        evidence=evidence,
+    )
+
+
+def _sag(bed: BedCorners) -> tuple[float, float, float | None]:
+    """Height of mid-span above the chord of the best parabola, -c (L/2)², its sigma and probability."""
+    scatter = scatter_of(bed, 3)
+    values, covariance = fit_bed(bed, scatter, 3)
+    lever = -(((bed.along[-1] - bed.along[0]) / 2.0) ** 2)
+    sag, sigma = float(lever * values[2]), float(-lever * math.sqrt(covariance[2, 2]))
+    return sag, sigma, _chance(sag, sigma, scatter.freedom)
+
+
+def _chance(value: float, sigma: float, freedom: int) -> float | None:
+    """Two-sided probability of Student's t."""
+    return float(2.0 * stdtr(freedom, -abs(value) / sigma)) if freedom > 0 else None
+
+
+def _at(line: CourseLine, place: float) -> tuple[float, float]:
+    """Height of a line at a place along the facade, and its variance."""
+    row = np.array([1.0, place - line.middle])
+    return line.level + (line.slope or 0.0) * float(row[1]), float(row @ line.covariance @ row)

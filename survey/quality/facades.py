@@ -1,0 +1,130 @@
+"""Facades: stones that face one way, and the elevation in which one draws them and measures along them."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from survey.quality.walls import WallPlane, upright_frame
+
+__all__ = ["LEVEL", "WIDEST", "Facade", "find_facades"]
+
+Array = NDArray[np.float64]
+
+WIDEST = 30.0
+"""How far a face may be turned from the mean of its facade [degrees]."""
+
+LEVEL = 45.0
+"""A face that looks up or down by more than this is of no facade: a floor, a soffit, a coping [degrees]."""
+
+_ROUNDS = 50  # until the mean direction and the stones it takes agree; three or four do as a rule
+
+
+@dataclass(frozen=True)
+class Facade:
+    """Stones that face one way.
+
+    A round tower falls into facades of up to 60° each; distances along them are measured on the mean plane of
+    each, which on an arc of ±30° are 5 % shorter than along the arc.
+
+    Attributes
+    ----------
+    name : "facade 1" is the largest; "faces up" and "faces down" are the level ones
+    members : (m,) indices of its stones, in the order given
+    frame : mean plane: along the facade (level, to the right of the viewer), up, outward
+    azimuth : direction it looks to, clockwise from the y axis of the survey's frame [degrees]; None if level
+    area : of its faces together [m²]
+    """
+
+    name: str
+    members: NDArray[np.intp]
+    frame: WallPlane
+    azimuth: float | None
+    area: float
+
+
+def find_facades(normals: Array, areas: Array, centroids: Array) -> tuple[Facade, ...]:
+    """Group faces by the direction in which they look.
+
+    The direction in which most area looks makes the first facade: all faces within 30° of its area-weighted
+    mean direction, in plan. What is left makes the next, and so on. Level faces stay apart.
+
+    Parameters
+    ----------
+    normals : (n, 3) unit outward normals [-]
+    areas : (n,) of the faces [m²]
+    centroids : (n, 3) of the faces [m]
+
+    Returns
+    -------
+    Facades, largest first, level ones last; every face belongs to one
+    """
+    if len(normals) == 0:
+        return ()
+    steep = np.degrees(np.arcsin(np.clip(normals[:, 2], -1.0, 1.0)))
+    standing = np.flatnonzero(np.abs(steep) <= LEVEL)
+    groups = sorted(_turns(normals, areas, standing), key=lambda rows: -float(areas[rows].sum()))
+    facades = [
+        _facade(f"facade {k}", rows, normals, areas, centroids) for k, rows in enumerate(groups, start=1)
+    ]
+    for name, rows in (
+        ("faces up", np.flatnonzero(steep > LEVEL)),
+        ("faces down", np.flatnonzero(steep < -LEVEL)),
+    ):
+        if len(rows):
+            facades.append(_facade(name, rows, normals, areas, centroids))
+    return tuple(facades)
+
+
+def _turns(normals: Array, areas: Array, standing: NDArray[np.intp]) -> Iterable[NDArray[np.intp]]:
+    """Split upright faces by their direction in plan."""
+    level = normals[:, :2] / np.maximum(np.linalg.norm(normals[:, :2], axis=1), 1e-300)[:, None]
+    left = standing
+    while len(left):
+        mine = _gather(level[left], areas[left])
+        yield left[mine]
+        left = left[~mine]
+
+
+def _gather(level: Array, areas: Array) -> NDArray[np.bool_]:
+    """Which of some plan directions, (n, 2), belong to the facade of the largest area."""
+    mean, mine = _peak(level, areas), np.ones(len(level), dtype=bool)
+    for count in range(_ROUNDS):
+        within = level @ mean >= np.cos(np.radians(WIDEST))
+        if count > _ROUNDS // 2:
+            within &= mine  # two faces that take turns in pushing each other out: let both go
+        if not within.any():
+            break
+        mean = areas[within] @ level[within]
+        mean /= max(float(np.linalg.norm(mean)), 1e-300)
+        if (within == mine).all():
+            break
+        mine = within
+    if not mine.any() or mine.all():
+        mine = level @ mean >= np.cos(np.radians(WIDEST))
+    if not mine.any():
+        mine[int(np.argmax(areas))] = True
+    return mine
+
+
+def _peak(level: Array, areas: Array) -> Array:
+    """The direction about which most area looks: a smoothed histogram in steps of a degree."""
+    angles = np.degrees(np.arctan2(level[:, 1], level[:, 0])) % 360.0
+    mass = np.bincount(angles.astype(np.int64) % 360, weights=areas, minlength=360)
+    offsets = np.arange(-180, 180)
+    window = np.where(np.abs(offsets) <= WIDEST, np.cos(np.radians(offsets)), 0.0)
+    around = np.fft.ifft(np.fft.fft(mass) * np.fft.fft(np.roll(window, -180))).real
+    best = np.radians(int(np.argmax(around)) + 0.5)
+    return np.array([np.cos(best), np.sin(best)])
+
+
+def _facade(name: str, rows: NDArray[np.intp], normals: Array, areas: Array, centroids: Array) -> Facade:
+    weights = areas[rows]
+    mean = weights @ normals[rows]
+    normal = mean / max(float(np.linalg.norm(mean)), 1e-300)
+    first = centroids[rows[0]]  # about a place of the facade: nothing is lost 10⁶ m from the origin
+    origin = first + weights @ (centroids[rows] - first) / weights.sum()
+    standing = name.startswith("facade")
+    azimuth = float(np.degrees(np.arctan2(normal[0], normal[1])) % 360.0) if standing else None
+    return Facade(name, rows, upright_frame(normal, origin), azimuth, float(weights.sum()))

@@ -1,0 +1,270 @@
+"""How well a survey was measured: each stone in a few numbers, and all of them together."""
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from statistics import NormalDist
+
+import numpy as np
+from numpy.typing import NDArray
+
+from survey.extrusion.extrusion import SurveyedBlock
+
+__all__ = ["Histogram", "StoneQuality", "SurveyQuality", "appraise", "judge_survey"]
+
+Array = NDArray[np.float64]
+
+_SIGNIFICANT = 3.0  # standard deviations beyond which sigma0 is not 1 by chance
+_TOLERANCE = 0.1  # relative: nobody states a sigma better than this, so a smaller error of it is none
+_NOTHING = "no stone has points of its own on its face: nothing was measured that could be judged"
+_REACH, _BIN = 5.0, 0.25  # of the histogram [standard deviations]; the end bins hold all beyond
+
+
+@dataclass(frozen=True, slots=True)
+class StoneQuality:
+    """What a report needs of one stone, without its points.
+
+    Attributes
+    ----------
+    code, kind, course, zone, line : as in the survey
+    source, provenance : how its face came to be known: "points", "photograph" or "solid", and in words
+    sigma : standard deviation of a coordinate, as stated [m]
+    points : measured points and corners together
+    rms : of the accepted residuals [m]
+    sigma0 : sqrt(Σ w r² / redundancy), 1 if the points are as precise as stated; None without redundancy
+    redundancy : accepted points minus 3
+    blunders : names of the points left out; "point 3" where the instrument gave none
+    worn : names of the corners that lie off the plane
+    shape, shape_text : verdict on one plane as its shape, in a word and in a sentence with numbers
+    tilt_sigma : of the less certain tilt of its plane [degrees]
+    offset_sigma : of its plane's height at its centroid [m]
+    depth, depth_sigma : [m]; None if not known
+    depth_source, depth_origin : the evidence in words, and its rank: "stone", "rule", "kind", "structure", or "none"
+    length, height : of its face, level and upwards [m]
+    dimension_sigma : standard deviation of each, as a difference of two corners [m]
+    area : of its face [m²]
+    skew : how far its middle lines are from square [rad]; None unless it has four corners
+    normal : (3,) outward [-]
+    outline : (nv, 3) corners of its face, counter-clockwise seen from outside [m]
+    corner_sigma : (nv, 3) their standard deviations along x, y and z [m]
+    worn_corners : indices of `outline` that lie off the plane
+    standardised : residuals of the accepted points and corners over their own standard deviation [-]
+    remarks : what was changed to make its outline a polygon, in words
+    """
+
+    code: str
+    kind: str
+    course: int | None
+    zone: str | None
+    line: int
+    source: str
+    provenance: str
+    sigma: float
+    points: int
+    rms: float
+    sigma0: float | None
+    redundancy: int
+    blunders: tuple[str, ...]
+    worn: tuple[str, ...]
+    shape: str
+    shape_text: str
+    tilt_sigma: float
+    offset_sigma: float
+    depth: float | None
+    depth_sigma: float | None
+    depth_source: str
+    depth_origin: str
+    length: float
+    height: float
+    dimension_sigma: float
+    area: float
+    skew: float | None
+    normal: Array
+    outline: Array
+    corner_sigma: Array
+    worn_corners: tuple[int, ...]
+    standardised: NDArray[np.float32]
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def measured(self) -> bool:
+        """Whether its plane is fitted to points of its own."""
+        return self.source == "points"
+
+
+@dataclass(frozen=True)
+class Histogram:
+    """How often standardised residuals fall where.
+
+    Attributes
+    ----------
+    edges : (bins + 1,) in standard deviations; the end bins hold what lies beyond too
+    counts : (bins,) residuals
+    expected : (bins,) of as many normal ones
+    """
+
+    edges: Array
+    counts: NDArray[np.int64]
+    expected: Array
+
+
+@dataclass(frozen=True)
+class SurveyQuality:
+    """All stones of a survey together.
+
+    Attributes
+    ----------
+    stones : how many were made
+    points, blunders, worn : points and corners measured, points left out, corners off their plane
+    redundancy : of all faces together
+    sigma0 : sqrt(Σ w r² / redundancy) of all faces; None without redundancy
+    sigma0_sigma : its standard deviation if the residuals are normal, 1 / sqrt(2 redundancy)
+    sigma : root mean square of the stated standard deviations [m]
+    verdict : whether the stated sigma is right, in words
+    rms : of all accepted residuals [m]
+    residuals : their histogram
+    kinds, shapes, depths, provenances : how many stones of each
+    """
+
+    stones: int
+    points: int
+    blunders: int
+    worn: int
+    redundancy: int
+    sigma0: float | None
+    sigma0_sigma: float | None
+    sigma: float
+    verdict: str
+    rms: float
+    residuals: Histogram
+    kinds: Mapping[str, int]
+    shapes: Mapping[str, int]
+    depths: Mapping[str, int]
+    provenances: Mapping[str, int]
+
+
+def appraise(block: SurveyedBlock) -> StoneQuality:
+    """Put what a report needs of a stone into few numbers."""
+    face, fit, record = block.face, block.face.fit, block.face.record
+    measured = face.provenance.source == "points"
+    corners = len(face.outline)
+    corner_sigma = block.vertex_sigma[:corners].copy()  # alone: the rest need not be kept
+    blunders, worn = _left_out(block) if measured else ((), ())
+    return StoneQuality(
+        code=block.code,
+        kind=block.kind,
+        course=block.course,
+        zone=record.zone,
+        line=record.line,
+        source=face.provenance.source,
+        provenance=face.provenance.text,
+        sigma=record.sigma,
+        points=len(record.points) + corners,
+        rms=fit.rms,
+        sigma0=fit.sigma0 if fit.redundancy > 0 and math.isfinite(fit.sigma0) else None,
+        redundancy=fit.redundancy,
+        blunders=blunders,
+        worn=worn,
+        shape=face.shape.kind.value,
+        shape_text=face.shape.text,
+        tilt_sigma=math.degrees(math.sqrt(max(fit.covariance[0, 0], fit.covariance[1, 1]))),
+        offset_sigma=math.sqrt(fit.covariance[2, 2]),
+        depth=block.depth.value,
+        depth_sigma=block.depth.sigma,
+        depth_source=block.depth.source,
+        depth_origin=block.depth.origin,
+        length=face.measures.length,
+        height=face.measures.height,
+        dimension_sigma=_dimension_sigma(block, corner_sigma),
+        area=face.measures.area,
+        skew=face.measures.skew,
+        normal=fit.normal.copy(),
+        outline=face.outline,
+        corner_sigma=corner_sigma,
+        worn_corners=face.rejected_vertices,
+        standardised=_standardised(block) if measured else np.empty(0, np.float32),
+        remarks=face.remarks,
+    )
+
+
+def _standardised(block: SurveyedBlock) -> NDArray[np.float32]:
+    """Standardised residuals of what the fit accepted and other points check."""
+    fit = block.face.fit
+    accepted = np.isfinite(fit.standardised)
+    accepted[list(fit.rejected)] = False
+    return fit.standardised[accepted].astype(np.float32)
+
+
+def _dimension_sigma(block: SurveyedBlock, corner_sigma: Array) -> float:
+    """Of the distance of two corners: √2 of that of one in the plane, which is what is not square to it."""
+    square = block.face.fit.height_sigma(block.face.outline) ** 2
+    level = ((corner_sigma**2).sum(axis=1) - square) / 2.0
+    return math.sqrt(2.0 * max(float(level.mean()), 0.0))
+
+
+def _left_out(block: SurveyedBlock) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of the rejected points, and of the rejected corners."""
+    record = block.face.record
+    count, rejected = len(record.points), block.face.fit.rejected
+
+    def name(index: int) -> str:
+        if record.names and record.names[index]:
+            return record.names[index]
+        return f"point {index + 1}" if index < count else f"corner {index - count + 1}"
+
+    return tuple(name(i) for i in rejected if i < count), tuple(name(i) for i in rejected if i >= count)
+
+
+def judge_survey(stones: Sequence[StoneQuality]) -> SurveyQuality:
+    """Sum up the stones of a survey; stones without points of their own count for no residual."""
+    own = [one for one in stones if one.measured]
+    squares = sum(one.redundancy * one.sigma0**2 for one in own if one.sigma0 is not None)
+    redundancy = sum(one.redundancy for one in own)
+    sigma0 = math.sqrt(squares / redundancy) if redundancy else None
+    error = 1.0 / math.sqrt(2.0 * redundancy) if redundancy else None
+    sigma = math.sqrt(sum(one.sigma**2 for one in own) / len(own)) if own else math.nan
+    counts = [one.redundancy + 3 for one in own]
+    total = sum(n * one.rms**2 for n, one in zip(counts, own, strict=True))
+    residuals = np.concatenate([one.standardised for one in own]) if own else np.empty(0, np.float32)
+    return SurveyQuality(
+        stones=len(stones),
+        points=sum(one.points for one in stones),
+        blunders=sum(len(one.blunders) for one in stones),
+        worn=sum(len(one.worn) for one in stones),
+        redundancy=redundancy,
+        sigma0=sigma0,
+        sigma0_sigma=error,
+        sigma=sigma,
+        verdict=_verdict(sigma0, error, sigma) if own or not stones else _NOTHING,
+        rms=math.sqrt(total / sum(counts)) if own else math.nan,
+        residuals=_histogram(residuals),
+        kinds=_count(one.kind for one in stones),
+        shapes=_count(one.shape for one in stones),
+        depths=_count(one.depth_origin for one in stones),
+        provenances=_count(one.source for one in stones),
+    )
+
+
+def _verdict(sigma0: float | None, error: float | None, sigma: float) -> str:
+    if sigma0 is None or error is None:
+        return "no face was measured by more than three points: nothing says how precise they are"
+    found = f"the points scatter {sigma0:.2f} ± {error:.2f} times as far as stated"
+    if abs(sigma0 - 1.0) <= max(_TOLERANCE, _SIGNIFICANT * error):
+        return f"the stated sigma is right: {found}"
+    better = f"{sigma0 * sigma * 1e3:.2g} mm would be right instead of {sigma * 1e3:.2g} mm"
+    if sigma0 > 1.0:
+        return f"the stated sigma is too small, or the faces are rough: {found}; {better}"
+    return f"the stated sigma is too large: {found}; {better}"
+
+
+def _histogram(residuals: NDArray[np.float32]) -> Histogram:
+    edges = np.linspace(-_REACH, _REACH, round(2 * _REACH / _BIN) + 1)
+    counts, _ = np.histogram(np.clip(residuals, -_REACH, _REACH), edges)
+    below = np.array([NormalDist().cdf(edge) for edge in edges])
+    below[0], below[-1] = 0.0, 1.0
+    return Histogram(edges, counts.astype(np.int64), len(residuals) * np.diff(below))
+
+
+def _count(values: Iterable[str]) -> dict[str, int]:
+    return dict(sorted(Counter(values).items()))

@@ -1,0 +1,345 @@
+"""What a survey file says, before anything is computed from it."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from moma.errors import MomaError, SurveyError
+from survey.records.snapping import Snapping
+
+__all__ = [
+    "OBSERVER",
+    "BlockRecord",
+    "Canon",
+    "ControlPoint",
+    "DepthRule",
+    "Extrusion",
+    "PhotoMark",
+    "Photograph",
+    "Reject",
+    "SolidRecord",
+    "Station",
+    "Survey",
+    "SurveyHead",
+    "SurveyStream",
+]
+
+Array = NDArray[np.float64]
+
+OBSERVER = "observer"
+"""Name of the station from which all stones were seen that do not name another."""
+
+
+@dataclass(frozen=True)
+class Station:
+    """Where an instrument, or the observer, stood.
+
+    Attributes
+    ----------
+    name : unique in its survey
+    position : (3,) [m]
+    line : line of the file, counted from 1
+    """
+
+    name: str
+    position: Array
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class ControlPoint:
+    """A point whose place is known in the frame of the survey and in that of the site.
+
+    Attributes
+    ----------
+    name : unique in its survey
+    measured : (3,) in the frame of the survey [m]
+    measured_sigma : standard deviation of each of its coordinates [m]
+    site : (3,) in the frame of the site [m]
+    site_sigma : standard deviation of each of its coordinates [m]
+    line : line of the file, counted from 1
+    """
+
+    name: str
+    measured: Array
+    measured_sigma: float
+    site: Array
+    site_sigma: float
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class PhotoMark:
+    """A point of the wall that is seen on a photograph and known in space.
+
+    Attributes
+    ----------
+    image : (2,) its place on the photograph, u to the right, v down or up alike [px]
+    position : (3,) in the frame of the survey [m]
+    sigma : standard deviation of each coordinate of `position` [m]
+    line : line of the file, counted from 1
+    """
+
+    image: Array
+    position: Array
+    sigma: float
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class Photograph:
+    """A photograph of a plane wall on which stones were measured.
+
+    Attributes
+    ----------
+    name : unique in its survey
+    sigma : standard deviation of a coordinate measured on it [px]
+    marks : what ties it to the wall, four or more
+    station : name of the station that it was taken from; None if not known
+    line : line of the file, counted from 1
+    """
+
+    name: str
+    sigma: float
+    marks: tuple[PhotoMark, ...]
+    station: str | None = None
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class DepthRule:
+    """How deep stones are that nobody measured.
+
+    Attributes
+    ----------
+    kind : the kind of stone; None for every stone of the structure
+    depth : [m]
+    sigma : standard deviation [m]; None if not known
+    source : the evidence, in words
+    line : line of the file, counted from 1
+    courses : first and last course that it holds for; None for all
+    zone : part of the building that it holds for; None for all
+    """
+
+    kind: str | None
+    depth: float
+    sigma: float | None
+    source: str
+    line: int = 0
+    courses: tuple[int, int] | None = None
+    zone: str | None = None
+
+
+@dataclass(frozen=True)
+class Canon:
+    """What archaeologists hold for the usual face of a kind of stone.
+
+    Attributes
+    ----------
+    kind : the kind of stone
+    length, height : of its face, level and upwards [m]
+    sigma : how much sound stones differ from it, standard deviation [m]
+    source : the evidence, in words
+    line : line of the file, counted from 1
+    """
+
+    kind: str
+    length: float
+    height: float
+    sigma: float
+    source: str
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class Extrusion:
+    """How the hidden side lies behind the face.
+
+    Attributes
+    ----------
+    direction : (3,) from the face into the wall, of any length; None: square to the face
+    tail : size of the hidden face over that of the visible one, 0 < tail ≤ 1 [-]
+    """
+
+    direction: Array | None = None
+    tail: float = 1.0
+
+
+@dataclass(frozen=True)
+class SurveyHead:
+    """What a survey file says of all its stones together.
+
+    Attributes
+    ----------
+    name : name of the survey
+    path : the file it was read from
+    stations : where instruments and observers stood
+    control : points known in the frame of the site too; none: the survey is in that frame
+    photographs : on which stones were measured
+    depth_rules : how deep stones are
+    canons : what archaeologists hold for the usual dimensions, at most one per kind
+    extrusion : of stones that do not say their own
+    """
+
+    name: str
+    path: str
+    stations: tuple[Station, ...] = ()
+    control: tuple[ControlPoint, ...] = ()
+    photographs: tuple[Photograph, ...] = ()
+    depth_rules: tuple[DepthRule, ...] = ()
+    canons: tuple[Canon, ...] = ()
+    extrusion: Extrusion = Extrusion()
+
+    def viewpoint(self, station: str | None) -> Array | None:
+        """Where a stone was seen from, (3,) [m]: its own station, else the observer, else the only station.
+
+        Raises
+        ------
+        SurveyError
+            if there is no station of that name
+        """
+        wanted = station or OBSERVER
+        for one in self.stations:
+            if one.name == wanted:
+                return one.position
+        if station is not None:
+            known = ", ".join(one.name for one in self.stations) or "none"
+            raise SurveyError(f"no station {station!r}", remedy=f"stations of this survey: {known}")
+        return self.stations[0].position if len(self.stations) == 1 else None
+
+
+@dataclass(frozen=True)
+class BlockRecord:
+    """One stone as it was measured.
+
+    Attributes
+    ----------
+    code : the stone's name, unique in its survey
+    kind : what sort of stone it is, e.g. "header"
+    course : number of its course, counted from the ground; None if it belongs to none
+    vertices : (nv, 3) corners of the visible face, in order around it, nv ≥ 3 [m]; none on a photograph
+    points : (np, 3) further points on the visible face [m]
+    sigma : standard deviation of one measured coordinate [m]; of those in `sigmas`, root mean square
+    depth : depth measured on this very stone [m]; None if it was not
+    depth_sigma : its standard deviation [m]; None if not known
+    depth_source : evidence for the depth; None if there is no depth
+    line : line of the file on which the record begins, counted from 1
+    notes : the surveyor's remarks, e.g. {"edge": "eroded"}
+    zone : part of the building, e.g. "north wall"; None if not said
+    station : name of the station that saw it; None if not said
+    photograph : name of the photograph that the corners were measured on; None: they were measured in space
+    image : (nv, 2) the corners on that photograph [px]
+    sigmas : (np + nv,) standard deviation of a coordinate of each point, then of each corner [m]; None: all
+        `sigma`
+    names : of each point, then of each corner, as the instrument numbers them; () if they have none
+    extrusion : how its hidden side lies; None: as the survey says
+    spans : lines of the file that it was read from
+    """
+
+    code: str
+    kind: str
+    course: int | None
+    vertices: Array
+    points: Array
+    sigma: float
+    depth: float | None = None
+    depth_sigma: float | None = None
+    depth_source: str | None = None
+    line: int = 0
+    notes: Mapping[str, str] = field(default_factory=dict)
+    zone: str | None = None
+    station: str | None = None
+    photograph: str | None = None
+    image: Array = field(default_factory=lambda: np.empty((0, 2)))
+    sigmas: Array | None = None
+    names: tuple[str, ...] = ()
+    extrusion: Extrusion | None = None
+    spans: tuple[range, ...] = ()
+
+    @property
+    def point_sigmas(self) -> Array:
+        """Standard deviation of a coordinate of each point, (np,) [m]."""
+        count = len(self.points)
+        return np.full(count, self.sigma) if self.sigmas is None else self.sigmas[:count]
+
+    @property
+    def vertex_sigmas(self) -> Array:
+        """Standard deviation of a coordinate of each corner, (nv,) [m]."""
+        if self.sigmas is None:
+            return np.full(len(self.vertices), self.sigma)
+        return self.sigmas[len(self.points) :]
+
+
+@dataclass(frozen=True)
+class SolidRecord:
+    """One closed stone as another program made it.
+
+    Attributes
+    ----------
+    code : the stone's name, unique in its file
+    kind : what sort of stone it is
+    course : number of its course; None if it belongs to none
+    vertices : (nv, 3) [m]
+    faces : vertex indices of each planar face, counter-clockwise seen from outside
+    line : line of the file on which it begins, counted from 1; 0 in a binary file
+    spans : lines of the file that it was read from
+    remarks : what was settled or moved to make it a solid with plane faces, in words
+    """
+
+    code: str
+    kind: str
+    course: int | None
+    vertices: Array
+    faces: tuple[tuple[int, ...], ...]
+    line: int = 0
+    spans: tuple[range, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Reject:
+    """What could not be read as a stone, and why.
+
+    Attributes
+    ----------
+    code : of the stone; None if not even that can be read
+    error : with the place and the remedy
+    spans : lines of the file that it was to be read from
+    """
+
+    code: str | None
+    error: MomaError
+    spans: tuple[range, ...] = ()
+
+
+@dataclass(frozen=True)
+class SurveyStream:
+    """A survey file that is being read: its head, and its stones one by one.
+
+    Attributes
+    ----------
+    head : what holds for all stones
+    blocks : the stones in the order of the file; a stone that is wrong comes as a Reject, a file that is
+        wrong as a whole raises SurveyError. To be gone through once.
+    snapping : of solids, what bringing their faces into common planes has changed; None if that was not asked for
+    """
+
+    head: SurveyHead
+    blocks: Iterator[BlockRecord | SolidRecord | Reject]
+    snapping: Snapping | None = None
+
+
+@dataclass(frozen=True)
+class Survey:
+    """The contents of one survey file.
+
+    Attributes
+    ----------
+    head : what holds for all stones
+    blocks : the stones, in the order of the file
+    """
+
+    head: SurveyHead
+    blocks: tuple[BlockRecord, ...]

@@ -1,0 +1,1 @@
+"""Transformation from survey frames and photographs to the site frame."""

@@ -1,0 +1,1 @@
+"""Simplification of a surveyed stone to a hexahedron, wedge or prism."""

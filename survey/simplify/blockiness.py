@@ -1,0 +1,102 @@
+"""What became of a solid: how far its corners moved, how square it is, and how much of it is a hexahedron."""
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from survey.geometry.solids import Solid
+from survey.simplify._kernels.blockiness import (
+    area_vectors,
+    common_volume,
+    edge_distances,
+    face_planes,
+    volume,
+    worst_angle,
+)
+
+__all__ = [
+    "about",
+    "common_share",
+    "face_vectors",
+    "from_edges",
+    "largest_skew",
+    "moved_corners",
+    "solid_planes",
+    "solid_volume",
+]
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+def about(solid: Solid, origin: Array) -> Solid:
+    """A solid with its places counted from an origin (3,) near to it, so that rounding is small."""
+    return Solid(solid.code, solid.vertices - origin, solid.faces)
+
+
+def solid_volume(solid: Solid) -> float:
+    """Volume [m³]; negative if the faces are seen from inside."""
+    return float(volume(*_arrays(solid)))
+
+
+def solid_planes(solid: Solid) -> Array:
+    """Planes (nf, 4) of the faces: unit normal outwards [-], distance from the origin [m]."""
+    planes: Array = face_planes(*_arrays(solid))
+    return planes
+
+
+def face_vectors(solid: Solid) -> Array:
+    """Area times outward normal of each face (nf, 3) [m²]."""
+    vectors: Array = area_vectors(*_arrays(solid))
+    return vectors
+
+
+def largest_skew(solid: Solid) -> float:
+    """Largest departure from a right angle of the angle, inside, between two neighbouring faces [degrees]."""
+    return float(np.degrees(worst_angle(*_arrays(solid))))
+
+
+def from_edges(points: Array, solid: Solid) -> Array:
+    """Distance of each point (n, 3) from the nearest edge of a solid, (n,) [m]."""
+    distances: Array = edge_distances(np.ascontiguousarray(points), *_arrays(solid))
+    return distances
+
+
+def moved_corners(old: Solid, new: Solid, left: Array) -> Array:
+    """How far each corner of a solid moved, (nv,) [m].
+
+    Parameters
+    ----------
+    old, new : before and after
+    left : (nv,) distance of each old corner from the new solid [m]
+
+    Returns
+    -------
+    that distance or, if larger, the distance from the old solid's edges of a new corner to which no other old corner
+    is nearer
+    """
+    out = left.copy()
+    gone = from_edges(new.vertices, old)
+    apart = np.linalg.norm(old.vertices[:, None, :] - new.vertices, axis=2)
+    for corner, nearest in enumerate(apart.argmin(axis=0).tolist()):
+        out[nearest] = max(out[nearest], gone[corner])
+    return out
+
+
+def common_share(solid: Solid, convex: Solid) -> float:
+    """Volume that a solid has in common with a convex one, over what the two fill together, 0 to 1 [-]."""
+    common = float(common_volume(*_arrays(solid), solid_planes(convex)))
+    share = common / (solid_volume(solid) + solid_volume(convex) - common)
+    return min(max(share, 0.0), 1.0)
+
+
+def _arrays(solid: Solid) -> tuple[Array, Indices, Indices]:
+    return np.ascontiguousarray(solid.vertices), *_corners(solid.faces)
+
+
+@lru_cache(maxsize=1024)
+def _corners(faces: tuple[tuple[int, ...], ...]) -> tuple[Indices, Indices]:
+    """The corners of all faces one after the other, and where each face begins."""
+    corners = np.array([i for face in faces for i in face], dtype=np.int64)
+    return corners, np.cumsum([0, *(len(face) for face in faces)], dtype=np.int64)

@@ -1,0 +1,148 @@
+"""Solids of other programs with faces that are plane to the last digit, and no more of them than there are planes.
+
+Meshes cut a plane face in two, or into triangles, and coordinates rounded to a millimetre bend it. Faces that share an
+edge and lie in one plane, within a tolerance, are one face here. A corner where three faces meet is put where their
+planes cross; corners where only one or two planes meet are none.
+"""
+
+from collections import defaultdict
+from collections.abc import Container
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from survey.geometry.solids import Solid
+from survey.simplify.blockiness import face_vectors, from_edges
+
+__all__ = ["FlatSolid", "flatten"]
+
+Array = NDArray[np.float64]
+Face = tuple[int, ...]
+
+_SAME_SIDE = 0.9  # cosine between normals, which are poor in thin triangles: heights decide
+_PLANE = 1e-13  # of a solid's size: what a corner that lies on its planes is beside them
+_SHALLOWEST = (
+    1e-4  # determinant of three unit normals, below which nothing is said of where their planes cross
+)
+
+
+@dataclass(frozen=True)
+class FlatSolid:
+    """A solid whose faces are plane.
+
+    Attributes
+    ----------
+    solid : with one face for each plane
+    moved : (nv,) distance of each corner of the old solid from the nearest edge of the new one; of a corner in
+        the middle of a plane, from that plane [m]
+    """
+
+    solid: Solid
+    moved: Array
+
+
+def flatten(solid: Solid, tolerance: float) -> FlatSolid | None:
+    """Give a solid plane faces, one for each plane.
+
+    Parameters
+    ----------
+    solid : closed, seen from outside, near the origin
+    tolerance : by which a corner may lie beside the plane of its face, and by which it may move [m]
+
+    Returns
+    -------
+    FlatSolid; None if no such solid is within the tolerance, a face has a hole, or more than three planes meet
+    in one corner
+    """
+    vectors = face_vectors(solid)
+    groups = _plane_groups(solid, vectors, tolerance)
+    around: dict[int, list[int]] = defaultdict(list)
+    for number, group in enumerate(groups):
+        for i in sorted({i for face in group for i in solid.faces[face]}):
+            around[i].append(number)
+    corners = [i for i in sorted(around) if len(around[i]) > 2]
+    loops = [_outline([solid.faces[face] for face in group]) for group in groups]
+    if not corners or any(len(around[i]) > 3 for i in corners):
+        return None
+    place = {i: k for k, i in enumerate(corners)}
+    faces = [tuple(place[i] for i in loop if i in place) for loop in loops if loop is not None]
+    if len(faces) < len(groups) or min(len(face) for face in faces) < 3:
+        return None
+    planes = np.array([_plane(solid, vectors, group, place) for group in groups])
+    vertices = _crossings(solid.vertices[corners], planes, [around[i] for i in corners])
+    if vertices is None or np.linalg.norm(vertices - solid.vertices[corners], axis=1).max() > tolerance:
+        return None
+    flat = Solid(solid.code, vertices, tuple(faces))
+    moved = from_edges(solid.vertices, flat)
+    for i in range(len(moved)):
+        if len(around[i]) == 1:
+            (plane,) = planes[around[i]]
+            moved[i] = abs(solid.vertices[i] @ plane[:3] - plane[3])
+        elif not around[i]:  # a corner of no face
+            moved[i] = 0.0
+    return FlatSolid(flat, moved) if moved.max() <= tolerance else None
+
+
+def _plane_groups(solid: Solid, vectors: Array, tolerance: float) -> list[list[int]]:
+    """Faces that share edges and lie in one plane, that of the largest of them."""
+    polygons = [solid.vertices[list(face)] for face in solid.faces]
+    areas = np.linalg.norm(vectors, axis=1)
+    normals = vectors / np.maximum(areas, 1e-300)[:, None]
+    owner = {edge: k for k, face in enumerate(solid.faces) for edge in _edges(face)}
+    groups: list[list[int]] = []
+    taken = [False] * len(polygons)
+    for seed in np.argsort(-areas, kind="stable").tolist():
+        if taken[seed]:
+            continue
+        taken[seed], group = True, [seed]
+        normal, origin = normals[seed], polygons[seed].mean(axis=0)
+        for k in group:
+            for p, q in _edges(solid.faces[k]):
+                other = owner.get((q, p), seed)
+                if taken[other] or (normals[other] @ normal < _SAME_SIDE and areas[other] > 0.0):
+                    continue
+                if np.abs((polygons[other] - origin) @ normal).max() <= tolerance:
+                    taken[other] = True
+                    group.append(other)
+        groups.append(group)
+    return groups
+
+
+def _edges(face: Face) -> list[tuple[int, int]]:
+    return [(face[k - 1], face[k]) for k in range(len(face))]
+
+
+def _outline(faces: list[Face]) -> Face | None:
+    """The one loop around faces that share edges; None if there are several, or it touches itself."""
+    if len(faces) == 1:
+        return faces[0]
+    inside = {edge for face in faces for edge in _edges(face)}
+    outer = [(p, q) for p, q in inside if (q, p) not in inside]
+    after = dict(outer)
+    if len(after) != len(outer) or not outer:
+        return None
+    start = min(after)
+    loop = [start]
+    while (following := after.get(loop[-1], start)) != start and len(loop) <= len(after):
+        loop.append(following)
+    return tuple(loop) if len(loop) == len(after) else None
+
+
+def _plane(solid: Solid, vectors: Array, group: list[int], corners: Container[int]) -> Array:
+    """Mean plane of the faces of a group: (4,) unit normal, and offset that is the mean of its corners'."""
+    vector = vectors[group].sum(axis=0)
+    normal = vector / max(float(np.linalg.norm(vector)), 1e-300)
+    own = sorted({i for k in group for i in solid.faces[k] if i in corners})
+    return np.append(normal, float((solid.vertices[own] @ normal).mean()) if own else 0.0)
+
+
+def _crossings(corners: Array, planes: Array, around: list[list[int]]) -> Array | None:
+    """Where the three planes around each corner cross, (n, 3); a corner that lies on all of them stays."""
+    three = planes[np.array(around)]
+    heights = np.einsum("nki,ni->nk", three[:, :, :3], corners) - three[:, :, 3]
+    if np.abs(np.linalg.det(three[:, :, :3])).min() < _SHALLOWEST:
+        return None
+    moved = corners - np.linalg.solve(three[:, :, :3], heights[:, :, None])[:, :, 0]
+    on_planes = np.abs(heights).max(axis=1) <= _PLANE * float(np.ptp(corners, axis=0).max())
+    return np.where(on_planes[:, None], corners, moved)

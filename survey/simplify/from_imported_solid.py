@@ -1,0 +1,134 @@
+"""Stones that came as closed solids: hexahedra, wedges and prisms where they are so but for rounding, else general."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from moma.errors import GeometryError
+from survey.extrusion.extrusion import SurveyedBlock
+from survey.geometry.folds import fold, warp
+from survey.geometry.plane_network import settle
+from survey.geometry.solids import Solid, highest_corner
+from survey.simplify.blockiness import about, common_share, largest_skew, moved_corners, solid_volume
+from survey.simplify.flattening import FlatSolid, flatten
+from survey.simplify.prisms import as_prism, box_around
+from survey.simplify.result import BlockShape, SimpleSolid, Simplified, prism_shape
+from survey.simplify.squaring import SimplifyBounds
+
+__all__ = ["simplify_solid"]
+
+Array = NDArray[np.float64]
+
+_PLANE = 5e-9  # metres: what rounding in a national grid bends a plane face
+_CONVEX = 1e-10  # of a stone's size: a corner above a face by less is on it
+_FLAT = 1e-12  # of the cube on a stone's length: a solid that encloses less is flat
+
+
+def simplify_solid(block: SurveyedBlock, bounds: SimplifyBounds) -> SimpleSolid:
+    """Simplify a stone that came as a solid; see `survey.simplify.simplify.simplify`."""
+    origin = block.solid.vertices.mean(axis=0)
+    old, tolerance = about(block.solid, origin), bounds.least_tolerance
+    _check_full(old)
+    found = flatten(old, tolerance)
+    new = (
+        None if found is None else _prism(found.solid, block.face.fit.normal, block.face.outline[0] - origin)
+    )
+    if found is not None and new is not None:
+        shape, reason = prism_shape(len(new.faces) - 2), _said(old, new, found)
+    else:
+        shape, new = BlockShape.POLYHEDRON, _general(old, tolerance)
+        reason = _why_general(old, new)
+    same = new is old
+    if found is None or shape is BlockShape.POLYHEDRON:
+        left = np.linalg.norm(new.vertices - old.vertices, axis=1)
+    else:
+        left = found.moved
+    hexahedron = new if shape is BlockShape.HEXAHEDRON else box_around(old, block.face.fit.normal)
+    report = Simplified(
+        displacement=left if same else moved_corners(old, new, left),
+        volume_change=0.0 if same else solid_volume(new) / solid_volume(old) - 1.0,
+        worst_angle=largest_skew(new),
+        blockiness=common_share(old, hexahedron),
+        tolerance=tolerance,
+        within=bool((left <= tolerance).all()),
+        reason=reason,
+    )
+    solid = block.solid if same else _placed(new, old, block.solid)
+    return SimpleSolid(solid, np.ones(len(solid.vertices), dtype=np.bool_), shape, report)
+
+
+def _check_full(solid: Solid) -> None:
+    volume = solid_volume(solid)
+    if not volume > _FLAT * _size(solid) ** 3:
+        raise GeometryError(
+            f"its faces enclose {volume:.3g} m³: it is flat, or seen from inside",
+            where=f"stone {solid.code}",
+            remedy="look at its corners and at the order of those of each face",
+        )
+
+
+def _prism(solid: Solid, outward: Array, first: Array) -> Solid | None:
+    """The solid as a convex prism, its visible corners first; None if it is none."""
+    return as_prism(solid, outward, first) if highest_corner(solid) <= _CONVEX * _size(solid) else None
+
+
+def _general(old: Solid, tolerance: float) -> Solid:
+    """A solid that is no prism, its faces plane: its corners are moved by as little as can be, or faces are folded."""
+    if _is_plane(old):
+        return old
+    settled = _settled(_folded(old, tolerance))
+    moved = float(np.linalg.norm(settled.vertices - old.vertices, axis=1).max())
+    return settled if moved <= tolerance and _is_plane(settled) else _folded(old, _PLANE)
+
+
+def _settled(solid: Solid) -> Solid:
+    """The solid with its corners on the planes of its faces."""
+    ties = [(i, k) for k, face in enumerate(face for face in solid.faces if len(face) > 3) for i in face]
+    if not ties:
+        return solid
+    corner, plane = np.array(ties, dtype=np.int64).T
+    return Solid(solid.code, settle(solid.vertices, corner, plane).vertices, solid.faces)
+
+
+def _folded(solid: Solid, tolerance: float) -> Solid:
+    faces = tuple(part for face in solid.faces for part in fold(solid.vertices, face, tolerance))
+    return Solid(solid.code, solid.vertices, faces)
+
+
+def _is_plane(solid: Solid) -> bool:
+    return all(warp(solid.vertices[list(face)]) <= _PLANE for face in solid.faces)
+
+
+def _size(solid: Solid) -> float:
+    return float(np.ptp(solid.vertices, axis=0).max())
+
+
+def _said(old: Solid, new: Solid, found: FlatSolid) -> str:
+    said = [f"{len(new.faces)} plane faces"]
+    if len(old.faces) > len(new.faces):
+        said.append(f"{len(old.faces)} faces lie in their planes")
+    if found.moved.max() > 0.0:
+        said.append(f"corners moved by up to {found.moved.max() * 1e3:.2g} mm to make them plane")
+    return "; ".join(said)
+
+
+def _why_general(old: Solid, new: Solid) -> str:
+    """Why a solid stays general, in words."""
+    said = [f"stays general, with {len(new.faces)} faces"]
+    if (rise := highest_corner(new)) > _CONVEX * _size(old):
+        said.append(f"not convex, a corner stands {rise * 1e3:.2g} mm above the plane of a face")
+    else:
+        said.append("convex, but no prism of which three planes meet in each corner")
+    if len(new.faces) > len(old.faces):
+        said.append(f"folded from {len(old.faces)} that are not plane")
+    if (moved := float(np.linalg.norm(new.vertices - old.vertices, axis=1).max())) > 0.0:
+        said.append(f"corners moved by up to {moved * 1e3:.2g} mm to make them plane")
+    return "; ".join(said)
+
+
+def _placed(new: Solid, old: Solid, world: Solid) -> Solid:
+    """A solid about the origin put where it belongs; corners that did not move keep their last bits."""
+    origin = world.vertices.mean(axis=0)
+    apart = np.abs(new.vertices[:, None, :] - old.vertices).max(axis=2)
+    same, nearest = apart.min(axis=1) == 0.0, apart.argmin(axis=1)
+    vertices = np.where(same[:, None], world.vertices[nearest], new.vertices + origin)
+    return Solid(world.code, vertices, new.faces)

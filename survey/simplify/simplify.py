@@ -1,0 +1,90 @@
+"""The simplest solid that is true to a surveyed stone, and what making it so has changed.
+
+A stone whose face was measured becomes a hexahedron where its face has four sides (`survey.simplify.squaring`), a
+wedge where it has three, a prism where it has more. One that came as a solid of another program becomes one of these
+where its faces are so but for rounding (`survey.simplify.flattening`). What is none of them stays as it was surveyed,
+and says why.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from survey.extrusion.depth import Depth
+from survey.extrusion.extrusion import SurveyedBlock
+from survey.faces.faces import Face
+from survey.geometry.solids import Solid
+from survey.records.survey import Extrusion
+from survey.simplify.from_imported_solid import simplify_solid
+from survey.simplify.from_measured_face import simplify_face
+from survey.simplify.result import BlockShape, Simplified
+from survey.simplify.squaring import SimplifyBounds
+
+__all__ = ["BlockShape", "BlockyStone", "Simplified", "SimplifyBounds", "simplify"]
+
+_BOUNDS = SimplifyBounds()
+
+
+@dataclass(frozen=True)
+class BlockyStone:
+    """A stone as the simplest solid that is true to it.
+
+    Attributes
+    ----------
+    code, kind, course : as in the survey
+    face : the measured face it comes from
+    depth : its depth, with the evidence
+    extrusion : how its hidden side lies
+    solid : closed, with planar faces. A hexahedron, wedge or prism has the visible corners first, counter-clockwise
+        seen from outside, then the hidden ones in the same order
+    sound : (n,) whether the place of each visible corner of the solid, or of each corner of a POLYHEDRON that another
+        program made, is known: measured, or restored; False: worn, and left where it was measured
+    shape : what it is
+    report : what was changed
+    """
+
+    code: str
+    kind: str
+    course: int | None
+    face: Face
+    depth: Depth
+    extrusion: Extrusion
+    solid: Solid
+    sound: NDArray[np.bool_]
+    shape: BlockShape
+    report: Simplified
+
+
+def simplify(block: SurveyedBlock, bounds: SimplifyBounds = _BOUNDS) -> BlockyStone:
+    """Make the simplest honest solid of a surveyed block.
+
+    Parameters
+    ----------
+    block : a stone with its measured face of three or more corners, or with the solid that another program made
+    bounds : how far its corners may be moved for that
+
+    Returns
+    -------
+    BlockyStone. Its solid is closed, with plane faces, and convex but for a POLYHEDRON; one that needs no change is
+    that of the block. The first visible corner is the one nearest to the first of the face.
+
+    Raises
+    ------
+    GeometryError
+        if the stone is flat: its face has fewer than three corners that stand out, or nothing lies behind it
+    """
+    measured = block.face.provenance.source in ("points", "photograph")
+    simple = simplify_face(block, bounds) if measured else simplify_solid(block, bounds)
+    return BlockyStone(
+        code=block.code,
+        kind=block.kind,
+        course=block.course,
+        face=block.face,
+        depth=block.depth,
+        extrusion=block.extrusion,
+        solid=simple.solid,
+        sound=simple.sound,
+        shape=simple.shape,
+        report=simple.report,
+    )

@@ -1,0 +1,106 @@
+"""From a survey file to stones with a hidden side: the whole way, one stone at a time."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from moma.errors import MomaError
+from survey.extrusion.depth import depth_for
+from survey.extrusion.extrusion import SurveyedBlock, extrude
+from survey.extrusion.imported_solids import block_of_solid
+from survey.faces.faces import Face, Provenance, face_on, outline_face
+from survey.faces.shapes import FaceShape, ShapeKind
+from survey.records.snapping import Snapping
+from survey.records.survey import BlockRecord, Reject, SolidRecord, SurveyHead, SurveyStream
+from survey.registration.photographed_stones import LiftedFace, lift_faces
+from survey.registration.site_frame import SiteTransform, fit_similarity, record_to_site, to_site
+
+__all__ = ["SurveyedStream", "survey_stones"]
+
+
+@dataclass(frozen=True)
+class SurveyedStream:
+    """A survey on its way to stones.
+
+    Attributes
+    ----------
+    head : of the survey, in the frame of the site
+    transform : from the frame of the survey to that of the site; None if they are the same
+    stones : the stones with their hidden side, in the frame of the site, and what could not become one. Those
+        measured on photographs come last, since they need the faces of their neighbours. To be gone through
+        once.
+    snapping : of solids, what bringing their faces into common planes has changed; None if that was not asked for
+    """
+
+    head: SurveyHead
+    transform: SiteTransform | None
+    stones: Iterator[SurveyedBlock | Reject]
+    snapping: Snapping | None = None
+
+
+def survey_stones(stream: SurveyStream) -> SurveyedStream:
+    """Make stones of what was measured.
+
+    A stone that cannot be made comes as a Reject, whose error names file, line and stone.
+
+    Raises
+    ------
+    SurveyError, GeometryError
+        if the control points do not tie the survey to the site
+    """
+    transform = fit_similarity(stream.head.control) if stream.head.control else None
+    head = stream.head if transform is None else to_site(stream.head, transform)
+    return SurveyedStream(head, transform, _stones(stream, head, transform), stream.snapping)
+
+
+def _stones(
+    stream: SurveyStream, head: SurveyHead, transform: SiteTransform | None
+) -> Iterator[SurveyedBlock | Reject]:
+    faces: list[Face] = []
+    on_photographs: list[BlockRecord] = []
+    for item in stream.blocks:
+        if isinstance(item, Reject):
+            yield item
+            continue
+        placed = item if transform is None else record_to_site(item, transform)
+        if isinstance(placed, BlockRecord) and placed.photograph is not None:
+            on_photographs.append(placed)
+            continue
+        made = _made(placed, head)
+        if head.photographs and isinstance(made, SurveyedBlock):
+            faces.append(made.face)
+        yield made
+    for record, lifted in lift_faces(on_photographs, head.photographs, faces, head):
+        yield (
+            _reject(record, head, lifted) if isinstance(lifted, MomaError) else _behind(record, head, lifted)
+        )
+
+
+def _made(item: BlockRecord | SolidRecord, head: SurveyHead) -> SurveyedBlock | Reject:
+    try:
+        if isinstance(item, SolidRecord):
+            return block_of_solid(item, head.viewpoint(None), head.path)
+        return _extruded(outline_face(item, head.viewpoint(item.station)), head)
+    except MomaError as error:
+        return _reject(item, head, error)
+
+
+def _behind(record: BlockRecord, head: SurveyHead, lifted: LiftedFace) -> SurveyedBlock | Reject:
+    """The stone of a face that was lifted from a photograph."""
+    sigmas = np.concatenate([record.point_sigmas, lifted.sigma])
+    corners = replace(record, vertices=lifted.outline, sigmas=sigmas)
+    shape = FaceShape(ShapeKind.UNTESTED, "not tested: its plane was taken over from others")
+    try:
+        face = face_on(lifted.fit, lifted.outline, shape, Provenance("photograph", lifted.text), corners)
+        return _extruded(face, head)
+    except MomaError as error:
+        return _reject(record, head, error)
+
+
+def _extruded(face: Face, head: SurveyHead) -> SurveyedBlock:
+    return extrude(face, depth_for(face.record, head.depth_rules), face.record.extrusion or head.extrusion)
+
+
+def _reject(item: BlockRecord | SolidRecord, head: SurveyHead, error: MomaError) -> Reject:
+    return Reject(item.code, error.at(f"{head.path}:{item.line}: stone {item.code}"), item.spans)

@@ -1,0 +1,1 @@
+"""Synthetic walls, vaults and assemblies."""

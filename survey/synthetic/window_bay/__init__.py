@@ -1,0 +1,1 @@
+"""The sample survey of a wall with a window."""

@@ -1,0 +1,1 @@
+"""Proposals for stones that no survey shows."""

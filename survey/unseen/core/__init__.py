@@ -1,0 +1,1 @@
+"""Core between the two facings of a wall."""

@@ -1,0 +1,209 @@
+"""The core of a wall as convex blocks that meet the hidden sides of the stones before and behind them."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from survey.geometry.half_spaces import intersection
+from survey.geometry.solids import Solid, volume_of
+from survey.unseen.core.courses import Stretch, Strip, height_of, place_of, stretches, strips
+from survey.unseen.core.facings import FacingStone, FacingWall
+from survey.unseen.core.settings import InfillSettings
+
+__all__ = ["CoreBlock", "core_blocks"]
+
+Array = NDArray[np.float64]
+
+_OUT = np.array([0.0, 0.0, 1.0])
+_ON_PLANE = 1e-10  # metres: corners so near to a plane lie on it
+_NOTHING = 1e-11  # cubic metres
+_SAME = 1e-6  # metres: head joints that are nearer are the same
+_MARGIN = 1.0  # metres around what is cut
+
+
+@dataclass(frozen=True)
+class CoreBlock:
+    """A convex part of the core.
+
+    Attributes
+    ----------
+    solid : in the frame of the wall
+    course : number of its course; None if it is of none
+    between : codes of the stones before and behind it
+    """
+
+    solid: Solid
+    course: int | None
+    between: tuple[str, str]
+
+
+@dataclass(frozen=True)
+class _Cut:
+    place: float
+    plane: Array
+
+
+def core_blocks(wall: FacingWall, settings: InfillSettings) -> tuple[CoreBlock, ...]:
+    """Fill the core of a wall with blocks, strip by strip from below, from left to right.
+
+    A block lies between two beds and two head joints of either facing, behind the hidden sides of the stones
+    around it. Where two joints of different facings nearly coincide one of them is left out, or what lies between
+    them, whichever leaves more of the core.
+
+    Parameters
+    ----------
+    wall : two facings
+    settings : tolerances
+
+    Returns
+    -------
+    Blocks, of which no two overlap each other or a stone
+    """
+    stones = _Stones((*wall.front, *wall.back))
+    blocks: list[CoreBlock] = []
+    for strip in strips(wall, settings):
+        sides = tuple(stretches(strip, stones_of, settings) for stones_of in (wall.front, wall.back))
+        cells = _Cells(strip, sides, stones, settings)
+        for left, right in _stretches_of_core(_cuts(sides), cells, settings):
+            if (block := cells.block(left, right)) is not None:
+                blocks.append(block)
+    return tuple(blocks)
+
+
+def _cuts(sides: Iterable[Sequence[Stretch]]) -> list[_Cut]:
+    """Head joints of both facings, from left to right, each once."""
+    cuts = [_Cut(one.start, one.left) for side in sides for one in side]
+    cuts += [_Cut(one.stop, one.right) for side in sides for one in side]
+    cuts.sort(key=lambda cut: cut.place)
+    kept: list[_Cut] = []
+    for cut in cuts:
+        if not kept or cut.place - kept[-1].place > _SAME:
+            kept.append(cut)
+    return kept
+
+
+def _stretches_of_core(
+    cuts: list[_Cut], cells: "_Cells", settings: InfillSettings
+) -> list[tuple[_Cut, _Cut]]:
+    """Pairs of cuts between which there may be a block."""
+    found: list[tuple[_Cut, _Cut]] = []
+    waiting = cuts[:0:-1]
+    left = cuts[0] if cuts else None
+    while left is not None and waiting:
+        here = waiting.pop()
+        ends = (here, here)
+        if len(waiting) >= 2 and waiting[-1].place - here.place < settings.merge:
+            ends = _one_of(left, here, waiting.pop(), waiting[-1], cells)
+        found.append((left, ends[0]))
+        left = ends[1]
+    return found
+
+
+def _one_of(left: _Cut, one: _Cut, other: _Cut, right: _Cut, cells: "_Cells") -> tuple[_Cut, _Cut]:
+    """Where the block on the left of two near cuts ends and that on their right begins, so that most is filled."""
+
+    def filled(ends: tuple[_Cut, _Cut]) -> float:
+        return cells.volume(left, ends[0]) + cells.volume(ends[1], right)
+
+    choices = [(one, one), (other, other)]
+    if not cells.crossed(one, other):
+        choices.append((one, other))
+    return max(choices, key=filled)
+
+
+class _Stones:
+    """The stones of both facings, to be searched by place."""
+
+    def __init__(self, stones: Sequence[FacingStone]) -> None:
+        self.stones = stones
+        self._low = np.array([stone.solid.vertices.min(axis=0) for stone in stones])
+        self._high = np.array([stone.solid.vertices.max(axis=0) for stone in stones])
+
+    def near(self, solid: Solid) -> list[FacingStone]:
+        """Stones whose box meets that of a solid."""
+        low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
+        found = np.flatnonzero(((self._low < high) & (self._high > low)).all(axis=1))
+        return [self.stones[i] for i in found.tolist()]
+
+
+class _Cells:
+    """What is left of the core between two head joints of a strip."""
+
+    def __init__(
+        self,
+        strip: Strip,
+        sides: Sequence[Sequence[Stretch]],
+        stones: _Stones,
+        settings: InfillSettings,
+    ) -> None:
+        self.strip, self.sides, self.stones, self.settings = strip, sides, stones, settings
+        self._made: dict[tuple[float, float], CoreBlock | None] = {}
+
+    def volume(self, left: _Cut, right: _Cut) -> float:
+        """Volume of the block between two cuts [m³]."""
+        block = self.block(left, right)
+        return 0.0 if block is None else volume_of(block.solid)
+
+    def crossed(self, left: _Cut, right: _Cut) -> bool:
+        """Whether two cuts meet within the strip."""
+        ends = [height_of(plane, left.place) for plane in (self.strip.lower, self.strip.upper)]
+        return any(place_of(left.plane, height) >= place_of(right.plane, height) for height in ends)
+
+    def block(self, left: _Cut, right: _Cut) -> CoreBlock | None:
+        """The block between two cuts; None if there is no core."""
+        key = (left.place, right.place)
+        if key not in self._made:
+            self._made[key] = self._make(left, right)
+        return self._made[key]
+
+    def _make(self, left: _Cut, right: _Cut) -> CoreBlock | None:
+        middle = 0.5 * (left.place + right.place)
+        over = [
+            next((one.stone for one in side if one.start <= middle <= one.stop), None) for side in self.sides
+        ]
+        front, back = over
+        if front is None or back is None or self.crossed(left, right):
+            return None
+        planes = [-self.strip.lower, self.strip.upper, -left.plane, right.plane]
+        planes += [-front.support(-_OUT), -back.support(_OUT)]
+        solid = _carved(planes, self.stones)
+        if solid is None:
+            return None
+        height = height_of(self.strip.upper, middle) - height_of(self.strip.lower, middle)
+        if volume_of(solid) < self.settings.min_thickness * height * (right.place - left.place):
+            return None
+        return CoreBlock(solid, self.strip.course, (front.code, back.code))
+
+
+def _carved(planes: list[Array], stones: _Stones) -> Solid | None:
+    """What half-spaces have in common, less the stones that reach into it: each is cut off by one of its own planes."""
+    solid = _common(planes)
+    for stone in stones.near(solid) if solid is not None else ():
+        if solid is None:
+            return None
+        if _apart(solid, planes, stone):
+            continue
+        left = [[*planes, -plane] for plane in stone.planes]
+        planes = max(left, key=lambda some: 0.0 if (part := _common(some)) is None else volume_of(part))
+        solid = _common(planes)
+    return solid
+
+
+def _apart(solid: Solid, planes: Sequence[Array], stone: FacingStone) -> bool:
+    """Whether a convex solid and a stone have no volume in common."""
+    if any((solid.vertices @ plane[:3] >= plane[3] - _ON_PLANE).all() for plane in stone.planes):
+        return True
+    if any((stone.solid.vertices @ plane[:3] >= plane[3] - _ON_PLANE).all() for plane in planes):
+        return True
+    shared = _common([*planes, *stone.planes])
+    return shared is None or volume_of(shared) <= _NOTHING
+
+
+def _common(planes: Sequence[Array]) -> Solid | None:
+    """What half-spaces have in common."""
+    reach = max(abs(float(plane[3])) for plane in planes) + _MARGIN
+    bounds = np.full(3, reach)
+    solid = intersection("", [tuple(plane) for plane in planes], -bounds, bounds, _ON_PLANE)
+    return solid if solid is not None and volume_of(solid) > _NOTHING else None

@@ -1,0 +1,168 @@
+"""Solids made of the cells between planes of three families: closed, and nowhere touching themselves along an edge."""
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import label
+
+from survey.geometry.solids import Solid
+
+__all__ = ["CellGrid", "grid_solids"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Node = tuple[int, int, int]
+
+# corners of each side of a cell, counter-clockwise seen from outside; axes: along, up, from the front to the back
+_SIDES: dict[Node, tuple[Node, ...]] = {
+    (-1, 0, 0): ((0, 0, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1)),
+    (1, 0, 0): ((1, 0, 0), (1, 0, 1), (1, 1, 1), (1, 1, 0)),
+    (0, -1, 0): ((0, 0, 0), (0, 0, 1), (1, 0, 1), (1, 0, 0)),
+    (0, 1, 0): ((0, 1, 0), (1, 1, 0), (1, 1, 1), (0, 1, 1)),
+    (0, 0, -1): ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)),
+    (0, 0, 1): ((0, 0, 1), (0, 1, 1), (1, 1, 1), (1, 0, 1)),
+}
+
+
+@dataclass(frozen=True)
+class CellGrid:
+    """Cells between upright planes, beds and levels.
+
+    Attributes
+    ----------
+    places : (ni,) of the upright planes along the wall, growing [m]
+    beds : (nj, 4) planes n·x = d, from below
+    levels : (nk, 4) planes, from the front of the wall to its back
+    filled : (ni - 1, nj - 1, nk - 1) which cells are of the solid
+    """
+
+    places: Array
+    beds: Array
+    levels: Array
+    filled: Mask
+
+
+def grid_solids(grid: CellGrid) -> Iterator[Solid]:
+    """The solids of the filled cells, one for each connected part, without cells by which one would touch itself."""
+    filled = _without_edges(grid.filled) if grid.filled.size else grid.filled
+    parts, count = label(filled)
+    for number in range(1, count + 1):
+        yield _solid(grid, parts == number)
+
+
+def _solid(grid: CellGrid, filled: Mask) -> Solid:
+    """The solid of connected cells; planes that cut nothing of it are left out."""
+    planes = [grid.places, grid.beds, grid.levels]
+    for axis in range(3):
+        filled, planes[axis] = _coarser(filled, planes[axis], axis)
+    loops = [_around(low, high, side) for side in _SIDES for low, high in _rectangles(filled, side)]
+    corners = {node for loop in loops for node in _turns(loop)}
+    numbers: dict[Node, int] = {}
+    faces = [
+        tuple(numbers.setdefault(node, len(numbers)) for node in loop if node in corners) for loop in loops
+    ]
+    vertices = np.array([_node(planes, node) for node in numbers])
+    return Solid("", vertices, tuple(faces))
+
+
+def _rectangles(filled: Mask, side: Node) -> Iterator[tuple[Node, Node]]:
+    """The free sides of cells that look one way, put together: first and last cell of each rectangle."""
+    padded = np.pad(filled, 1)
+    free = (padded & ~np.roll(padded, [-s for s in side], axis=(0, 1, 2)))[1:-1, 1:-1, 1:-1]
+    one, other = (axis for axis in range(3) if side[axis] == 0)
+    for first in np.argwhere(free).tolist():
+        if not free[tuple(first)]:
+            continue
+        last = list(first)
+        for axis in (one, other):
+            while last[axis] + 1 < free.shape[axis]:
+                span = [slice(a, b + 1) for a, b in zip(first, last, strict=True)]
+                span[axis] = slice(last[axis] + 1, last[axis] + 2)
+                if not free[tuple(span)].all():
+                    break
+                last[axis] += 1
+        free[tuple(slice(a, b + 1) for a, b in zip(first, last, strict=True))] = False
+        yield (first[0], first[1], first[2]), (last[0], last[1], last[2])
+
+
+def _around(low: Node, high: Node, side: Node) -> list[Node]:
+    """All nodes on the edge of a rectangle of cells' sides, counter-clockwise seen from outside."""
+    ends = [
+        tuple(a if bit == 0 else b + 1 for a, b, bit in zip(low, high, corner, strict=True))
+        for corner in _SIDES[side]
+    ]
+    loop: list[Node] = []
+    for start, stop in zip(ends, [*ends[1:], ends[0]], strict=True):
+        run = [b - a for a, b in zip(start, stop, strict=True)]
+        count = max(abs(r) for r in run)
+        x, y, z = (r // count for r in run)
+        loop += [(start[0] + k * x, start[1] + k * y, start[2] + k * z) for k in range(count)]
+    return loop
+
+
+def _turns(loop: list[Node]) -> Iterator[Node]:
+    """The nodes at which a loop turns."""
+    for before, here, after in zip([loop[-1], *loop[:-1]], loop, [*loop[1:], loop[0]], strict=True):
+        if any(2 * h != a + b for a, h, b in zip(before, here, after, strict=True)):
+            yield here
+
+
+def _coarser(filled: Mask, planes: Array, axis: int) -> tuple[Mask, Array]:
+    """The cells without planes that have the same on both sides all over, and without empty layers at the ends."""
+    layers = np.moveaxis(filled, axis, 0)
+    used = np.flatnonzero(layers.reshape(len(layers), -1).any(axis=1))
+    layers, planes = layers[used[0] : used[-1] + 1], planes[used[0] : used[-1] + 2]
+    kept = [0, *(k for k in range(1, len(layers)) if (layers[k] != layers[k - 1]).any())]
+    return np.moveaxis(layers[kept], 0, axis), planes[[*kept, len(layers)]]
+
+
+def _node(planes: list[Array], node: Node) -> Array:
+    """Where three planes meet."""
+    place, bed, level = (family[k] for family, k in zip(planes, node, strict=True))
+    matrix = np.array([[1.0, 0.0, 0.0], bed[:3], level[:3]])
+    out: Array = np.linalg.solve(matrix, np.array([float(place), bed[3], level[3]]))
+    return out
+
+
+def _without_edges(filled: Mask) -> Mask:
+    """Empty cells until no two touch along an edge alone, or at a corner alone, the fewest that will do in turn."""
+    filled = filled.copy()
+    while True:
+        touching = _touching(filled)
+        if not touching:
+            return filled
+        filled[max(touching, key=lambda cell: (touching[cell], cell))] = False
+
+
+def _touching(filled: Mask) -> Counter[Node]:
+    """Cells that touch others where they must not, and how often."""
+    found: Counter[Node] = Counter()
+    padded = np.pad(filled, 1)
+    for step in _DIAGONALS:
+        moved = np.roll(padded, [-s for s in step], axis=(0, 1, 2))
+        both = padded & moved
+        for between in _between(step):
+            both &= ~np.roll(padded, [-s for s in between], axis=(0, 1, 2))
+        for cell in np.argwhere(both).tolist():
+            for one in (cell, [c + s for c, s in zip(cell, step, strict=True)]):
+                found[(one[0] - 1, one[1] - 1, one[2] - 1)] += 1
+    return found
+
+
+_DIAGONALS = [
+    (a, b, c)
+    for a in (-1, 0, 1)
+    for b in (-1, 0, 1)
+    for c in (-1, 0, 1)
+    if (a, b, c) > (0, 0, 0) and (a != 0) + (b != 0) + (c != 0) >= 2
+]
+
+
+def _between(step: Node) -> list[Node]:
+    """Steps to the cells around the edge, or the corner, that a diagonal step goes through."""
+    choices = [(0,) if s == 0 else (0, s) for s in step]
+    around = [(a, b, c) for a in choices[0] for b in choices[1] for c in choices[2]]
+    return [one for one in around if one not in ((0, 0, 0), step)]

@@ -1,0 +1,165 @@
+"""Where the core of a wall is cut: beds of its courses, head joints of its facings.
+
+All in the frame of the wall: x along it, y up, z out of the front. Planes are (nx, ny, nz, d), n·x = d.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from survey.unseen.core.facings import FacingStone, FacingWall
+from survey.unseen.core.settings import InfillSettings
+
+__all__ = ["Stretch", "Strip", "height_of", "place_of", "stretches", "strips"]
+
+Array = NDArray[np.float64]
+
+_ALONG, _UP = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
+_OFF_BED = 0.03  # metres: a corner farther from the bed of its course is left out of it
+
+
+@dataclass(frozen=True)
+class Strip:
+    """What lies between two beds.
+
+    Attributes
+    ----------
+    lower, upper : (4,) their planes, with normals upwards
+    course : number of the course of the front that begins at the lower bed, else of the back; None if none does
+    """
+
+    lower: Array
+    upper: Array
+    course: int | None
+
+    @property
+    def middle(self) -> float:
+        """Height half-way between the beds, at the origin [m]."""
+        return 0.5 * (height_of(self.lower, 0.0) + height_of(self.upper, 0.0))
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """What one stone of a facing takes of a strip.
+
+    Attributes
+    ----------
+    stone : of the facing
+    left, right : (4,) planes of its head joints, with normals to the right
+    start, stop : where they are at half the height of the strip [m]
+    """
+
+    stone: FacingStone
+    left: Array
+    right: Array
+    start: float
+    stop: float
+
+
+@dataclass(frozen=True)
+class _Bed:
+    height: float
+    corners: Array
+    course: int | None
+
+
+def strips(wall: FacingWall, settings: InfillSettings) -> tuple[Strip, ...]:
+    """The strips between the beds of both facings, from below; beds that nearly coincide are one."""
+    beds = sorted(
+        (bed for side in (wall.front, wall.back) for bed in _beds(side)), key=lambda bed: bed.height
+    )
+    groups: list[list[_Bed]] = []
+    for bed in beds:
+        if groups and bed.height - groups[-1][-1].height < settings.merge:
+            groups[-1].append(bed)
+        else:
+            groups.append([bed])
+    planes = [_plane(np.concatenate([bed.corners for bed in group])) for group in groups]
+    courses = [next((bed.course for bed in group if bed.course is not None), None) for group in groups]
+    return tuple(
+        Strip(lower, upper, course) for lower, upper, course in zip(planes, planes[1:], courses, strict=False)
+    )
+
+
+def stretches(strip: Strip, stones: Sequence[FacingStone], settings: InfillSettings) -> list[Stretch]:
+    """What the stones of one facing take of a strip, from left to right.
+
+    Neighbours share the plane half-way between them; at a hole or an opening each ends where it ends.
+    """
+    found = []
+    for stone in stones:
+        if not _fills(stone, strip):
+            continue
+        left, right = -stone.support(-_ALONG), stone.support(_ALONG)
+        start, stop = (place_of(plane, strip.middle) for plane in (left, right))
+        found.append(Stretch(stone, left, right, start, stop))
+    found.sort(key=lambda one: one.start + one.stop)
+    for k in range(len(found) - 1):
+        one, other = found[k], found[k + 1]
+        if other.start - one.stop >= settings.max_joint:
+            continue
+        shared = _between(one.right, other.left, 0.5 * (one.stop + other.start), strip.middle)
+        place = place_of(shared, strip.middle)
+        found[k] = Stretch(one.stone, one.left, shared, one.start, place)
+        found[k + 1] = Stretch(other.stone, shared, other.right, place, other.stop)
+    return [one for one in found if one.stop > one.start]
+
+
+def height_of(plane: Array, along: float) -> float:
+    """Height of a bed plane at a place along the wall, in the middle of its thickness [m]."""
+    return float((plane[3] - plane[0] * along) / plane[1])
+
+
+def place_of(plane: Array, height: float) -> float:
+    """Where a head joint's plane is along the wall, at a height, in the middle of its thickness [m]."""
+    return float((plane[3] - plane[1] * height) / plane[0])
+
+
+def _fills(stone: FacingStone, strip: Strip) -> bool:
+    """Whether a stone takes more than half the height of the strip, where it stands."""
+    low, high = stone.solid.vertices[:, 1].min(), stone.solid.vertices[:, 1].max()
+    along = float(stone.solid.vertices[:, 0].mean())
+    bottom, top = height_of(strip.lower, along), height_of(strip.upper, along)
+    return bool(min(high, top) - max(low, bottom) > 0.5 * (top - bottom))
+
+
+def _beds(stones: Sequence[FacingStone]) -> list[_Bed]:
+    """Lower and upper beds of each course of a facing; of each stone, if courses are not known."""
+    courses: dict[object, list[FacingStone]] = {}
+    known = any(stone.course is not None for stone in stones)
+    for stone in stones:
+        if stone.course is not None or not known:
+            courses.setdefault(stone.course if known else stone.code, []).append(stone)
+    beds = []
+    for members in courses.values():
+        for direction, course in ((-_UP, members[0].course), (_UP, None)):
+            faces = [(stone, stone.towards(direction)) for stone in members]
+            corners = [stone.solid.vertices[face] for stone, face in faces if face is not None]
+            if corners:
+                together = np.concatenate(corners)
+                beds.append(_Bed(float(np.median(together[:, 1])), together, course))
+    return beds
+
+
+def _plane(corners: Array) -> Array:
+    """The bed plane through corners (n, 3), without those that are of another bed."""
+    near = np.abs(corners[:, 1] - np.median(corners[:, 1])) <= 2.0 * _OFF_BED
+    for _ in range(3):
+        some = corners[near]
+        middle = some.mean(axis=0)
+        arms = some[:, [0, 2]] - middle[[0, 2]]
+        slopes = np.linalg.lstsq(arms, some[:, 1] - middle[1], rcond=1e-9)[0]
+        residuals = corners[:, 1] - middle[1] - (corners[:, [0, 2]] - middle[[0, 2]]) @ slopes
+        near = np.abs(residuals) <= _OFF_BED
+    normal = np.array([-slopes[0], 1.0, -slopes[1]])
+    normal /= np.linalg.norm(normal)
+    return np.append(normal, float(normal @ middle))
+
+
+def _between(one: Array, other: Array, place: float, height: float) -> Array:
+    """The plane half-way between two head joints, through a place at a height."""
+    normal = one[:3] + other[:3]
+    normal = normal / np.linalg.norm(normal)
+    return np.append(normal, float(normal @ np.array([place, height, 0.0])))

@@ -1,0 +1,131 @@
+"""The core between the two facings of a wall, which no survey sees: proposed from the hidden sides of the stones.
+
+The stones of both facings are known with their depths; what lies between their hidden sides is core. It is made of
+convex blocks, cut where the joints of either facing are (`survey.unseen.core.blocks`), or of one continuum for each
+storey (`survey.unseen.core.storeys`). Stones that go through the wall, and headers whose tails meet, have no core
+behind them; nor has an opening, or a hole where a stone is missing.
+"""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from moma.errors import UsageError
+from survey.geometry.solids import Solid, volume_of
+from survey.unseen.core.blocks import core_blocks
+from survey.unseen.core.facings import FacingStone, FacingWall, find_walls, wall_between
+from survey.unseen.core.settings import InfillSettings, InfillShape
+from survey.unseen.core.storeys import core_storeys
+
+__all__ = ["InfillProposal", "propose_infill"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class InfillProposal:
+    """A part of the core of a wall that nobody has seen.
+
+    Attributes
+    ----------
+    code : its name, e.g. I1-05-03: third block of course 5 of wall 1; or I1-S2: second storey of wall 1
+    solid : closed; convex if it is a block
+    course : number of the course of a block; None if it is of none, or a storey
+    normal : (3,) of the first facing, towards the observer [-]
+    volume : [m³]
+    evidence : on what it rests, in words
+    """
+
+    code: str
+    solid: Solid
+    course: int | None
+    normal: Array
+    volume: float
+    evidence: str
+
+
+def propose_infill(
+    stones: Sequence[FacingStone],
+    settings: InfillSettings | None = None,
+    *,
+    facings: tuple[Collection[str], Collection[str]] | None = None,
+    taken: Collection[str] = (),
+) -> tuple[InfillProposal, ...]:
+    """Propose the core of all walls with two facings.
+
+    Parameters
+    ----------
+    stones : with the solids that the core is to meet
+    settings : what the core is made of, and tolerances
+    facings : codes of the stones of the two facings of one wall; None: facings are recognised
+    taken : codes that proposals must not have
+
+    Returns
+    -------
+    Proposals, wall by wall from below
+
+    Raises
+    ------
+    GeometryError
+        if facings are given that do not look opposite ways
+    UsageError
+        if one of them is empty, or a stone is in both
+    """
+    settings = settings or InfillSettings()
+    walls = find_walls(stones, settings) if facings is None else (_given(stones, facings),)
+    found: list[InfillProposal] = []
+    number = 0
+    for wall in walls:
+        number += 1
+        while any(code.startswith(f"I{number}-") for code in taken):
+            number += 1
+        make = _blocks if settings.shape is InfillShape.BLOCKS else _storeys
+        found += make(wall, f"I{number}", settings)
+    return tuple(found)
+
+
+def _given(stones: Sequence[FacingStone], facings: tuple[Collection[str], Collection[str]]) -> FacingWall:
+    one, other = (set(codes) for codes in facings)
+    if one & other:
+        raise UsageError(f"stone {min(one & other)} is in both facings", remedy="let each stone be in one")
+    front, back = ([stone for stone in stones if stone.code in codes] for codes in (one, other))
+    if not front or not back:
+        raise UsageError("a facing has no stones", remedy="name stones of both sides of the wall")
+    return wall_between(front, back)
+
+
+def _blocks(wall: FacingWall, name: str, settings: InfillSettings) -> list[InfillProposal]:
+    count: dict[int | None, int] = {}
+    found = []
+    for block in core_blocks(wall, settings):
+        count[block.course] = count.get(block.course, 0) + 1
+        course = "00" if block.course is None else f"{block.course:02d}"
+        front, back = block.between
+        text = f"core between the hidden sides of {front} and {back}, which follow from their depths"
+        code = f"{name}-{course}-{count[block.course]:02d}"
+        found.append(_proposal(code, block.solid, block.course, wall, text))
+    return found
+
+
+def _storeys(wall: FacingWall, name: str, settings: InfillSettings) -> list[InfillProposal]:
+    storeys = core_storeys(wall, settings)
+    found = []
+    for k, storey in enumerate(storeys):
+        part = sum(other.number == storey.number for other in storeys[:k])
+        code = f"{name}-S{storey.number}" + (f"-{part + 1}" if part else "")
+        where = "" if storey.courses is None else f" of courses {storey.courses[0]} to {storey.courses[1]}"
+        text = (
+            f"core between the hidden sides{where} of {len(wall.front)} and {len(wall.back)} stones of two facings, "
+            f"which follow from their depths; depths within {settings.level * 1e3:.0f} mm are taken as one"
+        )
+        found.append(_proposal(code, storey.solid, None, wall, text))
+    return found
+
+
+def _proposal(code: str, local: Solid, course: int | None, wall: FacingWall, text: str) -> InfillProposal:
+    """A solid of the wall's frame, in the frame of the site."""
+    vertices = wall.frame.origin + local.vertices @ wall.frame.axes
+    solid = Solid(code, vertices, local.faces)
+    return InfillProposal(code, solid, course, wall.frame.axes[2], volume_of(local), text)

@@ -1,0 +1,1 @@
+"""Missing stones: gaps, openings and arches."""

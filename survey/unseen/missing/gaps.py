@@ -1,0 +1,271 @@
+"""Gaps in the courses of a facade, put together to holes, and which of them are openings."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from survey.unseen.missing.settings import MissingSettings
+from survey.unseen.missing.sides import Elevation, FlatStone, Line
+
+__all__ = ["CourseGap", "Gaps", "Hole", "find_gaps", "find_holes", "opening_signs"]
+
+Array = NDArray[np.float64]
+
+_UP, _DOWN = np.array([0.0, 1.0]), np.array([0.0, -1.0])
+_LEVEL = np.array([1.0, 0.0])
+_AROUND = 4  # stones of the course from which the beds beside a gap are drawn
+_SAME_BED = 0.05  # metres: ends of stones that are farther apart are not of one bed
+_BEYOND = 0.05  # metres above and below a gap at which stones are looked for
+_SAMPLES = 21
+_SHARED = 0.05  # metres by which gaps of two courses must overlap to be one hole
+_FRAMES = {"jamb": "a jamb", "mullion": "a mullion"}
+_BELOW = {"sill": "a sill"}
+_ABOVE = {"lintel": "a lintel", "voussoir": "an arch", "keystone": "an arch"}
+
+
+@dataclass(frozen=True)
+class CourseGap:
+    """Where no stone is known between two neighbours of a course.
+
+    Attributes
+    ----------
+    zone, course : where it is
+    left, right : the neighbours
+    start, stop : between them, at half the height of the course [m]
+    lower, upper : lines of its beds
+    below, above : index of the stone at places along it, under and over it; -1 where there is none, -2 for the ground
+    """
+
+    zone: str | None
+    course: int
+    left: FlatStone
+    right: FlatStone
+    start: float
+    stop: float
+    lower: Line
+    upper: Line
+    below: NDArray[np.int64]
+    above: NDArray[np.int64]
+
+    @property
+    def width(self) -> float:
+        """Distance of the neighbours [m]."""
+        return self.stop - self.start
+
+    @property
+    def middle(self) -> float:
+        """Half-way between the neighbours, along the wall [m]."""
+        return 0.5 * (self.start + self.stop)
+
+
+@dataclass(frozen=True)
+class Gaps:
+    """What the courses of a facade leave open.
+
+    Attributes
+    ----------
+    gaps : wider than a joint
+    joints : widths of the joints of the courses [m]
+    """
+
+    gaps: tuple[CourseGap, ...]
+    joints: Array
+
+
+@dataclass(frozen=True)
+class Hole:
+    """Gaps that are one above the other.
+
+    Attributes
+    ----------
+    gaps : from below
+    courses : how many courses high it is
+    bounded : least part of the length of any of its gaps that has stones, or another gap, below it and above it [-]
+    """
+
+    gaps: tuple[CourseGap, ...]
+    courses: int
+    bounded: float
+
+
+def find_gaps(elevation: Elevation, settings: MissingSettings) -> Gaps:
+    """All gaps in the courses of a facade, course by course from below, from left to right."""
+    stones = elevation.stones
+    low, high = elevation.boxes[:, 0, 1], elevation.boxes[:, 1, 1]
+    courses: dict[tuple[str, int], list[FlatStone]] = {}
+    for stone in stones:
+        if stone.block.course is not None:
+            courses.setdefault((stone.block.face.record.zone or "", stone.block.course), []).append(stone)
+    gaps: list[CourseGap] = []
+    joints: list[float] = []
+    for (zone, course), members in sorted(courses.items(), key=lambda one: (one[0][1], one[0][0])):
+        middle = _middle(members)
+        heights = [middle.at_place(place) for place in _ends(members)]
+        near = np.flatnonzero((low < max(heights)) & (high > min(heights))).tolist()
+        for left, right, start, stop in _between([stones[i] for i in near], middle, _ends(members)):
+            if stop - start <= settings.max_joint:
+                joints.append(stop - start)
+            elif (
+                gap := _gap(elevation, members, zone or None, course, left, right, start, stop)
+            ) is not None:
+                gaps.append(gap)
+    return Gaps(tuple(gaps), np.array(joints))
+
+
+def find_holes(gaps: Sequence[CourseGap]) -> tuple[Hole, ...]:
+    """Put gaps together that lie on one another."""
+    pairs = [
+        (i, j)
+        for i, one in enumerate(gaps)
+        for j, other in enumerate(gaps)
+        if i != j and _lies_on(other, one)
+    ]
+    rows, columns = ([pair[k] for pair in pairs] for k in (0, 1))
+    graph = coo_array((np.ones(len(pairs)), (rows, columns)), shape=(len(gaps), len(gaps)))
+    count, member = connected_components(graph, directed=False) if gaps else (0, np.zeros(0))
+    holes = []
+    for number in range(count):
+        mine = [gaps[i] for i in np.flatnonzero(member == number).tolist()]
+        mine.sort(key=lambda gap: (gap.lower.at_place(gap.middle), gap.start))
+        levels = {(gap.zone, gap.course) for gap in mine}
+        holes.append(Hole(tuple(mine), len(levels), min(_bounded(gap, mine) for gap in mine)))
+    return tuple(holes)
+
+
+def opening_signs(hole: Hole, elevation: Elevation) -> tuple[str, ...]:
+    """What frames a hole as one frames openings: jambs, a sill, a lintel, an arch."""
+    signs = []
+    for gap in hole.gaps:
+        signs += [f"{_FRAMES[kind]} on the left" for kind in [gap.left.block.kind] if kind in _FRAMES]
+        signs += [f"{_FRAMES[kind]} on the right" for kind in [gap.right.block.kind] if kind in _FRAMES]
+        for found, known, where in ((gap.below, _BELOW, "below"), (gap.above, _ABOVE, "above")):
+            kinds = [elevation.stones[i].block.kind for i in found.tolist() if i >= 0]
+            framing = [known[kind] for kind in kinds if kind in known]
+            if 2 * len(framing) > len(found):
+                signs.append(f"{framing[0]} {where}")
+    return tuple(dict.fromkeys(signs))
+
+
+def _ends(members: Sequence[FlatStone]) -> tuple[float, float]:
+    return (
+        min(float(stone.outline[:, 0].min()) for stone in members),
+        max(float(stone.outline[:, 0].max()) for stone in members),
+    )
+
+
+def _middle(members: Sequence[FlatStone]) -> Line:
+    """The line at half the height of a course, without stones that are much higher than the others."""
+    heights = np.array([np.ptp(stone.outline[:, 1]) for stone in members])
+    usual = np.abs(heights - np.median(heights)) <= 0.3 * np.median(heights)
+    boxes = np.array([[stone.outline.min(axis=0), stone.outline.max(axis=0)] for stone in members])
+    return _fitted(boxes[usual].mean(axis=1))
+
+
+def _fitted(points: Array) -> Line:
+    """The nearly level line through points (n, 2)."""
+    centre = points.mean(axis=0)
+    arms = points - centre
+    spread = float((arms[:, 0] ** 2).sum())
+    slope = float(arms[:, 0] @ arms[:, 1]) / spread if spread > 0.05**2 else 0.0
+    direction = np.array([1.0, slope])
+    return Line(centre, direction / np.linalg.norm(direction))
+
+
+def _between(
+    stones: Sequence[FlatStone], middle: Line, ends: tuple[float, float]
+) -> list[tuple[FlatStone, FlatStone, float, float]]:
+    """Neighbours along a line, and where the one ends and the other begins."""
+    spans = [(span, stone) for stone in stones if (span := stone.crossing(middle)) is not None]
+    spans = [(span, stone) for span, stone in spans if span[1] > ends[0] and span[0] < ends[1]]
+    spans.sort(key=lambda one: one[0])
+    found = []
+    (_, reached), left = spans[0] if spans else ((0.0, 0.0), None)
+    for (start, stop), right in spans[1:]:
+        if left is not None:
+            found.append((left, right, reached, start))
+        if stop > reached:
+            reached, left = stop, right
+    return found
+
+
+def _gap(
+    elevation: Elevation,
+    members: Sequence[FlatStone],
+    zone: str | None,
+    course: int,
+    left: FlatStone,
+    right: FlatStone,
+    start: float,
+    stop: float,
+) -> CourseGap | None:
+    middle = 0.5 * (start + stop)
+    lower, upper = (_bed(members, towards, start, stop) for towards in (_DOWN, _UP))
+    if lower is None or upper is None or upper.at_place(middle) <= lower.at_place(middle):
+        return None
+    places = start + (np.arange(_SAMPLES) + 0.5) / _SAMPLES * (stop - start)
+    below = _stones_at(elevation, places, lower, -_BEYOND)
+    above = _stones_at(elevation, places, upper, _BEYOND)
+    if _on_the_ground(elevation, lower, start, stop):
+        below = np.full(_SAMPLES, -2)
+    return CourseGap(zone, course, left, right, start, stop, lower, upper, below, above)
+
+
+def _bed(members: Sequence[FlatStone], towards: Array, start: float, stop: float) -> Line | None:
+    """Upper or lower bed of a course at a gap, through sound corners of the nearest stones of the course."""
+    sides = [(stone, stone.side_ends(towards)) for stone in members]
+    known = [(stone, ends) for stone, ends in sides if ends is not None and not stone.worn & set(ends)]
+    known.sort(key=lambda one: max(start - one[0].centre[0], one[0].centre[0] - stop))
+    near = [stone.outline[list(ends)] for stone, ends in known[: 2 * _AROUND]]
+    if not near:
+        return None
+    heights = np.array([ends[:, 1].mean() for ends in near])
+    usual = np.abs(heights - np.median(heights)) <= _SAME_BED
+    return _fitted(np.concatenate([ends for ends, one in zip(near, usual, strict=True) if one][:_AROUND]))
+
+
+def _stones_at(elevation: Elevation, places: Array, bed: Line, above: float) -> NDArray[np.int64]:
+    """Which stone is at places along a bed, some way above it; -1 where there is none."""
+    found = np.full(len(places), -1, dtype=np.int64)
+    points = np.array([[place, bed.at_place(place) + above] for place in places.tolist()])
+    boxes = elevation.boxes
+    near = (boxes[:, 0] < points.max(axis=0)) & (boxes[:, 1] > points.min(axis=0))
+    for number in np.flatnonzero(near.all(axis=1)).tolist():
+        stone = elevation.stones[number]
+        for k in np.flatnonzero(found < 0).tolist():
+            if stone.contains(points[k]):
+                found[k] = number
+    return found
+
+
+def _on_the_ground(elevation: Elevation, lower: Line, start: float, stop: float) -> bool:
+    """Whether no stone is known under a gap, however deep."""
+    boxes = elevation.boxes
+    over = (boxes[:, 1, 0] > start) & (boxes[:, 0, 0] < stop)
+    return not bool((boxes[over, :, 1].mean(axis=1) < lower.at_place(0.5 * (start + stop))).any())
+
+
+def _lies_on(upper: CourseGap, lower: CourseGap) -> bool:
+    shared = min(upper.stop, lower.stop) - max(upper.start, lower.start)
+    if shared < _SHARED:
+        return False
+    place = max(upper.start, lower.start) + 0.5 * shared
+    return abs(upper.lower.at_place(place) - lower.upper.at_place(place)) < 2.0 * _BEYOND
+
+
+def _bounded(gap: CourseGap, hole: Sequence[CourseGap]) -> float:
+    """Least part of a gap's length with stones, the ground or another gap of its hole, below or above it."""
+    places = gap.start + (np.arange(_SAMPLES) + 0.5) / _SAMPLES * gap.width
+    parts = []
+    for found, others in (
+        (gap.below, [one for one in hole if _lies_on(gap, one)]),
+        (gap.above, [one for one in hole if _lies_on(one, gap)]),
+    ):
+        held = found != -1
+        for one in others:
+            held |= (places > one.start) & (places < one.stop)
+        parts.append(float(held.mean()))
+    return min(parts)

@@ -1,0 +1,179 @@
+"""Which stones would fill a gap: the usual lengths and depths of the kinds of a facade.
+
+A gap of width w is filled by stones of kinds k₁ … kₙ with probability
+
+    p(k₁ … kₙ | w) ∝ rⁿ⁻¹ · n!/(…) · Π pₖ · N(w - (n + 1) j; Σ lₖ, Σ σₖ²)
+
+with the share pₖ of a kind, its usual length lₖ and how much that varies, σₖ, the usual joint j, and r, how much rarer
+it is that a further stone is missing beside one.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations_with_replacement, permutations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from survey.extrusion.depth import Depth
+from survey.unseen.missing.gaps import CourseGap
+from survey.unseen.missing.settings import MissingSettings
+from survey.unseen.missing.sides import Elevation, FlatStone
+
+__all__ = ["Filling", "UsualKind", "depth_of_kind", "likeliest", "split", "usual_kinds"]
+
+Array = NDArray[np.float64]
+
+_PARTICULAR = {
+    "jamb",
+    "sill",
+    "lintel",
+    "mullion",
+    "springer",
+    "voussoir",
+    "keystone",
+    "quoin",
+    "infill",
+    "support",
+}
+_ENOUGH = 3  # stones of a kind from which its usual length is known
+_LEAST_SIGMA = 0.02  # metres by which lengths of a kind vary at the least
+_FURTHER = 0.3  # how much rarer it is that a further stone is missing
+_UNLIKELY = 3.5  # standard deviations
+_CLOSE = 0.1  # metres: head joints of two courses that are farther apart are as good as any
+
+
+@dataclass(frozen=True)
+class UsualKind:
+    """A kind of plain stone of a facade.
+
+    Attributes
+    ----------
+    kind : its name
+    length, sigma : mean and standard deviation of the lengths of its stones [m]
+    share : of all plain stones [-]
+    """
+
+    kind: str
+    length: float
+    sigma: float
+    share: float
+
+
+@dataclass(frozen=True)
+class Filling:
+    """What would fill a gap.
+
+    Attributes
+    ----------
+    kinds : of its stones
+    probability : against all other fillings that were thought of [-]
+    off : difference of the gap's width from their usual length together, in standard deviations
+    """
+
+    kinds: tuple[str, ...]
+    probability: float
+    off: float
+
+    @property
+    def usual(self) -> bool:
+        """Whether stones of such lengths are known on the facade."""
+        return abs(self.off) <= _UNLIKELY
+
+
+def usual_kinds(elevation: Elevation) -> tuple[UsualKind, ...]:
+    """The kinds of plain stones of a facade; kinds that frame openings and arches, and corners, are left out."""
+    lengths: dict[str, list[float]] = {}
+    for stone in elevation.stones:
+        if stone.block.course is not None and stone.block.kind not in _PARTICULAR:
+            lengths.setdefault(stone.block.kind, []).append(float(np.ptp(stone.outline[:, 0])))
+    total = sum(len(values) for values in lengths.values())
+    return tuple(
+        UsualKind(
+            kind,
+            float(np.mean(values)),
+            max(float(np.std(values, ddof=1)), _LEAST_SIGMA),
+            len(values) / total,
+        )
+        for kind, values in sorted(lengths.items())
+        if len(values) >= _ENOUGH
+    )
+
+
+def likeliest(
+    width: float, joint: float, kinds: Sequence[UsualKind], settings: MissingSettings
+) -> Filling | None:
+    """The likeliest stones in a gap; None if no kind is known."""
+    found = []
+    for count in range(1, settings.max_stones + 2):
+        for some in combinations_with_replacement(kinds, count):
+            sigma = math.sqrt(sum(one.sigma**2 for one in some))
+            off = (width - (count + 1) * joint - sum(one.length for one in some)) / sigma
+            orders = math.factorial(count) / math.prod(
+                math.factorial(n) for n in Counter(one.kind for one in some).values()
+            )
+            prior = _FURTHER ** (count - 1) * orders * math.prod(one.share for one in some)
+            found.append((math.log(prior / sigma) - 0.5 * off**2, off, tuple(one.kind for one in some)))
+    if not found:
+        return None
+    best = max(found)
+    total = sum(math.exp(one[0] - best[0]) for one in found)
+    return Filling(best[2], 1.0 / total, best[1])
+
+
+def split(
+    gap: CourseGap, filling: Filling, kinds: Sequence[UsualKind], elevation: Elevation
+) -> tuple[tuple[str, ...], tuple[float, ...]]:
+    """The order of several stones in a gap, and where one ends and the next begins.
+
+    Their usual lengths are stretched to fill the gap; of all orders that one is taken whose joints stay farthest
+    from the head joints of the courses above and below.
+    """
+    lengths = {one.kind: one.length for one in kinds}
+    avoid = _joints_around(gap, elevation)
+
+    def cuts(order: tuple[str, ...]) -> Array:
+        ends = np.cumsum([lengths[kind] for kind in order])
+        out: Array = gap.start + gap.width * ends[:-1] / ends[-1]
+        return out
+
+    def clear(order: tuple[str, ...]) -> float:
+        places = cuts(order)
+        if not len(places) or not len(avoid):
+            return 0.0
+        return min(float(np.abs(places[:, None] - avoid).min()), _CLOSE)
+
+    best = max(sorted(set(permutations(filling.kinds))), key=clear)
+    return best, tuple(cuts(best).tolist())
+
+
+def depth_of_kind(
+    kind: str, gap_beside: Sequence[FlatStone], elevation: Elevation, course: int | None
+) -> Depth:
+    """How deep a stone of a kind probably is: as those of its course, else of the facade, else as its neighbours."""
+    alike = [stone.block for stone in elevation.stones if stone.block.kind == kind]
+    same = [block for block in alike if course is not None and block.course == course]
+    blocks, where = (same, f" of course {course}") if len(same) >= _ENOUGH else (alike, "")
+    if not blocks:
+        blocks = [stone.block for stone in gap_beside]
+        text = f"hypothesis: as its neighbours {' and '.join(block.code for block in blocks)}"
+    else:
+        text = f"hypothesis: median of {len(blocks)} {kind}{'s' if len(blocks) > 1 else ''}{where}"
+    depths = np.array([block.depth.value for block in blocks])
+    known = [block.depth.sigma for block in blocks if block.depth.sigma is not None]
+    value = float(np.median(depths))
+    spread = 1.4826 * float(np.median(np.abs(depths - value)))
+    sigma = math.hypot(spread, float(np.median(known))) if known else None
+    return Depth(value, sigma, text, "kind", 0)
+
+
+def _joints_around(gap: CourseGap, elevation: Elevation) -> Array:
+    """Ends of the stones above and below a gap, along the wall [m]."""
+    places = []
+    for found in (gap.below, gap.above):
+        for i in sorted({i for i in found.tolist() if i >= 0}):
+            outline = elevation.stones[i].outline
+            places += [float(outline[:, 0].min()), float(outline[:, 0].max())]
+    return np.array([place for place in places if gap.start < place < gap.stop])

@@ -1,0 +1,180 @@
+"""Stones in the elevation of their facade: their sides as lines, worn corners left out.
+
+Coordinates (s, t): s along the facade to the right as seen from outside, t up, metres.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from survey.extrusion.extrusion import SurveyedBlock
+from survey.faces.neighbours import Neighbours
+from survey.quality.facades import find_facades
+from survey.quality.walls import WallPlane
+
+__all__ = ["Elevation", "FlatStone", "Line", "elevations", "line_through", "meeting"]
+
+Array = NDArray[np.float64]
+
+_FACING = float(np.cos(np.radians(50.0)))  # a side looks a way if its normal is not farther from it
+_NEARLY = float(np.cos(np.radians(12.0)))  # how far wear may turn a side
+_LAYER = 0.5  # metres between two walls that look the same way
+
+
+@dataclass(frozen=True)
+class Line:
+    """A straight line: a point (2,) and a unit direction (2,)."""
+
+    point: Array
+    direction: Array
+
+    def moved(self, towards: Array, by: float) -> "Line":
+        """The parallel line at a distance, on the side of a point (2,)."""
+        normal = np.array([-self.direction[1], self.direction[0]])
+        sign = 1.0 if normal @ (towards - self.point) > 0.0 else -1.0
+        return Line(self.point + sign * by * normal, self.direction)
+
+    def at_height(self, height: float) -> float:
+        """Where it is along the wall, at a height [m]."""
+        return float(self.point[0] + (height - self.point[1]) * self.direction[0] / self.direction[1])
+
+    def at_place(self, place: float) -> float:
+        """How high it is at a place along the wall [m]."""
+        return float(self.point[1] + (place - self.point[0]) * self.direction[1] / self.direction[0])
+
+
+def line_through(one: Array, other: Array) -> Line:
+    """The line through two points."""
+    run = other - one
+    return Line(one, run / np.linalg.norm(run))
+
+
+def meeting(one: Line, other: Line) -> Array:
+    """Where two lines cross, (2,)."""
+    matrix = np.column_stack([one.direction, -other.direction])
+    along = np.linalg.solve(matrix, other.point - one.point)
+    out: Array = one.point + along[0] * one.direction
+    return out
+
+
+@dataclass(frozen=True)
+class FlatStone:
+    """A stone in the elevation.
+
+    Attributes
+    ----------
+    block : as surveyed
+    outline : (nv, 2) counter-clockwise [m]
+    worn : indices of worn corners
+    """
+
+    block: SurveyedBlock
+    outline: Array
+    worn: frozenset[int]
+
+    @cached_property
+    def centre(self) -> Array:
+        """Mean of its corners, (2,)."""
+        out: Array = self.outline.mean(axis=0)
+        return out
+
+    def side(self, towards: Array, otherwise: Array) -> Line | None:
+        """The line of the side that looks a way (2,); None if none does.
+
+        Where an end of the side is worn the line goes through the sound one, in the direction `otherwise` (2,), if
+        the side is nearly in that direction.
+        """
+        ends = self.side_ends(towards)
+        if ends is None:
+            return None
+        sound = [k for k in ends if k not in self.worn]
+        line = line_through(self.outline[ends[0]], self.outline[ends[1]])
+        if len(sound) == 2 or abs(line.direction @ otherwise) < _NEARLY:
+            return line
+        return Line(self.outline[sound[0] if sound else ends[0]], otherwise)
+
+    def side_ends(self, towards: Array) -> tuple[int, int] | None:
+        """Indices of the ends of the side that looks a way; None if none does."""
+        run = np.roll(self.outline, -1, axis=0) - self.outline
+        length = np.hypot(run[:, 0], run[:, 1])
+        facing = (run[:, 1] * towards[0] - run[:, 0] * towards[1]) / length
+        if not (facing >= _FACING).any():
+            return None
+        # of a long side that looks half away and a short one that looks there it is the short one
+        k = int(np.where(facing >= _FACING, length * facing**4, 0.0).argmax())
+        return k, (k + 1) % len(self.outline)
+
+    def crossing(self, height: Line) -> tuple[float, float] | None:
+        """Where a nearly level line enters and leaves it, along the wall [m]; None if it passes by."""
+        normal = np.array([-height.direction[1], height.direction[0]])
+        above = (self.outline - height.point) @ normal
+        places = []
+        for k, (a, b) in enumerate(zip(above, np.roll(above, -1), strict=True)):
+            if (a > 0.0) != (b > 0.0):
+                here, after = self.outline[k], self.outline[(k + 1) % len(above)]
+                places.append(float(here[0] + a / (a - b) * (after[0] - here[0])))
+        return (min(places), max(places)) if places else None
+
+    def contains(self, point: Array) -> bool:
+        """Whether a point (2,) is in its outline."""
+        inside = False
+        for here, after in zip(self.outline, np.roll(self.outline, -1, axis=0), strict=True):
+            if (here[1] > point[1]) != (after[1] > point[1]):
+                share = (point[1] - here[1]) / (after[1] - here[1])
+                inside ^= bool(point[0] < here[0] + share * (after[0] - here[0]))
+        return inside
+
+
+@dataclass(frozen=True)
+class Elevation:
+    """A facade as one draws it.
+
+    Attributes
+    ----------
+    frame : of the facade
+    stones : all that face this way, and are of this wall
+    """
+
+    frame: WallPlane
+    stones: tuple[FlatStone, ...]
+
+    @cached_property
+    def neighbours(self) -> Neighbours:
+        """The faces of its stones, to be searched by place."""
+        return Neighbours([stone.block.face for stone in self.stones])
+
+    @cached_property
+    def boxes(self) -> Array:
+        """Lower left and upper right corner of each stone's outline, (n, 2, 2) [m]."""
+        return np.array([[one.outline.min(axis=0), one.outline.max(axis=0)] for one in self.stones])
+
+
+def elevations(blocks: Sequence[SurveyedBlock]) -> tuple[Elevation, ...]:
+    """The standing facades of a survey; walls that look one way and stand behind one another are apart."""
+    if not blocks:
+        return ()
+    normals = np.array([block.face.fit.normal for block in blocks])
+    areas = np.array([block.face.measures.area for block in blocks])
+    centres = np.array([block.face.outline.mean(axis=0) for block in blocks])
+    found = []
+    for facade in find_facades(normals, areas, centres):
+        if facade.azimuth is None:
+            continue
+        out = (centres[facade.members] - facade.frame.origin) @ facade.frame.axes[2]
+        order = np.argsort(out)
+        layer = np.concatenate([[0], np.cumsum(np.diff(out[order]) > _LAYER)])
+        for number in range(int(layer[-1]) + 1):
+            members = sorted(facade.members[order[layer == number]].tolist())
+            found.append(_elevation([blocks[i] for i in members], facade.frame))
+    return tuple(found)
+
+
+def _elevation(blocks: Sequence[SurveyedBlock], frame: WallPlane) -> Elevation:
+    stones = []
+    for block in blocks:
+        flat = frame.flatten(block.face.outline)
+        stones.append(FlatStone(block, flat, frozenset(block.face.rejected_vertices)))
+    return Elevation(frame, tuple(stones))
