@@ -9,17 +9,17 @@ from numpy.typing import NDArray
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from archmodel.database import Database
-from archmodel.declaring import declare_phase
-from archmodel.entities import Entity
-from archmodel.entries import new_entry
-from archmodel.finding import Subjects
-from archmodel.records import StoneRecord
-from archmodel.relations import Relation
-from archmodel.run_records import ContactArrays, ErrorMeasures, JointArrays, RunRecord, StoneResult
-from archmodel.statements import say_mason_mark, say_of_phase
-from archmodel.store import store_survey
-from archmodel.store_runs import store_run
+from archmodel.assertions.declare import declare_phase
+from archmodel.assertions.statements import say_mason_mark, say_of_phase
+from archmodel.database.session import Database
+from archmodel.store.find_by_code import Subjects
+from archmodel.store.run_record import ContactArrays, ErrorMeasures, JointArrays, RunRecord, StoneResult
+from archmodel.store.stone_record import StoneRecord
+from archmodel.store.stones import store_survey
+from archmodel.store.store_runs import store_run
+from archmodel.tables.entities import Entity
+from archmodel.tables.entries import new_entry
+from archmodel.tables.relations import Relation
 from pipelines.relate import relate
 
 __all__ = ["COURSES", "RUNS", "relate_all", "store_all_stones", "store_knowledge", "store_results"]

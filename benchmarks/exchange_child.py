@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from archmodel.bulk import insert_rows
-from archmodel.database import open_database
-from archmodel.entities import Entity
-from archmodel.entries import new_entry
-from archmodel.relations import Relation
-from archmodel.surveys import Measurement, Survey
+from archmodel.database.session import open_database
+from archmodel.store.bulk import insert_rows
+from archmodel.tables.entities import Entity
+from archmodel.tables.entries import new_entry
+from archmodel.tables.relations import Relation
+from archmodel.tables.surveys import Measurement, Survey
 from benchmarks.memory import peak_bytes
 from pipelines.exchange import export_database, import_database
 

@@ -7,7 +7,7 @@ from typing import Any
 from sqlalchemy import JSON, Float, ForeignKey, Index, Integer, MetaData, String
 from sqlalchemy.orm import DeclarativeBase, mapped_column
 
-from archmodel.entities import Entity, OwnAttribute, kind_of, kinds
+from archmodel.tables.entities import Entity, OwnAttribute, kind_of, kinds
 
 __all__ = ["LAYOUTS", "Layout", "make_layout"]
 
@@ -33,7 +33,7 @@ COMMON = {
     "y": Float,
     "z": Float,
 }
-"""Attributes of every entity, as in `archmodel.entities.Entity`."""
+"""Attributes of every entity, as in `archmodel.tables.entities.Entity`."""
 
 
 @dataclass(frozen=True)

@@ -15,11 +15,11 @@ from typing import Any
 from sqlalchemy import Connection, event, text
 from sqlalchemy.orm import Session
 
-from archmodel.database import Database, open_database
-from archmodel.graph import load_path
-from archmodel.query import find
-from archmodel.run_description import describe_run
-from archmodel.trace import trace
+from archmodel.database.session import Database, open_database
+from archmodel.describe.runs import describe_run
+from archmodel.describe.trace import trace
+from archmodel.query.api import find
+from archmodel.relations.graph import load_path
 from benchmarks.building import (
     COURSES,
     RUNS,

@@ -19,11 +19,11 @@ from typing import TYPE_CHECKING
 from moma.errors import MomaError
 
 if TYPE_CHECKING:
-    from archmodel.database import open_database
-    from archmodel.graph import load_path
-    from archmodel.history import history
-    from archmodel.query import find, find_rows
-    from archmodel.trace import trace
+    from archmodel.database.session import open_database
+    from archmodel.describe.history import history
+    from archmodel.describe.trace import trace
+    from archmodel.query.api import find, find_rows
+    from archmodel.relations.graph import load_path
     from mechanics.result import Result
     from mechanics.scene import Block, Scene
     from mechanics.simulate import simulate
@@ -66,12 +66,12 @@ _HOMES = {
     "Result": "mechanics.result",
     "Scene": "mechanics.scene",
     "assemble": "pipelines.assemble",
-    "find": "archmodel.query",
-    "find_rows": "archmodel.query",
-    "history": "archmodel.history",
+    "find": "archmodel.query.api",
+    "find_rows": "archmodel.query.api",
+    "history": "archmodel.describe.history",
     "ingest": "pipelines.ingest",
-    "load_path": "archmodel.graph",
-    "open_database": "archmodel.database",
+    "load_path": "archmodel.relations.graph",
+    "open_database": "archmodel.database.session",
     "open_survey": "survey.formats.reading",
     "read_scene": "pipelines.scenefile",
     "record": "pipelines.record",
@@ -79,7 +79,7 @@ _HOMES = {
     "run_scene": "pipelines.run",
     "simulate": "mechanics.simulate",
     "survey_stones": "survey.stones",
-    "trace": "archmodel.trace",
+    "trace": "archmodel.describe.trace",
 }
 
 __version__: str

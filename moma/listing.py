@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from archmodel.run_records import STONE_VALUES
+from archmodel.store.run_record import STONE_VALUES
 
 __all__ = ["USUAL_COLUMNS", "as_csv", "as_geojson", "as_json", "as_lines", "as_table", "shown_columns"]
 

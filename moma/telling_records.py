@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from archmodel.recording import Outcome
+    from archmodel.store.revisions import Outcome
     from pipelines.record import RecordReport
 
 __all__ = ["record_lines"]

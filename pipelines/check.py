@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from archmodel.database import open_database
+from archmodel.database.session import open_database
 from mechanics.cost import expected_cost, machine_slowness
 from mechanics.meshing.report import MeshReport
 from mechanics.plan import Plan, plan

@@ -6,14 +6,14 @@ from dataclasses import replace
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from archmodel.bulk import batches
-from archmodel.correcting import replace_measurement
-from archmodel.entities import Entity
-from archmodel.entries import Entry
-from archmodel.finding import subjects
-from archmodel.recording import NOTHING, Outcome
-from archmodel.statements import PLAIN, Remark, say_depth
-from archmodel.store import load_stones
+from archmodel.assertions.correct import replace_measurement
+from archmodel.assertions.statements import PLAIN, Remark, say_depth
+from archmodel.store.bulk import batches
+from archmodel.store.find_by_code import subjects
+from archmodel.store.revisions import NOTHING, Outcome
+from archmodel.store.stones import load_stones
+from archmodel.tables.entities import Entity
+from archmodel.tables.entries import Entry
 from moma.errors import UsageError
 from pipelines.stone_records import stone_record, surveyed_block
 

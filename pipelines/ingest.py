@@ -8,11 +8,11 @@ from pathlib import Path
 
 from sqlalchemy.orm import Session
 
-from archmodel.bulk import first_free_id
-from archmodel.database import home_of, open_database
-from archmodel.entities import Entity, kind_named
-from archmodel.records import StoneRecord
-from archmodel.store import store_survey
+from archmodel.database.session import home_of, open_database
+from archmodel.store.bulk import first_free_id
+from archmodel.store.stone_record import StoneRecord
+from archmodel.store.stones import store_survey
+from archmodel.tables.entities import Entity, kind_named
 from moma.errors import NoDatabaseError, SurveyError, UsageError
 from pipelines.frame_records import frame_record
 from pipelines.ingest_report import IngestReport, Tally

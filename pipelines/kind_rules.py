@@ -11,9 +11,9 @@ import operator
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from archmodel.entities import kind_named
-from archmodel.grammar import All, AnyOf, Call, Comparison, IsNull, Like, Membership, Node, Not, parse
-from archmodel.tokens import Token, complaint
+from archmodel.query.grammar import All, AnyOf, Call, Comparison, IsNull, Like, Membership, Node, Not, parse
+from archmodel.query.tokens import Token, complaint
+from archmodel.tables.entities import kind_named
 from moma.errors import UsageError
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.solids import area_vector

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from archmodel.records import StoneRecord
+from archmodel.store.stone_record import StoneRecord
 from pipelines.entries import Entry
 
 __all__ = ["entry_about", "local_origin", "stone_about"]

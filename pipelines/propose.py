@@ -6,12 +6,12 @@ from dataclasses import asdict, dataclass
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from archmodel.database import open_database
-from archmodel.entities import Entity
-from archmodel.hypotheses import store_hypotheses
-from archmodel.query import find
-from archmodel.records import StoneRecord
-from archmodel.store import load_stones
+from archmodel.database.session import open_database
+from archmodel.query.api import find
+from archmodel.store.hypotheses import store_hypotheses
+from archmodel.store.stone_record import StoneRecord
+from archmodel.store.stones import load_stones
+from archmodel.tables.entities import Entity
 from moma.errors import UsageError
 from pipelines.propose_records import core_record, is_known, record_volume
 from pipelines.relate import relate

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from archmodel.records import StoneRecord
+from archmodel.store.stone_record import StoneRecord
 from pipelines.stone_records import stone_record
 from survey.extrusion.imported_solids import block_of_solid
 from survey.faces.faces import Provenance

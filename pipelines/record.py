@@ -7,12 +7,12 @@ from pathlib import Path
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from archmodel.database import open_database
-from archmodel.entries import Entry, new_entry
-from archmodel.knowledge import Correction
-from archmodel.recording import NOTHING, Outcome
-from archmodel.rows import storable
-from archmodel.values import checked_text
+from archmodel.assertions.validation import checked_text
+from archmodel.database.session import open_database
+from archmodel.store.revisions import NOTHING, Outcome
+from archmodel.store.stone_rows import storable
+from archmodel.tables.entries import Entry, new_entry
+from archmodel.tables.knowledge import Correction
 from moma.errors import UsageError
 from pipelines.record_file import RecordFile, Table, read_record
 from pipelines.record_tables import record_table

@@ -2,10 +2,10 @@
 
 from collections.abc import Mapping
 
-from archmodel.declaring import DOCUMENT_TYPES
-from archmodel.knowledge import OBSERVATIONS
-from archmodel.relations import RELATIONS
-from archmodel.structures import structure_kinds
+from archmodel.assertions.declare import DOCUMENT_TYPES
+from archmodel.tables.knowledge import OBSERVATIONS
+from archmodel.tables.relations import RELATIONS
+from archmodel.tables.structures import structure_kinds
 from pipelines.schema import Key, Kind
 
 __all__ = ["ABOUT", "ARRAYS", "ATTRIBUTE", "CITED", "PROPERTY", "RECORD", "WHO", "WITHDRAWN"]

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 
 from sqlalchemy.orm import Session
 
-from archmodel.finding import Subjects, entity_numbers, subjects
-from archmodel.query import find
+from archmodel.query.api import find
+from archmodel.store.find_by_code import Subjects, entity_numbers, subjects
 from moma.errors import UsageError
 from pipelines.record_file import RecordFile, Table
 

@@ -7,13 +7,25 @@ from typing import Any
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from archmodel.arranging import declare_members, declare_relation, declare_structure
-from archmodel.correcting import correct
-from archmodel.declaring import PropertyValue, declare_document, declare_material, declare_phase
-from archmodel.entries import Entry
-from archmodel.finding import held_or_none
-from archmodel.hypotheses import withdraw_hypotheses
-from archmodel.knowledge import (
+from archmodel.assertions.arrange import declare_members, declare_relation, declare_structure
+from archmodel.assertions.correct import correct
+from archmodel.assertions.declare import PropertyValue, declare_document, declare_material, declare_phase
+from archmodel.assertions.register_kind import register_kind
+from archmodel.assertions.statements import (
+    Remark,
+    say_made_of,
+    say_mason_mark,
+    say_note,
+    say_observation,
+    say_of_phase,
+    say_reference,
+)
+from archmodel.assertions.withdraw import withdraw_members, withdraw_relations, withdraw_statements
+from archmodel.store.find_by_code import held_or_none
+from archmodel.store.hypotheses import withdraw_hypotheses
+from archmodel.store.revisions import NOTHING, Outcome, withdraw
+from archmodel.tables.entries import Entry
+from archmodel.tables.knowledge import (
     Document,
     MadeOf,
     MasonMark,
@@ -26,19 +38,7 @@ from archmodel.knowledge import (
     Reference,
     Statement,
 )
-from archmodel.recording import NOTHING, Outcome, withdraw
-from archmodel.registering import register_kind
-from archmodel.statements import (
-    Remark,
-    say_made_of,
-    say_mason_mark,
-    say_note,
-    say_observation,
-    say_of_phase,
-    say_reference,
-)
-from archmodel.structures import Structure
-from archmodel.withdrawing import withdraw_members, withdraw_relations, withdraw_statements
+from archmodel.tables.structures import Structure
 from moma.errors import UsageError
 from pipelines.depth_records import record_depth
 from pipelines.record_file import RecordFile, Table

@@ -8,13 +8,18 @@ from numpy.typing import NDArray
 from sqlalchemy import ColumnElement, func, select
 from sqlalchemy.orm import Session
 
-from archmodel.arches import arch_parts, find_arches
-from archmodel.composing import parts_of_survey, store_parts, whole_courses
-from archmodel.computed_values import arch_values, give_values, tail_lengths
-from archmodel.entities import Entity
-from archmodel.relating import Contacts, FoundRelations, RelationSettings, StonesOf, relations_between
-from archmodel.relation_store import Act, Changes, held_settings, store_relations
-from archmodel.stone_columns import (
+from archmodel.relations.arches import arch_parts, find_arches
+from archmodel.relations.classify import (
+    Contacts,
+    FoundRelations,
+    RelationSettings,
+    StonesOf,
+    relations_between,
+)
+from archmodel.relations.derived_attributes import arch_values, give_values, tail_lengths
+from archmodel.relations.store import Act, Changes, held_settings, store_relations
+from archmodel.relations.zones_and_courses import parts_of_survey, store_parts, whole_courses
+from archmodel.store.stone_arrays import (
     ENTITY,
     StoneColumns,
     id_conditions,
@@ -22,6 +27,7 @@ from archmodel.stone_columns import (
     stone_columns,
     stone_shapes,
 )
+from archmodel.tables.entities import Entity
 from survey.geometry.adjacency import Polyhedra, PolyhedraBuilder, find_touching
 
 __all__ = ["KnownSolids", "RelationReport", "relate"]

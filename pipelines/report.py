@@ -5,7 +5,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from archmodel.run_records import StoneResult
+from archmodel.store.run_record import StoneResult
 from mechanics.result import Result
 from pipelines.history_plot import history_svg
 from pipelines.html_page import figure, page

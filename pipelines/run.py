@@ -8,10 +8,10 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from archmodel.database import open_database
-from archmodel.entries import latest_entry
-from archmodel.run_records import StoneResult
-from archmodel.store_runs import store_run
+from archmodel.database.session import open_database
+from archmodel.store.run_record import StoneResult
+from archmodel.store.store_runs import store_run
+from archmodel.tables.entries import latest_entry
 from mechanics.result import Outcome, Result
 from mechanics.simulate import simulate
 from moma.errors import DatabaseError, MissingLibraryError

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from archmodel.measures import solid_volume
-from archmodel.run_records import (
+from archmodel.store.measures import solid_volume
+from archmodel.store.run_record import (
     ContactArrays,
     ErrorMeasures,
     JointArrays,

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from sqlalchemy.orm import Session
 
-from archmodel.query import MAX_EXPRESSIONS, find, find_rows
-from archmodel.records import StoneRecord
-from archmodel.store import load_stones
+from archmodel.query.api import MAX_EXPRESSIONS, find, find_rows
+from archmodel.store.stone_record import StoneRecord
+from archmodel.store.stones import load_stones
 from mechanics.materials import Material
 from mechanics.scene import Fidelity
 from moma.errors import QueryError, UsageError

@@ -15,7 +15,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from archmodel.records import StoneRecord
+from archmodel.store.stone_record import StoneRecord
 from moma.errors import SurveyError
 
 __all__ = ["Spool"]

@@ -6,7 +6,7 @@ from typing import get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from archmodel.records import StoneRecord
+from archmodel.store.stone_record import StoneRecord
 from survey.extrusion.depth import Depth, Origin
 from survey.extrusion.extrusion import SurveyedBlock, extrude
 from survey.faces.faces import Face, Provenance, Source, face_on, outline_face

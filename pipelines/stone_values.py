@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from archmodel.run_records import StoneResult
+from archmodel.store.run_record import StoneResult
 from mechanics.contact_result import JointResult
 from mechanics.result import BodyResult, Result
 from mechanics.stress_values import StressValues, volume_quantile

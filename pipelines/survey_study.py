@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from archmodel.entities import kind_named
+from archmodel.tables.entities import kind_named
 from moma.errors import UsageError
 from pipelines.progress import Listener, Progress, silent
 from pipelines.reading_options import check_survey_file

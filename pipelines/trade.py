@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from archmodel.database import open_database
+from archmodel.database.session import open_database
 from mechanics.scene import Fidelity
 from moma.errors import UsageError
 from pipelines.assemble import assemble

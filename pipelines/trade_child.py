@@ -15,7 +15,7 @@ import time
 from dataclasses import dataclass, fields
 from typing import Any
 
-from archmodel.database import open_database
+from archmodel.database.session import open_database
 from mechanics.meshing.elements import Element
 from mechanics.result import Result
 from mechanics.scene import Fidelity, Method, Placement

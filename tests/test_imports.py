@@ -42,8 +42,8 @@ def test_the_import_rule_holds():
             ("numpy", "sqlalchemy", "numba", "gmsh", "pyvista", "vtkmodules", "scipy", "matplotlib"),
         ),
         ("mechanics.simulate", ("sqlalchemy", "typer", "vtkmodules")),
-        ("archmodel.database", ("alembic", "psycopg", "numba", "typer", "scipy")),
-        ("archmodel.query", ("numba", "typer", "vtkmodules", "scipy")),
+        ("archmodel.database.session", ("alembic", "psycopg", "numba", "typer", "scipy")),
+        ("archmodel.query.api", ("numba", "typer", "vtkmodules", "scipy")),
         (
             "survey.formats.reading",
             ("sqlalchemy", "numba", "typer", "vtkmodules", "trimesh", "meshio", "scipy"),

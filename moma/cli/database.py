@@ -25,8 +25,8 @@ def migrate(
     verbose: Verbose = False,
 ) -> None:
     """Give a database the layout of this program, or of an older one: all of it, or nothing."""
-    from archmodel.layout import SCHEMA_VERSION
-    from archmodel.migrating import migrate as change
+    from archmodel.migrations.migrate import migrate as change
+    from archmodel.tables.layout import SCHEMA_VERSION
     from moma.listing import as_json
 
     if yes and to is None:

@@ -40,7 +40,7 @@ def query(
     verbose: Verbose = False,
 ) -> None:
     """List the entities of a kind that satisfy conditions."""
-    from archmodel.database import open_database
+    from archmodel.database.session import open_database
     from moma.answers import Question, answer
 
     if json and format not in (None, ListFormat.JSON):
@@ -79,8 +79,8 @@ def schema(
     """Show what there can be: kinds with their attributes, structures, relations."""
     from pathlib import Path
 
-    from archmodel.database import open_database
-    from archmodel.schema_tree import schema as tree_of
+    from archmodel.database.session import open_database
+    from archmodel.describe.schema_tree import schema as tree_of
     from moma.listing import as_json
     from moma.schema_text import print_schema
 
@@ -112,9 +112,9 @@ def show(
     """Show one stone or structure: what it is, what is known of it, what was measured and computed."""
     from dataclasses import asdict
 
-    from archmodel import history as past
-    from archmodel.database import open_database
-    from archmodel.query import describe
+    from archmodel.database.session import open_database
+    from archmodel.describe import history as past
+    from archmodel.query.api import describe
     from moma.listing import as_json
     from moma.telling_entities import entity_lines, history_lines
 

@@ -37,8 +37,8 @@ def relate(
     verbose: Verbose = False,
 ) -> None:
     """Compute again what rests on what, and which courses and arches there are; see docs/relations.md."""
-    from archmodel.database import open_database
-    from archmodel.relation_store import held_settings
+    from archmodel.database.session import open_database
+    from archmodel.relations.store import held_settings
     from moma.listing import as_json, as_table
     from pipelines.relate import relate as compute
 
@@ -78,8 +78,8 @@ def load_path(
     verbose: Verbose = False,
 ) -> None:
     """Show all stones on which one rests, directly or through others; with --up, all that rest on it."""
-    from archmodel.database import open_database
-    from archmodel.graph import load_path as follow
+    from archmodel.database.session import open_database
+    from archmodel.relations.graph import load_path as follow
     from moma.listing import as_json, as_table
 
     with open_database(db, create=False) as database, database.session(read_only=True) as session:

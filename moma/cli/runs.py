@@ -58,8 +58,8 @@ def runs(
     verbose: Verbose = False,
 ) -> None:
     """List the simulation runs, or show one in full, or compare two."""
-    from archmodel.database import open_database
-    from archmodel.run_description import compare_runs, describe_run, list_runs
+    from archmodel.database.session import open_database
+    from archmodel.describe.runs import compare_runs, describe_run, list_runs
     from moma.listing import as_json, as_table
 
     if number is None and against is not None:

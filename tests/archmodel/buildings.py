@@ -13,10 +13,10 @@ import numpy as np
 from sqlalchemy import JSON, Boolean, Date, Float, Integer, String, Table, insert, select, update
 from sqlalchemy.orm import Session
 
-from archmodel.base import ArrayType, Base, UtcDateTime
-from archmodel.database import Database
-from archmodel.entities import kinds as entity_kinds
-from archmodel.layout import SchemaVersion
+from archmodel.database.session import Database
+from archmodel.tables.base import ArrayType, Base, UtcDateTime
+from archmodel.tables.entities import kinds as entity_kinds
+from archmodel.tables.layout import SchemaVersion
 
 TEXTS = (
     *(

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from archmodel.database import Database, open_database
-from archmodel.records import StoneRecord
-from archmodel.store import store_survey
+from archmodel.database.session import Database, open_database
+from archmodel.store.stone_record import StoneRecord
+from archmodel.store.stones import store_survey
 from tests.archmodel.recycling import Recycled
 from tests.archmodel.stones import SHA, box_stone
 from tests.postgresql import Server

@@ -5,10 +5,11 @@ Every table has rows that are no longer held, which no query may find.
 
 from sqlalchemy.orm import Session
 
-from archmodel.database import Database
-from archmodel.entities import Entity, Voussoir
-from archmodel.entries import Entry, new_entry
-from archmodel.knowledge import (
+from archmodel.database.session import Database
+from archmodel.store.store_runs import store_run
+from archmodel.tables.entities import Entity, Voussoir
+from archmodel.tables.entries import Entry, new_entry
+from archmodel.tables.knowledge import (
     Correction,
     Document,
     MadeOf,
@@ -22,9 +23,8 @@ from archmodel.knowledge import (
     Reference,
     Statement,
 )
-from archmodel.relations import Membership, Relation
-from archmodel.store_runs import store_run
-from archmodel.structures import Structure, structure_kind_named
+from archmodel.tables.relations import Membership, Relation
+from archmodel.tables.structures import Structure, structure_kind_named
 from tests.archmodel.stones import run_record
 
 RELATIONS = (

@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 
-from archmodel.database import open_database
-from archmodel.layout import SCHEMA_VERSION, metadata
+from archmodel.database.session import open_database
+from archmodel.tables.layout import SCHEMA_VERSION, metadata
 from tests.postgresql import Server
 
 __all__ = ["Recycled"]

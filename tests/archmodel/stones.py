@@ -5,9 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 from sqlalchemy import MetaData, select
 
-from archmodel.database import Database
-from archmodel.records import StoneRecord
-from archmodel.run_records import RunRecord, StoneResult
+from archmodel.database.session import Database
+from archmodel.store.run_record import RunRecord, StoneResult
+from archmodel.store.stone_record import StoneRecord
 
 SHA = "ab" * 32
 

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from archmodel.arch_rows import ArchJoint, arches_among
-from archmodel.stone_columns import StoneColumns
+from archmodel.relations.arch_rings import ArchJoint, arches_among
+from archmodel.store.stone_arrays import StoneColumns
 
 FRONT = np.array([0.0, -1.0, 0.0])
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from archmodel.composing import along_the_wall, course_code
+from archmodel.relations.zones_and_courses import along_the_wall, course_code
 
 
 def order(centres, normals):

@@ -4,13 +4,13 @@ import pytest
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from archmodel.correcting import correct
-from archmodel.database import Database
-from archmodel.entities import Entity, Header, Quoin, Voussoir
-from archmodel.entries import Entry, new_entry
-from archmodel.knowledge import Correction
-from archmodel.query import find
-from archmodel.recording import Outcome
+from archmodel.assertions.correct import correct
+from archmodel.database.session import Database
+from archmodel.query.api import find
+from archmodel.store.revisions import Outcome
+from archmodel.tables.entities import Entity, Header, Quoin, Voussoir
+from archmodel.tables.entries import Entry, new_entry
+from archmodel.tables.knowledge import Correction
 from moma.errors import UsageError
 
 

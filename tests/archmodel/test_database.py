@@ -7,12 +7,12 @@ from datetime import UTC, datetime
 import pytest
 from sqlalchemy import func, select
 
-from archmodel.database import Database, open_database
-from archmodel.entities import Entity
-from archmodel.entries import Entry
-from archmodel.layout import SchemaVersion
-from archmodel.relations import Membership
-from archmodel.store import store_survey
+from archmodel.database.session import Database, open_database
+from archmodel.store.stones import store_survey
+from archmodel.tables.entities import Entity
+from archmodel.tables.entries import Entry
+from archmodel.tables.layout import SchemaVersion
+from archmodel.tables.relations import Membership
 from moma.errors import DatabaseError
 from tests.archmodel.stones import SHA, box_stone, contents
 
@@ -105,8 +105,8 @@ def test_an_error_of_the_program_undoes_the_session(filled: Database) -> None:
 def test_many_processes_can_open_one_new_database_at_once(new_url: Callable[[], str]) -> None:
     url = new_url()
     program = (
-        "import sys; from archmodel.database import open_database\n"
-        "from archmodel.store import store_survey; from tests.archmodel.stones import box_stone\n"
+        "import sys; from archmodel.database.session import open_database\n"
+        "from archmodel.store.stones import store_survey; from tests.archmodel.stones import box_stone\n"
         "print('ready', flush=True); sys.stdin.readline()\n"
         "name = sys.argv[2]; database = open_database(sys.argv[1])\n"
         "with database.session() as session:\n"

@@ -6,17 +6,23 @@ import pytest
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from archmodel.arranging import declare_members, declare_relation, declare_structure
-from archmodel.database import Database
-from archmodel.declaring import PROPERTIES, PropertyValue, declare_document, declare_material, declare_phase
-from archmodel.description import describe
-from archmodel.entries import Entry, held_at, new_entry
-from archmodel.finding import Subjects, held_named, subjects
-from archmodel.knowledge import Document, MaterialProperty, Phase
-from archmodel.recording import Outcome, supersede, withdraw
-from archmodel.relations import Membership, Relation
-from archmodel.structures import Arch, Structure
-from archmodel.withdrawing import withdraw_members
+from archmodel.assertions.arrange import declare_members, declare_relation, declare_structure
+from archmodel.assertions.declare import (
+    PROPERTIES,
+    PropertyValue,
+    declare_document,
+    declare_material,
+    declare_phase,
+)
+from archmodel.assertions.withdraw import withdraw_members
+from archmodel.database.session import Database
+from archmodel.describe.entity import describe
+from archmodel.store.find_by_code import Subjects, held_named, subjects
+from archmodel.store.revisions import Outcome, supersede, withdraw
+from archmodel.tables.entries import Entry, held_at, new_entry
+from archmodel.tables.knowledge import Document, MaterialProperty, Phase
+from archmodel.tables.relations import Membership, Relation
+from archmodel.tables.structures import Arch, Structure
 from moma.errors import DatabaseError, UsageError
 
 NEW, SAME, OTHER = Outcome(new=1), Outcome(unchanged=1), Outcome(replaced=1)

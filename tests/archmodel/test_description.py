@@ -5,14 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from archmodel.arranging import declare_members, declare_relation, declare_structure
-from archmodel.database import Database
-from archmodel.declaring import PropertyValue, declare_document, declare_material, declare_phase
-from archmodel.description import describe
-from archmodel.entries import new_entry
-from archmodel.finding import subjects
-from archmodel.run_records import JointArrays
-from archmodel.statements import (
+from archmodel.assertions.arrange import declare_members, declare_relation, declare_structure
+from archmodel.assertions.declare import PropertyValue, declare_document, declare_material, declare_phase
+from archmodel.assertions.statements import (
     Remark,
     say_depth,
     say_made_of,
@@ -22,7 +17,12 @@ from archmodel.statements import (
     say_of_phase,
     say_reference,
 )
-from archmodel.store_runs import store_run
+from archmodel.database.session import Database
+from archmodel.describe.entity import describe
+from archmodel.store.find_by_code import subjects
+from archmodel.store.run_record import JointArrays
+from archmodel.store.store_runs import store_run
+from archmodel.tables.entries import new_entry
 from tests.archmodel.stones import run_record
 
 

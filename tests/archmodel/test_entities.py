@@ -3,7 +3,7 @@ import sys
 
 import pytest
 
-from archmodel.entities import (
+from archmodel.tables.entities import (
     Ashlar,
     Entity,
     Header,
@@ -84,10 +84,10 @@ def test_a_kind_like_no_other_lists_them_all() -> None:
 def test_a_new_kind_is_one_small_class() -> None:
     # In a process of its own, since a kind cannot be taken back.
     program = '''
-from archmodel.entities import Voussoir, kinds
-from archmodel.database import open_database
-from archmodel.store import store_survey
-from archmodel.query import find
+from archmodel.tables.entities import Voussoir, kinds
+from archmodel.database.session import open_database
+from archmodel.store.stones import store_survey
+from archmodel.query.api import find
 from tests.archmodel.stones import SHA, box_stone
 
 class Counterkey(Voussoir):

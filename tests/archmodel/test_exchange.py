@@ -30,15 +30,15 @@ from sqlalchemy import (
     update,
 )
 
-from archmodel.base import ArrayType, UtcDateTime
-from archmodel.database import Database, open_database
-from archmodel.entities import Entity, Header, kinds
-from archmodel.entries import Entry, new_entry
-from archmodel.exchange import export_building, import_building
-from archmodel.exchange_sections import sections
-from archmodel.exchange_values import value_of
-from archmodel.knowledge import MadeOf, Material
-from archmodel.structures import Building, Tower
+from archmodel.database.session import Database, open_database
+from archmodel.exchange.document import export_building, import_building
+from archmodel.exchange.sections import sections
+from archmodel.exchange.values import value_of
+from archmodel.tables.base import ArrayType, UtcDateTime
+from archmodel.tables.entities import Entity, Header, kinds
+from archmodel.tables.entries import Entry, new_entry
+from archmodel.tables.knowledge import MadeOf, Material
+from archmodel.tables.structures import Building, Tower
 from moma.errors import ExchangeError
 from tests.archmodel.buildings import everything, exact, fill, tables
 from tests.postgresql import Server

@@ -10,12 +10,12 @@ from typing import Any
 
 import pytest
 
-from archmodel.database import Database, open_database
-from archmodel.entities import kinds
-from archmodel.exchange import export_building, import_building
-from archmodel.exchange_head import FRAME, UNITS
-from archmodel.layout import SCHEMA_VERSION
-from archmodel.registered import release_registered
+from archmodel.database.session import Database, open_database
+from archmodel.exchange.document import export_building, import_building
+from archmodel.exchange.head import FRAME, UNITS
+from archmodel.tables.entities import kinds
+from archmodel.tables.layout import SCHEMA_VERSION
+from archmodel.tables.registered import release_registered
 from moma.errors import ExchangeError, MomaError
 from tests.archmodel.buildings import everything, fill, tables
 from tests.postgresql import Server

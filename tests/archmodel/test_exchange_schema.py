@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 
-from archmodel.database import Database, open_database
-from archmodel.exchange import export_building
-from archmodel.exchange_schema import building_schema, schema_text
+from archmodel.database.session import Database, open_database
+from archmodel.exchange.document import export_building
+from archmodel.exchange.json_schema import building_schema, schema_text
 from tests.archmodel.buildings import fill, tables
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -33,7 +33,7 @@ def exported(seed: int, path: Path) -> Any:
 
 def test_what_is_published_is_what_the_code_says():
     published = (ROOT / "docs/exchange.schema.json").read_text(encoding="utf-8")
-    again = "python -m archmodel.exchange_schema > docs/exchange.schema.json"
+    again = "python -m archmodel.exchange.json_schema > docs/exchange.schema.json"
     assert published == schema_text(), f"write it again: {again}"
 
 

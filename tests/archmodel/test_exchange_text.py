@@ -8,8 +8,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from archmodel import exchange_text
-from archmodel.exchange_text import JsonText
+from archmodel.exchange import json_stream as exchange_text
+from archmodel.exchange.json_stream import JsonText
 from moma.errors import ExchangeError
 
 VALUES = st.recursive(

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from archmodel.database import Database
-from archmodel.geojson import feature_collection, flattened
-from archmodel.query import Face, find_faces
+from archmodel.database.session import Database
+from archmodel.query.api import Face, find_faces
+from archmodel.query.geojson import feature_collection, flattened
 from moma.errors import UsageError
 from tests.archmodel.conftest import WALL
 

@@ -8,11 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sqlalchemy import select
 
-from archmodel.bulk import insert_rows
-from archmodel.database import open_database
-from archmodel.entities import Entity
-from archmodel.entries import new_entry
-from archmodel.graph import (
+from archmodel.database.session import open_database
+from archmodel.relations.graph import (
     carried_by,
     carries,
     courses_in_order,
@@ -20,7 +17,10 @@ from archmodel.graph import (
     neighbours,
     stones_near,
 )
-from archmodel.relations import Relation
+from archmodel.store.bulk import insert_rows
+from archmodel.tables.entities import Entity
+from archmodel.tables.entries import new_entry
+from archmodel.tables.relations import Relation
 from moma.errors import UsageError
 from pipelines.relate import relate
 from tests.pipelines.standing import arch, take_in, wall

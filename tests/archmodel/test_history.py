@@ -12,18 +12,18 @@ from hypothesis import strategies as st
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from archmodel.arranging import declare_members, declare_relation, declare_structure
-from archmodel.correcting import correct
-from archmodel.database import Database, open_database
-from archmodel.declaring import PropertyValue, declare_material, declare_phase
-from archmodel.entries import Entry, new_entry
-from archmodel.finding import held_named, subjects
-from archmodel.history import history, known_at
-from archmodel.knowledge import MasonMark, Material
-from archmodel.recording import withdraw
-from archmodel.statements import say_made_of, say_mason_mark, say_observation, say_of_phase
-from archmodel.store import store_survey
-from archmodel.withdrawing import withdraw_members, withdraw_relations, withdraw_statements
+from archmodel.assertions.arrange import declare_members, declare_relation, declare_structure
+from archmodel.assertions.correct import correct
+from archmodel.assertions.declare import PropertyValue, declare_material, declare_phase
+from archmodel.assertions.statements import say_made_of, say_mason_mark, say_observation, say_of_phase
+from archmodel.assertions.withdraw import withdraw_members, withdraw_relations, withdraw_statements
+from archmodel.database.session import Database, open_database
+from archmodel.describe.history import history, known_at
+from archmodel.store.find_by_code import held_named, subjects
+from archmodel.store.revisions import withdraw
+from archmodel.store.stones import store_survey
+from archmodel.tables.entries import Entry, new_entry
+from archmodel.tables.knowledge import MasonMark, Material
 from moma.errors import UsageError
 from tests.archmodel.stones import SHA, box_stone
 
@@ -304,7 +304,7 @@ def test_the_history_of_a_structure_goes_through_its_versions(empty: Database) -
             declare_structure(session, entry, "arch", "ARCH", title=title)
         declare_members(session, entry, "ARCH", subjects(session, ["B", "A"]).entities, ordered=True)
         last = new_entry(session, "declaration", "no arch after all")
-        from archmodel.structures import Structure
+        from archmodel.tables.structures import Structure
 
         withdraw(session, last, held_named(session, Structure, "ARCH"))
     with empty.session(read_only=True) as session:

@@ -11,11 +11,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from sqlalchemy import event
 
-from archmodel.attributes import ATTRIBUTES
-from archmodel.database import Database, open_database
-from archmodel.functions import FUNCTIONS, STRUCTURE_FUNCTIONS
-from archmodel.query import find, find_rows
-from archmodel.store import store_survey
+from archmodel.database.session import Database, open_database
+from archmodel.query.api import find, find_rows
+from archmodel.query.attributes import ATTRIBUTES
+from archmodel.query.functions.registry import FUNCTIONS, STRUCTURE_FUNCTIONS
+from archmodel.store.stones import store_survey
 from moma.errors import QueryError
 from tests.archmodel.conftest import WALL
 from tests.archmodel.furnished import furnish

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from sqlalchemy import func, select
 
-from archmodel.database import open_database
-from archmodel.entities import Entity
-from archmodel.entries import Entry, new_entry
-from archmodel.hypotheses import store_hypotheses, withdraw_hypotheses
-from archmodel.query import find
-from archmodel.recording import Outcome
-from archmodel.store import load_stones
-from archmodel.surveys import Measurement
+from archmodel.database.session import open_database
+from archmodel.query.api import find
+from archmodel.store.hypotheses import store_hypotheses, withdraw_hypotheses
+from archmodel.store.revisions import Outcome
+from archmodel.store.stones import load_stones
+from archmodel.tables.entities import Entity
+from archmodel.tables.entries import Entry, new_entry
+from archmodel.tables.surveys import Measurement
 from moma.errors import DatabaseError, UsageError
 from pipelines.stone_records import stone_record, surveyed_block
 from survey.extrusion.depth import depth_for

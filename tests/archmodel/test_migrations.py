@@ -16,16 +16,16 @@ from alembic.migration import MigrationContext
 from numpy.typing import NDArray
 from sqlalchemy import MetaData, inspect, select, text
 
-from archmodel import layout
-from archmodel.database import open_database
-from archmodel.entities import Corbel, Entity, Joint
-from archmodel.entries import new_entry
-from archmodel.migrating import migrate
-from archmodel.relations import Relation
-from archmodel.run_records import JointArrays, SimplificationRecord
-from archmodel.store import load_stones, store_survey
-from archmodel.store_runs import store_run
-from archmodel.surveys import Measurement
+from archmodel.database.session import open_database
+from archmodel.migrations.migrate import migrate
+from archmodel.store.run_record import JointArrays, SimplificationRecord
+from archmodel.store.stones import load_stones, store_survey
+from archmodel.store.store_runs import store_run
+from archmodel.tables import layout
+from archmodel.tables.entities import Corbel, Entity, Joint
+from archmodel.tables.entries import new_entry
+from archmodel.tables.relations import Relation
+from archmodel.tables.surveys import Measurement
 from moma.errors import DatabaseError, UsageError
 from tests.archmodel.old_databases import LAYOUTS, Rows, connected, dumped, make_old, rows_of, run_alembic
 from tests.archmodel.stones import SHA, box_stone, run_record
@@ -443,7 +443,7 @@ def test_what_cannot_be_migrated_is_said(new_url: NewUrl, tmp_path: Path) -> Non
 
 PROGRAM = """
 import sys
-from archmodel.migrating import migrate
+from archmodel.migrations.migrate import migrate
 print("ready", flush=True)
 sys.stdin.readline()
 migrate(sys.argv[1], int(sys.argv[2]), lossy=True)

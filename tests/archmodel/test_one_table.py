@@ -3,8 +3,8 @@
 import pytest
 from sqlalchemy import Connection, Select, event, select
 
-from archmodel.database import Database
-from archmodel.entities import Ashlar, Entity, Header, Keystone, kinds
+from archmodel.database.session import Database
+from archmodel.tables.entities import Ashlar, Entity, Header, Keystone, kinds
 
 ASHLARS = [name for name, cls in kinds().items() if issubclass(cls, Ashlar)]
 

@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 from sqlalchemy import select, text
 
-from archmodel.database import open_database
-from archmodel.entities import Entity
-from archmodel.postgresql import WRITE_LOCK
-from archmodel.store import store_survey
+from archmodel.database.postgresql import WRITE_LOCK
+from archmodel.database.session import open_database
+from archmodel.store.stones import store_survey
+from archmodel.tables.entities import Entity
 from moma.errors import DatabaseError, MissingLibraryError
 from tests.archmodel.stones import SHA, box_stone
 from tests.postgresql import Server
@@ -127,8 +127,8 @@ def test_a_writer_sees_what_was_written_while_it_waited(url: str) -> None:
         with database.session() as session:
             store_survey(session, "a", "a.moma", SHA, [box_stone("A1")])
             program = (
-                "import sys; from sqlalchemy import select; from archmodel.database import open_database\n"
-                "from archmodel.entities import Entity\n"
+                "import sys; from sqlalchemy import select; from archmodel.database.session import open_database\n"
+                "from archmodel.tables.entities import Entity\n"
                 "with open_database(sys.argv[1]) as d:\n"
                 "    print('ready', flush=True)\n"
                 "    with d.session() as s: print(s.scalars(select(Entity.code)).all())\n"

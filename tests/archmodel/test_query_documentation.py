@@ -7,16 +7,16 @@ from pathlib import Path
 
 import pytest
 
-from archmodel import grammar
-from archmodel.database import Database, open_database
-from archmodel.entities import canon_of, definition_of, kind_of, kinds
-from archmodel.expressions import STRUCTURE_ATTRIBUTES
-from archmodel.grammar import MAX_CALLS, MAX_DEPTH
-from archmodel.query import MAX_EXPRESSIONS, attributes, find, find_rows
-from archmodel.scope import MAX_FUNCTIONS, MAX_RUNS
-from archmodel.store import store_survey
-from archmodel.tokens import MAX_LENGTH
-from archmodel.usages import STRUCTURE_USAGES, USAGES
+from archmodel.database.session import Database, open_database
+from archmodel.query import grammar
+from archmodel.query.api import MAX_EXPRESSIONS, attributes, find, find_rows
+from archmodel.query.compile import STRUCTURE_ATTRIBUTES
+from archmodel.query.functions.usages import STRUCTURE_USAGES, USAGES
+from archmodel.query.grammar import MAX_CALLS, MAX_DEPTH
+from archmodel.query.scope import MAX_FUNCTIONS, MAX_RUNS
+from archmodel.query.tokens import MAX_LENGTH
+from archmodel.store.stones import store_survey
+from archmodel.tables.entities import canon_of, definition_of, kind_of, kinds
 from moma.errors import QueryError
 from tests.archmodel.conftest import WALL
 from tests.archmodel.furnished import MEMBERS, RELATIONS, STRUCTURES, furnish

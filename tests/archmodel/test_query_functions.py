@@ -3,9 +3,9 @@
 import pytest
 from sqlalchemy import select
 
-from archmodel.database import Database
-from archmodel.entities import Entity, Voussoir
-from archmodel.query import condition, find, find_rows
+from archmodel.database.session import Database
+from archmodel.query.api import condition, find, find_rows
+from archmodel.tables.entities import Entity, Voussoir
 from moma.errors import QueryError
 from tests.archmodel.furnished import furnish
 
@@ -177,8 +177,8 @@ def test_a_condition_is_part_of_a_plain_select(furnished: Database) -> None:
 
 
 def test_stones_that_rest_on_one_another_in_a_circle_are_found_once(furnished: Database) -> None:
-    from archmodel.entries import new_entry
-    from archmodel.relations import Relation
+    from archmodel.tables.entries import new_entry
+    from archmodel.tables.relations import Relation
 
     with furnished.session() as session:
         entry = new_entry(session, "declaration", "a mistake")
@@ -203,7 +203,7 @@ def test_stones_that_rest_on_one_another_in_a_circle_are_found_once(furnished: D
 
 
 def test_structures_that_contain_one_another_end(furnished: Database) -> None:
-    from archmodel.structures import Structure
+    from archmodel.tables.structures import Structure
 
     with furnished.session() as session:
         structures = {one.code: one for one in session.query(Structure)}

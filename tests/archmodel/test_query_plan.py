@@ -3,9 +3,9 @@
 import pytest
 from sqlalchemy import event, text
 
-from archmodel.database import Database, open_database
-from archmodel.query import find, find_rows
-from archmodel.store import store_survey
+from archmodel.database.session import Database, open_database
+from archmodel.query.api import find, find_rows
+from archmodel.store.stones import store_survey
 from tests.archmodel.conftest import WALL
 from tests.archmodel.furnished import furnish
 from tests.archmodel.stones import SHA

@@ -14,12 +14,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sqlalchemy import select
 
-from archmodel.base import Base
-from archmodel.bulk import insert_rows
-from archmodel.database import Database, open_database
-from archmodel.entities import Entity
-from archmodel.entries import new_entry
-from archmodel.knowledge import (
+from archmodel.database.session import Database, open_database
+from archmodel.query.api import find
+from archmodel.store.bulk import insert_rows
+from archmodel.store.stones import store_survey
+from archmodel.tables.base import Base
+from archmodel.tables.entities import Entity
+from archmodel.tables.entries import new_entry
+from archmodel.tables.knowledge import (
     OBSERVATIONS,
     Document,
     MasonMark,
@@ -29,10 +31,8 @@ from archmodel.knowledge import (
     Reference,
     Statement,
 )
-from archmodel.query import find
-from archmodel.relations import RELATIONS, SYMMETRIC, Membership, Relation
-from archmodel.store import store_survey
-from archmodel.structures import Structure
+from archmodel.tables.relations import RELATIONS, SYMMETRIC, Membership, Relation
+from archmodel.tables.structures import Structure
 from tests.archmodel.stones import SHA, box_stone
 
 STONES = tuple(f"S{number}" for number in range(14))

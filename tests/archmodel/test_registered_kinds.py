@@ -7,16 +7,24 @@ import pytest
 from sqlalchemy import select
 from sqlalchemy.orm import Session, aliased
 
-from archmodel.correcting import correct
-from archmodel.database import Database, open_database
-from archmodel.description import describe
-from archmodel.entities import Ashlar, Entity, canon_of, definition_of, kind_named, kinds, own_attributes
-from archmodel.entries import Entry, new_entry
-from archmodel.knowledge import Correction
-from archmodel.query import find
-from archmodel.recording import Outcome
-from archmodel.registering import MAX_LEVELS, register_kind
-from archmodel.store import store_survey
+from archmodel.assertions.correct import correct
+from archmodel.assertions.register_kind import MAX_LEVELS, register_kind
+from archmodel.database.session import Database, open_database
+from archmodel.describe.entity import describe
+from archmodel.query.api import find
+from archmodel.store.revisions import Outcome
+from archmodel.store.stones import store_survey
+from archmodel.tables.entities import (
+    Ashlar,
+    Entity,
+    canon_of,
+    definition_of,
+    kind_named,
+    kinds,
+    own_attributes,
+)
+from archmodel.tables.entries import Entry, new_entry
+from archmodel.tables.knowledge import Correction
 from moma.errors import DatabaseError, MomaError, UsageError
 from tests.archmodel.stones import box_stone
 

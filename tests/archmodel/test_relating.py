@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from archmodel.relating import Contacts, RelationSettings, StonesOf, relations_between
-from archmodel.relations import RELATIONS
+from archmodel.relations.classify import Contacts, RelationSettings, StonesOf, relations_between
+from archmodel.tables.relations import RELATIONS
 
 FRONT, BACK = (0.0, -1.0, 0.0), (0.0, 1.0, 0.0)
 

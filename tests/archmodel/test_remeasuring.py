@@ -2,13 +2,13 @@ import numpy as np
 import pytest
 from sqlalchemy import select
 
-from archmodel.database import Database
-from archmodel.entities import Entity
-from archmodel.entries import held_at
-from archmodel.knowledge import Correction
-from archmodel.query import find
-from archmodel.store import load_stones, store_survey
-from archmodel.surveys import Measurement
+from archmodel.database.session import Database
+from archmodel.query.api import find
+from archmodel.store.stones import load_stones, store_survey
+from archmodel.tables.entities import Entity
+from archmodel.tables.entries import held_at
+from archmodel.tables.knowledge import Correction
+from archmodel.tables.surveys import Measurement
 from moma.errors import DatabaseError, GeometryError
 from tests.archmodel.stones import box_stone
 

@@ -8,16 +8,16 @@ from typing import Any
 
 import pytest
 
-from archmodel.database import Database
-from archmodel.entities import Entity, definition_of, kind_of, kinds
-from archmodel.entries import new_entry
-from archmodel.query import attributes, condition, find, find_rows
-from archmodel.registered import RegisteredKind, declare_registered
-from archmodel.registering import register_kind
-from archmodel.relations import INVERSE
-from archmodel.schema_tree import schema
-from archmodel.store import store_survey
-from archmodel.structures import structure_kinds
+from archmodel.assertions.register_kind import register_kind
+from archmodel.database.session import Database
+from archmodel.describe.schema_tree import schema
+from archmodel.query.api import attributes, condition, find, find_rows
+from archmodel.store.stones import store_survey
+from archmodel.tables.entities import Entity, definition_of, kind_of, kinds
+from archmodel.tables.entries import new_entry
+from archmodel.tables.registered import RegisteredKind, declare_registered
+from archmodel.tables.relations import INVERSE
+from archmodel.tables.structures import structure_kinds
 from moma.errors import QueryError, UsageError
 from tests.archmodel.stones import SHA, box_stone
 
@@ -171,10 +171,10 @@ def test_a_kind_with_a_column_of_its_own_is_asked_for_like_any_other() -> None:
     # In a process of its own, since a kind cannot be taken back.
     program = '''
 from sqlalchemy.orm import Mapped
-from archmodel.database import open_database
-from archmodel.entities import Ashlar, OwnAttribute
-from archmodel.query import find
-from archmodel.store import store_survey
+from archmodel.database.session import open_database
+from archmodel.tables.entities import Ashlar, OwnAttribute
+from archmodel.query.api import find
+from archmodel.store.stones import store_survey
 from tests.archmodel.stones import SHA, box_stone
 
 question = "not rests_on(depth > 9) and is_a(header)"

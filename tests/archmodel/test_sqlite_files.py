@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from sqlalchemy import func, select
 
-from archmodel.database import Database, open_database
-from archmodel.entities import Entity
-from archmodel.store import store_survey
+from archmodel.database.session import Database, open_database
+from archmodel.store.stones import store_survey
+from archmodel.tables.entities import Entity
 from moma.errors import DatabaseError
 from tests.archmodel.stones import SHA, box_stone, contents
 

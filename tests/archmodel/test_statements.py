@@ -7,14 +7,9 @@ import pytest
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
-from archmodel.arranging import declare_structure
-from archmodel.database import Database
-from archmodel.declaring import declare_document, declare_material, declare_phase
-from archmodel.entries import Entry, new_entry
-from archmodel.finding import Subjects, subjects
-from archmodel.knowledge import DepthEvidence, MadeOf, MasonMark, Note, Observation, Statement
-from archmodel.recording import Outcome, supersede, withdraw
-from archmodel.statements import (
+from archmodel.assertions.arrange import declare_structure
+from archmodel.assertions.declare import declare_document, declare_material, declare_phase
+from archmodel.assertions.statements import (
     Remark,
     say_depth,
     say_made_of,
@@ -24,7 +19,12 @@ from archmodel.statements import (
     say_of_phase,
     say_reference,
 )
-from archmodel.withdrawing import withdraw_members, withdraw_relations, withdraw_statements
+from archmodel.assertions.withdraw import withdraw_members, withdraw_relations, withdraw_statements
+from archmodel.database.session import Database
+from archmodel.store.find_by_code import Subjects, subjects
+from archmodel.store.revisions import Outcome, supersede, withdraw
+from archmodel.tables.entries import Entry, new_entry
+from archmodel.tables.knowledge import DepthEvidence, MadeOf, MasonMark, Note, Observation, Statement
 from moma.errors import UsageError
 
 

@@ -4,10 +4,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from archmodel.database import Database
-from archmodel.query import find
-from archmodel.records import StoneRecord
-from archmodel.store import load_stones, store_survey, survey_with_hash
+from archmodel.database.session import Database
+from archmodel.query.api import find
+from archmodel.store.stone_record import StoneRecord
+from archmodel.store.stones import load_stones, store_survey, survey_with_hash
 from moma.errors import DatabaseError, GeometryError, MomaError, SurveyError
 from tests.archmodel.stones import SHA, box_stone, contents
 

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from sqlalchemy import func, select
 
-from archmodel.database import Database
-from archmodel.entities import Entity
-from archmodel.run_records import (
+from archmodel.database.session import Database
+from archmodel.store.run_record import (
     ContactArrays,
     ErrorMeasures,
     JointArrays,
@@ -17,10 +16,11 @@ from archmodel.run_records import (
     SimplificationRecord,
     StoneResult,
 )
-from archmodel.runs import ContactPoint, EntityResult, JointResult, Run
-from archmodel.store import store_survey
-from archmodel.store_runs import store_run
-from archmodel.surveys import Simplification
+from archmodel.store.stones import store_survey
+from archmodel.store.store_runs import store_run
+from archmodel.tables.entities import Entity
+from archmodel.tables.runs import ContactPoint, EntityResult, JointResult, Run
+from archmodel.tables.surveys import Simplification
 from moma.errors import DatabaseError
 from tests.archmodel.stones import SHA, box_stone, contents, run_record
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from sqlalchemy import insert, select, update
 
-from archmodel.database import Database
-from archmodel.entities import Entity
-from archmodel.entries import latest_entry, new_entry
-from archmodel.run_records import SimplificationRecord
-from archmodel.store_runs import store_run
-from archmodel.surveys import Measurement
-from archmodel.trace import trace
+from archmodel.database.session import Database
+from archmodel.describe.trace import trace
+from archmodel.store.run_record import SimplificationRecord
+from archmodel.store.store_runs import store_run
+from archmodel.tables.entities import Entity
+from archmodel.tables.entries import latest_entry, new_entry
+from archmodel.tables.surveys import Measurement
 from moma.errors import UsageError
 from tests.archmodel.conftest import WALL
 from tests.archmodel.stones import run_record

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 from sqlalchemy import func, select
 
-from archmodel.database import open_database
-from archmodel.entities import Entity
-from archmodel.relations import Relation
-from archmodel.runs import ContactPoint, EntityResult, JointResult
-from archmodel.structures import Arch
+from archmodel.database.session import open_database
+from archmodel.tables.entities import Entity
+from archmodel.tables.relations import Relation
+from archmodel.tables.runs import ContactPoint, EntityResult, JointResult
+from archmodel.tables.structures import Arch
 from benchmarks import query_child
 from benchmarks.building import COURSES, RUNS
 

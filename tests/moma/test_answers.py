@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
-from archmodel.attributes import ATTRIBUTES
-from archmodel.database import open_database
-from archmodel.entities import kinds
-from archmodel.schema_tree import schema
-from archmodel.store import store_survey
+from archmodel.database.session import open_database
+from archmodel.describe.schema_tree import schema
+from archmodel.query.attributes import ATTRIBUTES
+from archmodel.store.stones import store_survey
+from archmodel.tables.entities import kinds
 from moma.cli import app
 from moma.schema_text import print_schema, schema_lines
 from tests.archmodel.conftest import WALL

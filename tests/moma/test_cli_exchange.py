@@ -9,7 +9,7 @@ import pytest
 from click.testing import Result
 from typer.testing import CliRunner
 
-from archmodel.database import open_database
+from archmodel.database.session import open_database
 from moma.cli import app
 from tests.archmodel.buildings import fill, tables
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from archmodel.exchange_sections import sections
-from archmodel.layout import SCHEMA_VERSION
+from archmodel.exchange.sections import sections
+from archmodel.tables.layout import SCHEMA_VERSION
 from moma.cli import app
 
 ROOT = Path(__file__).parents[2]

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
-from archmodel.database import open_database
-from archmodel.store import store_survey
+from archmodel.database.session import open_database
+from archmodel.store.stones import store_survey
 from moma.cli import app
 from tests.archmodel.stones import SHA, box_stone
 

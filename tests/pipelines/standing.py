@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from archmodel.store import store_survey
+from archmodel.store.stones import store_survey
 from survey.geometry.solids import area_vector
 from tests.archmodel.stones import box_stone, hash_of
 from tests.validation import masonry

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 from sqlalchemy import func, select
 
-from archmodel.database import open_database
-from archmodel.entities import Entity
-from archmodel.surveys import Measurement, Survey
+from archmodel.database.session import open_database
+from archmodel.tables.entities import Entity
+from archmodel.tables.surveys import Measurement, Survey
 from pipelines.ingest import ingest
 from tests.archmodel.stones import contents
 from tests.pipelines.interrupted import Ingest, wall_survey

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from sqlalchemy import select
 
-from archmodel.database import open_database
-from archmodel.description import describe
-from archmodel.entities import Entity
-from archmodel.entries import held_at, new_entry
-from archmodel.knowledge import Correction, DepthEvidence
-from archmodel.recording import Outcome
-from archmodel.statements import Remark
-from archmodel.surveys import Measurement
+from archmodel.assertions.statements import Remark
+from archmodel.database.session import open_database
+from archmodel.describe.entity import describe
+from archmodel.store.revisions import Outcome
+from archmodel.tables.entities import Entity
+from archmodel.tables.entries import held_at, new_entry
+from archmodel.tables.knowledge import Correction, DepthEvidence
+from archmodel.tables.surveys import Measurement
 from moma.errors import UsageError
 from pipelines.depth_records import record_depth
 from pipelines.ingest import ingest

@@ -12,7 +12,7 @@ from random import Random
 
 import pytest
 
-from archmodel.database import open_database
+from archmodel.database.session import open_database
 from moma.errors import DatabaseError, ExchangeError
 from pipelines import exchange
 from pipelines.exchange import export_database, import_database
@@ -133,7 +133,7 @@ def test_a_killed_import_leaves_no_database_and_the_next_one_works(document: Pat
     code = (
         "import os, sys, time\n"
         "from pathlib import Path\n"
-        "import archmodel.exchange_storing as storing\n"
+        "import archmodel.exchange.store as storing\n"
         "storing.SectionStore.finish = lambda self: (print('storing', flush=True), time.sleep(60))\n"
         "from pipelines.exchange import import_database\n"
         "import_database(Path(sys.argv[1]), sys.argv[2])\n"

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from archmodel.database import open_database
-from archmodel.query import find
-from archmodel.store import load_stones
+from archmodel.database.session import open_database
+from archmodel.query.api import find
+from archmodel.store.stones import load_stones
 from moma.cli import app
 from moma.errors import DatabaseError, GeometryError, SurveyError, UsageError
 from pipelines.ingest import ingest

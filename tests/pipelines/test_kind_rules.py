@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from archmodel.database import open_database
-from archmodel.entities import Entity
+from archmodel.database.session import open_database
+from archmodel.tables.entities import Entity
 from moma.errors import QueryError, UsageError
 from moma.telling import ingest_lines
 from pipelines.ingest import ingest

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from archmodel.declaring import DOCUMENT_TYPES, PROPERTIES
-from archmodel.knowledge import OBSERVATIONS
-from archmodel.relations import RELATIONS
-from archmodel.structures import structure_kinds
+from archmodel.assertions.declare import DOCUMENT_TYPES, PROPERTIES
+from archmodel.tables.knowledge import OBSERVATIONS
+from archmodel.tables.relations import RELATIONS
+from archmodel.tables.structures import structure_kinds
 from moma.cli import app
 from pipelines.record import record
 from pipelines.record_file import read_record

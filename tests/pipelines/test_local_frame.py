@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from archmodel.database import open_database
-from archmodel.query import find
-from archmodel.store import load_stones
+from archmodel.database.session import open_database
+from archmodel.query.api import find
+from archmodel.store.stones import load_stones
 from pipelines.assemble import assemble
 from pipelines.ingest import ingest
 from pipelines.local_frame import local_origin, stone_about

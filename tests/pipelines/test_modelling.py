@@ -7,9 +7,9 @@ import pytest
 from sqlalchemy import event
 from typer.testing import CliRunner
 
-from archmodel.database import open_database
-from archmodel.entities import Entity
-from archmodel.surveys import Measurement
+from archmodel.database.session import open_database
+from archmodel.tables.entities import Entity
+from archmodel.tables.surveys import Measurement
 from mechanics.scene import Fidelity
 from mechanics.simulate import simulate
 from moma.cli import app

@@ -6,15 +6,15 @@ from pathlib import Path
 import pytest
 from sqlalchemy import func, select
 
-from archmodel.database import open_database
-from archmodel.description import describe
-from archmodel.entries import Entry
-from archmodel.knowledge import Correction, MasonMark, Material, Observation, Phase, Statement
-from archmodel.query import find
-from archmodel.recording import Outcome
-from archmodel.relations import Relation
-from archmodel.store import store_survey
-from archmodel.structures import Structure
+from archmodel.database.session import open_database
+from archmodel.describe.entity import describe
+from archmodel.query.api import find
+from archmodel.store.revisions import Outcome
+from archmodel.store.stones import store_survey
+from archmodel.tables.entries import Entry
+from archmodel.tables.knowledge import Correction, MasonMark, Material, Observation, Phase, Statement
+from archmodel.tables.relations import Relation
+from archmodel.tables.structures import Structure
 from moma.errors import UsageError
 from pipelines.record import record
 from pipelines.record_file import read_record

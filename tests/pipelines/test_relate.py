@@ -8,15 +8,15 @@ import pytest
 from sqlalchemy import select, update
 from sqlalchemy.orm import aliased
 
-from archmodel.database import open_database
-from archmodel.entities import Entity
-from archmodel.entries import Entry, held_at, new_entry
-from archmodel.knowledge import Correction
-from archmodel.relating import RelationSettings
-from archmodel.relation_store import held_settings
-from archmodel.relations import Membership, Relation
-from archmodel.structures import Structure
-from archmodel.surveys import Measurement
+from archmodel.database.session import open_database
+from archmodel.relations.classify import RelationSettings
+from archmodel.relations.store import held_settings
+from archmodel.tables.entities import Entity
+from archmodel.tables.entries import Entry, held_at, new_entry
+from archmodel.tables.knowledge import Correction
+from archmodel.tables.relations import Membership, Relation
+from archmodel.tables.structures import Structure
+from archmodel.tables.surveys import Measurement
 from moma.errors import UsageError
 from pipelines import relate as relating
 from pipelines.relate import KnownSolids, relate

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from archmodel.relating import RelationSettings
+from archmodel.relations.classify import RelationSettings
 from moma.cli import app
 
 ROOT = Path(__file__).parents[2]

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from archmodel.database import open_database
-from archmodel.query import describe, find_rows
-from archmodel.run_records import STONE_VALUES
+from archmodel.database.session import open_database
+from archmodel.query.api import describe, find_rows
+from archmodel.store.run_record import STONE_VALUES
 from mechanics.result import Outcome
 from mechanics.scene import Fidelity
 from moma.errors import MissingLibraryError, SceneError, UsageError

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from sqlalchemy import func, select
 
-from archmodel.database import open_database
-from archmodel.entities import Entity
-from archmodel.runs import ContactPoint, EntityResult, JointResult, Run
-from archmodel.surveys import Simplification
-from archmodel.trace import trace
+from archmodel.database.session import open_database
+from archmodel.describe.trace import trace
+from archmodel.tables.entities import Entity
+from archmodel.tables.runs import ContactPoint, EntityResult, JointResult, Run
+from archmodel.tables.surveys import Simplification
 from mechanics.scene import Fidelity
 from pipelines import run as run_module
 from pipelines.assemble import assemble

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from archmodel import runs, surveys
-from archmodel.base import Base
-from archmodel.database import open_database
+from archmodel.database.session import open_database
+from archmodel.tables import runs, surveys
+from archmodel.tables.base import Base
 from pipelines.ingest import ingest
 from pipelines.run import run_scene
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from archmodel.database import open_database
+from archmodel.database.session import open_database
 from mechanics.laws.cohesive_zone import CohesiveZone
 from mechanics.laws.dry_joint import DryJoint
 from mechanics.laws.lennard_jones import LennardJones

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from archmodel.database import open_database
+from archmodel.database.session import open_database
 from mechanics.polyhedra import mass_properties
 from pipelines.assemble import assemble
 from pipelines.ingest import ingest

@@ -5,7 +5,7 @@ from math import pi, sin
 import numpy as np
 import pytest
 
-from archmodel.database import open_database
+from archmodel.database.session import open_database
 from mechanics.polyhedra import mass_properties
 from pipelines.assemble import assemble
 from pipelines.check import check_scene

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from archmodel.database import open_database
-from archmodel.query import find
-from archmodel.store import load_stones
+from archmodel.database.session import open_database
+from archmodel.query.api import find
+from archmodel.store.stones import load_stones
 from pipelines.ingest import ingest
 from pipelines.stone_records import stone_record, surveyed_block
 from survey.faces.faces import Provenance

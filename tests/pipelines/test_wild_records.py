@@ -9,8 +9,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from archmodel.database import open_database
-from archmodel.store import store_survey
+from archmodel.database.session import open_database
+from archmodel.store.stones import store_survey
 from moma.errors import MomaError
 from pipelines.record import record
 from pipelines.record_keys import ARRAYS

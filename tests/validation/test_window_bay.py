@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from archmodel.database import open_database
+from archmodel.database.session import open_database
 from mechanics.result import Outcome
 from mechanics.scene import Fidelity, Method, SolverSettings, TimeSettings
 from mechanics.simulate import simulate

@@ -1,6 +1,6 @@
 """Tables of version 3, as they were when it was declared: the architectural model.
 
-Never to be changed: a new layout of `archmodel.layout` is a new version.
+Never to be changed: a new layout of `archmodel.tables.layout` is a new version.
 """
 
 from sqlalchemy import (

@@ -1,6 +1,6 @@
 """Tables of version 4, as they were when it was declared: hypotheses, simplified solids, widths of joints.
 
-Never to be changed: a new layout of `archmodel.layout` is a new version.
+Never to be changed: a new layout of `archmodel.tables.layout` is a new version.
 """
 
 from sqlalchemy import (

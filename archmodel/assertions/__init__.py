@@ -1,0 +1,1 @@
+"""Recording of assertions: declare, arrange, state, correct, withdraw."""

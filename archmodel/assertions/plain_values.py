@@ -1,0 +1,69 @@
+"""Rows of knowledge as plain values under the names that users know, for descriptions, histories and matching."""
+
+from archmodel.tables.entries import Entry
+from archmodel.tables.knowledge import (
+    DepthEvidence,
+    MadeOf,
+    MasonMark,
+    Note,
+    Observation,
+    OfPhase,
+    Statement,
+)
+
+__all__ = ["entry_values", "statement_values"]
+
+Values = dict[str, object]
+
+
+def statement_values(statement: Statement) -> Values:
+    """What a statement says, without what is not known; the session must be open.
+
+    Returns
+    -------
+    dict
+        material, phase, sign, place, type, severity, at [m], value, sigma [m] or key, as its kind has them; then
+        text, document (code), locator, observed_on
+    """
+    document = statement.document
+    seen = statement.observed_on
+    values = {
+        **_own(statement),
+        "text": statement.text,
+        "document": None if document is None else document.code,
+        "locator": statement.locator,
+        "observed_on": None if seen is None else seen.isoformat(),
+    }
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def entry_values(entry: Entry) -> Values:
+    """An act of recording: number, action, author, source, when."""
+    return {
+        "entry": entry.id,
+        "action": entry.action,
+        "author": entry.author,
+        "source": entry.source,
+        "recorded_at": entry.recorded_at.isoformat(timespec="seconds"),
+    }
+
+
+def _own(statement: Statement) -> Values:
+    match statement:
+        case MadeOf(material=material):
+            return {"material": None if material is None else material.name}
+        case OfPhase(phase=phase):
+            return {"phase": None if phase is None else phase.name}
+        case MasonMark(sign=sign, place=place):
+            return {"sign": sign, "place": place}
+        case Observation(x=None):
+            return {"type": statement.type, "severity": statement.severity, "place": statement.place}
+        case Observation(x=x, y=y, z=z):
+            rest = {"severity": statement.severity, "place": statement.place}
+            return {"type": statement.type, **rest, "at": [x, y, z]}
+        case DepthEvidence(value=value, sigma=sigma):
+            return {"value": value, "sigma": sigma}
+        case Note(key=key):
+            return {"key": key}
+        case _:
+            return {}

@@ -1,0 +1,137 @@
+"""Registering a kind of a user's own in a database."""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, is_dataclass
+
+from sqlalchemy.orm import Session
+
+from archmodel.assertions.validation import checked_label, checked_text
+from archmodel.query.attributes import ATTRIBUTES
+from archmodel.query.compile import condition
+from archmodel.query.functions.registry import FUNCTIONS, STRUCTURE_FUNCTIONS
+from archmodel.query.grammar import Call, parse
+from archmodel.query.tokens import KEYWORDS, Token, complaint
+from archmodel.store.revisions import Outcome
+from archmodel.tables.entities import OwnAttribute, kind_chain, kind_named, kind_of, kinds, own_attributes
+from archmodel.tables.entries import Entry
+from archmodel.tables.registered import RegisteredKind, declare_registered
+from moma.errors import QueryError, UsageError
+
+__all__ = ["MAX_LEVELS", "register_kind"]
+
+MAX_LEVELS = 20
+"""Most kinds from the most general one down to the most particular."""
+
+_NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
+
+
+def register_kind(
+    session: Session,
+    entry: Entry,
+    name: str,
+    parent: str,
+    definition: str,
+    *,
+    canon: str | None = None,
+    attributes: Mapping[str, tuple[str | None, str]] | None = None,
+) -> Outcome:
+    """Make a kind known to this database; it is a class of the hierarchy from now on.
+
+    Parameters
+    ----------
+    name : in lower case, with _ between words
+    parent : the kind that it is a case of
+    definition : one sentence: one word, one role
+    canon : canonical proportions, as a query expression; None: those of the parent
+    attributes : of its own, by name: unit ("-" for numbers without one, None for texts) and definition
+
+    Raises
+    ------
+    UsageError
+        if the name is taken, the parent unknown, or an attribute is named like another one
+    QueryError
+        if the canon is no expression, or asks for what is not known
+    """
+    declare_registered(session)
+    above = kind_named(parent)
+    if len(kind_chain(above)) >= MAX_LEVELS:
+        remedy = "make it a case of a kind that is less particular"
+        raise UsageError(f"{name} is a case of a case, {MAX_LEVELS} times over", remedy=remedy)
+    given = {key: (unit, definition.strip()) for key, (unit, definition) in (attributes or {}).items()}
+    row = RegisteredKind(
+        name=_checked_name("a kind", name),
+        parent=kind_of(above),
+        definition=" ".join(str(checked_text("definition", definition)).split()),
+        canon=checked_text("canon", canon),
+        attributes=given,
+        entry_id=entry.id,
+    )
+    known = session.get(RegisteredKind, name)
+    if known is not None:
+        if known.says() == row.says():
+            return Outcome(unchanged=1)
+        remedy = "give the new one another name; definitions of kinds do not change"
+        raise UsageError(f"the kind {name} is registered already, with another definition", remedy=remedy)
+    if name in kinds():
+        raise UsageError(f"there is a kind {name} already", remedy="give yours another name")
+    _check_attributes(given, own_attributes(above))
+    try:
+        with session.begin_nested():
+            session.add(row)
+            session.flush()
+            declare_registered(session)
+            if row.canon is not None:
+                _check_canon(row.canon)
+                condition(session, row.canon)
+    except QueryError:
+        declare_registered(session)
+        raise
+    return Outcome(new=1)
+
+
+def _check_attributes(
+    given: Mapping[str, tuple[str | None, str]], inherited: Mapping[str, OwnAttribute]
+) -> None:
+    """An attribute has a name of its own, so that a query can ask for it."""
+    # what the classes call their own members (own, entry, metadata, …) would be written over
+    built_in = [name for cls in kinds().values() if cls.__users__ is None for name in dir(cls)]
+    taken = {*ATTRIBUTES, *built_in, *inherited, *KEYWORDS, *FUNCTIONS, *STRUCTURE_FUNCTIONS}
+    units = {one.name: one.unit for cls in kinds().values() for one in cls.__own__}
+    for name, (unit, definition) in given.items():
+        _checked_name("an attribute", name)
+        checked_text(f"definition of {name}", definition)
+        if unit is not None:
+            checked_label(f"unit of {name}", unit)
+        if name in taken:
+            remedy = "give it another name"
+            raise UsageError(f"{name} means something already", remedy=remedy)
+        if name in units and units[name] != unit:
+            what = f"{name} [{unit or 'text'}] is an attribute of another kind, in {units[name] or 'text'}"
+            raise UsageError(what, remedy="give it the same unit, or another name")
+
+
+def _check_canon(canon: str) -> None:
+    """Proportions are of the stone itself: runs, other stones and structures may be gone when they are asked for."""
+    for node in _nodes(parse(canon)):
+        if isinstance(node, Call):
+            raise complaint(node.function, "canonical proportions cannot ask functions", "compare attributes")
+        if isinstance(node, Token) and node.role == "word" and "@" in node.text:
+            raise complaint(node, "canonical proportions cannot ask a run", "leave out @ and what follows")
+
+
+def _nodes(node: object) -> Iterator[object]:
+    """A node of an expression and all that is in it."""
+    yield node
+    if is_dataclass(node) and not isinstance(node, Token):
+        for part in fields(node):
+            value = getattr(node, part.name)
+            for one in value if isinstance(value, tuple) else (value,):
+                yield from _nodes(one)
+
+
+def _checked_name(thing: str, name: str) -> str:
+    if not _NAME.fullmatch(name) or len(name) > 40:
+        remedy = "write it in small letters a–z and digits, with _ between words, e.g. corner_merlon"
+        raise UsageError(f"{name[:40]!a} is not the name of {thing}", remedy=remedy)
+    return name

@@ -1,0 +1,240 @@
+"""Saying something of entities and structures: material, phase, marks, observations, depth, documents, notes.
+
+One thing said of many subjects is one statement about each. Of what a subject can have but one (`SINGLE`), a new
+statement supersedes the one before; the others add up. What is said already, word for word, is not said again.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import date
+
+from sqlalchemy import insert, select
+from sqlalchemy.orm import Session
+
+from archmodel.assertions.validation import (
+    checked_choice,
+    checked_label,
+    checked_number,
+    checked_text,
+    checked_whole,
+)
+from archmodel.store.bulk import batches
+from archmodel.store.find_by_code import Subjects, held_named
+from archmodel.store.revisions import NOTHING, Outcome, end_rows, table_of
+from archmodel.tables.entries import Entry
+from archmodel.tables.knowledge import (
+    OBSERVATIONS,
+    DepthEvidence,
+    Document,
+    MadeOf,
+    MasonMark,
+    Material,
+    Note,
+    Observation,
+    OfPhase,
+    Phase,
+    Reference,
+    Statement,
+)
+from moma.errors import UsageError
+
+__all__ = [
+    "PLAIN",
+    "SINGLE",
+    "Remark",
+    "say_depth",
+    "say_made_of",
+    "say_mason_mark",
+    "say_note",
+    "say_observation",
+    "say_of_phase",
+    "say_reference",
+]
+
+SINGLE: tuple[type[Statement], ...] = (MadeOf, OfPhase, DepthEvidence)
+"""Statements of which a subject has at most one that is held."""
+
+
+@dataclass(frozen=True)
+class Remark:
+    """What can be said with every statement.
+
+    Attributes
+    ----------
+    text : in words
+    document, locator : code of the document that says so, and where in it
+    observed_on : date on which it was seen
+    """
+
+    text: str | None = None
+    document: str | None = None
+    locator: str | None = None
+    observed_on: date | None = None
+
+
+PLAIN = Remark()
+
+
+def say_made_of(
+    session: Session, entry: Entry, about: Subjects, material: str, remark: Remark = PLAIN
+) -> Outcome:
+    """They are of a material, which must have been declared."""
+    number = held_named(session, Material, material).id
+    return _say(session, entry, MadeOf, about, {"material_id": number}, remark)
+
+
+def say_of_phase(
+    session: Session, entry: Entry, about: Subjects, phase: str, remark: Remark = PLAIN
+) -> Outcome:
+    """They were built, or put where they are, in a phase, which must have been declared."""
+    number = held_named(session, Phase, phase).id
+    return _say(session, entry, OfPhase, about, {"phase_id": number}, remark)
+
+
+def say_mason_mark(
+    session: Session,
+    entry: Entry,
+    about: Subjects,
+    sign: str,
+    place: str | None = None,
+    remark: Remark = PLAIN,
+) -> Outcome:
+    """They bear a mason's mark; `sign` is the same for the same mark, `place` is where on the stone, in words."""
+    values = {"sign": checked_label("sign", sign), "place": checked_text("place", place)}
+    return _say(session, entry, MasonMark, about, values, remark)
+
+
+def say_observation(
+    session: Session,
+    entry: Entry,
+    about: Subjects,
+    type: str,
+    *,
+    severity: int | None = None,
+    place: str | None = None,
+    at: Sequence[float] | None = None,
+    remark: Remark = PLAIN,
+) -> Outcome:
+    """Something was seen on them.
+
+    Parameters
+    ----------
+    type : one of ``knowledge.OBSERVATIONS``
+    severity : from 0 (traces) to 4 (lost, or about to be)
+    place : on the stone, in words
+    at : (x, y, z) in the frame of the site [m]
+    """
+    x, y, z = _point(at)
+    values = {
+        "type": checked_choice("type of observation", type, OBSERVATIONS),
+        "severity": checked_whole("severity", severity, 0, 4),
+        "place": checked_text("place", place),
+        "x": x,
+        "y": y,
+        "z": z,
+    }
+    return _say(session, entry, Observation, about, values, remark)
+
+
+def say_depth(
+    session: Session,
+    entry: Entry,
+    about: Subjects,
+    value: float,
+    sigma: float | None = None,
+    remark: Remark = PLAIN,
+) -> Outcome:
+    """They are so deep [m], with this standard deviation [m].
+
+    This is the statement alone; ``pipelines.depth_records`` makes the solid follow it.
+    """
+    values = {
+        "value": checked_number("depth", value, "m", above=0.0),
+        "sigma": checked_number("sigma", sigma, "m", at_least=0.0),
+    }
+    return _say(session, entry, DepthEvidence, about, values, remark)
+
+
+def say_reference(session: Session, entry: Entry, about: Subjects, remark: Remark) -> Outcome:
+    """A document or photograph, named in the remark, treats or shows them."""
+    if remark.document is None:
+        raise UsageError("a reference names no document", remedy="give the code of a document")
+    return _say(session, entry, Reference, about, {}, remark)
+
+
+def say_note(session: Session, entry: Entry, about: Subjects, key: str, remark: Remark) -> Outcome:
+    """A word, the text of the remark, under a key such as "edge"."""
+    if remark.text is None:
+        raise UsageError(f"the note {key[:40]!r} says nothing", remedy="give its text")
+    return _say(session, entry, Note, about, {"key": checked_label("key", key)}, remark)
+
+
+def _say(
+    session: Session,
+    entry: Entry,
+    cls: type[Statement],
+    about: Subjects,
+    values: Mapping[str, object],
+    remark: Remark,
+) -> Outcome:
+    """One statement about each subject that does not have it already."""
+    full = {**values, **_remark_row(session, remark)}
+    outcome = NOTHING
+    for owner, numbers in (("entity_id", about.entities), ("structure_id", about.structures)):
+        for batch in batches(numbers):
+            outcome += _say_of_batch(session, entry, cls, owner, batch, full)
+    return outcome
+
+
+def _say_of_batch(
+    session: Session,
+    entry: Entry,
+    cls: type[Statement],
+    owner: str,
+    numbers: Sequence[int],
+    values: Mapping[str, object],
+) -> Outcome:
+    session.flush()
+    table = table_of(Statement)
+    held = select(table).where(
+        table.c[owner].in_(numbers), table.c.kind == cls.__kind__, table.c.superseded_id.is_(None)
+    )
+    same: set[int] = set()
+    others: dict[int, int] = {}
+    for row in session.execute(held).mappings():
+        if all(row[name] == value for name, value in values.items()):
+            same.add(row[owner])
+        elif cls in SINGLE:
+            others[row[owner]] = row["id"]
+    if others:
+        end_rows(session, entry, Statement, list(others.values()))
+    rows = [
+        {"kind": cls.__kind__, "entry_id": entry.id, owner: number, "supersedes_id": others.get(number)}
+        | dict(values)
+        for number in numbers
+        if number not in same
+    ]
+    if rows:
+        session.execute(insert(table), rows)
+    return Outcome(new=len(rows) - len(others), replaced=len(others), unchanged=len(same))
+
+
+def _remark_row(session: Session, remark: Remark) -> dict[str, object]:
+    document = remark.document
+    if remark.locator is not None and document is None:
+        raise UsageError(f"the locator {remark.locator[:40]!r} is in no document", remedy="name the document")
+    return {
+        "text": checked_text("text", remark.text),
+        "document_id": None if document is None else held_named(session, Document, document).id,
+        "locator": checked_text("locator", remark.locator),
+        "observed_on": remark.observed_on,
+    }
+
+
+def _point(at: Sequence[float] | None) -> tuple[float | None, float | None, float | None]:
+    if at is None:
+        return None, None, None
+    if len(at) != 3:
+        raise UsageError(f"a place of {len(at)} numbers", remedy="give x, y and z in metres")
+    x, y, z = (checked_number(name, value, "m") for name, value in zip("xyz", at, strict=True))
+    return x, y, z

@@ -1,0 +1,1 @@
+"""Connections and sessions on SQLite and PostgreSQL."""

@@ -1,0 +1,159 @@
+"""What is particular to databases that are one SQLite file, or lie in memory."""
+
+import sqlite3
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self
+
+from sqlalchemy import URL, Connection, Engine, create_engine, event
+from sqlalchemy.engine.interfaces import DBAPIConnection
+from sqlalchemy.exc import DBAPIError
+from sqlalchemy.pool import ConnectionPoolEntry
+
+from archmodel.tables.base import json_text
+from moma.errors import DatabaseError, NoDatabaseError
+
+__all__ = ["HOW_TO_WRITE", "SqliteFile"]
+
+HOW_TO_WRITE = "sqlite:///FILE with three slashes, e.g. sqlite:///moma.db"
+"""The URL of a file."""
+
+
+@dataclass(frozen=True)
+class SqliteFile:
+    """A database in one file.
+
+    Attributes
+    ----------
+    url : as SQLAlchemy knows it
+    file : None in memory
+    lock_timeout : how long to wait for another program's lock [s]
+    """
+
+    url: URL
+    file: Path | None
+    lock_timeout: float
+
+    @classmethod
+    def of(cls, url: URL, lock_timeout: float) -> Self:
+        """The file that a URL names.
+
+        Raises
+        ------
+        DatabaseError
+            if it names none
+        """
+        if url.host or url.username or url.query or "\0" in (url.database or ""):
+            shown = url.render_as_string()[:80]
+            raise DatabaseError(f"{shown!r} does not name a file", remedy=f"write {HOW_TO_WRITE}")
+        file = None if url.database in (None, "", ":memory:") else Path(str(url.database))
+        return cls(url, file, lock_timeout)
+
+    @property
+    def place(self) -> str:
+        """Where the database is, for messages."""
+        return "memory" if self.file is None else str(self.file)
+
+    @property
+    def shown(self) -> str:
+        """The URL, to be printed."""
+        return self.url.render_as_string()
+
+    def engine(self, create: bool) -> Engine:
+        """An engine on the file, which may be missing if `create` allows it."""
+        if self.file is not None:
+            _check_file(self.file, create)
+        engine = create_engine(
+            self.url, connect_args={"timeout": self.lock_timeout}, json_serializer=json_text
+        )
+        event.listen(engine, "connect", _on_connect)
+        event.listen(engine, "begin", _on_begin)
+        return engine
+
+    def settle(self, engine: Engine) -> None:
+        """Let readers and one writer work at once: the write-ahead log.
+
+        The file remembers it, so mostly there is nothing to do. It cannot be done within a transaction, hence
+        on the bare connection; and SQLite does not wait for another program's write lock here, hence the loop.
+        """
+        if self.file is None:
+            return
+        connection = engine.raw_connection()
+        deadline = time.monotonic() + self.lock_timeout
+        try:
+            cursor = connection.cursor()
+            while True:
+                try:
+                    cursor.execute("PRAGMA journal_mode = WAL")
+                    break
+                except sqlite3.OperationalError as error:
+                    if "locked" not in str(error) or time.monotonic() > deadline:
+                        raise
+                time.sleep(0.01)
+            cursor.close()
+        finally:
+            connection.close()
+
+    def refusal(self, error: Exception) -> DatabaseError:
+        """SQLite's complaint in the user's words."""
+        said = _said(error)
+        for words, what, remedy in _COMPLAINTS:
+            if any(word in said for word in words):
+                return DatabaseError(what.format(said=said), where=self.place, remedy=remedy)
+        return DatabaseError(f"the database refused: {said}", where=self.place, remedy="nothing was changed")
+
+
+_COMPLAINTS = (
+    (
+        ("locked",),
+        "the database is locked by another program",
+        "wait until the other program is done, then try again",
+    ),
+    (("not a database",), "is not a MOMA database", "name another file with --db"),
+    (("malformed",), "the file is damaged ({said})", "restore a copy of it, or try: sqlite3 FILE .recover"),
+    (("is full",), "the disk is full", "make room on it and try again; nothing was changed"),
+    (
+        ("readonly", "unable to open"),
+        "the database cannot be written ({said})",
+        "check the permissions of the file and of its folder",
+    ),
+)
+"""Words of SQLite, what they mean, and what to do."""
+
+
+def _said(error: Exception) -> str:
+    """What SQLite said first: after some failures it has ended the transaction, and knows its savepoints no more."""
+    said: str = str(error.orig if isinstance(error, DBAPIError) else error)
+    before = error.__context__
+    while "no such savepoint" in said and before is not None:
+        if isinstance(before, sqlite3.Error):
+            said = str(before)
+        before = before.__context__
+    return said
+
+
+def _check_file(file: Path, create: bool) -> None:
+    """Say what is wrong with the path before SQLite says it less clearly, or makes an empty file."""
+    if file.is_dir():
+        raise DatabaseError("is a folder, not a database", where=str(file), remedy="name a file in it")
+    if not file.exists() and not create:
+        remedy = "take in a survey first (moma ingest FILE), or name another database with --db"
+        raise NoDatabaseError("there is no database", where=str(file), remedy=remedy)
+    if not file.parent.is_dir():
+        raise DatabaseError(f"there is no folder {file.parent}", where=str(file), remedy="make it first")
+
+
+def _on_connect(connection: DBAPIConnection, entry: ConnectionPoolEntry) -> None:
+    """Leave transactions to SQLAlchemy (sqlite3 would begin them too late) and enforce foreign keys."""
+    connection.isolation_level = None
+    cursor = connection.cursor()
+    cursor.execute("PRAGMA foreign_keys = ON")
+    cursor.close()
+
+
+def _on_begin(connection: Connection) -> None:
+    """Writers lock at once: a transaction that reads first and locks later can fail half-way."""
+    read_only = connection.get_execution_options().get("moma_read_only", False)
+    connection.exec_driver_sql(f"PRAGMA query_only = {'ON' if read_only else 'OFF'}")
+    connection.exec_driver_sql("BEGIN" if read_only else "BEGIN IMMEDIATE")

@@ -1,0 +1,1 @@
+"""Descriptions of one entity or run: everything known, its history, its traces."""

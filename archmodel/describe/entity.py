@@ -1,0 +1,262 @@
+"""All that is known of one entity or structure, now or at an earlier entry."""
+
+import math
+from typing import Any
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session, joinedload
+
+from archmodel.assertions.plain_values import entry_values
+from archmodel.describe.as_of import entity_at, structures_named, version_at
+from archmodel.describe.knowledge import knowledge, memberships, owners_of, owners_of_structure
+from archmodel.describe.relations import joints, relations
+from archmodel.store.find_by_code import check_entry, no_such_code
+from archmodel.tables.entities import (
+    Entity,
+    canon_of,
+    definition_of,
+    kind_chain,
+    kind_named,
+    kind_of,
+    own_attributes,
+    refuse_unknown_kinds,
+)
+from archmodel.tables.entries import held_at
+from archmodel.tables.knowledge import Correction
+from archmodel.tables.relations import Membership
+from archmodel.tables.runs import EntityResult, Run
+from archmodel.tables.structures import Structure
+from archmodel.tables.surveys import Measurement, Survey
+from moma.errors import UsageError
+
+__all__ = ["describe"]
+
+Values = dict[str, Any]
+
+
+def describe(session: Session, code: str, at: int | None = None) -> dict[str, object]:
+    """Everything about the stone or structure of this code, in plain values that JSON can say.
+
+    Parameters
+    ----------
+    code : that it has now
+    at : number of an entry: as it was known when that had just been made; None: now
+
+    Returns
+    -------
+    dict
+        of a stone: code, kind, definition, kinds (general to particular, each with its definition), canon,
+        course, zone, hypothesis, own (attributes of its kind: value, unit, definition), face, solid, depth, structures,
+        relations, knowledge, survey, measured, notes, runs (latest first), joints (of the latest run),
+        corrections; of a structure: code, kind, definition, title, number, side, part_of, parts, members,
+        knowledge, recorded, withdrawn; SI units
+
+    Raises
+    ------
+    UsageError
+        if there is no such stone or structure, or was not; names the nearest codes
+    """
+    refuse_unknown_kinds(session)
+    if not code.isprintable():
+        raise no_such_code(session, code, Entity.code, Structure.code)
+    check_entry(session, at)
+    number = session.scalar(select(Entity.id).where(Entity.code == code))
+    if number is not None:
+        return _entity(session, number, code, at)
+    structures = structures_named(session, code)
+    if not structures:
+        raise no_such_code(session, code, Entity.code, Structure.code)
+    # a code that was given up can have been given to another structure since
+    then = [one for one in structures if at is None or version_at(session, one, at).entry_id <= at]
+    return _structure(session, (then or structures)[0], at)
+
+
+def _entity(session: Session, number: int, code: str, at: int | None) -> Values:
+    row = entity_at(session, number, at)
+    if row is None:
+        raise UsageError(f"{code} was not known at entry {at}", remedy="ask for a later one")
+    cls = kind_named(row["kind"])
+    measured = _measurement(session, number, at)
+    members = memberships(session, number, at)
+    results = _results(session, number, at)
+    return {
+        "code": row["code"],
+        "kind": row["kind"],
+        "definition": definition_of(cls),
+        "kinds": [{"kind": kind_of(one), "definition": definition_of(one)} for one in kind_chain(cls)],
+        "canon": canon_of(cls),
+        "course": row["course"],
+        "zone": row["zone"],
+        "hypothesis": row["hypothesis"],
+        "own": _own(cls, row),
+        "face": {"length": row["length"], "height": row["height"], "area": row["area"]},
+        "solid": {"volume": row["volume"], "centroid": [row["x"], row["y"], row["z"]]},
+        "depth": {
+            "value": row["depth"],
+            "sigma": row["depth_sigma"],
+            "source": row["depth_source"],
+            "origin": row["depth_origin"],
+        },
+        "structures": [_membership(session, one, at) for one in members],
+        "relations": relations(session, number, at),
+        "knowledge": knowledge(session, "entity_id", number, owners_of(session, members, at), at),
+        "survey": None if measured is None else _survey(measured),
+        "measured": None if measured is None else _measured(measured),
+        "notes": {} if measured is None else dict(measured.notes),
+        "runs": [_result(result) for result in results],
+        "joints": joints(session, number, results[0].run_id) if results else [],
+        "corrections": _corrections(session, number, at),
+    }
+
+
+def _structure(session: Session, held: Structure, at: int | None) -> Values:
+    number, row = held.id, version_at(session, held, at)
+    if at is not None and row.entry_id > at:
+        raise UsageError(f"{held.code} was not known at entry {at}", remedy="ask for a later one")
+    owners = owners_of_structure(session, row.parent_id, at)
+    parts = select(Structure.code).where(Structure.parent_id == number, held_at(Structure, at))
+    members = (
+        select(Entity.code)
+        .join(Membership, Membership.entity_id == Entity.id)
+        .where(Membership.structure_id == number, held_at(Membership, at))
+        .order_by(Membership.rank.is_(None), Membership.rank, Membership.id)
+    )
+    ended = row.superseded_by if held.superseded_id is not None else None
+    withdrawn = ended is not None and (at is None or ended.id <= at)
+    return {
+        "code": row.code,
+        "kind": row.kind,
+        "definition": _definition(type(row)),
+        "title": row.title,
+        "number": row.number,
+        "side": row.side,
+        "part_of": [owner.structure.code for owner in owners],
+        "parts": sorted(session.scalars(parts)),
+        "members": list(session.scalars(members)),
+        "knowledge": knowledge(session, "structure_id", number, owners, at),
+        "recorded": entry_values(row.entry),
+        "withdrawn": entry_values(ended) if withdrawn and ended is not None else None,
+    }
+
+
+def _own(cls: type[Entity], row: Values) -> Values:
+    """The attributes of its kind that are known, each with its unit (None for a text) and definition."""
+    kept = row["own"] or {}
+    values = {name: row[name] if name in row else kept.get(name) for name in own_attributes(cls)}
+    return {
+        name: {"value": values[name], "unit": one.unit, "definition": one.definition}
+        for name, one in own_attributes(cls).items()
+        if values[name] is not None
+    }
+
+
+def _measurement(session: Session, number: int, at: int | None) -> Measurement | None:
+    return session.scalar(
+        select(Measurement)
+        .where(Measurement.entity_id == number, held_at(Measurement, at))
+        .options(joinedload(Measurement.survey).joinedload(Survey.entry))
+    )
+
+
+def _results(session: Session, number: int, at: int | None) -> list[EntityResult]:
+    """What runs computed, latest first."""
+    statement = (
+        select(EntityResult)
+        .join(EntityResult.run)
+        .where(EntityResult.entity_id == number)
+        .options(joinedload(EntityResult.run).joinedload(Run.entry))
+        .order_by(EntityResult.run_id.desc())
+    )
+    return list(session.scalars(statement if at is None else statement.where(Run.entry_id <= at)))
+
+
+def _membership(session: Session, one: Membership, at: int | None) -> Values:
+    """A structure that it is a member of, and what that is a part of."""
+    structure = version_at(session, one.structure, at)
+    return {
+        "code": structure.code,
+        "kind": structure.kind,
+        "title": structure.title,
+        "rank": one.rank,
+        "part_of": [owner.structure.code for owner in owners_of_structure(session, structure.parent_id, at)],
+        "declared": one.declared,
+        "entry": one.entry_id,
+    }
+
+
+def _corrections(session: Session, number: int, at: int | None) -> list[Values]:
+    statement = (
+        select(Correction)
+        .where(Correction.entity_id == number)
+        .options(joinedload(Correction.entry))
+        .order_by(Correction.id)
+    )
+    made = session.scalars(statement if at is None else statement.where(Correction.entry_id <= at))
+    return [
+        {"attribute": one.attribute, "before": one.before, "after": one.after} | entry_values(one.entry)
+        for one in made
+    ]
+
+
+def _survey(measured: Measurement) -> dict[str, object]:
+    """Where the measurement comes from."""
+    survey = measured.survey
+    return {
+        "name": survey.name,
+        "file": survey.path,
+        "line": measured.line,
+        "sha256": survey.sha256,
+        "stored_at": survey.entry.recorded_at.isoformat(timespec="seconds"),
+    }
+
+
+def _measured(measurement: Measurement) -> dict[str, object]:
+    """The measurement and the plane fitted to it, with standard deviations from the covariance."""
+    deviations = [math.sqrt(max(variance, 0.0)) for variance in measurement.covariance.diagonal().tolist()]
+    return {
+        "vertices": len(measurement.vertices),
+        "points": measurement.point_count,
+        "rejected": _names(measurement),
+        "rejected_corners": [index + 1 for index in measurement.rejected_vertices],
+        "sigma": measurement.sigma,
+        "plane": {
+            "normal": measurement.normal.tolist(),
+            "offset": measurement.offset,
+            "centroid": measurement.centroid.tolist(),
+            "tilt_sigma": deviations[:2],
+            "height_sigma": deviations[2],
+        },
+        "shape": measurement.shape_text,
+        "provenance": measurement.provenance_text,
+        "station": measurement.station,
+        "remarks": list(measurement.remarks),
+        "rms": measurement.rms,
+        "redundancy": measurement.redundancy,
+    }
+
+
+def _names(measurement: Measurement) -> list[str | int]:
+    """The points left out: by the names that the instrument gave them, else by their numbers from 1."""
+    return [measurement.names[i] if measurement.names else i + 1 for i in measurement.rejected]
+
+
+def _result(result: EntityResult) -> dict[str, object]:
+    """What one run computed for the stone."""
+    return {
+        "run": result.run.id,
+        "scene": result.run.scene,
+        "outcome": result.run.outcome,
+        "version": result.run.versions["moma"],
+        "stored_at": result.run.entry.recorded_at.isoformat(timespec="seconds"),
+        "fidelity": result.fidelity,
+        "von_mises_max": result.von_mises_max,
+        "von_mises_mean": result.von_mises_mean,
+        "displacement_max": result.displacement_max,
+        "contact_force_max": result.contact_force_max,
+        "values": dict(result.values),
+    }
+
+
+def _definition(cls: type[Structure]) -> str:
+    """The one sentence that defines a kind of structure."""
+    return (cls.__doc__ or "").strip().split("\n", 1)[0]

@@ -1,0 +1,241 @@
+"""Everything that was ever said of an entity or a structure, in the order in which it was recorded.
+
+What is held now, what was held once and what replaced it: nothing is overwritten, so all of it can be read back,
+and so can the whole description as it was when any entry had just been made (`known_at`).
+"""
+
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import or_, select
+from sqlalchemy.orm import Session, joinedload
+
+from archmodel.assertions.plain_values import entry_values, statement_values
+from archmodel.describe.as_of import entity_at, structures_named
+from archmodel.describe.entity import describe
+from archmodel.store.find_by_code import no_such_code
+from archmodel.tables.entities import Entity
+from archmodel.tables.entries import Entry, Recorded
+from archmodel.tables.knowledge import Correction, Statement
+from archmodel.tables.relations import INVERSE, Membership, Relation
+from archmodel.tables.runs import EntityResult, Run
+from archmodel.tables.structures import Structure
+from archmodel.tables.surveys import Measurement
+
+__all__ = ["Event", "history", "known_at"]
+
+Values = dict[str, object]
+
+
+@dataclass(frozen=True)
+class Event:
+    """One thing that was said, or said no longer.
+
+    Attributes
+    ----------
+    entry, action, author, source, recorded_at : the act of recording that it came with
+    event : recorded, measured, corrected, said, replaced, withdrawn or simulated
+    what : entity, structure, measurement, the name of the corrected attribute, the kind of statement or
+        relation, membership or run
+    says : what was said, by name; what was withdrawn
+    before : what was held until then, if it was replaced or corrected
+    """
+
+    entry: int
+    action: str
+    author: str | None
+    source: str
+    recorded_at: str
+    event: str
+    what: str
+    says: Values
+    before: Values | None = None
+
+
+def history(session: Session, code: str) -> tuple[Event, ...]:
+    """Everything ever said of the stone or structure of this code, oldest first.
+
+    Raises
+    ------
+    UsageError
+        if there is no such stone or structure; names the nearest codes
+    """
+    number = session.scalar(select(Entity.id).where(Entity.code == code)) if code.isprintable() else None
+    if number is not None:
+        events = [*_of_entity(session, number), *_statements(session, "entity_id", number)]
+        return _ordered(events)
+    structures = structures_named(session, code) if code.isprintable() else []
+    if not structures:
+        raise no_such_code(session, code, Entity.code, Structure.code)
+    return _ordered([event for one in structures for event in _of_structure(session, one)])
+
+
+def known_at(session: Session, code: str, entry: int) -> dict[str, object]:
+    """The description of a stone or structure as it was when an entry had just been made.
+
+    Parameters
+    ----------
+    code : that it has now
+    entry : number of an entry
+
+    Raises
+    ------
+    UsageError
+        if there is no such entry, or the stone or structure was not known then
+    """
+    return describe(session, code, entry)
+
+
+def _ordered(events: Sequence[Event]) -> tuple[Event, ...]:
+    # stable: within an entry as they were gathered
+    return tuple(sorted(events, key=lambda one: one.entry))
+
+
+def _event(entry: Entry, event: str, what: str, says: Values, before: Values | None = None) -> Event:
+    provenance: dict[str, Any] = entry_values(entry)
+    known = {name: value for name, value in says.items() if value is not None}
+    return Event(event=event, what=what, says=known, before=before, **provenance)
+
+
+def _of_entity(session: Session, number: int) -> Iterator[Event]:
+    """Its record, measurements, corrections, structures, relations and runs."""
+    entity = session.get_one(Entity, number)
+    first = entity_at(session, number, entity.entry_id) or {}
+    told = {name: first[name] for name in ("code", "kind", "course", "zone", "depth")}
+    yield _event(entity.entry, "recorded", "entity", told)
+    measured = select(Measurement).where(Measurement.entity_id == number).order_by(Measurement.id)
+    yield from _chain(session.scalars(measured).all(), "measurement", _measurement, lambda one: one.entity_id)
+    corrections = select(Correction).where(Correction.entity_id == number).order_by(Correction.id)
+    for one in session.scalars(corrections):
+        yield _event(one.entry, "corrected", one.attribute, {"value": one.after}, {"value": one.before})
+    member = (
+        select(Membership)
+        .where(Membership.entity_id == number)
+        .options(joinedload(Membership.structure))
+        .order_by(Membership.id)
+    )
+    yield from _chain(
+        session.scalars(member).all(), "membership", _structure_of, lambda one: one.structure_id
+    )
+    yield from _relations(session, number)
+    runs = (
+        select(EntityResult)
+        .where(EntityResult.entity_id == number)
+        .options(joinedload(EntityResult.run).joinedload(Run.entry))
+        .order_by(EntityResult.run_id)
+    )
+    for result in session.scalars(runs):
+        told = {"run": result.run_id, "scene": result.run.scene, "fidelity": result.fidelity}
+        yield _event(result.run.entry, "simulated", "run", told | {"von_mises_max": result.von_mises_max})
+
+
+def _relations(session: Session, number: int) -> Iterator[Event]:
+    """Its relations, as seen from it."""
+    statement = (
+        select(Relation)
+        .where(or_(Relation.subject_id == number, Relation.object_id == number))
+        .options(joinedload(Relation.subject), joinedload(Relation.object))
+        .order_by(Relation.id)
+    )
+    rows = session.scalars(statement).all()
+    for kind in dict.fromkeys(INVERSE.values()):
+        seen = [one for one in rows if (one.kind if one.subject_id == number else INVERSE[one.kind]) == kind]
+
+        def told(one: Relation) -> Values:
+            other = one.object if one.subject_id == number else one.subject
+            return {"code": other.code, "declared": one.declared, "area": one.area, "gap": one.gap}
+
+        yield from _chain(seen, kind, told, lambda one: (one.subject_id, one.object_id, one.declared))
+
+
+def _of_structure(session: Session, held: Structure) -> Iterator[Event]:
+    """The versions of a structure, its members, what is said of it, and its end."""
+    versions = [held]
+    while versions[0].supersedes_id is not None:
+        versions.insert(0, session.get_one(Structure, versions[0].supersedes_id))
+    before: Values | None = None
+    for one in versions:
+        told = _structure(session, one)
+        yield _event(one.entry, "recorded" if before is None else "replaced", "structure", told, before)
+        before = told
+    members = (
+        select(Membership)
+        .where(Membership.structure_id == held.id)
+        .options(joinedload(Membership.entity))
+        .order_by(Membership.id)
+    )
+    yield from _chain(
+        session.scalars(members).all(),
+        "member",
+        lambda one: {"code": one.entity.code, "rank": one.rank},
+        lambda one: one.entity_id,
+    )
+    yield from _statements(session, "structure_id", held.id)
+    if held.superseded_by is not None:
+        yield _event(held.superseded_by, "withdrawn", "structure", before or {})
+
+
+def _statements(session: Session, column: str, number: int) -> Iterator[Event]:
+    rows = session.scalars(
+        select(Statement)
+        .where(getattr(Statement, column) == number)
+        .options(joinedload(Statement.document))
+        .order_by(Statement.id)
+    ).all()
+    by_number = {one.id: one for one in rows}
+    replaced = {one.supersedes_id for one in rows}
+    for one in rows:
+        old = by_number.get(one.supersedes_id) if one.supersedes_id is not None else None
+        before = None if old is None else statement_values(old)
+        yield _event(
+            one.entry, "said" if old is None else "replaced", one.kind, statement_values(one), before
+        )
+        if one.superseded_by is not None and one.id not in replaced:
+            yield _event(one.superseded_by, "withdrawn", one.kind, statement_values(one))
+
+
+def _chain(
+    rows: Sequence[Any],
+    what: str,
+    told: Callable[[Any], Values],
+    about: Callable[[Any], Hashable],
+) -> Iterator[Event]:
+    """Rows without ``supersedes_id``: one that began with the entry that ended another about the same replaces it."""
+    ended: dict[tuple[Hashable, int], Recorded] = {
+        (about(one), one.superseded_id): one for one in rows if one.superseded_id is not None
+    }
+    for one in rows:
+        old = ended.pop((about(one), one.entry_id), None)
+        first = "measured" if what == "measurement" else "said"
+        before = None if old is None else told(old)
+        yield _event(one.entry, first if old is None else "replaced", what, told(one), before)
+    for old in ended.values():
+        if old.superseded_by is not None:
+            yield _event(old.superseded_by, "withdrawn", what, told(old))
+
+
+def _measurement(one: Measurement) -> Values:
+    return {
+        "survey": one.survey.name,
+        "line": one.line,
+        "points": one.point_count,
+        "rejected": one.rejected_count,
+        "rms": one.rms,
+    }
+
+
+def _structure_of(one: Membership) -> Values:
+    return {"structure": one.structure.code, "rank": one.rank}
+
+
+def _structure(session: Session, one: Structure) -> Values:
+    parent = None if one.parent_id is None else session.get_one(Structure, one.parent_id)
+    values = {
+        "kind": one.kind,
+        "title": one.title,
+        "part_of": None if parent is None else parent.code,
+        "number": one.number,
+        "side": one.side,
+    }
+    return {name: value for name, value in values.items() if value is not None}

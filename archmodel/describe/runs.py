@@ -1,0 +1,264 @@
+"""What is known of simulation runs: all of them in a list, one in full, two beside each other."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from sqlalchemy import func, select
+from sqlalchemy.orm import InstrumentedAttribute, Session, aliased, joinedload
+
+from archmodel.tables.entities import Entity
+from archmodel.tables.runs import EntityResult, JointResult, Run
+from archmodel.tables.surveys import Simplification
+from moma.errors import UsageError
+
+__all__ = ["compare_runs", "describe_run", "list_runs"]
+
+ERRORS = ("natural_map", "penetration", "balance", "reaction", "energy")
+"""Columns of a run that say how far it can be trusted [-]."""
+
+_LARGEST = 2**31 - 1
+"""No run has a larger number."""
+
+_SHOWN = 12
+"""Numbers that an error lists."""
+
+
+def list_runs(session: Session) -> list[dict[str, object]]:
+    """All runs, oldest first: run, scene, stored_at, outcome, stones, contacts, the error measures, wall [s]."""
+    stones = select(func.count()).where(EntityResult.run_id == Run.id).correlate(Run).scalar_subquery()
+    statement = select(Run, stones).options(joinedload(Run.entry)).order_by(Run.id)
+    return [
+        {
+            "run": run.id,
+            "scene": run.scene,
+            "stored_at": run.entry.recorded_at.isoformat(timespec="seconds"),
+            "outcome": run.outcome,
+            "stones": count,
+            "contacts": run.contacts,
+            **{name: getattr(run, name) for name in ERRORS},
+            "wall": run.wall,
+        }
+        for run, count in session.execute(statement)
+    ]
+
+
+def describe_run(session: Session, number: int, count: int = 5) -> dict[str, Any]:
+    """One run in full, in plain values that JSON can say.
+
+    Parameters
+    ----------
+    session : any
+    number : of the run
+    count : how many of the worst stones and joints
+
+    Returns
+    -------
+    dict
+        as in `list_runs`, and: steps, simulated [s], fidelities, as_of, author, versions, settings, scene_text;
+        simplification (mode; how many stones of each shape, and how many outside of the survey's tolerance; the largest
+        displacement of a corner and its stone; None where solids are not kept),
+        largest_stresses (by stone), and joints by what is worst of them: largest_openings, least_centred
+        (outside of the kern), most_used_friction; SI units
+
+    Raises
+    ------
+    UsageError
+        if there is no such run; names those that there are
+    """
+    run = _run(session, number)
+    counted = session.execute(
+        select(EntityResult.fidelity, func.count().label("stones"))
+        .where(EntityResult.run_id == number)
+        .group_by(EntityResult.fidelity)
+        .order_by(EntityResult.fidelity)
+    )
+    stones = {row.fidelity: row.stones for row in counted}
+    return {
+        "run": run.id,
+        "scene": run.scene,
+        "stored_at": run.entry.recorded_at.isoformat(timespec="seconds"),
+        "outcome": run.outcome,
+        "stones": sum(stones.values()),
+        "fidelities": stones,
+        "contacts": run.contacts,
+        "steps": run.steps,
+        "simulated": run.simulated,
+        "wall": run.wall,
+        "errors": {name: getattr(run, name) for name in ERRORS},
+        "as_of": run.as_of_id,
+        "author": run.entry.author,
+        "versions": dict(run.versions),
+        "settings": dict(run.entry.settings),
+        "simplification": _simplification(session, number),
+        "largest_stresses": _stresses(session, number, count),
+        "largest_openings": _joints(session, number, JointResult.opening, 0.0, count),
+        "least_centred": _joints(session, number, JointResult.kern, 1.0, count),
+        "most_used_friction": _joints(session, number, JointResult.friction_use, 0.0, count),
+        "scene_text": run.scene_text,
+    }
+
+
+def compare_runs(session: Session, number: int, against: int, count: int = 10) -> dict[str, Any]:
+    """What is different in run `number` from run `against`.
+
+    Returns
+    -------
+    dict
+        run, against, outcomes (of both), settings (those that differ: [of the run, of the other]), only_in_run and
+        only_against (how many stones), stresses and displacements (the stones that changed most, with the value in
+        both runs and the difference)
+    """
+    one, other = _run(session, number), _run(session, against)
+    mine, theirs = _flat(one.entry.settings), _flat(other.entry.settings)
+    return {
+        "run": one.id,
+        "against": other.id,
+        "outcomes": [one.outcome, other.outcome],
+        "settings": {
+            name: [mine.get(name), theirs.get(name)]
+            for name in sorted({*mine, *theirs})
+            if mine.get(name) != theirs.get(name)
+        },
+        "only_in_run": _alone(session, number, against),
+        "only_against": _alone(session, against, number),
+        "stresses": _changes(session, number, against, "von_mises_max", count),
+        "displacements": _changes(session, number, against, "displacement_max", count),
+    }
+
+
+def _run(session: Session, number: int) -> Run:
+    """The run of this number; an error that names the latest if there is none."""
+    found = None
+    if 0 < number <= _LARGEST:
+        found = session.get(Run, number, options=[joinedload(Run.entry)])
+    if found is not None:
+        return found
+    known = session.scalars(select(Run.id).order_by(Run.id.desc()).limit(_SHOWN + 1)).all()
+    if not known:
+        raise UsageError(
+            f"there is no run {number}", remedy="there is none yet; simulate with moma run SCENE.toml"
+        )
+    named = ", ".join(map(str, sorted(known[:_SHOWN])))
+    earlier = " and earlier ones" if len(known) > _SHOWN else ""
+    raise UsageError(f"there is no run {number}", remedy=f"there are {named}{earlier}")
+
+
+def _stresses(session: Session, run: int, count: int) -> list[dict[str, object]]:
+    """The stones with the largest Von Mises stress [Pa]."""
+    # the largest first, all else of them then: what is sorted should be short
+    largest = (
+        select(EntityResult.entity_id)
+        .where(EntityResult.run_id == run, EntityResult.von_mises_max.is_not(None))
+        .order_by(EntityResult.von_mises_max.desc(), EntityResult.entity_id)
+        .limit(count)
+        .subquery()
+    )
+    statement = (
+        select(Entity.code, Entity.kind, EntityResult.von_mises_max, EntityResult.von_mises_mean)
+        .join(EntityResult.entity)
+        .join(largest, largest.c.entity_id == Entity.id)
+        .where(EntityResult.run_id == run)
+        .order_by(EntityResult.von_mises_max.desc(), Entity.id)
+    )
+    return [dict(row) for row in session.execute(statement).mappings()]
+
+
+def _simplification(session: Session, run: int) -> dict[str, object] | None:
+    """What the solids of the stones were made of."""
+    of_run = Simplification.run_id == run
+    farthest = session.execute(
+        select(Entity.code, Simplification.displacement_max, Simplification.mode)
+        .join(Entity, Entity.id == Simplification.entity_id)
+        .where(of_run)
+        .order_by(Simplification.displacement_max.desc(), Entity.id)
+        .limit(1)
+    ).first()
+    if farthest is None:
+        return None
+    shape, count = Simplification.shape, func.count().label("stones")
+    shapes = session.execute(
+        select(shape, count).where(of_run, shape.is_not(None)).group_by(shape).order_by(shape)
+    )
+    outside = select(func.count()).where(of_run, Simplification.within_tolerance.is_(False))
+    return {
+        "mode": farthest.mode,
+        "shapes": {row.shape: row.stones for row in shapes},
+        "outside_tolerance": session.scalar(outside),
+        "displacement_max": farthest.displacement_max,
+        "farthest": farthest.code,
+    }
+
+
+def _joints(
+    session: Session, run: int, worst: InstrumentedAttribute[Any], above: float, count: int
+) -> list[dict[str, object]]:
+    """The joints that have the largest of one value, of those above a bound."""
+    chosen = (
+        select(JointResult.number)
+        .where(JointResult.run_id == run, worst > above)
+        .order_by(worst.desc(), JointResult.number)
+        .limit(count)
+        .subquery()
+    )
+    first, second = aliased(Entity), aliased(Entity)
+    statement = (
+        select(
+            first.code.label("first"),
+            second.code.label("second"),
+            *(getattr(JointResult, name) for name in _JOINT_VALUES),
+        )
+        .join(chosen, chosen.c.number == JointResult.number)
+        .join(first, JointResult.first_id == first.id)
+        .join(second, JointResult.second_id == second.id)
+        .where(JointResult.run_id == run)
+        .order_by(worst.desc(), JointResult.number)
+    )
+    return [dict(row) for row in session.execute(statement).mappings()]
+
+
+_JOINT_VALUES = (
+    "width",
+    "force_normal",
+    "force_shear",
+    "pressure_max",
+    "kern",
+    "friction_use",
+    "opening",
+    "sliding",
+)
+
+
+def _flat(settings: Mapping[str, Any], prefix: str = "") -> dict[str, object]:
+    """Nested settings as {"time.step": …}."""
+    flat: dict[str, object] = {}
+    for name, value in settings.items():
+        inner = _flat(value, f"{prefix}{name}.") if isinstance(value, Mapping) else {f"{prefix}{name}": value}
+        flat.update(inner)
+    return flat
+
+
+def _alone(session: Session, run: int, other: int) -> int:
+    """How many stones are in one run and not in the other."""
+    there = select(EntityResult.entity_id).where(EntityResult.run_id == other)
+    alone = select(func.count()).where(EntityResult.run_id == run, EntityResult.entity_id.not_in(there))
+    return int(session.scalar(alone) or 0)
+
+
+def _changes(session: Session, run: int, other: int, value: str, count: int) -> list[dict[str, object]]:
+    """The stones whose value changed most, largest change first."""
+    mine, theirs = aliased(EntityResult), aliased(EntityResult)
+    now, then = getattr(mine, value), getattr(theirs, value)
+    statement = (
+        select(
+            Entity.code,
+            now.label("run"),
+            then.label("against"),
+            (now - then).label("change"),
+        )
+        .join(mine, mine.entity_id == Entity.id)
+        .join(theirs, theirs.entity_id == Entity.id)
+        .where(mine.run_id == run, theirs.run_id == other, now != then)
+        .order_by(func.abs(now - then).desc(), Entity.id)
+        .limit(count)
+    )
+    return [dict(row) for row in session.execute(statement).mappings()]

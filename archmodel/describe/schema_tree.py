@@ -1,0 +1,82 @@
+"""What a database can hold, as a tree: kinds with their attributes, structures, relations."""
+
+from collections.abc import Sequence
+
+from sqlalchemy.orm import Session
+
+from archmodel.query.attributes import ATTRIBUTES, kinds_of
+from archmodel.tables.entities import Entity, canon_of, definition_of, kind_named, kind_of
+from archmodel.tables.structures import structure_kinds
+
+__all__ = ["RELATION_DEFINITIONS", "schema"]
+
+RELATION_DEFINITIONS = {
+    "rests_on": "a bed joint brings its load down to the other",
+    "supports": "the other rests on it",
+    "beside": "a head joint parts the two, neither bears the other",
+    "bonded_with": "one reaches over or behind the other, so that they hold together",
+    "across_the_wall": "the two are opposite, in the outer and in the inner facing of a wall",
+    "member_of": "it is one of the entities that make up a structure",
+}
+"""The relations as one asks for them: `supports` is `rests_on` from the other side."""
+
+
+def schema(session: Session | None = None, kind: str | None = None) -> dict[str, object]:
+    """The hierarchy in values that JSON can say.
+
+    Parameters
+    ----------
+    session : of a database whose registered kinds are shown too
+    kind : only this kind and its subkinds
+
+    Returns
+    -------
+    dict
+        ``kinds``: a tree of {kind, definition, registered, canonical, attributes: [{name, unit, definition}], kinds},
+        in which attributes and canonical proportions are inherited; and, without `kind`, ``attributes`` of every
+        entity, ``structures`` and ``relations``
+
+    Raises
+    ------
+    UsageError
+        if there is no such kind
+    """
+    known = frozenset(kinds_of(session).values())
+    root = Entity if kind is None else kind_named(kind)
+    tree = {"kinds": [_branch(root, known, whole=kind is not None)]}
+    if kind is not None:
+        return dict(tree)
+    return {
+        **tree,
+        "attributes": [
+            {"name": one.name, "unit": one.unit, "definition": one.definition} for one in ATTRIBUTES.values()
+        ],
+        "structures": [
+            {"kind": name, "definition": _first_sentence(cls.__doc__)}
+            for name, cls in structure_kinds().items()
+        ],
+        "relations": [
+            {"relation": name, "definition": meaning} for name, meaning in RELATION_DEFINITIONS.items()
+        ],
+    }
+
+
+def _branch(cls: type[Entity], known: frozenset[type[Entity]], whole: bool = False) -> dict[str, object]:
+    """A kind and its subkinds; with what it inherits, if it is the `whole` tree."""
+    own: Sequence[type[Entity]] = [one for one in reversed(cls.__mro__) if issubclass(one, Entity)]
+    declared = [one for base in (own if whole else own[-1:]) for one in base.__dict__.get("__own__", ())]
+    canon = canon_of(cls) if whole or "__canon__" in cls.__dict__ else None
+    return {
+        "kind": kind_of(cls),
+        "definition": definition_of(cls),
+        "registered": cls.__users__ is not None,
+        "canonical": canon,
+        "attributes": [
+            {"name": one.name, "unit": one.unit, "definition": one.definition} for one in declared
+        ],
+        "kinds": [_branch(sub, known) for sub in cls.__subclasses__() if sub in known],
+    }
+
+
+def _first_sentence(text: str | None) -> str:
+    return (text or "").strip().split("\n", 1)[0]

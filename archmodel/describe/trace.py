@@ -1,0 +1,115 @@
+"""From what was computed of a stone back to the points that were measured."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import Select, select
+from sqlalchemy.orm import Session, joinedload
+
+from archmodel.store.find_by_code import no_such_code
+from archmodel.tables.entities import Entity
+from archmodel.tables.entries import held_at
+from archmodel.tables.runs import EntityResult, Run
+from archmodel.tables.surveys import Measurement, Simplification
+from moma.errors import UsageError
+
+__all__ = ["Trace", "trace"]
+
+_TOO_LARGE = 2**31
+
+
+@dataclass(frozen=True)
+class Trace:
+    """What a result of one stone rests on, step by step.
+
+    Attributes
+    ----------
+    entity : the stone
+    result : what the run computed for it, e.g. ``result.von_mises_max`` [Pa]
+    run : the simulation, with its entry
+    simplification : the solid that stood for it; None if the run kept none
+    measurement : what was held to be measured when the run read the stone: ``points`` [m], ``residuals`` [m],
+        the plane, and the survey; None if it was never measured
+    """
+
+    entity: Entity
+    result: EntityResult
+    run: Run
+    simplification: Simplification | None
+    measurement: Measurement | None
+
+    @property
+    def place(self) -> str | None:
+        """``file:line`` of the survey where the stone's record begins."""
+        return None if self.measurement is None else f"{self.measurement.survey.path}:{self.measurement.line}"
+
+    @property
+    def is_outdated(self) -> bool:
+        """Whether the stone has been measured again, or its depth corrected, since the run read it."""
+        return self.measurement is not None and self.measurement.superseded_id is not None
+
+
+def trace(session: Session, code: str, run: int | None = None) -> Trace:
+    """Go back from a result of the stone to its measurement.
+
+    Parameters
+    ----------
+    session : the values stay readable when it is closed
+    code : of the stone
+    run : number of the run; None: the latest that holds the stone
+
+    Raises
+    ------
+    UsageError
+        if there is no such stone, or it was in no such run
+    """
+    entity = session.scalar(select(Entity).where(Entity.code == code)) if code.isprintable() else None
+    if entity is None:
+        raise no_such_code(session, code, Entity.code)
+    own = select(EntityResult).where(EntityResult.entity_id == entity.id)
+    # no run has a number that the column cannot hold
+    wanted = own if run is None else own.where(EntityResult.run_id == (run if abs(run) < _TOO_LARGE else 0))
+    result = session.scalar(
+        wanted.options(joinedload(EntityResult.run).joinedload(Run.entry))
+        .order_by(EntityResult.run_id.desc())
+        .limit(1)
+    )
+    if result is None:
+        raise _not_run(session, entity, run)
+    return Trace(
+        entity=entity,
+        result=result,
+        run=result.run,
+        simplification=session.get(Simplification, (entity.id, result.run_id)),
+        measurement=session.scalar(_measurement(entity, result.run)),
+    )
+
+
+def _measurement(entity: Entity, run: Run) -> Select[Any]:
+    """What was held to be measured when the run read the stone."""
+    known = run.entry_id if run.as_of_id is None else run.as_of_id
+    return (
+        select(Measurement)
+        .where(Measurement.entity_id == entity.id, held_at(Measurement, known))
+        .options(joinedload(Measurement.survey))
+        .order_by(Measurement.id.desc())
+        .limit(1)
+    )
+
+
+def _not_run(session: Session, entity: Entity, run: int | None) -> UsageError:
+    """The error for a stone without the result that was asked for."""
+    runs = session.scalars(
+        select(EntityResult.run_id)
+        .where(EntityResult.entity_id == entity.id)
+        .order_by(EntityResult.run_id.desc())
+        .limit(12)
+    ).all()
+    if not runs:
+        return UsageError(
+            f"stone {entity.code} was in no run", remedy="simulate it first: moma run SCENE.toml"
+        )
+    return UsageError(
+        f"stone {entity.code} was not in run {run}",
+        remedy=f"it was in {', '.join(map(str, reversed(runs)))}",
+    )

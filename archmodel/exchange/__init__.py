@@ -1,0 +1,1 @@
+"""Exchange of a whole database as one JSON document."""

@@ -1,0 +1,103 @@
+"""The head of a building document: what it is, what wrote it, in which units and which frame."""
+
+import re
+from importlib.metadata import version
+from typing import Any
+
+from sqlalchemy import Column, func, select
+from sqlalchemy.orm import Session
+
+from archmodel.exchange.values import INSTANT, Schema, said, value_of
+from archmodel.tables.base import UtcDateTime
+from archmodel.tables.entries import Entry
+from archmodel.tables.layout import SCHEMA_VERSION
+from moma.errors import ExchangeError
+
+__all__ = ["FORMAT", "FORMAT_VERSION", "HEAD", "TABLES", "check_head", "head_of", "head_schema"]
+
+FORMAT = "moma building"
+FORMAT_VERSION = 1
+"""Of the document's grammar; what the tables hold is said by the version of the schema."""
+
+TABLES = "tables"
+"""Key of the object that holds the sections; it is the last."""
+
+UNITS = {
+    "length": "m",
+    "angle": "rad",
+    "time": "s",
+    "mass": "kg",
+    "force": "N",
+    "stress": "Pa",
+    "others": "SI, without prefixes; a property of a material names its unit",
+}
+FRAME = "right-handed, z upwards, that of the site; survey.frame says how each survey was carried into it"
+
+HEAD = ("format", "format_version", "moma", "schema_version", "recorded_until", "units", "frame")
+"""Keys that come before `TABLES`."""
+
+
+def head_of(session: Session) -> dict[str, Any]:
+    """The head of a document; the same as long as nothing is recorded, hence no time of writing."""
+    latest = session.scalar(select(func.max(Entry.recorded_at)))
+    instant = value_of(Column("recorded_at", UtcDateTime()))
+    said_head = (
+        FORMAT,
+        FORMAT_VERSION,
+        version("moma-masonry"),
+        SCHEMA_VERSION,
+        None if latest is None else instant.encode(latest),
+        UNITS,
+        FRAME,
+    )
+    return dict(zip(HEAD, said_head, strict=True))
+
+
+def check_head(head: dict[str, Any], name: str) -> None:
+    """Refuse what another program, another layout of the tables or other units wrote.
+
+    Raises
+    ------
+    ExchangeError
+        with the JSON path
+    """
+    expected = {"format": FORMAT, "format_version": FORMAT_VERSION, "schema_version": SCHEMA_VERSION}
+    remedies = {
+        "format": "give a document that `moma export` wrote",
+        "format_version": "use the version of MOMA that wrote it",
+        "schema_version": "with the version of MOMA that wrote it, import it there; migrate that database with "
+        "this version (moma migrate) and export it again",
+        "units": "convert the numbers, then say these units",
+        "frame": "carry the coordinates into that frame, then say it",
+    }
+    expected |= {"units": UNITS, "frame": FRAME}
+    for key in HEAD:
+        place = f"{name} $.{key}"
+        if key not in head:
+            raise ExchangeError("is missing", where=place, remedy=remedies.get(key))
+        given = head[key]
+        if key in expected and (type(given), given) != (type(expected[key]), expected[key]):
+            what = f"is {said(given)}, expected {expected[key]!r}"
+            raise ExchangeError(what, where=place, remedy=remedies[key])
+    until = head["recorded_until"]
+    if until is not None and not (type(until) is str and re.match(INSTANT, until)):
+        what = f"is {said(until)}, expected the instant of the latest entry, or null"
+        raise ExchangeError(what, where=f"{name} $.recorded_until")
+    if type(head["moma"]) is not str:
+        raise ExchangeError(f"is {said(head['moma'])}, expected the version of MOMA", where=f"{name} $.moma")
+
+
+def head_schema() -> dict[str, Schema]:
+    """JSON Schema of each key of the head."""
+    return {
+        "format": {"const": FORMAT, "description": "what the document is"},
+        "format_version": {"const": FORMAT_VERSION, "description": "of the document's grammar"},
+        "moma": {"type": "string", "description": "version of MOMA that wrote it"},
+        "schema_version": {"const": SCHEMA_VERSION, "description": "of the layout of the tables"},
+        "recorded_until": {
+            "anyOf": [{"type": "string", "pattern": INSTANT}, {"type": "null"}],
+            "description": "when the latest entry was recorded; null if there is none",
+        },
+        "units": {"const": UNITS, "description": "of all numbers"},
+        "frame": {"const": FRAME, "description": "of all coordinates"},
+    }

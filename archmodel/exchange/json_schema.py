@@ -1,0 +1,157 @@
+"""The JSON Schema of a building document, from the tables and what is written of them.
+
+``python -m archmodel.exchange.document.json_schema`` prints ``docs/exchange.schema.json``.
+"""
+
+import inspect
+import json
+import re
+import sys
+from importlib import import_module
+from typing import Any
+
+from archmodel.exchange.head import HEAD, TABLES, head_schema
+from archmodel.exchange.sections import Field, Section, sections
+from archmodel.exchange.values import NUMBER, Schema
+from archmodel.tables.entities import Entity, OwnAttribute
+from archmodel.tables.layout import SCHEMA_VERSION
+
+__all__ = ["building_schema", "schema_text"]
+
+_NULL: Schema = {"type": "null"}
+
+_DESCRIPTION = (
+    "All that a MOMA database holds of a building. Every section of `tables` is a table of the database; they come "
+    "in this order, each row after what it refers to, and in the order of its key. What is null is left out."
+)
+
+
+def building_schema() -> Schema:
+    """JSON Schema, draft 2020-12, of the documents that this version writes and reads."""
+    known = sections()
+    tables = {
+        "type": "object",
+        "description": "the sections, in their order",
+        "properties": {
+            section.name: {
+                "type": "array",
+                "description": _first_sentence(section.mapper.class_),
+                "items": {"$ref": f"#/$defs/{section.name}"},
+            }
+            for section in known
+        },
+        "required": [section.name for section in known],
+        "additionalProperties": False,
+    }
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": f"urn:moma:building:{SCHEMA_VERSION}",
+        "title": "A building, as MOMA exports and imports it",
+        "description": _DESCRIPTION,
+        "type": "object",
+        "properties": {**head_schema(), TABLES: tables},
+        "required": [*HEAD, TABLES],
+        "additionalProperties": False,
+        "$defs": {"number": {**NUMBER, "description": "of 64 bits"}}
+        | {section.name: _row(section) for section in known},
+    }
+
+
+def schema_text() -> str:
+    """The schema as it is published."""
+    return json.dumps(building_schema(), indent=1, ensure_ascii=False) + "\n"
+
+
+def _row(section: Section) -> Schema:
+    meanings = _meanings(section)
+    properties: dict[str, Schema] = {}
+    for field in section.fields:
+        properties[field.name] = _column(section, field, meanings)
+        if (label := field.label) is not None:
+            what = f"{label.target.name} of the {label.target.table.name} {field.name}, for those who read"
+            properties[label.name] = {"type": "string", "description": f"{what}; may be left out"}
+    return {
+        "type": "object",
+        "description": f"{_first_sentence(section.mapper.class_)} Key: {', '.join(section.key)}.",
+        "properties": properties,
+        "required": [field.name for field in section.fields if field.required],
+        "additionalProperties": False,
+    }
+
+
+def _column(section: Section, field: Field, meanings: dict[str, str]) -> Schema:
+    schema = dict(field.value.schema)
+    on = section.mapper.polymorphic_on
+    if on is not None and on.key == field.name and section.table is not Entity.__table__:
+        schema["enum"] = sorted(str(name) for name in section.mapper.polymorphic_map)
+    if not field.required and _NULL not in schema.get("anyOf", ()):
+        others = schema["anyOf"] if [*schema] == ["anyOf"] else [schema]
+        schema = {"anyOf": [*others, _NULL]}
+    said = [meanings.get(field.name) or meanings.get(field.name.removesuffix("_id"))]
+    said += [f"refers to {key.target_fullname}" for key in field.column.foreign_keys]
+    text = "; ".join(one for one in said if one)
+    return schema | {"description": text} if text else schema
+
+
+def _meanings(section: Section) -> dict[str, str]:
+    """What the docstrings of a table's classes say of its columns."""
+    found: dict[str, str] = {}
+    for mapper in section.mapper.self_and_descendants:
+        if getattr(mapper.class_, "__users__", None) is not None:
+            continue  # registered in an open database, not a part of MOMA
+        for cls in (mapper.class_, *mapper.class_.__bases__):
+            found = _documented(cls) | found
+        own: tuple[OwnAttribute, ...] = mapper.class_.__dict__.get("__own__", ())
+        found = {
+            one.name: f"{one.definition} [{one.unit}]" if one.unit else one.definition for one in own
+        } | found
+    return {**_OF_ALL, **found}
+
+
+_OF_ALL = {
+    "id": "number of the row, to which others refer",
+    "kind": "name of its kind",
+    "entry": "the act of recording that it came with",
+    "superseded": "the act of recording that ended it; left out if it is held now",
+    "supersedes": "the row that it replaces",
+}
+
+
+def _documented(cls: type[Any]) -> dict[str, str]:
+    """What a class's docstring says of its attributes, or the docstring of another class to which it points."""
+    text = inspect.cleandoc(cls.__dict__.get("__doc__") or "")
+    found = {name: _plain(meaning, cls) for name, meaning in _entries(text).items()}
+    found = {name: meaning for name, meaning in found.items() if not _ELSEWHERE.match(meaning)}
+    for module, name in _ELSEWHERE.findall(text):
+        found = _documented(getattr(import_module(f"archmodel.{module}"), name)) | found
+    return found
+
+
+_ELSEWHERE = re.compile(r"as in ``(\w+)\.(\w+)``")
+
+
+def _plain(meaning: str, cls: type[Any]) -> str:
+    """In the words of JSON, with the names that a constant has."""
+    meaning = re.sub(r"\b(?:None|NaN)\b", "null", meaning)
+    constants = vars(sys.modules[cls.__module__])
+    return re.sub(r"\b[A-Z]{4,}\b", lambda word: ", ".join(constants.get(word[0], [word[0]])), meaning)
+
+
+def _entries(text: str) -> dict[str, str]:
+    """The entries of a section "Attributes" in numpydoc."""
+    match = re.search(r"^Attributes\n-+\n(.*?)(?:\n\n|\Z)", text, re.MULTILINE | re.DOTALL)
+    found: dict[str, str] = {}
+    for entry in re.split(r"\n(?=\S)", match[1]) if match else ():
+        names, colon, meaning = entry.partition(" : ")
+        if colon:
+            found |= dict.fromkeys(re.split(r",\s*", names), " ".join(meaning.split()))
+    return found
+
+
+def _first_sentence(cls: type[Any]) -> str:
+    sentence = inspect.cleandoc(cls.__doc__ or "").partition("\n")[0]
+    return re.sub(r"[;,][^;,]* as in ``[^`]*``", "", sentence)
+
+
+if __name__ == "__main__":
+    sys.stdout.write(schema_text())

@@ -1,0 +1,144 @@
+"""A building document, read row by row into an empty database: all of it or nothing."""
+
+import difflib
+from collections.abc import Sequence
+from typing import Any, BinaryIO
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from archmodel.exchange.head import HEAD, TABLES, check_head
+from archmodel.exchange.json_stream import JsonText
+from archmodel.exchange.rows import Row, RowReader
+from archmodel.exchange.sections import Section, sections
+from archmodel.exchange.store import SectionStore
+from archmodel.tables.registered import RegisteredKind, declare_registered, release_registered
+from moma.errors import DatabaseError, ExchangeError
+
+__all__ = ["read_building"]
+
+
+def read_building(session: Session, stream: BinaryIO, name: str) -> dict[str, int]:
+    """Take in all that a document says.
+
+    Parameters
+    ----------
+    session : a writing session of an empty database; after an error it must be rolled back
+    stream : of the document's bytes
+    name : of the document, for errors
+
+    Returns
+    -------
+    dict
+        number of rows by section
+
+    Raises
+    ------
+    ExchangeError
+        at the JSON path and the line, if anything is wrong
+    """
+    _refuse_filled(session)
+    text = JsonText(stream, name)
+    try:
+        _read_head(text, name)
+        counts = _read_tables(session, text, name)
+        text.take("}")
+        text.take("")
+    except BaseException:
+        release_registered(session.get_bind().engine)
+        raise
+    return counts
+
+
+def _refuse_filled(session: Session) -> None:
+    for section in sections():
+        if session.execute(select(section.fields[0].column).limit(1)).first() is not None:
+            what = f"it is not empty, its table {section.name} has rows"
+            remedy = "a document makes a database of its own; name a new one with --db"
+            url = session.get_bind().engine.url.render_as_string()  # without a password
+            raise ExchangeError(what, where=url, remedy=remedy)
+
+
+def _read_head(text: JsonText, name: str) -> None:
+    """Up to the value of `TABLES`."""
+    head: dict[str, Any] = {}
+    text.take("{")
+    if text.peek() != "}":
+        while (key := _key(text, head, (*HEAD, TABLES))) != TABLES:
+            head[key] = text.value()
+            if text.take(",", "}") == "}":
+                break
+        else:
+            check_head(head, name)
+            return
+    check_head(head, name)
+    raise ExchangeError("is missing", where=f"{name} $.{TABLES}", remedy="export the building again")
+
+
+def _key(text: JsonText, before: dict[str, Any], known: Sequence[str]) -> str:
+    """The next key of an object, and its colon."""
+    if text.peek() != '"':
+        text.take('"')
+    key = str(text.value())
+    if key in before:
+        text.refuse(f"the key {key} comes twice")
+    if key not in known:
+        near = difflib.get_close_matches(key[:40], known, n=1)
+        text.refuse(
+            f"unknown key {key[:40]!a}",
+            f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}",
+        )
+    text.take(":")
+    return key
+
+
+def _read_tables(session: Session, text: JsonText, name: str) -> dict[str, int]:
+    """The sections, which come in our order, so that references can be checked at once."""
+    known = [section.name for section in sections()]
+    counts: dict[str, int] = {}
+    kinds: set[str] = set()
+    text.take("{")
+    for section in sections():
+        if text.peek() == "}":
+            raise ExchangeError(
+                "is missing", where=f"{name} $.{TABLES}.{section.name}", remedy="write [] if it is empty"
+            )
+        key = _key(text, counts, known)
+        if key != section.name:
+            text.refuse(f"found section {key}, expected {section.name}", f"the order is {', '.join(known)}")
+        counts[key] = _read_section(session, section, text, name, kinds)
+        if section is not sections()[-1] and text.peek() != "}":
+            text.take(",")
+    if text.take(",", "}") == ",":
+        _key(text, counts, known)  # which is unknown, or comes twice
+    return counts
+
+
+def _read_section(session: Session, section: Section, text: JsonText, name: str, kinds: set[str]) -> int:
+    reader = RowReader(section, name, kinds)
+    store = SectionStore(session, section, name)
+    text.take("[")
+    count = 0
+    if text.peek() != "]":
+        while True:
+            text.peek()
+            line, before = text.line, text.consumed
+            row: Row = reader.read(text.value(), count, line)
+            store.add(row, text.consumed - before)
+            count += 1
+            if text.take(",", "]") == "]":
+                break
+    else:
+        text.take("]")
+    store.finish()
+    if section.table is RegisteredKind.__table__:
+        _declare(session, name)
+    return count
+
+
+def _declare(session: Session, name: str) -> None:
+    """Let the registered kinds be kinds, so that entities can be of them."""
+    try:
+        declare_registered(session)
+    except DatabaseError as error:
+        raise ExchangeError(error.what, where=f"{name} $.{TABLES}.kind", remedy=error.remedy) from error

@@ -1,0 +1,155 @@
+"""One row of a building document, checked and made a row of its table."""
+
+import difflib
+import re
+from dataclasses import dataclass
+from typing import Any
+
+from archmodel.exchange.json_types import Mismatch
+from archmodel.exchange.sections import Section
+from archmodel.exchange.values import said
+from archmodel.query.grammar import parse
+from archmodel.tables.entities import Entity
+from archmodel.tables.registered import RegisteredKind
+from moma.errors import ExchangeError, QueryError
+
+__all__ = ["Row", "RowReader", "said_key"]
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A row, and where it came from.
+
+    Attributes
+    ----------
+    values : by column; every column, null as None
+    labels : the codes and names of what it refers to, by key, as far as the document says them
+    later : references to rows of the same table that may not be there yet, by column; None in `values`
+    document, path, line : its place
+    """
+
+    values: dict[str, Any]
+    labels: dict[str, str]
+    later: dict[str, Any]
+    document: str
+    path: str
+    line: int
+
+    def wrong(self, what: str, path: str = "", remedy: str | None = None) -> ExchangeError:
+        """An error at this row, or within it."""
+        return ExchangeError(what, where=f"{self.document}:{self.line} {self.path}{path}", remedy=remedy)
+
+
+class RowReader:
+    """Reads the rows of one section.
+
+    Parameters
+    ----------
+    section : the section
+    document : its name, for errors
+    kinds : names of the kinds that the document registers; filled from their section, read in that of entities
+    """
+
+    def __init__(self, section: Section, document: str, kinds: set[str]) -> None:
+        self._section, self._document = section, document
+        self._registered = kinds
+        self._labels = {label.name for label in section.labels}
+        self._fields = [
+            (field.name, field.value.decode, field.required, field.within) for field in section.fields
+        ]
+        self._of_entities = section.table is Entity.__table__
+        self._last: tuple[Any, ...] | None = None
+        column = section.mapper.polymorphic_on
+        self._kind = None if column is None else str(column.key)
+        self._kinds = _built_in(section)
+
+    def read(self, given: Any, index: int, line: int) -> Row:
+        """The row at this index of the section, at this line.
+
+        Raises
+        ------
+        ExchangeError
+            if it is not a row of this table, or not after the one before it
+        """
+        row = Row({}, {}, {}, self._document, f"$.tables.{self._section.name}[{index}]", line)
+        if type(given) is not dict:
+            raise row.wrong(f"is {said(given)}, expected an object")
+        for name, decode, required, within in self._fields:
+            value = given.pop(name, None)
+            if value is None:
+                if required:
+                    raise row.wrong("is missing or null", f".{name}", "give a value")
+                row.values[name] = None
+                continue
+            try:
+                row.values[name] = decode(value)
+            except Mismatch as wrong:
+                raise row.wrong(wrong.what, f".{name}{wrong.path}") from None
+            if within:
+                row.later[name] = row.values[name]
+        if given:
+            self._take_labels(row, given)
+        self._check_order(row)
+        self._check_kind(row)
+        return row
+
+    def _take_labels(self, row: Row, rest: dict[str, Any]) -> None:
+        for name, value in rest.items():
+            if name not in self._labels:
+                known = [field.name for field in self._section.fields] + sorted(self._labels)
+                near = difflib.get_close_matches(name[:40], known, n=1)
+                remedy = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"
+                raise row.wrong(f"unknown key {name[:40]!a}", remedy=remedy)
+            if type(value) is not str:
+                raise row.wrong(f"is {said(value)}, expected a text", f".{name}")
+            row.labels[name] = value
+
+    def _check_order(self, row: Row) -> None:
+        """Rows come in the order of their keys, so none comes twice."""
+        key = tuple(row.values[name] for name in self._section.key)
+        if self._last is not None and key <= self._last:
+            names = ", ".join(self._section.key)
+            what = f"{names} {said_key(key)} comes after {said_key(self._last)}"
+            raise row.wrong(what, remedy=f"sort the rows by {names}, each once")
+        self._last = key
+        # What refers to an earlier row can be stored as it is.
+        for name, target in [*row.later.items()]:
+            if target < key[0]:
+                del row.later[name]
+            else:
+                row.values[name] = None
+
+    def _check_kind(self, row: Row) -> None:
+        if self._section.table is RegisteredKind.__table__:
+            _check_registered(row)
+            self._registered.add(row.values["name"])
+        if self._kind is None:
+            return
+        kind = row.values[self._kind]
+        if kind not in self._kinds and not (self._of_entities and kind in self._registered):
+            near = difflib.get_close_matches(kind[:40], self._kinds, n=1)
+            remedy = f"did you mean {near[0]}?" if near else f"known are {', '.join(sorted(self._kinds))}"
+            raise row.wrong(f"is {said(kind)}, which is no kind", f".{self._kind}", remedy)
+
+
+def _built_in(section: Section) -> frozenset[str]:
+    """The kinds of a table's rows, without those that open databases register."""
+    classes = ((str(name), mapper.class_) for name, mapper in section.mapper.polymorphic_map.items())
+    return frozenset(name for name, cls in classes if getattr(cls, "__users__", None) is None)
+
+
+def _check_registered(row: Row) -> None:
+    """A registered kind can be asked for, and its proportions too."""
+    name, canon = row.values["name"], row.values["canon"]
+    if not re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", name):
+        raise row.wrong(f"is {said(name)}, which is not the name of a kind", ".name", "as corner_merlon, say")
+    try:
+        if canon is not None:
+            parse(canon)
+    except QueryError as error:
+        raise row.wrong(str(error), ".canon") from None
+
+
+def said_key(key: tuple[Any, ...]) -> str:
+    """A key as an error quotes it."""
+    return ", ".join(said(part) for part in key)

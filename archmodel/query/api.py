@@ -1,0 +1,206 @@
+"""Asking the database: which entities, with which attributes, and all that is known of one."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import ColumnElement, select
+from sqlalchemy.orm import Session, object_session
+
+from archmodel.describe.entity import describe
+from archmodel.query.attributes import ATTRIBUTES, Attribute, attributes_of
+from archmodel.query.compile import column_named, condition, condition_in
+from archmodel.query.grammar import attributes_in, parse
+from archmodel.query.names import refuse_unknown_run
+from archmodel.query.scope import Context, Scope
+from archmodel.store.hypotheses import not_withdrawn
+from archmodel.tables.entities import Entity, kind_named, kinds, refuse_unknown_kinds
+from moma.errors import DatabaseError, QueryError
+
+__all__ = [
+    "MAX_EXPRESSIONS",
+    "Face",
+    "asked_columns",
+    "attributes",
+    "condition",
+    "describe",
+    "find",
+    "find_faces",
+    "find_rows",
+    "row_of",
+    "rows_of",
+]
+
+Array = NDArray[np.float64]
+
+MAX_EXPRESSIONS = 20
+"""Most expressions in one query: together they stay below the number of parameters that SQLite takes."""
+
+BATCH = 500
+"""Entities per statement in `rows_of`, below SQLite's limit of parameters."""
+
+
+@dataclass(frozen=True)
+class Face:
+    """The face of an entity that was found.
+
+    Attributes
+    ----------
+    outline : (nv, 3) corners, counter-clockwise seen from outside [m]; None if it was not measured
+    normal : (3,) unit normal towards the observer; None if it was not measured
+    row : attributes by name
+    """
+
+    outline: Array | None
+    normal: Array | None
+    row: dict[str, object]
+
+
+def attributes(session: Session | None = None, kind: str | None = None) -> tuple[Attribute, ...]:
+    """What can be asked, in the order in which it is shown.
+
+    Parameters
+    ----------
+    session : of a database whose registered kinds count too
+    kind : the attributes that entities of this kind and its subkinds have of their own come last; None: only
+        those of every entity
+    """
+    if kind is None:
+        return tuple(ATTRIBUTES.values())
+    return tuple(attributes_of(session, kind_named(kind)).values())
+
+
+def find(session: Session, kind: str, where: Sequence[str] = (), run: int | None = None) -> list[Entity]:
+    """The entities of a kind and its subkinds that satisfy all expressions, in the order of the survey.
+
+    Parameters
+    ----------
+    session : of the database that is asked
+    kind : name of a kind
+    where : expressions, see docs/query.md; one need not be in a list
+    run : whose results are meant where an expression names no run; None: the latest that holds the entity
+
+    Raises
+    ------
+    UsageError
+        if there is no such kind
+    QueryError
+        if an expression cannot be understood, or there is no such run
+    """
+    scope, conditions = _asked(session, where, run)
+    # Entity, whatever the kind: the columns of all subkinds come with it
+    statement = scope.joined(select(Entity)).where(*_of_kind(scope, kind), *conditions)
+    return list(session.scalars(statement.order_by(Entity.id)))
+
+
+def find_rows(
+    session: Session,
+    kind: str,
+    where: Sequence[str] = (),
+    run: int | None = None,
+    columns: Sequence[str] | None = None,
+) -> list[dict[str, object]]:
+    """As `find`, but attributes by name instead of entities: the fast way to a table.
+
+    Parameters
+    ----------
+    columns : names of the attributes that are wanted, also ``von_mises_max@12``; None: those of ``attributes``
+    """
+    names = list(ATTRIBUTES) if columns is None else columns
+    found = _select(session, kind, where, run, lambda scope: _columns(scope, names))
+    return [dict(zip(names, row, strict=True)) for row in found]
+
+
+def find_faces(
+    session: Session,
+    kind: str,
+    where: Sequence[str] = (),
+    run: int | None = None,
+    columns: Sequence[str] = ("code",),
+) -> list[Face]:
+    """As `find_rows`, with the face of each entity."""
+
+    def chosen(scope: Scope) -> list[ColumnElement[Any]]:
+        measurement = scope.measurement()
+        return [measurement.c.outline, measurement.c.normal, *_columns(scope, columns)]
+
+    found = _select(session, kind, where, run, chosen)
+    return [Face(outline, normal, dict(zip(columns, row, strict=True))) for outline, normal, *row in found]
+
+
+def asked_columns(where: Sequence[str], session: Session | None = None, kind: str = "entity") -> list[str]:
+    """The attributes that expressions name, but for those of other entities: ``depth``, ``von_mises_max@12``."""
+    known = attributes_of(session, kind_named(kind))
+    expressions = [where] if isinstance(where, str) else where
+    named = [token.text.lower() for one in expressions for token in attributes_in(parse(one))]
+    return [name for name in dict.fromkeys(named) if name.partition("@")[0] in known]
+
+
+def row_of(entity: Entity) -> dict[str, object]:
+    """Every attribute of an entity by name; None where it is not known. The entity's session must be open."""
+    return rows_of([entity])[0]
+
+
+def rows_of(entities: Iterable[Entity]) -> list[dict[str, object]]:
+    """As `row_of`, for many entities of one session, in their order."""
+    wanted = list(entities)
+    names = list(ATTRIBUTES)
+    found: dict[object, dict[str, object]] = {}
+    for start in range(0, len(wanted), BATCH):
+        batch = wanted[start : start + BATCH]
+        session = object_session(batch[0])
+        if session is None:
+            remedy = "ask for its row before the session is closed"
+            raise DatabaseError("the entity's session is closed", where=batch[0].code, remedy=remedy)
+        scope = Scope(Context(session))
+        statement = scope.joined(select(*_columns(scope, names)))
+        statement = statement.where(scope.entity.c.id.in_([entity.id for entity in batch]))
+        rows = (dict(zip(names, row, strict=True)) for row in session.execute(statement))
+        found.update((row["code"], row) for row in rows)
+    return [found[entity.code] for entity in wanted]
+
+
+def _asked(
+    session: Session, where: Sequence[str], run: int | None
+) -> tuple[Scope, list[ColumnElement[bool]]]:
+    """The scope of a query and its conditions; every kind in the database must be one that we know."""
+    expressions = [where] if isinstance(where, str) else where
+    if len(expressions) > MAX_EXPRESSIONS:
+        remedy = "join some of them by and"
+        raise QueryError(
+            f"{len(expressions)} expressions, at most {MAX_EXPRESSIONS}", where="--where", remedy=remedy
+        )
+    scope = Scope(Context(session, run))
+    refuse_unknown_run(scope.context)
+    conditions = [condition_in(scope, parse(expression)) for expression in expressions]
+    refuse_unknown_kinds(session)
+    return scope, [*conditions, not_withdrawn(scope.entity.c)]
+
+
+def _columns(scope: Scope, names: Sequence[str]) -> list[ColumnElement[Any]]:
+    """The attributes of these names, as columns without them: a name may be the user's."""
+    return [column_named(scope, name).label(f"column_{number}") for number, name in enumerate(names)]
+
+
+def _select(
+    session: Session,
+    kind: str,
+    where: Sequence[str],
+    run: int | None,
+    chosen: Callable[[Scope], list[ColumnElement[Any]]],
+) -> Iterable[Sequence[Any]]:
+    """The chosen columns of the entities of a kind that satisfy all expressions, in the order of the survey."""
+    scope, conditions = _asked(session, where, run)
+    columns = chosen(scope)
+    statement = scope.joined(select(*columns)).where(*_of_kind(scope, kind), *conditions)
+    return session.execute(statement.order_by(scope.entity.c.id))
+
+
+def _of_kind(scope: Scope, kind: str) -> list[ColumnElement[bool]]:
+    """That an entity is of a kind or one of its subkinds; nothing where every entity is."""
+    cls = kind_named(kind)
+    if cls is Entity:
+        return []
+    return [scope.entity.c.kind.in_([name for name, sub in kinds().items() if issubclass(sub, cls)])]

@@ -1,0 +1,233 @@
+"""From query expressions to SQL conditions; see ``docs/query.md`` for the language.
+
+What the user wrote reaches the database as bound parameters only; the names that become SQL are those of
+``attributes``, ``functions`` and the tables.
+"""
+
+import math
+import operator
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from sqlalchemy import Boolean, ColumnElement, Double, Integer, and_, literal, not_, or_, select
+from sqlalchemy.orm import Session
+
+from archmodel.query.attributes import ATTRIBUTES, Attribute, attributes_of
+from archmodel.query.functions.registry import FUNCTIONS, STRUCTURE_FUNCTIONS, Function
+from archmodel.query.grammar import All, AnyOf, Call, Comparison, IsNull, Like, Membership, Node, Not, parse
+from archmodel.query.names import meant, run_numbered
+from archmodel.query.scope import Context, Scope, StructureScope
+from archmodel.query.tokens import Token, complaint
+from archmodel.tables.entities import Entity, kind_named, kind_of
+from archmodel.tables.structures import structure_kind_named, structure_kind_of
+from moma.errors import UsageError
+
+__all__ = ["STRUCTURE_ATTRIBUTES", "column_named", "condition", "condition_in"]
+
+LARGEST = 2**31 - 1
+"""Whole numbers up to this one are compared as such; larger ones as floating-point numbers."""
+
+Where = Scope | StructureScope
+
+_OPERATORS: Mapping[str, Callable[[Any, Any], Any]] = {
+    "=": operator.eq,
+    "!=": operator.ne,
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+}
+
+
+def _of_structure(name: str) -> Any:
+    return lambda scope, run: scope.structure.c[name]
+
+
+STRUCTURE_ATTRIBUTES: Mapping[str, Attribute] = {
+    one.name: one
+    for one in (
+        Attribute("code", None, "its name", _of_structure("code")),
+        Attribute("kind", None, "what it is, e.g. arch", _of_structure("kind")),
+        Attribute("title", None, "its name in words", _of_structure("title")),
+        Attribute("number", "-", "its place among its like, from the ground", _of_structure("number")),
+        Attribute(
+            "side", None, "outer or inner, of a wall facing", _of_structure("side"), words=("outer", "inner")
+        ),
+    )
+}
+"""What can be asked of a structure, within ``member_of(…)``."""
+
+
+def condition(session: Session, expression: str, run: int | None = None) -> ColumnElement[bool]:
+    """The condition of one expression, for a select of entities: ``select(Header).where(condition(…))``.
+
+    Parameters
+    ----------
+    session : of the database that will be asked
+    expression : see docs/query.md
+    run : whose results are meant where the expression names no run; None: the latest that holds the entity
+
+    Raises
+    ------
+    QueryError
+        with the place in the expression and the nearest names
+    """
+    scope = Scope(Context(session, run))
+    simple = condition_in(scope, parse(expression))
+    if scope.is_bare:
+        return simple
+    there = Scope.elsewhere(Context(session, run))
+    nested = condition_in(there, parse(expression))
+    return Entity.id.in_(there.joined(select(there.entity.c.id)).where(nested))
+
+
+def column_named(scope: Scope, name: str) -> ColumnElement[Any]:
+    """Where an attribute is found: ``depth``, ``von_mises_max@12``.
+
+    Raises
+    ------
+    QueryError
+        with the nearest names, if there is no such attribute or run
+    """
+    return _column(scope, Token("word", name, 1, name))[1]
+
+
+def condition_in(scope: Where, node: Node) -> ColumnElement[bool]:
+    """The condition of a node, for a select that has the joins of the scope; as deep as the grammar allows."""
+    match node:
+        case All(operands):
+            return and_(*(condition_in(scope, operand) for operand in operands))
+        case AnyOf(operands):
+            return or_(*(condition_in(scope, operand) for operand in operands))
+        case Not(operand):
+            return not_(condition_in(scope, operand))
+        case Call():
+            return _call(scope, node)
+        case IsNull(operand):
+            tested = _call(scope, operand) if isinstance(operand, Call) else _column(scope, operand)[1]
+            return tested.is_(None)
+        case Like(name, pattern):
+            attribute, column = _column(scope, name)
+            if attribute.is_number:
+                raise complaint(name, f"{attribute.name} is a number, like is for texts", "use < and >")
+            if attribute.is_truth:
+                what = f"{attribute.name} is true or false, like is for texts"
+                raise complaint(name, what, f"write {attribute.name} = true")
+            # With an escape character of our own: databases differ in the one that they assume.
+            return column.ilike(pattern.text.replace("~", "~~"), escape="~")
+        case Membership(name, values):
+            attribute, column = _column(scope, name)
+            return column.in_([_constant(scope, attribute, value) for value in values])
+        case Comparison(name, sign, value):
+            attribute, column = _column(scope, name)
+            compared: ColumnElement[bool] = _OPERATORS[sign](column, _operand(scope, attribute, value))
+            return compared
+
+
+def _call(scope: Where, call: Call) -> ColumnElement[bool]:
+    """The condition of a function."""
+    name = call.function.text.lower()
+    known: Mapping[str, Function] = FUNCTIONS if isinstance(scope, Scope) else STRUCTURE_FUNCTIONS
+    if (function := known.get(name)) is None:
+        if name in _attributes(scope):
+            what, remedy = f"{name} is an attribute, not a function", "compare it, e.g. depth > 0.4"
+        else:
+            what = f"unknown function {call.function.text[:40]!r}"
+            remedy = meant(name, known, "the functions")
+        raise complaint(call.function, what, remedy)
+    scope.context.count_function(call.function)
+    return function.sql(scope, call, condition_in)
+
+
+def _attributes(scope: Where) -> Mapping[str, Attribute]:
+    """What can be asked here."""
+    if isinstance(scope, StructureScope):
+        return STRUCTURE_ATTRIBUTES
+    session = scope.context.session
+    known: Mapping[str, Attribute] = scope.context.once("attributes", lambda: attributes_of(session))
+    return known
+
+
+def _found(scope: Where, name: str) -> Attribute | None:
+    """The attribute of this name; the database is asked only for what is not built in."""
+    if isinstance(scope, Scope) and name in ATTRIBUTES:
+        return ATTRIBUTES[name]
+    return _attributes(scope).get(name)
+
+
+def _column(scope: Where, token: Token) -> tuple[Attribute, ColumnElement[Any]]:
+    """The attribute that a token names, and where it is found: ``depth``, ``von_mises_max@12``."""
+    name, at, number = token.text.partition("@")
+    if (attribute := _found(scope, name.lower())) is None:
+        known = _attributes(scope)
+        functions = FUNCTIONS if isinstance(scope, Scope) else STRUCTURE_FUNCTIONS
+        if name.lower() in functions:
+            raise complaint(token, f"{name} is a function", f"write {functions[name.lower()].usages[0][0]}")
+        raise complaint(token, f"unknown attribute {name[:40]!r}", meant(name, known, "the attributes"))
+    if at and not attribute.of_run:
+        what = f"{attribute.name} does not depend on a run"
+        raise complaint(token, what, f"write {attribute.name} without @{number[:20]}")
+    run = run_numbered(scope.context, token, number) if at else None
+    return attribute, attribute.value(scope, run)  # type: ignore[arg-type]
+
+
+def _operand(scope: Where, attribute: Attribute, value: Token) -> Any:
+    """The right side of a comparison: a constant, or another attribute of the same kind (depth > length)."""
+    if value.role == "word" and (attribute.is_number or (attribute.of_run and "@" in value.text)):
+        name = value.text.partition("@")[0].lower()
+        other = _found(scope, name)
+        if other is None:
+            kind = _type_of(attribute)
+            what = f"{value.text[:40]!r} is neither {kind} nor an attribute, and {attribute.name} is {kind}"
+            raise complaint(value, what, meant(name, _attributes(scope), "the attributes"))
+        if (other.is_number, other.is_truth) != (attribute.is_number, attribute.is_truth):
+            raise complaint(
+                value, f"{attribute.name} is {_type_of(attribute)}, {other.name} is {_type_of(other)}"
+            )
+        return _column(scope, value)[1]
+    return _constant(scope, attribute, value)
+
+
+def _constant(scope: Where, attribute: Attribute, value: Token) -> Any:
+    """The value as the attribute's type has it."""
+    if attribute.is_number:
+        return _number(attribute, value)
+    if attribute.is_truth:
+        return _truth(attribute, value)
+    if attribute.name == "kind":
+        try:
+            if isinstance(scope, StructureScope):
+                return structure_kind_of(structure_kind_named(value.text))
+            return kind_of(kind_named(value.text))
+        except UsageError as error:
+            raise complaint(value, error.what, error.remedy) from None
+    if attribute.words is not None and value.text not in attribute.words:
+        what = f"unknown {attribute.name} {value.text[:40]!r}"
+        raise complaint(value, what, f"they are {', '.join(attribute.words)}")
+    return value.text
+
+
+def _type_of(attribute: Attribute) -> str:
+    return "a number" if attribute.is_number else "true or false" if attribute.is_truth else "a text"
+
+
+def _truth(attribute: Attribute, value: Token) -> ColumnElement[Any]:
+    """True or false, in upper or lower case."""
+    if value.text.lower() not in _TRUTHS:
+        what = f"{attribute.name} is true or false, {value.text[:40]!r} is not"
+        raise complaint(value, what, f"write {attribute.name} = true or {attribute.name} = false")
+    return literal(_TRUTHS[value.text.lower()], Boolean)
+
+
+_TRUTHS = {"true": True, "false": False}
+
+
+def _number(attribute: Attribute, value: Token) -> ColumnElement[Any]:
+    """A number with its type: PostgreSQL would round it to that of the column, or not use the index."""
+    number = float(value.text) if value.role == "number" else math.nan
+    if not math.isfinite(number):
+        remedy = "write a number without quotes, e.g. 0.4 or 2e5"
+        raise complaint(value, f"{attribute.name} is a number, {value.text[:40]!r} is not", remedy)
+    if number.is_integer() and abs(number) <= LARGEST:
+        return literal(int(number), Integer)
+    return literal(number, Double)

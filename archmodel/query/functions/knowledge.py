@@ -1,0 +1,122 @@
+"""Functions of query expressions that ask what is said of a stone, and whether it is as its kind should be."""
+
+from sqlalchemy import FromClause, case, exists, null
+
+from archmodel.query.attributes import attributes_of, kinds_of
+from archmodel.query.columns import DOCUMENTING
+from archmodel.query.functions.usages import Ask, Condition, tokens
+from archmodel.query.grammar import Call, parse
+from archmodel.query.inherited import entities_told, held
+from archmodel.query.names import document_named, mark_named, meant
+from archmodel.query.scope import Scope
+from archmodel.query.tokens import Token, complaint
+from archmodel.tables.entities import canon_of, kind_named, kinds
+from archmodel.tables.knowledge import OBSERVATIONS, Correction, Statement
+from moma.errors import QueryError, UsageError
+
+__all__ = ["canonical", "corrected", "documented", "has_mark", "is_a", "observed"]
+
+MAX_SEVERITY = 4
+
+
+def has_mark(scope: Scope, call: Call, ask: Ask) -> Condition:
+    """Mason marks. One that is said of a structure is somewhere on it, on no stone in particular."""
+    said = scope.context.alias(Statement)
+    conditions: list[Condition] = [
+        held(said),
+        said.c.entity_id == scope.entity.c.id,
+        said.c.kind == "mason_mark",
+    ]
+    conditions += [said.c.sign == mark_named(scope.context, sign) for sign in tokens(call, 0, 1)]
+    return _any_row(scope, *conditions)
+
+
+def observed(scope: Scope, call: Call, ask: Ask) -> Condition:
+    """Observations of the stone, and of its structures if it has none of their type."""
+    values = tokens(call, 0, 1, 2)
+    wanted = {}
+    if values:
+        wanted["type"] = type_ = values[0].text.lower()
+        if type_ not in OBSERVATIONS:
+            remedy = meant(type_, OBSERVATIONS, "the types")
+            raise complaint(values[0], f"unknown type of observation {values[0].text[:40]!r}", remedy)
+    least = _severity(values[1]) if len(values) == 2 else None
+
+    def conditions(said: FromClause) -> list[Condition]:
+        of_type = [said.c[name] == value for name, value in wanted.items()]
+        return of_type if least is None else [*of_type, said.c.severity >= least]
+
+    context = scope.context
+    of_structures = context.said_of_structures("observation")
+    told = entities_told(context.alias, of_structures, conditions, "observation", own_type_first=True)
+    return scope.entity.c.id.in_(told)
+
+
+def _severity(token: Token) -> int:
+    if token.text not in map(str, range(MAX_SEVERITY + 1)):
+        remedy = "write a number from 0 (traces) to 4 (lost, or about to be)"
+        raise complaint(token, f"{token.text[:40]!r} is not a severity", remedy)
+    return int(token.text)
+
+
+def documented(scope: Scope, call: Call, ask: Ask) -> Condition:
+    """Documents that any statement about the stone, or its structures, names."""
+    numbers = [document_named(scope.context, code) for code in tokens(call, 0, 1)]
+
+    def conditions(said: FromClause) -> list[Condition]:
+        return [said.c.document_id > 0, *(said.c.document_id == number for number in numbers)]
+
+    context = scope.context
+    of_structures = context.said_of_structures(*DOCUMENTING)
+    return scope.entity.c.id.in_(entities_told(context.alias, of_structures, conditions, *DOCUMENTING))
+
+
+def corrected(scope: Scope, call: Call, ask: Ask) -> Condition:
+    """Corrections of its attributes."""
+    rows = scope.context.alias(Correction)
+    conditions: list[Condition] = [rows.c.entity_id == scope.entity.c.id]
+    for token in tokens(call, 0, 1):
+        known = attributes_of(scope.context.session)
+        if (name := token.text.lower()) not in known:
+            raise complaint(
+                token, f"unknown attribute {token.text[:40]!r}", meant(name, known, "the attributes")
+            )
+        conditions.append(rows.c.attribute == name)
+    return _any_row(scope, *conditions)
+
+
+def _any_row(scope: Scope, *conditions: Condition) -> Condition:
+    """Whether there is a row that satisfies the conditions, for each entity."""
+    return exists().where(*conditions).correlate(scope.entity)
+
+
+def is_a(scope: Scope, call: Call, ask: Ask) -> Condition:
+    """Its kind, or one that its kind is a case of."""
+    (name,) = tokens(call, 1)
+    try:
+        cls = kind_named(name.text)
+    except UsageError as error:
+        raise complaint(name, error.what, error.remedy) from None
+    return scope.entity.c.kind.in_([kind for kind, sub in kinds().items() if issubclass(sub, cls)])
+
+
+def canonical(scope: Scope, call: Call, ask: Ask) -> Condition:
+    """The proportions that theory asks of its kind, in the very language of queries."""
+    tokens(call, 0)
+    with_canon: dict[str, list[str]] = {}
+    for kind, cls in kinds_of(scope.context.session).items():
+        if (canon := canon_of(cls)) is not None:
+            with_canon.setdefault(canon, []).append(kind)
+    if scope.context.within_canon:
+        raise complaint(call.function, "canonical proportions cannot refer to canonical()")
+    scope.context.within_canon = True
+    cases = []
+    for canon, names in with_canon.items():
+        try:
+            cases.append((scope.entity.c.kind.in_(names), ask(scope, parse(canon))))
+        except QueryError as error:
+            what = f"the canonical proportions of {' and '.join(names)} cannot be understood: {error}"
+            raise complaint(call.function, what) from None
+    scope.context.within_canon = False
+    # Neither true nor false for kinds that have none.
+    return case(*cases, else_=null())

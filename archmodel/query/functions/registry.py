@@ -1,0 +1,61 @@
+"""The functions of query expressions by name."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from archmodel.query.functions import knowledge as told
+from archmodel.query.functions import relations as related
+from archmodel.query.functions import spatial as places
+from archmodel.query.functions.usages import STRUCTURE_USAGES, USAGES, Ask, Condition
+from archmodel.query.grammar import Call
+
+__all__ = ["FUNCTIONS", "STRUCTURE_FUNCTIONS", "Function"]
+
+Sql = Callable[[Any, Call, Ask], Condition]
+
+
+@dataclass(frozen=True)
+class Function:
+    """A function of expressions that is true or false of an entity, or of a structure.
+
+    Attributes
+    ----------
+    name : as users write it
+    usages : ways to write it, and what each says
+    sql : the condition, of the scope, the call, and what makes conditions of nested expressions
+    """
+
+    name: str
+    usages: tuple[tuple[str, str], ...]
+    sql: Sql
+
+
+_SQL: Mapping[str, Sql] = {
+    "within": places.within,
+    "within_box": places.within_box,
+    "rests_on": related.related("rests_on", "subject_id", "object_id"),
+    "supports": related.related("rests_on", "object_id", "subject_id"),
+    "beside": related.related("beside", "subject_id", "object_id"),
+    "bonded_with": related.related("bonded_with", "subject_id", "object_id"),
+    "across_the_wall": related.related("across_the_wall", "subject_id", "object_id"),
+    "above": related.load_path("object_id", "subject_id"),
+    "below": related.load_path("subject_id", "object_id"),
+    "member_of": related.member_of,
+    "has_mark": told.has_mark,
+    "observed": told.observed,
+    "documented": told.documented,
+    "corrected": told.corrected,
+    "is_a": told.is_a,
+    "canonical": told.canonical,
+}
+
+FUNCTIONS: Mapping[str, Function] = {
+    name: Function(name, usages, _SQL[name]) for name, usages in USAGES.items()
+}
+"""What can be asked of an entity."""
+
+STRUCTURE_FUNCTIONS: Mapping[str, Function] = {
+    "part_of": Function("part_of", STRUCTURE_USAGES["part_of"], related.part_of)
+}
+"""What can be asked of a structure, within ``member_of(…)``."""

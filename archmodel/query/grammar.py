@@ -1,0 +1,276 @@
+"""The grammar of query expressions: from text to a small tree, with limits; no database here.
+
+::
+
+    expression  = conjunction { "or" conjunction }
+    conjunction = negation { "and" negation }
+    negation    = "not" negation | "(" expression ")" | test
+    test        = attribute ( "=" | "==" | "!=" | "<" | "<=" | ">" | ">=" ) value
+                | attribute [ "not" ] "in" "(" value { "," value } ")"
+                | attribute [ "not" ] "like" value
+                | attribute "is" [ "not" ] "null"
+                | function "(" [ argument { "," argument } ] ")" [ "is" [ "not" ] "null" ]
+    argument    = value | expression
+    attribute   = name [ "@" run ]
+    value       = number | word | 'quoted' | "quoted"
+
+A word is anything without blanks, quotes, commas, parentheses and comparison signs, such as ``W05-03``. A
+quote within quotes is doubled. The words of the grammar (and, or, not, in, like, is, null) are the same in
+upper and lower case, and must be quoted to be values.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from archmodel.query.tokens import Token, complaint, named, tokenise
+
+__all__ = [
+    "MAX_CALLS",
+    "MAX_DEPTH",
+    "All",
+    "AnyOf",
+    "Call",
+    "Comparison",
+    "IsNull",
+    "Like",
+    "Membership",
+    "Node",
+    "Not",
+    "attributes_in",
+    "parse",
+]
+
+MAX_DEPTH = 30
+"""Deepest nesting of parentheses, nots and functions."""
+
+MAX_CALLS = 8
+"""Deepest nesting of functions alone: each is a select within a select."""
+
+OPERATORS = frozenset({"=", "==", "!=", "<", "<=", ">", ">="})
+
+VALUES = frozenset({"quoted", "word", "number"})
+
+
+_JOINING = "join tests by and, or; put a text with blanks in quotes"
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """attribute operator value."""
+
+    attribute: Token
+    operator: str
+    value: Token
+
+
+@dataclass(frozen=True)
+class Membership:
+    """attribute in (values)."""
+
+    attribute: Token
+    values: tuple[Token, ...]
+
+
+@dataclass(frozen=True)
+class Like:
+    """attribute like pattern."""
+
+    attribute: Token
+    pattern: Token
+
+
+@dataclass(frozen=True)
+class Call:
+    """function(arguments)."""
+
+    function: Token
+    arguments: "tuple[Token | Node, ...]"
+
+
+@dataclass(frozen=True)
+class IsNull:
+    """attribute is null, or function(…) is null: it is neither true nor false."""
+
+    operand: Token | Call
+
+
+@dataclass(frozen=True)
+class Not:
+    """The opposite; unknown stays unknown."""
+
+    operand: "Node"
+
+
+@dataclass(frozen=True)
+class All:
+    """Every operand, joined by and."""
+
+    operands: "tuple[Node, ...]"
+
+
+@dataclass(frozen=True)
+class AnyOf:
+    """At least one operand, joined by or."""
+
+    operands: "tuple[Node, ...]"
+
+
+Node = Comparison | Membership | Like | Call | IsNull | Not | All | AnyOf
+
+
+def parse(text: str) -> Node:
+    """The tree of an expression.
+
+    Raises
+    ------
+    QueryError
+        with the place in the expression, if it does not follow the grammar or exceeds its limits
+    """
+    return _Parser(tokenise(text)).whole()
+
+
+def attributes_in(node: Node) -> Iterator[Token]:
+    """The tokens that are, or may be, attributes of what the expression speaks of; not those within functions."""
+    match node:
+        case All(operands) | AnyOf(operands):
+            for operand in operands:
+                yield from attributes_in(operand)
+        case Not(operand):
+            yield from attributes_in(operand)
+        case Comparison(attribute, _, value):
+            yield attribute
+            if value.role == "word":
+                yield value
+        case IsNull(Token() as attribute) | Like(attribute, _) | Membership(attribute, _):
+            yield attribute
+
+
+class _Parser:
+    """Recursive descent over the tokens; `depth` counts parentheses, nots and functions, `calls` functions."""
+
+    def __init__(self, tokens: list[Token]) -> None:
+        self.tokens = tokens
+        self.index = 0
+        self.calls = 0
+
+    @property
+    def token(self) -> Token:
+        return self.tokens[self.index]
+
+    def take(self) -> Token:
+        token = self.token
+        self.index += 1
+        return token
+
+    def taken(self, role: str, text: str) -> bool:
+        """Take the token if it is this one."""
+        if (self.token.role, self.token.text) != (role, text):
+            return False
+        self.index += 1
+        return True
+
+    def whole(self) -> Node:
+        node = self.expression(0)
+        if self.token.role != "end":
+            raise complaint(self.token, f"{named(self.token)} is not expected here", _JOINING)
+        return node
+
+    def expression(self, depth: int) -> Node:
+        operands = [self.conjunction(depth)]
+        while self.taken("keyword", "or"):
+            operands.append(self.conjunction(depth))
+        return operands[0] if len(operands) == 1 else AnyOf(tuple(operands))
+
+    def conjunction(self, depth: int) -> Node:
+        operands = [self.negation(depth)]
+        while self.taken("keyword", "and"):
+            operands.append(self.negation(depth))
+        return operands[0] if len(operands) == 1 else All(tuple(operands))
+
+    def negation(self, depth: int) -> Node:
+        if depth > MAX_DEPTH:
+            raise complaint(
+                self.token, f"the expression is nested more than {MAX_DEPTH} deep", "use several --where"
+            )
+        if self.taken("keyword", "not"):
+            return Not(self.negation(depth + 1))
+        if self.taken("sign", "("):
+            node = self.expression(depth + 1)
+            self.close()
+            return node
+        return self.test(depth)
+
+    def test(self, depth: int) -> Node:
+        attribute = self.take()
+        if attribute.role != "word":
+            example = "begin a test with an attribute, e.g. depth > 0.4"
+            raise complaint(attribute, f"{named(attribute)} is not an attribute", example)
+        if self.taken("sign", "("):
+            call = self.call(attribute, depth)
+            return self.null(call) if self.taken("keyword", "is") else call
+        if self.token.role == "sign" and self.token.text in OPERATORS:
+            operator = self.take().text
+            return Comparison(attribute, "=" if operator == "==" else operator, self.value())
+        if self.taken("keyword", "is"):
+            return self.null(attribute)
+        negated = self.taken("keyword", "not")
+        node = self.membership_or_pattern(attribute)
+        return Not(node) if negated else node
+
+    def call(self, function: Token, depth: int) -> Call:
+        """The arguments; the parenthesis has been taken."""
+        self.calls += 1
+        if self.calls > MAX_CALLS:
+            what = f"functions are nested more than {MAX_CALLS} deep"
+            raise complaint(function, what, "ask in several steps, e.g. by above(…)")
+        arguments: list[Token | Node] = []
+        if not self.taken("sign", ")"):
+            arguments.append(self.argument(depth))
+            while self.taken("sign", ","):
+                arguments.append(self.argument(depth))
+            self.close()
+        self.calls -= 1
+        return Call(function, tuple(arguments))
+
+    def argument(self, depth: int) -> Token | Node:
+        """A value if nothing but the next argument or the end follows it, else an expression."""
+        if self.token.role in VALUES and self.following in ((",", "sign"), (")", "sign"), ("", "end")):
+            return self.take()
+        return self.expression(depth + 1)
+
+    @property
+    def following(self) -> tuple[str, str]:
+        """Text and role of the token after this one."""
+        token = self.tokens[min(self.index + 1, len(self.tokens) - 1)]
+        return token.text, token.role
+
+    def null(self, operand: Token | Call) -> Node:
+        negated = self.taken("keyword", "not")
+        if not self.taken("keyword", "null"):
+            raise complaint(self.token, f"{named(self.token)} after is", "write is null or is not null")
+        return Not(IsNull(operand)) if negated else IsNull(operand)
+
+    def membership_or_pattern(self, attribute: Token) -> Node:
+        if self.taken("keyword", "like"):
+            return Like(attribute, self.value())
+        if not self.taken("keyword", "in"):
+            remedy = "write one of = != < <= > >=, in (…), like '…', is null; or, of a function, (…)"
+            raise complaint(self.token, f"{named(self.token)} after {attribute.text[:40]}", remedy)
+        if not self.taken("sign", "("):
+            raise complaint(self.token, f"{named(self.token)} after in", "write in (a, b, …)")
+        values = [self.value()]
+        while self.taken("sign", ","):
+            values.append(self.value())
+        self.close()
+        return Membership(attribute, tuple(values))
+
+    def value(self) -> Token:
+        token = self.take()
+        if token.role not in VALUES:
+            remedy = "write a number, a word, or a 'quoted text'"
+            raise complaint(token, f"{named(token)} is not a value", remedy)
+        return token
+
+    def close(self) -> None:
+        if not self.taken("sign", ")"):
+            raise complaint(self.token, f"{named(self.token)} instead of )")

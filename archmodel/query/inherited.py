@@ -1,0 +1,183 @@
+"""What is said of an entity: by statements about it, else about the structures that it is a member of.
+
+Statements about a structure hold for its members and for the members of its parts, unless the entity, or a structure
+nearer to it, has a statement of its own.
+"""
+
+from collections.abc import Callable
+
+from sqlalchemy import (
+    CTE,
+    ColumnElement,
+    CompoundSelect,
+    FromClause,
+    and_,
+    func,
+    literal,
+    not_,
+    or_,
+    select,
+    union_all,
+)
+
+from archmodel.tables.base import Base
+from archmodel.tables.knowledge import Statement
+from archmodel.tables.relations import Membership
+from archmodel.tables.structures import Structure
+
+__all__ = [
+    "Alias",
+    "entities_told",
+    "held",
+    "observations_of",
+    "said_of",
+    "said_of_structures",
+    "statements_of",
+]
+
+MAX_LEVELS = 40
+"""Deepest structure within structures; ends the search where structures contain one another in a circle."""
+
+Alias = Callable[[type[Base]], FromClause]
+"""A new alias of the table of a class, see ``scope.Context.alias``."""
+
+_SUBJECT = {"of_phase": "phase_id", "made_of": "material_id"}
+
+
+def held(rows: FromClause) -> ColumnElement[bool]:
+    """Only what is held to be true now."""
+    return rows.c.superseded_id.is_(None)
+
+
+def said_of_structures(alias: Alias, *kinds: str) -> CTE:
+    """Held statements of some kinds about structures, for each structure and all parts of it.
+
+    Returns
+    -------
+    CTE
+        of structure_id, statement_id, distance (0: said of the structure itself)
+    """
+    said, part = alias(Statement), alias(Structure)
+    # > 0, and not "is not null", since SQLite has an index for it
+    seeds = select(
+        said.c.structure_id.label("structure_id"),
+        said.c.id.label("statement_id"),
+        literal(0).label("distance"),
+    ).where(said.c.structure_id > 0, said.c.kind.in_(kinds), held(said))
+    reach = seeds.cte(recursive=True)
+    return reach.union_all(
+        select(part.c.id, reach.c.statement_id, reach.c.distance + 1)
+        .join_from(reach, part, part.c.parent_id == reach.c.structure_id)
+        .where(held(part), reach.c.distance < MAX_LEVELS)
+    )
+
+
+def said_of(alias: Alias, entity: FromClause, kind: str, of_structures: CTE) -> ColumnElement[int]:
+    """Number of the phase or the material that an entity is held to be of; the latest statement decides.
+
+    Parameters
+    ----------
+    kind : of statement: of_phase or made_of
+    of_structures : `said_of_structures` of that kind
+    """
+    own, inherited, member = alias(Statement), alias(Statement), alias(Membership)
+    subject = _SUBJECT[kind]
+    by_itself = (
+        select(own.c[subject])
+        .where(own.c.entity_id == entity.c.id, own.c.kind == kind, held(own))
+        .order_by(own.c.id.desc())
+        .limit(1)
+    )
+    by_structure = (
+        select(inherited.c[subject])
+        .select_from(member)
+        .join(of_structures, of_structures.c.structure_id == member.c.structure_id)
+        .join(inherited, inherited.c.id == of_structures.c.statement_id)
+        .where(member.c.entity_id == entity.c.id, held(member))
+        .order_by(of_structures.c.distance, inherited.c.id.desc())
+        .limit(1)
+    )
+    return func.coalesce(
+        by_itself.correlate(entity).scalar_subquery(), by_structure.correlate(entity).scalar_subquery()
+    )
+
+
+def statements_of(
+    alias: Alias, entity: FromClause, said: FromClause, of_structures: CTE, *kinds: str
+) -> ColumnElement[bool]:
+    """The condition that a statement `said` is one of the entity, or of a structure that it is a member of.
+
+    Parameters
+    ----------
+    of_structures : `said_of_structures` of these kinds
+    """
+    own, member = alias(Statement), alias(Membership)
+    by_itself = select(own.c.id).where(own.c.entity_id == entity.c.id, own.c.kind.in_(kinds), held(own))
+    by_structure = (
+        select(of_structures.c.statement_id)
+        .join(member, member.c.structure_id == of_structures.c.structure_id)
+        .where(member.c.entity_id == entity.c.id, held(member))
+    )
+    # one list of numbers and not two conditions joined by "or", for which PostgreSQL reads all statements
+    return said.c.id.in_(union_all(by_itself.correlate(entity), by_structure.correlate(entity)))
+
+
+def entities_told(
+    alias: Alias,
+    of_structures: CTE,
+    wanted: Callable[[FromClause], list[ColumnElement[bool]]],
+    *kinds: str,
+    own_type_first: bool = False,
+) -> CompoundSelect[int]:
+    """Numbers of all entities for which a statement holds: one search, however many entities there are.
+
+    Parameters
+    ----------
+    of_structures : `said_of_structures` of these kinds
+    wanted : what is asked of the statement
+    own_type_first : a statement about a structure gives way to one of the same type about the entity
+    """
+    said, inherited, member = alias(Statement), alias(Statement), alias(Membership)
+    by_themselves = select(said.c.entity_id).where(
+        said.c.entity_id > 0, said.c.kind.in_(kinds), held(said), *wanted(said)
+    )
+    by_structures = (
+        select(member.c.entity_id)
+        .select_from(of_structures)
+        .join(inherited, inherited.c.id == of_structures.c.statement_id)
+        .join(member, member.c.structure_id == of_structures.c.structure_id)
+        .where(held(member), *wanted(inherited))
+    )
+    if own_type_first:
+        by_structures = by_structures.where(not_(_of_same_type(alias, member.c.entity_id, inherited, member)))
+    return union_all(by_themselves, by_structures)
+
+
+def observations_of(
+    alias: Alias, entity: FromClause, of_structures: CTE
+) -> tuple[FromClause, ColumnElement[bool]]:
+    """Observations that hold for an entity: its own, and those of its structures of types that it has none of.
+
+    Returns
+    -------
+    tuple
+        an alias of the statements, and the condition on it, which speaks of the `entity` around it
+    """
+    said = alias(Statement)
+    same = _of_same_type(alias, entity.c.id, said, entity)
+    seen = and_(
+        statements_of(alias, entity, said, of_structures, "observation"),
+        or_(said.c.entity_id.is_not(None), not_(same)),
+    )
+    return said, seen
+
+
+def _of_same_type(
+    alias: Alias, entity_id: ColumnElement[int], said: FromClause, around: FromClause
+) -> ColumnElement[bool]:
+    """Whether there is an observation about the entity itself that is of the type of `said`."""
+    own = alias(Statement)
+    same = select(own.c.id).where(
+        own.c.entity_id == entity_id, own.c.kind == "observation", own.c.type == said.c.type, held(own)
+    )
+    return same.correlate(around, said).exists()

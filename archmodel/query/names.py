@@ -1,0 +1,134 @@
+"""Names in an expression that only the database knows: stones, structures, marks, documents, runs."""
+
+import difflib
+from collections.abc import Iterable, Sequence
+
+from sqlalchemy import Row, select
+
+from archmodel.query.scope import MAX_RUNS, Context
+from archmodel.query.tokens import Token, complaint
+from archmodel.store.find_by_code import no_such_code
+from archmodel.tables.entities import Entity
+from archmodel.tables.knowledge import Document, MasonMark
+from archmodel.tables.runs import Run
+from archmodel.tables.structures import Structure
+from moma.errors import QueryError
+
+__all__ = [
+    "document_named",
+    "mark_named",
+    "meant",
+    "refuse_unknown_run",
+    "run_numbered",
+    "stone_named",
+    "structure_named",
+]
+
+MAX_SHOWN = 12
+"""So many names are listed where none is like what was written."""
+
+
+def meant(written: str, known: Iterable[str], what: str) -> str:
+    """What the user may have meant: the nearest names, else the first of all."""
+    names = list(known)
+    lower = {name.lower(): name for name in names}
+    near = difflib.get_close_matches(written[:40].lower(), lower, n=3, cutoff=0.5)
+    if near:
+        return f"did you mean {' or '.join(lower[name] for name in near)}?"
+    shown = [*names[:MAX_SHOWN], "…"] if len(names) > MAX_SHOWN else names
+    return f"{what} are {', '.join(shown)}" if shown else f"there are no {what.removeprefix('the ')} yet"
+
+
+def stone_named(context: Context, code: Token) -> Row[int, float | None, float | None, float | None]:
+    """Number and centroid (x, y, z) of a stone."""
+
+    def look() -> Row[int, float | None, float | None, float | None]:
+        stone = select(Entity.id, Entity.x, Entity.y, Entity.z).where(Entity.code == code.text)
+        row = context.session.execute(stone).one_or_none()
+        if row is None:
+            error = no_such_code(context.session, code.text, Entity.code)
+            raise complaint(code, error.what, error.remedy)
+        return row
+
+    row: Row[int, float | None, float | None, float | None] = context.once(("stone", code.text), look)
+    return row
+
+
+def structure_named(context: Context, code: Token) -> int:
+    """Number of a structure that is held now."""
+
+    def look() -> int:
+        structure = select(Structure.id).where(Structure.code == code.text, Structure.superseded_id.is_(None))
+        number = context.session.scalar(structure)
+        if number is None:
+            known = select(Structure.code).where(Structure.superseded_id.is_(None)).order_by(Structure.code)
+            remedy = meant(code.text, context.session.scalars(known), "the structures")
+            raise complaint(code, f"there is no structure {code.text[:40]!r} in the database", remedy)
+        return number
+
+    return int(context.once(("structure", code.text), look))
+
+
+def mark_named(context: Context, sign: Token) -> str:
+    """The sign, if a mason mark of this name is held."""
+    known = select(MasonMark.sign).where(MasonMark.superseded_id.is_(None), MasonMark.sign.is_not(None))
+    signs = context.once("marks", lambda: sorted(set(context.session.scalars(known))))
+    if sign.text not in signs:
+        what = f"there is no mason mark {sign.text[:40]!r} in the database"
+        raise complaint(sign, what, meant(sign.text, signs, "the marks"))
+    return sign.text
+
+
+def document_named(context: Context, code: Token) -> int:
+    """Number of a document that is held now."""
+    known = select(Document.code, Document.id).where(Document.superseded_id.is_(None)).order_by(Document.code)
+    documents: dict[str, int] = context.once(
+        "documents", lambda: {row.code: row.id for row in context.session.execute(known)}
+    )
+    if code.text not in documents:
+        what = f"there is no document {code.text[:40]!r} in the database"
+        raise complaint(code, what, meant(code.text, documents, "the documents"))
+    return documents[code.text]
+
+
+def run_numbered(context: Context, token: Token, number: str) -> int:
+    """The number, if there is a run of this number.
+
+    Parameters
+    ----------
+    token : where it is written
+    number : as it is written
+    """
+    runs = _runs(context)
+    # No int() of what is no number, and no number that is longer than any run's.
+    found = int(number) if number.isascii() and number.isdigit() and len(number) < 11 else -1
+    if found not in runs:
+        raise complaint(token, f"there is no run {number[:40]!r} in the database", _known_runs(runs))
+    used: set[int] = context.once("runs used", set)
+    used.add(found)
+    if len(used) > MAX_RUNS:
+        raise complaint(token, f"more than {MAX_RUNS} runs", "ask in several queries")
+    return found
+
+
+def refuse_unknown_run(context: Context) -> None:
+    """Check that the run whose results are meant, if one is named, is in the database."""
+    runs = _runs(context) if context.run is not None else ()
+    if context.run is not None and context.run not in runs:
+        what = "there is no such run in the database"
+        raise QueryError(what, where=f"run {context.run}", remedy=_known_runs(runs))
+
+
+def _runs(context: Context) -> list[int]:
+    """Numbers of all runs."""
+    runs: list[int] = context.once(
+        "runs", lambda: list(context.session.scalars(select(Run.id).order_by(Run.id)))
+    )
+    return runs
+
+
+def _known_runs(runs: Sequence[int]) -> str:
+    """The latest runs, for an error."""
+    if not runs:
+        return "there are no runs yet (moma run SCENE)"
+    return f"the runs are {'…, ' if len(runs) > MAX_SHOWN else ''}{', '.join(map(str, runs[-MAX_SHOWN:]))}"

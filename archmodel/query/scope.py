@@ -1,0 +1,199 @@
+"""Where the names of a query are found: a table of entities, and tables joined to it only as they are asked for."""
+
+from collections import Counter
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+from sqlalchemy import CTE, ColumnElement, FromClause, Select, and_, func, select
+from sqlalchemy.orm import Session
+
+from archmodel.query.inherited import held, said_of, said_of_structures
+from archmodel.query.tokens import Token, complaint
+from archmodel.tables.base import Base
+from archmodel.tables.entities import Entity
+from archmodel.tables.knowledge import Material, MaterialProperty, Phase
+from archmodel.tables.runs import EntityResult, Run
+from archmodel.tables.surveys import Measurement, Simplification, Survey
+
+__all__ = ["MAX_FUNCTIONS", "MAX_RUNS", "Context", "Scope", "StructureScope"]
+
+MAX_FUNCTIONS = 40
+"""Most functions in one query, those within functions and within canonical proportions included."""
+
+MAX_RUNS = 12
+"""Most runs in one query, each a table joined (SQLite joins at most 64)."""
+
+S = TypeVar("S", bound=Select[Any])
+
+_ALIASES: dict[tuple[type[Base], int], list[FromClause]] = {}
+
+
+@dataclass
+class Context:
+    """What the parts of one query share.
+
+    Attributes
+    ----------
+    session : of the database that is asked
+    run : the run of results whose run is not named; None: the latest that holds the entity
+    within_canon : the part that is being understood is the canonical proportions of a kind
+    """
+
+    session: Session
+    run: int | None = None
+    within_canon: bool = field(default=False, init=False)
+    _functions: int = field(default=0, init=False)
+    _aliases: Counter[type[Base]] = field(default_factory=Counter, init=False)
+    _shared: dict[Hashable, Any] = field(default_factory=dict, init=False)
+
+    def alias(self, cls: type[Base]) -> FromClause:
+        """An alias of the table of a class that this query does not have yet.
+
+        Queries share their aliases with later ones, since to make one takes longer than most queries do.
+        """
+        # A kind that was declared since then may have brought columns of its own.
+        pool = _ALIASES.setdefault((cls, len(cls.__table__.c)), [])
+        number = self._aliases[cls]
+        self._aliases[cls] += 1
+        if number == len(pool):
+            pool.append(cls.__table__.alias())
+        return pool[number]
+
+    def count_function(self, token: Token) -> None:
+        """Refuse one function too many."""
+        self._functions += 1
+        if self._functions > MAX_FUNCTIONS:
+            raise complaint(token, f"more than {MAX_FUNCTIONS} functions", "ask in several queries")
+
+    def once(self, key: Hashable, make: Callable[[], Any]) -> Any:
+        """What is looked up, or put together, at most once in a query."""
+        if key not in self._shared:
+            self._shared[key] = make()
+        return self._shared[key]
+
+    def said_of_structures(self, *kinds: str) -> CTE:
+        """Statements of some kinds about structures, for every structure that is a part of theirs."""
+        cte: CTE = self.once(("structures", kinds), lambda: said_of_structures(self.alias, *kinds))
+        return cte
+
+
+@dataclass
+class Scope:
+    """The entities that an expression speaks of.
+
+    Every join finds at most one row for each entity, so that it adds no rows.
+
+    Attributes
+    ----------
+    context : of the whole query
+    entity : the table of entities, or an alias of it
+    """
+
+    context: Context
+    entity: FromClause = field(default_factory=lambda: Entity.__table__)
+    _joins: dict[Hashable, tuple[FromClause, ColumnElement[bool]]] = field(default_factory=dict, init=False)
+
+    @classmethod
+    def elsewhere(cls, context: Context) -> "Scope":
+        """Other entities than those that are spoken of."""
+        return cls(context, context.alias(Entity))
+
+    @property
+    def is_bare(self) -> bool:
+        """Whether nothing was joined."""
+        return not self._joins
+
+    def joined(self, statement: S) -> S:
+        """The select on entities with the joins that were asked for."""
+        source = self.entity
+        for target, condition in self._joins.values():
+            source = source.outerjoin(target, condition)
+        return statement.select_from(source)
+
+    def measurement(self) -> FromClause:
+        """The measurement that is held now."""
+        return self._join(
+            "measurement", Measurement, lambda rows: and_(rows.c.entity_id == self.entity.c.id, held(rows))
+        )
+
+    def survey(self) -> FromClause:
+        """The survey of that measurement."""
+        number = self.measurement().c.survey_id
+        return self._join("survey", Survey, lambda rows: rows.c.id == number)
+
+    def result(self, run: int | None = None) -> FromClause:
+        """What a run computed: that of this number, or of the query, or the latest that holds the entity."""
+        number = self.context.run if run is None else run
+        wanted = self._latest_run() if number is None else number
+        return self._join(
+            ("result", number),
+            EntityResult,
+            lambda rows: and_(rows.c.entity_id == self.entity.c.id, rows.c.run_id == wanted),
+        )
+
+    def run(self, run: int | None = None) -> FromClause:
+        """The run of that result."""
+        result = self.result(run)
+        return self._join(("run", id(result)), Run, lambda rows: rows.c.id == result.c.run_id)
+
+    def simplification(self, run: int | None = None) -> FromClause:
+        """The solid that stood for the entity in that run."""
+        result = self.result(run)
+        return self._join(
+            ("simplification", id(result)),
+            Simplification,
+            lambda rows: and_(rows.c.entity_id == self.entity.c.id, rows.c.run_id == result.c.run_id),
+        )
+
+    def phase(self) -> FromClause:
+        """The phase that it is held to be of."""
+        number = said_of(
+            self.context.alias, self.entity, "of_phase", self.context.said_of_structures("of_phase")
+        )
+        return self._join("phase", Phase, lambda rows: rows.c.id == number)
+
+    def material(self) -> FromClause:
+        """The material that it is held to be of."""
+        number = said_of(
+            self.context.alias, self.entity, "made_of", self.context.said_of_structures("made_of")
+        )
+        return self._join("material", Material, lambda rows: rows.c.id == number)
+
+    def material_property(self, name: str) -> FromClause:
+        """A property of that material."""
+        number = self.material().c.id
+        return self._join(
+            ("property", name),
+            MaterialProperty,
+            lambda rows: and_(rows.c.material_id == number, rows.c.name == name, held(rows)),
+        )
+
+    def _latest_run(self) -> ColumnElement[int]:
+        """Number of the latest run that holds the entity: one step in the primary key."""
+        result = self.context.alias(EntityResult)
+        latest = select(func.max(result.c.run_id)).where(result.c.entity_id == self.entity.c.id)
+        return latest.correlate(self.entity).scalar_subquery()
+
+    def _join(
+        self, key: Hashable, cls: type[Base], condition: Callable[[FromClause], ColumnElement[bool]]
+    ) -> FromClause:
+        """The alias that is joined under this key, joined now if it was not."""
+        if key not in self._joins:
+            rows = self.context.alias(cls)
+            self._joins[key] = rows, condition(rows)
+        return self._joins[key][0]
+
+
+@dataclass
+class StructureScope:
+    """The structures that an expression within ``member_of(…)`` speaks of.
+
+    Attributes
+    ----------
+    context : of the whole query
+    structure : an alias of the table of structures
+    """
+
+    context: Context
+    structure: FromClause

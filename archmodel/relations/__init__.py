@@ -1,0 +1,1 @@
+"""Relations, courses and arches computed from solids; load paths."""

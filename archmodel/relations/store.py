@@ -1,0 +1,209 @@
+"""Computed relations into the database: the same stay, new ones come, those no longer found are superseded."""
+
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import ColumnElement, select, update
+from sqlalchemy.orm import Session
+
+from archmodel.relations.classify import FoundRelations, RelationSettings
+from archmodel.store.bulk import batches, insert_rows
+from archmodel.store.revisions import table_of
+from archmodel.store.stone_arrays import id_conditions
+from archmodel.tables.base import Base
+from archmodel.tables.entries import Entry, new_entry
+from archmodel.tables.relations import RELATIONS, Relation
+
+__all__ = ["Act", "Changes", "held_settings", "store_relations", "supersede"]
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+_SAME = 1e-6
+"""Numbers of a joint that differ by less [m, m²] are those of the same joint, computed about another place."""
+
+_NUMBERS = ("area", "gap", "x", "y", "z", "nx", "ny", "nz")
+
+
+class Act:
+    """An act of recording that is made when the first row needs it: what changes nothing leaves no entry."""
+
+    def __init__(
+        self, session: Session, source: str, settings: Mapping[str, object], action: str = "geometry"
+    ) -> None:
+        self._make: Callable[[], Entry] = lambda: new_entry(session, action, source, settings=settings)
+        self._entry: Entry | None = None
+
+    @property
+    def id(self) -> int:
+        """Number of the entry."""
+        if self._entry is None:
+            self._entry = self._make()
+        return self._entry.id
+
+    @property
+    def made(self) -> int | None:
+        """Number of the entry; None as long as nothing needed it."""
+        return None if self._entry is None else self._entry.id
+
+
+def held_settings(session: Session) -> RelationSettings:
+    """The tolerances with which the relations of this database were computed last; the usual ones if they were not.
+
+    Relations that are computed later, of stones that come or change, are so to the same measure.
+    """
+    last = select(Entry.settings).where(Entry.action == "geometry").order_by(Entry.id.desc()).limit(1)
+    known = {one.name for one in fields(RelationSettings)}
+    given: dict[str, Any] = {
+        name: value for name, value in (session.scalar(last) or {}).items() if name in known
+    }
+    return RelationSettings(**given)
+
+
+@dataclass(frozen=True)
+class Changes:
+    """What became of rows of one table.
+
+    Attributes
+    ----------
+    added : that are new
+    kept : that were found again
+    superseded : that were not
+    """
+
+    added: int = 0
+    kept: int = 0
+    superseded: int = 0
+
+    def __add__(self, other: "Changes") -> "Changes":
+        return Changes(self.added + other.added, self.kept + other.kept, self.superseded + other.superseded)
+
+
+def store_relations(
+    session: Session, ids: Indices, found: FoundRelations, act: Act, only: Collection[int] | None = None
+) -> dict[str, Changes]:
+    """Make the computed relations of the database those that were found.
+
+    A declared relation is left as it is, and no computed one comes beside it.
+
+    Parameters
+    ----------
+    session : a writing session
+    ids : (n,) numbers of the entities that the indices of `found` mean, growing
+    found : relations
+    act : that they come with
+    only : numbers of entities; relations of which neither side is one of them are left alone. None: all
+
+    Returns
+    -------
+    Changes by kind of relation
+    """
+    held = _held(session, only)
+    keys = _keys(found.kind, ids[found.subject], ids[found.object])
+    declared = np.isin(keys, held.keys[held.declared])
+    place = np.searchsorted(held.keys, keys) if len(held.keys) else np.zeros(len(keys), np.int64)
+    known = np.zeros(len(keys), np.bool_)
+    if len(held.keys):
+        place = np.minimum(place, len(held.keys) - 1)
+        known = (held.keys[place] == keys) & ~held.declared[place]
+        known[known] &= (np.abs(held.numbers[place[known]] - _numbers(found)[known]) <= _SAME).all(axis=1)
+    stays = held.declared.copy()
+    stays[place[known]] = True
+    new = np.flatnonzero(~declared & ~known)
+    supersede(session, Relation, held.ids[~stays].tolist(), act)
+    if len(new):
+        insert_rows(session, Relation, _rows(ids, found, new, act.id))
+    return {
+        name: Changes(
+            int((found.kind[new] == number).sum()),
+            int((found.kind[known] == number).sum()),
+            int((held.kinds[~stays] == number).sum()),
+        )
+        for number, name in enumerate(RELATIONS)
+    }
+
+
+def supersede(session: Session, table: type[Base], numbers: list[int], act: Act) -> None:
+    """End rows that are held now."""
+    target = table_of(table)
+    for batch in batches(numbers):
+        session.execute(update(target).where(target.c.id.in_(batch)).values(superseded_id=act.id))
+
+
+@dataclass(frozen=True)
+class _Held:
+    """Relations that are held now, in the order of their keys; a computed one before a declared one."""
+
+    ids: Indices
+    keys: Indices
+    kinds: Indices
+    declared: NDArray[np.bool_]
+    numbers: Array
+
+
+def _held(session: Session, only: Collection[int] | None) -> _Held:
+    rows = {row[0]: row for condition in _concerning(only) for row in _select(session, condition)}
+    count = len(rows)
+    ids, subject, other = (np.array([row[k] for row in rows.values()], dtype=np.int64) for k in (0, 2, 3))
+    kind = np.array([row[1] for row in rows.values()], dtype="U16")
+    declared = np.array([row[4] for row in rows.values()], dtype=np.bool_)
+    kinds = np.zeros(count, np.int64)
+    for number, name in enumerate(RELATIONS):
+        kinds[kind == name] = number
+    numbers = np.array([row[5:] for row in rows.values()], dtype=np.float64).reshape(count, len(_NUMBERS))
+    keys = _keys(kinds, subject, other)
+    order = np.lexsort((ids, declared, keys))
+    return _Held(ids[order], keys[order], kinds[order], declared[order], numbers[order])
+
+
+def _select(session: Session, condition: ColumnElement[bool]) -> list[Any]:
+    columns = table_of(Relation).c
+    numbers = [columns[name] for name in _NUMBERS]
+    return list(
+        session.execute(
+            select(
+                columns.id, columns.kind, columns.subject_id, columns.object_id, columns.declared, *numbers
+            ).where(columns.superseded_id.is_(None), condition)
+        )
+    )
+
+
+def _concerning(only: Collection[int] | None) -> Iterator[ColumnElement[bool]]:
+    """Conditions that together hold for the relations of some entities."""
+    if only is None:
+        yield table_of(Relation).c.id.is_not(None)
+        return
+    for one in id_conditions(table_of(Relation).c.subject_id, only):
+        yield one
+    for one in id_conditions(table_of(Relation).c.object_id, only):
+        yield one
+
+
+def _keys(kind: Indices, subject: Indices, other: Indices) -> Indices:
+    """One number for kind, subject and object, each entity's below 2³⁰."""
+    return (kind << 60) | (subject << 30) | other
+
+
+def _numbers(found: FoundRelations) -> Array:
+    return np.column_stack([found.area, found.gap, found.centroid, found.normal])
+
+
+def _rows(ids: Indices, found: FoundRelations, new: Indices, entry: int) -> Iterator[dict[str, Any]]:
+    numbers = _numbers(found)
+    for batch in batches(new.tolist()):
+        rows = np.array(batch)
+        subjects, others = ids[found.subject[rows]].tolist(), ids[found.object[rows]].tolist()
+        kinds = [RELATIONS[kind] for kind in found.kind[rows].tolist()]
+        for kind, subject, other, values in zip(kinds, subjects, others, numbers[rows].tolist(), strict=True):
+            yield {
+                "kind": kind,
+                "subject_id": subject,
+                "object_id": other,
+                "declared": False,
+                "entry_id": entry,
+                "superseded_id": None,
+                **dict(zip(_NUMBERS, values, strict=True)),
+            }

@@ -1,0 +1,1 @@
+"""Storage of stones, runs and revisions."""

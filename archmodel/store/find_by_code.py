@@ -1,0 +1,177 @@
+"""Entities and structures by their codes; what is not there is an error that names the nearest codes."""
+
+import difflib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+from sqlalchemy import select
+from sqlalchemy.orm import InstrumentedAttribute, Session
+
+from archmodel.store.bulk import batches
+from archmodel.tables.entities import Entity
+from archmodel.tables.entries import Entry, latest_entry
+from archmodel.tables.knowledge import Correction, Document, Material, Phase
+from archmodel.tables.structures import Structure
+from moma.errors import UsageError
+
+__all__ = [
+    "Subjects",
+    "check_entry",
+    "entity_numbers",
+    "held_named",
+    "held_or_none",
+    "no_such_code",
+    "structure_numbers",
+    "subjects",
+]
+
+T = TypeVar("T", Material, Phase, Document, Structure)
+
+MAX_CANDIDATES = 1000
+"""Codes that are looked through for one that is like a mistyped code."""
+
+SHOWN = 12
+"""Names that an error lists where none is like what was written."""
+
+
+@dataclass(frozen=True)
+class Subjects:
+    """What something is said of.
+
+    Attributes
+    ----------
+    entities, structures : their numbers in the database
+    """
+
+    entities: tuple[int, ...] = ()
+    structures: tuple[int, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.entities) + len(self.structures)
+
+
+def check_entry(session: Session, at: int | None) -> None:
+    """Refuse a number that is not that of an entry; None is always right: it means now.
+
+    Raises
+    ------
+    UsageError
+        naming the last entry
+    """
+    if at is not None and session.get(Entry, at) is None:
+        remedy = (
+            f"the last one is {latest_entry(session)}; list those of a stone by: moma show CODE --history"
+        )
+        raise UsageError(f"there is no entry {at}", remedy=remedy)
+
+
+def subjects(session: Session, stones: Iterable[str] = (), structures: Iterable[str] = ()) -> Subjects:
+    """Stones and structures by their codes; each counts once.
+
+    Raises
+    ------
+    UsageError
+        if there is no such stone or structure; names the nearest codes
+    """
+    return Subjects(
+        tuple(entity_numbers(session, list(stones)).values()),
+        tuple(structure_numbers(session, list(structures)).values()),
+    )
+
+
+def entity_numbers(session: Session, codes: Sequence[str]) -> dict[str, int]:
+    """Primary keys of entities by code, in the order of the codes."""
+    found: dict[str, int] = {}
+    for batch in batches(dict.fromkeys(codes)):
+        rows = session.execute(select(Entity.code, Entity.id).where(Entity.code.in_(_typable(batch))))
+        found.update((code, number) for code, number in rows)
+    for code in codes:
+        if code not in found:
+            raise no_such_code(session, code, Entity.code)
+    return {code: found[code] for code in codes}
+
+
+def structure_numbers(session: Session, codes: Sequence[str]) -> dict[str, int]:
+    """Primary keys of the structures that are held now, by code, in the order of the codes."""
+    found: dict[str, int] = {}
+    for batch in batches(dict.fromkeys(codes)):
+        statement = select(Structure.code, Structure.id).where(
+            Structure.superseded_id.is_(None), Structure.code.in_(_typable(batch))
+        )
+        found.update((code, number) for code, number in session.execute(statement))
+    for code in codes:
+        if code not in found:
+            raise no_such_code(session, code, Structure.code)
+    return {code: found[code] for code in codes}
+
+
+def no_such_code(session: Session, code: str, *columns: InstrumentedAttribute[str]) -> UsageError:
+    """The error for a code that is in none of the columns, with the nearest that are; the first says what it is of."""
+    things = "stone" if columns[0].class_ is Entity else "structure"
+    if not code.isprintable():
+        remedy = "list the codes by: moma query entity"
+        return UsageError(f"{code[:40]!a} is not a {things}'s code", remedy=remedy)
+    what = f"there is no {things} {code[:40]!r} in the database"
+    if Entity.code in columns and (renamed := _renamed(session, code)) is not None:
+        return UsageError(what, remedy=f"it is called {renamed} now")
+    known: list[str] = []
+    for column in columns:
+        alike = select(column).where(column.istartswith(code[:1], autoescape=True)).limit(MAX_CANDIDATES)
+        known += session.scalars(alike)
+    near = difflib.get_close_matches(code[:40], known, n=3, cutoff=0.5)
+    remedy = f"did you mean {' or '.join(near)}?" if near else "list the codes by: moma query entity"
+    return UsageError(what, remedy=remedy)
+
+
+def _typable(codes: Iterable[str]) -> list[str]:
+    """The codes that can be in a database: what cannot be printed, PostgreSQL does not even take as a value."""
+    return [code for code in codes if code.isprintable()]
+
+
+def _renamed(session: Session, code: str) -> str | None:
+    """The code that an entity has now which had this one before it was corrected."""
+    rows = session.execute(
+        select(Correction.before, Entity.code)
+        .join(Correction.entity)
+        .where(Correction.attribute == "code")
+        .order_by(Correction.id.desc())
+    )
+    return next((now for before, now in rows if before == code), None)
+
+
+def held_named(session: Session, cls: type[T], name: str) -> T:
+    """The material, phase, document or structure of this name or code that is held now.
+
+    Raises
+    ------
+    UsageError
+        if there is none; names the nearest ones
+    """
+    found = held_or_none(session, cls, name)
+    if found is not None:
+        return found
+    column = _name_column(cls)
+    known = sorted(session.scalars(select(column).where(cls.superseded_id.is_(None)).limit(MAX_CANDIDATES)))
+    near = difflib.get_close_matches(name[:40], known, n=3, cutoff=0.5)
+    thing = cls.__name__.lower()
+    remedy = f"declare it first; there is no {thing} yet"
+    if near:
+        remedy = f"did you mean {' or '.join(near)}?"
+    elif known:
+        remedy = (
+            f"declare it first; known are {', '.join(known[:SHOWN])}{', …' if len(known) > SHOWN else ''}"
+        )
+    raise UsageError(f"there is no {thing} {name[:40]!r}", remedy=remedy)
+
+
+def held_or_none(session: Session, cls: type[T], name: str) -> T | None:
+    """As `held_named`, but None where there is none."""
+    if not name.isprintable():
+        return None
+    return session.scalar(select(cls).where(_name_column(cls) == name, cls.superseded_id.is_(None)))
+
+
+def _name_column(cls: type[Material | Phase | Document | Structure]) -> InstrumentedAttribute[str]:
+    column: InstrumentedAttribute[str] = cls.name if issubclass(cls, Material | Phase) else cls.code
+    return column

@@ -1,0 +1,147 @@
+"""Stones that nobody has seen: stored with the grounds on which they are thought to be there, and withdrawn again.
+
+A hypothesis is an entity like others, whose `hypothesis` is true and whose measurement has the provenance
+"hypothesis". One that is withdrawn loses its geometry, its course and its zone: it is in no relation and no scene any
+more, and queries do not find it; what was said of it stays in its history.
+"""
+
+import hashlib
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from sqlalchemy import ColumnElement, insert, or_, select, update
+from sqlalchemy.orm import Session
+
+from archmodel.store.bulk import batches
+from archmodel.store.revisions import NOTHING, Outcome, end_rows
+from archmodel.store.stone_record import StoneRecord
+from archmodel.store.stones import insert_stones
+from archmodel.tables.entities import Entity
+from archmodel.tables.entries import Entry, new_entry
+from archmodel.tables.knowledge import Correction
+from archmodel.tables.surveys import Measurement, Survey
+from moma.errors import DatabaseError, UsageError
+
+__all__ = ["not_withdrawn", "store_hypotheses", "withdraw_hypotheses"]
+
+_GIVEN_UP = ("course", "zone", "length", "height", "area", "volume", "x", "y", "z")
+"""What is not known any more of a hypothesis that is withdrawn, besides its depth."""
+
+_DEPTH = ("depth", "depth_sigma", "depth_source", "depth_origin")
+
+
+def store_hypotheses(
+    session: Session,
+    name: str,
+    stones: Sequence[StoneRecord],
+    source: str,
+    *,
+    author: str | None = None,
+    settings: Mapping[str, object] | None = None,
+) -> tuple[Entry, tuple[int, ...]]:
+    """Take in stones that nobody has seen: all of them or, if anything is wrong, none.
+
+    Parameters
+    ----------
+    session : a writing session; it stays usable after an error
+    name : what proposed them
+    stones : with `hypothesis` true, at least one
+    source : on what grounds
+    author : who says so; None if a program does
+    settings : of the program that computed them
+
+    Returns
+    -------
+    The act of recording, and the primary keys of the entities in the order of the stones
+
+    Raises
+    ------
+    DatabaseError
+        if a code is there already, or given twice
+    UsageError
+        if a stone is no hypothesis
+    """
+    with session.begin_nested():
+        _check(session, stones)
+        entry = new_entry(session, "declaration", source, author=author, settings=settings)
+        digest = hashlib.sha256(f"{entry.id}: {name}".encode()).hexdigest()
+        survey = Survey(name=name, path=name, sha256=digest, entry_id=entry.id, stations={}, frame=None)
+        session.add(survey)
+        session.flush()
+        numbers: list[int] = []
+        for batch in batches(stones):
+            numbers += insert_stones(session, batch, survey)
+        return entry, tuple(numbers)
+
+
+def withdraw_hypotheses(session: Session, entry: Entry, entities: Iterable[int]) -> Outcome:
+    """Say that stones that nobody has seen are not thought to be there any more.
+
+    Parameters
+    ----------
+    entities : their primary keys
+
+    Raises
+    ------
+    UsageError
+        if one of them was seen
+    """
+    outcome = NOTHING
+    for batch in batches(entities):
+        found = list(session.scalars(select(Entity).where(Entity.id.in_(batch)).order_by(Entity.id)))
+        seen = next((one for one in found if not one.hypothesis), None)
+        if seen is not None:
+            raise UsageError(f"{seen.code} is no hypothesis: it was surveyed", remedy="leave it out")
+        held = [one for one in found if one.x is not None]
+        outcome += Outcome(withdrawn=len(held), unchanged=len(found) - len(held))
+        _end_geometry(session, entry, held)
+    return outcome
+
+
+def not_withdrawn(entity: Any) -> ColumnElement[bool]:
+    """The condition that an entity, as a table or an alias of it, is no hypothesis that was withdrawn."""
+    return or_(~entity.hypothesis, entity.x.is_not(None))
+
+
+def _check(session: Session, stones: Sequence[StoneRecord]) -> None:
+    if not stones:
+        raise UsageError("there are no stones", remedy="give one at least")
+    known: set[str] = set()
+    for batch in batches(stones):
+        codes = [stone.code for stone in batch]
+        there = session.scalars(select(Entity.code).where(Entity.code.in_(codes))).all()
+        twice = [*there, *(code for code in codes if code in known or codes.count(code) > 1)]
+        if twice:
+            raise DatabaseError(f"the code {twice[0]} is taken", remedy="give each stone a code of its own")
+        known |= set(codes)
+        if any(not stone.hypothesis for stone in batch):
+            code = next(stone.code for stone in batch if not stone.hypothesis)
+            raise UsageError(f"{code} is no hypothesis", remedy="store what was surveyed by ingest")
+
+
+def _end_geometry(session: Session, entry: Entry, entities: Sequence[Entity]) -> None:
+    """End the measurements of entities, and take from them what follows from these; nothing is forgotten."""
+    if not entities:
+        return
+    numbers = [one.id for one in entities]
+    measured = select(Measurement.id).where(
+        Measurement.entity_id.in_(numbers), Measurement.superseded_id.is_(None)
+    )
+    end_rows(session, entry, Measurement, list(session.scalars(measured)))
+    names = (*_GIVEN_UP, *_DEPTH)
+    rows = [
+        {
+            "entity_id": one.id,
+            "entry_id": entry.id,
+            "attribute": name,
+            "before": getattr(one, name),
+            "after": None,
+        }
+        for one in entities
+        for name in names
+        if getattr(one, name) is not None
+    ]
+    session.execute(insert(Correction), rows)
+    session.execute(update(Entity).where(Entity.id.in_(numbers)).values(dict.fromkeys(names)))
+    for one in entities:
+        session.expire(one)

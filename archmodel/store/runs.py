@@ -1,0 +1,184 @@
+"""From the record of a run to rows of its tables, with every number checked on the way in."""
+
+import json
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict
+from itertools import repeat
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from archmodel.store.run_record import (
+    ContactArrays,
+    JointArrays,
+    RunRecord,
+    SimplificationRecord,
+    StoneResult,
+)
+from archmodel.store.stone_rows import storable
+from archmodel.tables.runs import FIDELITIES
+from moma.errors import DatabaseError
+
+__all__ = ["contact_rows", "joint_rows", "plain", "result_row", "run_row", "simplification_row"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_CHUNK = 5_000
+"""Rows that are Python objects at a time: of a million contact points the arrays alone are all in memory."""
+
+_JOINT_NUMBERS = ("area", "force_normal", "force_shear", "gap", "opening", "sliding")
+_JOINT_UNKNOWNS = ("pressure_mean", "pressure_max", "kern", "friction_use", "slipping", "open")
+_CONTACT_NUMBERS = ("area", "gap", "opening", "slide")
+
+
+def run_row(run: RunRecord, place: str) -> dict[str, object]:
+    """Row of the `run` table, without its keys.
+
+    Parameters
+    ----------
+    run : the record
+    place : names the run in errors
+    """
+    numbers = {"simulated": run.simulated, "wall": run.wall, **asdict(run.errors)}
+    return {
+        "scene": storable(run.scene),
+        "scene_text": storable(run.scene_text),
+        "outcome": str(run.outcome),
+        "steps": run.steps,
+        "contacts": None if run.contacts is None else len(run.contacts.joint),
+        "versions": {str(name): str(version) for name, version in run.versions.items()},
+        "summary": plain(run.summary, "summary", place),
+        **{name: _finite(value, name, place) for name, value in numbers.items()},
+    }
+
+
+def plain(value: Mapping[str, object], name: str, place: str) -> dict[str, Any]:
+    """The mapping as JSON will give it back.
+
+    Raises
+    ------
+    DatabaseError
+        if JSON cannot say it
+    """
+    try:
+        said: dict[str, Any] = json.loads(json.dumps(dict(value), allow_nan=False))
+    except (TypeError, ValueError) as error:
+        raise DatabaseError(f"the {name} cannot be stored: {error}", where=place) from error
+    return said
+
+
+def result_row(result: StoneResult, place: str) -> dict[str, object]:
+    """Row of the `entity_result` table, without its keys."""
+    if result.fidelity not in FIDELITIES:
+        what = f"fidelity {result.fidelity!r} is none of {', '.join(FIDELITIES)}"
+        raise DatabaseError(what, where=place)
+    numbers = {
+        "von_mises_max": result.von_mises_max,
+        "von_mises_mean": result.von_mises_mean,
+        "displacement_max": result.displacement_max,
+        "contact_force_max": result.contact_force_max,
+    }
+    values = {str(name): _finite(value, name, place) for name, value in result.values.items()}
+    known = {name: _finite(value, name, place) for name, value in numbers.items()}
+    return {"fidelity": str(result.fidelity), "values": values, **known}
+
+
+def simplification_row(record: SimplificationRecord, place: str) -> dict[str, object]:
+    """Row of the `simplification` table, without its keys."""
+    vertices = np.asarray(record.vertices, dtype=np.float64)
+    if vertices.ndim != 2 or vertices.shape[1] != 3 or not np.isfinite(vertices).all():
+        raise DatabaseError("the corners of its solid are not (n, 3) finite numbers", where=place)
+    return {
+        "mode": record.mode,
+        "displacement_max": _finite(record.displacement_max, "displacement_max", place),
+        "volume_change": _finite(record.volume_change, "volume_change", place),
+        "shape": record.shape,
+        "blockiness": _finite(record.blockiness, "blockiness", place),
+        "worst_angle": _finite(record.worst_angle, "worst_angle", place),
+        "within_tolerance": record.within_tolerance,
+        "vertices": vertices,
+        "faces": [[int(index) for index in face] for face in record.faces],
+    }
+
+
+def joint_rows(joints: JointArrays, entities: Ints, run: int, place: str) -> Iterator[dict[str, Any]]:
+    """Rows of the `joint_result` table, checked before the first of them comes.
+
+    Parameters
+    ----------
+    joints : the arrays
+    entities : (n,) primary keys of the run's stones
+    run : number of the run
+    place : names the run in errors
+    """
+    columns: dict[str, NDArray[Any]] = {"number": np.arange(len(joints.area))}
+    columns |= _stones(joints.stones, entities, ("first_id", "second_id"), place)
+    columns |= _vectors(joints.centroid, ("x", "y", "z"), place)
+    columns |= _vectors(joints.normal, ("nx", "ny", "nz"), place)
+    columns |= {name: _all_finite(getattr(joints, name), name, place) for name in _JOINT_NUMBERS}
+    columns |= {name: _known(getattr(joints, name), name, place) for name in _JOINT_UNKNOWNS}
+    width = np.full(len(joints.area), np.nan) if joints.width is None else joints.width
+    columns["width"] = _known(width, "width", place)
+    return _rows(columns | {"parted": np.asarray(joints.parted, dtype=bool)}, run)
+
+
+def contact_rows(contacts: ContactArrays, entities: Ints, run: int, place: str) -> Iterator[dict[str, Any]]:
+    """Rows of the `contact_point` table; as `joint_rows`."""
+    joint = np.ma.masked_less(contacts.joint, 0)
+    columns: dict[str, NDArray[Any]] = {"number": np.arange(len(joint)), "joint": joint}
+    columns |= _stones(contacts.stones, entities, ("candidate_id", "antagonist_id"), place)
+    columns |= _vectors(contacts.point, ("x", "y", "z"), place)
+    columns |= _vectors(contacts.normal, ("nx", "ny", "nz"), place)
+    columns |= _vectors(contacts.force, ("fx", "fy", "fz"), place)
+    columns |= {name: _all_finite(getattr(contacts, name), name, place) for name in _CONTACT_NUMBERS}
+    return _rows(columns | {"status": np.asarray(contacts.status)}, run)
+
+
+def _rows(columns: Mapping[str, NDArray[Any]], run: int) -> Iterator[dict[str, Any]]:
+    """One mapping per row, made a chunk at a time, None where it is masked; every column must be equally long."""
+    names, count = ("run_id", *columns), len(next(iter(columns.values())))
+    for start in range(0, count, _CHUNK):
+        lists = [column[start : start + _CHUNK].tolist() for column in columns.values()]
+        for row in zip(repeat(run, len(lists[0])), *lists, strict=True):
+            yield dict(zip(names, row, strict=True))
+
+
+def _stones(stones: Ints, entities: Ints, names: tuple[str, str], place: str) -> dict[str, NDArray[Any]]:
+    """Primary keys in place of the indices of the two stones."""
+    if len(stones) and not (stones.min() >= 0 and stones.max() < len(entities)):
+        raise DatabaseError(
+            f"a pair of stones is not among the {len(entities)} stones of the run", where=place
+        )
+    return {name: entities[stones[:, side]] for side, name in enumerate(names)}
+
+
+def _vectors(values: Array, names: tuple[str, str, str], place: str) -> dict[str, NDArray[Any]]:
+    """The three components, by name."""
+    return {name: _all_finite(values[:, axis], name, place) for axis, name in enumerate(names)}
+
+
+def _all_finite(values: Array, name: str, place: str) -> Array:
+    """The values, of which each must be a number."""
+    if not np.isfinite(values).all():
+        number = int(np.flatnonzero(~np.isfinite(values))[0])
+        what = f"{name} is {values[number]}, not a finite number"
+        raise DatabaseError(what, where=f"{place}, number {number}")
+    return np.asarray(values, dtype=np.float64)
+
+
+def _known(values: Array, name: str, place: str) -> NDArray[Any]:
+    """The values, masked where there is nothing to say; infinity is no value."""
+    unknown = np.isnan(values)
+    known = _all_finite(np.where(unknown, 0.0, values), name, place)
+    return np.ma.masked_array(known, unknown)
+
+
+def _finite(value: float | None, name: str, place: str) -> float | None:
+    if value is None:
+        return None
+    if not math.isfinite(value):
+        raise DatabaseError(f"{name} is {value}, not a finite number", where=place)
+    return float(value)

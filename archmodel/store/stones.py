@@ -1,0 +1,188 @@
+"""Surveyed stones into the database and out again."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from archmodel.store.bulk import batches, first_free_id, insert_rows
+from archmodel.store.remeasuring import supersede_measurements
+from archmodel.store.stone_record import StoneRecord
+from archmodel.store.stone_rows import entity_rows, measurement_row, stone_record, storable
+from archmodel.tables.entities import Entity
+from archmodel.tables.entries import new_entry
+from archmodel.tables.surveys import Measurement, Survey
+from moma.errors import DatabaseError
+
+__all__ = ["StoredSurvey", "insert_stones", "load_stones", "store_survey", "survey_with_hash"]
+
+
+@dataclass(frozen=True)
+class StoredSurvey:
+    """What became of a survey.
+
+    Attributes
+    ----------
+    survey, entry : their numbers in the database
+    new : primary keys of the entities that it brought, in the order of the file
+    again : of those that it measured again
+    """
+
+    survey: int
+    entry: int
+    new: range
+    again: tuple[int, ...]
+
+
+def store_survey(
+    session: Session,
+    name: str,
+    source_path: str,
+    sha256: str,
+    stones: Iterable[StoneRecord],
+    *,
+    stations: Mapping[str, Sequence[float]] | None = None,
+    frame: Mapping[str, object] | None = None,
+    again: bool = False,
+) -> StoredSurvey:
+    """Take in one survey file: all of it, or, if anything is wrong, nothing.
+
+    Parameters
+    ----------
+    session : a writing session; it stays usable after an error
+    name : the survey's name
+    source_path : the file, as the user wrote it
+    sha256 : of the file's bytes, in hexadecimal
+    stones : its stones, at least one; read once, never all in memory
+    stations : where instruments and observers stood, by name, (x, y, z) [m]
+    frame : how the survey was carried into the frame of the site, in values that JSON can say
+    again : stones whose code is there already were measured again; otherwise they are an error
+
+    Raises
+    ------
+    DatabaseError
+        if the file was taken in before, or a code is there already or twice in the file
+    SurveyError, GeometryError
+        if a stone cannot be stored, at its ``file:line``
+    """
+    with session.begin_nested():
+        _refuse_again(session, source_path, sha256)
+        entry = new_entry(session, "ingest", storable(source_path))
+        survey = Survey(
+            name=storable(name),
+            path=storable(source_path),
+            sha256=sha256,
+            entry_id=entry.id,
+            stations={name: [float(value) for value in place] for name, place in (stations or {}).items()},
+            frame=None if frame is None else dict(frame),
+        )
+        session.add(survey)
+        session.flush()
+        lines: dict[str, int] = {}
+        start, measured_again = first_free_id(session, Entity), list[int]()
+        for batch in batches(stones):
+            known = _known_codes(session, batch)
+            _refuse_codes(batch, {} if again else known, lines, source_path)
+            insert_stones(session, [one for one in batch if one.code not in known], survey)
+            old = [one for one in batch if one.code in known]
+            numbers = [known[one.code][0] for one in old]
+            supersede_measurements(
+                session, survey.entry_id, survey.id, numbers, old, _places(old, source_path)
+            )
+            measured_again += numbers
+        if not lines:
+            remedy = "give it at least one stone record"
+            raise DatabaseError("the survey has no stones", where=source_path, remedy=remedy)
+        new = range(start, start + len(lines) - len(measured_again))
+        return StoredSurvey(survey.id, survey.entry_id, new, tuple(measured_again))
+
+
+def survey_with_hash(session: Session, sha256: str) -> Survey | None:
+    """The survey that was taken in from a file with these bytes, if any."""
+    return session.scalar(select(Survey).where(Survey.sha256 == sha256))
+
+
+def load_stones(session: Session, entities: Iterable[Entity]) -> list[StoneRecord]:
+    """The survey's records of these entities, in the same order, exactly as they were stored."""
+    wanted = [entity.id for entity in entities]
+    found: dict[int, StoneRecord] = {}
+    for batch in batches(dict.fromkeys(wanted)):
+        rows = session.execute(
+            select(Entity, Measurement).join(Entity.measurement).where(Entity.id.in_(batch))
+        )
+        found.update((entity.id, stone_record(entity, measured)) for entity, measured in rows)
+    missing = [number for number in wanted if number not in found]
+    if missing:
+        raise DatabaseError(
+            f"{len(missing)} entities are no longer in the database", where=f"entity {missing[0]}"
+        )
+    return [found[number] for number in wanted]
+
+
+def _refuse_again(session: Session, source_path: str, sha256: str) -> None:
+    """A file is taken in once."""
+    if (known := survey_with_hash(session, sha256)) is not None:
+        what = f"this file is in the database already, as survey {known.name!r} from {known.path}"
+        raise DatabaseError(
+            what, where=source_path, remedy="there is nothing to do, or use another database (--db)"
+        )
+
+
+def _known_codes(session: Session, batch: Sequence[StoneRecord]) -> dict[str, tuple[int, str]]:
+    """Which of the codes are in the database before this file: primary key, and where it was measured."""
+    found = session.execute(
+        select(Entity.code, Entity.id, Survey.path, Measurement.line)
+        .outerjoin(Entity.measurement)
+        .outerjoin(Measurement.survey)
+        .where(Entity.code.in_([stone.code for stone in batch]))
+    )
+    return {
+        code: (number, "the database, not measured" if path is None else f"{path}:{line}")
+        for code, number, path, line in found
+    }
+
+
+def _refuse_codes(
+    batch: Sequence[StoneRecord],
+    known: Mapping[str, tuple[int, str]],
+    lines: dict[str, int],
+    path: str,
+) -> None:
+    """A code names one stone of the database. `lines` holds this file's codes so far, and is added to."""
+    for stone in batch:
+        remedy = "give each stone a code of its own"
+        if stone.code in lines:
+            first = f"{path}:{lines[stone.code]}"
+        elif stone.code in known:
+            first = known[stone.code][1]
+            remedy += "; if it was measured again, give --again"
+        else:
+            lines[stone.code] = stone.line
+            continue
+        what = f"the code {stone.code} is taken by the stone at {first}"
+        raise DatabaseError(what, where=f"{path}:{stone.line}", remedy=remedy)
+
+
+def _places(batch: Sequence[StoneRecord], path: str) -> list[str]:
+    """Where errors find the stones."""
+    return [f"{path}:{stone.line} stone {stone.code}" for stone in batch]
+
+
+def insert_stones(session: Session, batch: Sequence[StoneRecord], survey: Survey) -> range:
+    """The rows of one batch of new stones, checked; primary keys of the entities, in their order."""
+    places = _places(batch, survey.path)
+    first = first_free_id(session, Entity)
+    entities = [
+        {"id": number, "entry_id": survey.entry_id, **row}
+        for number, row in enumerate(entity_rows(batch, places), start=first)
+    ]
+    shared = {"survey_id": survey.id, "entry_id": survey.entry_id, "superseded_id": None}
+    measured = first_free_id(session, Measurement) - first
+    measurements = [
+        {"id": number + measured, "entity_id": number, **shared, **measurement_row(stone, place)}
+        for number, (stone, place) in enumerate(zip(batch, places, strict=True), start=first)
+    ]
+    insert_rows(session, Entity, entities)
+    insert_rows(session, Measurement, measurements)
+    return range(first, first + len(entities))

@@ -1,0 +1,422 @@
+"""The hierarchy of entities: one word, one role, indivisible.
+
+::
+
+    Entity
+    ├── Stone
+    │   ├── Ashlar
+    │   │   ├── Header
+    │   │   ├── Stretcher
+    │   │   ├── Quoin
+    │   │   ├── Jamb
+    │   │   ├── Sill
+    │   │   ├── Lintel
+    │   │   ├── Mullion
+    │   │   ├── Corbel
+    │   │   ├── Coping
+    │   │   ├── Cornice
+    │   │   ├── Slab
+    │   │   ├── Voussoir
+    │   │   │   ├── Keystone
+    │   │   │   └── Springer
+    │   │   └── RibSegment
+    │   │       └── Boss
+    │   ├── ColumnPart
+    │   │   ├── ColumnBase (base)
+    │   │   ├── Shaft
+    │   │   └── Capital
+    │   ├── Rubble
+    │   └── Support
+    ├── Infill
+    └── Joint
+
+To add a kind, write one class with a docstring; all kinds live in one table and differ in the column `kind`
+(single-table inheritance, see ``docs/decisions/015-one-table-of-entities.md``). Attributes of its own are typed
+columns of that table, named with their units in ``__own__``. A query of a kind finds its subkinds too. Kinds
+that a user registers in a database (``archmodel.tables.registered``) become classes of this hierarchy when it is
+opened.
+"""
+
+import difflib
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, ClassVar
+from weakref import WeakSet
+
+from sqlalchemy import ForeignKey, Index, func, select
+from sqlalchemy.orm import Mapped, Session, declared_attr, mapped_column, relationship
+
+from archmodel.tables.base import Base
+from archmodel.tables.entries import Entry
+from archmodel.tables.runs import EntityResult
+from archmodel.tables.surveys import Measurement
+from moma.errors import DatabaseError, UsageError
+
+__all__ = [
+    "Ashlar",
+    "Boss",
+    "Capital",
+    "ColumnBase",
+    "ColumnPart",
+    "Coping",
+    "Corbel",
+    "Cornice",
+    "Entity",
+    "Header",
+    "Infill",
+    "Jamb",
+    "Joint",
+    "Keystone",
+    "Lintel",
+    "Mullion",
+    "OwnAttribute",
+    "Quoin",
+    "RibSegment",
+    "Rubble",
+    "Shaft",
+    "Sill",
+    "Slab",
+    "Springer",
+    "Stone",
+    "Stretcher",
+    "Support",
+    "Voussoir",
+    "canon_of",
+    "definition_of",
+    "kind_chain",
+    "kind_named",
+    "kind_of",
+    "kinds",
+    "own_attributes",
+    "refuse_unknown_kinds",
+]
+
+
+@dataclass(frozen=True)
+class OwnAttribute:
+    """An attribute that one kind has and its parents have not.
+
+    Attributes
+    ----------
+    name : as users write it
+    unit : "m", "rad", …; "-" for counts and numbers without a unit; None for texts
+    definition : what it is, in a few words
+    """
+
+    name: str
+    unit: str | None
+    definition: str
+
+
+@cache
+def kind_of(cls: type["Entity"]) -> str:
+    """Name of a kind as users write it: its ``__kind__``, else the class's name as rib_segment of RibSegment."""
+    own = cls.__dict__.get("__kind__")
+    return str(own) if own is not None else re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
+
+
+class Entity(Base):
+    """A part of the building that has one role and is not divided further.
+
+    Attributes
+    ----------
+    code : the name that the survey gave it, unique in the database
+    kind : name of its class
+    course : number of its course, counted from the ground; None if it belongs to none
+    zone : part of the building, as the survey names it; None if it does not
+    depth : how far it reaches into the wall [m], with its standard deviation, its evidence, and what kind of
+        evidence that is; None if not known, as are all that follow
+    length, height : of its face, horizontally and upwards in the face's plane [m]
+    area : of its face [m²]
+    volume : of its solid [m³]
+    x, y, z : centroid of its solid [m]
+    hypothesis : nobody has seen it: a stone that is missing, or hidden within the wall, and thought to be there
+    own : values of the attributes of a registered kind, by name
+    entry : the act of recording that it came with; later changes are `knowledge.Correction`
+
+    Class attributes, for those who write kinds
+    -------------------------------------------
+    __kind__ : the name, if it is not that of the class
+    __own__ : the attributes that the kind has and its parents have not
+    __canon__ : canonical proportions, as a query expression; None: those of the parent
+    __users__ : the open databases that register the kind; None: it is built in
+    """
+
+    __tablename__ = "entity"
+    __table_args__ = (
+        Index("ix_entity_kind_course", "kind", "course"),
+        Index("ix_entity_kind_depth", "kind", "depth"),
+        Index("ix_entity_zone_course", "zone", "course"),
+        Index("ix_entity_place", "x", "y", "z"),
+    )
+    __own__: ClassVar[tuple[OwnAttribute, ...]] = ()
+    __canon__: ClassVar[str | None] = None
+    __users__: ClassVar["WeakSet[Any] | None"] = None
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    kind: Mapped[str]
+    code: Mapped[str] = mapped_column(unique=True)
+    entry_id: Mapped[int] = mapped_column(ForeignKey("entry.id"))
+    course: Mapped[int | None]
+    zone: Mapped[str | None]
+    depth: Mapped[float | None]
+    depth_sigma: Mapped[float | None]
+    depth_source: Mapped[str | None]
+    depth_origin: Mapped[str | None]
+    length: Mapped[float | None]
+    height: Mapped[float | None]
+    area: Mapped[float | None]
+    volume: Mapped[float | None]
+    x: Mapped[float | None]
+    y: Mapped[float | None]
+    z: Mapped[float | None]
+    hypothesis: Mapped[bool] = mapped_column(default=False)
+    own: Mapped[dict[str, object] | None]
+
+    entry: Mapped[Entry] = relationship()
+    measurement: Mapped[Measurement | None] = relationship(
+        primaryjoin="and_(Measurement.entity_id == Entity.id, Measurement.superseded_id.is_(None))",
+        viewonly=True,
+    )
+    measurements: Mapped[list[Measurement]] = relationship(
+        back_populates="entity", order_by=Measurement.entry_id
+    )
+    results: Mapped[list[EntityResult]] = relationship(back_populates="entity", order_by=EntityResult.run_id)
+
+    @declared_attr.directive
+    @classmethod
+    def __mapper_args__(cls) -> dict[str, object]:
+        # A query of a general kind loads the attributes of its subkinds at once, not one entity after another.
+        identity: dict[str, object] = {"polymorphic_identity": kind_of(cls)}
+        if cls.__name__ != "Entity":
+            return identity
+        # Columns of all kinds come with a query of Entity. Of Entity alone: an alias of a class takes an alias of
+        # each subclass that comes with it, and where these do the same, their number doubles with every level.
+        return identity | {"polymorphic_on": "kind", "with_polymorphic": "*"}
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.code}>"
+
+
+class Stone(Entity):
+    """A single block of stone in its place."""
+
+
+class Ashlar(Stone):
+    """A stone cut to planar faces and laid in the masonry."""
+
+
+class Header(Ashlar):
+    """An ashlar laid across the wall, so that its short side is seen and its length binds the wall."""
+
+    __own__ = (OwnAttribute("tail_length", "m", "how far it reaches behind the stretchers beside it"),)
+    __canon__ = "depth >= length"
+
+    tail_length: Mapped[float | None]
+
+
+class Stretcher(Ashlar):
+    """An ashlar laid along the wall, so that its long side is seen."""
+
+    __canon__ = "length >= depth and length >= height"
+
+
+class Quoin(Ashlar):
+    """An ashlar at the corner of two walls, seen on two sides."""
+
+
+class Jamb(Ashlar):
+    """An ashlar at the upright side of an opening."""
+
+
+class Sill(Ashlar):
+    """An ashlar that closes an opening below."""
+
+    __canon__ = "length >= height"
+
+
+class Lintel(Ashlar):
+    """An ashlar that spans an opening and carries what is above by bending."""
+
+    __own__ = (OwnAttribute("span", "m", "clear width of the opening below it"),)
+    __canon__ = "length >= height"
+
+    span: Mapped[float | None]
+
+
+class Mullion(Ashlar):
+    """An upright ashlar that divides an opening."""
+
+    __canon__ = "height >= length"
+
+
+class Corbel(Ashlar):
+    """An ashlar built into the wall whose free end carries what projects from it."""
+
+    __own__ = (OwnAttribute("projection", "m", "how far it projects from the face of the wall"),)
+
+    projection: Mapped[float | None]
+
+
+class Coping(Ashlar):
+    """An ashlar that covers the top of a wall and sheds the water."""
+
+
+class Cornice(Ashlar):
+    """An ashlar of a projecting, moulded course."""
+
+
+class Slab(Ashlar):
+    """A flat ashlar of a floor, a landing or a roof."""
+
+
+class Voussoir(Ashlar):
+    """A wedge-shaped ashlar of an arch, which carries by pressing on its neighbours."""
+
+    __own__ = (
+        OwnAttribute("ring", "-", "number of its ring of the arch, from the intrados outwards"),
+        OwnAttribute("rank", "-", "its place in the ring, from 1 at one springer to the other"),
+        OwnAttribute("intrados_angle", "rad", "angle between its two joints, seen along the arch's axis"),
+    )
+
+    ring: Mapped[int | None]
+    rank: Mapped[int | None]
+    intrados_angle: Mapped[float | None]
+
+
+class Keystone(Voussoir):
+    """The voussoir at the crown of an arch, set last."""
+
+
+class Springer(Voussoir):
+    """The lowest stone on either side of an arch, whose sloped side takes the arch's thrust."""
+
+
+class RibSegment(Ashlar):
+    """A moulded ashlar of the rib of a vault."""
+
+    __own__ = (OwnAttribute("rank", "-", "its place in the rib, from 1 at the springing"),)
+
+    rank: Mapped[int | None] = mapped_column(use_existing_column=True)
+
+
+class Boss(RibSegment):
+    """The rib segment where ribs meet at the crown of a vault."""
+
+
+class ColumnPart(Stone):
+    """A stone of a column."""
+
+
+class ColumnBase(ColumnPart):
+    """The lowest part of a column, wider than the shaft."""
+
+    __kind__ = "base"
+
+
+class Shaft(ColumnPart):
+    """A drum of a column, or the whole of it between base and capital."""
+
+    __own__ = (OwnAttribute("drum", "-", "number of the drum, from the base upwards"),)
+
+    drum: Mapped[int | None]
+
+
+class Capital(ColumnPart):
+    """The head of a column, which spreads to take what it carries."""
+
+
+class Rubble(Stone):
+    """A stone laid as it was found, without cut faces."""
+
+
+class Support(Stone):
+    """A block that carries the masonry and does not move: a foundation, an abutment."""
+
+
+class Infill(Entity):
+    """The core of mortar and small stones between the two facings of a wall."""
+
+
+class Joint(Entity):
+    """The mortar between two entities."""
+
+    __own__ = (OwnAttribute("thickness", "m", "distance of the two faces that it fills"),)
+
+    thickness: Mapped[float | None]
+
+
+def kinds() -> Mapping[str, type[Entity]]:
+    """Every kind by its name, general before particular."""
+    return {kind_of(cls): cls for cls in _descend(Entity)}
+
+
+def _descend(cls: type[Entity]) -> Iterator[type[Entity]]:
+    yield cls
+    for child in cls.__subclasses__():
+        if child.__users__ is not None and not child.__users__:
+            continue  # registered in no database that is open
+        yield from _descend(child)
+
+
+def kind_named(name: str) -> type[Entity]:
+    """The kind of this name, in upper or lower case, with _ or a hyphen or a blank between its words.
+
+    Raises
+    ------
+    UsageError
+        if there is none; names the nearest ones
+    """
+    known = kinds()
+    if (cls := known.get(re.sub(r"[\s-]+", "_", name[:80].strip().lower()))) is not None:
+        return cls
+    near = difflib.get_close_matches(name[:40].strip().lower(), known, n=3, cutoff=0.5)
+    remedy = f"did you mean {' or '.join(near)}?" if near else f"the kinds are {', '.join(known)}"
+    raise UsageError(f"unknown kind {name[:40]!r}", remedy=remedy)
+
+
+def kind_chain(cls: type[Entity]) -> tuple[type[Entity], ...]:
+    """The kind and what it inherits from, most general first: Entity, Ashlar, Voussoir, Keystone."""
+    return tuple(base for base in reversed(cls.__mro__) if issubclass(base, Entity))
+
+
+def definition_of(cls: type[Entity]) -> str:
+    """The one sentence that defines a kind."""
+    return (cls.__doc__ or "").strip().split("\n", 1)[0]
+
+
+def own_attributes(cls: type[Entity]) -> Mapping[str, OwnAttribute]:
+    """The attributes that a kind has besides those of every entity: its parents' and its own."""
+    return {one.name: one for base in kind_chain(cls) for one in base.__own__}
+
+
+def canon_of(cls: type[Entity]) -> str | None:
+    """The canonical proportions of a kind, as a query expression; None if it has none."""
+    return cls.__canon__
+
+
+def refuse_unknown_kinds(session: Session) -> None:
+    """Check that every kind in the database is declared, as it is not if another program added its own.
+
+    Raises
+    ------
+    DatabaseError
+        naming such a kind
+    """
+    unknown = next((kind for kind in _stored_kinds(session) if kind not in kinds()), None)
+    if unknown is not None:
+        remedy = (
+            "open the database again if it was registered since; else use the version of MOMA that stored it"
+        )
+        raise DatabaseError(f"the database holds a kind {unknown!r} that is not declared", remedy=remedy)
+
+
+def _stored_kinds(session: Session) -> list[str]:
+    """The kinds that entities in the database are of: from one to the next in the index, not all entities."""
+    kind = Entity.__table__.c.kind
+    stored = select(func.min(kind).label("kind")).cte("stored", recursive=True)
+    following = select(func.min(kind)).where(kind > stored.c.kind).correlate(stored).scalar_subquery()
+    stored = stored.union_all(select(following).where(stored.c.kind.is_not(None)))
+    return list(session.scalars(select(stored.c.kind).where(stored.c.kind.is_not(None))))

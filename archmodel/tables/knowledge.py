@@ -1,0 +1,310 @@
+"""What is known besides the geometry: materials, phases, documents, and statements about entities and structures.
+
+A statement is one thing that somebody says of one entity or structure, on stated grounds: that it is of a material
+or a phase, bears a mason mark, is eroded, is so deep, is treated in a document. Statements are never changed; a
+better one supersedes them (`supersedes_id`), or they are withdrawn (`superseded_id` without a successor).
+"""
+
+from datetime import date
+from typing import TYPE_CHECKING
+
+from sqlalchemy import Date, ForeignKey, Index, text
+from sqlalchemy.orm import Mapped, declared_attr, mapped_column, relationship
+
+from archmodel.tables.base import JSON_TYPE, Base
+from archmodel.tables.entries import Entry, Recorded
+from archmodel.tables.structures import Structure
+
+if TYPE_CHECKING:
+    from archmodel.tables.entities import Entity
+
+__all__ = [
+    "OBSERVATIONS",
+    "Correction",
+    "DepthEvidence",
+    "Document",
+    "MadeOf",
+    "MasonMark",
+    "Material",
+    "MaterialProperty",
+    "Note",
+    "Observation",
+    "OfPhase",
+    "Phase",
+    "Reference",
+    "Statement",
+]
+
+OBSERVATIONS = {
+    "erosion": "surface or edges are worn away",
+    "crack": "it is broken through or in part",
+    "bevel": "an edge is cut or broken off at an angle",
+    "displaced": "it no longer lies as it was laid",
+    "spalling": "pieces of its face have come off",
+    "open_joint": "mortar of its joints is lost",
+    "stain": "discoloured by water, soot or growth",
+    "replaced": "it was put there in a repair",
+    "reused": "it was cut for another place",
+    "remark": "anything else",
+}
+"""Types of observations and their definitions."""
+
+
+def _current(name: str, *columns: str) -> Index:
+    """A unique index over the rows that are held now."""
+    now = text("superseded_id IS NULL")
+    return Index(name, *columns, unique=True, sqlite_where=now, postgresql_where=now)
+
+
+class Material(Recorded, Base):
+    """A stone or a mortar, under one name.
+
+    Attributes
+    ----------
+    name : unique among the materials that are held now
+    description : in words; None if the name says enough
+    """
+
+    __tablename__ = "material"
+    __table_args__ = (_current("ix_material_name", "name"),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    name: Mapped[str]
+    description: Mapped[str | None]
+    supersedes_id: Mapped[int | None] = mapped_column(ForeignKey("material.id"))
+
+    properties: Mapped[list["MaterialProperty"]] = relationship(back_populates="material")
+
+
+class MaterialProperty(Recorded, Base):
+    """One number of a material, with its source.
+
+    Attributes
+    ----------
+    name : density, young, poisson, tensile_strength, compressive_strength, friction, …
+    value, sigma : in `unit`; sigma is None if not known
+    unit : SI, e.g. "kg/m³"
+    source : a test, a document, a table
+    """
+
+    __tablename__ = "material_property"
+    __table_args__ = (_current("ix_material_property_name", "material_id", "name"),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    material_id: Mapped[int] = mapped_column(ForeignKey("material.id"))
+    name: Mapped[str]
+    value: Mapped[float]
+    sigma: Mapped[float | None]
+    unit: Mapped[str]
+    source: Mapped[str]
+    supersedes_id: Mapped[int | None] = mapped_column(ForeignKey("material_property.id"))
+
+    material: Mapped[Material] = relationship(back_populates="properties")
+
+
+class Phase(Recorded, Base):
+    """A time of building or repair.
+
+    Attributes
+    ----------
+    name : unique among the phases that are held now, e.g. "2" or "repair of 1860"
+    begins, ends : years, at the earliest and at the latest; None if not known
+    description : in words
+    """
+
+    __tablename__ = "phase"
+    __table_args__ = (_current("ix_phase_name", "name"),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    name: Mapped[str]
+    begins: Mapped[int | None]
+    ends: Mapped[int | None]
+    description: Mapped[str | None]
+    supersedes_id: Mapped[int | None] = mapped_column(ForeignKey("phase.id"))
+
+
+class Document(Recorded, Base):
+    """A document, drawing or photograph, by reference.
+
+    Attributes
+    ----------
+    code : unique among the documents that are held now
+    type : document, drawing or photograph
+    title : in words
+    place : where it can be found: a path, a URL, an archive's number
+    author, dated : of the document itself; None if not known
+    """
+
+    __tablename__ = "document"
+    __table_args__ = (_current("ix_document_code", "code"),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    code: Mapped[str]
+    type: Mapped[str]
+    title: Mapped[str]
+    place: Mapped[str | None]
+    author: Mapped[str | None]
+    dated: Mapped[str | None]
+    supersedes_id: Mapped[int | None] = mapped_column(ForeignKey("document.id"))
+
+
+class Statement(Recorded, Base):
+    """One thing said of one entity or of one structure.
+
+    Attributes
+    ----------
+    kind : name of its class
+    entity, structure : what it is said of, exactly one of them
+    text : in words; None if the rest says enough
+    document, locator : the document that says so, and where in it (page, number of the figure)
+    observed_on : date on which it was seen; None if not known
+    supersedes : the statement that it replaces
+    """
+
+    __tablename__ = "statement"
+    __table_args__ = (
+        Index("ix_statement_entity", "entity_id", "kind"),
+        Index(
+            "ix_statement_structure",
+            "structure_id",
+            "kind",
+            sqlite_where=text("structure_id IS NOT NULL"),
+            postgresql_where=text("structure_id IS NOT NULL"),
+        ),
+    )
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    kind: Mapped[str]
+    entity_id: Mapped[int | None] = mapped_column(ForeignKey("entity.id"))
+    structure_id: Mapped[int | None] = mapped_column(ForeignKey("structure.id"))
+    text: Mapped[str | None]
+    document_id: Mapped[int | None] = mapped_column(ForeignKey("document.id"))
+    locator: Mapped[str | None]
+    observed_on: Mapped[date | None] = mapped_column(Date)
+    supersedes_id: Mapped[int | None] = mapped_column(ForeignKey("statement.id"))
+
+    entity: Mapped["Entity | None"] = relationship()
+    structure: Mapped[Structure | None] = relationship()
+    document: Mapped[Document | None] = relationship()
+
+    @declared_attr.directive
+    @classmethod
+    def __mapper_args__(cls) -> dict[str, object]:
+        if cls.__name__ == "Statement":
+            return {"polymorphic_on": "kind", "polymorphic_abstract": True}
+        return {"polymorphic_identity": cls.__kind__}
+
+    __kind__ = "statement"
+
+
+class MadeOf(Statement):
+    """It is of a material."""
+
+    __kind__ = "made_of"
+
+    material_id: Mapped[int | None] = mapped_column(ForeignKey("material.id"))
+
+    material: Mapped[Material | None] = relationship()
+
+
+class OfPhase(Statement):
+    """It was built, or put where it is, in a phase."""
+
+    __kind__ = "of_phase"
+
+    phase_id: Mapped[int | None] = mapped_column(ForeignKey("phase.id"))
+
+    phase: Mapped[Phase | None] = relationship()
+
+
+class MasonMark(Statement):
+    """It bears a mason's mark.
+
+    Attributes
+    ----------
+    sign : name of the mark, the same for the same mark
+    place : on the stone, in words
+    """
+
+    __kind__ = "mason_mark"
+
+    sign: Mapped[str | None]
+    place: Mapped[str | None] = mapped_column(use_existing_column=True)
+
+
+class Observation(Statement):
+    """Something was seen on it.
+
+    Attributes
+    ----------
+    type : one of OBSERVATIONS
+    severity : from 0 (traces) to 4 (lost, or about to be); None if not said
+    place : on the stone, in words
+    x, y, z : where, in the frame of the site [m]; None if not measured
+    """
+
+    __kind__ = "observation"
+
+    type: Mapped[str | None]
+    severity: Mapped[int | None]
+    place: Mapped[str | None] = mapped_column(use_existing_column=True)
+    x: Mapped[float | None]
+    y: Mapped[float | None]
+    z: Mapped[float | None]
+
+
+class DepthEvidence(Statement):
+    """How deep it is said to be, on what evidence.
+
+    Attributes
+    ----------
+    value, sigma : [m]; sigma is None if not known
+    """
+
+    __kind__ = "depth"
+
+    value: Mapped[float | None]
+    sigma: Mapped[float | None]
+
+
+class Reference(Statement):
+    """A document or photograph treats or shows it."""
+
+    __kind__ = "reference"
+
+
+class Note(Statement):
+    """A word of the surveyor, under a key.
+
+    Attributes
+    ----------
+    key : as in the survey, e.g. "edge"
+    """
+
+    __kind__ = "note"
+
+    key: Mapped[str | None]
+
+
+class Correction(Base):
+    """One attribute of an entity was changed; the entity has the new value, this row has both.
+
+    Attributes
+    ----------
+    attribute : name of a column of Entity, or of an attribute of its kind
+    before, after : the values; None if not known
+    entry : who, when, on what grounds
+    """
+
+    __tablename__ = "correction"
+    __table_args__ = (Index("ix_correction_entity_id", "entity_id"),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    entity_id: Mapped[int] = mapped_column(ForeignKey("entity.id"))
+    entry_id: Mapped[int] = mapped_column(ForeignKey("entry.id"))
+    attribute: Mapped[str]
+    before: Mapped[float | int | str | None] = mapped_column(JSON_TYPE)
+    after: Mapped[float | int | str | None] = mapped_column(JSON_TYPE)
+
+    entity: Mapped["Entity"] = relationship()
+    entry: Mapped[Entry] = relationship()

@@ -1,0 +1,31 @@
+"""All tables of the entity database, declared on one base."""
+
+from sqlalchemy.orm import Mapped, mapped_column
+
+from archmodel.tables import (
+    entities,  # noqa: F401
+    entries,  # noqa: F401
+    knowledge,  # noqa: F401
+    registered,  # noqa: F401
+    relations,  # noqa: F401
+    runs,  # noqa: F401
+    structures,  # noqa: F401
+    surveys,  # noqa: F401
+)
+from archmodel.tables.base import Base
+
+__all__ = ["SCHEMA_VERSION", "SchemaVersion", "metadata"]
+
+SCHEMA_VERSION = 4
+"""Layout of the tables that this version of MOMA reads and writes."""
+
+
+class SchemaVersion(Base):
+    """One row that says that this is a MOMA database, and how its tables are laid out."""
+
+    __tablename__ = "moma_schema"
+
+    version: Mapped[int] = mapped_column(primary_key=True)
+
+
+metadata = Base.metadata

@@ -1,0 +1,181 @@
+"""What was computed: simulation runs, and their results by entity, by joint and by contact point."""
+
+from typing import TYPE_CHECKING
+
+from sqlalchemy import ForeignKey, Index
+from sqlalchemy.orm import Mapped, mapped_column, relationship
+
+from archmodel.tables.base import JSON_TYPE, Base
+from archmodel.tables.entries import Entry
+
+if TYPE_CHECKING:
+    from archmodel.tables.entities import Entity
+
+__all__ = ["FIDELITIES", "ContactPoint", "EntityResult", "JointResult", "Run"]
+
+FIDELITIES = ("fixed", "rigid", "deformable")
+"""How a stone can be modelled in a run."""
+
+
+class Run(Base):
+    """One simulation run.
+
+    Attributes
+    ----------
+    scene, scene_text : the scene's name, and its file as it was run: all settings
+    outcome : equilibrium, moving or collapsed
+    steps, contacts : how many
+    simulated, wall : simulated time and time of work [s]
+    natural_map, penetration, balance, reaction, energy : the error measures of docs/theory.md §4 [-]
+    versions : of the programs and libraries, by name
+    summary : the contents of summary.json
+    entry : the act of recording that it came with; its settings are those of the simulation, as run
+    as_of : the last act of recording before its stones were read: what was held then is what was simulated
+    """
+
+    __tablename__ = "run"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    entry_id: Mapped[int] = mapped_column(ForeignKey("entry.id"))
+    as_of_id: Mapped[int | None] = mapped_column(ForeignKey("entry.id"))
+    scene: Mapped[str]
+    scene_text: Mapped[str]
+    outcome: Mapped[str]
+    steps: Mapped[int | None]
+    contacts: Mapped[int | None]
+    simulated: Mapped[float | None]
+    wall: Mapped[float | None]
+    natural_map: Mapped[float | None]
+    penetration: Mapped[float | None]
+    balance: Mapped[float | None]
+    reaction: Mapped[float | None]
+    energy: Mapped[float | None]
+    versions: Mapped[dict[str, str]] = mapped_column(JSON_TYPE)
+    summary: Mapped[dict[str, object]]
+
+    entry: Mapped[Entry] = relationship(foreign_keys=[entry_id])
+    as_of: Mapped[Entry | None] = relationship(foreign_keys=[as_of_id])
+    results: Mapped[list["EntityResult"]] = relationship(back_populates="run")
+
+
+class EntityResult(Base):
+    """What one run computed for one entity; units and meaning as in ``run_records.StoneResult``.
+
+    The primary key begins with the entity: "its latest run" is one step in that index.
+    """
+
+    __tablename__ = "entity_result"
+    __table_args__ = (Index("ix_entity_result_run_id", "run_id"),)
+
+    entity_id: Mapped[int] = mapped_column(ForeignKey("entity.id"), primary_key=True)
+    run_id: Mapped[int] = mapped_column(ForeignKey("run.id"), primary_key=True)
+    fidelity: Mapped[str]
+    von_mises_max: Mapped[float | None]
+    von_mises_mean: Mapped[float | None]
+    displacement_max: Mapped[float]
+    contact_force_max: Mapped[float | None]
+    values: Mapped[dict[str, float]] = mapped_column(JSON_TYPE)
+
+    entity: Mapped["Entity"] = relationship(back_populates="results")
+    run: Mapped[Run] = relationship(back_populates="results")
+
+
+class JointResult(Base):
+    """What one run computed for the joint of two entities; meaning as in ``run_records.JointArrays``.
+
+    Attributes
+    ----------
+    number : of the joint in the run
+    first_id, second_id : the two entities; forces act on the first
+    x, y, z : centroid [m]
+    nx, ny, nz : unit normal from the second to the first
+    area : [m²]
+    parted : it was closed at the start and is now wide open
+    force_normal, force_shear : compression positive, and the size of the rest [N]
+    pressure_mean, pressure_max : [Pa]
+    kern, friction_use, slipping, open : [-]; None where there is nothing to say
+    gap, opening, sliding : [m]
+    width : as surveyed, which is the thickness of its mortar; None if not known [m]
+    """
+
+    __tablename__ = "joint_result"
+    __table_args__ = (
+        Index("ix_joint_result_first", "first_id", "run_id"),
+        Index("ix_joint_result_second", "second_id", "run_id"),
+    )
+
+    run_id: Mapped[int] = mapped_column(ForeignKey("run.id"), primary_key=True)
+    number: Mapped[int] = mapped_column(primary_key=True)
+    first_id: Mapped[int] = mapped_column(ForeignKey("entity.id"))
+    second_id: Mapped[int] = mapped_column(ForeignKey("entity.id"))
+    x: Mapped[float]
+    y: Mapped[float]
+    z: Mapped[float]
+    nx: Mapped[float]
+    ny: Mapped[float]
+    nz: Mapped[float]
+    area: Mapped[float]
+    parted: Mapped[bool]
+    force_normal: Mapped[float]
+    force_shear: Mapped[float]
+    pressure_mean: Mapped[float | None]
+    pressure_max: Mapped[float | None]
+    kern: Mapped[float | None]
+    friction_use: Mapped[float | None]
+    slipping: Mapped[float | None]
+    open: Mapped[float | None]
+    gap: Mapped[float]
+    opening: Mapped[float]
+    sliding: Mapped[float]
+    width: Mapped[float | None]
+
+    run: Mapped[Run] = relationship()
+    first: Mapped["Entity"] = relationship(foreign_keys=[first_id])
+    second: Mapped["Entity"] = relationship(foreign_keys=[second_id])
+
+
+class ContactPoint(Base):
+    """One contact point at the end of a run; meaning as in ``run_records.ContactArrays``.
+
+    Attributes
+    ----------
+    number : of the point in the run
+    joint : number of its joint; None between edges
+    candidate_id, antagonist_id : the two entities; the force acts on the candidate
+    x, y, z : [m]
+    nx, ny, nz : unit normal from the antagonist to the candidate
+    fx, fy, fz : mean force over the last step, world axes [N]
+    area : that the point stands for; zero between edges [m²]
+    gap, opening, slide : [m]
+    status : open, stick, slip, bonded or broken
+    """
+
+    __tablename__ = "contact_point"
+    __table_args__ = (
+        Index("ix_contact_point_candidate", "candidate_id", "run_id"),
+        Index("ix_contact_point_antagonist", "antagonist_id", "run_id"),
+    )
+
+    run_id: Mapped[int] = mapped_column(ForeignKey("run.id"), primary_key=True)
+    number: Mapped[int] = mapped_column(primary_key=True)
+    joint: Mapped[int | None]
+    candidate_id: Mapped[int] = mapped_column(ForeignKey("entity.id"))
+    antagonist_id: Mapped[int] = mapped_column(ForeignKey("entity.id"))
+    x: Mapped[float]
+    y: Mapped[float]
+    z: Mapped[float]
+    nx: Mapped[float]
+    ny: Mapped[float]
+    nz: Mapped[float]
+    fx: Mapped[float]
+    fy: Mapped[float]
+    fz: Mapped[float]
+    area: Mapped[float]
+    gap: Mapped[float]
+    opening: Mapped[float]
+    slide: Mapped[float]
+    status: Mapped[str]
+
+    run: Mapped[Run] = relationship()
+    candidate: Mapped["Entity"] = relationship(foreign_keys=[candidate_id])
+    antagonist: Mapped["Entity"] = relationship(foreign_keys=[antagonist_id])

@@ -1,0 +1,194 @@
+"""What entities make up: the divisible parts of a building, from the building itself to a course.
+
+::
+
+    Structure
+    ├── Building
+    ├── Tower
+    ├── Storey
+    ├── Wall
+    ├── WallFacing
+    ├── Course
+    ├── Arch
+    ├── BarrelVault
+    ├── RibVault
+    ├── Buttress
+    ├── Column
+    ├── Window
+    ├── Door
+    ├── Machicolation
+    └── Crenelation
+
+Structures contain structures (`parent`), and entities are members of structures (`relations.Membership`); an entity
+can be a member of several, of a course and of a window, say.
+"""
+
+import difflib
+import re
+from collections.abc import Mapping
+
+from sqlalchemy import ForeignKey, Index, text
+from sqlalchemy.orm import Mapped, declared_attr, mapped_column, relationship
+
+from archmodel.tables.base import Base
+from archmodel.tables.entries import Recorded
+from moma.errors import UsageError
+
+__all__ = [
+    "Arch",
+    "BarrelVault",
+    "Building",
+    "Buttress",
+    "Column",
+    "Course",
+    "Crenelation",
+    "Door",
+    "Machicolation",
+    "RibVault",
+    "Storey",
+    "Structure",
+    "Tower",
+    "Wall",
+    "WallFacing",
+    "Window",
+    "structure_kind_named",
+    "structure_kind_of",
+    "structure_kinds",
+]
+
+
+def structure_kind_of(cls: type["Structure"]) -> str:
+    """Name of a kind of structure as users write it: wall_facing for WallFacing."""
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
+
+
+class Structure(Recorded, Base):
+    """A part of the building that is made of entities and of other structures.
+
+    Attributes
+    ----------
+    code : its name, unique among the structures that are held now
+    kind : name of its class
+    title : in words; None if the code says enough
+    parent : the structure that it is a part of
+    number : its place among its like: a course counted from the ground, a storey from the lowest
+    side : outer or inner, of a wall facing
+    supersedes : the row that it replaces, if it is a correction
+    """
+
+    __tablename__ = "structure"
+    __table_args__ = (
+        Index(
+            "ix_structure_code",
+            "code",
+            unique=True,
+            sqlite_where=text("superseded_id IS NULL"),
+            postgresql_where=text("superseded_id IS NULL"),
+        ),
+        Index("ix_structure_parent_id", "parent_id"),
+    )
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    kind: Mapped[str]
+    code: Mapped[str]
+    title: Mapped[str | None]
+    parent_id: Mapped[int | None] = mapped_column(ForeignKey("structure.id"))
+    number: Mapped[int | None]
+    side: Mapped[str | None]
+    supersedes_id: Mapped[int | None] = mapped_column(ForeignKey("structure.id"))
+
+    parent: Mapped["Structure | None"] = relationship(
+        foreign_keys=[parent_id], remote_side=[id], back_populates="parts"
+    )
+    parts: Mapped[list["Structure"]] = relationship(foreign_keys=[parent_id], back_populates="parent")
+
+    @declared_attr.directive
+    @classmethod
+    def __mapper_args__(cls) -> dict[str, object]:
+        identity: dict[str, object] = {"polymorphic_identity": structure_kind_of(cls)}
+        return identity | {"polymorphic_on": "kind"} if cls.__name__ == "Structure" else identity
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.code}>"
+
+
+class Building(Structure):
+    """The whole, under one name."""
+
+
+class Tower(Structure):
+    """A part that is taller than wide and stands out of the rest."""
+
+
+class Storey(Structure):
+    """What lies between two floors."""
+
+
+class Wall(Structure):
+    """An upright part that closes or divides, with its facings and its core."""
+
+
+class WallFacing(Structure):
+    """The layer of stones on one side of a wall: the outer or the inner."""
+
+
+class Course(Structure):
+    """A row of stones laid on one bed."""
+
+
+class Arch(Structure):
+    """A curved row of wedge-shaped stones over an opening."""
+
+
+class BarrelVault(Structure):
+    """A vault of one curvature: an arch drawn out along its axis."""
+
+
+class RibVault(Structure):
+    """A vault of webs carried by ribs."""
+
+
+class Buttress(Structure):
+    """A pier built against a wall to take a thrust."""
+
+
+class Column(Structure):
+    """An upright support of base, shaft and capital."""
+
+
+class Window(Structure):
+    """An opening for light, with the stones that frame it."""
+
+
+class Door(Structure):
+    """An opening to go through, with the stones that frame it."""
+
+
+class Machicolation(Structure):
+    """A gallery on corbels with openings in its floor."""
+
+
+class Crenelation(Structure):
+    """A parapet of merlons and embrasures."""
+
+
+def structure_kinds() -> Mapping[str, type[Structure]]:
+    """Every kind of structure by its name."""
+    classes: tuple[type[Structure], ...] = (Structure, *Structure.__subclasses__())
+    return {structure_kind_of(cls): cls for cls in classes}
+
+
+def structure_kind_named(name: str) -> type[Structure]:
+    """The kind of structure of this name.
+
+    Raises
+    ------
+    UsageError
+        if there is none; names the nearest ones
+    """
+    known = structure_kinds()
+    if (cls := known.get(name.strip().lower())) is not None:
+        return cls
+    near = difflib.get_close_matches(name[:40].strip().lower(), known, n=3, cutoff=0.5)
+    remedy = f"did you mean {' or '.join(near)}?" if near else f"they are {', '.join(known)}"
+    raise UsageError(f"unknown kind of structure {name[:40]!r}", remedy=remedy)
