@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.materials import Material
-from mechanics.scene import Block, ContactSettings, Fidelity, Part, Scene, Start, TimeSettings
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import Block, ContactSettings, Fidelity, Part, Scene, Start, TimeSettings
 from mechanics.simulate import simulate
+from mechanics.stones.materials import Material
 from survey.formats.options import ReadingOptions
 from survey.formats.solids.reader import open_solids
 from survey.geometry.convex_parts import convex_parts

@@ -10,10 +10,10 @@ import numpy as np
 
 from benchmarks.memory import peak_bytes
 from benchmarks.report import Row
-from mechanics.materials import Material
-from mechanics.meshing.elements import Element
-from mechanics.meshing.mesher import mesh_block
-from mechanics.scene import Block, Fidelity
+from mechanics.scene.scene import Block, Fidelity
+from mechanics.stones.materials import Material
+from mechanics.stones.meshing.elements import Element
+from mechanics.stones.meshing.meshers.mesher import mesh_block
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.solids import Solid
 from survey.joints.close import ClosedStones, close_joints

@@ -13,9 +13,9 @@ from pathlib import Path
 
 from benchmarks.masonry import courses, running_bond, semicircular_arch
 from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.result import Outcome
-from mechanics.scene import Block, ContactSettings, Fidelity, Scene, TimeSettings
+from mechanics.results.result import Outcome
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene, TimeSettings
 from mechanics.simulate import simulate
 from pipelines.overlay import overlaid_scene
 from pipelines.profiles import PROFILES, Profile

@@ -1,8 +1,8 @@
 """How long will a run take? `python -m benchmarks.cost [--fit] [--json]`.
 
-Runs scenes of known size and compares the time and the memory they take with what `mechanics.cost` expects of them.
-With `--fit` other scenes are run, and the rates are found anew: what is printed is to replace those of
-mechanics/cost_rates.py.
+Runs scenes of known size and compares the time and the memory they take with what `mechanics.results.forecast.cost`
+expects of them. With `--fit` other scenes are run, and the rates are found anew: what is printed is to replace those
+of mechanics/results/forecast/cost_rates.py.
 """
 
 import argparse
@@ -18,10 +18,10 @@ from scipy.optimize import nnls
 from benchmarks.child import run_child
 from benchmarks.cost_scenes import Case
 from benchmarks.report import Row, Table, guarded, machine, print_json, print_table, progress
-from mechanics.amounts import Amounts
-from mechanics.cost import calibration, expected_cost, measures
-from mechanics.cost_rates import Rate
-from mechanics.plan import plan
+from mechanics.results.forecast.cost import calibration, expected_cost, measures
+from mechanics.results.forecast.cost_rates import Rate
+from mechanics.results.forecast.plan import plan
+from mechanics.results.forecast.workload import Amounts
 from moma.errors import SolverError
 
 __all__ = ["fitted", "main"]

@@ -12,13 +12,13 @@ import mechanics.simulate
 from benchmarks.cost_scenes import Case
 from benchmarks.memory import peak_bytes
 from benchmarks.report import Row
-from mechanics.amounts import Amounts
-from mechanics.model import build_model
-from mechanics.observers.energy import EnergyBalance
-from mechanics.observers.equilibrium import imbalance
-from mechanics.outcome import Watch
-from mechanics.plan import plan
-from mechanics.simulation import Clock, Simulation
+from mechanics.dynamics.observers.energy import EnergyBalance
+from mechanics.dynamics.observers.equilibrium import imbalance
+from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.dynamics.stopping import Watch
+from mechanics.model.model import build_model
+from mechanics.results.forecast.plan import plan
+from mechanics.results.forecast.workload import Amounts
 from moma.errors import SolverError
 
 __all__ = ["main"]

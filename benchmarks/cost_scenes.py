@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.generated import box_faces
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.materials import Material
-from mechanics.meshing.elements import Element
-from mechanics.scene import Block, ContactSettings, Fidelity, Scene, Start, TimeSettings
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene, Start, TimeSettings
+from mechanics.stones.materials import Material
+from mechanics.stones.meshing.elements import Element
 
 __all__ = ["KINDS", "Case"]
 

@@ -16,10 +16,10 @@ import numpy as np
 from benchmarks.deformable_wall import wall_scene
 from benchmarks.memory import peak_bytes
 from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
-from mechanics.meshing.elements import Element
-from mechanics.result import Outcome
-from mechanics.scene import Scene, Start
+from mechanics.results.result import Outcome
+from mechanics.scene.scene import Scene, Start
 from mechanics.simulate import simulate
+from mechanics.stones.meshing.elements import Element
 from moma.errors import SolverError
 
 __all__ = ["main"]

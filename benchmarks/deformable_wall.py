@@ -11,15 +11,15 @@ import numpy as np
 
 from benchmarks.generated import box_faces
 from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.laws.mortar import MortarJoint
-from mechanics.materials import Material
-from mechanics.meshing.elements import Element
-from mechanics.model import build_model
-from mechanics.observers.equilibrium import imbalance, support_reaction
-from mechanics.scene import Block, ContactSettings, Fidelity, LawRule, Scene, Start, TimeSettings
-from mechanics.simulation import Clock, Simulation
-from mechanics.static_start import static_start
+from mechanics.dynamics.observers.equilibrium import imbalance, support_reaction
+from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.dynamics.static_start import static_start
+from mechanics.model.model import build_model
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.laws.mortar import MortarJoint
+from mechanics.scene.scene import Block, ContactSettings, Fidelity, LawRule, Scene, Start, TimeSettings
+from mechanics.stones.materials import Material
+from mechanics.stones.meshing.elements import Element
 from moma.errors import SolverError
 
 __all__ = ["deformable_wall", "main", "wall_scene"]

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from benchmarks.reference import Siconos
 from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
-from mechanics.operators.stored import StoredDelassus
-from mechanics.problem import ContactProblem, ContactSolution, ContactStart
-from mechanics.residual import project_on_cone
-from mechanics.solvers.admm import ADMM
-from mechanics.solvers.auto import Auto
-from mechanics.solvers.nsgs import NSGS
+from mechanics.delassus.stored import StoredDelassus
+from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
+from mechanics.problem.residual import project_on_cone
+from mechanics.solvers.first_order.admm import ADMM
+from mechanics.solvers.first_order.nsgs import NSGS
+from mechanics.solvers.strategies.auto import Auto
 from moma.errors import UsageError
 
 __all__ = ["main", "read_problem", "siconos_error"]

@@ -5,9 +5,9 @@ from itertools import pairwise
 import numpy as np
 
 from benchmarks.scenes import BlockScene
-from mechanics.laws.dry_joint import DryJoint
 from mechanics.planar.scene import Disk, PlanarScene, PlanarTime, Wall
-from mechanics.scene import SolverSettings
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import SolverSettings
 
 __all__ = ["box_faces", "disk_box", "running_bond"]
 

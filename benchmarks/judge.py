@@ -8,10 +8,10 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.scenes import BlockScene
 from benchmarks.trace import Touch, Trace
-from mechanics.operators.rigid import RigidDelassus, schedule
-from mechanics.polyhedra import mass_properties
-from mechanics.problem import ContactProblem
-from mechanics.residual import natural_map
+from mechanics.delassus.rigid import RigidDelassus, schedule
+from mechanics.problem.problem import ContactProblem
+from mechanics.problem.residual import natural_map
+from mechanics.stones.polyhedra import mass_properties
 
 __all__ = ["Judge", "Verdict"]
 

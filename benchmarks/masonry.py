@@ -9,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.materials import Material
-from mechanics.scene import Block, Fidelity
+from mechanics.scene.scene import Block, Fidelity
+from mechanics.stones.materials import Material
 
 __all__ = [
     "arch_on",

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
-from mechanics.materials import Material
-from mechanics.meshing.choice import Mesher
-from mechanics.meshing.elements import Element
-from mechanics.meshing.mesher import mesh_block
-from mechanics.meshing.quality import mesh_quality
-from mechanics.polyhedra import mass_properties
-from mechanics.scene import Block, Fidelity
+from mechanics.scene.scene import Block, Fidelity
+from mechanics.stones.materials import Material
+from mechanics.stones.meshing.elements import Element
+from mechanics.stones.meshing.meshers.choice import Mesher
+from mechanics.stones.meshing.meshers.mesher import mesh_block
+from mechanics.stones.meshing.quality import mesh_quality
+from mechanics.stones.polyhedra import mass_properties
 
 __all__ = ["main"]
 

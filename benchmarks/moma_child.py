@@ -10,10 +10,10 @@ import numpy as np
 
 from benchmarks.scenes import engine_scene, read_scene
 from mechanics.contact.contacts import gaps, material_points
-from mechanics.model import build_model
-from mechanics.scene import Scene
-from mechanics.simulation import Clock, Simulation, Step
-from mechanics.state import State
+from mechanics.dynamics.simulation import Clock, Simulation, Step
+from mechanics.model.model import build_model
+from mechanics.scene.scene import Scene
+from mechanics.scene.state import State
 
 __all__ = ["main"]
 

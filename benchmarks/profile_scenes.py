@@ -12,8 +12,8 @@ from benchmarks.masonry import (
     trilith,
     two_spans,
 )
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.scene import Block, ContactSettings, Scene, Start, TimeSettings
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import Block, ContactSettings, Scene, Start, TimeSettings
 
 __all__ = ["HELD_OUT", "REFERENCE"]
 

@@ -17,7 +17,7 @@ import numpy as np
 from benchmarks import collapse
 from benchmarks.profile_scenes import HELD_OUT, REFERENCE
 from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
-from mechanics.scene import Fidelity, Scene
+from mechanics.scene.scene import Fidelity, Scene
 from mechanics.simulate import simulate
 from pipelines.overlay import Overlay, overlaid_scene
 from pipelines.profile_report import BOUNDS, TYPICAL, expected_errors, loops, measure

@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
-from mechanics.materials import Material
-from mechanics.meshing.elements import Element
-from mechanics.result import BodyResult, Result
-from mechanics.scene import Block, Fidelity, Scene, SolverSettings, Start, TimeSettings
+from mechanics.results.result import BodyResult, Result
+from mechanics.scene.scene import Block, Fidelity, Scene, SolverSettings, Start, TimeSettings
 from mechanics.simulate import simulate
+from mechanics.stones.materials import Material
+from mechanics.stones.meshing.elements import Element
 from pipelines.fidelity import Wishes, modelled, neighbours
 from pipelines.quantities import Quantities, differences, quantities
 from survey.extrusion.extrusion import SurveyedBlock

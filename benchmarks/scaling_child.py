@@ -15,17 +15,17 @@ from numpy.typing import NDArray
 from benchmarks.generated import disk_box, running_bond
 from benchmarks.memory import arrays_bytes, peak_bytes
 from benchmarks.scenes import engine_scene
-from mechanics.contact.assembly import rigid_delassus
 from mechanics.contact.contacts import take
-from mechanics.model import build_model
-from mechanics.operators import rigid
+from mechanics.delassus import rigid
+from mechanics.delassus.assembly import rigid_delassus
+from mechanics.dynamics.simulation import Clock, Simulation, detector
+from mechanics.model.model import build_model
 from mechanics.planar.contacts import PlanarDetector
 from mechanics.planar.delassus import PlanarDelassus
 from mechanics.planar.model import build_planar_model
 from mechanics.planar.simulation import PlanarSimulation
-from mechanics.problem import Delassus
-from mechanics.scene import SolverSettings
-from mechanics.simulation import Clock, Simulation, detector
+from mechanics.problem.problem import Delassus
+from mechanics.scene.scene import SolverSettings
 
 __all__ = ["main"]
 

@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.materials import Material
-from mechanics.scene import (
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import (
     Block,
     ContactSettings,
     Fidelity,
@@ -18,6 +17,7 @@ from mechanics.scene import (
     SolverSettings,
     TimeSettings,
 )
+from mechanics.stones.materials import Material
 from moma.errors import UsageError
 
 __all__ = ["BlockScene", "engine_scene", "list_scenes", "read_scene", "write_scene"]

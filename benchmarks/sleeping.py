@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 
 from benchmarks.generated import box_faces, running_bond
 from benchmarks.report import Row, Table, guarded, machine, print_json, print_table, progress
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.loads.history import History
-from mechanics.loads.load import Loads
-from mechanics.loads.motions import ImposedMotion
-from mechanics.materials import Material
-from mechanics.model import build_model
-from mechanics.observers.energy import EnergyBalance
-from mechanics.observers.equilibrium import imbalance, support_reaction
-from mechanics.scene import Block, ContactSettings, Fidelity, Scene, TimeSettings
-from mechanics.simulation import Clock, Simulation
+from mechanics.dynamics.observers.energy import EnergyBalance
+from mechanics.dynamics.observers.equilibrium import imbalance, support_reaction
+from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.model.model import build_model
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.loads.load import Loads
+from mechanics.scene.loads.motions import ImposedMotion
+from mechanics.scene.loads.time_series import History
+from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene, TimeSettings
+from mechanics.stones.materials import Material
 
 __all__ = ["SCENES", "main"]
 

@@ -15,14 +15,14 @@ import numpy as np
 
 from benchmarks.generated import box_faces
 from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.materials import Material
-from mechanics.model import build_model
-from mechanics.problem import ContactProblem, ContactSolution, ContactStart
-from mechanics.residual import residual
-from mechanics.scene import Block, ContactSettings, Fidelity, Scene, TimeSettings
-from mechanics.simulation import Clock, Simulation
-from mechanics.solvers.alternating import Alternating
+from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.model.model import build_model
+from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
+from mechanics.problem.residual import residual
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene, TimeSettings
+from mechanics.solvers.strategies.rigid import Alternating
+from mechanics.stones.materials import Material
 
 __all__ = ["CASES", "Case", "column", "first_problem", "main", "thick_wall"]
 

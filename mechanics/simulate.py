@@ -7,17 +7,17 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
-from mechanics.model import Model, build_model
-from mechanics.observers.energy import EnergyBalance, kinetic_energy
-from mechanics.observers.equilibrium import imbalance, settlement, speed, support_reaction
-from mechanics.outcome import LASTING, Watch
-from mechanics.postprocess import Observer
-from mechanics.progress import Progress
-from mechanics.result import Energies, Errors, Frame, History, Outcome, Result, StaticStart
-from mechanics.scene import Scene, Start
-from mechanics.simulation import Clock, Simulation, Step
-from mechanics.state import State
-from mechanics.static_start import static_start
+from mechanics.dynamics.observers.energy import EnergyBalance, kinetic_energy
+from mechanics.dynamics.observers.equilibrium import imbalance, settlement, speed, support_reaction
+from mechanics.dynamics.progress import Progress
+from mechanics.dynamics.simulation import Clock, Simulation, Step
+from mechanics.dynamics.static_start import static_start
+from mechanics.dynamics.stopping import LASTING, Watch
+from mechanics.model.model import Model, build_model
+from mechanics.results.postprocess import Observer
+from mechanics.results.result import Energies, Errors, Frame, History, Outcome, Result, StaticStart
+from mechanics.scene.scene import Scene, Start
+from mechanics.scene.state import State
 
 __all__ = ["simulate"]
 

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from archmodel.describe.trace import trace
     from archmodel.query.api import find, find_rows
     from archmodel.relations.graph import load_path
-    from mechanics.result import Result
-    from mechanics.scene import Block, Scene
+    from mechanics.results.result import Result
+    from mechanics.scene.scene import Block, Scene
     from mechanics.simulate import simulate
     from pipelines.assemble import assemble
     from pipelines.ingest import ingest
@@ -61,10 +61,10 @@ __all__ = [
 ]
 
 _HOMES = {
-    "Block": "mechanics.scene",
+    "Block": "mechanics.scene.scene",
     "ReadingOptions": "survey.formats.reading",
-    "Result": "mechanics.result",
-    "Scene": "mechanics.scene",
+    "Result": "mechanics.results.result",
+    "Scene": "mechanics.scene.scene",
     "assemble": "pipelines.assemble",
     "find": "archmodel.query.api",
     "find_rows": "archmodel.query.api",

@@ -15,7 +15,7 @@ from moma.errors import MomaError
 if TYPE_CHECKING:
     from rich.progress import TaskID
 
-    from mechanics.progress import Progress as Told
+    from mechanics.dynamics.progress import Progress as Told
     from pipelines.progress import Listener
 
 __all__ = ["progress_bars", "reporting", "say"]

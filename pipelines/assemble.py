@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy.orm import Session
 
-from mechanics.meshing.choice import Mesher
-from mechanics.meshing.elements import Element
-from mechanics.scene import Block, Fidelity, Part, Scene
+from mechanics.scene.scene import Block, Fidelity, Part, Scene
+from mechanics.stones.meshing.elements import Element
+from mechanics.stones.meshing.meshers.choice import Mesher
 from pipelines.effects import remarks
 from pipelines.fidelity import Modelled, Wishes, modelled, neighbours
 from pipelines.joint_laws import law_rules

@@ -6,10 +6,10 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 from archmodel.database.session import open_database
-from mechanics.cost import expected_cost, machine_slowness
-from mechanics.meshing.report import MeshReport
-from mechanics.plan import Plan, plan
-from mechanics.scene import Fidelity, Scene
+from mechanics.results.forecast.cost import expected_cost, machine_slowness
+from mechanics.results.forecast.plan import Plan, plan
+from mechanics.scene.scene import Fidelity, Scene
+from mechanics.stones.meshing.report import MeshReport
 from moma.errors import GeometryError, MeshError
 from pipelines.assemble import Assembly, assemble_stones, wishes_of
 from pipelines.check_report import (

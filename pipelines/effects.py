@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 
-from mechanics.scene import Fidelity
+from mechanics.scene.scene import Fidelity
 from pipelines.fidelity import Modelled
 from pipelines.scenefile import SceneFile
 from pipelines.selection import STRESS, Groups

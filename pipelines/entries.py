@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
-from mechanics.loads.accelerogram import Accelerogram
-from mechanics.loads.history import History
-from mechanics.loads.tables import read_history
+from mechanics.scene.loads.accelerogram import Accelerogram
+from mechanics.scene.loads.tables import read_history
+from mechanics.scene.loads.time_series import History
 from pipelines.entry_keys import HISTORY_FILE
 from pipelines.schema import Document, Key, Kind, check_table
 from pipelines.toml_lines import Path

@@ -5,8 +5,8 @@ docs/scene.md is held to these lists by a test.
 
 from collections.abc import Mapping
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.loads.record_files import UNITS
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.loads.record_files import UNITS
 from pipelines.schema import Key, Kind
 
 __all__ = ["ARRAYS", "HISTORY_FILE", "LAW_KEYS", "LAW_TYPES", "LOAD_TYPES", "THROW_KEYS"]

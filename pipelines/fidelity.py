@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 
-from mechanics.scene import Fidelity
+from mechanics.scene.scene import Fidelity
 from survey.joints.report import Joint
 
 __all__ = ["Modelled", "Wishes", "modelled", "neighbours"]

@@ -6,7 +6,7 @@ import logging
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.result import History
+from mechanics.results.result import History
 
 __all__ = ["history_svg"]
 

@@ -4,12 +4,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mechanics.laws.cohesive_zone import CohesiveZone
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.laws.law import Law
-from mechanics.laws.lennard_jones import LennardJones
-from mechanics.laws.mortar import MortarJoint
-from mechanics.scene import LawRule
+from mechanics.scene.laws.cohesive_zone import CohesiveZone
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.laws.law import Law
+from mechanics.scene.laws.lennard_jones import LennardJones
+from mechanics.scene.laws.mortar import MortarJoint
+from mechanics.scene.scene import LawRule
 from pipelines.entries import Entry, read_entries
 from pipelines.entry_keys import LAW_KEYS, LAW_TYPES
 from pipelines.schema import Document, nearest

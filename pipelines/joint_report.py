@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.result import Result
+from mechanics.results.result import Result
 from pipelines.html_tables import kilopascals, millimetres, ratio, table
 
 __all__ = ["joint_sections"]

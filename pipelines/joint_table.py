@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.contact_result import JointResult
-from mechanics.result import Result
+from mechanics.results.contact_result import JointResult
+from mechanics.results.result import Result
 
 __all__ = ["JOINT_COLUMNS", "normal_and_shear", "write_joints"]
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.meshing.elements import Element
-from mechanics.polyhedra import smallest_width
-from mechanics.scene import Block, Fidelity, Method, Placement, Scene
+from mechanics.scene.scene import Block, Fidelity, Method, Placement, Scene
+from mechanics.stones.meshing.elements import Element
+from mechanics.stones.polyhedra import smallest_width
 from pipelines.scenefile import SceneFile
 from pipelines.selection import StoneModel
 

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.materials import Material
-from mechanics.result import BodyResult, Outcome, Result
-from mechanics.scene import Fidelity
-from mechanics.stress_values import volume_quantile
+from mechanics.results.result import BodyResult, Outcome, Result
+from mechanics.results.stress_values import volume_quantile
+from mechanics.scene.scene import Fidelity
+from mechanics.stones.materials import Material
 from moma.errors import MissingLibraryError
 from pipelines.surfaces import FIELDS, save_surface, stone_fields, wall_surface
 

@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from mechanics.result import Outcome, Result
-from mechanics.scene import Fidelity
+from mechanics.results.result import Outcome, Result
+from mechanics.scene.scene import Fidelity
 from pipelines.profile_errors import COLLAPSE, ERRORS
 from pipelines.profiles import profile_named, settings_of_profile
 from pipelines.quantities import QUANTITIES, Quantities, quantities

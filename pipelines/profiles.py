@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
-from mechanics.meshing.elements import Element
-from mechanics.scene import Fidelity, Method, Placement, TimeSettings
+from mechanics.scene.scene import Fidelity, Method, Placement, TimeSettings
+from mechanics.stones.meshing.elements import Element
 from moma.errors import UsageError
 from pipelines.overlay import Overlay, overlaid, typical_width
 from pipelines.scenefile import SceneFile

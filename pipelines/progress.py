@@ -1,8 +1,8 @@
-"""Who listens to long work; `mechanics.progress.Progress` is what is told."""
+"""Who listens to long work; `mechanics.dynamics.progress.Progress` is what is told."""
 
 from collections.abc import Callable
 
-from mechanics.progress import Progress
+from mechanics.dynamics.progress import Progress
 
 __all__ = ["Listener", "Progress", "silent"]
 

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.result import BodyResult, Result
-from mechanics.scene import Fidelity
+from mechanics.results.result import BodyResult, Result
+from mechanics.scene.scene import Fidelity
 from pipelines.stone_values import stress_statistics
 
 __all__ = ["QUANTITIES", "Quantities", "StoneQuantities", "differences", "quantities", "quantities_from"]

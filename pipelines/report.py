@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from archmodel.store.run_record import StoneResult
-from mechanics.result import Result
+from mechanics.results.result import Result
 from pipelines.history_plot import history_svg
 from pipelines.html_page import figure, page
 from pipelines.html_tables import megapascals, millimetres, percent, ratio, scientific, table

@@ -12,7 +12,7 @@ from archmodel.database.session import open_database
 from archmodel.store.run_record import StoneResult
 from archmodel.store.store_runs import store_run
 from archmodel.tables.entries import latest_entry
-from mechanics.result import Outcome, Result
+from mechanics.results.result import Outcome, Result
 from mechanics.simulate import simulate
 from moma.errors import DatabaseError, MissingLibraryError
 from pipelines.assemble import Assembly, assemble_stones

@@ -21,9 +21,9 @@ from archmodel.store.run_record import (
     SimplificationRecord,
     StoneResult,
 )
-from mechanics.contact_result import ContactResult, JointResult
-from mechanics.result import Errors, Result
-from mechanics.scene import Scene
+from mechanics.results.contact_result import ContactResult, JointResult
+from mechanics.results.result import Errors, Result
+from mechanics.scene.scene import Scene
 from pipelines.assemble import Assembly
 from pipelines.joint_table import normal_and_shear
 from pipelines.scenefile import SceneFile

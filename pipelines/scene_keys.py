@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.scene import (
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import (
     ContactSettings,
     Fidelity,
     Method,

@@ -5,17 +5,17 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.loads.accelerogram import Accelerogram
-from mechanics.loads.forces import StoneForce
-from mechanics.loads.gravity import GravityRamp, TiltingTable
-from mechanics.loads.ground_motion import Component, GroundMotion
-from mechanics.loads.history import History
-from mechanics.loads.load import Force, GravityChange, Loads, Motion
-from mechanics.loads.motions import ImposedMotion, settlement, spreading
-from mechanics.loads.record_files import read_accelerogram
-from mechanics.loads.record_processing import band_pass, without_drift
-from mechanics.polyhedra import mass_properties
-from mechanics.scene import Block, Fidelity
+from mechanics.scene.loads.accelerogram import Accelerogram
+from mechanics.scene.loads.forces import StoneForce
+from mechanics.scene.loads.gravity import GravityRamp, TiltingTable
+from mechanics.scene.loads.ground_motion import Component, GroundMotion
+from mechanics.scene.loads.load import Force, GravityChange, Loads, Motion
+from mechanics.scene.loads.motions import ImposedMotion, settlement, spreading
+from mechanics.scene.loads.record_files import read_accelerogram
+from mechanics.scene.loads.record_processing import band_pass, without_drift
+from mechanics.scene.loads.time_series import History
+from mechanics.scene.scene import Block, Fidelity
+from mechanics.stones.polyhedra import mass_properties
 from pipelines.entries import Entry, file_beside, read_entries
 from pipelines.entry_keys import LOAD_TYPES, THROW_KEYS
 from pipelines.schema import Document

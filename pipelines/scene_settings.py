@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass
 
-from mechanics.materials import Material
-from mechanics.meshing.choice import Mesher
-from mechanics.meshing.elements import Element
-from mechanics.scene import Block, Fidelity
+from mechanics.scene.scene import Block, Fidelity
+from mechanics.stones.materials import Material
+from mechanics.stones.meshing.elements import Element
+from mechanics.stones.meshing.meshers.choice import Mesher
 
 __all__ = ["Fidelities", "MaterialRule", "MeshSettings", "Output", "Selection"]
 

@@ -10,11 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.materials import Material, Orthotropy
-from mechanics.meshing.choice import Mesher
-from mechanics.meshing.elements import Element
-from mechanics.scene import (
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import (
     ContactSettings,
     Fidelity,
     Method,
@@ -23,6 +20,9 @@ from mechanics.scene import (
     Start,
     TimeSettings,
 )
+from mechanics.stones.materials import Material, Orthotropy
+from mechanics.stones.meshing.elements import Element
+from mechanics.stones.meshing.meshers.choice import Mesher
 from moma.errors import SceneError
 from pipelines.entries import Entry, read_entries
 from pipelines.entry_keys import ARRAYS

@@ -9,8 +9,8 @@ from sqlalchemy.orm import Session
 from archmodel.query.api import MAX_EXPRESSIONS, find, find_rows
 from archmodel.store.stone_record import StoneRecord
 from archmodel.store.stones import load_stones
-from mechanics.materials import Material
-from mechanics.scene import Fidelity
+from mechanics.scene.scene import Fidelity
+from mechanics.stones.materials import Material
 from moma.errors import QueryError, UsageError
 from pipelines.scenefile import SceneFile
 from pipelines.schema import nearest

@@ -3,10 +3,10 @@
 docs/scene.md is held to these lists by a test.
 """
 
-from mechanics.materials import Material
-from mechanics.meshing.choice import Mesher
-from mechanics.meshing.elements import Element
-from mechanics.scene import Block
+from mechanics.scene.scene import Block
+from mechanics.stones.materials import Material
+from mechanics.stones.meshing.elements import Element
+from mechanics.stones.meshing.meshers.choice import Mesher
 from pipelines.schema import Key, Kind
 
 __all__ = ["MATERIAL_KEYS", "MESH", "MESH_KEYS", "ORTHOTROPY_KEYS"]

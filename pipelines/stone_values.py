@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from archmodel.store.run_record import StoneResult
-from mechanics.contact_result import JointResult
-from mechanics.result import BodyResult, Result
-from mechanics.stress_values import StressValues, volume_quantile
+from mechanics.results.contact_result import JointResult
+from mechanics.results.result import BodyResult, Result
+from mechanics.results.stress_values import StressValues, volume_quantile
 
 __all__ = ["StressStatistics", "stone_results", "stress_statistics"]
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.contact_result import JointResult
-from mechanics.result import Result
-from mechanics.scene import Fidelity
+from mechanics.results.contact_result import JointResult
+from mechanics.results.result import Result
+from mechanics.scene.scene import Fidelity
 from pipelines.profile_report import ProfileReport
 from pipelines.quantities import quantities
 from pipelines.stone_values import stress_statistics

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.contact_result import JointResult
-from mechanics.materials import Material
-from mechanics.result import BodyResult, Result
-from mechanics.scene import Fidelity
-from mechanics.stress_values import utilisation
+from mechanics.results.contact_result import JointResult
+from mechanics.results.result import BodyResult, Result
+from mechanics.results.stress_values import utilisation
+from mechanics.scene.scene import Fidelity
+from mechanics.stones.materials import Material
 
 __all__ = ["FIELDS", "WallSurface", "load_surface", "save_surface", "stone_fields", "wall_surface"]
 

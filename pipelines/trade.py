@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from archmodel.database.session import open_database
-from mechanics.scene import Fidelity
+from mechanics.scene.scene import Fidelity
 from moma.errors import UsageError
 from pipelines.assemble import assemble
 from pipelines.overlay import typical_width

@@ -16,10 +16,10 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from archmodel.database.session import open_database
-from mechanics.meshing.elements import Element
-from mechanics.result import Result
-from mechanics.scene import Fidelity, Method, Placement
+from mechanics.results.result import Result
+from mechanics.scene.scene import Fidelity, Method, Placement
 from mechanics.simulate import simulate
+from mechanics.stones.meshing.elements import Element
 from moma.errors import MomaError
 from pipelines.assemble import assemble
 from pipelines.overlay import Overlay, overlaid

@@ -7,8 +7,8 @@ from itertools import chain
 
 import numpy as np
 
-from mechanics.meshing.elements import Element
-from mechanics.scene import Block, Fidelity, Method, Placement
+from mechanics.scene.scene import Block, Fidelity, Method, Placement
+from mechanics.stones.meshing.elements import Element
 from pipelines.overlay import Overlay
 from pipelines.profiles import PROFILES
 from pipelines.scenefile import SceneFile

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from typing import Any
 
-from mechanics.scene import Fidelity
+from mechanics.scene.scene import Fidelity
 from pipelines.quantities import QUANTITIES
 from pipelines.summary import as_json
 from pipelines.trade_child import overlay_record

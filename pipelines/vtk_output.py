@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.contact_result import ContactResult, JointResult
-from mechanics.elasticity import principal, von_mises
-from mechanics.laws.status import STATUSES
-from mechanics.result import BodyResult, Frame, Result
-from mechanics.scene import Fidelity
-from mechanics.stress_values import utilisation
+from mechanics.results.contact_result import ContactResult, JointResult
+from mechanics.results.result import BodyResult, Frame, Result
+from mechanics.results.stress_values import utilisation
+from mechanics.scene.laws.status import STATUSES
+from mechanics.scene.scene import Fidelity
+from mechanics.stones.elasticity import principal, von_mises
 from pipelines.vtu import CELL_TYPES, POLYGON, POLYHEDRON, VERTEX, Cells, Grid, cells_of, write_pvd, write_vtu
 
 __all__ = ["UNITS", "body_cells", "body_grid", "contact_grid", "joint_grid", "write_frames"]

@@ -11,7 +11,7 @@ from xml.sax.saxutils import escape, quoteattr
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.meshing.elements import Element
+from mechanics.stones.meshing.elements import Element
 
 __all__ = [
     "CELL_TYPES",

@@ -16,7 +16,7 @@ from benchmarks.extremes.scenes import run_cells, scene_rows
 from benchmarks.extremes.tables import Measured, as_lines, as_markdown, as_objects, columns, is_refused
 from benchmarks.report import Row as Line
 from benchmarks.report import Table, environment, guarded, machine, print_json, print_table, progress
-from mechanics.scene import Method
+from mechanics.scene.scene import Method
 
 __all__ = ["main"]
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from benchmarks.extremes.laws import judge
 from benchmarks.extremes.problems import VELOCITY_TOLERANCE, Row
-from mechanics.problem import ContactProblem, ContactStart
-from mechanics.residual import natural_map
-from mechanics.scene import Method, SolverSettings
+from mechanics.problem.problem import ContactProblem, ContactStart
+from mechanics.problem.residual import natural_map
+from mechanics.scene.scene import Method, SolverSettings
 from mechanics.solvers.choice import choose_solver
 from moma.errors import MomaError
 
@@ -41,7 +41,7 @@ class Cell:
     Attributes
     ----------
     outcome : see `Outcome`
-    eta : η of the end, computed by `mechanics.residual`; NaN where there is none [-]
+    eta : η of the end, computed by `mechanics.problem.residual`; NaN where there is none [-]
     iterations : of the solver, or of all steps
     broken : by how much a law is broken, over what the tolerances allow
     error : against what is known of the solution; None: nothing is

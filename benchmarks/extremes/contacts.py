@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.extremes.stones import G
-from mechanics.operators.rigid import RigidDelassus, schedule
-from mechanics.operators.stored import StoredDelassus
-from mechanics.problem import ContactProblem
+from mechanics.delassus.rigid import RigidDelassus, schedule
+from mechanics.delassus.stored import StoredDelassus
+from mechanics.problem.problem import ContactProblem
 
 __all__ = [
     "HALF",

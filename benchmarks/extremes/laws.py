@@ -8,9 +8,9 @@ time other equations; what it breaks is the least that one of these states leave
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.operators.rigid import RigidDelassus
-from mechanics.operators.stored import StoredDelassus
-from mechanics.problem import ContactProblem, scale_of
+from mechanics.delassus.rigid import RigidDelassus
+from mechanics.delassus.stored import StoredDelassus
+from mechanics.problem.problem import ContactProblem, scale_of
 
 __all__ = ["broken", "judge", "velocity_of"]
 

@@ -33,9 +33,9 @@ from benchmarks.extremes.stones import (
     volume,
     wall,
 )
-from mechanics.operators.rigid import RigidDelassus
-from mechanics.problem import ContactProblem
-from mechanics.scene import Fidelity, Scene
+from mechanics.delassus.rigid import RigidDelassus
+from mechanics.problem.problem import ContactProblem
+from mechanics.scene.scene import Fidelity, Scene
 
 __all__ = ["VELOCITY_TOLERANCE", "Row", "rows"]
 

@@ -7,17 +7,17 @@ from typing import Any
 import numpy as np
 
 from benchmarks.extremes.stones import box, ground, standing
-from mechanics.laws.cohesive_zone import CohesiveZone
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.laws.lennard_jones import LennardJones
-from mechanics.laws.mortar import MortarJoint
-from mechanics.loads.forces import StoneForce
-from mechanics.loads.history import History
-from mechanics.loads.load import Loads
-from mechanics.loads.motions import ImposedMotion, settlement
-from mechanics.materials import Material, Orthotropy
-from mechanics.scene import Block, ContactSettings, Fidelity, Scene, SolverSettings, TimeSettings
+from mechanics.scene.laws.cohesive_zone import CohesiveZone
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.laws.lennard_jones import LennardJones
+from mechanics.scene.laws.mortar import MortarJoint
+from mechanics.scene.loads.forces import StoneForce
+from mechanics.scene.loads.load import Loads
+from mechanics.scene.loads.motions import ImposedMotion, settlement
+from mechanics.scene.loads.time_series import History
+from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene, SolverSettings, TimeSettings
 from mechanics.simulate import simulate
+from mechanics.stones.materials import Material, Orthotropy
 
 __all__ = ["refusals"]
 

@@ -20,12 +20,12 @@ from benchmarks.extremes.stones import (
     standing,
     wall,
 )
-from mechanics.laws.mortar import MortarJoint
-from mechanics.loads.history import History
-from mechanics.loads.load import Loads
-from mechanics.loads.motions import ImposedMotion
-from mechanics.result import Result
-from mechanics.scene import Block, Fidelity, Method, Scene, SolverSettings, Start
+from mechanics.results.result import Result
+from mechanics.scene.laws.mortar import MortarJoint
+from mechanics.scene.loads.load import Loads
+from mechanics.scene.loads.motions import ImposedMotion
+from mechanics.scene.loads.time_series import History
+from mechanics.scene.scene import Block, Fidelity, Method, Scene, SolverSettings, Start
 from mechanics.simulate import simulate
 
 __all__ = ["SceneRow", "run_cells", "scene_rows"]

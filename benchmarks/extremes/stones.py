@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.laws.law import Law
-from mechanics.materials import Material
-from mechanics.meshing.elements import Element
-from mechanics.model import build_model
-from mechanics.problem import ContactProblem, ContactSolution, ContactStart
-from mechanics.scene import Block, ContactSettings, Fidelity, Scene, TimeSettings
-from mechanics.simulation import Clock, Simulation
+from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.model.model import build_model
+from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.laws.law import Law
+from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene, TimeSettings
+from mechanics.stones.materials import Material
+from mechanics.stones.meshing.elements import Element
 
 __all__ = [
     "G",

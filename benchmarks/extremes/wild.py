@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.operators.rigid import RigidDelassus, schedule
-from mechanics.problem import ContactProblem
+from mechanics.delassus.rigid import RigidDelassus, schedule
+from mechanics.problem.problem import ContactProblem
 
 __all__ = ["wild_problem"]
 

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
-from mechanics.contact._kernels_broad import points_of
-from mechanics.state import State
+from mechanics.contact._kernels.broad_phase import points_of
+from mechanics.scene.state import State
 
 __all__ = ["Contacts", "gaps", "joined", "material_points", "take"]
 

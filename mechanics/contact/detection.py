@@ -13,15 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from mechanics.contact._kernels_balls import ball_points
-from mechanics.contact._kernels_broad import boxes, close_pairs, place
-from mechanics.contact._kernels_narrow import EDGES, FACE_FIRST, interface_points, separating_axes
-from mechanics.contact.ball_sides import FaceCells, ball_contacts, face_cells
+from mechanics.contact._kernels.balls import ball_points
+from mechanics.contact._kernels.broad_phase import boxes, close_pairs, place
+from mechanics.contact._kernels.narrow_phase import EDGES, FACE_FIRST, interface_points, separating_axes
+from mechanics.contact.ball_contacts import FaceCells, ball_contacts, face_cells
 from mechanics.contact.contacts import Contacts, gaps, joined, take
-from mechanics.contact.elastic_sides import mortar_contacts, surface_weights
+from mechanics.contact.mortar_contacts import mortar_contacts, surface_weights
 from mechanics.contact.surfaces import Placed, Surfaces
-from mechanics.scene import Placement
-from mechanics.state import State
+from mechanics.scene.scene import Placement
+from mechanics.scene.state import State
 
 __all__ = ["FLAT", "THIN", "Detector"]
 

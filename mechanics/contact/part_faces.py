@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.contact._kernels_overlap import overlap_area
+from mechanics.contact._kernels.overlap import overlap_area
 from mechanics.contact.face_meshes import FaceMesh
-from mechanics.meshing.mesh import SolidMesh
-from mechanics.polyhedra import face_plane
+from mechanics.stones.meshing.mesh import SolidMesh
+from mechanics.stones.polyhedra import face_plane
 
 __all__ = ["face_meshes", "part_face_meshes"]
 

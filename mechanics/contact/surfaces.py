@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechanics.contact.face_meshes import FaceMesh, PackedMeshes, packed_meshes
-from mechanics.polyhedra import face_plane, smallest_width
+from mechanics.stones.polyhedra import face_plane, smallest_width
 
 __all__ = ["Placed", "Surfaces", "surfaces"]
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 
-from mechanics.planar._kernels_sweep import (
+from mechanics.planar._kernels.sweep import (
     apply,
     diagonals,
     records,
@@ -16,8 +16,8 @@ from mechanics.planar._kernels_sweep import (
     sweep,
     velocity_change,
 )
-from mechanics.problem import SparseForm
-from mechanics.solvers.colouring import greedy_colours
+from mechanics.problem.problem import SparseForm
+from mechanics.solvers.first_order.colouring import greedy_colours
 
 __all__ = ["PlanarDelassus", "PlanarGaussSeidel"]
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.laws.table import LawTable, law_table
 from mechanics.planar.scene import PlanarScene
+from mechanics.scene.laws.table import LawTable, law_table
 
 __all__ = ["PlanarModel", "PlanarState", "build_planar_model"]
 

@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.outcome import LASTING
+from mechanics.dynamics.stopping import LASTING
 from mechanics.planar.contacts import PlanarContacts
 from mechanics.planar.model import PlanarModel, PlanarState
 from mechanics.planar.simulation import PlanarStep
-from mechanics.result import Outcome
+from mechanics.results.result import Outcome
 
 __all__ = ["PlanarEnergy", "PlanarWatch", "disk_speed", "imbalance", "kinetic_energy", "world_force"]
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechanics.planar.scene import PlanarScene
-from mechanics.result import Errors, Outcome
+from mechanics.results.result import Errors, Outcome
 
 __all__ = ["PlanarContactResult", "PlanarFrame", "PlanarHistory", "PlanarResult"]
 

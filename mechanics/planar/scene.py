@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.laws.law import Law
-from mechanics.loads.load import Loads
-from mechanics.scene import LawRule, SolverSettings
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.laws.law import Law
+from mechanics.scene.loads.load import Loads
+from mechanics.scene.scene import LawRule, SolverSettings
 from moma.errors import SceneError
 
 __all__ = ["Disk", "PlanarScene", "PlanarTime", "Wall"]

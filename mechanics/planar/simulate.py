@@ -4,8 +4,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mechanics.laws.status import contact_status
-from mechanics.outcome import LASTING
+from mechanics.dynamics.progress import Progress
+from mechanics.dynamics.simulation import Clock
+from mechanics.dynamics.stopping import LASTING
 from mechanics.planar.model import PlanarModel, PlanarState, build_planar_model
 from mechanics.planar.observers import (
     PlanarEnergy,
@@ -18,9 +19,8 @@ from mechanics.planar.observers import (
 from mechanics.planar.result import PlanarContactResult, PlanarFrame, PlanarHistory, PlanarResult
 from mechanics.planar.scene import PlanarScene
 from mechanics.planar.simulation import PlanarSimulation, PlanarStep
-from mechanics.progress import Progress
-from mechanics.result import Errors, Outcome
-from mechanics.simulation import Clock
+from mechanics.results.result import Errors, Outcome
+from mechanics.scene.laws.status import contact_status
 
 __all__ = ["simulate_planar"]
 

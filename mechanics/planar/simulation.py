@@ -5,14 +5,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.laws.law import Approach, Terms
-from mechanics.memory import Memory
+from mechanics.dynamics.simulation import Clock
+from mechanics.dynamics.warm_start import Memory
 from mechanics.planar.contacts import PlanarContacts, PlanarDetector
 from mechanics.planar.delassus import PlanarDelassus
 from mechanics.planar.model import PlanarModel, PlanarState
 from mechanics.planar.stepping import Drive, fly, load_velocity
-from mechanics.problem import ContactProblem, ContactSolution, ContactStart
-from mechanics.simulation import Clock
+from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
+from mechanics.scene.laws.law import Approach, Terms
 from mechanics.solvers.choice import choose_planar_solver
 from moma.errors import SolverError
 

@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.loads.load import Motion
 from mechanics.planar.model import PlanarModel, PlanarState
+from mechanics.scene.loads.load import Motion
 from moma.errors import SceneError
 
 __all__ = ["Drive", "fly", "load_velocity", "space"]

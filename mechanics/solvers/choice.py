@@ -3,16 +3,16 @@
 from collections.abc import Callable, Mapping
 from typing import Protocol
 
-from mechanics.problem import ContactProblem, ContactSolution, ContactStart
-from mechanics.scene import Method, SolverSettings
-from mechanics.solvers.admm import ADMM
-from mechanics.solvers.alternating import moving_admm
-from mechanics.solvers.apgd import APGD
-from mechanics.solvers.auto import Auto
-from mechanics.solvers.cone_program import ConeProgram
-from mechanics.solvers.interior_point import InteriorPoint
-from mechanics.solvers.newton import Newton
-from mechanics.solvers.nsgs import NSGS
+from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
+from mechanics.scene.scene import Method, SolverSettings
+from mechanics.solvers.first_order.admm import ADMM
+from mechanics.solvers.first_order.apgd import APGD
+from mechanics.solvers.first_order.nsgs import NSGS
+from mechanics.solvers.second_order.cone_program import ConeProgram
+from mechanics.solvers.second_order.interior_point import InteriorPoint
+from mechanics.solvers.second_order.newton import Newton
+from mechanics.solvers.strategies.auto import Auto
+from mechanics.solvers.strategies.rigid import moving_admm
 from moma.errors import SolverError
 
 __all__ = ["Solver", "choose_planar_solver", "choose_solver"]

@@ -9,8 +9,8 @@ from benchmarks.judge import Judge
 from benchmarks.memory import arrays_bytes
 from benchmarks.scenes import read_scene, write_scene
 from benchmarks.trace import Touch, Trace
-from mechanics.operators.stored import StoredDelassus
-from mechanics.problem import ContactProblem
+from mechanics.delassus.stored import StoredDelassus
+from mechanics.problem.problem import ContactProblem
 
 STEP, THETA = 1e-3, 0.5
 # one brick of 0.30 × 0.15 × 0.10 m on a slab

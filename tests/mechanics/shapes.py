@@ -8,21 +8,21 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from mechanics.contact.assembly import mixed_delassus, rigid_delassus
 from mechanics.contact.contacts import Contacts, gaps, material_points, take
 from mechanics.contact.detection import Detector
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.laws.law import STATE
-from mechanics.materials import Material
-from mechanics.model import Model, build_model
-from mechanics.operators.mixed import MixedDelassus
-from mechanics.operators.rigid import RigidDelassus, schedule
-from mechanics.problem import ContactProblem
-from mechanics.scene import Block, ContactSettings, Fidelity, Part, Placement, Scene, TimeSettings
-from mechanics.solvers._kernels import local_factors, solve_contact
-from mechanics.state import State
-from mechanics.statement import state_laws
-from mechanics.stepping import compliances, free_kick
+from mechanics.delassus.assembly import mixed_delassus, rigid_delassus
+from mechanics.delassus.mixed import MixedDelassus
+from mechanics.delassus.rigid import RigidDelassus, schedule
+from mechanics.dynamics.contact_laws import state_laws
+from mechanics.dynamics.stepping import compliances, free_kick
+from mechanics.model.model import Model, build_model
+from mechanics.problem._kernels import local_factors, solve_contact
+from mechanics.problem.problem import ContactProblem
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.laws.law import STATE
+from mechanics.scene.scene import Block, ContactSettings, Fidelity, Part, Placement, Scene, TimeSettings
+from mechanics.scene.state import State
+from mechanics.stones.materials import Material
 from tests.pipelines.handmade import BOX_FACES, box
 
 LIMESTONE = Material("limestone", density=2000.0, young=1e9, poisson=0.2)

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mechanics.contact.assembly import local_velocity, mixed_delassus, world_impulse
 from mechanics.contact.contacts import gaps
 from mechanics.contact.detection import Detector
-from mechanics.laws.law import STATE
-from mechanics.model import build_model
-from mechanics.operators.mixed import ELASTIC, NONE, RIGID
-from mechanics.problem import scale_of
-from mechanics.scene import Fidelity
-from mechanics.statement import state_laws
-from mechanics.stepping import advance, compliances, free_kick, kicked, predict
+from mechanics.delassus.assembly import local_velocity, mixed_delassus, world_impulse
+from mechanics.delassus.mixed import ELASTIC, NONE, RIGID
+from mechanics.dynamics.contact_laws import state_laws
+from mechanics.dynamics.stepping import advance, compliances, free_kick, kicked, predict
+from mechanics.model.model import build_model
+from mechanics.problem.problem import scale_of
+from mechanics.scene.laws.law import STATE
+from mechanics.scene.scene import Fidelity
 from tests.mechanics.shapes import TURN, brick, dense_operator, ground, moved, scene
 
 STEP, THETA = 2e-3, 0.75

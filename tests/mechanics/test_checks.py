@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mechanics.checks import check_corners, finite, sane
-from mechanics.scene import Block, Fidelity
+from mechanics.scene.scene import Block, Fidelity
+from mechanics.stones.validation import check_corners, finite, sane
 from moma.errors import SceneError
 
 CUBE = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])

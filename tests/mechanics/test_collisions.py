@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.model import build_model
-from mechanics.observers.energy import EnergyBalance, kinetic_energy
-from mechanics.scene import Block, ContactSettings, Fidelity, SolverSettings
+from mechanics.dynamics.observers.energy import EnergyBalance, kinetic_energy
+from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.model.model import build_model
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import Block, ContactSettings, Fidelity, SolverSettings
 from mechanics.simulate import simulate
-from mechanics.simulation import Clock, Simulation
 from tests.mechanics.shapes import LIMESTONE, brick, ground, pile, random_stone, scene
 
 THETAS = pytest.mark.parametrize("theta", [0.5, 0.75, 1.0])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mechanics.contact_patches import patch_pressure
+from mechanics.results.patch_pressure import patch_pressure
 
 
 def grid(n=8):

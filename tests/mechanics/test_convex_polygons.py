@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
-from mechanics.convex_polygons import following, moments, overlaps
+from mechanics.stones.convex_polygons import following, moments, overlaps
 from tests.mechanics import polygons
 
 

@@ -7,13 +7,13 @@ import pytest
 
 from benchmarks.cost import fitted
 from benchmarks.cost_scenes import KINDS, Case
-from mechanics.amounts import Amounts
-from mechanics.cost import expected_cost, machine_slowness, measures
-from mechanics.cost_rates import RATES, Rate
-from mechanics.loads.gravity import GravityRamp
-from mechanics.loads.load import Loads
-from mechanics.plan import plan
-from mechanics.scene import Fidelity, Scene, Start, TimeSettings
+from mechanics.results.forecast.cost import expected_cost, machine_slowness, measures
+from mechanics.results.forecast.cost_rates import RATES, Rate
+from mechanics.results.forecast.plan import plan
+from mechanics.results.forecast.workload import Amounts
+from mechanics.scene.loads.gravity import GravityRamp
+from mechanics.scene.loads.load import Loads
+from mechanics.scene.scene import Fidelity, Scene, Start, TimeSettings
 from tests.validation.scenes import box, ground
 
 

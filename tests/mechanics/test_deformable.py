@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from mechanics.bodies.deformable import Compliance, deformable
-from mechanics.bodies.dissection import dissection
-from mechanics.elasticity import from_voigt, von_mises
-from mechanics.meshing.gmsh_mesher import mesh_with_gmsh
+from mechanics.model.deformable import Compliance, deformable
+from mechanics.model.dissection import dissection
+from mechanics.stones.elasticity import from_voigt, von_mises
+from mechanics.stones.meshing.meshers.gmsh import mesh_with_gmsh
 from tests.mechanics.shapes import LIMESTONE, TURN
 from tests.pipelines.handmade import BOX_FACES, box
 
@@ -133,7 +133,7 @@ def test_an_even_push_moves_the_stone_as_a_whole(stone, response):
 
 
 def test_large_stones_are_factorised_by_dissection_with_the_same_answer(mesh, stone, response, monkeypatch):
-    monkeypatch.setattr("mechanics.bodies.deformable._LARGE", 10)
+    monkeypatch.setattr("mechanics.model.deformable._LARGE", 10)
     push = np.random.default_rng(3).normal(size=(len(mesh.nodes), 3))
     expected = response.respond(push)
     found = Compliance(stone, STEP, THETA).respond(push)

@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from mechanics.contact.contacts import gaps, material_points
 from mechanics.contact.detection import Detector
-from mechanics.model import build_model
-from mechanics.scene import Fidelity
-from mechanics.simulation import Clock, Simulation
+from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.model.model import build_model
+from mechanics.scene.scene import Fidelity
 from tests.mechanics.shapes import TURN, brick, detected, ground, moved, scene
 
 SOFT = Fidelity.DEFORMABLE

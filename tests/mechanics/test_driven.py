@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mechanics.loads.forces import StoneForce
-from mechanics.loads.history import History
-from mechanics.loads.load import Loads, Pose
-from mechanics.model import build_model
-from mechanics.observers.energy import EnergyBalance
-from mechanics.scene import Fidelity, SolverSettings
-from mechanics.simulation import Clock, Simulation
+from mechanics.dynamics.observers.energy import EnergyBalance
+from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.model.model import build_model
+from mechanics.scene.loads.forces import StoneForce
+from mechanics.scene.loads.load import Loads, Pose
+from mechanics.scene.loads.time_series import History
+from mechanics.scene.scene import Fidelity, SolverSettings
 from moma.errors import SceneError
 from tests.mechanics.shapes import brick, ground, scene
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from mechanics.elasticity import (
+from mechanics.stones.elasticity import (
     elastic_operators,
     from_voigt,
     recovery,
@@ -14,8 +14,8 @@ from mechanics.elasticity import (
     to_voigt,
     von_mises,
 )
-from mechanics.meshing.gmsh_mesher import mesh_with_gmsh
-from mechanics.meshing.mesh import tet_mesh
+from mechanics.stones.meshing.mesh import tet_mesh
+from mechanics.stones.meshing.meshers.gmsh import mesh_with_gmsh
 from tests.mechanics.shapes import LIMESTONE, TETRAHEDRON_FACES, TURN
 from tests.pipelines.handmade import BOX_FACES, box, box_mesh
 

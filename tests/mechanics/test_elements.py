@@ -8,14 +8,14 @@ import vtk
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mechanics.meshing.delaunay_mesher import mesh_with_delaunay
-from mechanics.meshing.elements import Element
-from mechanics.meshing.mesh import boundary_facets, solid_mesh
-from mechanics.meshing.mesher import mesh_block
-from mechanics.meshing.quadratic import with_middle_nodes
-from mechanics.meshing.shape_functions import integration, jacobians, reference_points, tabulated
-from mechanics.polyhedra import face_plane, mass_properties
-from mechanics.scene import Block, Fidelity
+from mechanics.scene.scene import Block, Fidelity
+from mechanics.stones.meshing.elements import Element
+from mechanics.stones.meshing.mesh import boundary_facets, solid_mesh
+from mechanics.stones.meshing.meshers.delaunay import mesh_with_delaunay
+from mechanics.stones.meshing.meshers.mesher import mesh_block
+from mechanics.stones.meshing.quadratic import with_middle_nodes
+from mechanics.stones.meshing.shape_functions import integration, jacobians, reference_points, tabulated
+from mechanics.stones.polyhedra import face_plane, mass_properties
 from moma.errors import MeshError, SceneError
 from tests.mechanics.shapes import LIMESTONE, TETRAHEDRON_FACES, TURN, hexahedra, prism, profile
 from tests.pipelines.handmade import BOX_FACES, box
@@ -70,7 +70,7 @@ def test_nodes_of_a_facet_have_the_order_of_vtk_and_look_outwards(element):
 
 @EACH
 def test_shape_functions_belong_to_their_nodes(element):
-    from mechanics.meshing.shape_functions import _evaluate
+    from mechanics.stones.meshing.shape_functions import _evaluate
 
     value, slope = _evaluate(element, reference_points(element).T)
     np.testing.assert_allclose(value, np.eye(element.cell_nodes), atol=1e-12)

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mechanics.elastic_stones import elastic_stones
-from mechanics.meshing.elements import Element
-from mechanics.model import build_model
-from mechanics.scene import Fidelity
-from mechanics.simulation import Clock, Simulation
+from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.model.model import build_model
+from mechanics.model.stone_groups import elastic_stones
+from mechanics.scene.scene import Fidelity
+from mechanics.stones.meshing.elements import Element
 from tests.mechanics.shapes import LIMESTONE, TURN, brick, ground, moved, profile, rectangle, scene
 
 SOFT = Fidelity.DEFORMABLE
@@ -181,7 +181,7 @@ def test_shared_stones_move_as_separate_ones(monkeypatch):
 
     shared, first = run()
 
-    monkeypatch.setattr("mechanics.stone_workshop.translation", lambda first, second: False)
+    monkeypatch.setattr("mechanics.model.stone_meshes.translation", lambda first, second: False)
     separate, second = run()
     assert len(shared.elastic_stones.groups) == 1
     assert len(separate.elastic_stones.groups) == 3

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mechanics.joints import parting
-from mechanics.model import build_model
-from mechanics.scene import Fidelity, Part
+from mechanics.model.model import build_model
+from mechanics.results.joints import parting
+from mechanics.scene.scene import Fidelity, Part
 from mechanics.simulate import simulate
 from tests.mechanics.shapes import BOX_FACES, brick, detected, ground, moved, scene
 from tests.pipelines.handmade import box
@@ -285,7 +285,7 @@ def test_frames_know_velocity_stress_and_contacts(fidelity):
 
 
 def test_a_model_of_balls_has_no_joints():
-    from mechanics.balls import ball
+    from mechanics.model.balls import ball
 
     model, _ = build_model(scene(ground(), brick("a", (0, 0, 0), (1, 1, 1))))
     assert model.rigid_only

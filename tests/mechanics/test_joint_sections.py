@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mechanics.interfaces import Faces
-from mechanics.joint_sections import eccentricity, sections
+from mechanics.results.interfaces import Faces
+from mechanics.results.joint_sections import eccentricity, sections
 
 TURN = Rotation.from_rotvec([0.4, -0.7, 1.1]).as_matrix()
 

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.laws.law import SLIDING, STATE
-from mechanics.laws.mortar import MortarJoint
-from mechanics.laws.table import law_table
-from mechanics.model import build_model
-from mechanics.result import Outcome
-from mechanics.scene import LawRule
+from mechanics.model.model import build_model
+from mechanics.results.result import Outcome
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.laws.law import SLIDING, STATE
+from mechanics.scene.laws.mortar import MortarJoint
+from mechanics.scene.laws.table import law_table
+from mechanics.scene.scene import LawRule
 from mechanics.simulate import simulate
 from moma.errors import SceneError
 from tests.mechanics.laws.one_contact import approach

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mechanics.elasticity import from_voigt, to_voigt
-from mechanics.materials import Material, Orthotropy
+from mechanics.stones.elasticity import from_voigt, to_voigt
+from mechanics.stones.materials import Material, Orthotropy
 from moma.errors import SceneError
 
 # along the bed of a sandstone, across it

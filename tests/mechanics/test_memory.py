@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mechanics.laws.law import BOND, SLIP, STATE
-from mechanics.memory import Memory
-from mechanics.problem import ContactSolution
+from mechanics.dynamics.warm_start import Memory
+from mechanics.problem.problem import ContactSolution
+from mechanics.scene.laws.law import BOND, SLIP, STATE
 
 
 def solution(values):

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mechanics.meshing import mesher as mesher_module
-from mechanics.meshing.choice import Mesher
-from mechanics.meshing.elements import Element
-from mechanics.meshing.mesher import meshed_block
-from mechanics.meshing.soundness import check_meshable, is_convex
-from mechanics.model import build_model
-from mechanics.scene import Block, Fidelity
+from mechanics.model.model import build_model
+from mechanics.scene.scene import Block, Fidelity
+from mechanics.stones.meshing.elements import Element
+from mechanics.stones.meshing.meshers import mesher as mesher_module
+from mechanics.stones.meshing.meshers.choice import Mesher
+from mechanics.stones.meshing.meshers.mesher import meshed_block
+from mechanics.stones.meshing.soundness import check_meshable, is_convex
 from moma.errors import MeshError
 from tests.mechanics.shapes import LIMESTONE, brick, profile, scene
 from tests.mechanics.wild_stones import BOX_FACES, wild_hexahedron

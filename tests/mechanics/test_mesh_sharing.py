@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from mechanics.meshing.congruence import motion, translation
-from mechanics.meshing.elements import Element
-from mechanics.model import build_model
-from mechanics.polyhedra import face_plane
-from mechanics.scene import Block, Fidelity
+from mechanics.model.model import build_model
+from mechanics.scene.scene import Block, Fidelity
+from mechanics.stones.meshing.congruence import motion, translation
+from mechanics.stones.meshing.elements import Element
+from mechanics.stones.polyhedra import face_plane
 from tests.mechanics.shapes import LIMESTONE, TURN, brick, moved, scene
 from tests.mechanics.wild_stones import BOX_FACES, wild_hexahedron, wild_polyhedron
 from tests.pipelines.handmade import box

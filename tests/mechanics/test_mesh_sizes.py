@@ -3,20 +3,20 @@
 import numpy as np
 import pytest
 
-from mechanics.meshing._kernels_sampling import lay_points, size_at
-from mechanics.meshing._kernels_shaping import relax, shape
-from mechanics.meshing.delaunay_mesher import mesh_with_delaunay
-from mechanics.meshing.elements import Element
-from mechanics.meshing.gmsh_mesher import mesh_with_gmsh
-from mechanics.meshing.hexahedral_mesher import mesh_with_hexahedra
-from mechanics.meshing.mesh import tet_mesh
-from mechanics.meshing.quality import cell_quality, mesh_quality
-from mechanics.meshing.shaping import improved
-from mechanics.meshing.sizes import as_field, graded
-from mechanics.model import build_model
-from mechanics.polyhedra import face_plane
-from mechanics.scene import Fidelity
-from mechanics.touching import touching_faces
+from mechanics.model.model import build_model
+from mechanics.model.touching import touching_faces
+from mechanics.scene.scene import Fidelity
+from mechanics.stones.meshing.elements import Element
+from mechanics.stones.meshing.mesh import tet_mesh
+from mechanics.stones.meshing.meshers._kernels.sampling import lay_points, size_at
+from mechanics.stones.meshing.meshers._kernels.shaping import relax, shape
+from mechanics.stones.meshing.meshers.delaunay import mesh_with_delaunay
+from mechanics.stones.meshing.meshers.gmsh import mesh_with_gmsh
+from mechanics.stones.meshing.meshers.hexahedral import mesh_with_hexahedra
+from mechanics.stones.meshing.quality import cell_quality, mesh_quality
+from mechanics.stones.meshing.shaping import improved
+from mechanics.stones.meshing.sizes import as_field, graded
+from mechanics.stones.polyhedra import face_plane
 from tests.mechanics.shapes import TURN, brick, ground, moved, scene, transformed
 from tests.mechanics.wild_stones import BOX_FACES, wild_hexahedron
 from tests.pipelines.handmade import box
@@ -219,7 +219,7 @@ def test_quality_of_known_cells():
 
 @pytest.mark.parametrize("batch", [1, 100, 100_000])
 def test_qualities_of_many_meshes_are_those_of_each(monkeypatch, batch):
-    monkeypatch.setattr("mechanics.meshing.quality._BATCH", batch)
+    monkeypatch.setattr("mechanics.stones.meshing.quality._BATCH", batch)
     corners = box((0, 0, 0), (0.6, 0.4, 0.3))
     meshes = [mesh_with_delaunay(corners, BOX_FACES, size, "A1") for size in (0.3, 0.1, 0.2)]
     meshes.insert(1, mesh_with_hexahedra(corners, BOX_FACES, 0.1, "A1"))

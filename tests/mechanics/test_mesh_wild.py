@@ -11,14 +11,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mechanics.meshing.corner_hexahedra import mesh_at_corners
-from mechanics.meshing.delaunay_mesher import mesh_with_delaunay
-from mechanics.meshing.elements import Element
-from mechanics.meshing.gmsh_mesher import mesh_with_gmsh
-from mechanics.meshing.hexahedral_mesher import mesh_with_hexahedra
-from mechanics.meshing.mesher import mesh_block
-from mechanics.meshing.quadratic import with_middle_nodes
-from mechanics.scene import Block, Fidelity
+from mechanics.scene.scene import Block, Fidelity
+from mechanics.stones.meshing.elements import Element
+from mechanics.stones.meshing.meshers.corner_hexahedra import mesh_at_corners
+from mechanics.stones.meshing.meshers.delaunay import mesh_with_delaunay
+from mechanics.stones.meshing.meshers.gmsh import mesh_with_gmsh
+from mechanics.stones.meshing.meshers.hexahedral import mesh_with_hexahedra
+from mechanics.stones.meshing.meshers.mesher import mesh_block
+from mechanics.stones.meshing.quadratic import with_middle_nodes
 from moma.errors import MeshError
 from tests.mechanics.shapes import LIMESTONE, profile
 from tests.mechanics.wild_stones import BOX_FACES, hull_volume, wild_hexahedron, wild_polyhedron
@@ -146,9 +146,9 @@ def test_stones_with_a_corner_cut_out_are_filled(cut, depth, size):
 SCRIPT = """
 import hashlib, json, sys
 import numpy as np
-from mechanics.meshing.delaunay_mesher import mesh_with_delaunay
-from mechanics.meshing.gmsh_mesher import mesh_with_gmsh
-from mechanics.meshing.hexahedral_mesher import mesh_with_hexahedra
+from mechanics.stones.meshing.meshers.delaunay import mesh_with_delaunay
+from mechanics.stones.meshing.meshers.gmsh import mesh_with_gmsh
+from mechanics.stones.meshing.meshers.hexahedral import mesh_with_hexahedra
 from tests.mechanics.wild_stones import BOX_FACES, wild_hexahedron
 found = {}
 for seed in map(int, sys.argv[1:]):

@@ -8,14 +8,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mechanics.meshing.choice import Mesher
-from mechanics.meshing.delaunay_mesher import mesh_with_delaunay
-from mechanics.meshing.elements import Element
-from mechanics.meshing.gmsh_mesher import mesh_with_gmsh
-from mechanics.meshing.mesh import boundary_facets, tet_mesh
-from mechanics.meshing.mesher import meshed_block
-from mechanics.polyhedra import face_plane, mass_properties
-from mechanics.scene import Fidelity
+from mechanics.scene.scene import Fidelity
+from mechanics.stones.meshing.elements import Element
+from mechanics.stones.meshing.mesh import boundary_facets, tet_mesh
+from mechanics.stones.meshing.meshers.choice import Mesher
+from mechanics.stones.meshing.meshers.delaunay import mesh_with_delaunay
+from mechanics.stones.meshing.meshers.gmsh import mesh_with_gmsh
+from mechanics.stones.meshing.meshers.mesher import meshed_block
+from mechanics.stones.polyhedra import face_plane, mass_properties
 from moma.errors import MeshError, MissingLibraryError
 from tests.mechanics.shapes import TETRAHEDRON_FACES, TURN, brick, hexahedra
 from tests.pipelines.handmade import BOX_FACES, box

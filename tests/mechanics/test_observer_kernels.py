@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mechanics.observers._kernels import largest_displacement, largest_speed
+from mechanics.dynamics.observers._kernels import largest_displacement, largest_speed
 
 FIRST = np.array([0, 8, 12, 18])
 

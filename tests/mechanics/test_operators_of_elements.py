@@ -8,7 +8,8 @@ import skfem
 from scipy.spatial.transform import Rotation
 from skfem.helpers import ddot, dot, eye, sym_grad, trace
 
-from mechanics.elasticity import (
+from mechanics.scene.scene import Block, Fidelity
+from mechanics.stones.elasticity import (
     elastic_operators,
     node_volumes,
     recovery,
@@ -16,11 +17,10 @@ from mechanics.elasticity import (
     stress_error,
     to_voigt,
 )
-from mechanics.materials import Material, Orthotropy
-from mechanics.meshing.elements import Element
-from mechanics.meshing.mesher import mesh_block
-from mechanics.polyhedra import mass_properties
-from mechanics.scene import Block, Fidelity
+from mechanics.stones.materials import Material, Orthotropy
+from mechanics.stones.meshing.elements import Element
+from mechanics.stones.meshing.meshers.mesher import mesh_block
+from mechanics.stones.polyhedra import mass_properties
 from tests.mechanics.shapes import LIMESTONE
 from tests.pipelines.handmade import BOX_FACES, box
 
@@ -161,7 +161,7 @@ def test_large_stones_are_assembled_in_parts(element, monkeypatch):
     mesh = leaning(element)
     whole = elastic_operators(mesh, BEDDED).stiffness
     assert len(mesh.cells) >= 4
-    monkeypatch.setattr("mechanics.elasticity.operators._PAIRS_AT_ONCE", 3 * element.cell_nodes**2)
+    monkeypatch.setattr("mechanics.stones.elasticity.operators._PAIRS_AT_ONCE", 3 * element.cell_nodes**2)
     parts = elastic_operators(mesh, BEDDED).stiffness
     assert abs(whole - parts).max() < 1e-14 * abs(whole).max()
     for matrix in (whole, parts):

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from mechanics.contact.contacts import gaps, material_points
-from mechanics.meshing.elements import Element
-from mechanics.model import build_model
-from mechanics.polyhedra import mass_properties
-from mechanics.result import Outcome
-from mechanics.scene import Fidelity, Part
+from mechanics.model.model import build_model
+from mechanics.results.result import Outcome
+from mechanics.scene.scene import Fidelity, Part
 from mechanics.simulate import simulate
+from mechanics.stones.meshing.elements import Element
+from mechanics.stones.polyhedra import mass_properties
 from moma.errors import GeometryError
 from tests.mechanics.shapes import (
     TURN,

@@ -2,9 +2,9 @@
 
 import pytest
 
-from mechanics.materials import Material
-from mechanics.plan import plan
-from mechanics.scene import Block, Fidelity, Scene
+from mechanics.results.forecast.plan import plan
+from mechanics.scene.scene import Block, Fidelity, Scene
+from mechanics.stones.materials import Material
 from tests.pipelines.handmade import BOX_FACES, box
 
 STONE = Material("stone", 2000.0, 1e10, 0.2)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from scipy.spatial import ConvexHull
 
-from mechanics.polyhedra import face_plane, fan, mass_properties, smallest_width
+from mechanics.stones.polyhedra import face_plane, fan, mass_properties, smallest_width
 from moma.errors import GeometryError
 from tests.mechanics.shapes import TETRAHEDRON_FACES, TURN, hexahedra
 from tests.pipelines.handmade import BOX_FACES, box

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mechanics.checks import LARGEST, SMALLEST
-from mechanics.operators.stored import StoredDelassus
-from mechanics.problem import ContactProblem
+from mechanics.delassus.stored import StoredDelassus
+from mechanics.problem.problem import ContactProblem
+from mechanics.stones.validation import LARGEST, SMALLEST
 from moma.errors import SolverError
 
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from mechanics.elasticity import recovery
-from mechanics.elasticity.stress import SAMPLE_ORDER
-from mechanics.meshing.elements import Element
-from mechanics.meshing.mesher import mesh_block
-from mechanics.meshing.shape_functions import integration
-from mechanics.scene import Block, Fidelity
+from mechanics.scene.scene import Block, Fidelity
+from mechanics.stones.elasticity import recovery
+from mechanics.stones.elasticity.stress import SAMPLE_ORDER
+from mechanics.stones.meshing.elements import Element
+from mechanics.stones.meshing.meshers.mesher import mesh_block
+from mechanics.stones.meshing.shape_functions import integration
 from tests.mechanics.shapes import LIMESTONE, TURN, hexahedra
 from tests.pipelines.handmade import BOX_FACES, box
 

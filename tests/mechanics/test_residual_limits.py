@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from mechanics.operators.stored import StoredDelassus
-from mechanics.problem import ContactProblem
-from mechanics.residual import residual
+from mechanics.delassus.stored import StoredDelassus
+from mechanics.problem.problem import ContactProblem
+from mechanics.problem.residual import residual
 
 
 def contradiction(u_free, bias):

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from mechanics.materials import Material
-from mechanics.model import build_model
-from mechanics.scene import Block, ContactSettings, Fidelity, Scene
+from mechanics.model.model import build_model
+from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene
+from mechanics.stones.materials import Material
 from moma.errors import GeometryError, SceneError
 from tests.mechanics.shapes import LIMESTONE, TURN, brick, ground, moved, scene
 from tests.pipelines.handmade import BOX_FACES, box

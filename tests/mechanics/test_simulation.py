@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mechanics.model import build_model
-from mechanics.observers.energy import EnergyBalance, elastic_energy, kinetic_energy
-from mechanics.observers.equilibrium import displacement, imbalance, speed, support_reaction
-from mechanics.result import Outcome
-from mechanics.scene import Fidelity, SolverSettings
+from mechanics.dynamics.observers.energy import EnergyBalance, elastic_energy, kinetic_energy
+from mechanics.dynamics.observers.equilibrium import displacement, imbalance, speed, support_reaction
+from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.model.model import build_model
+from mechanics.results.result import Outcome
+from mechanics.scene.scene import Fidelity, SolverSettings
 from mechanics.simulate import simulate
-from mechanics.simulation import Clock, Simulation
 from tests.mechanics.shapes import TURN, brick, ground, moved, pile, scene
 
 SOFT = Fidelity.DEFORMABLE

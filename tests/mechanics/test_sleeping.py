@@ -5,18 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.loads.forces import StoneForce
-from mechanics.loads.gravity import TiltingTable
-from mechanics.loads.history import History
-from mechanics.loads.load import Loads
-from mechanics.loads.motions import settlement
-from mechanics.model import build_model
-from mechanics.observers.equilibrium import imbalance, support_reaction
-from mechanics.result import Outcome
-from mechanics.scene import ContactSettings, Scene, TimeSettings
+from mechanics.dynamics.observers.equilibrium import imbalance, support_reaction
+from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.model.model import build_model
+from mechanics.results.result import Outcome
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.loads.forces import StoneForce
+from mechanics.scene.loads.gravity import TiltingTable
+from mechanics.scene.loads.load import Loads
+from mechanics.scene.loads.motions import settlement
+from mechanics.scene.loads.time_series import History
+from mechanics.scene.scene import ContactSettings, Scene, TimeSettings
 from mechanics.simulate import simulate
-from mechanics.simulation import Clock, Simulation
 from moma.errors import SceneError
 from tests.validation.scenes import G, box, ground, moved, rotation, tilted_gravity
 

@@ -5,21 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mechanics.laws.mortar import MortarJoint
-from mechanics.operators.rigid import RigidDelassus
-from mechanics.problem import ContactStart
-from mechanics.residual import natural_map, residual
-from mechanics.scene import ContactSettings, Fidelity, Method, Placement, SolverSettings
-from mechanics.solvers.admm import ADMM
-from mechanics.solvers.alternating import Alternating
-from mechanics.solvers.anderson import Anderson
-from mechanics.solvers.apgd import APGD
-from mechanics.solvers.auto import Auto
+from mechanics.delassus.rigid import RigidDelassus
+from mechanics.problem.problem import ContactStart
+from mechanics.problem.residual import natural_map, residual
+from mechanics.scene.laws.mortar import MortarJoint
+from mechanics.scene.scene import ContactSettings, Fidelity, Method, Placement, SolverSettings
 from mechanics.solvers.choice import choose_planar_solver, choose_solver
-from mechanics.solvers.cone_program import ConeProgram
-from mechanics.solvers.interior_point import InteriorPoint
-from mechanics.solvers.newton import Newton
-from mechanics.solvers.nsgs import NSGS
+from mechanics.solvers.first_order.admm import ADMM
+from mechanics.solvers.first_order.anderson import Anderson
+from mechanics.solvers.first_order.apgd import APGD
+from mechanics.solvers.first_order.nsgs import NSGS
+from mechanics.solvers.second_order.cone_program import ConeProgram
+from mechanics.solvers.second_order.interior_point import InteriorPoint
+from mechanics.solvers.second_order.newton import Newton
+from mechanics.solvers.strategies.auto import Auto
+from mechanics.solvers.strategies.rigid import Alternating
 from moma.errors import SolverError
 from tests.mechanics.shapes import brick, ground, posed, scene
 

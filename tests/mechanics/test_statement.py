@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from mechanics.contact.contacts import gaps
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.laws.law import BOND, STATE
-from mechanics.laws.mortar import MortarJoint, held_tension
-from mechanics.laws.status import contact_status
-from mechanics.problem import ContactStart
-from mechanics.scene import ContactSettings, LawRule
-from mechanics.solvers.nsgs import NSGS
-from mechanics.statement import state_laws
-from mechanics.stepping import free_kick
+from mechanics.dynamics.contact_laws import state_laws
+from mechanics.dynamics.stepping import free_kick
+from mechanics.problem.problem import ContactStart
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.laws.law import BOND, STATE
+from mechanics.scene.laws.mortar import MortarJoint, held_tension
+from mechanics.scene.laws.status import contact_status
+from mechanics.scene.scene import ContactSettings, LawRule
+from mechanics.solvers.first_order.nsgs import NSGS
 from tests.mechanics.shapes import TURN, brick, ground, posed, scene, transformed
 
 STEP = 2e-3

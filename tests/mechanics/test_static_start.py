@@ -6,20 +6,20 @@ from functools import cache
 import numpy as np
 import pytest
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.loads.gravity import GravityRamp, TiltingTable
-from mechanics.loads.history import History
-from mechanics.loads.load import Loads
-from mechanics.loads.motions import ImposedMotion
-from mechanics.memory import Memory
-from mechanics.meshing.elements import Element
-from mechanics.model import build_model
-from mechanics.observers.equilibrium import speed, support_reaction
-from mechanics.problem import ContactSolution
-from mechanics.scene import ContactSettings, Fidelity, SolverSettings, Start
+from mechanics.dynamics.observers.equilibrium import speed, support_reaction
+from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.dynamics.static_start import static_start
+from mechanics.dynamics.warm_start import Memory
+from mechanics.model.model import build_model
+from mechanics.problem.problem import ContactSolution
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.loads.gravity import GravityRamp, TiltingTable
+from mechanics.scene.loads.load import Loads
+from mechanics.scene.loads.motions import ImposedMotion
+from mechanics.scene.loads.time_series import History
+from mechanics.scene.scene import ContactSettings, Fidelity, SolverSettings, Start
 from mechanics.simulate import simulate
-from mechanics.simulation import Clock, Simulation
-from mechanics.static_start import static_start
+from mechanics.stones.meshing.elements import Element
 from tests.mechanics.shapes import TURN, brick, ground, scene, transformed
 
 HARD, SOFT = Fidelity.RIGID, Fidelity.DEFORMABLE

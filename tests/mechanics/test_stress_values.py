@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mechanics.materials import Material
-from mechanics.stress_values import stress_values, utilisation, volume_quantile
+from mechanics.results.stress_values import stress_values, utilisation, volume_quantile
+from mechanics.stones.materials import Material
 
 STONE = Material("stone", 2000.0, 1e10, 0.2)
 STRONG = replace(STONE, tensile_strength=2e6, compressive_strength=20e6)

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from mechanics.meshing.elements import Element
+from mechanics.stones.meshing.elements import Element
 from moma.cli import app
 from pipelines import trade as trade_module
 from pipelines.ingest import ingest

@@ -4,14 +4,9 @@ import itertools
 
 import numpy as np
 
-from mechanics.contact_result import ContactResult, JointResult
-from mechanics.elasticity import node_volumes, principal
-from mechanics.elasticity import von_mises as equivalent_stress
-from mechanics.materials import Material
-from mechanics.meshing.elements import Element
-from mechanics.meshing.mesh import SolidMesh
-from mechanics.postprocess import surface_polygons
-from mechanics.result import (
+from mechanics.results.contact_result import ContactResult, JointResult
+from mechanics.results.postprocess import surface_polygons
+from mechanics.results.result import (
     BodyResult,
     Energies,
     Errors,
@@ -20,8 +15,13 @@ from mechanics.result import (
     Outcome,
     Result,
 )
-from mechanics.scene import Block, Fidelity, Scene
-from mechanics.stress_values import stress_values
+from mechanics.results.stress_values import stress_values
+from mechanics.scene.scene import Block, Fidelity, Scene
+from mechanics.stones.elasticity import node_volumes, principal
+from mechanics.stones.elasticity import von_mises as equivalent_stress
+from mechanics.stones.materials import Material
+from mechanics.stones.meshing.elements import Element
+from mechanics.stones.meshing.mesh import SolidMesh
 
 LIMESTONE = Material("limestone", density=2000.0, young=1e10, poisson=0.2)
 BOX_FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))

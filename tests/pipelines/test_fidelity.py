@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mechanics.scene import Fidelity
+from mechanics.scene.scene import Fidelity
 from pipelines.fidelity import Wishes, modelled, neighbours
 from survey.joints.report import Joint
 

@@ -5,7 +5,7 @@ import csv
 import numpy as np
 import pytest
 
-from mechanics.materials import Material
+from mechanics.stones.materials import Material
 from pipelines.joint_table import JOINT_COLUMNS, write_joints
 from pipelines.stone_values import stone_results
 from pipelines.summary import summarise

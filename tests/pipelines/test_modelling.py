@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from archmodel.database.session import open_database
 from archmodel.tables.entities import Entity
 from archmodel.tables.surveys import Measurement
-from mechanics.scene import Fidelity
+from mechanics.scene.scene import Fidelity
 from mechanics.simulate import simulate
 from moma.cli import app
 from moma.errors import SceneError

@@ -11,10 +11,10 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from mechanics.meshing.elements import Element
-from mechanics.meshing.mesher import mesh_block
-from mechanics.result import Outcome
-from mechanics.scene import Block, Fidelity
+from mechanics.results.result import Outcome
+from mechanics.scene.scene import Block, Fidelity
+from mechanics.stones.meshing.elements import Element
+from mechanics.stones.meshing.meshers.mesher import mesh_block
 from moma.errors import MissingLibraryError
 from pipelines import pictures
 from pipelines.drawing import colouring

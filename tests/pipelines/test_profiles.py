@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from benchmarks.masonry import column, courses, running_bond, semicircular_arch
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.meshing.elements import Element
-from mechanics.scene import ContactSettings, Fidelity, Scene, Start, TimeSettings
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import ContactSettings, Fidelity, Scene, Start, TimeSettings
 from mechanics.simulate import simulate
+from mechanics.stones.meshing.elements import Element
 from moma.cli.options import ProfileName
 from moma.errors import UsageError
 from pipelines.overlay import Overlay, overlaid, overlaid_scene

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mechanics.result import Outcome
-from mechanics.scene import Fidelity
+from mechanics.results.result import Outcome
+from mechanics.scene.scene import Fidelity
 from pipelines.quantities import QUANTITIES, Quantities, differences, quantities, quantities_from
 from tests.pipelines.handmade import deformable_body, result_of, rigid_body
 

@@ -10,8 +10,8 @@ import pytest
 from archmodel.database.session import open_database
 from archmodel.query.api import describe, find_rows
 from archmodel.store.run_record import STONE_VALUES
-from mechanics.result import Outcome
-from mechanics.scene import Fidelity
+from mechanics.results.result import Outcome
+from mechanics.scene.scene import Fidelity
 from moma.errors import MissingLibraryError, SceneError, UsageError
 from pipelines import run as run_module
 from pipelines.assemble import assemble

@@ -9,7 +9,7 @@ from archmodel.describe.trace import trace
 from archmodel.tables.entities import Entity
 from archmodel.tables.runs import ContactPoint, EntityResult, JointResult, Run
 from archmodel.tables.surveys import Simplification
-from mechanics.scene import Fidelity
+from mechanics.scene.scene import Fidelity
 from pipelines import run as run_module
 from pipelines.assemble import assemble
 from pipelines.ingest import ingest

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from archmodel.database.session import open_database
-from mechanics.laws.cohesive_zone import CohesiveZone
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.laws.lennard_jones import LennardJones
-from mechanics.laws.mortar import MortarJoint
-from mechanics.meshing.elements import Element
-from mechanics.polyhedra import mass_properties
-from mechanics.scene import Block, Fidelity, Placement
+from mechanics.scene.laws.cohesive_zone import CohesiveZone
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.laws.lennard_jones import LennardJones
+from mechanics.scene.laws.mortar import MortarJoint
+from mechanics.scene.scene import Block, Fidelity, Placement
+from mechanics.stones.meshing.elements import Element
+from mechanics.stones.polyhedra import mass_properties
 from moma.errors import SceneError
 from pipelines.assemble import assemble
 from pipelines.check import check_scene

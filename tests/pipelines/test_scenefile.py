@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.meshing.elements import Element
-from mechanics.scene import ContactSettings, SolverSettings, Start, TimeSettings
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import ContactSettings, SolverSettings, Start, TimeSettings
+from mechanics.stones.meshing.elements import Element
 from moma.errors import MomaError, SceneError, UsageError
 from pipelines.record_file import parse_record
 from pipelines.scene_keys import TABLES

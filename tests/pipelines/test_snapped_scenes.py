@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from archmodel.database.session import open_database
-from mechanics.polyhedra import mass_properties
+from mechanics.stones.polyhedra import mass_properties
 from pipelines.assemble import assemble
 from pipelines.ingest import ingest
 from pipelines.kind_rules import kind_rules

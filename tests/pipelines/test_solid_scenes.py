@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from archmodel.database.session import open_database
-from mechanics.polyhedra import mass_properties
+from mechanics.stones.polyhedra import mass_properties
 from pipelines.assemble import assemble
 from pipelines.check import check_scene
 from pipelines.ingest import ingest

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mechanics.meshing.elements import Element
+from mechanics.stones.meshing.elements import Element
 from pipelines.overlay import Overlay
 from pipelines.trade_forecast import Forecast, left_out, next_run
 from pipelines.trade_grid import Setting

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mechanics.meshing.elements import Element
+from mechanics.stones.meshing.elements import Element
 from pipelines.overlay import Overlay
 from pipelines.quantities import QUANTITIES, Quantities, StoneQuantities
 from pipelines.trade_front import Judged, Reference, cheapest, front, judge, models_of_interest

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mechanics.materials import Material
-from mechanics.meshing.elements import Element
-from mechanics.scene import Block, Fidelity, Method, Placement
+from mechanics.scene.scene import Block, Fidelity, Method, Placement
+from mechanics.stones.materials import Material
+from mechanics.stones.meshing.elements import Element
 from pipelines.overlay import Overlay, overlaid
 from pipelines.scenefile import parse_scene
 from pipelines.trade_child import overlay_from, overlay_record

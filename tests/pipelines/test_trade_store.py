@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mechanics.loads.gravity import TiltingTable
-from mechanics.loads.load import Loads
-from mechanics.scene import Fidelity, Method, Scene
+from mechanics.scene.loads.gravity import TiltingTable
+from mechanics.scene.loads.load import Loads
+from mechanics.scene.scene import Fidelity, Method, Scene
 from moma.errors import UsageError
 from pipelines.overlay import Overlay
 from pipelines.trade_store import Measured, Status, Store, study_key

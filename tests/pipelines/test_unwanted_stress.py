@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mechanics.scene import Fidelity
+from mechanics.scene.scene import Fidelity
 from pipelines.pictures import missing
 from pipelines.stone_values import stone_results, stress_statistics
 from pipelines.summary import summarise

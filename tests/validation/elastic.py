@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scenes import CORNERS, FACES, G
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.laws.law import Law
-from mechanics.materials import Material
-from mechanics.meshing.elements import Element
-from mechanics.model import Model, build_model
-from mechanics.scene import Block, ContactSettings, Fidelity, Scene, SolverSettings, TimeSettings
+from mechanics.dynamics.simulation import Clock, Simulation, Step
+from mechanics.model.model import Model, build_model
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.laws.law import Law
+from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene, SolverSettings, TimeSettings
 from mechanics.simulate import simulate
-from mechanics.simulation import Clock, Simulation, Step
+from mechanics.stones.materials import Material
+from mechanics.stones.meshing.elements import Element
 
 Array = NDArray[np.float64]
 

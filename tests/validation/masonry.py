@@ -8,8 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from mechanics.materials import Material
-from mechanics.scene import Block, Fidelity, Part
+from mechanics.scene.scene import Block, Fidelity, Part
+from mechanics.stones.materials import Material
 
 DENSITY = 2000.0
 STONE = Material("stone", DENSITY, young=1e10, poisson=0.2)

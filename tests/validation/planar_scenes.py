@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from mechanics.laws.dry_joint import DryJoint
+from mechanics.dynamics.simulation import Clock
 from mechanics.planar.model import build_planar_model
 from mechanics.planar.scene import Disk, PlanarScene, PlanarTime, Wall
 from mechanics.planar.simulate import simulate_planar
 from mechanics.planar.simulation import PlanarSimulation
-from mechanics.scene import Method, SolverSettings
-from mechanics.simulation import Clock
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import Method, SolverSettings
 
 __all__ = ["FLOOR", "G", "ball", "run", "start", "steps_of"]
 

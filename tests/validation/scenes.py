@@ -6,11 +6,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.materials import Material
-from mechanics.model import Model, build_model
-from mechanics.scene import Block, ContactSettings, Fidelity, Method, Scene, SolverSettings, TimeSettings
-from mechanics.simulation import Clock, Simulation, Step
+from mechanics.dynamics.simulation import Clock, Simulation, Step
+from mechanics.model.model import Model, build_model
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import (
+    Block,
+    ContactSettings,
+    Fidelity,
+    Method,
+    Scene,
+    SolverSettings,
+    TimeSettings,
+)
+from mechanics.stones.materials import Material
 
 Array = NDArray[np.float64]
 

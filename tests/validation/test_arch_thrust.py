@@ -10,11 +10,11 @@ from limit_analysis import thrust_bounds
 from masonry import semicircular_arch
 from verdict import hold, report, stands
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.loads.load import Loads
-from mechanics.loads.motions import spreading
-from mechanics.result import Outcome
-from mechanics.scene import ContactSettings, Scene, SolverSettings, TimeSettings
+from mechanics.results.result import Outcome
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.loads.load import Loads
+from mechanics.scene.loads.motions import spreading
+from mechanics.scene.scene import ContactSettings, Scene, SolverSettings, TimeSettings
 from mechanics.simulate import simulate
 
 COUNT, FRICTION = 27, 1.0

@@ -10,12 +10,12 @@ No stone rests on a strip of 3 cm or less: of that, noise and open joints leave 
 import numpy as np
 import pytest
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.materials import Material
-from mechanics.meshing.elements import Element
-from mechanics.result import Outcome
-from mechanics.scene import Block, ContactSettings, Fidelity, Scene, SolverSettings, Start, TimeSettings
+from mechanics.results.result import Outcome
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene, SolverSettings, Start, TimeSettings
 from mechanics.simulate import simulate
+from mechanics.stones.materials import Material
+from mechanics.stones.meshing.elements import Element
 from survey.joints.close import close_joints
 from survey.synthetic.buildings.openings import Arch
 from survey.synthetic.buildings.quoins import corner

@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 from scenes import G, box, ground, tilted_gravity
 
-from mechanics.laws.cohesive_zone import CohesiveZone
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.laws.law import BOND
-from mechanics.laws.mortar import MortarJoint
-from mechanics.loads.forces import StoneForce
-from mechanics.loads.history import History
-from mechanics.loads.load import Loads
-from mechanics.materials import Material
-from mechanics.model import build_model
-from mechanics.scene import ContactSettings, Fidelity, LawRule, Placement, Scene, TimeSettings
-from mechanics.simulation import Clock, Simulation
+from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.model.model import build_model
+from mechanics.scene.laws.cohesive_zone import CohesiveZone
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.laws.law import BOND
+from mechanics.scene.laws.mortar import MortarJoint
+from mechanics.scene.loads.forces import StoneForce
+from mechanics.scene.loads.load import Loads
+from mechanics.scene.loads.time_series import History
+from mechanics.scene.scene import ContactSettings, Fidelity, LawRule, Placement, Scene, TimeSettings
+from mechanics.stones.materials import Material
 
 STEP = 1e-3
 

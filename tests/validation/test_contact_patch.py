@@ -10,10 +10,10 @@ import pytest
 from elastic import elastic_box, joint_force, resting
 from scenes import CORNERS, FACES, G, box, ground
 
-from mechanics.materials import Material
-from mechanics.meshing.elements import Element
-from mechanics.result import Outcome
-from mechanics.scene import Block, Fidelity
+from mechanics.results.result import Outcome
+from mechanics.scene.scene import Block, Fidelity
+from mechanics.stones.materials import Material
+from mechanics.stones.meshing.elements import Element
 
 SOFT = Material("soft", density=1e2, young=1e9, poisson=0.0)
 # the plate weighs 3,000 times as much as a block: a balance of 0.1 of a block's weight is one of 3·10⁻⁵ of the load

@@ -5,9 +5,9 @@ import pytest
 from elastic import base_force, elastic_box, inner, joint_force, mean_between, mean_stress, resting
 from scenes import G, ground
 
-from mechanics.materials import Material
-from mechanics.meshing.elements import Element
-from mechanics.result import Outcome
+from mechanics.results.result import Outcome
+from mechanics.stones.materials import Material
+from mechanics.stones.meshing.elements import Element
 
 COUNT, SIDE, RISE = 10, 0.5, 0.3
 HEIGHT = COUNT * RISE

@@ -5,12 +5,12 @@ import pytest
 from elastic import base_force, elastic_box
 from scenes import G, box, ground
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.materials import Material
-from mechanics.meshing.elements import Element
-from mechanics.result import Outcome
-from mechanics.scene import ContactSettings, Fidelity, Scene, SolverSettings, Start, TimeSettings
+from mechanics.results.result import Outcome
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import ContactSettings, Fidelity, Scene, SolverSettings, Start, TimeSettings
 from mechanics.simulate import simulate
+from mechanics.stones.materials import Material
+from mechanics.stones.meshing.elements import Element
 from moma.errors import MomaError
 
 DENSITY = 2000.0

@@ -5,15 +5,15 @@ import pytest
 from elastic import elastic_box
 from scenes import G, box, ground
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.laws.mortar import MortarJoint
-from mechanics.loads.forces import StoneForce
-from mechanics.loads.gravity import GravityRamp
-from mechanics.loads.history import History
-from mechanics.loads.load import Loads
-from mechanics.materials import Material
-from mechanics.scene import ContactSettings, LawRule, Scene, SolverSettings, TimeSettings
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.laws.mortar import MortarJoint
+from mechanics.scene.loads.forces import StoneForce
+from mechanics.scene.loads.gravity import GravityRamp
+from mechanics.scene.loads.load import Loads
+from mechanics.scene.loads.time_series import History
+from mechanics.scene.scene import ContactSettings, LawRule, Scene, SolverSettings, TimeSettings
 from mechanics.simulate import simulate
+from mechanics.stones.materials import Material
 
 # μq = 2 kN/m and P = 0.4 m · μq, in the proportions of F15: q = ρ g A. Friction at the foot bends the bar and shifts
 # μq h/2 of its weight from the end of the slip to its beginning: 0.6 % of P here, 2.5 % for a bar of 4 cm

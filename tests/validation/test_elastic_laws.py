@@ -7,16 +7,16 @@ import pytest
 from elastic import elastic_box, elastic_follow, joint_force
 from scenes import G, box, ground, tilted_gravity
 
-from mechanics.laws.cohesive_zone import CohesiveZone
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.laws.mortar import MortarJoint
-from mechanics.loads.forces import StoneForce
-from mechanics.loads.gravity import GravityRamp
-from mechanics.loads.history import History
-from mechanics.loads.load import Loads
-from mechanics.materials import Material
-from mechanics.scene import ContactSettings, Fidelity, LawRule, Scene, SolverSettings, TimeSettings
+from mechanics.scene.laws.cohesive_zone import CohesiveZone
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.laws.mortar import MortarJoint
+from mechanics.scene.loads.forces import StoneForce
+from mechanics.scene.loads.gravity import GravityRamp
+from mechanics.scene.loads.load import Loads
+from mechanics.scene.loads.time_series import History
+from mechanics.scene.scene import ContactSettings, Fidelity, LawRule, Scene, SolverSettings, TimeSettings
 from mechanics.simulate import simulate
+from mechanics.stones.materials import Material
 
 MATERIAL = Material("stone", density=2000.0, young=1e9, poisson=0.2, stiffness_damping=1e-4)
 NO_WIDENING = Material("stone", density=2000.0, young=1e9, poisson=0.0, stiffness_damping=1e-4)

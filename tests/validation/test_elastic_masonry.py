@@ -5,11 +5,11 @@ import pytest
 from elastic import ELEMENTS, base_force, elastic_box, joint_force, mean_stress, resting
 from scenes import G, box, ground
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.materials import Material
-from mechanics.meshing.elements import Element
-from mechanics.result import Outcome
-from mechanics.scene import Fidelity
+from mechanics.results.result import Outcome
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import Fidelity
+from mechanics.stones.materials import Material
+from mechanics.stones.meshing.elements import Element
 
 HEIGHT, WIDTH = 0.6, 0.4
 LEAF, CORE = 0.15, 0.3

@@ -8,11 +8,11 @@ from elastic import resting
 from masonry import semicircular_arch
 from scenes import G, box, ground, moved, rotation, tilted_gravity
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.materials import Material
-from mechanics.meshing.elements import Element
-from mechanics.scene import Block, ContactSettings, Fidelity, Scene, SolverSettings, TimeSettings
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene, SolverSettings, TimeSettings
 from mechanics.simulate import simulate
+from mechanics.stones.materials import Material
+from mechanics.stones.meshing.elements import Element
 
 # from 10 GPa to 10⁴ GPa
 YOUNGS = (1e10, 1e11, 1e12, 1e13)

@@ -5,10 +5,10 @@ import pytest
 from elastic import ELEMENTS, bar, elastic_box, elastic_follow
 from scipy.integrate import solve_ivp
 
-from mechanics.materials import Material
-from mechanics.meshing.elements import Element
-from mechanics.scene import Scene, TimeSettings
+from mechanics.scene.scene import Scene, TimeSettings
 from mechanics.simulate import simulate
+from mechanics.stones.materials import Material
+from mechanics.stones.meshing.elements import Element
 
 YOUNG = 1e10
 STONE = Material("stone", density=2000.0, young=YOUNG, poisson=0.2)

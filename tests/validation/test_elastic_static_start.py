@@ -6,13 +6,13 @@ from elastic import base_force, elastic_box, mean_stress, resting
 from masonry import semicircular_arch
 from scenes import G, box, ground, tilted_gravity
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.laws.mortar import MortarJoint
-from mechanics.materials import Material
-from mechanics.meshing.elements import Element
-from mechanics.result import Outcome
-from mechanics.scene import Block, ContactSettings, Fidelity, Scene, SolverSettings, Start, TimeSettings
+from mechanics.results.result import Outcome
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.laws.mortar import MortarJoint
+from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene, SolverSettings, Start, TimeSettings
 from mechanics.simulate import simulate
+from mechanics.stones.materials import Material
+from mechanics.stones.meshing.elements import Element
 
 STONE = Material("stone", density=2000.0, young=5e9, poisson=0.2)
 

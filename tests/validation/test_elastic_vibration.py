@@ -7,12 +7,12 @@ import pytest
 from elastic import SOFT, bar, elastic_box, elastic_follow
 from scenes import G, box, ground
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.laws.mortar import MortarJoint
-from mechanics.materials import Material
-from mechanics.meshing.elements import Element
-from mechanics.scene import ContactSettings, Scene, SolverSettings, TimeSettings
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.laws.mortar import MortarJoint
+from mechanics.scene.scene import ContactSettings, Scene, SolverSettings, TimeSettings
 from mechanics.simulate import simulate
+from mechanics.stones.materials import Material
+from mechanics.stones.meshing.elements import Element
 
 LENGTH, SIDE = 1.0, 0.0625
 SPEED = np.sqrt(SOFT.young / SOFT.density)

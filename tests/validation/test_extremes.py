@@ -8,11 +8,11 @@ import pytest
 from masonry import bond, running_bond
 from scenes import G, box, dynamic, follow, ground, moved, rotation, tilted_gravity
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.materials import Material
-from mechanics.result import Outcome
-from mechanics.scene import ContactSettings, Method, Scene, SolverSettings, TimeSettings
+from mechanics.results.result import Outcome
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import ContactSettings, Method, Scene, SolverSettings, TimeSettings
 from mechanics.simulate import simulate
+from mechanics.stones.materials import Material
 
 
 def resting(name, blocks, *, friction=0.6, tolerance=1e-12, **time):

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from solids import body_forces, facets_at, grid, norm, solve, strain, traction_forces
 
-from mechanics.elasticity import recovery, sampled_stress
-from mechanics.materials import Material, Orthotropy
-from mechanics.meshing.elements import Element
+from mechanics.stones.elasticity import recovery, sampled_stress
+from mechanics.stones.materials import Material, Orthotropy
+from mechanics.stones.meshing.elements import Element
 
 QUADRATIC = (Element.TET10, Element.HEX20, Element.HEX27)
 

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from solids import ELEMENTS, Waves, body_forces, distorted, grid, norm, solve, strain
 
-from mechanics.elasticity import recovery, sampled_stress, stress_error
-from mechanics.materials import Material, Orthotropy
-from mechanics.meshing.elements import Element
+from mechanics.stones.elasticity import recovery, sampled_stress, stress_error
+from mechanics.stones.materials import Material, Orthotropy
+from mechanics.stones.meshing.elements import Element
 
 ISOTROPIC = Material("waves", 1.0, 1.0, 0.3)
 _AXES = ((0.8, 0.6, 0.0), (-0.6, 0.8, 0.0), (0.0, 0.0, 1.0))

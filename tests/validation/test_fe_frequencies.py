@@ -9,9 +9,9 @@ import pytest
 from scipy.sparse.linalg import eigsh
 from solids import grid
 
-from mechanics.elasticity import elastic_operators
-from mechanics.materials import Material
-from mechanics.meshing.elements import Element
+from mechanics.stones.elasticity import elastic_operators
+from mechanics.stones.materials import Material
+from mechanics.stones.meshing.elements import Element
 
 CUBE = Material("cube", 2500.0, 30e9, 0.2)
 CUBE_FREQUENCIES = np.array([1016.28] * 2 + [1358.32] * 3 + [1388.92] * 3 + [1531.07] * 3 + [1581.139])

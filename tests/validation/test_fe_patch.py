@@ -10,9 +10,9 @@ import pytest
 from scipy.linalg import eigh
 from solids import ELEMENTS, facets_at, grid, shaken, solid, solve, traction_forces
 
-from mechanics.elasticity import elastic_operators, recovery, sampled_stress, stress_error, von_mises
-from mechanics.materials import Material
-from mechanics.meshing.shape_functions import integration
+from mechanics.stones.elasticity import elastic_operators, recovery, sampled_stress, stress_error, von_mises
+from mechanics.stones.materials import Material
+from mechanics.stones.meshing.shape_functions import integration
 
 MATERIAL = Material("patch", density=2.0, young=1e6, poisson=0.25)
 GRADIENT = 0.5e-3 * (np.ones((3, 3)) + np.eye(3))

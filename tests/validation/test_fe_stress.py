@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from solids import facets_at, grid, solve, traction_forces
 
-from mechanics.elasticity import principal, recovery, sampled_stress, von_mises
-from mechanics.materials import Material
-from mechanics.meshing.elements import Element
+from mechanics.stones.elasticity import principal, recovery, sampled_stress, von_mises
+from mechanics.stones.materials import Material
+from mechanics.stones.meshing.elements import Element
 
 # fine enough for 2 % in the stress at the inner surface; tetrahedra of the first order want more
 CYLINDER = {

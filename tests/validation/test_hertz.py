@@ -11,22 +11,30 @@ import pytest
 from scenes import CORNERS, FACES, G, box
 from scipy.optimize import minimize_scalar
 
-from mechanics.balls import ball
 from mechanics.contact.contacts import material_points
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.loads.history import History
-from mechanics.loads.load import Loads
-from mechanics.loads.motions import ImposedMotion
-from mechanics.materials import Material
-from mechanics.meshing.elements import Element
-from mechanics.meshing.mesh import solid_mesh
-from mechanics.meshing.mesher import Meshed
-from mechanics.meshing.quadratic import with_middle_nodes
-from mechanics.model import build_model
-from mechanics.result import Outcome
-from mechanics.scene import Block, ContactSettings, Fidelity, LawRule, Scene, SolverSettings, TimeSettings
+from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.model.balls import ball
+from mechanics.model.model import build_model
+from mechanics.results.result import Outcome
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.loads.load import Loads
+from mechanics.scene.loads.motions import ImposedMotion
+from mechanics.scene.loads.time_series import History
+from mechanics.scene.scene import (
+    Block,
+    ContactSettings,
+    Fidelity,
+    LawRule,
+    Scene,
+    SolverSettings,
+    TimeSettings,
+)
 from mechanics.simulate import simulate
-from mechanics.simulation import Clock, Simulation
+from mechanics.stones.materials import Material
+from mechanics.stones.meshing.elements import Element
+from mechanics.stones.meshing.mesh import solid_mesh
+from mechanics.stones.meshing.meshers.mesher import Meshed
+from mechanics.stones.meshing.quadratic import with_middle_nodes
 
 YOUNG, RADIUS, FORCE = 1e9, 1.0, 1e6
 FEET = frozenset({"foot00", "foot01", "foot10", "foot11"})
@@ -103,7 +111,7 @@ def block_on_feet(monkeypatch, a, per_radius, width, poisson, element):
     x = np.concatenate([-side[:0:-1], side])
     z = -graded(fine, 2 * fine, half, 1.8)[::-1]
     monkeypatch.setattr(
-        "mechanics.stone_workshop.meshed_block",
+        "mechanics.model.stone_meshes.meshed_block",
         lambda block, contact: Meshed(lattice(x, x, z, block), "lattice", ()),
     )
     soft = Material("soft", density=2000.0, young=YOUNG, poisson=poisson)

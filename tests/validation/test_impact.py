@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scenes import G, box, dynamic, follow, ground, moved, rotation
 
-from mechanics.materials import Material
-from mechanics.scene import Block
+from mechanics.scene.scene import Block
+from mechanics.stones.materials import Material
 
 WEIGHTLESS = (0.0, 0.0, 0.0)
 

@@ -11,7 +11,7 @@ import pytest
 from masonry import bond, running_bond, semicircular_arch
 from scenes import G, dynamic, follow, moved, rotation
 
-from mechanics.scene import Method
+from mechanics.scene.scene import Method
 
 TOLERANCE = 1e-6
 STEP = 4e-3

@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 from scenes import G, box, ground
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.loads.accelerogram import Accelerogram
-from mechanics.loads.forces import StoneForce
-from mechanics.loads.gravity import GravityRamp, TiltingTable
-from mechanics.loads.ground_motion import Component, GroundMotion
-from mechanics.loads.history import History
-from mechanics.loads.load import Loads
-from mechanics.loads.motions import ImposedMotion, settlement, spreading
-from mechanics.model import build_model
-from mechanics.result import Outcome
-from mechanics.scene import ContactSettings, Fidelity, Scene, TimeSettings
+from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.model.model import build_model
+from mechanics.results.result import Outcome
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.loads.accelerogram import Accelerogram
+from mechanics.scene.loads.forces import StoneForce
+from mechanics.scene.loads.gravity import GravityRamp, TiltingTable
+from mechanics.scene.loads.ground_motion import Component, GroundMotion
+from mechanics.scene.loads.load import Loads
+from mechanics.scene.loads.motions import ImposedMotion, settlement, spreading
+from mechanics.scene.loads.time_series import History
+from mechanics.scene.scene import ContactSettings, Fidelity, Scene, TimeSettings
 from mechanics.simulate import simulate
-from mechanics.simulation import Clock, Simulation
 
 GROUND = frozenset({"ground"})
 BLOCK = frozenset({"block"})

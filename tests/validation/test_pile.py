@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from masonry import cuboid
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.materials import Material
-from mechanics.result import Outcome
-from mechanics.scene import ContactSettings, Fidelity, Scene, SolverSettings, TimeSettings
+from mechanics.results.result import Outcome
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import ContactSettings, Fidelity, Scene, SolverSettings, TimeSettings
 from mechanics.simulate import simulate
+from mechanics.stones.materials import Material
 
 COUNT, G = 100, 9.81
 # a cube of side 1 m that weighs 1 N

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from planar_scenes import ball, start, steps_of
 
-from mechanics.laws.lennard_jones import LennardJones
+from mechanics.scene.laws.lennard_jones import LennardJones
 
 LAW = LennardJones(friction=0.0, force=10.0, distance=1e-3)
 STEP = 1e-5

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from planar_scenes import G
 
-from mechanics.laws.dry_joint import DryJoint
 from mechanics.planar.scene import Disk, PlanarScene, PlanarTime, Wall
 from mechanics.planar.simulate import simulate_planar
-from mechanics.result import Outcome
-from mechanics.scene import Method, SolverSettings
+from mechanics.results.result import Outcome
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import Method, SolverSettings
 
 SOLVER = SolverSettings(Method.NSGS, tolerance=1e-7, velocity_tolerance=1e-4, max_iterations=5000)
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from planar_scenes import G, ball, run, start, steps_of
 
-from mechanics.laws.dry_joint import DryJoint
 from mechanics.planar.scene import Disk
-from mechanics.result import Outcome
+from mechanics.results.result import Outcome
+from mechanics.scene.laws.dry_joint import DryJoint
 
 
 @pytest.mark.parametrize(("restitution", "zeno"), [(0.5, 1.354571), (0.8, 4.063713)])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from planar_scenes import G, ball, run, start, steps_of
 
-from mechanics.laws.dry_joint import DryJoint
+from mechanics.scene.laws.dry_joint import DryJoint
 
 
 def slope(degrees):

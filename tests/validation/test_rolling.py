@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from mechanics.balls import ball
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.model import build_model
-from mechanics.scene import ContactSettings, Scene, TimeSettings
-from mechanics.simulation import Clock, Simulation
+from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.model.balls import ball
+from mechanics.model.model import build_model
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import ContactSettings, Scene, TimeSettings
 from tests.validation.scenes import STONE, G, ground, tilted_gravity
 
 

@@ -7,9 +7,9 @@ import pytest
 from scenes import G, box, dynamic, follow, moved, rotation
 from scipy.integrate import solve_ivp
 
-from mechanics.loads.load import Loads
-from mechanics.materials import Material
-from mechanics.scene import Block
+from mechanics.scene.loads.load import Loads
+from mechanics.scene.scene import Block
+from mechanics.stones.materials import Material
 
 
 def plate(inertia, velocity=(0.0,) * 6):

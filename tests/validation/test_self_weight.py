@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scenes import G, box, ground
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.materials import Material
-from mechanics.result import Outcome
-from mechanics.scene import ContactSettings, Fidelity, Method, Scene, SolverSettings, TimeSettings
+from mechanics.results.result import Outcome
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import ContactSettings, Fidelity, Method, Scene, SolverSettings, TimeSettings
 from mechanics.simulate import simulate
+from mechanics.stones.materials import Material
 
 HEIGHT, DENSITY, YOUNG = 1.0, 2000.0, 1e9
 

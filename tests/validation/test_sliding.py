@@ -5,8 +5,8 @@ import pytest
 from scenes import STONE, G, box, dynamic, follow, ground, moved, rotation, tilted_gravity
 from scipy.integrate import solve_ivp
 
-from mechanics.result import Outcome
-from mechanics.scene import Block, Method
+from mechanics.results.result import Outcome
+from mechanics.scene.scene import Block, Method
 from mechanics.simulate import simulate
 
 # R01: tan θ_c = μ

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from scipy.sparse import bsr_array
 
-from mechanics.operators.stored import StoredDelassus
-from mechanics.problem import ContactProblem, ContactStart
-from mechanics.residual import natural_map
-from mechanics.solvers.admm import ADMM
-from mechanics.solvers.alternating import Alternating
-from mechanics.solvers.nsgs import NSGS
+from mechanics.delassus.stored import StoredDelassus
+from mechanics.problem.problem import ContactProblem, ContactStart
+from mechanics.problem.residual import natural_map
+from mechanics.solvers.first_order.admm import ADMM
+from mechanics.solvers.first_order.nsgs import NSGS
+from mechanics.solvers.strategies.rigid import Alternating
 
 SOLVERS = {"nsgs": NSGS, "admm": ADMM, "auto": Alternating}
 

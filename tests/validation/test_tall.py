@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from benchmarks.tall import column, first_problem, thick_wall
-from mechanics.problem import ContactStart
-from mechanics.residual import residual
-from mechanics.solvers.alternating import Alternating
-from mechanics.solvers.interior_point import InteriorPoint
+from mechanics.problem.problem import ContactStart
+from mechanics.problem.residual import residual
+from mechanics.solvers.second_order.interior_point import InteriorPoint
+from mechanics.solvers.strategies.rigid import Alternating
 
 G, STEP = 9.81, 1e-3
 STONE = 2400.0

@@ -10,7 +10,7 @@ import pytest
 from masonry import semicircular_arch
 from verdict import hold, report, stands
 
-from mechanics.polyhedra import mass_properties
+from mechanics.stones.polyhedra import mass_properties
 
 # the least t/R of 27 voussoirs is 0.10672; a little more, so that it stands, and its state is all but unique
 COUNT, THICKNESS = 27, 0.1075

@@ -5,11 +5,11 @@ import pytest
 from masonry import cuboid
 from verdict import ALONG, DOWN, TOLERANCE, G, falls, hold, report, stands
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.loads.gravity import TiltingTable
-from mechanics.loads.load import Loads
-from mechanics.result import Outcome
-from mechanics.scene import ContactSettings, Fidelity, Scene, SolverSettings, TimeSettings
+from mechanics.results.result import Outcome
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.loads.gravity import TiltingTable
+from mechanics.scene.loads.load import Loads
+from mechanics.scene.scene import ContactSettings, Fidelity, Scene, SolverSettings, TimeSettings
 from mechanics.simulate import simulate
 
 FRICTION = 0.7

@@ -12,12 +12,12 @@ import pytest
 from masonry import STONE, cuboid
 from verdict import G
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.loads.forces import StoneForce
-from mechanics.loads.history import History
-from mechanics.loads.load import Loads
-from mechanics.result import Outcome
-from mechanics.scene import ContactSettings, Fidelity, Placement, Scene, SolverSettings, TimeSettings
+from mechanics.results.result import Outcome
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.loads.forces import StoneForce
+from mechanics.scene.loads.load import Loads
+from mechanics.scene.loads.time_series import History
+from mechanics.scene.scene import ContactSettings, Fidelity, Placement, Scene, SolverSettings, TimeSettings
 from mechanics.simulate import simulate
 
 SIDE, HEIGHT, WEIGHT, FRICTION = 1.0, 0.2, 0.2, 0.5

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from archmodel.database.session import open_database
-from mechanics.result import Outcome
-from mechanics.scene import Fidelity, Method, SolverSettings, TimeSettings
+from mechanics.results.result import Outcome
+from mechanics.scene.scene import Fidelity, Method, SolverSettings, TimeSettings
 from mechanics.simulate import simulate
 from pipelines.assemble import assemble
 from pipelines.ingest import ingest

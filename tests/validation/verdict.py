@@ -16,9 +16,9 @@ all contact forces is less than a twentieth of the force that some stone lacks f
 
 import numpy as np
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.result import Outcome
-from mechanics.scene import ContactSettings, Fidelity, Method, Scene, SolverSettings, TimeSettings
+from mechanics.results.result import Outcome
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import ContactSettings, Fidelity, Method, Scene, SolverSettings, TimeSettings
 from mechanics.simulate import simulate
 
 G = 9.81

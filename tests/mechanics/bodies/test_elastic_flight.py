@@ -9,13 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from mechanics.bodies._kernels_elastic import deform, rigid_part
-from mechanics.meshing.elements import Element
-from mechanics.model import build_model
-from mechanics.observers.energy import elastic_energy, kinetic_energy
-from mechanics.scene import Fidelity
-from mechanics.simulation import Clock, Simulation
-from mechanics.stepping import predict
+from mechanics.dynamics.observers.energy import elastic_energy, kinetic_energy
+from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.dynamics.stepping import predict
+from mechanics.model._kernels_elastic import deform, rigid_part
+from mechanics.model.model import build_model
+from mechanics.scene.scene import Fidelity
+from mechanics.stones.meshing.elements import Element
 from tests.mechanics.shapes import TURN, brick, ground, moved, scene
 
 SOFT = Fidelity.DEFORMABLE

@@ -7,12 +7,12 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from mechanics.bodies._kernels import fly
-from mechanics.bodies.rigid import RigidInertia, free_flight, inverse_inertia_world
-from mechanics.model import build_model
-from mechanics.observers.energy import kinetic_energy
-from mechanics.simulation import Clock, Simulation
-from mechanics.stepping import free_kick
+from mechanics.dynamics.observers.energy import kinetic_energy
+from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.dynamics.stepping import free_kick
+from mechanics.model._kernels import fly
+from mechanics.model.model import build_model
+from mechanics.model.rigid import RigidInertia, free_flight, inverse_inertia_world
 from tests.mechanics.shapes import TURN, brick, ground, moved, scene
 
 component = st.floats(-1.0, 1.0)

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mechanics.balls import ball
 from mechanics.contact.contacts import gaps, material_points
 from mechanics.contact.detection import Detector
-from mechanics.meshing.elements import Element
-from mechanics.scene import Fidelity
+from mechanics.model.balls import ball
+from mechanics.scene.scene import Fidelity
+from mechanics.stones.meshing.elements import Element
 from tests.mechanics.shapes import LIMESTONE, TURN, brick, detected, moved, scene
 
 SOFT = Fidelity.DEFORMABLE

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from scipy.optimize import nnls
 from scipy.spatial.transform import Rotation
 
-from mechanics.balls import ball
-from mechanics.materials import Material
-from mechanics.scene import Fidelity
+from mechanics.model.balls import ball
+from mechanics.scene.scene import Fidelity
+from mechanics.stones.materials import Material
 from moma.errors import SceneError
 from tests.mechanics.shapes import brick, detected, moved, scene
 

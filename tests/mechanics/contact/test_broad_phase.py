@@ -8,7 +8,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from mechanics.contact import _kernels_broad as kernel
+from mechanics.contact._kernels import broad_phase as kernel
 
 coordinate = st.integers(-128, 128).map(lambda i: i / 64)
 

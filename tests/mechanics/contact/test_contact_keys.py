@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from mechanics.contact.contacts import gaps, material_points
 from mechanics.contact.detection import Detector
-from mechanics.model import build_model
-from mechanics.scene import Fidelity, Placement
+from mechanics.model.model import build_model
+from mechanics.scene.scene import Fidelity, Placement
 from tests.mechanics.shapes import TURN, brick, detected, ground, pile, scene, transformed
 
 seeds = st.integers(0, 2**32 - 1)

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from skfem import ElementQuad1, ElementQuad2, ElementQuadS2, ElementTriP1, ElementTriP2
 
-from mechanics.contact import _kernels_facets as kernel
+from mechanics.contact._kernels import facets as kernel
 from tests.mechanics.contact.faces import KINDS, nodes_of
 
 # scikit-fem's elements of the unit square or triangle, which number mid nodes by edges in their own order

@@ -6,7 +6,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from mechanics.contact import _kernels_narrow as kernel
+from mechanics.contact._kernels import narrow_phase as kernel
 from mechanics.contact.surfaces import surfaces
 from tests.mechanics.polygons import clip, moments, overlap
 from tests.mechanics.shapes import ellipse, prism

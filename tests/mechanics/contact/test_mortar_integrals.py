@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mechanics.contact.contacts import material_points
-from mechanics.contact.elastic_sides import mortar_contacts
-from mechanics.state import State
+from mechanics.contact.mortar_contacts import mortar_contacts
+from mechanics.scene.state import State
 from tests.mechanics.contact.faces import BOTTOM, KINDS, TOP, nodes_of, two_boxes
 from tests.mechanics.polygons import moments, overlap
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mechanics.meshing.elements import Element
-from mechanics.scene import Fidelity
+from mechanics.scene.scene import Fidelity
+from mechanics.stones.meshing.elements import Element
 from tests.mechanics.shapes import brick, detected, scene
 
 SOFT = Fidelity.DEFORMABLE

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
-from mechanics.contact import _kernels_narrow as kernel
+from mechanics.contact._kernels import narrow_phase as kernel
 from mechanics.contact.surfaces import surfaces
 from tests.mechanics.shapes import TURN, random_stone
 from tests.pipelines.handmade import BOX_FACES, box

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mechanics.contact.contacts import gaps, material_points
-from mechanics.contact.elastic_sides import surface_weights
-from mechanics.meshing.elements import Element
-from mechanics.scene import Fidelity
+from mechanics.contact.mortar_contacts import surface_weights
+from mechanics.scene.scene import Fidelity
+from mechanics.stones.meshing.elements import Element
 from tests.mechanics.contact.faces import BOTTOM, KINDS, TOP, nodes_of, two_boxes
 from tests.mechanics.shapes import brick, detected, ground, moved, scene
 

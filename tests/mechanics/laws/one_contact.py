@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mechanics.laws.law import STATE, Approach, Law
+from mechanics.scene.laws.law import STATE, Approach, Law
 
 
 def approach(gap, speed=0.0, state=None, **changed):

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from mechanics.laws.bonds import BROKEN, WHOLE
-from mechanics.laws.cohesive_zone import CohesiveZone
-from mechanics.laws.law import BOND, OPENING, SLIDING, SLIP, STATE
+from mechanics.scene.laws.bonds import BROKEN, WHOLE
+from mechanics.scene.laws.cohesive_zone import CohesiveZone
+from mechanics.scene.laws.law import BOND, OPENING, SLIDING, SLIP, STATE
 from moma.errors import SceneError
 from tests.mechanics.laws.one_contact import Block, approach
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from mechanics.laws.bonds import BROKEN
-from mechanics.laws.law import BOND, STATE, Terms
-from mechanics.laws.status import STATUSES, contact_status
+from mechanics.scene.laws.bonds import BROKEN
+from mechanics.scene.laws.law import BOND, STATE, Terms
+from mechanics.scene.laws.status import STATUSES, contact_status
 
 
 def test_each_contact_has_the_status_of_its_bond_and_its_impulse():

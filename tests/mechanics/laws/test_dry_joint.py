@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mechanics.laws.dry_joint import DryJoint, at_limit, slid
-from mechanics.laws.law import REST, SLIDING, STATE, Terms
+from mechanics.scene.laws.dry_joint import DryJoint, at_limit, slid
+from mechanics.scene.laws.law import REST, SLIDING, STATE, Terms
 from moma.errors import SceneError
 from tests.mechanics.laws.one_contact import Block, approach
 

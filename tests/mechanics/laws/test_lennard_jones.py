@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mechanics.laws.lennard_jones import LennardJones
+from mechanics.scene.laws.lennard_jones import LennardJones
 from moma.errors import SceneError
 from tests.mechanics.laws.one_contact import Block, approach
 

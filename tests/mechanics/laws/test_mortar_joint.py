@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from mechanics.laws.bonds import BROKEN, WHOLE
-from mechanics.laws.law import BOND, REST, SLIDING, STATE
-from mechanics.laws.mortar import MortarJoint, held_tension
+from mechanics.scene.laws.bonds import BROKEN, WHOLE
+from mechanics.scene.laws.law import BOND, REST, SLIDING, STATE
+from mechanics.scene.laws.mortar import MortarJoint, held_tension
 from moma.errors import SceneError
 from tests.mechanics.laws.one_contact import Block, approach
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from mechanics.loads.accelerogram import Accelerogram
-from mechanics.loads.ground_motion import Component, GroundMotion
-from mechanics.loads.record_processing import band_pass, without_drift
+from mechanics.scene.loads.accelerogram import Accelerogram
+from mechanics.scene.loads.ground_motion import Component, GroundMotion
+from mechanics.scene.loads.record_processing import band_pass, without_drift
 from moma.errors import SceneError
 
 DT = 0.005

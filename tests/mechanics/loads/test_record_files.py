@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mechanics.loads.record_files import read_accelerogram, read_at2, read_csv
+from mechanics.scene.loads.record_files import read_accelerogram, read_at2, read_csv
 from moma.errors import SceneError
 
 ACCELERATION = 0.1 * np.sin(np.arange(12) / 2.0)  # [g]

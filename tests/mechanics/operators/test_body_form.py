@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mechanics.operators import _kernels_bodies as kernel
+from mechanics.delassus._kernels import bodies as kernel
 from moma.errors import SolverError
 from tests.mechanics.shapes import brick, ground, posed, scene
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mechanics.scene import Fidelity
+from mechanics.scene.scene import Fidelity
 from tests.mechanics.shapes import TURN, brick, dense_operator, ground, moved, posed, scene, slow_pass
 
 

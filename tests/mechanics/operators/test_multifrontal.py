@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import lu_solve
 
-from mechanics.operators._kernels_fronts import add_into, solve
-from mechanics.operators.condensed import CondensedForm
-from mechanics.operators.multifrontal import Cliques, fronts
-from mechanics.scene import Fidelity
+from mechanics.delassus._kernels.fronts import add_into, solve
+from mechanics.delassus.condensed import CondensedForm
+from mechanics.delassus.multifrontal import Cliques, fronts
+from mechanics.scene.scene import Fidelity
 from moma.errors import SolverError
 from tests.mechanics.shapes import TURN, brick, dense_operator, ground, moved, posed, scene
 

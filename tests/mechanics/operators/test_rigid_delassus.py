@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from mechanics.operators.rigid import RigidDelassus, schedule
+from mechanics.delassus.rigid import RigidDelassus, schedule
 from tests.mechanics.shapes import brick, dense_operator, ground, pile, posed, scene, slow_pass
 
 ROOT = Path(__file__).parents[3]

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.sparse import bsr_array
 
-from mechanics.operators.stored import StoredDelassus
-from mechanics.problem import ContactProblem, ContactStart
-from mechanics.residual import natural_map
-from mechanics.solvers._kernels import local_factors, solve_contact
-from mechanics.solvers.admm import ADMM
-from mechanics.solvers.nsgs import NSGS
+from mechanics.delassus.stored import StoredDelassus
+from mechanics.problem._kernels import local_factors, solve_contact
+from mechanics.problem.problem import ContactProblem, ContactStart
+from mechanics.problem.residual import natural_map
+from mechanics.solvers.first_order.admm import ADMM
+from mechanics.solvers.first_order.nsgs import NSGS
 from moma.errors import SolverError
 
 

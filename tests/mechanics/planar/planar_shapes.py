@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from mechanics.laws.dry_joint import DryJoint
 from mechanics.planar.scene import Disk, PlanarScene, PlanarTime, Wall
-from mechanics.scene import Method, SolverSettings
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import Method, SolverSettings
 
 G = 9.81
 ACCURATE = SolverSettings(Method.NSGS, tolerance=1e-12, max_iterations=20000)

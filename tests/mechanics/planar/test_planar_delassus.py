@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from planar_shapes import dense, random_problem
 
 from mechanics.planar import delassus
-from mechanics.planar._kernels_sweep import solve_local
+from mechanics.planar._kernels.sweep import solve_local
 from mechanics.planar.delassus import PlanarDelassus
-from mechanics.problem import ContactProblem, ContactStart
-from mechanics.residual import natural_map
-from mechanics.solvers.nsgs import NSGS
+from mechanics.problem.problem import ContactProblem, ContactStart
+from mechanics.problem.residual import natural_map
+from mechanics.solvers.first_order.nsgs import NSGS
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from planar_shapes import G
 
-from mechanics.laws.dry_joint import DryJoint
 from mechanics.planar.scene import Disk, PlanarScene, PlanarTime, Wall
 from mechanics.planar.simulate import simulate_planar
-from mechanics.result import Outcome
-from mechanics.scene import Method, SolverSettings
+from mechanics.results.result import Outcome
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import Method, SolverSettings
 
 FLOOR = Wall("floor", (-10.0, 0.0), (10.0, 0.0))
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.loads.history import History
-from mechanics.loads.load import Loads
-from mechanics.loads.motions import ImposedMotion
 from mechanics.planar.model import build_planar_model
 from mechanics.planar.scene import Disk, PlanarScene, PlanarTime, Wall
-from mechanics.scene import LawRule
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.loads.load import Loads
+from mechanics.scene.loads.motions import ImposedMotion
+from mechanics.scene.loads.time_series import History
+from mechanics.scene.scene import LawRule
 from moma.errors import SceneError
 
 DISK = Disk("d", (0.0, 1.0), 0.5)

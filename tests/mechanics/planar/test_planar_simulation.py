@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 from planar_shapes import ACCURATE, G, box, grid_of_disks
 
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.loads.forces import StoneForce
-from mechanics.loads.gravity import GravityRamp, TiltingTable
-from mechanics.loads.history import History
-from mechanics.loads.load import Loads
-from mechanics.loads.motions import ImposedMotion
+from mechanics.dynamics.simulation import Clock
 from mechanics.planar.contacts import PlanarDetector
 from mechanics.planar.model import build_planar_model
 from mechanics.planar.scene import Disk, PlanarScene, PlanarTime, Wall
 from mechanics.planar.simulate import simulate_planar
 from mechanics.planar.simulation import PlanarSimulation
-from mechanics.result import Outcome
-from mechanics.scene import LawRule, Method
-from mechanics.simulation import Clock
+from mechanics.results.result import Outcome
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.loads.forces import StoneForce
+from mechanics.scene.loads.gravity import GravityRamp, TiltingTable
+from mechanics.scene.loads.load import Loads
+from mechanics.scene.loads.motions import ImposedMotion
+from mechanics.scene.loads.time_series import History
+from mechanics.scene.scene import LawRule, Method
 from moma.errors import SceneError, SolverError
 
 FLOOR = Wall("floor", (-10.0, 0.0), (10.0, 0.0))

@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mechanics.operators.stored import StoredDelassus
-from mechanics.problem import ContactProblem, ContactStart
-from mechanics.residual import residual
-from mechanics.solvers import _kernels_portfolio as portfolio
-from mechanics.solvers.auto import Auto
+from mechanics.delassus.stored import StoredDelassus
+from mechanics.problem.problem import ContactProblem, ContactStart
+from mechanics.problem.residual import residual
+from mechanics.solvers._kernels import stored_portfolio as portfolio
+from mechanics.solvers.strategies.auto import Auto
 
 
 def problem_of(seed, bodies, contacts, friction=0.6, cohesion=0.0, bias=0.0):

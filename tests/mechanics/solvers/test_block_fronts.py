@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mechanics.solvers import _kernels_block_fronts as fronts
+from mechanics.solvers._kernels import block_fronts as fronts
 
 
 def pattern_of(bodies, count):

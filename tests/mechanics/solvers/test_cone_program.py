@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mechanics.operators.stored import StoredDelassus
-from mechanics.problem import ContactProblem, ContactStart
-from mechanics.residual import natural_map
-from mechanics.scene import Fidelity
-from mechanics.solvers.cone_program import ConeProgram
+from mechanics.delassus.stored import StoredDelassus
+from mechanics.problem.problem import ContactProblem, ContactStart
+from mechanics.problem.residual import natural_map
+from mechanics.scene.scene import Fidelity
+from mechanics.solvers.second_order.cone_program import ConeProgram
 from moma.errors import SolverError
 from tests.mechanics.shapes import brick, ground, posed, scene
 

@@ -6,13 +6,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from mechanics.problem import ContactSolution, ContactStart
-from mechanics.residual import natural_map
-from mechanics.scene import Fidelity, Method, SolverSettings
-from mechanics.solvers import elastic
-from mechanics.solvers.admm import ADMM
+from mechanics.problem.problem import ContactSolution, ContactStart
+from mechanics.problem.residual import natural_map
+from mechanics.scene.scene import Fidelity, Method, SolverSettings
 from mechanics.solvers.choice import choose_solver
-from mechanics.solvers.elastic import Elastic
+from mechanics.solvers.first_order.admm import ADMM
+from mechanics.solvers.strategies import elastic
+from mechanics.solvers.strategies.elastic import Elastic
 from tests.mechanics.shapes import brick, ground, posed, scene
 
 SOFT = Fidelity.DEFORMABLE

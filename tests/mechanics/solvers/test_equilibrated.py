@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from mechanics.materials import Material
-from mechanics.problem import scale_of
-from mechanics.residual import residual
-from mechanics.scene import Fidelity
-from mechanics.solvers.equilibrated import equilibrated
+from mechanics.problem.problem import scale_of
+from mechanics.problem.residual import residual
+from mechanics.scene.scene import Fidelity
+from mechanics.solvers.second_order.scaling import equilibrated
+from mechanics.stones.materials import Material
 from tests.mechanics.shapes import brick, ground, posed, scene
 
 HEAVY, LIGHT = (Material(name, density, 20e9, 0.2) for name, density in (("heavy", 2.4e6), ("light", 2.4)))

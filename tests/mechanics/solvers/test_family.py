@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mechanics.laws.cohesive_zone import CohesiveZone
-from mechanics.laws.dry_joint import DryJoint
-from mechanics.laws.lennard_jones import LennardJones
-from mechanics.laws.mortar import MortarJoint
 from mechanics.planar.delassus import PlanarDelassus
-from mechanics.problem import ContactProblem, ContactStart
-from mechanics.residual import natural_map
-from mechanics.scene import ContactSettings, Fidelity, Method, Placement, SolverSettings
+from mechanics.problem.problem import ContactProblem, ContactStart
+from mechanics.problem.residual import natural_map
+from mechanics.scene.laws.cohesive_zone import CohesiveZone
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.laws.lennard_jones import LennardJones
+from mechanics.scene.laws.mortar import MortarJoint
+from mechanics.scene.scene import ContactSettings, Fidelity, Method, Placement, SolverSettings
 from mechanics.solvers.choice import choose_planar_solver, choose_solver
 from moma.errors import SolverError
 from tests.mechanics.shapes import brick, ground, posed, scene

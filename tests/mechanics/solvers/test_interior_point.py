@@ -6,14 +6,14 @@ from functools import cache
 import numpy as np
 import pytest
 
-from mechanics.contact.assembly import mixed_delassus
-from mechanics.laws.mortar import MortarJoint
-from mechanics.problem import ContactSolution, ContactStart
-from mechanics.residual import natural_map, residual
-from mechanics.scene import ContactSettings, Fidelity
-from mechanics.solvers import interior_point
-from mechanics.solvers.interior_point import InteriorPoint, _Path
-from mechanics.solvers.nsgs import NSGS
+from mechanics.delassus.assembly import mixed_delassus
+from mechanics.problem.problem import ContactSolution, ContactStart
+from mechanics.problem.residual import natural_map, residual
+from mechanics.scene.laws.mortar import MortarJoint
+from mechanics.scene.scene import ContactSettings, Fidelity
+from mechanics.solvers.first_order.nsgs import NSGS
+from mechanics.solvers.second_order import interior_point
+from mechanics.solvers.second_order.interior_point import InteriorPoint, _Path
 from moma.errors import SolverError
 from tests.mechanics.shapes import TURN, brick, dense_operator, ground, moved, posed, scene
 

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from mechanics.laws.mortar import MortarJoint
-from mechanics.problem import ContactStart
-from mechanics.residual import natural_map, project_on_cone
-from mechanics.scene import ContactSettings, Fidelity
-from mechanics.solvers.newton import Newton, projection_derivative
-from mechanics.solvers.nsgs import NSGS
+from mechanics.problem.problem import ContactStart
+from mechanics.problem.residual import natural_map, project_on_cone
+from mechanics.scene.laws.mortar import MortarJoint
+from mechanics.scene.scene import ContactSettings, Fidelity
+from mechanics.solvers.first_order.nsgs import NSGS
+from mechanics.solvers.second_order.newton import Newton, projection_derivative
 from moma.errors import SolverError
 from tests.mechanics.shapes import brick, ground, posed, scene
 

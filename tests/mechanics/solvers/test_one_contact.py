@@ -5,9 +5,8 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from mechanics.operators._kernels_rigid import factors_of
-from mechanics.residual import project_on_cone
-from mechanics.solvers._kernels import (
+from mechanics.delassus._kernels.rigid import factors_of
+from mechanics.problem._kernels import (
     local_factors,
     natural_errors,
     onto_cone,
@@ -15,6 +14,7 @@ from mechanics.solvers._kernels import (
     slip,
     solve_contact,
 )
+from mechanics.problem.residual import project_on_cone
 
 number = st.integers(-1000, 1000).map(lambda i: i / 500)
 frictions = st.sampled_from([0.0, 1e-3, 0.3, 0.6, 1.0, 3.0])

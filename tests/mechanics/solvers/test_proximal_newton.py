@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from mechanics.materials import Material
-from mechanics.model import build_model
-from mechanics.operators.stored import StoredDelassus
-from mechanics.problem import ContactProblem, ContactStart
-from mechanics.scene import Scene
-from mechanics.simulation import Clock, Simulation
-from mechanics.solvers import _kernels_body_newton as bodies
-from mechanics.solvers.nsgs import NSGS
-from mechanics.solvers.proximal_newton import ProximalNewton, _System
+from mechanics.delassus.stored import StoredDelassus
+from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.model.model import build_model
+from mechanics.problem.problem import ContactProblem, ContactStart
+from mechanics.scene.scene import Scene
+from mechanics.solvers._kernels import body_newton as bodies
+from mechanics.solvers.first_order.nsgs import NSGS
+from mechanics.solvers.second_order.proximal_newton import ProximalNewton, _System
+from mechanics.stones.materials import Material
 from moma.errors import SolverError
 from tests.mechanics.shapes import brick, ground
 

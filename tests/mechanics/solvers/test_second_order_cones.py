@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mechanics.solvers.second_order_cones import divide, product, reach, scaling
+from mechanics.solvers.second_order.second_order_cones import divide, product, reach, scaling
 
 seeds = st.integers(0, 2**32 - 1)
 IDENTITY = np.array([1.0, 0.0, 0.0])

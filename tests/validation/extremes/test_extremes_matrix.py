@@ -16,7 +16,7 @@ from benchmarks.extremes.refusals import refusals
 from benchmarks.extremes.scenes import run_cells, scene_rows
 from benchmarks.extremes.wild import wild_problem
 from benchmarks.fc3d import read_problem
-from mechanics.scene import Method
+from mechanics.scene.scene import Method
 from moma.errors import SolverError
 
 # a row that no method solves, whatever it tries, has no solution or is refused where it is stated

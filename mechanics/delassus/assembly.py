@@ -1,0 +1,144 @@
+"""From contact points to the Delassus operator: the Jacobians of rigid sides, the compliance between elastic ones."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from mechanics.contact.contacts import Contacts, material_points
+from mechanics.delassus.mixed import ELASTIC, NONE, RIGID, MixedDelassus
+from mechanics.delassus.rigid import RigidDelassus, Schedule
+from mechanics.model.deformable import Compliance
+from mechanics.model.model import Model
+from mechanics.model.rigid import RigidInertia, inverse_inertia_world
+from mechanics.scene.state import State
+
+__all__ = ["local_velocity", "mixed_delassus", "rigid_delassus", "world_impulse"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def rigid_delassus(model: Model, state: State, contacts: Contacts, schedule: Schedule) -> RigidDelassus:
+    """W of contacts between rigid bodies, already in the order of the schedule.
+
+    Both bodies meet in one common point, half-way between their material points, so that equal and opposite
+    impulses leave the angular momentum of the scene as it is, whatever the gap.
+    """
+    point = material_points(contacts, state).mean(axis=1)
+    arm = point[:, None] - state.centre[contacts.bodies]
+    turned = inverse_inertia_world(model.inertia, state.rotation).reshape(-1, 9)
+    return RigidDelassus(
+        contacts.bodies,
+        np.hstack([contacts.frame.reshape(-1, 9), arm.reshape(-1, 6)]),
+        np.hstack([model.inertia.inverse_mass[:, None], turned[:, [0, 1, 2, 4, 5, 8]]]),
+        schedule,
+        model.scene.solver.threads,
+    )
+
+
+def mixed_delassus(
+    model: Model,
+    state: State,
+    contacts: Contacts,
+    compliance: Sequence[Compliance],
+    elastic_scale: bool = False,
+) -> MixedDelassus:
+    """W of the contacts at the configuration of `state`: condense each deformable body on its contact sides.
+
+    With `elastic_scale`, r and u are measured against the elastic part of W alone. In steps so long that nothing but
+    friction holds a stone back, W is nearly all rigid motion, and forces inside the joints would not count.
+    """
+    body = contacts.bodies
+    kind = np.where(model.fixed[body], NONE, np.where(model.elastic[body], ELASTIC, RIGID)).astype(np.int64)
+    count, slot, sides = _slots(body, kind, len(model.mass))
+    yptr = np.concatenate([[0], np.cumsum(3 * count)]).astype(np.int64)
+    bptr = np.concatenate([[0], np.cumsum((3 * count) ** 2)]).astype(np.int64)
+    block, diagonal = np.zeros(int(bptr[-1])), np.zeros((2 * len(contacts), 3, 3))
+    first = np.concatenate([[0], np.cumsum(count)])
+    for group, own in zip(model.elastic_stones.groups, compliance, strict=True):
+        for b in group.bodies[count[group.bodies] > 0]:
+            rows = sides[first[b] : first[b + 1]]
+            square = _compliance_block(model, state, contacts, int(b), rows, own)
+            block[bptr[b] : bptr[b + 1]] = square.ravel()
+            n = np.arange(len(rows))
+            diagonal[rows] = square.reshape(len(rows), 3, len(rows), 3)[n, :, n]
+    arm = np.einsum("csij,csj->csi", state.rotation[body], contacts.arm)
+    jacobian, response = _rigid_sides(model.inertia, state, contacts, arm)
+    total = (diagonal.reshape(-1, 2, 3, 3) + jacobian @ response).sum(axis=1)
+    own_part = total - _rigid_share(model, state, contacts, kind) if elastic_scale else total
+    scale = float(np.einsum("cii->", own_part) / max(3 * len(contacts), 1))
+    return MixedDelassus(body, kind, jacobian, response, slot, yptr, bptr, block, total, scale)
+
+
+def _rigid_share(model: Model, state: State, contacts: Contacts, kind: Ints) -> Array:
+    """The part of W_αα (nc, 3, 3) that is the motion of elastic stones as a whole, where a side is elastic."""
+    point = (contacts.weights @ state.node).reshape(-1, 2, 3)
+    jacobian, response = _rigid_sides(model.flight, state, contacts, point - state.centre[contacts.bodies])
+    share: Array = np.where((kind == ELASTIC)[..., None, None], jacobian @ response, 0.0).sum(axis=1)
+    return share
+
+
+def _rigid_sides(inertia: RigidInertia, state: State, contacts: Contacts, arm: Array) -> tuple[Array, Array]:
+    """Jacobians (nc, 2, 3, 6) and responses (nc, 2, 6, 3) of sides by rigid motion; without inverse mass, none.
+
+    `arm` (nc, 2, 3) from the centres of mass, world axes [m].
+    """
+    body = contacts.bodies
+    frame = np.broadcast_to(contacts.frame[:, None], (len(contacts), 2, 3, 3))
+    # row · (ω × arm) = (arm × row) · ω
+    jacobian = np.concatenate([frame, np.cross(arm[:, :, None, :], frame)], axis=-1)
+    spin = inverse_inertia_world(inertia, state.rotation)[body] @ jacobian[..., 3:].transpose(0, 1, 3, 2)
+    push = inertia.inverse_mass[body][..., None, None] * jacobian[..., :3].transpose(0, 1, 3, 2)
+    return np.ascontiguousarray(jacobian), np.ascontiguousarray(np.concatenate([push, spin], axis=2))
+
+
+def _slots(body: Ints, kind: Ints, bodies: int) -> tuple[Ints, Ints, Ints]:
+    """How many elastic sides each body has, the place of each side among them, and the sides body by body."""
+    flat_body, elastic = body.ravel(), kind.ravel() == ELASTIC
+    count = np.bincount(flat_body[elastic], minlength=bodies)
+    order = np.flatnonzero(elastic)[np.argsort(flat_body[elastic], kind="stable")]
+    slot = np.zeros(len(flat_body), dtype=np.int64)
+    starts = np.concatenate([[0], np.cumsum(count)])[:-1]
+    slot[order] = np.arange(len(order)) - np.repeat(starts, count)
+    return count.astype(np.int64), slot.reshape(body.shape), order
+
+
+def _compliance_block(
+    model: Model, state: State, contacts: Contacts, b: int, sides: Ints, compliance: Compliance
+) -> Array:
+    """T C Tᵀ of one body: C between the nodes that its contact sides touch, T their weights in local frames."""
+    weights = contacts.weights[sides]
+    nodes, column = np.unique(weights.indices, return_inverse=True)
+    turn = contacts.frame[sides // 2] @ state.rotation[b]
+    side = np.repeat(np.arange(len(sides)), np.diff(weights.indptr))
+    values = weights.data[:, None, None] * turn[side]
+    rows = 3 * side[:, None, None] + np.arange(3)[:, None] + np.zeros(3, dtype=np.int64)
+    columns = 3 * column[:, None, None] + np.zeros((3, 1), dtype=np.int64) + np.arange(3)
+    spread = csr_array(
+        (values.ravel(), (rows.ravel(), columns.ravel())), shape=(3 * len(sides), 3 * len(nodes))
+    )
+    half = spread @ compliance.between(nodes - model.elastic_stones.start[b])
+    block = spread @ half.T
+    symmetric: Array = 0.5 * (block + block.T)
+    return symmetric
+
+
+def local_velocity(
+    contacts: Contacts, operator: RigidDelassus | MixedDelassus, velocity: Array, node_velocity: Array
+) -> Array:
+    """Relative velocity u = Hᵀ v (nc, 3) of the contacts, local frame [m/s]."""
+    if isinstance(operator, RigidDelassus):
+        return operator.relative_velocity(velocity)
+    rigid = np.einsum("csij,csj->csi", operator.jacobian, velocity[contacts.bodies])
+    elastic = np.einsum("cij,csj->csi", contacts.frame, (contacts.weights @ node_velocity).reshape(-1, 2, 3))
+    sides = np.where((operator.kind == ELASTIC)[..., None], elastic, rigid)
+    relative: Array = sides[:, 0] - sides[:, 1]
+    return relative
+
+
+def world_impulse(contacts: Contacts, impulse: Array) -> Array:
+    """Impulses (nc, 3) on the candidates, world axes [N s]."""
+    world: Array = np.einsum("cij,ci->cj", contacts.frame, impulse)
+    return world

@@ -1,0 +1,1 @@
+"""Time stepping: predict, detect, state, solve, advance."""

@@ -1,0 +1,149 @@
+"""Is every stone in balance, does it rest, has it fallen?"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.contact.contacts import Contacts, material_points
+from mechanics.dynamics.observers._kernels import largest_displacement, largest_speed
+from mechanics.model.model import Model
+from mechanics.scene.state import State
+
+__all__ = [
+    "Support",
+    "displacement",
+    "imbalance",
+    "seen_from_supports",
+    "settlement",
+    "speed",
+    "support_reaction",
+    "wrenches",
+]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Support:
+    """Global equilibrium.
+
+    Attributes
+    ----------
+    reaction : contact force of all fixed bodies against gravity [N]
+    weight : of all bodies that are not fixed [N]
+    """
+
+    reaction: float
+    weight: float
+
+    @property
+    def error(self) -> float:
+        """|reaction - weight| / weight [-]; zero without weight."""
+        return abs(self.reaction - self.weight) / self.weight if self.weight > 0 else 0.0
+
+
+def imbalance(
+    model: Model, state: State, contacts: Contacts, force: Array, load: Array, borne: Array | None = None
+) -> Array:
+    """Unbalanced force and moment of each body over its weight (nb,) [-]; zero for fixed bodies.
+
+    The sum of the loads (nb, 6) on rigid bodies, weight included, and of the contact forces (nc, 3) [N], inertia left
+    out: it is zero only for a body in static equilibrium. The moment, about the centre of mass, counts with the
+    smallest width as its arm. Forces on elastic bodies act on their undeformed shape, as small strain has it; else high
+    walls, whose lower stones carry many times their own weight, would seem out of balance by their strain. Without
+    gravity the largest contact force replaces the weight. `borne` (nb, 6) are forces and moments of contacts that
+    are not among those given: those between stones that sleep.
+    """
+    points = material_points(contacts, replace(state, node=_undeformed(model, state)))
+    count = len(model.mass)
+    resultant = wrenches(state, contacts.bodies[:, 0], points[:, 0], force, count)
+    resultant -= wrenches(state, contacts.bodies[:, 1], points[:, 1], force, count)
+    weight = model.mass[:, None] * model.gravity(state.time)
+    if borne is not None:
+        resultant += borne
+    # the load on rigid bodies holds their weight
+    resultant += np.where(model.elastic[:, None], np.hstack([weight, np.zeros_like(weight)]), load)
+    scale = np.linalg.norm(weight, axis=1)
+    if not scale.any():
+        scale = np.full(len(scale), np.linalg.norm(force, axis=1).max(initial=0.0) or 1.0)
+    size = model.surfaces.size
+    parts = np.linalg.norm(resultant[:, :3], axis=1), np.linalg.norm(resultant[:, 3:], axis=1) / size
+    result: Array = np.where(model.fixed, 0.0, np.maximum(*parts) / scale)
+    return result
+
+
+def _undeformed(model: Model, state: State) -> Array:
+    """Where the nodes (nn, 3) would be if no body were strained [m]."""
+    place = np.empty_like(state.node)
+    for group in model.elastic_stones.groups:
+        turned = group.stone.mesh.nodes @ state.rotation[group.bodies].transpose(0, 2, 1)
+        place[group.nodes] = state.centre[group.bodies, None] + turned
+    return place
+
+
+def wrenches(state: State, body: NDArray[np.int64], point: Array, force: Array, count: int) -> Array:
+    """Sums (count, 6) of forces and of their moments about the centres of the bodies."""
+    wrench = np.column_stack([force, np.cross(point - state.centre[body], force)])
+    # without contacts bincount forgets that forces are no integers
+    return np.column_stack([np.bincount(body, column, count) for column in wrench.T]).astype(np.float64)
+
+
+def support_reaction(model: Model, contacts: Contacts, force: Array, time: float) -> Support:
+    """Sum of the contact forces (nc, 3) [N] from fixed bodies, along -gravity (along z without gravity)."""
+    gravity = model.gravity(time)
+    g = float(np.linalg.norm(gravity))
+    up = -gravity / g if g > 0 else np.array([0.0, 0.0, 1.0])
+    sign = model.fixed[contacts.bodies[:, 1]].astype(float) - model.fixed[contacts.bodies[:, 0]]
+    return Support(float(sign @ (force @ up)), float(model.mass[~model.fixed].sum() * g))
+
+
+def settlement(model: Model, start: State, state: State) -> Array:
+    """How far the centre of each body has sunk along gravity since `start` (nb,) [m]; along -z without gravity."""
+    gravity = model.gravity(state.time)
+    g = float(np.linalg.norm(gravity))
+    down = gravity / g if g > 0 else np.array([0.0, 0.0, -1.0])
+    sunk: Array = (state.centre - start.centre) @ down
+    return sunk
+
+
+def seen_from_supports(model: Model, start: State, state: State) -> State:
+    """The state as an observer sees it who moves along with the supports, by the mean of their translations.
+
+    Where the ground shakes, what counts is how stones move against it.
+    """
+    if not model.motions:
+        return state
+    away = (state.centre - start.centre)[model.fixed].mean(axis=0)
+    pace = state.velocity[model.fixed, :3].mean(axis=0)
+    velocity = state.velocity.copy()
+    velocity[~model.elastic, :3] -= pace
+    return replace(
+        state,
+        centre=state.centre - away,
+        velocity=velocity,
+        node=state.node - away,
+        node_velocity=state.node_velocity - pace,
+    )
+
+
+def displacement(model: Model, start: State, state: State) -> Array:
+    """Largest displacement of a corner or node of each body since `start` (nb,) [m]."""
+    own = model.surfaces
+    largest = largest_displacement(
+        own.body_vptr, own.vertex, state.centre, state.rotation, start.centre, start.rotation
+    )
+    return _with_nodes(model, largest, np.linalg.norm(state.node - start.node, axis=1))
+
+
+def speed(model: Model, state: State) -> Array:
+    """Largest speed of a corner or node of each body (nb,) [m/s]."""
+    own = model.surfaces
+    largest = largest_speed(own.body_vptr, own.vertex, state.rotation, state.velocity)
+    return _with_nodes(model, largest, np.linalg.norm(state.node_velocity, axis=1))
+
+
+def _with_nodes(model: Model, largest: Array, of_nodes: Array) -> Array:
+    for group in model.elastic_stones.groups:
+        largest[group.bodies] = of_nodes[group.nodes].max(axis=1)
+    return largest

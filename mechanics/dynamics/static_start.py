@@ -1,0 +1,85 @@
+"""The static equilibrium in which a run may begin, found at once instead of by waiting for it."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from mechanics.dynamics.observers.equilibrium import displacement, imbalance
+from mechanics.dynamics.progress import Progress
+from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.model.model import Model
+from mechanics.results.result import StaticStart
+from mechanics.scene.scene import TimeSettings
+from mechanics.scene.state import State
+from mechanics.solvers.choice import Solver
+from mechanics.solvers.second_order.interior_point import InteriorPoint
+
+__all__ = ["static_start"]
+
+# so long that inertia holds nothing back: a structure of 1 Hz keeps less than a part in 40 of its motion to come
+_STEP = 1.0
+# steps until inertia and changes of shape count for nothing; few need more than three
+_STEPS = 10
+# how much further than asked for η and velocities are solved: Newton's last steps cost little, and the first steps of
+# the run none
+_FURTHER, _FASTEST = 0.1, 0.03
+# what rounding leaves of η in steps that long
+_ROUNDING = 1e-7
+# steps in which rigid stones close their last gaps
+_SETTLING = 5
+# a stone that moves by this part of its width does not settle, it falls
+_FALLS = 0.2
+
+
+def static_start(
+    model: Model, start: State, report: Callable[[Progress], None]
+) -> tuple[StaticStart, Simulation]:
+    """Take steps of 1 s, each from a halt, until every body is in balance under the loads of the first instant.
+
+    With θ = 1 such a step is the static problem (docs/theory.md §2): M/h² is next to nothing beside K, but holds what
+    nothing else does. Driven supports stay where they are.
+    """
+    still = _still(model, _STEP)
+    asked = model.scene.solver
+    solver: Solver | None = None
+    if not model.rigid_only:
+        solver = InteriorPoint(
+            _FURTHER * max(asked.tolerance, _ROUNDING), _FASTEST * asked.velocity_tolerance
+        )
+    search = Simulation(still, start, Clock(), solver, elastic_scale=True)
+    limit = model.scene.time.balance_tolerance
+    iterations, count, balance, eta, found = 0, 0, np.inf, np.inf, False
+    while count < _STEPS and not found:
+        made = search.step()
+        # the loads stay those of the first instant
+        search.halt(start.time)
+        count += 1
+        iterations += made.solution.iterations
+        eta = made.solution.natural_map
+        after = replace(made.after, time=start.time)
+        balance = float(imbalance(still, after, made.contacts, made.force, made.kick.load).max())
+        report(Progress("static", count, _STEPS, f"balance {balance:.1e}, η {eta:.1e}"))
+        if not bool((displacement(still, start, after) < _FALLS * still.surfaces.size).all()):
+            break
+        found = eta <= max(asked.tolerance, _ROUNDING) and balance <= limit
+    if found and model.inertia.moving.any():
+        search = _set_down(model, search)
+    return StaticStart(found, count, iterations, eta, balance), search
+
+
+def _still(model: Model, step: float) -> Model:
+    """The model for steps of the search: θ = 1, no support moves."""
+    own = model.scene.time
+    time = TimeSettings(step=step, theta=1.0, relaxation=True, lumped_mass=own.lumped_mass)
+    return replace(model, scene=replace(model.scene, time=time), motions=())
+
+
+def _set_down(model: Model, search: Simulation) -> Simulation:
+    """Some steps of the run's own length: a small error of velocity has left gaps between rigid stones over 1 s."""
+    last = Simulation(_still(model, model.scene.time.step), search.start, Clock())
+    last.take_over(search)
+    for _ in range(_SETTLING):
+        last.step()
+        last.halt(search.start.time)
+    return last

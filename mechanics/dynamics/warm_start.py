@@ -1,0 +1,91 @@
+"""What is remembered from step to step of contacts that persist: the solver's solution and the laws' own variables."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.problem.problem import ContactSolution, ContactStart
+from mechanics.scene.laws.law import BOND, STATE
+
+__all__ = ["Memory"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# the bits of a key below those that name the pair of shapes
+_POINT_BITS = 24
+
+
+class Memory:
+    """Impulses, velocities and internal variables by contact key.
+
+    Bonds belong to places in a joint. A face that slides by a hair, or is cut at another edge, gets contacts with new
+    keys; where a joint has bonds, these take the internal variables of the nearest contact that the pair had.
+
+    Parameters
+    ----------
+    dimension : d, of the impulses
+    """
+
+    def __init__(self, dimension: int = 3) -> None:
+        self._dimension = dimension
+        self._key = np.zeros(0, dtype=np.int64)
+        self._values = np.zeros((0, 2 * dimension + STATE))
+        self._place: Array | None = None
+
+    def recall(self, key: Ints, place: Array | None = None) -> tuple[ContactStart, Array]:
+        """What the contacts of these keys (nc,) had in the last step, and their internal variables (nc, STATE).
+
+        Zero for new contacts, but for the internal variables of those in a bonded joint, if their places (nc, d) [m]
+        are given.
+        """
+        if key is self._key:
+            values = self._values
+        else:
+            values = np.zeros((len(key), self._values.shape[1]))
+            order = np.argsort(self._key, kind="stable")
+            if len(order):
+                at = order[np.minimum(np.searchsorted(self._key, key, sorter=order), len(order) - 1)]
+                known = self._key[at] == key
+                values[known] = self._values[at[known]]
+                if place is not None and self._place is not None:
+                    self._inherit(values, np.flatnonzero(~known), key, place, order)
+        d = self._dimension
+        return ContactStart(values[:, :d], values[:, d : 2 * d]), values[:, 2 * d :]
+
+    def _inherit(self, values: Array, new: Ints, key: Ints, place: Array, order: Ints) -> None:
+        """Give the new contacts (rows of `values`) of bonded joints the internal variables of the nearest old ones."""
+        state = self._values[:, 2 * self._dimension :]
+        if not len(new) or self._place is None or not state[:, BOND].any():
+            return
+        pair, asked = self._key[order] >> _POINT_BITS, key[new] >> _POINT_BITS
+        low, high = np.searchsorted(pair, asked, side="left"), np.searchsorted(pair, asked, side="right")
+        heirs, count = new[high > low], (high - low)[high > low]
+        if not len(heirs):
+            return
+        # all old contacts of the pair of each heir, one heir after the other
+        first = np.concatenate([[0], np.cumsum(count)[:-1]])
+        old = order[np.arange(count.sum()) - np.repeat(first - low[high > low], count)]
+        distance = np.linalg.norm(self._place[old] - np.repeat(place[heirs], count, axis=0), axis=1)
+        heir = np.repeat(np.arange(len(heirs)), count)
+        nearest = old[np.lexsort((distance, heir))[first]]
+        values[heirs, 2 * self._dimension :] = state[nearest]
+
+    def store(self, key: Ints, solution: ContactSolution, state: Array, place: Array | None = None) -> None:
+        """Remember this step: its solution, the internal variables (nc, STATE) that the laws left, and the places."""
+        self._key, self._place = key, place
+        self._values = np.hstack([solution.impulse, solution.velocity, state])
+
+    def take_up(self, key: Ints, solution: Array, state: Array, place: Array | None = None) -> None:
+        """Remember more contacts as if they had been in the last step: r and û (nc, 2d), internal variables, places."""
+        self._key = np.concatenate([self._key, key])
+        self._values = np.vstack([self._values, np.hstack([solution, state])])
+        if self._place is not None and place is not None:
+            self._place = np.vstack([self._place, place])
+
+    def at_rest(self, factor: float) -> "Memory":
+        """The same forces over a step that is `factor` times as long, in bodies that have come to rest."""
+        d, other = self._dimension, Memory(self._dimension)
+        other._key, other._place, other._values = self._key, self._place, self._values.copy()
+        other._values[:, :d] *= factor
+        other._values[:, d : 2 * d] = 0.0
+        return other

@@ -1,0 +1,49 @@
+"""Balls: thrown bodies, and the cases of rolling that have closed forms."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import trimesh
+
+from mechanics.scene.scene import Block, Fidelity
+from mechanics.stones.materials import Material
+from mechanics.stones.polyhedra import MassProperties
+from moma.errors import SceneError
+
+__all__ = ["ball", "ball_properties"]
+
+
+def ball(
+    code: str,
+    centre: Sequence[float],
+    radius: float,
+    material: Material,
+    fidelity: Fidelity = Fidelity.RIGID,
+    velocity: tuple[float, ...] = (0.0,) * 6,
+) -> Block:
+    """A ball of a radius [m] about a centre (3,) [m]; contacts are those of the sphere, pictures show facets.
+
+    Raises
+    ------
+    SceneError : if the radius is not positive
+    """
+    if not radius > 0:
+        raise SceneError(f"radius = {radius!r}", where=f"stone {code}", remedy="give metres greater than 0")
+    facets = trimesh.creation.icosphere(subdivisions=2, radius=radius)
+    return Block(
+        code,
+        np.asarray(facets.vertices) + np.asarray(centre, dtype=float),
+        tuple(tuple(int(v) for v in face) for face in facets.faces),
+        material,
+        fidelity,
+        velocity=velocity,
+        radius=radius,
+    )
+
+
+def ball_properties(block: Block) -> MassProperties:
+    """Volume, centre and inertia of the sphere that a block stands for."""
+    assert block.radius is not None
+    volume = 4.0 / 3.0 * np.pi * block.radius**3
+    inertia = 0.4 * volume * block.radius**2 * np.eye(3)
+    return MassProperties(volume, block.vertices.mean(axis=0), inertia)

@@ -1,0 +1,312 @@
+"""A scene made ready to compute: meshes, masses, surfaces; what does not change while it runs."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.contact._kernels.narrow_phase import MAX_CORNERS
+from mechanics.contact.face_meshes import FaceMesh
+from mechanics.contact.part_faces import face_meshes, part_face_meshes
+from mechanics.contact.surfaces import Surfaces, surfaces
+from mechanics.model.balls import ball_properties
+from mechanics.model.deformable import Deformable
+from mechanics.model.rigid import RigidInertia
+from mechanics.model.stone_groups import ElasticStones, elastic_stones
+from mechanics.model.stone_meshes import StoneWorkshop
+from mechanics.scene.laws.table import LawTable, law_table
+from mechanics.scene.loads.load import Force, Motion
+from mechanics.scene.scene import Block, Fidelity, LawRule, Part, Scene
+from mechanics.scene.state import State
+from mechanics.stones.meshing.mesh import SolidMesh
+from mechanics.stones.meshing.report import MeshReport
+from mechanics.stones.polyhedra import MassProperties, mass_properties, united
+from moma.errors import GeometryError, SceneError
+
+__all__ = ["Model", "build_model"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# contact keys number the faces of a stone in six bits
+_MAX_FACES = 64
+# by this fraction the volume of a stone's parts may differ from that of its outline
+_SAME_VOLUME = 1e-6
+
+
+@dataclass(frozen=True)
+class Model:
+    """What does not change while a scene runs.
+
+    Attributes
+    ----------
+    scene : as given
+    fixed, elastic : (nb,) which bodies no force moves, which are deformable
+    motions : imposed motions, each with the bodies that it drives
+    forces : forces, each with the bodies on which it acts
+    laws : contact laws, and between which bodies they hold
+    inertia : of the rigid bodies
+    flight : of all bodies that move, the elastic ones by their rigid motion
+    mass : (nb,) [kg]
+    volume : (nb,) [m³]
+    surfaces : for contact detection
+    outline : per body its corners (n, 3) as the scene gives them, from the centre of mass, body axes [m]
+    stones : per body its finite elements; None if it has none
+    elastic_stones : the same, packed; equal stones together
+    meshes : how the deformable stones were meshed
+    """
+
+    scene: Scene
+    fixed: NDArray[np.bool_]
+    elastic: NDArray[np.bool_]
+    motions: tuple[tuple[Motion, Ints], ...]
+    forces: tuple[tuple[Force, Ints], ...]
+    laws: LawTable
+    inertia: RigidInertia
+    flight: RigidInertia
+    mass: Array
+    volume: Array
+    surfaces: Surfaces
+    outline: tuple[Array, ...]
+    stones: tuple[Deformable | None, ...]
+    elastic_stones: ElasticStones
+    meshes: MeshReport
+
+    @property
+    def rigid_only(self) -> bool:
+        """Nothing is deformable."""
+        return not bool(self.elastic.any())
+
+    def gravity(self, time: float) -> Array:
+        """(3,) acceleration at a time [m/s²]."""
+        gravity = np.array(self.scene.gravity, dtype=float)
+        for change in self.scene.loads.gravity:
+            gravity = change(time, gravity)
+        return gravity
+
+    def nodes_of(self, body: int) -> slice:
+        """Where the nodes of a body lie in State.node."""
+        start = self.elastic_stones.start
+        return slice(int(start[body]), int(start[body + 1]))
+
+
+def build_model(scene: Scene, progress: Callable[[int, int], None] | None = None) -> tuple[Model, State]:
+    """Mesh the deformable stones and pack all bodies; also the state at rest where the scene begins.
+
+    Raises
+    ------
+    SceneError : if a deformable block has no mesh size, or a fixed one a velocity
+    MeshError, GeometryError : if a stone cannot be meshed or its faces do not close
+    """
+    blocks = scene.blocks
+    for block in blocks:
+        _check(block)
+    properties = [_mass_properties(block) for block in blocks]
+    stones: list[Deformable | None] = []
+    centres = np.array([p.centroid for p in properties])
+    workshop = StoneWorkshop(blocks, scene.contact.alert_distance, scene.time.lumped_mass)
+    for index, block in enumerate(blocks):
+        if block.fidelity is Fidelity.DEFORMABLE:
+            stone, centres[index] = workshop(index)
+            stones.append(stone)
+        else:
+            stones.append(None)
+        if progress is not None:
+            progress(index + 1, len(blocks))
+    packed = elastic_stones(stones)
+    inertia = _inertia(blocks, properties, np.array([block.material.density for block in blocks]))
+    density = np.array([block.material.density for block in blocks])
+    model = Model(
+        scene=scene,
+        fixed=np.array([block.fidelity is Fidelity.FIXED for block in blocks]),
+        elastic=np.array([stone is not None for stone in stones]),
+        motions=tuple((motion, _indices(scene, motion.stones)) for motion in scene.loads.motions),
+        forces=tuple((force, _indices(scene, force.stones)) for force in scene.loads.forces),
+        laws=law_table(
+            scene.contact.law,
+            [(*_groups(scene, rule), rule.law) for rule in scene.contact.rules],
+            len(blocks),
+        ),
+        inertia=inertia,
+        flight=_flight(inertia, stones),
+        mass=density * np.array([p.volume for p in properties]),
+        volume=np.array([p.volume for p in properties]),
+        surfaces=_surfaces(blocks, centres, stones, packed.start),
+        outline=tuple(block.vertices - centre for block, centre in zip(blocks, centres, strict=True)),
+        stones=tuple(stones),
+        elastic_stones=packed,
+        meshes=workshop.report(),
+    )
+    _check_loads(model)
+    return model, _start(model, centres)
+
+
+def _flight(inertia: RigidInertia, stones: list[Deformable | None]) -> RigidInertia:
+    """The inertia of all bodies that fly."""
+    mass, inverse = inertia.mass.copy(), inertia.inverse_mass.copy()
+    own, inverted = inertia.inertia.copy(), inertia.inverse_inertia.copy()
+    for b, stone in enumerate(stones):
+        if stone is not None:
+            mass[b], inverse[b] = stone.mass, 1.0 / stone.mass
+            own[b], inverted[b] = stone.inertia, np.linalg.inv(stone.inertia)
+    return RigidInertia(mass, inverse, own, inverted)
+
+
+def _parts(block: Block) -> tuple[Part, ...]:
+    return block.parts or (Part(block.vertices, block.faces),)
+
+
+def _mass_properties(block: Block) -> MassProperties:
+    if block.radius is not None:
+        return ball_properties(block)
+    where = f"stone {block.code}"
+    whole = united([mass_properties(part.vertices, part.faces, where) for part in _parts(block)])
+    if block.parts:
+        outline = mass_properties(block.vertices, block.faces, where).volume
+        if abs(outline - whole.volume) > _SAME_VOLUME * outline:
+            raise GeometryError(
+                f"its parts have {whole.volume:.6g} m³, its outline {outline:.6g} m³",
+                where=where,
+                remedy="give convex parts that fill it without overlap",
+            )
+    return whole
+
+
+def _surfaces(
+    blocks: tuple[Block, ...], centres: Array, stones: list[Deformable | None], node_ptr: Ints
+) -> Surfaces:
+    shapes = [(b, part) for b, block in enumerate(blocks) for part in _parts(block)]
+    return surfaces(
+        [part.vertices - centres[b] for b, part in shapes],
+        [part.faces for _, part in shapes],
+        [
+            mesh
+            for b, part in shapes
+            for mesh in _face_meshes(blocks[b], part, _mesh_of(stones[b]), centres[b], int(node_ptr[b]))
+        ],
+        [b for b, _ in shapes],
+        [blocks[b].radius or 0.0 for b, _ in shapes],
+    )
+
+
+def _mesh_of(stone: Deformable | None) -> SolidMesh | None:
+    return None if stone is None else stone.mesh
+
+
+def _indices(scene: Scene, codes: frozenset[str]) -> Ints:
+    _check_codes(scene, codes, "a load")
+    return np.array([b for b, block in enumerate(scene.blocks) if block.code in codes], dtype=np.int64)
+
+
+def _groups(scene: Scene, rule: LawRule) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    _check_codes(scene, rule.first | rule.second, "a law")
+    codes = [block.code for block in scene.blocks]
+    first, second = (np.array([code in group for code in codes]) for group in (rule.first, rule.second))
+    return first, second
+
+
+def _check_codes(scene: Scene, codes: frozenset[str], who: str) -> None:
+    missing = sorted(codes.difference(block.code for block in scene.blocks))
+    if missing:
+        raise SceneError(
+            f"{who} names {', '.join(missing[:5])}",
+            where=scene.name,
+            remedy="give codes of blocks of the scene",
+        )
+
+
+def _check_loads(model: Model) -> None:
+    codes = [block.code for block in model.scene.blocks]
+    driven: set[int] = set()
+    for _, bodies in model.motions:
+        loose = [codes[b] for b in bodies if not model.fixed[b]]
+        if loose:
+            raise SceneError(
+                f"a motion is imposed on {loose[0]}, which is not fixed",
+                where=model.scene.name,
+                remedy="make it fixed: an imposed motion leaves a stone no freedom of its own",
+            )
+        twice = driven.intersection(bodies.tolist())
+        if twice:
+            raise SceneError(
+                f"two motions are imposed on {codes[min(twice)]}", where=model.scene.name, remedy="give one"
+            )
+        driven.update(bodies.tolist())
+    for _, bodies in model.forces:
+        held = [codes[b] for b in bodies if model.fixed[b] or model.elastic[b]]
+        if held:
+            raise SceneError(
+                f"a force acts on {held[0]}, which is not rigid",
+                where=model.scene.name,
+                remedy="forces act on rigid stones",
+            )
+
+
+def _check(block: Block) -> None:
+    deformable_ = block.fidelity is Fidelity.DEFORMABLE
+    wrong = (
+        (
+            block.radius is not None and (deformable_ or bool(block.parts)),
+            "a ball is deformable or has parts",
+            "make it rigid, or a polyhedron",
+        ),
+        (
+            deformable_ and not (block.mesh_size is not None and block.mesh_size > 0),
+            f"mesh_size = {block.mesh_size!r} for a deformable stone",
+            "give metres greater than 0",
+        ),
+        (
+            block.fidelity is Fidelity.FIXED and any(block.velocity),
+            "a fixed stone has a velocity",
+            "make it rigid",
+        ),
+    )
+    for is_wrong, what, remedy in wrong:
+        if is_wrong:
+            raise SceneError(what, where=f"stone {block.code}", remedy=remedy)
+    # the facets of a ball are for pictures
+    for part in _parts(block) if block.radius is None else ():
+        corners = max(len(face) for face in part.faces)
+        if len(part.faces) > _MAX_FACES or corners > MAX_CORNERS:
+            raise GeometryError(
+                f"{len(part.faces)} faces with up to {corners} corners",
+                where=f"stone {block.code}",
+                remedy=f"simplify it to at most {_MAX_FACES} faces with at most {MAX_CORNERS} corners each",
+            )
+
+
+def _inertia(blocks: tuple[Block, ...], properties: list[MassProperties], density: Array) -> RigidInertia:
+    rigid = np.array([block.fidelity is Fidelity.RIGID for block in blocks])
+    mass = density * np.array([p.volume for p in properties])
+    inertia = density[:, None, None] * np.array([p.inertia for p in properties])
+    return RigidInertia(
+        mass,
+        np.where(rigid, 1.0 / mass, 0.0),
+        inertia,
+        np.where(rigid[:, None, None], np.linalg.inv(inertia), 0.0),
+    )
+
+
+def _face_meshes(
+    block: Block, part: Part, mesh: SolidMesh | None, centre: Array, start: int
+) -> Sequence[FaceMesh | None]:
+    if mesh is None:
+        return [None] * len(part.faces)
+    if not block.parts:
+        return face_meshes(mesh, len(block.faces), start)
+    return part_face_meshes(mesh, part.vertices - centre, part.faces, start)
+
+
+def _start(model: Model, centres: Array) -> State:
+    velocity = np.array([block.velocity for block in model.scene.blocks], dtype=float)
+    node = np.zeros((int(model.elastic_stones.start[-1]), 3))
+    node_velocity = np.zeros_like(node)
+    for body, stone in enumerate(model.stones):
+        if stone is not None:
+            rows = model.nodes_of(body)
+            node[rows] = centres[body] + stone.mesh.nodes
+            node_velocity[rows] = velocity[body, :3] + np.cross(velocity[body, 3:], stone.mesh.nodes)
+            velocity[body] = 0.0
+    rotation = np.tile(np.eye(3), (len(centres), 1, 1))
+    return State(0.0, centres.copy(), rotation, velocity, node, node_velocity)

@@ -1,0 +1,132 @@
+"""The finite elements of all deformable stones of a scene; stones of one shape share a mesh.
+
+Stones that differ by a translation share one `Deformable` with its matrices. Those that are turned too share the mesh,
+turned with them. The stone that is meshed is the one of a shape whose code comes first, so a mesh does not depend
+on the order of the blocks.
+"""
+
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.model.deformable import Deformable, deformable
+from mechanics.model.touching import touching_faces
+from mechanics.scene.scene import Block, Fidelity
+from mechanics.stones.meshing.congruence import Motion, classes, motion, translation
+from mechanics.stones.meshing.mesh import SolidMesh
+from mechanics.stones.meshing.meshers.mesher import Meshed, meshed_block
+from mechanics.stones.meshing.quality import MeshQuality, mesh_quality
+from mechanics.stones.meshing.report import MeshReport, StoneMesh
+
+__all__ = ["StoneWorkshop"]
+
+Array = NDArray[np.float64]
+
+
+class StoneWorkshop:
+    """Makes the elastic stones of a scene, each shape once.
+
+    Parameters
+    ----------
+    blocks : of the scene
+    near : distance over size at which contacts are watched [-]
+    lumped : mass on the diagonal
+    """
+
+    def __init__(self, blocks: Sequence[Block], near: float, lumped: bool) -> None:
+        self._blocks, self._lumped = blocks, lumped
+        self._soft = [b for b, block in enumerate(blocks) if block.fidelity is Fidelity.DEFORMABLE]
+        graded = [b for b in self._soft if _is_graded(blocks[b])]
+        self._contact = touching_faces(blocks, graded, near) if graded else {}
+        self._motions: dict[int, Motion] = {}
+        self._meshed: dict[int, Meshed] = {}
+        self._made: dict[int, tuple[Deformable, Array]] = {}
+        in_order = sorted(self._soft, key=lambda b: blocks[b].code)
+        self._first = self._classes(in_order, self._stone_key, self._moved)
+        leaders = [b for b in in_order if self._first[b] == b]
+        self._shape = self._classes(leaders, self._mesh_key, self._turned)
+
+    def __call__(self, index: int) -> tuple[Deformable, Array]:
+        """The finite elements of a block, and its centre of mass (3,) [m].
+
+        Raises
+        ------
+        MeshError : if the stone cannot be meshed
+        """
+        first = self._first[index]
+        if first not in self._made:
+            stone, centre = deformable(self._mesh(first), self._blocks[first].material, self._lumped)
+            self._made[first] = stone, centre - self._blocks[first].vertices[0]
+        stone, arm = self._made[first]
+        return stone, self._blocks[index].vertices[0] + arm
+
+    def report(self) -> MeshReport:
+        """How the stones were meshed that have been asked for."""
+        made = list(self._meshed)
+        quality = dict(zip(made, mesh_quality([self._meshed[b].mesh for b in made]), strict=True))
+        return MeshReport(
+            tuple(self._stone_mesh(b, quality) for b in self._soft if self._shape[self._first[b]] in quality)
+        )
+
+    def _stone_mesh(self, index: int, quality: dict[int, MeshQuality]) -> StoneMesh:
+        shape = self._shape[self._first[index]]
+        made = self._meshed[shape]
+        return StoneMesh(
+            self._blocks[index].code, made.how, made.failures, self._blocks[shape].code, quality[shape]
+        )
+
+    def _mesh(self, index: int) -> SolidMesh:
+        shape = self._shape[index]
+        if shape not in self._meshed:
+            self._meshed[shape] = meshed_block(self._blocks[shape], self._contact.get(shape, ()))
+        mesh = self._meshed[shape].mesh
+        if shape == index:
+            return mesh
+        there = self._motions[index]
+        return replace(mesh, nodes=there(mesh.nodes), facet_face=there.face[mesh.facet_face])
+
+    def _classes(
+        self, order: list[int], key: Callable[[int], Hashable], same: Callable[[int, int], bool]
+    ) -> dict[int, int]:
+        """For each of some blocks the first that is the same."""
+        own = classes(
+            [key(b) for b in order],
+            [self._blocks[b].vertices for b in order],
+            lambda one, other: same(order[one], order[other]),
+        )
+        return {b: order[k] for b, k in zip(order, own, strict=True)}
+
+    def _stone_key(self, index: int) -> tuple[object, ...]:
+        block = self._blocks[index]
+        own = block.faces, block.material, tuple(map(id, block.parts)), self._contact.get(index, ())
+        return (*_sizes(block), *own)
+
+    def _mesh_key(self, index: int) -> tuple[object, ...]:
+        block = self._blocks[index]
+        corners = tuple(sorted(map(len, block.faces)))
+        return (*_sizes(block), corners, len(self._contact.get(index, ())))
+
+    def _moved(self, first: int, other: int) -> bool:
+        return translation(self._blocks[first].vertices, self._blocks[other].vertices)
+
+    def _turned(self, first: int, other: int) -> bool:
+        one, two = self._blocks[first], self._blocks[other]
+        contact = self._contact.get(first, ()), self._contact.get(other, ())
+        found = motion(one.vertices, one.faces, two.vertices, two.faces, *contact)
+        if found is not None:
+            self._motions[other] = found
+        return found is not None
+
+
+def _is_graded(block: Block) -> bool:
+    return (
+        block.contact_size is not None
+        and block.mesh_size is not None
+        and block.contact_size < block.mesh_size
+    )
+
+
+def _sizes(block: Block) -> tuple[object, ...]:
+    return block.mesh_size, block.element, block.contact_size, block.growth, block.mesher

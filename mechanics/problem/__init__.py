@@ -1,0 +1,1 @@
+"""The contact problem of one step, its residual and its exact local solution."""

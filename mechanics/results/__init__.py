@@ -1,0 +1,1 @@
+"""Results: contacts, joints, stresses."""

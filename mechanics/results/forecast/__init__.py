@@ -1,0 +1,1 @@
+"""Forecast of the time and memory of a run."""

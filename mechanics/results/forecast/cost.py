@@ -1,0 +1,170 @@
+"""What a run will take, before it runs: seconds by stage, and memory.
+
+The seconds of a stage are a sum over the amounts on which its algorithm depends (mechanics.amounts), each times what
+one unit took on the machine named in mechanics.cost_rates. Two things are not known beforehand: how many iterations the
+contact problems need, and how many steps pass until a scene rests. So the answer is a range: each stage has the factor
+by which measured runs lay above and below, and the number of steps has a least, a likely and a largest value.
+"""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from functools import cache
+
+import numpy as np
+
+from mechanics.results.forecast.cost_rates import CALIBRATION, MEMORY, RATES
+from mechanics.results.forecast.plan import Plan
+from mechanics.results.forecast.workload import Amounts
+from mechanics.scene.scene import Scene, Start, TimeSettings
+
+__all__ = ["ExpectedCost", "calibration", "expected_cost", "machine_slowness", "measures"]
+
+# steps in which an equilibrium must last, with the one that finds it, and how many some runs took
+_RESTING = (5, 6, 40)
+# steps of a kinetic relaxation, and of a run from rest that ends where it begins
+_RELAXING, _SETTLING = (5, 20, 80), (5, 30, 300)
+
+
+@dataclass(frozen=True)
+class ExpectedCost:
+    """What a run will take.
+
+    Attributes
+    ----------
+    seconds : low, likely and high, of one processor
+    longest : if no stone comes to rest before the duration is over [s]
+    memory : most of the whole program [bytes]
+    asleep : likely seconds if nearly all stones slept in its steps (`[time] sleep`); None where none may, or where a
+        run ends as soon as they would
+    by_stage : likely seconds of mesh, assemble, start, steps and stress; stages that there will not be are left out
+    steps : least, likely and largest number of steps
+    """
+
+    seconds: tuple[float, float, float]
+    longest: float
+    memory: int
+    asleep: float | None
+    by_stage: Mapping[str, float]
+    steps: tuple[int, int, int]
+
+
+def expected_cost(plan: Plan, scene: Scene, slowness: float = 1.0) -> ExpectedCost:
+    """What the run of a scene will take.
+
+    Parameters
+    ----------
+    plan : of the scene
+    scene : the scene
+    slowness : time of this machine over that of the one on which the rates were measured; see `machine_slowness`
+    """
+    amounts, time_ = plan.amounts, scene.time
+    kind = "elastic" if amounts.nodes else "rigid"
+    stages = {"mesh": 1.0, "assemble": 1.0, "start": 1.0, "stress": 1.0}
+    if time_.start is not Start.EQUILIBRIUM:
+        del stages["start"]
+    work, steps = measures(amounts), _steps(time_, scene.loads.until)
+    step = RATES[kind, _pace(time_)]
+    low = likely = high = 0.0
+    by_stage = {}
+    for stage in stages:
+        rate = RATES.get((kind, stage))
+        if rate is None:
+            continue
+        seconds = slowness * rate(work)
+        by_stage[stage] = seconds
+        low, likely, high = low + seconds / rate.below, likely + seconds, high + seconds * rate.above
+    one = slowness * step(work)
+    by_stage["steps"] = steps[1] * one
+    total = max(1, round(time_.duration / time_.step))
+    moving = high + total * slowness * RATES[kind, "moving"](work)
+    seconds_range = (
+        low + steps[0] * one / step.below,
+        likely + steps[1] * one,
+        high + steps[2] * one * step.above,
+    )
+    return ExpectedCost(
+        seconds_range,
+        max(moving, seconds_range[1]),
+        int(MEMORY[kind](work)),
+        _asleep(kind, time_, likely, slowness * steps[1] * RATES["rigid", "asleep"](work)),
+        by_stage,
+        steps,
+    )
+
+
+def measures(amounts: Amounts) -> dict[str, float]:
+    """What rates refer to: the amounts; *one*; *tangle*, contacts times the root of the number of stones."""
+    own = {name: float(value) for name, value in asdict(amounts).items()}
+    return own | {"one": 1.0, "tangle": own["contacts"] * own["stones"] ** 0.5}
+
+
+def _asleep(kind: str, time_: TimeSettings, rest: float, steps: float) -> float | None:
+    """Seconds with sleep: `rest` of the other stages, `steps` of the steps."""
+    useless = kind == "elastic" or time_.relaxation or time_.stop_at_equilibrium
+    return None if useless else rest + steps
+
+
+def _pace(time_: TimeSettings) -> str:
+    """Which steps a run has mostly."""
+    if time_.relaxation:
+        return "relaxing"
+    return "settled" if time_.start is Start.EQUILIBRIUM and time_.stop_at_equilibrium else "moving"
+
+
+def _steps(time_: TimeSettings, until: float) -> tuple[int, int, int]:
+    """Least, likely and largest number of steps, with loads that change `until` some time [s]."""
+    total = max(1, round(time_.duration / time_.step))
+    if not time_.stop_at_equilibrium:
+        return total, total, total
+    first = total if until >= time_.duration else int(np.ceil(until / time_.step))
+    more = _RELAXING if time_.relaxation else _RESTING if time_.start is Start.EQUILIBRIUM else _SETTLING
+    low, likely, high = (min(total, first + one) for one in more)
+    return low, likely, high
+
+
+@cache
+def machine_slowness() -> float:
+    """Time of this machine over that of the one on which the rates were measured, from some 0.1 s of work [-].
+
+    The mean, in logarithms, of Python's own loops, of passes over arrays and of products of matrices.
+    """
+    return float(np.exp(np.mean([np.log(took / CALIBRATION[name]) for name, took in calibration().items()])))
+
+
+def calibration() -> dict[str, float]:
+    """Processor seconds of three fixed pieces of work; the best of some."""
+    return {name: _best(work) for name, work in _WORK.items()}
+
+
+def _best(work: Callable[[], object], times: int = 5) -> float:
+    seconds = []
+    for _ in range(times):
+        start = time.process_time()
+        work()
+        seconds.append(time.process_time() - start)
+    return max(min(seconds), 1e-6)
+
+
+def _loops() -> int:
+    total = 0
+    for i in range(60_000):
+        total += i % 7
+    return total
+
+
+def _passes() -> float:
+    numbers = np.arange(250_000, dtype=float)
+    for _ in range(4):
+        numbers = np.sqrt(numbers + 1.0) * 2.0
+    return float(numbers[-1])
+
+
+def _products() -> float:
+    matrix = np.full((300, 300), 0.5)
+    for _ in range(2):
+        matrix = matrix @ matrix / 300.0
+    return float(matrix[0, 0])
+
+
+_WORK: Mapping[str, Callable[[], object]] = {"loops": _loops, "passes": _passes, "products": _products}

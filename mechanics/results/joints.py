@@ -1,0 +1,295 @@
+"""What each joint carries: resultant and its eccentricity, pressure, opening, sliding, use of friction."""
+
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.contact.contacts import Contacts, material_points
+from mechanics.dynamics.simulation import Step
+from mechanics.model.model import Model
+from mechanics.results.contact_result import ContactResult, JointResult
+from mechanics.results.interfaces import Faces, find_interfaces, placed_faces
+from mechanics.results.joint_sections import Section, eccentricity, sections
+from mechanics.results.patch_pressure import patch_pressure
+from mechanics.scene.state import State
+
+__all__ = ["StartingJoints", "joint_results", "parting", "starting_joints"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# over the size of the smaller stone
+_CLOSED = 1e-2
+# status of contacts that bear nothing
+_IDLE = ("open", "broken")
+
+
+@dataclass(frozen=True)
+class StartingJoints:
+    """The joints in which a run begins.
+
+    Attributes
+    ----------
+    state : where it begins
+    face : (nj, 2) pairs of faces
+    section : their polygons then
+    closed : (nj,) whether they are open by no more than a hundredth of the smaller stone's size, as for bonds
+    """
+
+    state: State
+    face: Ints
+    section: Section
+    closed: NDArray[np.bool_]
+
+
+def starting_joints(model: Model, start: State, contacts: Contacts) -> StartingJoints:
+    """The joints of the contacts of the first step."""
+    faces = placed_faces(model, start)
+    face = find_interfaces(faces, contacts, start).face
+    section = sections(faces, face)
+    meant = np.arange(section.gap.shape[1]) < section.count[:, None]
+    nearest = np.where(meant, section.gap, np.inf).min(axis=1, initial=np.inf)
+    return StartingJoints(start, face, section, nearest <= _CLOSED * faces.size[face].min(axis=1))
+
+
+def parting(contacts: Contacts, start: State, state: State) -> tuple[Array, Array]:
+    """How far the two material points of each contact have parted since the start.
+
+    In axes that turn with the antagonist: stones that turn together do not part.
+
+    Returns
+    -------
+    opening : (nc,) along the normal [m]
+    slide : (nc, 3) across it [m]
+    """
+    now, then = (np.subtract(*np.moveaxis(material_points(contacts, one), 1, 0)) for one in (state, start))
+    body, normal = contacts.bodies[:, 1], contacts.frame[:, 0]
+    parted = now - np.einsum("nab,nb->na", _turn(start, state, body), then)
+    return np.einsum("ci,ci->c", parted, normal), _across(normal, parted)
+
+
+def joint_results(
+    model: Model, start: StartingJoints, faces: Faces, face: Ints, step: Step, contacts: ContactResult
+) -> JointResult:
+    """Sum up the contacts of each joint.
+
+    Parameters
+    ----------
+    start : the joints at the start; they come first in `face`
+    faces, face : all faces at the end of the step, and the pairs (nj, 2) that are joints
+    step, contacts : the step that gave the forces, and its contact points
+    """
+    count, bodies = len(face), faces.body[face]
+    own = np.flatnonzero(contacts.joint >= 0)
+    joint = contacts.joint[own]
+    away = np.bincount(joint, minlength=count) == 0
+    section = _with_parted(sections(faces, face), start, bodies, step.after, np.flatnonzero(away))
+    force, moment = _resultants(section, bodies, contacts, own)
+    n, status = section.frame[:, 0], contacts.status[own]
+    # what is less than the solver leaves is no force
+    least = model.scene.solver.tolerance * float(np.linalg.norm(force, axis=1).max(initial=0.0))
+    place, kern, edge = eccentricity(section, force, moment, least)
+    opening, sliding = _movement(section, start, bodies, step.after, contacts, own)
+    bearing = _sums(joint, _bearing(model, step)[own], count)
+    shear = np.linalg.norm(_across(n, force), axis=1)
+    return JointResult(
+        bodies=bodies,
+        parted=away & np.append(start.closed, np.zeros(count - len(start.face), dtype=bool)),
+        polygon=tuple(section.polygon(number) for number in range(count)),
+        frame=section.frame,
+        centroid=section.centroid,
+        area=section.area,
+        second_moment=section.moment,
+        force=force,
+        moment=moment,
+        centre_of_pressure=section.centroid + np.einsum("jd,jdi->ji", place, section.frame[:, 1:]),
+        eccentricity=place,
+        kern=kern,
+        edge=edge,
+        pressure_mean=_ratio(np.einsum("ji,ji->j", force, n), section.area),
+        pressure_max=_largest(joint, _patches(contacts, own), count),
+        gap=np.maximum(_at_most(section, section.gap), _largest(joint, contacts.gap[own], count)),
+        opening=opening,
+        sliding=sliding,
+        slipping=_share(joint, contacts.area[own], status == "slip", count),
+        open=np.where(away, 1.0, _share(joint, contacts.area[own], np.isin(status, _IDLE), count)),
+        friction_use=_ratio(shear, np.where(bearing > least, bearing, 0.0)),
+    )
+
+
+def _movement(
+    section: Section, start: StartingJoints, bodies: Ints, state: State, contacts: ContactResult, own: Ints
+) -> tuple[Array, Array]:
+    """(nj,) opening and sliding since the start, the largest of the corners and of the contact points [m]."""
+    joint, count = contacts.joint[own], len(bodies)
+    opened, slid = _moved_apart(section, start.state, state, bodies)
+    # what is new has no start from which to count
+    opened[len(start.face) :] = _at_most(section, section.gap)[len(start.face) :]
+    # where there are contacts, these know it better: stones deform
+    slid[np.bincount(joint, minlength=count) > 0] = 0.0
+    return (
+        np.maximum(opened, _largest(joint, contacts.opening[own], count)),
+        np.maximum(slid, _largest(joint, contacts.slide[own], count)),
+    )
+
+
+def _resultants(section: Section, bodies: Ints, contacts: ContactResult, own: Ints) -> tuple[Array, Array]:
+    """(nj, 3) forces on the first stones, and moments about the centroids."""
+    joint, count = contacts.joint[own], len(bodies)
+    # forces act on the candidate; in a joint, on the first stone
+    sign = np.where(contacts.bodies[own, 0] == bodies[joint, 0], 1.0, -1.0)
+    force = sign[:, None] * contacts.force[own]
+    return _sums(joint, force, count), _sums(
+        joint, np.cross(contacts.point[own] - section.centroid[joint], force), count
+    )
+
+
+def _patches(contacts: ContactResult, own: Ints) -> Array:
+    """(n,) pressure around each contact point of a joint [Pa]."""
+    area = contacts.area[own]
+    return patch_pressure(contacts.point[own], contacts.pressure[own] * area, area, contacts.joint[own])
+
+
+def _bearing(model: Model, step: Step) -> Array:
+    """(nc,) shear force that friction and cohesion can bear in each contact of a step [N]."""
+    limit = step.terms.friction * step.shifted[:, 0] + step.terms.cohesion
+    bearing: Array = limit / model.scene.time.step
+    return bearing
+
+
+def _with_parted(
+    section: Section, start: StartingJoints, bodies: Ints, state: State, parted: Ints
+) -> Section:
+    """The sections, those of parted joints as at the start but carried along by the second stone."""
+    if not len(parted):
+        return section
+    then, second = start.section, bodies[parted, 1]
+    turn = _turn(start.state, state, second)
+    frame = then.frame[parted] @ turn.transpose(0, 2, 1)
+    first_sides, second_sides = (
+        _moved(start.state, state, body, side)
+        for body, side in zip(bodies[parted].T, _sides(then, parted), strict=True)
+    )
+    gap = np.einsum("jki,ji->jk", first_sides - second_sides, frame[:, 0])
+    centroid = _moved(start.state, state, second, then.centroid[parted, None])[:, 0]
+    moved = replace(
+        then,
+        frame=_put(then.frame, parted, frame),
+        centroid=_put(then.centroid, parted, centroid),
+        gap=_put(then.gap, parted, gap),
+        # on the second stone
+        middle=_put(then.middle, parted, then.middle[parted] + 0.5 * (gap - then.gap[parted])),
+    )
+    return _merged(section, moved, parted)
+
+
+def _sides(section: Section, rows: Ints) -> tuple[Array, Array]:
+    """Corners (n, m, 3) of some sections on the faces of the first and of the second stones [m]."""
+    n = section.frame[rows, 0][:, None]
+    middle = section.centroid[rows, None] + np.einsum(
+        "jkd,jdi->jki", section.corner[rows], section.frame[rows, 1:]
+    )
+    return tuple(
+        middle + (section.middle[rows] + half * section.gap[rows])[..., None] * n for half in (0.5, -0.5)
+    )
+
+
+def _moved_apart(section: Section, start: State, state: State, bodies: Ints) -> tuple[Array, Array]:
+    """How far the two stones of each joint have parted since the start at its corners, at most: across it, along it.
+
+    As if they were rigid. Returns (nj,), not less than zero, and (nj,) [m].
+    """
+    sides = _sides(section, np.arange(len(bodies)))
+    then = [_moved(state, start, body, side) for body, side in zip(bodies.T, sides, strict=True)]
+    turn = _turn(start, state, bodies[:, 1])
+    parted = sides[0] - sides[1] - np.einsum("jab,jkb->jka", turn, then[0] - then[1])
+    n = section.frame[:, None, 0]
+    opened = np.einsum("jki,jni->jk", parted, n)
+    return _at_most(section, opened), _at_most(section, np.linalg.norm(_across(n, parted), axis=2))
+
+
+def _turn(start: State, state: State, body: Ints) -> Array:
+    """(n, 3, 3) by how much bodies have turned since the start."""
+    turn: Array = state.rotation[body] @ start.rotation[body].transpose(0, 2, 1)
+    return turn
+
+
+def _moved(start: State, state: State, body: Ints, point: Array) -> Array:
+    """Where places (n, k, 3) of bodies (n,) at the start are at a state, if these are rigid."""
+    moved: Array = state.centre[body, None] + np.einsum(
+        "jab,jkb->jka", _turn(start, state, body), point - start.centre[body, None]
+    )
+    return moved
+
+
+def _merged(section: Section, other: Section, rows: Ints) -> Section:
+    """A section with some rows of another one."""
+    most = max(section.corner.shape[1], other.corner.shape[1])
+    wide, narrow = (
+        replace(
+            one,
+            corner=_padded(one.corner, most),
+            gap=_padded(one.gap, most),
+            middle=_padded(one.middle, most),
+        )
+        for one in (section, other)
+    )
+    values: dict[str, Any] = {
+        one.name: _put(getattr(wide, one.name), rows, getattr(narrow, one.name)[rows])
+        for one in fields(Section)
+    }
+    return Section(**values)
+
+
+def _padded(values: Array, most: int) -> Array:
+    room = most - values.shape[1]
+    return np.concatenate([values, np.zeros((len(values), room, *values.shape[2:]))], axis=1)
+
+
+def _put(values: Array, rows: Ints, new: Array) -> Array:
+    changed = values.copy()
+    changed[rows] = new
+    return changed
+
+
+def _across(normal: Array, vector: Array) -> Array:
+    """The part of vectors (…, 3) at right angles to unit normals."""
+    across: Array = vector - np.sum(vector * normal, axis=-1, keepdims=True) * normal
+    return across
+
+
+def _at_most(section: Section, values: Array) -> Array:
+    """Largest of the values (nj, m) at the corners of each joint, not less than zero."""
+    meant = np.arange(values.shape[1]) < section.count[:, None]
+    largest: Array = np.where(meant, values, 0.0).max(axis=1, initial=0.0)
+    return largest
+
+
+def _share(joint: Ints, area: Array, chosen: NDArray[np.bool_], count: int) -> Array:
+    """Part (nj,) of the area of the contacts of each joint; zero where there are none."""
+    return np.nan_to_num(_ratio(_sums(joint, area * chosen, count), _sums(joint, area, count)))
+
+
+def _sums(joint: Ints, values: Array, count: int) -> Array:
+    """Sum the values (n,) or (n, d) of the contacts of each joint."""
+    total = np.zeros((count, *values.shape[1:]))
+    np.add.at(total, joint, values)
+    return total
+
+
+def _largest(joint: Ints, values: Array, count: int) -> Array:
+    """Largest value of the contacts of each joint, not less than zero."""
+    largest = np.zeros(count)
+    np.maximum.at(largest, joint, values)
+    return largest
+
+
+def _ratio(number: Array, by: Array) -> Array:
+    """Their ratio; NaN where that has no meaning."""
+    return np.where(by > 0, number / _positive(by), np.nan)
+
+
+def _positive(values: Array) -> Array:
+    return np.where(values > 0, values, 1.0)

@@ -1,0 +1,234 @@
+"""From a state to what is asked of it: positions, stresses, contact forces, joints."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.contact.contacts import material_points
+from mechanics.dynamics.simulation import Step
+from mechanics.model.deformable import Deformable
+from mechanics.model.model import Model
+from mechanics.results.contact_result import ContactResult, JointResult
+from mechanics.results.interfaces import Faces, Interfaces, find_interfaces, placed_faces
+from mechanics.results.joints import StartingJoints, joint_results, parting, starting_joints
+from mechanics.results.result import BodyResult, Frame
+from mechanics.results.stress_values import stress_values
+from mechanics.scene.laws.status import contact_status
+from mechanics.scene.scene import Block
+from mechanics.scene.state import State
+from mechanics.stones.elasticity import (
+    from_voigt,
+    node_volumes,
+    principal,
+    stress_error,
+    to_voigt,
+    von_mises,
+)
+from mechanics.stones.meshing.elements import Element
+from mechanics.stones.meshing.mesh import SolidMesh
+
+__all__ = ["Observer", "positions", "surface_polygons", "velocities"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+# parts of a facet that have all its nodes for corners, counter-clockwise seen from outside
+_FACET_PARTS: Mapping[Element, tuple[tuple[int, ...], ...]] = {
+    Element.TET4: ((0, 1, 2),),
+    Element.TET10: ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)),
+    Element.HEX8: ((0, 1, 2, 3),),
+    Element.HEX20: ((0, 4, 7), (4, 1, 5), (5, 2, 6), (6, 3, 7), (4, 5, 6, 7)),
+    Element.HEX27: ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3)),
+}
+
+
+def surface_polygons(mesh: SolidMesh) -> tuple[tuple[int, ...], ...]:
+    """Outward polygons that cover the boundary, with a corner in every node of it."""
+    parts = [mesh.facets[:, part] for part in _FACET_PARTS[mesh.element]]
+    return tuple(tuple(polygon) for part in parts for polygon in part.tolist())
+
+
+def positions(model: Model, state: State) -> tuple[Array, ...]:
+    """Points of each body now: the corners of a rigid one, the nodes of a deformable one [m]."""
+    return tuple(
+        state.node[model.nodes_of(b)]
+        if stone is not None
+        else state.centre[b] + model.outline[b] @ state.rotation[b].T
+        for b, stone in enumerate(model.stones)
+    )
+
+
+def velocities(model: Model, state: State) -> tuple[Array, ...]:
+    """Velocities of the same points [m/s]."""
+    return tuple(
+        state.node_velocity[model.nodes_of(b)]
+        if stone is not None
+        else state.velocity[b, :3] + np.cross(state.velocity[b, 3:], model.outline[b] @ state.rotation[b].T)
+        for b, stone in enumerate(model.stones)
+    )
+
+
+class Observer:
+    """What is seen of a run: frames while it goes on; bodies, contacts and joints at its end.
+
+    Parameters
+    ----------
+    model, start : the run, and its stones before they bear anything: displacements count from there
+    """
+
+    def __init__(self, model: Model, start: State) -> None:
+        self._model, self._start = model, start
+        self._joints: StartingJoints | None = None
+
+    def first_frame(self, state: State) -> Frame:
+        """The instant at which the motion begins, before its first contact forces are known."""
+        return self._frame(state, _no_contacts())
+
+    def begin(self, step: Step) -> None:
+        """Take the contacts of the first step as the joints that there are at the start."""
+        self._joints = starting_joints(self._model, self._start, step.contacts)
+
+    def frame(self, step: Step) -> Frame:
+        """The end of a step."""
+        _, interfaces = self._interfaces(step)
+        return self._frame(step.after, self._contacts(step, interfaces))
+
+    def contacts_and_joints(self, step: Step) -> tuple[ContactResult, JointResult]:
+        """The contact points of a step with their mean forces, and what they add up to."""
+        faces, interfaces = self._interfaces(step)
+        contacts = self._contacts(step, interfaces)
+        assert self._joints is not None
+        return contacts, joint_results(self._model, self._joints, faces, interfaces.face, step, contacts)
+
+    def bodies(self, state: State, balance: Array) -> tuple[BodyResult, ...]:
+        """What became of each body; `balance` (nb,) as `imbalance` gives it."""
+        model = self._model
+        before, now = positions(model, self._start), positions(model, state)
+        return tuple(
+            _rigid_result(model, b, block, before[b], now[b], float(balance[b]))
+            if stone is None
+            else self._elastic_result(b, stone, state, before[b], float(balance[b]))
+            for b, (block, stone) in enumerate(zip(model.scene.blocks, model.stones, strict=True))
+        )
+
+    def _frame(self, state: State, contacts: ContactResult) -> Frame:
+        seen = [
+            self._stress(b, stone, state) if stone is not None and block.stress else (None, None)
+            for b, (block, stone) in enumerate(zip(self._model.scene.blocks, self._model.stones, strict=True))
+        ]
+        return Frame(
+            time=state.time,
+            positions=positions(self._model, state),
+            velocities=velocities(self._model, state),
+            stresses=tuple(stress for stress, _ in seen),
+            stress_errors=tuple(error for _, error in seen),
+            contacts=contacts,
+        )
+
+    def _interfaces(self, step: Step) -> tuple[Faces, Interfaces]:
+        assert self._joints is not None
+        faces = placed_faces(self._model, step.after)
+        return faces, find_interfaces(faces, step.contacts, step.after, self._joints.face)
+
+    def _contacts(self, step: Step, interfaces: Interfaces) -> ContactResult:
+        contacts, normal = step.contacts, step.contacts.frame[:, 0]
+        opening, slide = parting(contacts, self._start, step.after)
+        pressing = np.einsum("ci,ci->c", step.force, normal)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            pressure = np.where(contacts.area > 0, pressing / contacts.area, np.nan)
+        return ContactResult(
+            bodies=contacts.bodies,
+            point=material_points(contacts, step.after).mean(axis=1),
+            normal=normal,
+            force=step.force,
+            gap=step.gap,
+            area=contacts.area,
+            pressure=pressure,
+            opening=opening,
+            slide=np.linalg.norm(slide, axis=1),
+            status=contact_status(step.internal, step.terms, step.shifted),
+            joint=interfaces.joint,
+        )
+
+    def _stress(self, body: int, stone: Deformable, state: State) -> tuple[Array, float]:
+        """Recovered stress of the nodes (n, 6), world axes [Pa], and its estimated relative error [-]."""
+        node, turn = state.node[self._model.nodes_of(body)], state.rotation[body]
+        displacement = stone.displacement(node, state.centre[body], turn)
+        local = stone.recovered(displacement)
+        error = stress_error(stone.mesh, stone.material, displacement, local)
+        return to_voigt(turn @ from_voigt(local) @ turn.T), error
+
+    def _elastic_result(
+        self, body: int, stone: Deformable, state: State, before: Array, balance: float
+    ) -> BodyResult:
+        model, block = self._model, self._model.scene.blocks[body]
+        now, volume = state.node[model.nodes_of(body)], node_volumes(stone.mesh)
+        bare = BodyResult(
+            code=block.code,
+            fidelity=block.fidelity,
+            reference=before,
+            position=now,
+            faces=surface_polygons(stone.mesh),
+            element=stone.mesh.element,
+            cells=stone.mesh.cells,
+            stress=None,
+            von_mises=None,
+            principal=None,
+            node_volume=volume,
+            values=None,
+            volume=float(model.volume[body]),
+            mass=float(model.mass[body]),
+            balance=balance,
+        )
+        if not block.stress:
+            return bare
+        stress, error = self._stress(body, stone, state)
+        return replace(
+            bare,
+            stress=stress,
+            von_mises=von_mises(stress),
+            principal=principal(stress)[0],
+            values=stress_values(stress, now, volume, stone.material, error),
+        )
+
+
+def _rigid_result(
+    model: Model, body: int, block: Block, before: Array, now: Array, balance: float
+) -> BodyResult:
+    return BodyResult(
+        code=block.code,
+        fidelity=block.fidelity,
+        reference=before,
+        position=now,
+        faces=block.faces,
+        element=None,
+        cells=np.zeros((0, 4), dtype=np.int64),
+        stress=None,
+        von_mises=None,
+        principal=None,
+        node_volume=None,
+        values=None,
+        volume=float(model.volume[body]),
+        mass=float(model.mass[body]),
+        balance=balance,
+    )
+
+
+def _no_contacts() -> ContactResult:
+    none, vectors = np.zeros(0), np.zeros((0, 3))
+    return ContactResult(
+        bodies=np.zeros((0, 2), dtype=np.int64),
+        point=vectors,
+        normal=vectors,
+        force=vectors,
+        gap=none,
+        area=none,
+        pressure=none,
+        opening=none,
+        slide=none,
+        status=np.zeros(0, dtype=np.str_),
+        joint=np.zeros(0, dtype=np.int64),
+    )

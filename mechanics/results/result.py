@@ -1,0 +1,230 @@
+"""What a simulation gives back."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.results.contact_result import ContactResult, JointResult
+from mechanics.results.stress_values import StressValues
+from mechanics.scene.scene import Fidelity, Scene
+from mechanics.stones.meshing.elements import Element
+
+__all__ = [
+    "BodyResult",
+    "Energies",
+    "Errors",
+    "Frame",
+    "History",
+    "Outcome",
+    "Result",
+    "StaticStart",
+]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+class Outcome(StrEnum):
+    """How a run ended."""
+
+    EQUILIBRIUM = "equilibrium"
+    MOVING = "moving"
+    COLLAPSED = "collapsed"
+
+
+@dataclass(frozen=True)
+class Errors:
+    """The error measures of docs/theory.md §4, at the last step unless it says otherwise.
+
+    Attributes
+    ----------
+    natural_map : η, largest over the last five steps, those in which an equilibrium must last [-]
+    penetration : deepest overlap over the smallest block's size, largest of the run [-]
+    balance : unbalanced force of a block over its weight, largest over the blocks [-]
+    reaction : |vertical support reaction - weight| over weight [-]
+    energy : energy that no term of the balance explains, over the reference energy, whole run [-]
+    unconverged_steps : steps that the solver left above its tolerance
+    """
+
+    natural_map: float
+    penetration: float
+    balance: float
+    reaction: float
+    energy: float
+    unconverged_steps: int
+
+
+@dataclass(frozen=True)
+class BodyResult:
+    """One block at the end of the run.
+
+    Attributes
+    ----------
+    code, fidelity : as in the scene
+    reference : (n, 3) points before the run: corners of a rigid block, mesh nodes of a deformable one [m]
+    position : (n, 3) the same points now [m]
+    faces : outward polygons on those points (the corners' polygons, or parts of the mesh's boundary facets)
+    element : kind of the finite elements; None if rigid
+    cells : (nc, k) node indices of the finite elements, in VTK's order; empty for rigid and fixed blocks
+    stress : (n, 6) recovered nodal stress xx, yy, zz, xy, yz, zx in world axes [Pa]; None if rigid, or not wanted
+    von_mises : (n,) Von Mises stress of the recovered nodal stress [Pa]; None without stress
+    principal : (n, 3) principal stresses of the same, largest first [Pa]; None without stress
+    node_volume : (n,) volume that each node stands for [m³]; None if rigid
+    values : the stress in a few numbers; None without stress
+    volume : [m³]
+    mass : [kg]
+    balance : unbalanced force, or moment over its smallest width, over its weight [-]
+    """
+
+    code: str
+    fidelity: Fidelity
+    reference: Array
+    position: Array
+    faces: tuple[tuple[int, ...], ...]
+    element: Element | None
+    cells: Ints
+    stress: Array | None
+    von_mises: Array | None
+    principal: Array | None
+    node_volume: Array | None
+    values: StressValues | None
+    volume: float
+    mass: float
+    balance: float
+
+    @property
+    def displacement(self) -> Array:
+        """(n, 3) displacement of each point [m]."""
+        return self.position - self.reference
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One instant.
+
+    Attributes
+    ----------
+    time : [s]
+    positions : of the points of each body, as in its BodyResult [m]
+    velocities : (n, 3) of the same points [m/s]
+    stresses : (n, 6) as in BodyResult; None without stress [Pa]
+    stress_errors : as StressValues.error; None without stress [-]
+    contacts : the contact points; joints of the start have the same numbers as at the end
+    """
+
+    time: float
+    positions: tuple[Array, ...]
+    velocities: tuple[Array, ...]
+    stresses: tuple[Array | None, ...]
+    stress_errors: tuple[float | None, ...]
+    contacts: ContactResult
+
+
+@dataclass(frozen=True)
+class History:
+    """One value per step.
+
+    Attributes
+    ----------
+    time : at the end of the step [s]
+    kinetic : kinetic energy [J]
+    speed : largest speed of a block's points [m/s]
+    balance : largest unbalanced force over weight [-]
+    natural_map : η after the solve [-]
+    iterations : of the contact solver
+    contacts : contact points
+    penetration : deepest overlap at the end of the step [m]
+    settlement : how far the stone that sank most has sunk along gravity [m]
+    """
+
+    time: Array
+    kinetic: Array
+    speed: Array
+    balance: Array
+    natural_map: Array
+    iterations: Ints
+    contacts: Ints
+    penetration: Array
+    settlement: Array
+
+
+@dataclass(frozen=True)
+class Energies:
+    """Where the energy of the run came from and went, up to its end [J].
+
+    Attributes
+    ----------
+    external : work of the weight, of the loads and of what drives supports
+    contact : work of the contacts; negative: they dissipate
+    scheme : dissipation of the time integration, of Rayleigh's damping and of the relaxation
+    """
+
+    external: float
+    contact: float
+    scheme: float
+
+
+@dataclass(frozen=True)
+class StaticStart:
+    """How the static equilibrium was sought.
+
+    Attributes
+    ----------
+    found : whether there is one; else the run begins with all stones at rest and without stress
+    steps, iterations : of the search, and of its solver
+    natural_map : η of the last step, r and u measured against the elastic part of W [-]
+    balance : unbalanced force of a body over its weight, largest over the bodies [-]
+    """
+
+    found: bool
+    steps: int
+    iterations: int
+    natural_map: float
+    balance: float
+
+
+@dataclass(frozen=True)
+class Result:
+    """The end of a run, with its history.
+
+    Attributes
+    ----------
+    scene : what was simulated
+    outcome : equilibrium, moving or collapsed
+    steps : time steps done
+    time : simulated time [s]
+    bodies : one per block, in the scene's order
+    contacts : the contact points at the end
+    joints : what each joint carries at the end
+    errors : how far the result can be trusted
+    energies : where the energy went
+    rest_time : when the spell of rest began in which the run ended; None if it did not end at rest [s]
+    reaction : total vertical support reaction [N]
+    weight : total weight of the blocks that are not fixed [N]
+    frames : the motion, at least its first and last instant
+    history : one value per step
+    wall_time : wall seconds by stage: mesh, start, assemble, detect, solve, advance, stress
+    static : the search for the equilibrium in which the run began; None if it began at rest
+    solvers : in how many steps which method was chosen, and why, most frequent first
+    """
+
+    scene: Scene
+    outcome: Outcome
+    steps: int
+    time: float
+    bodies: tuple[BodyResult, ...]
+    contacts: ContactResult
+    joints: JointResult
+    errors: Errors
+    energies: Energies
+    rest_time: float | None
+    reaction: float
+    weight: float
+    frames: tuple[Frame, ...]
+    history: History
+    wall_time: dict[str, float]
+    static: StaticStart | None = None
+    solvers: Mapping[str, int] = field(default_factory=dict)

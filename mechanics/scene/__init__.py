@@ -1,0 +1,1 @@
+"""Scenes: blocks, laws, loads, supports and settings that a user states."""

@@ -1,0 +1,106 @@
+"""Mortar that softens as it opens or slides: a cohesive zone (after Jean, Acary & Monerie 2001)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.scene.laws.bonds import BROKEN, bonded, with_bonds
+from mechanics.scene.laws.dry_joint import DryJoint, at_limit, slid
+from mechanics.scene.laws.law import BOND, OPENING, REST, SLIDING, SLIP, Approach, Terms
+from mechanics.scene.laws.mortar import held_tension
+from mechanics.scene.laws.parameters import require_positive
+
+__all__ = ["CohesiveZone"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CohesiveZone:
+    """A bond whose intact fraction β falls linearly as it opens and slides; broken, a dry joint.
+
+        β = 1 - δ_N/δ_f,N - δ_T/δ_f,T,   δ_f = 2 G/σ0,   r_N ≥ -h A β σ_N,   ‖r_T‖ ≤ h A β σ_T + μ r_N
+
+    with the largest opening δ_N and the path of sliding δ_T so far. There is no elastic branch: a whole bond is rigid.
+    Opening alone spends G_I A, sliding alone G_II A (and friction besides); of both, the bond breaks where their parts
+    sum up to one, whatever the path: ∫σ_N β dδ_N/G_I + ∫σ_T β dδ_T/G_II = 1. A bond that closes again pulls in
+    proportion to its opening; in shear it acts as friction does.
+
+    The pull of a step is that of the opening in its middle, at the velocity before. An opening smaller than what the
+    full pull moves in one step cannot be resolved: there the pull stays full until the bond has closed. The pull in
+    proportion begins that far before closed, and so its steps h²W·(pull/opening) stay below 1/θ, where they are stable.
+
+    Attributes
+    ----------
+    friction : μ [-]
+    tension, shear : σ_N and σ_T; tension is cut at σ_T/μ, the apex of the cone [Pa]
+    energy_tension, energy_shear : G_I and G_II [J/m²]
+    """
+
+    friction: float
+    tension: float
+    shear: float
+    energy_tension: float
+    energy_shear: float
+
+    def __post_init__(self) -> None:
+        require_positive(
+            "cohesive zone",
+            tension=self.tension,
+            shear=self.shear,
+            energy_tension=self.energy_tension,
+            energy_shear=self.energy_shear,
+        )
+        _ = self._dry  # checks the friction
+
+    @property
+    def reach(self) -> float:
+        """Opening at which the bond is broken, δ_f,N [m]."""
+        return 2.0 * self.energy_tension / self._tension
+
+    @property
+    def _tension(self) -> float:
+        return held_tension(self.friction, self.tension, self.shear)
+
+    @property
+    def _dry(self) -> DryJoint:
+        return DryJoint(self.friction)
+
+    def _intact(self, opening: Array, slip: Array) -> Array:
+        """β (n,) after a largest opening and a path of sliding [m], if the bond was made at all."""
+        intact: Array = np.maximum(
+            1.0 - opening / self.reach - slip * self.shear / (2.0 * self.energy_shear), 0.0
+        )
+        return intact
+
+    def terms(self, contacts: Approach) -> Terms:
+        """The shift of bonded contacts by their opening and their damage."""
+        contacts = with_bonds(contacts)
+        dry, state = self._dry.terms(contacts), contacts.state
+        step, theta = contacts.step, contacts.theta
+        opening = np.maximum(contacts.gap - state[:, REST] + step * (theta - 0.5) * contacts.speed, 0.0)
+        largest = np.maximum(state[:, OPENING], opening)
+        area = step * contacts.area * self._intact(largest, state[:, SLIP]) * bonded(contacts)
+        full = area * self._tension
+        unresolved = step * theta * contacts.yielding * full
+        opened = largest > 0
+        part = np.where(opened, (opening + unresolved) / np.where(opened, largest, 1.0), 1.0)
+        pull = full * np.minimum(part, 1.0)
+        cohesion = np.maximum(area * self.shear - self.friction * pull, 0.0)
+        return Terms(dry.bias, dry.friction, cohesion, pull)
+
+    def after(self, contacts: Approach, impulse: Array, velocity: Array) -> Array:
+        """Let openings and slides of this step damage the bonds."""
+        contacts = with_bonds(contacts)
+        terms, holds = self.terms(contacts), bonded(contacts)
+        step, state = contacts.step, contacts.state.copy()
+        opening = contacts.gap - state[:, REST] + step * contacts.theta * velocity[:, 0]
+        state[:, OPENING] = np.where(holds, np.maximum(state[:, OPENING], opening), state[:, OPENING])
+        # an open contact is not held in its plane; else only what lies on its cone has slid
+        free = holds & ((impulse[:, 0] <= 0) | at_limit(terms, impulse))
+        state[:, SLIP] += np.where(free, step * np.linalg.norm(velocity[:, 1:], axis=1), 0.0)
+        state[:, SLIDING] = slid(contacts, terms, impulse, velocity)
+        intact = self._intact(state[:, OPENING], state[:, SLIP])
+        state[holds, BOND] = np.where(intact > 0, intact, BROKEN)[holds]
+        return state

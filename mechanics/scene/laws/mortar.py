@@ -1,0 +1,86 @@
+"""Mortar that breaks at once: cohesion as a shift of the normal impulse (Acary et al. 1999)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.scene.laws.bonds import BROKEN, bonded, with_bonds
+from mechanics.scene.laws.dry_joint import DryJoint, at_limit, slid
+from mechanics.scene.laws.law import BOND, REST, SLIDING, SLIP, Approach, Terms
+from mechanics.scene.laws.parameters import require_at_least_zero
+
+__all__ = ["MortarJoint", "held_tension"]
+
+Array = NDArray[np.float64]
+
+# of a body's size: a bond at its tensile limit has broken when it is open by this,
+_OPENED = 1e-6
+# one at its shear limit when it slides faster than solvers let it drift, or has crept by this
+_CREPT = 1e-3
+
+
+def held_tension(friction: float, tension: float, shear: float) -> float:
+    """Tension that a joint holds [Pa]: `tension`, cut at the apex c_t/μ of its Mohr–Coulomb cone."""
+    return min(tension, shear / friction) if friction > 0 else tension
+
+
+@dataclass(frozen=True)
+class MortarJoint:
+    """A bond r_N ≥ -h c_n A, ‖r_T‖ ≤ h c_t A + μ r_N that breaks once and for all, then a dry joint.
+
+    With r̃_N = r_N + h c_n A these are r̃_N ≥ 0 and ‖r_T‖ ≤ μ r̃_N + h A (c_t - μ c_n). A is the tributary area of the
+    contact point. The bond breaks when it opens at its tensile limit or slides at its shear limit.
+
+    Attributes
+    ----------
+    friction : μ, of the bond and of the broken joint [-]
+    tension : c_n; where it exceeds c_t/μ, the apex of the cone, the joint holds c_t/μ [Pa]
+    shear : c_t, shear strength without pressure [Pa]
+    dynamic_friction : μ of a broken joint that slid in the last step; None: the same [-]
+    """
+
+    friction: float
+    tension: float
+    shear: float
+    dynamic_friction: float | None = None
+
+    def __post_init__(self) -> None:
+        require_at_least_zero("mortar joint", tension=self.tension, shear=self.shear)
+        _ = self._dry  # checks the friction
+
+    @property
+    def reach(self) -> float:
+        """An intact bond does not open, a broken one does not pull [m]."""
+        return 0.0
+
+    @property
+    def _dry(self) -> DryJoint:
+        return DryJoint(self.friction, self.dynamic_friction)
+
+    def terms(self, contacts: Approach) -> Terms:
+        """The shift of bonded contacts; broken ones are dry."""
+        contacts = with_bonds(contacts)
+        dry, holds = self._dry.terms(contacts), bonded(contacts)
+        area = contacts.step * contacts.area * holds
+        tension = held_tension(self.friction, self.tension, self.shear)
+        return Terms(
+            bias=dry.bias,
+            friction=np.where(holds, self.friction, dry.friction),
+            cohesion=area * max(self.shear - self.friction * tension, 0.0),
+            adhesion=area * tension,
+        )
+
+    def after(self, contacts: Approach, impulse: Array, velocity: Array) -> Array:
+        """Break the bonds that opened at their tensile limit, or slid."""
+        contacts = with_bonds(contacts)
+        terms = self.terms(contacts)
+        state, holds = contacts.state.copy(), bonded(contacts)
+        opening = contacts.gap - state[:, REST] + contacts.step * contacts.theta * velocity[:, 0]
+        opened = (impulse[:, 0] <= 0) & (opening > _OPENED * contacts.size)
+        path = contacts.step * np.linalg.norm(velocity[:, 1:], axis=1)
+        state[:, SLIP] += np.where(holds & at_limit(terms, impulse), path, 0.0)
+        state[:, SLIDING] = slid(contacts, terms, impulse, velocity)
+        sheared = (state[:, SLIDING] > 0) | (state[:, SLIP] > _CREPT * contacts.size)
+        state[holds & (opened | sheared), BOND] = BROKEN
+        return state

@@ -1,0 +1,27 @@
+"""What a contact is doing, in one word."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.scene.laws.dry_joint import at_limit
+from mechanics.scene.laws.law import BOND, Terms
+
+__all__ = ["STATUSES", "contact_status"]
+
+Array = NDArray[np.float64]
+
+STATUSES = ("open", "stick", "slip", "bonded", "broken")
+
+
+def contact_status(state: Array, terms: Terms, impulse: Array) -> NDArray[np.str_]:
+    """Status (n,) of contacts, by their internal variables (n, STATE) after a step and its r̃ (n, d) [N s].
+
+    *bonded*: an intact or damaged bond; *broken*: open, where there was a bond; *slip*: pressed, and at the limit of
+    its cone; *stick*: pressed, and below it.
+    """
+    bond, is_open = state[:, BOND], impulse[:, 0] <= 0
+    return np.select(
+        [bond > 0, is_open & (bond < 0), is_open, at_limit(terms, impulse)],
+        ["bonded", "broken", "open", "slip"],
+        "stick",
+    )

@@ -1,0 +1,52 @@
+"""Forces on stones."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.scene.loads.time_series import History
+from mechanics.stones.validation import finite, refuse_unless
+from moma.errors import SceneError
+
+__all__ = ["StoneForce"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class StoneForce:
+    """A force on each of some stones, at a point that moves with the stone.
+
+    Attributes
+    ----------
+    stones : codes
+    force : (3,) with time [N]
+    arm : (3,) from the centre of mass to where it acts, in the axes of the start [m]
+    follows : the force turns with the stone; else it keeps its direction in the world
+    """
+
+    stones: frozenset[str]
+    force: History
+    arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    follows: bool = False
+
+    def __post_init__(self) -> None:
+        if self.force.components != 3:
+            raise SceneError(
+                f"a force of {self.force.components} components", where="force", remedy="give x, y and z"
+            )
+        refuse_unless("force", [("arm", self.arm, finite(self.arm, 3), "give x, y and z")])
+
+    @property
+    def until(self) -> float:
+        """When the force ceases to change [s]."""
+        return self.force.until
+
+    def __call__(self, time: float, centre: Array, rotation: Array) -> tuple[Array, Array]:
+        """Force (n, 3) [N] and moment (n, 3) [N m] about the centre of mass, world axes."""
+        force = np.broadcast_to(self.force(time), centre.shape)
+        if self.follows:
+            force = np.einsum("nij,nj->ni", rotation, force)
+        arm = np.einsum("nij,j->ni", rotation, np.array(self.arm))
+        return force, np.cross(arm, force)

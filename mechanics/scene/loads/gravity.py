@@ -1,0 +1,90 @@
+"""Changes of gravity: a ramp, and a tilting table."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from mechanics.scene.loads.time_series import History
+from moma.errors import SceneError
+
+__all__ = ["GravityRamp", "TiltingTable"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class GravityRamp:
+    """Gravity grows from nothing, linearly, so that a structure takes up its weight without a shock.
+
+    Attributes
+    ----------
+    duration : time until it is whole [s]
+    """
+
+    duration: float
+
+    def __post_init__(self) -> None:
+        if not 0 < self.duration < np.inf:
+            raise SceneError(
+                f"duration = {self.duration!r}", where="gravity ramp", remedy="give seconds greater than 0"
+            )
+
+    @property
+    def until(self) -> float:
+        """T [s]."""
+        return self.duration
+
+    def __call__(self, time: float, gravity: Array) -> Array:
+        """g t/T up to the duration T, then g (3,) [m/s²]."""
+        return gravity * min(max(time / self.duration, 0.0), 1.0)
+
+
+@dataclass(frozen=True)
+class TiltingTable:
+    """Gravity as a table that turns about a horizontal axis feels it, in the axes of the table.
+
+    The scene is described in the axes of the table, which do not move: gravity turns by the opposite angle. The
+    table's own acceleration is left out; turn it slowly. To turn the table itself, give it an imposed motion.
+
+    Attributes
+    ----------
+    axis : (3,) about which the table turns, right-handed; its length does not matter
+    angle : by which it has turned [rad]
+    """
+
+    axis: tuple[float, float, float]
+    angle: History
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.axis).all() and any(self.axis)):
+            raise SceneError(
+                f"axis = {self.axis!r}", where="tilting table", remedy="give a direction, e.g. (0, 1, 0)"
+            )
+        if self.angle.value.ndim != 1:
+            raise SceneError("the angle is a vector", where="tilting table", remedy="give one angle a time")
+
+    @classmethod
+    def at_rate_degrees(
+        cls, axis: tuple[float, float, float], rate: float, limit: float, start: float = 0.0
+    ) -> "TiltingTable":
+        """A table that turns at a constant rate [°/s] from the time `start` [s] up to a limit [°]."""
+        if not (rate > 0 and limit > 0 and start >= 0):
+            raise SceneError(
+                f"rate = {rate:g} °/s, limit = {limit:g} °, start = {start:g} s",
+                where="tilting table",
+                remedy="give a rate and a limit greater than 0, from a time of 0 or later",
+            )
+        return cls(axis, History(np.array([start, start + limit / rate]), np.radians([0.0, limit])))
+
+    @property
+    def until(self) -> float:
+        """When the angle ceases to change [s]."""
+        return self.angle.until
+
+    def __call__(self, time: float, gravity: Array) -> Array:
+        """Gravity (3,) turned by minus the angle [m/s²]."""
+        axis = np.array(self.axis) / np.linalg.norm(self.axis)
+        turned: Array = Rotation.from_rotvec(-float(self.angle(time)) * axis).apply(gravity)
+        return turned

@@ -1,0 +1,89 @@
+"""Shaking: accelerograms as an imposed motion of the supports."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.scene.loads.accelerogram import Accelerogram
+from mechanics.scene.loads.load import Pose
+from mechanics.scene.loads.time_series import History
+from moma.errors import SceneError
+
+__all__ = ["Component", "GroundMotion"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Component:
+    """One record and the direction (3,) in which it shakes; its length does not matter."""
+
+    direction: tuple[float, float, float]
+    record: Accelerogram
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.direction).all() and any(self.direction)):
+            raise SceneError(
+                f"direction = {self.direction!r}", where="ground motion", remedy="give e.g. (1, 0, 0)"
+            )
+
+
+@dataclass(frozen=True)
+class GroundMotion:
+    """The ground moves as recorded, and with it its stones.
+
+    The ground's velocity is linear between the samples; one step after the last it is zero, and the ground stays
+    where it is then.
+
+    Attributes
+    ----------
+    stones : codes
+    components : up to three, in different directions
+    scale : factor on the records [-]
+    start : time of their first sample; the ground rests before [s]
+    """
+
+    stones: frozenset[str]
+    components: tuple[Component, ...]
+    scale: float = 1.0
+    start: float = 0.0
+
+    def __post_init__(self) -> None:
+        directions = np.array([one.direction for one in self.components], dtype=float).reshape(-1, 3)
+        # of parallel directions one record would only add to the other
+        if not self.components or np.linalg.matrix_rank(directions) < len(directions):
+            raise SceneError(
+                f"{len(self.components)} components whose directions are not independent",
+                where="ground motion",
+                remedy="give one record for each of up to three directions",
+            )
+        if not (np.isfinite(self.scale) and self.start >= 0):
+            raise SceneError(
+                f"scale = {self.scale!r}, start = {self.start!r} s",
+                where="ground motion",
+                remedy="give a number, and a time of 0 or later",
+            )
+
+    @property
+    def until(self) -> float:
+        """When the ground comes to rest [s]."""
+        return max(one.until for one in self._velocity)
+
+    def pose(self, time: float) -> Pose:
+        """Where the ground is at `time` [s]."""
+        return Pose(sum((one.integral(time) for one in self._velocity), np.zeros(3)), np.eye(3), np.zeros(3))
+
+    @cached_property
+    def _velocity(self) -> tuple[History, ...]:
+        """Velocity (3,) of each component with time [m/s]."""
+        return tuple(self._history(one) for one in self.components)
+
+    def _history(self, component: Component) -> History:
+        record = component.record
+        direction = np.array(component.direction) / np.linalg.norm(component.direction)
+        speed = np.append(self.scale * record.velocity, 0.0)
+        return History(
+            self.start + np.linspace(0.0, record.dt * len(record), len(speed)), np.outer(speed, direction)
+        )

@@ -1,0 +1,97 @@
+"""Imposed motions of supports: settlement, spreading, and whatever velocities are given."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from mechanics.scene.loads.load import Pose
+from mechanics.scene.loads.time_series import History
+from mechanics.stones.validation import finite
+from moma.errors import SceneError
+
+__all__ = ["ImposedMotion", "settlement", "spreading"]
+
+Array = NDArray[np.float64]
+Vector = tuple[float, float, float]
+
+
+def _still() -> History:
+    return History.constant(np.zeros(3))
+
+
+def _no_spin() -> History:
+    return History.constant(0.0)
+
+
+@dataclass(frozen=True)
+class ImposedMotion:
+    """Stones that move as one, with given velocities.
+
+    Places follow from velocities by exact integration; so velocities that are linear between the given instants give
+    places without error.
+
+    Attributes
+    ----------
+    stones : codes
+    velocity : (3,) with time [m/s]
+    spin : turning velocity about `axis` with time [rad/s]
+    axis : (3,) right-handed; its length does not matter
+    pivot : (3,) a point of the axis at the start; it moves with `velocity` [m]
+    """
+
+    stones: frozenset[str]
+    velocity: History = field(default_factory=_still)
+    spin: History = field(default_factory=_no_spin)
+    axis: Vector = (0.0, 0.0, 1.0)
+    pivot: Vector = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        for ok, what, remedy in (
+            (self.velocity.components == 3, "a velocity without three components", "give x, y and z"),
+            (self.spin.value.ndim == 1, "a spin that is a vector", "give one number a time, and an axis"),
+            (np.isfinite(self.axis).all() and any(self.axis), f"axis = {self.axis!r}", "give a direction"),
+            (finite(self.pivot, 3), f"pivot = {self.pivot!r}", "give x, y and z"),
+        ):
+            if not ok:
+                raise SceneError(what, where="motion", remedy=remedy)
+
+    @property
+    def until(self) -> float:
+        """When the stones come to rest [s]; infinity if they do not."""
+        moving = self.velocity.value[-1].any() or self.spin.value[-1].any()
+        return float(np.inf) if moving else max(self.velocity.until, self.spin.until)
+
+    def pose(self, time: float) -> Pose:
+        """Where the stones are at `time` [s]."""
+        axis = np.array(self.axis) / np.linalg.norm(self.axis)
+        turn = Rotation.from_rotvec(float(self.spin.integral(time)) * axis)
+        return Pose(self.velocity.integral(time), turn.as_matrix(), np.array(self.pivot))
+
+
+def settlement(
+    stones: Iterable[str], displacement: Vector, duration: float, start: float = 0.0
+) -> ImposedMotion:
+    """Supports that move by `displacement` (3,) [m] within `duration` after `start` [s], without jumps of velocity."""
+    return ImposedMotion(frozenset(stones), History.trapezoid(start, duration, displacement))
+
+
+def spreading(
+    first: Iterable[str],
+    second: Iterable[str],
+    direction: Vector,
+    distance: float,
+    duration: float,
+    start: float = 0.0,
+) -> tuple[ImposedMotion, ImposedMotion]:
+    """Supports that part by `distance` [m]: the second group goes half of it along `direction`, the first back."""
+    length = float(np.linalg.norm(direction))
+    if length == 0.0:
+        raise SceneError("direction has no length", where="spreading", remedy="give for example (1, 0, 0)")
+    half = 0.5 * distance * np.array(direction) / length
+    return (
+        ImposedMotion(frozenset(first), History.trapezoid(start, duration, -half)),
+        ImposedMotion(frozenset(second), History.trapezoid(start, duration, half)),
+    )

@@ -1,0 +1,78 @@
+"""What is done to recorded ground motions before they are used: baseline correction and filtering.
+
+Both follow what the PEER database documents of its own records (Ancheta et al. 2013; Boore & Bommer 2005).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import signal
+
+from mechanics.scene.loads.accelerogram import Accelerogram
+from moma.errors import SceneError
+
+__all__ = ["band_pass", "without_drift"]
+
+Array = NDArray[np.float64]
+
+
+def without_drift(record: Accelerogram, degree: int = 6) -> Accelerogram:
+    """Take away the drift that integration makes of a wrong baseline.
+
+    A polynomial of `degree`, without constant and linear term, is fitted to the displacement by least squares, and its
+    second derivative is subtracted from the acceleration.
+    """
+    if degree < 2:
+        raise SceneError(f"degree = {degree}", where=record.source, remedy="give 2 or more")
+    powers = np.arange(2, degree + 1)
+    # in units of the duration, so that high powers stay of one size
+    place = np.linspace(0.0, 1.0, len(record))[:, None]
+    coefficients = np.linalg.lstsq(place**powers, record.displacement, rcond=None)[0]
+    drift = (place ** (powers - 2)) @ (coefficients * powers * (powers - 1)) / record.duration**2
+    return replace(
+        record,
+        acceleration=record.acceleration - drift,
+        source=f"{record.source}, baseline corrected (degree {degree})",
+    )
+
+
+def band_pass(
+    record: Accelerogram, low: float | None = None, high: float | None = None, order: int = 4
+) -> Accelerogram:
+    """Keep the frequencies between `low` and `high` [Hz]; without one of them, all on that side.
+
+    A Butterworth filter of `order` goes through the record forwards and backwards: no phase is shifted, and the
+    amplitude at a corner is halved. Before, the record is lengthened by zeros, 1.5 order/low in all, half in front and
+    half behind (Converse & Brady 1992). They stay: without them velocity and displacement would not begin and end at
+    rest (Boore 2005). So the motion begins 0.75 order/low later than in the record.
+    """
+    nyquist = 0.5 / record.dt
+    corners = [corner for corner in (low, high) if corner is not None]
+    if not corners or not all(0 < corner < nyquist for corner in corners) or corners != sorted(set(corners)):
+        raise SceneError(
+            f"band from {low} to {high} Hz",
+            where=record.source,
+            remedy=f"give corners that increase, above 0 and below {nyquist:g} Hz, half the sampling rate",
+        )
+    if order < 1:
+        raise SceneError(f"order = {order}", where=record.source, remedy="give 1 or more")
+    sections = _butterworth(order, low, high, 1 / record.dt)
+    zeros = np.zeros(int(np.ceil(0.75 * order / min(corners) / record.dt)))
+    padded = np.concatenate([zeros, record.acceleration, zeros])
+    band = f"{low or 0:g} to {high or nyquist:g} Hz"
+    return replace(
+        record,
+        acceleration=signal.sosfiltfilt(sections, padded, padtype=None),
+        source=f"{record.source}, Butterworth {band} (order {order}, both ways)",
+    )
+
+
+def _butterworth(order: int, low: float | None, high: float | None, rate: float) -> Array:
+    """Second-order sections of the filter for a sampling rate [Hz]."""
+    if low is not None and high is not None:
+        return signal.butter(order, [low, high], "bandpass", fs=rate, output="sos")
+    if low is not None:
+        return signal.butter(order, low, "highpass", fs=rate, output="sos")
+    assert high is not None
+    return signal.butter(order, high, "lowpass", fs=rate, output="sos")

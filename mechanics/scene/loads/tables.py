@@ -1,0 +1,94 @@
+"""Columns of numbers from text files: histories, and the rows that accelerograms are made of."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.scene.loads.time_series import History
+from moma.errors import SceneError
+
+__all__ = ["fail_at", "number_at", "numbered_lines", "read_columns", "read_history"]
+
+Array = NDArray[np.float64]
+
+
+def read_columns(path: str | Path, columns: str) -> tuple[NDArray[np.int64], Array]:
+    """Line numbers (n,) and numbers (n, k) of a text file with k columns.
+
+    Columns are parted by commas, semicolons, tabs or blanks; one header line, comments (#) and blank lines are
+    skipped. `columns` says what they are, in words with a comma between each.
+
+    Raises
+    ------
+    SceneError : with file and line
+    """
+    count = columns.count(",") + 1
+    lines: list[int] = []
+    rows: list[list[float]] = []
+    headed = False
+    for number, line in numbered_lines(path):
+        text = line.split("#")[0].strip()
+        if not text:
+            continue
+        cells = re.split(r"\s*[,;]\s*|\s+", text)
+        if not rows and not headed and not _is_number(cells[0]):
+            headed = True
+            continue
+        if len(cells) != count:
+            fail_at(path, number, f"{len(cells)} columns", f"give {columns}")
+        rows.append([number_at(path, number, cell) for cell in cells])
+        lines.append(number)
+    if len(rows) < 2:
+        raise SceneError(f"{len(rows)} rows of numbers", where=str(path), remedy=f"give {columns}")
+    return np.array(lines), np.array(rows)
+
+
+def read_history(path: str | Path, columns: str) -> History:
+    """A history from a file of two columns, or of four for a vector; `columns` says what they are, time [s] first.
+
+    Raises
+    ------
+    SceneError : with file and line
+    """
+    lines, rows = read_columns(path, columns)
+    still = np.flatnonzero(np.diff(rows[:, 0]) <= 0)
+    if len(still):
+        at = int(still[0]) + 1
+        what = f"time {rows[at, 0]:g} s comes after {rows[at - 1, 0]:g} s"
+        fail_at(path, int(lines[at]), what, "give increasing times")
+    return History(rows[:, 0], rows[:, 1] if rows.shape[1] == 2 else rows[:, 1:])
+
+
+def numbered_lines(path: str | Path) -> Iterator[tuple[int, str]]:
+    """The lines of a text file, numbered from 1 (SceneError if it cannot be read)."""
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig", errors="replace")
+    except FileNotFoundError:
+        raise SceneError("no such file", where=str(path), remedy="check the path") from None
+    except (OSError, ValueError) as error:  # a path may hold what no file system takes
+        raise SceneError(f"cannot be read: {error}", where=repr(str(path)), remedy="check the path") from None
+    return enumerate(text.splitlines(), start=1)
+
+
+def number_at(path: str | Path, line: int, text: str) -> float:
+    """The number that a text means (SceneError if it is none, or not finite)."""
+    if not _is_number(text) or not np.isfinite(float(text)):
+        fail_at(path, line, f"{text[:40]!r} is not a number", "correct it, or take the line away")
+    return float(text)
+
+
+def fail_at(path: str | Path, line: int, what: str, remedy: str) -> NoReturn:
+    """Raise a SceneError at a line of a file."""
+    raise SceneError(what, where=f"{path}:{line}", remedy=remedy)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

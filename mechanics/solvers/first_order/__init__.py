@@ -1,0 +1,1 @@
+"""First-order solvers: NSGS, ADMM and APGD."""

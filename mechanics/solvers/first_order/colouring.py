@@ -1,0 +1,28 @@
+"""Colours of contacts: two contacts of one colour share no body that moves, so a colour may be swept in parallel."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.solvers._kernels.colouring import first_fit
+
+__all__ = ["greedy_colours"]
+
+
+def greedy_colours(bodies: NDArray[np.int64], moving: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """The smallest colour, from 0, that no earlier contact of its moving bodies has.
+
+    Low colours are large, high ones small; there are at most as many as the contacts of two bodies that touch.
+    A body that does not move (fixed, driven) takes no part, however many contacts it has. The same contacts in the
+    same order get the same colours.
+
+    Parameters
+    ----------
+    bodies : (n, 2) the two bodies of each contact
+    moving : (nb,) which bodies impulses can move
+
+    Returns
+    -------
+    (n,) colours
+    """
+    colour: NDArray[np.int64] = first_fit(np.ascontiguousarray(bodies, dtype=np.int64), moving)
+    return colour

@@ -1,0 +1,86 @@
+"""Non-smooth Gauss–Seidel (Jean 1999; Jourdan, Alart & Jean 1998), with safeguarded Anderson acceleration."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, GaussSeidel
+from mechanics.problem.residual import Residual, project_on_cone, residual
+from mechanics.solvers.first_order.anderson import Anderson
+
+__all__ = ["NSGS"]
+
+Array = NDArray[np.float64]
+
+# an extrapolation this many times worse than the sweeps alone is not kept, and the old iterates are worthless
+_BAD = 10.0
+
+
+@dataclass(frozen=True)
+class NSGS:
+    """Sweeps the contacts, solving each exactly with its neighbours frozen, until η ≤ tolerance.
+
+    Attributes
+    ----------
+    tolerance : natural map η at which the problem counts as solved [-]
+    velocity_tolerance : and the largest velocity by which a contact may break its law, over that of u_free [-]
+    max_iterations : sweeps after which it is given up
+    check_every : sweeps between two looks at η
+    depth : past iterates from which Anderson's method extrapolates at each look; an extrapolation is kept unless its
+        η is ten times that of the sweeps alone: what looks worse at first mostly leads on. 0: plain sweeps
+    """
+
+    tolerance: float = 1e-6
+    velocity_tolerance: float = 1e-5
+    max_iterations: int = 2000
+    check_every: int = 5
+    depth: int = 20
+
+    def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
+        """Solve from the impulses of `start`; the best of all looks is given back."""
+        impulse = start.impulse.copy()
+        left = residual(problem, impulse)
+        best, sweeps = (impulse, left), 0
+        limits = self.tolerance, self.velocity_tolerance
+        if not left.within(*limits):
+            shift = problem.biased
+            sweep = problem.delassus.gauss_seidel(shift, problem.friction, problem.cohesion)
+            look = _Look(problem, sweep, self.depth, limits)
+            while not left.within(*limits) and sweeps < self.max_iterations:
+                count = min(self.check_every, self.max_iterations - sweeps)
+                impulse, left = look(impulse, count)
+                sweeps += count
+                if left.natural_map <= best[1].natural_map:
+                    best = impulse.copy(), left
+        if not left.within(*limits):
+            impulse, left = best
+        return ContactSolution(impulse, left.dual, sweeps, left.natural_map, left.within(*limits))
+
+
+class _Look:
+    """Some sweeps, a look at what is left, and maybe an extrapolation."""
+
+    def __init__(
+        self, problem: ContactProblem, sweep: GaussSeidel, depth: int, limits: tuple[float, float]
+    ) -> None:
+        self._problem, self._sweep, self._limits = problem, sweep, limits
+        self._anderson = Anderson(depth) if depth else None
+
+    def __call__(self, impulse: Array, count: int) -> tuple[Array, Residual]:
+        """The next iterate and its residual; `impulse` may be overwritten."""
+        if self._anderson is None:
+            self._sweep(impulse, count)
+            return impulse, residual(self._problem, impulse)
+        swept = impulse.copy()
+        self._sweep(swept, count)
+        left = residual(self._problem, swept)
+        candidate = self._anderson(impulse, swept)
+        if candidate is None or left.within(*self._limits):
+            return swept, left
+        candidate = project_on_cone(candidate, self._problem.friction, self._problem.cohesion)
+        bold = residual(self._problem, candidate)
+        if bold.natural_map < _BAD * left.natural_map:
+            return candidate, bold
+        self._anderson.forget()
+        return swept, left

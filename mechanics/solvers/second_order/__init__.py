@@ -1,0 +1,1 @@
+"""Second-order solvers: Newton, interior point and cone programs."""

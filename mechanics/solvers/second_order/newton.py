@@ -1,0 +1,182 @@
+"""Newton's method on the natural map, with a proximal term (Alart & Curnier 1991; Acary, Brémond & Huber 2018)."""
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, scale_of
+from mechanics.problem.residual import Residual, project_on_cone, residual
+from mechanics.solvers.second_order.shifted_systems import shifted_system
+from moma.errors import SolverError
+
+__all__ = ["Newton", "projection_derivative"]
+
+Array = NDArray[np.float64]
+
+# keeps D invertible where a contact is open, and 1 - D where it sticks, as between rigid stones W is singular
+_SOFT, _GIVE = 1e-7, 1e-9
+# the proximal term α over η and the mean diagonal of W; and the η below which it shrinks no more
+_PROXIMAL, _FLOOR = 0.3, 1e-6
+# shortest fraction of a step; what a step must gain; on how many of the last iterates, the worst of them counts
+_SHORTEST, _GAIN, _MEMORY = 0.005, 1e-4, 5
+# how many steps that gain nothing are taken all the same, and how many iterates may bring no η that is this much better
+_DARING, _PATIENCE, _BETTER = 10, 40, 0.7
+# of the mean diagonal of W: the smallest that a contact's own counts for
+_LEAST = 1e-12
+
+
+@dataclass(frozen=True)
+class Newton:
+    """Solves Φ(r) = r - P_K(r - ρ û(r)) = 0, with ρ = 1/(mean of the contact's own diagonal).
+
+    With D the derivative of the projection P_K and S that of û by u, each step solves
+
+        [ W + Θ + α ] Δr = -(ρ D S)⁻¹ Φ,     Θ = (ρ D S)⁻¹ (1 - D)
+
+    so contacts that stick, slip or are open are told apart by themselves, and once they are right it converges within a
+    few steps to rounding. The proximal term α = 0.3 max(η, 10⁻⁶) W̄ (Levenberg 1944; Rockafellar 1976) makes the matrix
+    regular where W is not, as between rigid stones with more contacts than freedoms; it shrinks with η, so
+    convergence is all but quadratic. The line search wants less of Φ than the worst of the last five iterates had
+    (Grippo, Lampariello & Lucidi 1986): Φ has kinks, and steps that are right may pass over them. The best iterate is
+    given back.
+
+    Attributes
+    ----------
+    tolerance, velocity_tolerance : as in `NSGS`
+    max_iterations : steps, each of one factorisation, after which it is given up
+    """
+
+    tolerance: float = 1e-6
+    velocity_tolerance: float = 1e-5
+    max_iterations: int = 100
+
+    def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
+        """Solve from the impulses of `start`.
+
+        Raises
+        ------
+        SolverError : if the problem has no form that can be factorised
+        """
+        system, limits = shifted_system(problem, "Newton"), (self.tolerance, self.velocity_tolerance)
+        if len(start.impulse) == 0:
+            return ContactSolution(start.impulse, start.velocity, 0, 0.0, True)
+        natural, daring, count, since = _Map(problem), 0, 0, 0
+        # not put on the cones first: that would break the balance, by which they are told apart
+        here, left = natural(start.impulse), residual(problem, start.impulse)
+        best, merits = (left, start.impulse), deque([here.size], _MEMORY)
+        while not left.within(*limits) and count < self.max_iterations and since < _PATIENCE:
+            count, since = count + 1, since + 1
+            try:
+                theta, right = natural.linear(here, min(left.natural_map, 1.0))
+                step = system(theta)(right).reshape(here.impulse.shape)
+            except SolverError:
+                # singular, far from a solution: the best so far has to do
+                break
+            found = _search(natural, here, step, max(merits))
+            if found is None:
+                # beyond a kink, a step that gains nothing at first may still lead on
+                daring += 1
+                found = natural(here.impulse + step)
+                merits.clear()
+            if daring > _DARING or not np.isfinite(found.size):
+                break
+            here = found
+            merits.append(here.size)
+            left = residual(problem, here.impulse)
+            since = 0 if left.natural_map < _BETTER * best[0].natural_map else since
+            if left.natural_map < best[0].natural_map:
+                best = left, here.impulse
+        return _solution(*best, count, limits)
+
+
+def _solution(left: Residual, impulse: Array, count: int, limits: tuple[float, float]) -> ContactSolution:
+    return ContactSolution(impulse, left.dual, count, left.natural_map, left.within(*limits))
+
+
+@dataclass(frozen=True)
+class _Point:
+    """The natural map at some impulses.
+
+    Attributes
+    ----------
+    impulse, error : r, Φ (nc, d) [N s]
+    u : relative velocities (nc, d) [m/s]
+    point : r - ρ û, which is projected (nc, d) [N s]
+    size : ‖Φ‖, each contact weighted by the root of its diagonal
+    """
+
+    impulse: Array
+    error: Array
+    u: Array
+    point: Array
+    size: float
+
+
+class _Map:
+    """Φ and its derivative."""
+
+    def __init__(self, problem: ContactProblem) -> None:
+        self._problem, self._scale = problem, scale_of(problem.delassus)
+        own = problem.delassus.diagonal
+        mean = np.einsum("cii->c", own) / max(own.shape[1], 1)
+        self._own = np.maximum(mean, _LEAST * self._scale)
+
+    def __call__(self, impulse: Array) -> _Point:
+        """Φ at some impulses."""
+        problem = self._problem
+        u = problem.delassus.apply(impulse) + problem.u_free
+        dual = u.copy()
+        dual[:, 0] += problem.bias + problem.friction * np.sqrt((u[:, 1:] ** 2).sum(axis=1))
+        point = impulse - dual / self._own[:, None]
+        error = impulse - project_on_cone(point, problem.friction, problem.cohesion)
+        size = float(np.sqrt((self._own[:, None] / self._scale * error**2).sum()))
+        return _Point(impulse, error, u, point, size)
+
+    def linear(self, here: _Point, eta: float) -> tuple[Array, Array]:
+        """Θ + α (nc, d, d) and the right side (d nc,) of a step."""
+        friction, unit = self._problem.friction, np.eye(here.u.shape[1])
+        derivative = projection_derivative(here.point, friction, self._problem.cohesion)
+        derivative = (1.0 - _SOFT - _GIVE) * derivative + _SOFT * unit
+        turn = np.tile(unit, (len(here.u), 1, 1))
+        slide = np.sqrt((here.u[:, 1:] ** 2).sum(axis=1))
+        turn[:, 0, 1:] = (friction / np.maximum(slide, 1e-300))[:, None] * here.u[:, 1:]
+        inverse = self._own[:, None, None] * np.linalg.inv(derivative @ turn)
+        theta = inverse @ (unit - derivative) + _PROXIMAL * max(eta, _FLOOR) * self._scale * unit
+        return theta, -np.einsum("cij,cj->ci", inverse, here.error).ravel()
+
+
+def _search(natural: _Map, here: _Point, step: Array, worst: float) -> _Point | None:
+    """The first of ever shorter parts of a step that gains on the worst of the last; None if none does."""
+    length = 1.0
+    while length > _SHORTEST:
+        found = natural(here.impulse + length * step)
+        if found.size < (1.0 - _GAIN * length) * worst:
+            return found
+        length *= 0.5
+    return None
+
+
+def projection_derivative(point: Array, friction: Array, cohesion: Array) -> Array:
+    """An element (nc, d, d) of the derivative of the projection on {r_N ≥ 0, ‖r_T‖ ≤ μ r_N + k}."""
+    n, size, d = point[:, 0], np.sqrt((point[:, 1:] ** 2).sum(axis=1)), point.shape[1]
+    along = point[:, 1:] / np.maximum(size, 1e-300)[:, None]
+    across = np.eye(along.shape[1]) - along[:, :, None] * along[:, None, :]
+    foot = (n + friction * (size - cohesion)) / (1.0 + friction**2)
+    inside = (n >= 0) & (size <= friction * n + cohesion)
+    below = ~inside & (n < 0) & (size <= cohesion)
+    sliding = ~inside & ~below & (foot > 0)
+    edge = ~inside & ~below & ~sliding & (cohesion > 0)
+    result = np.zeros((len(point), d, d))
+    result[inside] = np.eye(d)
+    result[below, 1:, 1:] = np.eye(d - 1)
+    height = np.where(sliding, foot, 0.0)
+    shrink = (friction * height + cohesion) / np.maximum(size, 1e-300)
+    result[edge, 1:, 1:] = shrink[edge, None, None] * across[edge]
+    # the foot moves with the point by gradient, along the generator (1, μ t)
+    generator = np.column_stack([np.ones(len(point)), friction[:, None] * along])
+    slope = generator[:, :, None] * generator[:, None, :] / (1.0 + friction**2)[:, None, None]
+    slope[:, 1:, 1:] += shrink[:, None, None] * across
+    result[sliding] = slope[sliding]
+    return result

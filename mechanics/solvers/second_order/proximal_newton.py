@@ -1,0 +1,228 @@
+"""Newton's method for rigid bodies, however many contacts two of them share.
+
+W of rigid bodies is singular: four contacts hold a stone in place three times over. So W + α stands for W in the
+derivative of the non-smooth Newton method of Alart & Curnier (1991), with α as small as η, as in the method of
+Levenberg and Marquardt (Fan & Yuan 2005): the steps stay near to where they began, and near the solution nothing is
+lost. A line search keeps them from going astray; where it has to shorten steps, α grows. The equations of each step are
+those of the bodies (_kernels_body_newton.py).
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.delassus.rigid import RigidDelassus
+from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, scale_of
+from mechanics.problem.residual import Residual, project_on_cone, residual
+from mechanics.solvers._kernels import block_fronts as fronts
+from mechanics.solvers._kernels import body_newton as bodies
+from mechanics.solvers._kernels.stored_portfolio import alart_curnier
+from moma.errors import SolverError
+
+__all__ = ["ProximalNewton"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# α over η and the scale of W; from where a cold start is held, and the least, below which rounding would win
+_SHARE, _HOLD, _LEAST = 0.1, 1e-4, 1e-11
+# steps that short say that α is too small; by how much it then grows, and falls again after whole steps
+_SHORT, _ADAPT, _MOST = 0.2, 4.0, 1e6
+# looks back of the line search, what a step must gain over what it promises, and the shortest
+_MEMORY, _GAIN, _SHORTEST = 5, 1e-4, 1e-3
+
+
+@dataclass(frozen=True)
+class ProximalNewton:
+    """Solves the problems of rigid bodies to high accuracy, from whatever start.
+
+    Attributes
+    ----------
+    tolerance, velocity_tolerance : as in `NSGS`
+    max_iterations : steps, with a factorisation each, after which it is given up
+    """
+
+    tolerance: float = 1e-6
+    velocity_tolerance: float = 1e-5
+    max_iterations: int = 100
+
+    def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
+        """Solve from the impulses of `start`; the best of all iterates is given back.
+
+        Raises
+        ------
+        SolverError : if W is not that of rigid bodies
+        """
+        if not isinstance(problem.delassus, RigidDelassus):
+            raise SolverError(
+                "bodies are not all rigid", where="proximal Newton", remedy='use the method "interior-point"'
+            )
+        limits = self.tolerance, self.velocity_tolerance
+        run = _Run(problem, start.impulse)
+        best = run.left, run.r
+        if not run.left.within(*limits) and not start.impulse.any():
+            run.hold()
+        while not run.left.within(*limits) and run.iterations < self.max_iterations and run.step():
+            if run.left.natural_map < best[0].natural_map:
+                best = run.left, run.r
+        if run.left.natural_map < best[0].natural_map:
+            best = run.left, run.r
+        left, impulse = best
+        return ContactSolution(impulse, left.dual, run.iterations, left.natural_map, left.within(*limits))
+
+
+class _Run:
+    """The iterates of one solution.
+
+    Attributes
+    ----------
+    r : (nc, 3) impulses [N s]
+    left : what they leave unsolved
+    iterations : steps so far
+    """
+
+    def __init__(self, problem: ContactProblem, impulse: Array) -> None:
+        assert isinstance(problem.delassus, RigidDelassus)
+        self._problem, self._delassus = problem, problem.delassus
+        self._free = problem.biased
+        self._scale = scale_of(problem.delassus)
+        diagonal = problem.delassus.diagonal
+        self._rho = np.column_stack([1.0 / diagonal[:, 0, 0], 2.0 / (diagonal[:, 1, 1] + diagonal[:, 2, 2])])
+        self._first, self._second = np.zeros((2, len(impulse), 3, 3))
+        self._merits: list[float] = []
+        self.iterations, self._share = 0, _SHARE
+        self._take(impulse, residual(problem, impulse))
+
+    def _take(self, impulse: Array, left: Residual) -> None:
+        self.r, self.left = impulse, left
+        self._error = np.empty_like(impulse)
+        self._u = self._delassus.apply(impulse) + self._free
+        self._merits.append(self._look(impulse, self._u, self._error))
+
+    @cached_property
+    def _system(self) -> "_System":
+        return _System(self._delassus)
+
+    def hold(self) -> None:
+        """Begin as if every contact held whatever it has to.
+
+        At rest without impulses, no contact but the lowest is seen to be pressed, and each step would find one more.
+        """
+        problem = self._problem
+        self._first[:], self._second[:] = 0.0, np.eye(3)
+        step = self._system.step(self._first, self._second, self._free, _HOLD * self._scale)
+        if step is None:
+            return
+        self.iterations += 1
+        held = project_on_cone(step, problem.friction, problem.cohesion)
+        self._merits.clear()
+        self._take(held, residual(problem, held))
+
+    def step(self) -> bool:
+        """One step of Newton's method; whether there was one."""
+        alpha = max(self._share * min(self.left.natural_map, 1.0), _LEAST) * self._scale
+        step = self._system.step(self._first, self._second, self._error, alpha)
+        if step is None:
+            return False
+        self.iterations += 1
+        change = self._delassus.apply(step)
+        length, limit, error = 1.0, max(self._merits[-_MEMORY:]), np.empty_like(step)
+        merit = self._look(self.r + step, self._u + change, error)
+        while not merit < (1.0 - _GAIN * length) * limit and length > _SHORTEST:
+            length *= 0.5
+            merit = self._look(self.r + length * step, self._u + length * change, error)
+        if not np.isfinite(merit):
+            return False
+        if length < _SHORT:
+            self._share = min(self._share * _ADAPT, _MOST)
+        elif length == 1.0:
+            self._share = max(self._share / _ADAPT, _SHARE)
+        impulse = self.r + length * step
+        self._take(impulse, residual(self._problem, impulse))
+        return True
+
+    def _look(self, r: Array, u: Array, error: Array) -> float:
+        problem = self._problem
+        merit: float = alart_curnier(
+            r, u, problem.friction, problem.cohesion, self._rho, error, self._first, self._second
+        )
+        return merit
+
+
+class _System:
+    """The equations of the bodies' velocities: pattern, matrix, factors."""
+
+    def __init__(self, delassus: RigidDelassus) -> None:
+        self._body, self._geometry = delassus.body, delassus.geometry
+        moving = np.flatnonzero(delassus.inertia[:, 0] > 0)
+        self._place = np.full(len(delassus.inertia), -1)
+        self._place[moving] = np.arange(len(moving))
+        self._own = np.zeros((len(moving), 2, 3, 3))
+        self._own[:, 0] = np.eye(3) / delassus.inertia[moving, 0, None, None]
+        upper = delassus.inertia[moving][:, [1, 2, 3, 2, 4, 5, 3, 5, 6]].reshape(-1, 3, 3)
+        self._own[:, 1] = np.linalg.inv(upper)
+        indices, indptr = self._pattern(len(moving))
+        self._plan = fronts.analyse(indices, indptr)
+        whole = self._plan[2]
+        self._aptr = np.concatenate([[0], np.cumsum(whole * whole)]).astype(np.int64)
+        nc, blocks = len(self._body), len(indices)
+        self._inverse, self._gain = np.empty((2, nc, 3, 3))
+        self._value, self._factor = np.empty((blocks, 3, 3)), np.empty(self._aptr[-1])
+        self._pivot, self._work = np.empty(6 * len(moving), dtype=np.int64), np.empty(int(whole.max()))
+
+    def _pattern(self, count: int) -> tuple[Ints, Ints]:
+        """Block rows of translation and rotation of each body; where the blocks of each contact begin."""
+        side = self._place[self._body]
+        s, t = np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])
+        row, column = side[:, s], side[:, t]
+        known = (row >= 0) & (column >= 0)
+        own = np.arange(count) * (count + 1)
+        keys, where = np.unique(np.concatenate([own, (row * count + column)[known]]), return_inverse=True)
+        degree = np.bincount(keys // count, minlength=count)
+        before = np.concatenate([[0], np.cumsum(degree)[:-1]]).astype(np.int64)
+        within = np.arange(len(keys)) - before[keys // count]
+        at = 4 * before[keys // count] + 2 * within
+        self._blocks = np.full((len(side), 4), -1)
+        self._blocks[known] = at[where[count:]]
+        self._width = np.column_stack([2 * degree, at[where[:count]]]).astype(np.int64)
+        columns = 2 * (keys % count)
+        both = np.column_stack([columns, columns + 1]).ravel()
+        parts = np.split(both, 2 * before[1:])
+        indices = np.concatenate([part for part in parts for _ in range(2)]).astype(np.int64)
+        indptr = np.concatenate([[0], np.cumsum(np.repeat(2 * degree, 2))]).astype(np.int64)
+        return indices, indptr
+
+    def step(self, first: Array, second: Array, error: Array, alpha: float) -> Array | None:
+        """Δr (nc, 3); None if the equations are singular."""
+        if not bodies.inverse_blocks(first, second, alpha, self._inverse, self._gain):
+            return None
+        bodies.body_matrix(
+            self._body,
+            self._geometry,
+            self._gain,
+            self._place,
+            self._blocks,
+            self._own,
+            self._width,
+            self._value,
+        )
+        _, width, whole, fptr, front, offset, mptr, member, eptr, entry, row, column, parent, place, _ = (
+            self._plan
+        )
+        if not fronts.factorise(
+            self._value, False, width, whole, fptr, front, offset, eptr, entry, row, column, parent, place,
+            self._aptr, self._factor, self._pivot,
+        ):  # fmt: skip
+            return None
+        velocity = np.empty((2 * len(self._own), 3))
+        bodies.body_load(self._body, self._geometry, self._inverse, error, self._place, velocity)
+        fronts.solve(
+            velocity, width, whole, fptr, front, offset, mptr, member, self._aptr, self._factor, self._pivot, self._work
+        )  # fmt: skip
+        step = np.empty_like(error)
+        bodies.contact_step(
+            self._body, self._geometry, self._inverse, second, error, self._place, velocity, step
+        )
+        return step

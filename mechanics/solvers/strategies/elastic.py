@@ -1,0 +1,45 @@
+"""ADMM, and where that is slow the interior-point method: for scenes with deformable stones."""
+
+from dataclasses import dataclass, replace
+
+from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
+from mechanics.solvers.first_order.admm import ADMM
+from mechanics.solvers.second_order.interior_point import InteriorPoint
+
+__all__ = ["Elastic"]
+
+# iterations of ADMM that cost as much as the interior-point method takes in all
+_ADMM = 400
+
+
+@dataclass(frozen=True)
+class Elastic:
+    """ADMM from where the last step ended, and the interior-point method where it does not converge soon.
+
+    ADMM factorises once for as long as contacts persist, so where little changes from step to step a few of its cheap
+    iterations suffice. The interior-point method factorises in each of some 30, whatever the state
+    (docs/decisions/010-interior-point.md has the measurements).
+
+    Attributes
+    ----------
+    tolerance, velocity_tolerance : as in `NSGS`
+    max_iterations : of both together
+    """
+
+    tolerance: float = 1e-6
+    velocity_tolerance: float = 1e-5
+    max_iterations: int = 2000
+
+    def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
+        """Solve from `start`; `why` says which of the two did."""
+        limits = self.tolerance, self.velocity_tolerance
+        warm = "warm start" if start.impulse.any() else f"cold start, {len(start.impulse):,} contacts"
+        first = ADMM(*limits, min(_ADMM, self.max_iterations))(problem, start)
+        first = replace(first, why=f"admm: {warm}")
+        if first.converged or self.max_iterations <= first.iterations:
+            return first
+        other = InteriorPoint(*limits, min(100, self.max_iterations - first.iterations))
+        second = other(problem, ContactStart(first.impulse, first.velocity))
+        second = replace(second, why=f"interior point: admm stood at η {first.natural_map:.0e}")
+        best = second if second.natural_map < first.natural_map or second.converged else first
+        return replace(best, iterations=first.iterations + second.iterations)

@@ -1,0 +1,1 @@
+"""One stone: material, solid, mesh and elasticity, without contact."""

@@ -1,0 +1,196 @@
+"""Stress at the nodes from that at the sampling points (superconvergent patch recovery)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array
+
+from mechanics.stones.elasticity.stress import SAMPLE_ORDER
+from mechanics.stones.meshing.elements import Element
+from mechanics.stones.meshing.mesh import SolidMesh
+from mechanics.stones.meshing.shape_functions import integration
+
+__all__ = ["recovery"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# directions, and quadratic terms, that a patch sees with less than this part of the largest variance are left out
+_UNSEEN = 0.03
+# a polynomial whose value is a sum of so much more than the sampled values is not trusted
+_AMPLIFIED = 6.0
+# weights (_FLAT + d²/d̄²)^-power fall with the distance d from the patch's corner, d̄² its mean square
+_FLAT, _POWER = 0.1, {1: 1.0, 2: 1.5}
+# on the surface a patch takes in the cells that share so many corners with its own; one where nothing is said
+_SHARED = {Element.HEX20: 4, Element.HEX27: 4}
+# so many patches are fitted at once
+_AT_ONCE = 64
+
+
+def recovery(mesh: SolidMesh) -> "csr_array[np.float64]":
+    """Weights (n, nq) that give nodal values from those of `sampled_stress` (Zienkiewicz & Zhu 1992).
+
+    Around each corner of the cells a polynomial of the element's order is fitted by weighted least squares to the
+    values at the sampling points of the cells that touch it; around a corner on the surface, also to those of the cells
+    beside these, as a patch on one side of a point says little of its value. Terms that a patch does not see are
+    left out, the quadratic ones first: constants are always exact. A middle node has the mean of the values that the
+    polynomials of its corners give there.
+    """
+    patches = _patches(mesh)
+    rule = integration(mesh.element, mesh.nodes, mesh.cells, SAMPLE_ORDER[mesh.element])
+    spread = _spread(mesh)
+    outside = np.isin(patches.corner, mesh.facets)
+    wider = _widened(patches.cells, _SHARED.get(mesh.element, 1))
+    parts = []
+    for chosen, cells in ((np.flatnonzero(~outside), patches.cells), (np.flatnonzero(outside), wider)):
+        # those of about the same size together
+        chosen = chosen[np.argsort(np.diff(cells.indptr)[chosen], kind="stable")]
+        parts += [
+            _weights(mesh, rule.point, spread, patches, cells, chosen[start : start + _AT_ONCE])
+            for start in range(0, len(chosen), _AT_ONCE)
+        ]
+    row, column, weight = (np.concatenate(one) for one in zip(*parts, strict=True))
+    whole = coo_array((weight, (row, column)), shape=(len(mesh.nodes), rule.volume.size)).tocsr()
+    count = np.bincount(patches.target, minlength=len(mesh.nodes))
+    whole.data /= np.repeat(count, np.diff(whole.indptr))
+    return csr_array(whole)
+
+
+@dataclass(frozen=True)
+class _Patches:
+    """Patches around the corners.
+
+    Attributes
+    ----------
+    corner : (np,) the node that each belongs to
+    cells : a row per patch, a column per cell that touches the corner
+    target : (nt,) nodes that get a value from a patch
+    targets : a row per patch, a column per one of these
+    """
+
+    corner: Ints
+    cells: "csr_array[np.float64]"
+    target: Ints
+    targets: "csr_array[np.float64]"
+
+
+def _patches(mesh: SolidMesh) -> _Patches:
+    corners, cells = mesh.element.corners, len(mesh.cells)
+    distinct, number = np.unique(mesh.cells[:, :corners], return_inverse=True)
+    number = number.reshape(cells, corners)
+    touches = csr_array(
+        (np.ones(number.size), (number.ravel(), np.repeat(np.arange(cells), corners))),
+        shape=(len(distinct), cells),
+    )
+    ends = [(corner, node) for node, of in enumerate(mesh.element.node_corners) for corner in of]
+    first, second = np.array(ends).T
+    pairs = np.unique(number[:, first].ravel() * len(mesh.nodes) + mesh.cells[:, second].ravel())
+    counts = np.bincount(pairs // len(mesh.nodes), minlength=len(distinct))
+    pointer = np.concatenate([[0], np.cumsum(counts)])
+    targets = csr_array(
+        (np.ones(len(pairs)), np.arange(len(pairs)), pointer), shape=(len(distinct), len(pairs))
+    )
+    return _Patches(distinct, touches, pairs % len(mesh.nodes), targets)
+
+
+def _widened(cells: "csr_array[np.float64]", shared: int) -> "csr_array[np.float64]":
+    """The patches with all cells that have so many corners in common with one of theirs."""
+    neighbours = csr_array(cells.T @ cells)
+    neighbours.data = (neighbours.data > shared - 0.5).astype(float)
+    neighbours.eliminate_zeros()
+    wider = csr_array(cells @ neighbours)
+    wider.data[:] = 1.0
+    return wider
+
+
+def _weights(
+    mesh: SolidMesh,
+    points: Array,
+    spread: Array,
+    patches: _Patches,
+    cells: "csr_array[np.float64]",
+    chosen: Ints,
+) -> tuple[Ints, Ints, Array]:
+    """Node, sampling point and weight of all that some patches give, fitted to points (nc, s, 3) of their cells."""
+    samples = points.shape[1]
+    cell, held = _rows(cells, chosen)
+    number = (samples * cell[:, :, None] + np.arange(samples)).reshape(len(chosen), -1)
+    held = np.repeat(held, samples, axis=1)
+    place, wanted = _rows(patches.targets, chosen)
+    node = patches.target[place]
+    size = (cells[chosen] @ spread).reshape(-1, 3, 3) / np.diff(cells.indptr)[chosen][:, None, None]
+    corner = mesh.nodes[patches.corner[chosen]]
+    found = _fit(points.reshape(-1, 3)[number], held, size, corner, mesh.nodes[node], mesh.element.order)
+    kept = wanted[:, :, None] & held[:, None, :]
+    row, column = (
+        np.broadcast_to(node[:, :, None], kept.shape),
+        np.broadcast_to(number[:, None, :], kept.shape),
+    )
+    return row[kept], column[kept], found[kept]
+
+
+def _spread(mesh: SolidMesh) -> Array:
+    """Mean square distances (nc, 9) of the corners of each cell from their mean."""
+    corners = mesh.nodes[mesh.cells[:, : mesh.element.corners]]
+    local = corners - corners.mean(axis=1, keepdims=True)
+    spread: Array = (local.transpose(0, 2, 1) @ local).reshape(-1, 9) / mesh.element.corners
+    return spread
+
+
+def _rows(matrix: "csr_array[np.float64]", rows: Ints) -> tuple[Ints, NDArray[np.bool_]]:
+    """Columns (nr, m) of some rows, filled up with the first of each, and which of them are the row's own."""
+    start, count = matrix.indptr[rows], np.diff(matrix.indptr)[rows]
+    place = np.arange(count.max())
+    held = place < count[:, None]
+    return matrix.indices[start[:, None] + np.where(held, place, 0)].astype(np.int64), held
+
+
+def _fit(
+    points: Array, held: NDArray[np.bool_], size: Array, corner: Array, target: Array, order: int
+) -> Array:
+    """Weights (np, nt, m) of the values at points (np, m, 3) of patches for targets (np, nt, 3).
+
+    Coordinates are turned and stretched so that the points of each patch have unit variance along each axis: the
+    fit does not know how slender the cells are. An axis is not seen where the points vary little beside the size of the
+    cells, its mean square (np, 3, 3), as in a single layer of cells with one point each.
+    """
+    distance = ((points - corner[:, None]) ** 2).sum(axis=2)
+    mean_square = (distance * held).sum(axis=1, keepdims=True) / held.sum(axis=1, keepdims=True)
+    part = held * (_FLAT + distance / mean_square) ** -_POWER[order]
+    part = (part / part.sum(axis=1, keepdims=True))[:, :, None]
+    mean = (part * points).sum(axis=1, keepdims=True)
+    local = points - mean
+    variance = local.transpose(0, 2, 1) @ (part * local)
+    stretch = _inverse_root(variance + size, 0.0)
+    stretch = stretch @ _inverse_root(stretch.transpose(0, 2, 1) @ variance @ stretch, _UNSEEN)
+    y, z = local @ stretch, (target - mean) @ stretch
+    fitted, wanted = [part, part * y], [np.ones((*z.shape[:2], 1)), z]
+    if order == 2:
+        # what the squares and products have beyond the constant and linear polynomials
+        squares, aim = _squares(y), _squares(z)
+        level, slope = (part * squares).sum(axis=1, keepdims=True), fitted[1].transpose(0, 2, 1) @ squares
+        rest, aim = squares - level - y @ slope, aim - level - z @ slope
+        root = _inverse_root(rest.transpose(0, 2, 1) @ (part * rest), _UNSEEN)
+        fitted.append((part * rest) @ root)
+        wanted.append(aim @ root)
+    columns, rows = np.concatenate(fitted, axis=2).transpose(0, 2, 1), np.concatenate(wanted, axis=2)
+    weights: Array = rows @ columns
+    amplified = np.abs(weights).sum(axis=2) > _AMPLIFIED
+    if order == 2 and amplified.any():
+        rows[amplified, 4:] = 0.0
+        weights = rows @ columns
+    return weights
+
+
+def _squares(y: Array) -> Array:
+    return y[..., [0, 1, 2, 0, 1, 2]] * y[..., [0, 1, 2, 1, 2, 0]]
+
+
+def _inverse_root(variance: Array, unseen: float) -> Array:
+    """Columns that bring (np, k, k) to the unit matrix; zero for the directions of hardly any variance."""
+    values, vectors = np.linalg.eigh(variance)
+    seen = values > unseen * np.maximum(values[:, -1:], np.finfo(float).tiny)
+    scale = np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)
+    result: Array = vectors * scale[:, None, :]
+    return result

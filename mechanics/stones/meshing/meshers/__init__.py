@@ -1,0 +1,1 @@
+"""Meshers, one per module."""
