@@ -20,7 +20,7 @@ from archmodel.store.store_runs import store_run
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import new_entry
 from archmodel.tables.relations import Relation
-from pipelines.relate import relate
+from pipelines.ingest.relate import relate
 
 __all__ = ["COURSES", "RUNS", "relate_all", "store_all_stones", "store_knowledge", "store_results"]
 

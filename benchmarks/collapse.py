@@ -17,8 +17,8 @@ from mechanics.results.result import Outcome
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene, TimeSettings
 from mechanics.simulate import simulate
-from pipelines.overlay import overlaid_scene
-from pipelines.profiles import PROFILES, Profile
+from pipelines.tuning.overlay import overlaid_scene
+from pipelines.tuning.profiles import PROFILES, Profile
 
 __all__ = ["CASES", "Case", "Found", "errors", "hold", "main", "search"]
 

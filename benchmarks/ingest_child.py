@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from benchmarks.memory import arrays_bytes, peak_bytes
 from moma.errors import SurveyError
-from pipelines.ingest import ingest
+from pipelines.ingest.ingest import ingest
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.formats.reading import open_survey
 from survey.records.survey import BlockRecord

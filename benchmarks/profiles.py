@@ -1,7 +1,7 @@
 """Errors of the profiles on reference scenes: `python -m benchmarks.profiles [--held-out] [--write] [--json]`.
 
 Each scene runs at each profile and on a mesh that no profile has; docs/accuracy.md has the tables. `--write` renews
-pipelines/profile_errors.py, from which `moma run` tells what error to expect.
+pipelines/tuning/measured_errors.py, from which `moma run` tells what error to expect.
 """
 
 import argparse
@@ -19,17 +19,17 @@ from benchmarks.profile_scenes import HELD_OUT, REFERENCE
 from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
 from mechanics.scene.scene import Fidelity, Scene
 from mechanics.simulate import simulate
-from pipelines.overlay import Overlay, overlaid_scene
-from pipelines.profile_report import BOUNDS, TYPICAL, expected_errors, loops, measure
-from pipelines.profiles import PROFILES
-from pipelines.quantities import Quantities, differences, quantities, quantities_from
+from pipelines.tuning.expected_errors import BOUNDS, TYPICAL, expected_errors, loops, measure
+from pipelines.tuning.overlay import Overlay, overlaid_scene
+from pipelines.tuning.profiles import PROFILES
+from pipelines.tuning.quantities import Quantities, differences, quantities, quantities_from
 
 __all__ = ["FINEST", "main", "measured_rows", "ratios", "run"]
 
 FINEST = replace(PROFILES["accurate"].rest, cells=3.0)
 """Of the reference: a mesh half as fine again as that of the finest profile."""
 
-_DATA = Path(__file__).resolve().parents[1] / "pipelines/profile_errors.py"
+_DATA = Path(__file__).resolve().parents[1] / "pipelines/tuning/measured_errors.py"
 _TABLE: Table = (
     ("scene", "scene", ""),
     ("profile", "profile", ""),
@@ -50,7 +50,7 @@ def main() -> None:
     parser.add_argument("--held-out", action="store_true", help="scenes that nothing was fitted to")
     parser.add_argument("--only", nargs="+", choices=[*REFERENCE, *HELD_OUT], default=None)
     parser.add_argument("--records", type=Path, help="keep each run in this folder, and take it from there")
-    parser.add_argument("--write", action="store_true", help="renew pipelines/profile_errors.py")
+    parser.add_argument("--write", action="store_true", help="renew pipelines/tuning/measured_errors.py")
     parser.add_argument("--json", action="store_true", help="print an array of objects, one for each run")
     options = parser.parse_args()
     scenes = HELD_OUT if options.held_out else REFERENCE

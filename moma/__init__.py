@@ -27,12 +27,12 @@ if TYPE_CHECKING:
     from mechanics.results.result import Result
     from mechanics.scene.scene import Block, Scene
     from mechanics.simulate import simulate
-    from pipelines.assemble import assemble
-    from pipelines.ingest import ingest
-    from pipelines.record import record
-    from pipelines.run import run_scene
-    from pipelines.scenefile import read_scene
-    from pipelines.survey_report import report_surveys
+    from pipelines.ingest.ingest import ingest
+    from pipelines.record.record import record
+    from pipelines.reports.survey.report import report_surveys
+    from pipelines.run.assemble import assemble
+    from pipelines.run.run import run_scene
+    from pipelines.scene.file import read_scene
     from survey.formats.reading import ReadingOptions, open_survey
     from survey.stones import survey_stones
 
@@ -65,18 +65,18 @@ _HOMES = {
     "ReadingOptions": "survey.formats.reading",
     "Result": "mechanics.results.result",
     "Scene": "mechanics.scene.scene",
-    "assemble": "pipelines.assemble",
+    "assemble": "pipelines.run.assemble",
     "find": "archmodel.query.api",
     "find_rows": "archmodel.query.api",
     "history": "archmodel.describe.history",
-    "ingest": "pipelines.ingest",
+    "ingest": "pipelines.ingest.ingest",
     "load_path": "archmodel.relations.graph",
     "open_database": "archmodel.database.session",
     "open_survey": "survey.formats.reading",
-    "read_scene": "pipelines.scenefile",
-    "record": "pipelines.record",
-    "report_surveys": "pipelines.survey_report",
-    "run_scene": "pipelines.run",
+    "read_scene": "pipelines.scene.file",
+    "record": "pipelines.record.record",
+    "report_surveys": "pipelines.reports.survey.report",
+    "run_scene": "pipelines.run.run",
     "simulate": "mechanics.simulate",
     "survey_stones": "survey.stones",
     "trace": "archmodel.describe.trace",

@@ -3,9 +3,9 @@
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from pipelines.ingest_report import IngestReport, SolidsReport
-    from pipelines.run import RunReport
-    from pipelines.survey_report import SurveyReport
+    from pipelines.ingest.report import IngestReport, SolidsReport
+    from pipelines.reports.survey.report import SurveyReport
+    from pipelines.run.run import RunReport
 
 __all__ = ["ingest_lines", "profile_lines", "run_lines", "survey_report_lines"]
 
@@ -134,8 +134,8 @@ def run_lines(report: "RunReport", verbose: bool) -> list[str]:
 
 def profile_lines(name: str) -> list[str]:
     """What a profile is, and the errors it had on the reference scenes."""
-    from pipelines.profile_errors import ERRORS
-    from pipelines.profiles import PROFILES
+    from pipelines.tuning.measured_errors import ERRORS
+    from pipelines.tuning.profiles import PROFILES
 
     ranges = (
         f"{quantity} {_part(low)} to {_part(high)}" for quantity, (_, low, high) in ERRORS[name].items()

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from pipelines.check_report import CheckReport, MeshQualityReport
-    from pipelines.closing_check import JointsReport, SimplificationReport
+    from pipelines.run.check_report import CheckReport, MeshQualityReport
+    from pipelines.run.closing_check import JointsReport, SimplificationReport
 
 __all__ = ["check_lines", "duration"]
 

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from archmodel.store.revisions import Outcome
-    from pipelines.record import RecordReport
+    from pipelines.record.record import RecordReport
 
 __all__ = ["record_lines"]
 

@@ -14,12 +14,12 @@ from typer.testing import CliRunner
 
 from moma.cli import app
 from moma.telling_trade import trade_lines
-from pipelines import trade as trade_module
-from pipelines.quantities import QUANTITIES
-from pipelines.trade import TradeReport
-from pipelines.trade_front import front
-from pipelines.trade_grid import grid
-from pipelines.trade_record import study_png
+from pipelines.tuning.quantities import QUANTITIES
+from pipelines.tuning.tradeoff import study as trade_module
+from pipelines.tuning.tradeoff.grid import grid
+from pipelines.tuning.tradeoff.pareto import front
+from pipelines.tuning.tradeoff.report import study_png
+from pipelines.tuning.tradeoff.study import TradeReport
 from tests.test_docs import ROOT, SCENE, blocks, commands, place
 
 __all__ = ["place"]

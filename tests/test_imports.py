@@ -49,7 +49,7 @@ def test_the_import_rule_holds():
             ("sqlalchemy", "numba", "typer", "vtkmodules", "trimesh", "meshio", "scipy"),
         ),
         ("survey.joints.close", ("sqlalchemy", "typer", "vtkmodules")),
-        ("pipelines.run", ("typer", "vtkmodules", "matplotlib")),
+        ("pipelines.run.run", ("typer", "vtkmodules", "matplotlib")),
     ],
 )
 def test_a_module_loads_only_what_it_needs(module, loaded_late):

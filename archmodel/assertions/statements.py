@@ -146,7 +146,7 @@ def say_depth(
 ) -> Outcome:
     """They are so deep [m], with this standard deviation [m].
 
-    This is the statement alone; ``pipelines.depth_records`` makes the solid follow it.
+    This is the statement alone; ``pipelines.record.depth`` makes the solid follow it.
     """
     values = {
         "value": checked_number("depth", value, "m", above=0.0),

@@ -30,7 +30,7 @@ def record(
     """Record knowledge of a building: materials, phases, structures, marks, observations, corrections, …"""
     from moma.listing import as_json
     from moma.telling_records import record_lines
-    from pipelines.record import record as put_in
+    from pipelines.record.record import record as put_in
 
     report = put_in(files, db, author=author, dry_run=dry_run)
     print(as_json(asdict(report)) if json else "\n".join(record_lines(report, verbose)))

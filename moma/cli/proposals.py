@@ -12,7 +12,7 @@ from moma.console import reporting, say
 from moma.errors import UsageError
 
 if TYPE_CHECKING:
-    from pipelines.propose import ProposalReport
+    from pipelines.propose.propose import ProposalReport
 
 __all__ = ["CoreShape", "What", "propose"]
 
@@ -70,7 +70,7 @@ def propose(
 ) -> None:
     """Propose stones that are missing, or the core between two facings; see docs/unseen.md."""
     from moma.listing import as_json
-    from pipelines.propose import Recording, propose_core, propose_stones
+    from pipelines.propose.propose import Recording, propose_core, propose_stones
     from survey.unseen.core.settings import InfillSettings, InfillShape
 
     given = {"--as": shape, "--storey-height": storey_height, "--facings": facings}

@@ -9,7 +9,7 @@ from moma.cli.options import DEFAULT_DB, Db, Json, Verbose
 from moma.console import reporting, say
 
 if TYPE_CHECKING:
-    from pipelines.relate import RelationReport
+    from pipelines.ingest.relate import RelationReport
 
 __all__ = ["load_path", "relate"]
 
@@ -40,7 +40,7 @@ def relate(
     from archmodel.database.session import open_database
     from archmodel.relations.store import held_settings
     from moma.listing import as_json, as_table
-    from pipelines.relate import relate as compute
+    from pipelines.ingest.relate import relate as compute
 
     given = {name: value for name, value in (("width", width), ("angle", angle)) if value is not None}
     with open_database(db, create=False) as database, database.session() as session:

@@ -35,7 +35,7 @@ def check(
     from moma.listing import as_json
     from moma.telling import profile_lines
     from moma.telling_checks import check_lines
-    from pipelines.check import check_scene
+    from pipelines.run.check import check_scene
 
     report = check_scene(scene, db, pictures, profile)
     for warning in report.warnings:
@@ -64,7 +64,7 @@ def run(
     """Simulate a scene; write tables, pictures and a report, and keep the results in the database."""
     from moma.listing import as_json
     from moma.telling import run_lines
-    from pipelines.run import run_scene
+    from pipelines.run.run import run_scene
 
     with progress_bars() as listener:
         done = run_scene(scene, db, out or Path("out") / scene.stem, listener, profile)

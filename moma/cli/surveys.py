@@ -65,9 +65,9 @@ def ingest(
     """Take survey files into the database: all of them, or none if anything is wrong."""
     from moma.listing import as_json
     from moma.telling import ingest_lines
-    from pipelines.ingest import ingest as take_in
-    from pipelines.kind_rules import kind_rules
-    from pipelines.reading_options import reading_options
+    from pipelines.ingest.ingest import ingest as take_in
+    from pipelines.ingest.kind_rules import kind_rules
+    from pipelines.ingest.reading_options import reading_options
 
     if rejects is not None and not keep_going:
         raise UsageError("--rejects without --keep-going", remedy="give --keep-going too")
@@ -107,8 +107,8 @@ def survey_report(
 ) -> None:
     """Judge survey files: precision, what to measure again, courses, kinds; no database is needed."""
     from moma.telling import survey_report_lines
-    from pipelines.reading_options import reading_options
-    from pipelines.survey_report import INDEX, report_surveys
+    from pipelines.ingest.reading_options import reading_options
+    from pipelines.reports.survey.report import INDEX, report_surveys
 
     options = reading_options(header, codes, kind, sigma)
     folder = out or Path("out") / f"survey-{files[0].stem}"

@@ -22,7 +22,7 @@ from archmodel.tables.entities import Entity
 from archmodel.tables.entries import new_entry
 from archmodel.tables.relations import Relation
 from moma.errors import UsageError
-from pipelines.relate import relate
+from pipelines.ingest.relate import relate
 from tests.pipelines.standing import arch, take_in, wall
 
 

@@ -15,7 +15,7 @@ from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry, new_entry
 from archmodel.tables.surveys import Measurement
 from moma.errors import DatabaseError, UsageError
-from pipelines.stone_records import stone_record, surveyed_block
+from pipelines.ingest.records import stone_record, surveyed_block
 from survey.extrusion.depth import depth_for
 from survey.extrusion.extrusion import extrude
 from survey.faces.faces import outline_face

@@ -9,9 +9,9 @@ import pytest
 from benchmarks import collapse
 from benchmarks.profile_scenes import HELD_OUT, REFERENCE
 from benchmarks.profiles import measured_rows, ratios
-from pipelines.profile_errors import COLLAPSE
-from pipelines.profile_report import BOUNDS, TYPICAL
-from pipelines.profiles import PROFILES
+from pipelines.tuning.expected_errors import BOUNDS, TYPICAL
+from pipelines.tuning.measured_errors import COLLAPSE
+from pipelines.tuning.profiles import PROFILES
 
 ROOT = Path(__file__).resolve().parents[2]
 # less is what solver and balance leave

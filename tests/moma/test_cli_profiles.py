@@ -7,8 +7,8 @@ import pytest
 from typer.testing import CliRunner
 
 from moma.cli import app
-from pipelines.ingest import ingest
-from pipelines.profile_errors import ERRORS
+from pipelines.ingest.ingest import ingest
+from pipelines.tuning.measured_errors import ERRORS
 
 SURVEY = Path(__file__).resolve().parents[2] / "data/samples/window/window.moma"
 SCENE = """

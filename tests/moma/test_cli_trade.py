@@ -15,11 +15,11 @@ from typer.testing import CliRunner
 
 from mechanics.stones.meshing.elements import Element
 from moma.cli import app
-from pipelines import trade as trade_module
-from pipelines.ingest import ingest
-from pipelines.overlay import Overlay
-from pipelines.quantities import QUANTITIES
-from pipelines.trade_grid import Setting, grid
+from pipelines.ingest.ingest import ingest
+from pipelines.tuning.overlay import Overlay
+from pipelines.tuning.quantities import QUANTITIES
+from pipelines.tuning.tradeoff import study as trade_module
+from pipelines.tuning.tradeoff.grid import Setting, grid
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -205,7 +205,7 @@ def children(pid):
             words = (entry / "cmdline").read_bytes()
         except OSError:
             continue
-        if parent == pid and b"pipelines.trade_child" in words:
+        if parent == pid and b"pipelines.tuning.tradeoff.worker" in words:
             found.append(int(entry.name))
     return found
 

@@ -9,7 +9,7 @@ from multiprocessing.context import ForkServerProcess
 from pathlib import Path
 
 from moma.errors import DatabaseError
-from pipelines.ingest import ingest
+from pipelines.ingest.ingest import ingest
 from pipelines.progress import Progress
 
 __all__ = ["Ingest", "wall_survey"]

@@ -9,9 +9,9 @@ import pytest
 
 from moma.errors import UsageError
 from moma.telling_checks import check_lines, duration
-from pipelines.check import check_scene
-from pipelines.closing_check import joints_report, simplification_report
-from pipelines.ingest import ingest
+from pipelines.ingest.ingest import ingest
+from pipelines.run.check import check_scene
+from pipelines.run.closing_check import joints_report, simplification_report
 from survey.joints.report import ClosingReport, Gap, Joint, Overlap
 from survey.joints.settings import JointMode
 from survey.simplify.simplify import simplify

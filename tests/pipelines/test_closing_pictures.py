@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 
-from pipelines.closing_drawing import load_surface, save_surface
-from pipelines.closing_pictures import (
+from pipelines.draw.closing_pictures import (
     closing_surface,
     draw_elevations,
     draw_in_space,
     flat_facades,
     viewpoint,
 )
-from pipelines.closing_shapes import closing_shapes, places
-from pipelines.sheets import FLAG
+from pipelines.draw.elevations.closing_shapes import closing_shapes, places
+from pipelines.draw.elevations.sheets import FLAG
+from pipelines.draw.offscreen.closing import load_surface, save_surface
 from survey.geometry.solids import Solid, area_vector
 from survey.joints.report import ClosingReport, Gap, Joint, Overlap
 from survey.joints.settings import JointMode

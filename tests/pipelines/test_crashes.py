@@ -14,7 +14,7 @@ from sqlalchemy import func, select
 from archmodel.database.session import open_database
 from archmodel.tables.entities import Entity
 from archmodel.tables.surveys import Measurement, Survey
-from pipelines.ingest import ingest
+from pipelines.ingest.ingest import ingest
 from tests.archmodel.stones import contents
 from tests.pipelines.interrupted import Ingest, wall_survey
 from tests.postgresql import Server

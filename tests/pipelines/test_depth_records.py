@@ -16,8 +16,8 @@ from archmodel.tables.entries import held_at, new_entry
 from archmodel.tables.knowledge import Correction, DepthEvidence
 from archmodel.tables.surveys import Measurement
 from moma.errors import UsageError
-from pipelines.depth_records import record_depth
-from pipelines.ingest import ingest
+from pipelines.ingest.ingest import ingest
+from pipelines.record.depth import record_depth
 
 SAMPLE = Path(__file__).parents[2] / "data/samples/window/window.moma"
 CODE = "W06-06"

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mechanics.scene.scene import Fidelity
-from pipelines.fidelity import Wishes, modelled, neighbours
+from pipelines.run.fidelity import Wishes, modelled, neighbours
 from survey.joints.report import Joint
 
 FIXED, RIGID, DEFORMABLE = Fidelity.FIXED, Fidelity.RIGID, Fidelity.DEFORMABLE

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from moma.errors import UsageError
-from pipelines.folder import check_replaceable, replacing
+from pipelines.results.folder import check_replaceable, replacing
 
 
 def write(folder, name, text="x"):

@@ -9,9 +9,9 @@ import pytest
 from typer.testing import CliRunner
 
 from moma.cli import app
-from pipelines.joint_table import JOINT_COLUMNS
-from pipelines.summary import summarise
-from pipelines.vtk_output import body_cells, body_grid, contact_grid, joint_grid
+from pipelines.results.joints_csv import JOINT_COLUMNS
+from pipelines.results.vtk import body_cells, body_grid, contact_grid, joint_grid
+from pipelines.run.summary import summarise
 from survey.formats.native import reader as moma_ascii
 from survey.formats.native.header import HeadReader
 from survey.formats.native.stone import STONE_WORDS

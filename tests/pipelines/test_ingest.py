@@ -13,8 +13,8 @@ from archmodel.query.api import find
 from archmodel.store.stones import load_stones
 from moma.cli import app
 from moma.errors import DatabaseError, GeometryError, SurveyError, UsageError
-from pipelines.ingest import ingest
-from pipelines.reading_options import reading_options
+from pipelines.ingest.ingest import ingest
+from pipelines.ingest.reading_options import reading_options
 
 HEAD = """\
 moma-survey 1

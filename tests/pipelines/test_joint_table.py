@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from mechanics.stones.materials import Material
-from pipelines.joint_table import JOINT_COLUMNS, write_joints
-from pipelines.stone_values import stone_results
-from pipelines.summary import summarise
+from pipelines.results.joints_csv import JOINT_COLUMNS, write_joints
+from pipelines.run.stone_values import stone_results
+from pipelines.run.summary import summarise
 from tests.pipelines.handmade import deformable_body, result_of, rigid_body
 
 STRONG = Material("marble", 2000.0, 1e10, 0.2, tensile_strength=1e6, compressive_strength=8e6)

@@ -9,9 +9,9 @@ from archmodel.database.session import open_database
 from archmodel.tables.entities import Entity
 from moma.errors import QueryError, UsageError
 from moma.telling import ingest_lines
-from pipelines.ingest import ingest
-from pipelines.kind_rules import RULE_ATTRIBUTES, kind_rules
-from pipelines.reading_options import reading_options
+from pipelines.ingest.ingest import ingest
+from pipelines.ingest.kind_rules import RULE_ATTRIBUTES, kind_rules
+from pipelines.ingest.reading_options import reading_options
 from survey.geometry.convex_parts import convex_parts
 from survey.geometry.solids import Solid
 from tests.survey.assemblies import dome, groin, obj, prism, wall

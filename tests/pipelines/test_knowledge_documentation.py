@@ -12,10 +12,10 @@ from archmodel.tables.knowledge import OBSERVATIONS
 from archmodel.tables.relations import RELATIONS
 from archmodel.tables.structures import structure_kinds
 from moma.cli import app
-from pipelines.record import record
-from pipelines.record_file import read_record
-from pipelines.record_keys import ABOUT, ARRAYS, ATTRIBUTE, CITED, PROPERTY, RECORD, WHO, WITHDRAWN
-from pipelines.schema import REQUIRED, Key
+from pipelines.record.file import read_record
+from pipelines.record.keys import ABOUT, ARRAYS, ATTRIBUTE, CITED, PROPERTY, RECORD, WHO, WITHDRAWN
+from pipelines.record.record import record
+from pipelines.toml.schema import REQUIRED, Key
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs/knowledge.md").read_text(encoding="utf-8")

@@ -13,11 +13,11 @@ import pytest
 from archmodel.database.session import open_database
 from archmodel.query.api import find
 from archmodel.store.stones import load_stones
-from pipelines.assemble import assemble
-from pipelines.ingest import ingest
-from pipelines.local_frame import local_origin, stone_about
-from pipelines.run import run_scene
-from pipelines.scenefile import parse_scene
+from pipelines.ingest.ingest import ingest
+from pipelines.run.assemble import assemble
+from pipelines.run.local_frame import local_origin, stone_about
+from pipelines.run.run import run_scene
+from pipelines.scene.file import parse_scene
 
 GRID = np.array([652_345.0, 6_862_789.0, 1_040.0])
 ORIGIN = np.array([652_000.0, 6_863_000.0, 1_000.0])  # the nearest multiple of 1 km

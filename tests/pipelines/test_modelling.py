@@ -15,11 +15,11 @@ from mechanics.simulate import simulate
 from moma.cli import app
 from moma.errors import SceneError
 from moma.telling_checks import check_lines
-from pipelines.assemble import assemble
-from pipelines.check import check_scene
-from pipelines.ingest import ingest
-from pipelines.scenefile import parse_scene
-from pipelines.selection import select_groups, select_stones
+from pipelines.ingest.ingest import ingest
+from pipelines.run.assemble import assemble
+from pipelines.run.check import check_scene
+from pipelines.scene.file import parse_scene
+from pipelines.scene.selection import select_groups, select_stones
 from tests.pipelines.test_run import SURVEY
 
 LOW = """

@@ -16,17 +16,17 @@ from mechanics.scene.scene import Block, Fidelity
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.meshers.mesher import mesh_block
 from moma.errors import MissingLibraryError
-from pipelines import pictures
-from pipelines.drawing import colouring
-from pipelines.picture_parts import nice_ceiling
-from pipelines.pictures import draw_pictures, missing, package_of
-from pipelines.report import write_report
-from pipelines.scene_keys import PICTURES
-from pipelines.stone_values import stone_results, stress_statistics
-from pipelines.summary import as_json, summarise
-from pipelines.surfaces import load_surface, save_surface, wall_surface
-from pipelines.vtk_output import contact_grid, write_frames
-from pipelines.vtu import CELL_TYPES
+from pipelines.draw import pictures
+from pipelines.draw.offscreen.parts import nice_ceiling
+from pipelines.draw.offscreen.result import colouring
+from pipelines.draw.offscreen.surfaces import load_surface, save_surface, wall_surface
+from pipelines.draw.pictures import draw_pictures, missing, package_of
+from pipelines.reports.run import write_report
+from pipelines.results.vtk import contact_grid, write_frames
+from pipelines.results.vtu import CELL_TYPES
+from pipelines.run.stone_values import stone_results, stress_statistics
+from pipelines.run.summary import as_json, summarise
+from pipelines.scene.table_keys import PICTURES
 from tests.pipelines.handmade import (
     BOX_FACES,
     LIMESTONE,

@@ -16,8 +16,8 @@ from archmodel.tables.knowledge import Correction, MasonMark, Material, Observat
 from archmodel.tables.relations import Relation
 from archmodel.tables.structures import Structure
 from moma.errors import UsageError
-from pipelines.record import record
-from pipelines.record_file import read_record
+from pipelines.record.file import read_record
+from pipelines.record.record import record
 from tests.archmodel.stones import SHA, box_stone
 
 STONES = (

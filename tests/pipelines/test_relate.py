@@ -18,8 +18,8 @@ from archmodel.tables.relations import Membership, Relation
 from archmodel.tables.structures import Structure
 from archmodel.tables.surveys import Measurement
 from moma.errors import UsageError
-from pipelines import relate as relating
-from pipelines.relate import KnownSolids, relate
+from pipelines.ingest import relate as relating
+from pipelines.ingest.relate import KnownSolids, relate
 from tests.archmodel.stones import box_stone
 from tests.pipelines.standing import FRONT, arch, stone, take_in, wall
 from tests.validation import masonry

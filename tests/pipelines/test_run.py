@@ -13,14 +13,14 @@ from archmodel.store.run_record import STONE_VALUES
 from mechanics.results.result import Outcome
 from mechanics.scene.scene import Fidelity
 from moma.errors import MissingLibraryError, SceneError, UsageError
-from pipelines import run as run_module
-from pipelines.assemble import assemble
-from pipelines.ingest import ingest
-from pipelines.run import run_scene, write_results
-from pipelines.scenefile import parse_scene
-from pipelines.selection import select_stones
-from pipelines.stone_records import surveyed_block
-from pipelines.stone_values import stone_results
+from pipelines.ingest.ingest import ingest
+from pipelines.ingest.records import surveyed_block
+from pipelines.run import run as run_module
+from pipelines.run.assemble import assemble
+from pipelines.run.run import run_scene, write_results
+from pipelines.run.stone_values import stone_results
+from pipelines.scene.file import parse_scene
+from pipelines.scene.selection import select_stones
 from tests.pipelines.handmade import result_of, rigid_body
 
 SURVEY = Path(__file__).resolve().parents[2] / "data/samples/window/window.moma"

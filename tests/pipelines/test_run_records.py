@@ -10,11 +10,11 @@ from archmodel.tables.entities import Entity
 from archmodel.tables.runs import ContactPoint, EntityResult, JointResult, Run
 from archmodel.tables.surveys import Simplification
 from mechanics.scene.scene import Fidelity
-from pipelines import run as run_module
-from pipelines.assemble import assemble
-from pipelines.ingest import ingest
-from pipelines.run import run_scene
-from pipelines.scenefile import read_scene
+from pipelines.ingest.ingest import ingest
+from pipelines.run import run as run_module
+from pipelines.run.assemble import assemble
+from pipelines.run.run import run_scene
+from pipelines.scene.file import read_scene
 
 FAR = np.array([652_345.0, 6_862_789.0, 1_040.0])
 

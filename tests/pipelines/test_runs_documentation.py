@@ -10,8 +10,8 @@ import pytest
 from archmodel.database.session import open_database
 from archmodel.tables import runs, surveys
 from archmodel.tables.base import Base
-from pipelines.ingest import ingest
-from pipelines.run import run_scene
+from pipelines.ingest.ingest import ingest
+from pipelines.run.run import run_scene
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "runs.md").read_text(encoding="utf-8")

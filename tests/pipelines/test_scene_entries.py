@@ -15,14 +15,14 @@ from mechanics.scene.scene import Block, Fidelity, Placement
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.polyhedra import mass_properties
 from moma.errors import SceneError
-from pipelines.assemble import assemble
-from pipelines.check import check_scene
-from pipelines.entry_keys import LAW_KEYS, LAW_TYPES, LOAD_TYPES, THROW_KEYS
-from pipelines.ingest import ingest
-from pipelines.joint_laws import law_rules
-from pipelines.scenefile import parse_scene
-from pipelines.stone_keys import MESH_KEYS
-from pipelines.toml_lines import key_lines
+from pipelines.ingest.ingest import ingest
+from pipelines.run.assemble import assemble
+from pipelines.run.check import check_scene
+from pipelines.scene.array_keys import LAW_KEYS, LAW_TYPES, LOAD_TYPES, THROW_KEYS
+from pipelines.scene.file import parse_scene
+from pipelines.scene.laws import law_rules
+from pipelines.scene.stone_keys import MESH_KEYS
+from pipelines.toml.lines import key_lines
 from tests.pipelines.test_scenefile import default_text, message_of
 
 ROOT = Path(__file__).resolve().parents[2]

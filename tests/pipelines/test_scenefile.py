@@ -13,13 +13,13 @@ from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import ContactSettings, SolverSettings, Start, TimeSettings
 from mechanics.stones.meshing.elements import Element
 from moma.errors import MomaError, SceneError, UsageError
-from pipelines.record_file import parse_record
-from pipelines.scene_keys import TABLES
-from pipelines.scene_settings import MeshSettings
-from pipelines.scenefile import parse_scene, read_scene
-from pipelines.schema import REQUIRED
-from pipelines.stone_keys import MATERIAL_KEYS, ORTHOTROPY_KEYS
-from pipelines.toml_lines import key_lines
+from pipelines.record.file import parse_record
+from pipelines.scene.file import parse_scene, read_scene
+from pipelines.scene.settings import MeshSettings
+from pipelines.scene.stone_keys import MATERIAL_KEYS, ORTHOTROPY_KEYS
+from pipelines.scene.table_keys import TABLES
+from pipelines.toml.lines import key_lines
+from pipelines.toml.schema import REQUIRED
 from survey.joints.settings import JointSettings
 
 ROOT = Path(__file__).resolve().parents[2]

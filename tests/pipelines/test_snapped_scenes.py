@@ -6,12 +6,12 @@ import pytest
 
 from archmodel.database.session import open_database
 from mechanics.stones.polyhedra import mass_properties
-from pipelines.assemble import assemble
-from pipelines.ingest import ingest
-from pipelines.kind_rules import kind_rules
-from pipelines.reading_options import reading_options
-from pipelines.run import run_scene
-from pipelines.scenefile import parse_scene
+from pipelines.ingest.ingest import ingest
+from pipelines.ingest.kind_rules import kind_rules
+from pipelines.ingest.reading_options import reading_options
+from pipelines.run.assemble import assemble
+from pipelines.run.run import run_scene
+from pipelines.scene.file import parse_scene
 from survey.geometry.solids import Solid
 from tests.survey.assemblies import dome, groin, obj
 

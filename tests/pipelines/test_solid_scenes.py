@@ -7,11 +7,11 @@ import pytest
 
 from archmodel.database.session import open_database
 from mechanics.stones.polyhedra import mass_properties
-from pipelines.assemble import assemble
-from pipelines.check import check_scene
-from pipelines.ingest import ingest
-from pipelines.run import run_scene
-from pipelines.scenefile import parse_scene
+from pipelines.ingest.ingest import ingest
+from pipelines.run.assemble import assemble
+from pipelines.run.check import check_scene
+from pipelines.run.run import run_scene
+from pipelines.scene.file import parse_scene
 from survey.joints.settings import JointMode
 
 SCENE = """

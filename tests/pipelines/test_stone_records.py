@@ -9,8 +9,8 @@ import pytest
 from archmodel.database.session import open_database
 from archmodel.query.api import find
 from archmodel.store.stones import load_stones
-from pipelines.ingest import ingest
-from pipelines.stone_records import stone_record, surveyed_block
+from pipelines.ingest.ingest import ingest
+from pipelines.ingest.records import stone_record, surveyed_block
 from survey.faces.faces import Provenance
 from survey.formats.reading import open_survey
 from survey.records.survey import Reject

@@ -13,10 +13,10 @@ from typer.testing import CliRunner
 from moma.cli import app
 from moma.errors import SurveyError, UsageError
 from moma.telling import survey_report_lines
-from pipelines import survey_report
-from pipelines.reading_options import reading_options
-from pipelines.survey_report import report_surveys
-from pipelines.survey_study import study_surveys
+from pipelines.ingest.reading_options import reading_options
+from pipelines.reports.survey import report as survey_report
+from pipelines.reports.survey.report import report_surveys
+from pipelines.reports.survey.study import study_surveys
 
 ROOT = Path(__file__).resolve().parents[2]
 SAMPLE = ROOT / "data/samples/window/window.moma"

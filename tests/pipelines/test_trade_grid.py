@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from mechanics.scene.scene import Block, Fidelity, Method, Placement
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
-from pipelines.overlay import Overlay, overlaid
-from pipelines.scenefile import parse_scene
-from pipelines.trade_child import overlay_from, overlay_record
-from pipelines.trade_grid import grid, setting_name
-from pipelines.trade_lines import scene_lines
+from pipelines.scene.file import parse_scene
+from pipelines.tuning.overlay import Overlay, overlaid
+from pipelines.tuning.tradeoff.grid import grid, setting_name
+from pipelines.tuning.tradeoff.toml import scene_lines
+from pipelines.tuning.tradeoff.worker import overlay_from, overlay_record
 from tests.pipelines.handmade import BOX_FACES, box
 
 STONE = Material("limestone", 2350.0, 12e9, 0.2)

@@ -11,8 +11,8 @@ from mechanics.scene.loads.gravity import TiltingTable
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.scene import Fidelity, Method, Scene
 from moma.errors import UsageError
-from pipelines.overlay import Overlay
-from pipelines.trade_store import Measured, Status, Store, study_key
+from pipelines.tuning.overlay import Overlay
+from pipelines.tuning.tradeoff.store import Measured, Status, Store, study_key
 from tests.pipelines.test_trade_front import quantities_of
 from tests.pipelines.test_trade_grid import blocks
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from mechanics.scene.scene import Fidelity
-from pipelines.pictures import missing
-from pipelines.stone_values import stone_results, stress_statistics
-from pipelines.summary import summarise
-from pipelines.surfaces import wall_surface
-from pipelines.vtk_output import body_cells, body_grid
+from pipelines.draw.offscreen.surfaces import wall_surface
+from pipelines.draw.pictures import missing
+from pipelines.results.vtk import body_cells, body_grid
+from pipelines.run.stone_values import stone_results, stress_statistics
+from pipelines.run.summary import summarise
 from tests.pipelines.handmade import deformable_body, result_of, rigid_body
 
 FORCES = ((0.0, 0.0, 3000.0), (0.0, 600.0, 800.0))

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from archmodel.database.session import open_database
 from archmodel.store.stones import store_survey
 from moma.errors import MomaError
-from pipelines.record import record
-from pipelines.record_keys import ARRAYS
-from pipelines.schema import REQUIRED, Kind
+from pipelines.record.keys import ARRAYS
+from pipelines.record.record import record
+from pipelines.toml.schema import REQUIRED, Kind
 from tests.archmodel.stones import SHA, box_stone
 
 NAMES = (

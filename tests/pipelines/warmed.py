@@ -3,7 +3,7 @@
 import tempfile
 from pathlib import Path
 
-from pipelines.ingest import ingest
+from pipelines.ingest.ingest import ingest
 from tests.pipelines.interrupted import wall_survey
 
 with tempfile.TemporaryDirectory() as _folder:

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from two_facings_by_hand import HALF, boxes_meet, contains, depth_of_overlap, facing
 
 from moma.errors import GeometryError, UsageError
-from pipelines.propose_records import core_record
-from pipelines.stone_records import surveyed_block
+from pipelines.ingest.records import surveyed_block
+from pipelines.propose.records import core_record
 from survey.geometry.solids import area_vector, volume_of
 from survey.geometry.watertight import check_watertight
 from survey.joints.close import close_joints

@@ -14,8 +14,8 @@ import pytest
 from typer.testing import CliRunner
 
 from moma.cli import app
-from pipelines.check import check_scene
-from pipelines.ingest import ingest
+from pipelines.ingest.ingest import ingest
+from pipelines.run.check import check_scene
 from survey.extrusion.depth import depth_for
 from survey.extrusion.extrusion import SurveyedBlock, extrude
 from survey.faces.faces import outline_face

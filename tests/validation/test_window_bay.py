@@ -10,9 +10,9 @@ from archmodel.database.session import open_database
 from mechanics.results.result import Outcome
 from mechanics.scene.scene import Fidelity, Method, SolverSettings, TimeSettings
 from mechanics.simulate import simulate
-from pipelines.assemble import assemble
-from pipelines.ingest import ingest
-from pipelines.scenefile import read_scene
+from pipelines.ingest.ingest import ingest
+from pipelines.run.assemble import assemble
+from pipelines.scene.file import read_scene
 
 SAMPLE = Path(__file__).resolve().parents[2] / "data/samples/window"
 

@@ -1,0 +1,1 @@
+"""Pictures of surveys, joints and results."""

@@ -1,0 +1,222 @@
+"""Pictures of how surveyed stones became solids that touch: elevations of what is flat, and the whole in space."""
+
+import json
+import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from moma.errors import MissingLibraryError
+from pipelines.draw.elevations.closing import draw_moved
+from pipelines.draw.elevations.closing_shapes import ClosingShapes, DrawnJoint
+from pipelines.draw.elevations.joints import draw_joints
+from pipelines.draw.offscreen.closing import ClosingSurface, save_surface
+from pipelines.draw.offscreen.parts import OBLIQUELY
+from pipelines.draw.pictures import draw_apart
+from survey.geometry.solids import Solid
+from survey.geometry.watertight import triangulate
+from survey.quality.facades import Facade, find_facades
+
+__all__ = ["closing_surface", "draw_closing", "draw_elevations", "draw_in_space", "flat_facades", "viewpoint"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_FLAT = 0.2  # depth of a facade over its extent, up to which an elevation shows it truly
+_LOOKING = np.cos(np.radians(25.0))  # mean of the normals' components square to it
+_SHARE = 0.08  # of all visible area: smaller facades are not worth an elevation
+_MOST = 4  # elevations
+_NOTHING = 5e-5  # movements below are rounding [m]
+_MAINLY = 0.6  # of all visible area, that flat facades must have together
+_LEVEL = 0.25  # length of the mean normal, below which the stones look nowhere in particular
+_STEEP = np.deg2rad(32.0)  # how far from above, or from below, vaults and floors are looked at
+
+
+def draw_closing(folder: Path, shapes: ClosingShapes) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Draw all pictures into a folder that is there: names of the files, and what could not be drawn."""
+    flat = draw_elevations(folder, shapes)
+    try:
+        return (*flat, *draw_in_space(folder, shapes)), ()
+    except MissingLibraryError as error:
+        return flat, (f"no pictures in space: {error}",)
+
+
+def draw_elevations(folder: Path, shapes: ClosingShapes) -> tuple[str, ...]:
+    """Draw each flat facade: what simplifying moved, what closing moved, and the joints; names of the files."""
+    facades = flat_facades(shapes)
+    names: list[str] = []
+    for number, facade in enumerate(facades, start=1):
+        end = f"-{number}.png" if len(facades) > 1 else ".png"
+        for step in _steps(shapes):
+            draw_moved(folder / f"{step}{end}", shapes, facade, step)
+            names.append(f"{step}{end}")
+        draw_joints(folder / f"joints{end}", shapes, facade)
+        names.append(f"joints{end}")
+    return tuple(names)
+
+
+def draw_in_space(folder: Path, shapes: ClosingShapes) -> tuple[str, ...]:
+    """Draw all stones and all joints from one side; names of the files.
+
+    Raises
+    ------
+    MissingLibraryError : VTK cannot be loaded or cannot draw on this machine
+    """
+    towards, elevation = viewpoint(shapes)
+    step = _steps(shapes)[-1:]
+    shared: dict[str, Any] = {"towards": towards.tolist(), "elevation": elevation}
+    jobs = [
+        {
+            "quantity": "moved",
+            "label": _LABELS[one],
+            "title": f"{shapes.scene}: {_TITLES[one]}",
+            **shared,
+        }
+        for one in step
+    ]
+    jobs.append(
+        {
+            "quantity": "joints",
+            "label": "Width of the joints as surveyed [mm]",
+            "title": f"{shapes.scene}: joints by their surveyed width\n{_note(shapes)}",
+            **shared,
+        }
+    )
+    names = [*(f"{one}-3d.png" for one in step), "joints-3d.png"]
+    with tempfile.TemporaryDirectory() as scratch:
+        surface = Path(scratch) / "surface.npz"
+        save_surface(surface, closing_surface(shapes, *step))
+        paths = [{"path": str((folder / name).absolute())} for name in names]
+        pictures = [job | path for job, path in zip(jobs, paths, strict=True)]
+        job_file = Path(scratch) / "job.json"
+        job_file.write_text(json.dumps({"surface": str(surface), "pictures": pictures}), encoding="utf-8")
+        draw_apart("pipelines.draw.offscreen.closing", job_file)
+    return tuple(names)
+
+
+def flat_facades(shapes: ClosingShapes) -> tuple[Facade, ...]:
+    """The facades that elevations show truly, largest first: two of a corner; none of a vault, or of a dome."""
+    seen = np.array([k for k, one in enumerate(shapes.stones) if not one.core])
+    if not len(seen):
+        return ()
+    normals = np.array([one.normal for one in shapes.stones])
+    areas = np.array([0.0 if one.core else one.area for one in shapes.stones])
+    centroids = np.array([one.centroid for one in shapes.stones])
+    found = []
+    for own_facade in find_facades(normals[seen], areas[seen], centroids[seen]):
+        facade = replace(own_facade, members=seen[own_facade.members])
+        out, own = facade.frame.axes[2], facade.members
+        depth = float(np.ptp(centroids[own] @ out))
+        reach = float(np.ptp(facade.frame.flatten(centroids[own]), axis=0).max()) + np.sqrt(areas[own].mean())
+        looking = float(areas[own] @ (normals[own] @ out)) / float(areas[own].sum())
+        if depth <= _FLAT * reach and looking >= _LOOKING and areas[own].sum() >= _SHARE * areas.sum():
+            found.append(facade)
+    mainly_flat = sum(one.area for one in found) >= _MAINLY * areas.sum()
+    return tuple(found[:_MOST]) if mainly_flat else ()
+
+
+def viewpoint(shapes: ClosingShapes) -> tuple[Array, float]:
+    """From where all stones are looked at: the level direction to the viewer (3,), and the height above it [rad]."""
+    areas = np.array([one.area for one in shapes.stones])
+    mean = areas @ np.array([one.normal for one in shapes.stones]) / areas.sum()
+    level = mean * [1.0, 1.0, 0.0]
+    size = float(np.linalg.norm(level))
+    steep = abs(float(mean[2])) > max(size, _LEVEL)
+    elevation = float(np.copysign(_STEEP, mean[2])) if steep else OBLIQUELY
+    if size >= _LEVEL:
+        return level / size, float(elevation)
+    return _along(shapes), float(elevation if steep else _STEEP)
+
+
+def _along(shapes: ClosingShapes) -> Array:
+    """The level direction in which the fewest faces look: the axis of a vault, from its southern end."""
+    areas = np.array([one.area for one in shapes.stones])
+    level = np.array([one.normal for one in shapes.stones])[:, :2]
+    _, directions = np.linalg.eigh((level * areas[:, None]).T @ level)
+    x, y = directions[:, 0].tolist()
+    sign = -1.0 if (y, x) > (0.0, 0.0) else 1.0
+    return np.array([sign * x, sign * y, 0.0])
+
+
+def closing_surface(shapes: ClosingShapes, step: str = "moved") -> ClosingSurface:
+    """The faces of all stones and joints; corners have what simplifying, or closing the joints, moved."""
+    simplified = step == "simplified"
+    solids = [one.surveyed if simplified else one.simple for one in shapes.stones]
+    starts = np.cumsum([0, *(len(one.vertices) for one in solids)])
+    shut = [one for one in shapes.joints if not one.joint.left_open and one.polygon is not None]
+    left = [one for one in shapes.joints if one.joint.left_open and one.polygon is not None]
+    joint_points, joint_triangles, of_joint = _fans(shut)
+    gap_points, gap_triangles, _ = _fans(left)
+    return ClosingSurface(
+        points=np.concatenate([one.vertices for one in solids]),
+        triangles=np.concatenate(
+            [triangulate(one) + start for one, start in zip(solids, starts[:-1], strict=True)]
+        ).astype(np.int64),
+        edges=np.concatenate([_edges(one) + start for one, start in zip(solids, starts[:-1], strict=True)]),
+        moved=np.concatenate([one.simplified if simplified else one.moved for one in shapes.stones]),
+        joint_points=joint_points,
+        joint_triangles=joint_triangles,
+        joint_width=np.array([one.joint.width for one in shut])[of_joint],
+        gap_points=gap_points,
+        gap_triangles=gap_triangles,
+        gaps=np.array([one.centroid for one in shapes.places if one.kind == "gap"]).reshape(-1, 3),
+        overlaps=np.array([one.centroid for one in shapes.places if one.kind == "overlap"]).reshape(-1, 3),
+    )
+
+
+_LABELS = {
+    "simplified": "Moved by simplifying the stones [mm]",
+    "moved": "Moved by closing the joints [mm]",
+}
+_TITLES = {"simplified": "what simplifying moved", "moved": "what closing the joints moved"}
+
+
+def _steps(shapes: ClosingShapes) -> list[str]:
+    """What moved anything: simplifying, closing the joints, or both."""
+    known = {
+        "simplified": any(np.nanmax(one.simplified, initial=0.0) > _NOTHING for one in shapes.stones),
+        "moved": any(np.nanmax(one.moved, initial=0.0) > _NOTHING for one in shapes.stones),
+    }
+    return [name for name, shown in known.items() if shown]
+
+
+def _note(shapes: ClosingShapes) -> str:
+    gaps = sum(one.kind == "gap" for one in shapes.places)
+    overlaps = len(shapes.places) - gaps
+    said = [f"orange: {gaps} gap{'s' * (gaps > 1)}"] if gaps else []
+    said += [f"black: {overlaps} overlap{'s' * (overlaps > 1)}"] if overlaps else []
+    return "; ".join(said) or "no gaps, no overlaps"
+
+
+def _fans(joints: Sequence[DrawnJoint]) -> tuple[Array, Ints, Ints]:
+    """Corners, triangles, and the joint of each triangle."""
+    points: list[Array] = [np.zeros((0, 3))]
+    triangles: list[tuple[int, int, int]] = []
+    owners: list[int] = []
+    start = 0
+    for number, one in enumerate(joints):
+        assert one.polygon is not None
+        count = len(one.polygon)
+        points.append(one.polygon)
+        triangles += [(start, start + k, start + k + 1) for k in range(1, count - 1)]
+        owners += [number] * (count - 2)
+        start += count
+    return (
+        np.concatenate(points),
+        np.array(triangles, dtype=np.int64).reshape(-1, 3),
+        np.array(owners, dtype=np.int64),
+    )
+
+
+def _edges(solid: Solid) -> Ints:
+    """(ne, 2) sides of the faces, each once."""
+    sides = {
+        (min(a, b), max(a, b))
+        for face in solid.faces
+        for a, b in zip(face, (*face[1:], face[0]), strict=True)
+    }
+    return np.array(sorted(sides), dtype=np.int64)

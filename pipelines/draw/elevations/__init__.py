@@ -1,0 +1,1 @@
+"""Elevations drawn with matplotlib."""

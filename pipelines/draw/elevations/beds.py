@@ -1,0 +1,132 @@
+"""The picture of bed lines, their deviations made larger."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.draw.elevations.sheets import FLAG, INK, PALE, PLAIN, new_sheet, save_sheet
+from survey.quality.courses import SIGNIFICANT, CourseLine
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["draw_courses"]
+
+Array = NDArray[np.float64]
+
+_LARGEST = 0.45  # the largest deviation of a bed is drawn so large, in distances between courses
+
+
+def draw_courses(path: Path, lines: Sequence[CourseLine]) -> None:
+    """Draw the bed lines of one facade at their heights, what they differ from level made larger.
+
+    Parameters
+    ----------
+    path : PNG
+    lines : courses of one facade
+    """
+    levels = np.array([line.level for line in lines])
+    factor = _exaggeration(lines, levels)
+    figure = new_sheet((10.0, float(np.clip(2.0 + 0.42 * len(lines), 3.5, 24.0))))
+    axes = figure.subplots()
+    right = max(float(line.along[-1]) for line in lines)
+    left = min(float(line.along[0]) for line in lines)
+    small = len(lines) > 60
+    for line, y in zip(lines, levels, strict=True):
+        colour = FLAG if _is_deformed(line) else PLAIN
+        _draw_bed(axes, line, factor, colour, small)
+        if not small:
+            axes.annotate(
+                _label(line), (right, y), (8, 0), textcoords="offset points", va="center", fontsize=8, color=colour,
+                annotation_clip=False, parse_math=False,
+            )  # fmt: skip
+    margin = max(0.02 * (right - left), 0.01)  # a single corner has a place but no width
+    axes.set_xlim(left - margin, right + margin)
+    axes.set_xlabel("along the facade, to the right of the viewer [m]")
+    axes.set_ylabel("height of the bed [m]")
+    axes.set_title(
+        f"Bed lines of {lines[0].facade}: deviations from level drawn {factor:g} times as large\n"
+        "bars: ± one standard deviation of a corner; grey: level; orange: slope or sag beyond chance",
+        fontsize=10, color=INK,
+    )  # fmt: skip
+    axes.spines[["top", "right"]].set_visible(False)
+    save_sheet(figure, path)
+
+
+def _draw_bed(axes: "Axes", line: CourseLine, factor: float, colour: str, small: bool) -> None:
+    from matplotlib.collections import LineCollection
+
+    axes.plot(line.along[[0, -1]], [line.level] * 2, color=PALE, linewidth=0.8, zorder=1)
+    size, thick = (1.5, 0.6) if small else (3.5, 1.0)
+    axes.errorbar(
+        line.along,
+        line.level + factor * (line.height - line.level),
+        factor * line.sigma,
+        fmt="o", markersize=size, color=INK, ecolor=PALE, elinewidth=thick, zorder=2,
+    )  # fmt: skip
+    places = np.column_stack([line.along, line.level + factor * (line.height - line.level)])
+    strokes = LineCollection(
+        [places[list(ends)] for ends in _stones(line)], colors=INK, linewidths=thick, zorder=3
+    )
+    axes.add_collection(strokes, autolim=False)
+    if line.slope is not None:
+        fine = np.linspace(line.along[0], line.along[-1], 2 if _curvature(line) == 0.0 else 50)
+        axes.plot(
+            fine,
+            line.level + factor * (_fitted(line, fine) - line.level),
+            color=colour,
+            linewidth=1.6,
+            zorder=4,
+        )
+
+
+def _fitted(line: CourseLine, along: Array) -> Array:
+    """The straight line of a course, or, where it sags or hogs beyond chance, its parabola [m]."""
+    half = line.span / 2.0
+    bulge = float((((line.along - line.middle) / half) ** 2).mean()) - ((along - line.middle) / half) ** 2
+    fitted: Array = line.level + (line.slope or 0.0) * (along - line.middle) + _curvature(line) * bulge
+    return fitted
+
+
+def _curvature(line: CourseLine) -> float:
+    """The sag, if it is beyond chance [m]."""
+    found = line.sag_probability is not None and line.sag_probability < SIGNIFICANT
+    return line.sag if found and line.sag is not None else 0.0
+
+
+def _stones(line: CourseLine) -> list[tuple[int, int]]:
+    """First and last corner of each stone of a course that has two."""
+    found: dict[str, list[int]] = {}
+    for i, code in enumerate(line.codes):
+        found.setdefault(code, []).append(i)
+    return [(rows[0], rows[-1]) for rows in found.values() if len(rows) > 1]
+
+
+def _is_deformed(line: CourseLine) -> bool:
+    chances = (line.slope_probability, line.sag_probability)
+    return any(chance is not None and chance < SIGNIFICANT for chance in chances)
+
+
+def _label(line: CourseLine) -> str:
+    course = f"{line.course}" if line.zone is None else f"{line.zone} {line.course}"
+    if line.slope is None or line.slope_sigma is None:
+        return f"{course}: not determined"
+    text = f"{course}: {line.slope * 1e3:+.1f} ± {line.slope_sigma * 1e3:.1f} mm/m"
+    if line.sag is not None and line.sag_sigma is not None:
+        text += f", mid-span {line.sag * 1e3:+.1f} ± {line.sag_sigma * 1e3:.1f} mm"
+    return text
+
+
+def _exaggeration(lines: Sequence[CourseLine], levels: Array) -> float:
+    """A round factor by which the deviations fill a good part of the room between courses."""
+    gaps = np.diff(np.unique(np.round(levels, 3)))
+    room = float(np.median(gaps)) if len(gaps) else 0.3
+    largest = max(float((np.abs(line.height - line.level) + line.sigma).max()) for line in lines)
+    wanted = _LARGEST * room / largest
+    decade = 10.0 ** math.floor(math.log10(wanted))
+    steps = (1.0, 2.0, 5.0, 10.0)
+    return max(1.0, decade * max(step for step in steps if step * decade <= wanted))

@@ -1,0 +1,221 @@
+"""Elevations of stones that were simplified and whose joints were closed: how far each corner was moved."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.draw.elevations.closing_shapes import ClosingShapes, DrawnStone
+from pipelines.draw.elevations.sheet import (
+    CODES,
+    elevated,
+    extent,
+    frame_elevation,
+    palette,
+    sheet_size,
+    write_codes,
+)
+from pipelines.draw.elevations.sheets import INK, PALE, new_sheet, save_sheet
+from pipelines.draw.offscreen.parts import nice_ceiling
+from survey.geometry.solids import Solid, area_vector
+from survey.geometry.watertight import triangulate
+from survey.quality.facades import Facade
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["SeenFace", "back_to_front", "draw_moved", "guess_key", "hatch", "name_stones", "seen"]
+
+Array = NDArray[np.float64]
+SeenFace = tuple[Array, tuple[int, ...]]
+
+_UNKNOWN = "#dcd9d4"
+_SEEN = np.cos(np.radians(60.0))  # a face that is turned farther away is not seen in an elevation
+_ROBUST = 98.0  # per cent of the corners that the colour scale reaches
+_FINEST = 0.1  # the colour scale ends here at least: what moved less is not worth a colour [mm]
+_DASHES = (0.0, (4.0, 2.0))
+_LABELS = {
+    "simplified": "moved by simplifying the stone [mm]",
+    "moved": "moved by closing the joints [mm]",
+}
+
+
+def draw_moved(path: Path, shapes: ClosingShapes, facade: Facade, step: str) -> None:
+    """Draw how far each corner of a facade's stones was moved, in colour.
+
+    Parameters
+    ----------
+    path : PNG
+    shapes : what there is to draw
+    facade : which of the stones, and the frame to draw them in
+    step : "simplified": on the stones as surveyed, with lines about those that became others; "moved": in closing the
+        joints, on the stones as simplified, with lines about all as simulated
+    """
+    own = back_to_front(shapes.stones, facade)
+    simplified = step == "simplified"
+    values = [1e3 * (stone.simplified if simplified else stone.moved) for stone in own]
+    faces = [seen(stone.surveyed if simplified else stone.simple, facade) for stone in own]
+    known = np.concatenate(values)
+    known = known[np.isfinite(known)]
+    end, _ = nice_ceiling(max(float(np.percentile(known, _ROBUST)) if len(known) else 0.0, _FINEST))
+    low, high = extent([corners for one in faces for corners, _ in one])
+    figure = new_sheet(sheet_size(high - low))
+    axes = figure.subplots()
+    shading = _shade_all(axes, faces, values, end)
+    hatch(axes, own, faces)
+    after = [
+        (one.simple if simplified else one.closed, one.simplified if simplified else one.moved) for one in own
+    ]
+    changed = [solid for solid, moved in after if np.nanmax(moved, initial=0.0) > 1e-3 * _FINEST]
+    _outline(axes, [corners for solid in changed for corners, _ in seen(solid, facade)])
+    shade = [float(np.nanmean(moved)) / end if np.isfinite(moved).any() else np.nan for moved in values]
+    name_stones(axes, own, faces, shade)
+    frame_elevation(axes, facade, low, high, _title(shapes.scene, facade, step, own, values))
+    if shading is not None:
+        beyond = "max" if known.max() > end else "neither"
+        figure.colorbar(shading, ax=axes, label=_LABELS[step], shrink=0.75, pad=0.02, extend=beyond)
+    _legend(figure, step, any(one.hypothesis for one in own), len(known) < sum(map(len, values)))
+    save_sheet(figure, path)
+
+
+def back_to_front(stones: Sequence[DrawnStone], facade: Facade) -> list[DrawnStone]:
+    """The facade's stones, the farthest from the viewer first, so that nearer ones are drawn over them."""
+    out = facade.frame.axes[2]
+    return sorted((stones[i] for i in facade.members.tolist()), key=lambda one: float(one.centroid @ out))
+
+
+def seen(solid: Solid, facade: Facade) -> list[SeenFace]:
+    """Faces of a solid that look to the viewer: corners (k, 2) in the elevation, and which corners they are."""
+    found = []
+    for face in solid.faces:
+        area = area_vector(solid.vertices[list(face)])
+        if area @ facade.frame.axes[2] > _SEEN * float(np.linalg.norm(area)):
+            found.append((elevated(solid.vertices[list(face)], facade), face))
+    return found
+
+
+def hatch(axes: "Axes", stones: Sequence[DrawnStone], faces: Sequence[Sequence[SeenFace]]) -> None:
+    """Hatch the stones that nobody has seen."""
+    from matplotlib.collections import PolyCollection
+
+    guessed = [
+        corners for stone, one in zip(stones, faces, strict=True) if stone.hypothesis for corners, _ in one
+    ]
+    if guessed:
+        axes.add_collection(
+            PolyCollection(guessed, facecolors="none", edgecolors=INK, linewidths=0.6, hatch="///", alpha=0.5)
+        )
+
+
+def name_stones(
+    axes: "Axes", stones: Sequence[DrawnStone], faces: Sequence[Sequence[SeenFace]], shade: Sequence[float]
+) -> None:
+    """Write the codes of the stones, where there are not too many, each on its largest face.
+
+    Parameters
+    ----------
+    shade : where on the colour scale each is, from 0 to 1; NaN where it has no colour
+    """
+    found = [
+        (stone.code, max((corners for corners, _ in one), key=_area), dark)
+        for stone, one, dark in zip(stones, faces, shade, strict=True)
+        if one
+    ]
+    if found and len(found) <= CODES:
+        codes, corners, dark = zip(*found, strict=True)
+        write_codes(axes, codes, corners, np.array(dark))
+
+
+def guess_key() -> Any:
+    """What the hatching means, for a legend."""
+    from matplotlib.patches import Patch
+
+    return Patch(
+        facecolor="none", edgecolor=INK, hatch="///", alpha=0.5, label="hypothesis: nobody has seen it"
+    )
+
+
+def _shade_all(axes: "Axes", faces: Sequence[Sequence[SeenFace]], values: Sequence[Array], end: float) -> Any:
+    """Colour all faces by the values at their corners; what the scale is of, None if nothing is known."""
+    from matplotlib.collections import PolyCollection
+
+    told = [
+        (corners, moved[list(indices)])
+        for one, moved in zip(faces, values, strict=True)
+        for corners, indices in one
+    ]
+    unknown = [corners for corners, moved in told if not np.isfinite(moved).all()]
+    axes.add_collection(PolyCollection(unknown, facecolors=_UNKNOWN, edgecolors="none"))
+    fans = [_fan(corners, moved) for corners, moved in told if np.isfinite(moved).all()]
+    shading = None
+    if fans:
+        points, heights, triangles = zip(*fans, strict=True)
+        starts = np.cumsum([0, *map(len, points)])[:-1]
+        x, y = np.concatenate(points).T
+        rows = np.concatenate([one + start for one, start in zip(triangles, starts, strict=True)])
+        # triangles are drawn in their order, so that nearer stones cover those behind
+        shading = axes.tripcolor(
+            x,
+            y,
+            np.concatenate(heights),
+            triangles=rows,
+            shading="gouraud",
+            cmap=palette(_UNKNOWN),
+            clim=(0.0, end),
+        )
+    outlines = [corners for corners, _ in told]
+    axes.add_collection(PolyCollection(outlines, facecolors="none", edgecolors=PALE, linewidths=0.9))
+    return shading
+
+
+def _fan(corners: Array, values: Array) -> tuple[Array, Array, NDArray[np.intp]]:
+    """Triangles about the middle of a polygon, or, where they would turn over, cut from its corners."""
+    count = len(corners)
+    middle = corners.mean(axis=0)
+    turns = corners - middle
+    following = np.roll(turns, -1, axis=0)
+    if ((turns[:, 0] * following[:, 1] - turns[:, 1] * following[:, 0]) > 0.0).all():
+        rim = np.arange(count)
+        triangles = np.column_stack([rim, np.roll(rim, -1), np.full(count, count)])
+        return np.vstack([corners, middle]), np.append(values, values.mean()), triangles
+    flat = Solid("", np.column_stack([corners, np.zeros(count)]), (tuple(range(count)),))
+    return corners, values, triangulate(flat)
+
+
+def _outline(axes: "Axes", polygons: Sequence[Array]) -> None:
+    from matplotlib.collections import PolyCollection
+
+    axes.add_collection(
+        PolyCollection(polygons, facecolors="none", edgecolors=INK, linewidths=0.7, linestyles=[_DASHES])
+    )
+
+
+def _area(polygon: Array) -> float:
+    x, y = (polygon - polygon[0]).T
+    return float(abs((x * np.roll(y, -1) - np.roll(x, -1) * y).sum()))
+
+
+def _title(
+    scene: str, facade: Facade, step: str, stones: Sequence[DrawnStone], values: Sequence[Array]
+) -> str:
+    what = "what simplifying moved" if step == "simplified" else "what closing the joints moved"
+    largest = [float(np.nanmax(moved, initial=0.0)) for moved in values]
+    worst = int(np.argmax(largest))
+    most = f"; {stones[worst].code} most, by {largest[worst]:.1f} mm" if largest[worst] > 0.0 else "; nothing"
+    return f"{scene}, {facade.name}: {what}{most}"
+
+
+def _legend(figure: "Figure", step: str, guessed: bool, unknown: bool) -> None:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    after = "as simplified" if step == "simplified" else "as simulated"
+    keys: list[Any] = [Line2D([], [], color=INK, linewidth=0.7, linestyle=_DASHES, label=after)]
+    if guessed:
+        keys.append(guess_key())
+    if unknown:
+        keys.append(Patch(facecolor=_UNKNOWN, edgecolor="none", label="not known"))
+    figure.legend(handles=keys, loc="outside lower left", ncols=len(keys), frameon=False, fontsize=9)

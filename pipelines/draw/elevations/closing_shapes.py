@@ -1,0 +1,178 @@
+"""What pictures show of how surveyed stones became solids that touch: stones, joints and what is wrong with them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.draw.elevations.joint_polygons import joint_polygon
+from survey.geometry.solids import Solid, area_vector
+from survey.joints.report import ClosingReport, Joint
+
+__all__ = ["ClosingShapes", "DrawnJoint", "DrawnStone", "Place", "closing_shapes", "places"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class DrawnStone:
+    """One stone, as surveyed and as it is simulated.
+
+    Attributes
+    ----------
+    surveyed, simple, closed : its solid as surveyed, as simplified, and as it is simulated
+    simplified : (n,) how far simplifying moved each corner of `surveyed`; NaN where it is not known [m]
+    moved : (m,) how far closing the joints moved each corner of `simple`; NaN where it is not known [m]
+    normal : (3,) of its visible face, outwards [-]
+    centroid : (3,) of its visible face [m]
+    area : of its visible face [m²]
+    hypothesis : nobody has seen it
+    core : it lies behind the stones of a facing
+    """
+
+    surveyed: Solid
+    simple: Solid
+    closed: Solid
+    simplified: Array
+    moved: Array
+    normal: Array
+    centroid: Array
+    area: float
+    hypothesis: bool
+    core: bool = False
+
+    @property
+    def code(self) -> str:
+        """Of the stone."""
+        return self.closed.code
+
+
+@dataclass(frozen=True)
+class DrawnJoint:
+    """A joint with the area over which its stones face each other.
+
+    Attributes
+    ----------
+    joint : as it is reported
+    polygon : (k, 3) [m]; None where it is not known
+    """
+
+    joint: Joint
+    polygon: Array | None
+
+
+@dataclass(frozen=True)
+class Place:
+    """Something that is not as it should be, to be found on the wall.
+
+    Attributes
+    ----------
+    kind : gap or overlap
+    stones : codes of the two
+    centroid : (3,) [m]
+    text : what it is, in words, with numbers
+    """
+
+    kind: str
+    stones: tuple[str, str]
+    centroid: Array
+    text: str
+
+
+@dataclass(frozen=True)
+class ClosingShapes:
+    """All that the pictures show.
+
+    Attributes
+    ----------
+    scene : its name
+    stones, joints : of the scene
+    places : gaps and overlaps, the largest first
+    """
+
+    scene: str
+    stones: tuple[DrawnStone, ...]
+    joints: tuple[DrawnJoint, ...]
+    places: tuple[Place, ...]
+
+
+def closing_shapes(
+    scene: str,
+    surveyed: Sequence[Solid],
+    simple: Sequence[Solid],
+    closed: Sequence[Solid],
+    simplified: Mapping[str, Array],
+    closing: ClosingReport,
+    faces: Sequence[Array],
+    hypotheses: frozenset[str],
+    core: frozenset[str] = frozenset(),
+) -> ClosingShapes:
+    """What to draw of stones and of the report on their joints.
+
+    Parameters
+    ----------
+    scene : its name
+    surveyed, simple, closed : solids of the stones as in DrawnStone, in the same order
+    simplified : by code, how far each corner of the surveyed solid was moved [m]
+    closing : what closing the joints changed
+    faces : (nv, 3) outline of each stone's visible face, counter-clockwise seen from outside [m]
+    hypotheses : codes of stones that nobody has seen
+    core : codes of what lies behind the stones of a facing
+    """
+    stones = tuple(
+        DrawnStone(
+            surveyed=before,
+            simple=between,
+            closed=after,
+            simplified=_of_corners(simplified.get(after.code), before),
+            moved=_of_corners(closing.displacement.get(after.code), between),
+            normal=area_vector(face) / np.linalg.norm(area_vector(face)),
+            centroid=face.mean(axis=0),
+            area=float(np.linalg.norm(area_vector(face))),
+            hypothesis=after.code in hypotheses,
+            core=after.code in core,
+        )
+        for before, between, after, face in zip(surveyed, simple, closed, faces, strict=True)
+    )
+    solids = {one.code: one for one in closed}
+    joints = tuple(
+        DrawnJoint(one, joint_polygon(solids[one.stones[0]], solids[one.stones[1]], one.normal, one.centroid))
+        for one in closing.joints
+    )
+    return ClosingShapes(scene, stones, joints, places(closing))
+
+
+def places(closing: ClosingReport) -> tuple[Place, ...]:
+    """Overlaps, then gaps, the largest first, in words."""
+    overlaps = [
+        Place(
+            "overlap",
+            one.stones,
+            one.centroid,
+            f"{_pair(one.stones)} lie {one.depth * 1e3:.1f} mm in each other",
+        )
+        for one in sorted(closing.overlaps, key=lambda one: -one.volume)
+    ]
+    gaps = [
+        Place(
+            "gap",
+            one.stones,
+            one.centroid,
+            f"{_pair(one.stones)} open by {one.width * 1e3:.1f} mm: {one.reason}",
+        )
+        for one in sorted(closing.gaps, key=lambda one: -one.width * one.area)
+    ]
+    return (*overlaps, *gaps)
+
+
+def _pair(stones: tuple[str, str]) -> str:
+    return " and ".join(stones)
+
+
+def _of_corners(values: Array | None, solid: Solid) -> Array:
+    """A value for each corner of a solid; the largest for all where they are of other corners."""
+    count = len(solid.vertices)
+    if values is None or not len(values):
+        return np.full(count, np.nan)
+    return values if len(values) == count else np.full(count, float(values.max()))

@@ -1,0 +1,184 @@
+"""Elevations of joints: how wide they were surveyed, which were left open, and where stones overlap."""
+
+import textwrap
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.draw.elevations.closing import back_to_front, guess_key, hatch, name_stones, seen
+from pipelines.draw.elevations.closing_shapes import ClosingShapes, DrawnJoint, Place
+from pipelines.draw.elevations.sheet import elevated, extent, frame_elevation, sheet_size
+from pipelines.draw.elevations.sheets import FLAG, PALE, new_sheet, save_sheet
+from pipelines.draw.offscreen.parts import nice_ceiling
+from survey.quality.facades import Facade
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["draw_joints"]
+
+Array = NDArray[np.float64]
+
+_STONE, _OVERLAP, _NEGATIVE = "#efede9", "#000000", "#cc79a7"
+_EDGE_ON = np.sin(np.radians(50.0))  # a joint that is turned farther to the viewer lies behind the faces
+_ROBUST = 98.0  # per cent of the joints that the colour scale reaches
+_FINEST = 0.1  # the colour scale ends here at least [mm]
+_TOLD = 12  # places that are numbered
+_WIDE = 125  # letters in a line below the picture
+_LINE = 0.185  # height of such a line [in]
+
+
+def draw_joints(path: Path, shapes: ClosingShapes, facade: Facade) -> None:
+    """Draw the joints of a facade, coloured by how wide they were surveyed; what is left open or overlaps is marked.
+
+    Parameters
+    ----------
+    path : PNG
+    shapes : what there is to draw
+    facade : which of the stones, and the frame to draw them in
+    """
+    from matplotlib.collections import PolyCollection
+
+    own = back_to_front(shapes.stones, facade)
+    codes = {stone.code for stone in own}
+    faces = [seen(stone.closed, facade) for stone in own]
+    flat = [corners for one in faces for corners, _ in one]
+    low, high = extent(flat)
+    shown = [one for one in shapes.joints if _is_seen(one, facade, codes)]
+    marked = [place for place in shapes.places if codes & {*place.stones}]
+    keys = _keys(shown, marked, len(shapes.places), any(one.hypothesis for one in own))
+    width, height = sheet_size(high - low)
+    figure = new_sheet((width, height + _LINE * len(keys)))
+    axes = figure.subplots()
+    axes.add_collection(PolyCollection(flat, facecolors=_STONE, edgecolors=PALE, linewidths=0.6))
+    hatch(axes, own, faces)
+    name_stones(axes, own, faces, [float("nan")] * len(own))
+    closed = [one for one in shown if not one.joint.left_open]
+    left = [one for one in shown if one.joint.left_open]
+    stroke = float(np.clip(28.0 / np.sqrt(len(own)), 0.8, 3.2))
+    _add_closed(figure, axes, closed, facade, stroke)
+    _add_open(axes, left, facade, stroke)
+    _mark(axes, marked, facade)
+    frame_elevation(axes, facade, low, high, _title(shapes.scene, facade, closed, left))
+    if keys:
+        figure.legend(handles=keys, loc="outside lower left", ncols=1, frameon=False, fontsize=9)
+    save_sheet(figure, path)
+
+
+def _add_closed(
+    figure: "Figure", axes: "Axes", joints: Sequence[DrawnJoint], facade: Facade, stroke: float
+) -> None:
+    """Lines in the colours of their widths, and the scale of these."""
+    from matplotlib.collections import LineCollection
+
+    if not joints:
+        return
+    width = np.array([1e3 * one.joint.width for one in joints])
+    end, _ = nice_ceiling(max(float(np.percentile(width, _ROBUST)), _FINEST))
+    lines = LineCollection(
+        [_trace(one, facade) for one in joints],
+        array=width,
+        cmap=_width_colours(),
+        clim=(0.0, end),
+        linewidths=stroke,
+        capstyle="round",
+    )
+    axes.add_collection(lines)
+    ends = {(True, True): "both", (True, False): "min", (False, True): "max"}
+    beyond = ends.get((bool((width < 0.0).any()), bool((width > end).any())), "neither")
+    label = "width of the joint as surveyed [mm]"
+    figure.colorbar(lines, ax=axes, label=label, shrink=0.75, pad=0.02, extend=beyond)
+
+
+def _add_open(axes: "Axes", joints: Sequence[DrawnJoint], facade: Facade, stroke: float) -> None:
+    """Double lines where stones do not meet."""
+    from matplotlib.collections import LineCollection
+
+    traces = [_trace(one, facade) for one in joints]
+    for colour, share in ((FLAG, 2.4), ("white", 1.0)):
+        axes.add_collection(LineCollection(traces, colors=colour, linewidths=share * stroke))
+
+
+def _is_seen(one: DrawnJoint, facade: Facade, codes: set[str]) -> bool:
+    """Whether a joint is one of the facade's, seen edge on."""
+    return bool(
+        codes & {*one.joint.stones} and abs(float(one.joint.normal @ facade.frame.axes[2])) < _EDGE_ON
+    )
+
+
+def _trace(one: DrawnJoint, facade: Facade) -> Array:
+    """Where a joint comes to the face of the wall: ends (2, 2) of a line in the elevation."""
+    if one.polygon is None:
+        along = np.cross(one.joint.normal, facade.frame.axes[2])
+        reach = 0.5 * np.sqrt(max(one.joint.area, 0.0)) * along / max(float(np.linalg.norm(along)), 1e-9)
+        return elevated(np.array([one.joint.centroid - reach, one.joint.centroid + reach]), facade)
+    out = one.polygon @ facade.frame.axes[2]
+    front = one.polygon[out >= 0.5 * (out.min() + out.max())]
+    along = np.cross(one.joint.normal, facade.frame.axes[2])
+    place = front @ along
+    return elevated(front[[int(place.argmin()), int(place.argmax())]], facade)
+
+
+def _width_colours() -> Any:
+    """From yellow-green to violet: no part of it is the vermilion of what is open."""
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap
+
+    return ListedColormap(colormaps["viridis_r"](np.linspace(0.12, 1.0, 256))).with_extremes(under=_NEGATIVE)
+
+
+def _mark(axes: "Axes", marked: Sequence[Place], facade: Facade) -> None:
+    """A sign at each gap and overlap, the first of them numbered."""
+    for number, place in enumerate(marked, start=1):
+        x, y = elevated(place.centroid, facade)
+        marker, colour = ("D", _OVERLAP) if place.kind == "overlap" else ("o", FLAG)
+        size = 12.0 if number <= _TOLD else 5.0
+        axes.plot([x], [y], marker, color=colour, markersize=size, markeredgecolor="white", zorder=5)
+        if number <= _TOLD:
+            axes.annotate(
+                str(number),
+                (x, y),
+                color="white",
+                ha="center",
+                va="center",
+                fontsize=7.0,
+                fontweight="bold",
+                zorder=6,
+            )
+
+
+def _title(scene: str, facade: Facade, closed: Sequence[DrawnJoint], left: Sequence[DrawnJoint]) -> str:
+    mean = ""
+    if closed:
+        width = float(np.mean([one.joint.width for one in closed]))
+        mean = f", {1e3 * width:.1f} mm wide on average"
+    return f"{scene}, {facade.name}: {len(closed)} joints closed{mean}; {len(left)} left open"
+
+
+def _keys(shown: Sequence[DrawnJoint], marked: Sequence[Place], places: int, guessed: bool) -> list[Any]:
+    """What the signs mean, and each numbered place in a line."""
+    from matplotlib.lines import Line2D
+
+    keys: list[Any] = [guess_key()] if guessed else []
+    if any(one.joint.left_open for one in shown) or any(one.kind == "gap" for one in marked):
+        keys.append(
+            Line2D([], [], color=FLAG, marker="o", linewidth=5.0, markersize=9.0, label="gap: left open")
+        )
+    if any(one.kind == "overlap" for one in marked):
+        keys.append(
+            Line2D([], [], color=_OVERLAP, marker="D", linewidth=0.0, markersize=8.0, label="overlap")
+        )
+    if any(one.joint.width < 0.0 for one in shown):
+        keys.append(Line2D([], [], color=_NEGATIVE, linewidth=3.0, label="the faces overlapped as surveyed"))
+    lines = [
+        textwrap.shorten(f"{number}: {place.text}", _WIDE, placeholder=" …")
+        for number, place in enumerate(marked[:_TOLD], start=1)
+    ]
+    if places > len(lines):
+        elsewhere = " (some on other sides)" if places > len(marked) else ""
+        lines.append(f"and {places - len(lines)} more{elsewhere}: moma check -v lists them all")
+    return keys + [Line2D([], [], linewidth=0.0, label=line) for line in lines]

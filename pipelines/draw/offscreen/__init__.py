@@ -1,0 +1,1 @@
+"""Three-dimensional pictures, drawn by PyVista in a child process."""

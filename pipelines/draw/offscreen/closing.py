@@ -1,0 +1,157 @@
+"""Pictures of closed joints in space, drawn off screen by PyVista.
+
+Like `pipelines.draw.offscreen.result`, this runs in a process of its own: ``python -m
+pipelines.draw.offscreen.closing JOB.json``.
+"""
+
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.draw.offscreen.parts import (
+    LIGHT,
+    PLAIN,
+    Colouring,
+    add_coloured,
+    add_edges,
+    mesh_of,
+    new_plotter,
+    nice_ceiling,
+    place_camera,
+    save_picture,
+)
+
+__all__ = ["ClosingSurface", "draw", "load_surface", "save_surface"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_GAP, _OVERLAP, _BALL = "#d55e00", "#000000", 26.0  # colours, and the size of a sign [px]
+_MOVED, _WIDTH = ("YlGnBu", 0.9), ("viridis_r", 1.0)
+_ROBUST = 98.0  # per cent of the values that a colour scale reaches
+_FINEST = 0.1  # a colour scale ends here at least [mm]
+
+
+@dataclass(frozen=True)
+class ClosingSurface:
+    """Faces of the stones and of their joints, fanned into triangles.
+
+    Attributes
+    ----------
+    points : (n, 3) corners of the stones [m]
+    triangles, edges : (nt, 3) and (ne, 2) of the stones
+    moved : (n,) how far each corner was moved [m]; NaN where that is not known
+    joint_points : (m, 3) corners of closed joints [m]
+    joint_triangles : (k, 3)
+    joint_width : (k,) of the joint of each triangle, as surveyed [m]
+    gap_points : (p, 3) corners of open joints [m]
+    gap_triangles : (q, 3)
+    gaps, overlaps : (g, 3) and (o, 3) places [m]
+    """
+
+    points: Array
+    triangles: Ints
+    edges: Ints
+    moved: Array
+    joint_points: Array
+    joint_triangles: Ints
+    joint_width: Array
+    gap_points: Array
+    gap_triangles: Ints
+    gaps: Array
+    overlaps: Array
+
+
+def save_surface(path: Path, surface: ClosingSurface) -> None:
+    """Write a surface as .npz."""
+    np.savez(path, **{one.name: getattr(surface, one.name) for one in fields(surface)})
+
+
+def load_surface(path: Path) -> ClosingSurface:
+    """Read what `save_surface` wrote."""
+    with np.load(path, allow_pickle=False) as arrays:
+        return ClosingSurface(**{one.name: arrays[one.name] for one in fields(ClosingSurface)})
+
+
+def draw(surface: ClosingSurface, path: Path, job: dict[str, Any]) -> None:
+    """Draw one picture as PNG.
+
+    Parameters
+    ----------
+    job : quantity ("moved" or "joints"), label of the scale, title, towards (to the viewer), elevation [rad]
+    """
+    import pyvista
+
+    plotter = new_plotter(pyvista)
+    if job["quantity"] == "moved":
+        _add_stones(pyvista, plotter, surface, job["label"])
+    else:
+        _add_joints(pyvista, plotter, surface, job["label"])
+    up = np.array([0.0, 0.0, 1.0])
+    place_camera(pyvista, plotter, surface.points, np.array(job["towards"]), up, job["elevation"])
+    add_edges(pyvista, plotter, surface.points, surface.edges)
+    if job["quantity"] == "joints":
+        _add_places(pyvista, plotter, surface)
+    save_picture(plotter, path, job["title"], "")
+
+
+def _add_stones(pyvista: Any, plotter: Any, surface: ClosingSurface, label: str) -> None:
+    known = np.isfinite(surface.moved)[surface.triangles].all(axis=1)
+    if not known.all():
+        plotter.add_mesh(mesh_of(pyvista, surface.points, surface.triangles[~known]), color=PLAIN, **LIGHT)
+    if known.any():
+        mesh = mesh_of(pyvista, surface.points, surface.triangles[known])
+        mesh.point_data["value"] = 1e3 * surface.moved
+        add_coloured(plotter, mesh, _colouring(1e3 * surface.moved, label, _MOVED))
+
+
+def _add_joints(pyvista: Any, plotter: Any, surface: ClosingSurface, label: str) -> None:
+    if len(surface.joint_triangles):
+        mesh = mesh_of(pyvista, surface.joint_points, surface.joint_triangles)
+        mesh.cell_data["value"] = 1e3 * surface.joint_width
+        add_coloured(plotter, mesh, _colouring(1e3 * surface.joint_width, label, _WIDTH), lit=False)
+    if len(surface.gap_triangles):
+        gaps = mesh_of(pyvista, surface.gap_points, surface.gap_triangles)
+        plotter.add_mesh(gaps, color=_GAP, lighting=False)
+
+
+def _add_places(pyvista: Any, plotter: Any, surface: ClosingSurface) -> None:
+    """Balls at gaps and overlaps, a good way before the stones, so that none is hidden."""
+    toward = np.array(plotter.camera.position) - np.array(plotter.camera.focal_point)
+    for places, colour in ((surface.gaps, _GAP), (surface.overlaps, _OVERLAP)):
+        if len(places):
+            heads = pyvista.PolyData(places + 0.5 * toward)
+            plotter.add_mesh(
+                heads, color=colour, point_size=_BALL, render_points_as_spheres=True, lighting=False
+            )
+
+
+def _colouring(values: Array, label: str, palette: tuple[str, float]) -> Colouring:
+    known = values[np.isfinite(values)]
+    end, intervals = nice_ceiling(max(float(np.percentile(known, _ROBUST)), _FINEST))
+    saturated = bool(known.max() > end)
+    return Colouring(values, label, end, intervals, saturated, palette)
+
+
+def _main(arguments: Sequence[str]) -> int:
+    """Draw what a job file asks for; exit code 3 if a library cannot be loaded, its message on stdout."""
+    job = json.loads(Path(arguments[1]).read_text(encoding="utf-8"))
+    try:
+        import pyvista  # noqa: F401
+    except ImportError as error:
+        print(error)
+        return 3
+    surface = load_surface(Path(job["surface"]))
+    for picture in job["pictures"]:
+        draw(surface, Path(picture["path"]), picture)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(_main(sys.argv))

@@ -1,0 +1,163 @@
+"""Pictures of a wall, drawn off screen by PyVista.
+
+This module runs in a process of its own (``python -m pipelines.draw.offscreen.result JOB.json``): a graphics library
+that is missing or broken may end the process that uses it, and must not take the results along.
+"""
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.draw.offscreen.parts import (
+    LIGHT,
+    PLAIN,
+    Colouring,
+    add_coloured,
+    add_edges,
+    add_glass,
+    mesh_of,
+    new_plotter,
+    nice_ceiling,
+    place_camera,
+    save_picture,
+)
+from pipelines.draw.offscreen.surfaces import WallSurface, load_surface
+
+__all__ = ["colouring", "draw"]
+
+Array = NDArray[np.float64]
+
+_FIXED = "#a3a09a"
+_INSIDE, _OUTSIDE = "#1f5f8b", "#c4302b"  # resultants within and outside the kern
+_LONGEST = 0.12  # the longest stroke of a resultant, over the wall's diagonal
+
+
+def colouring(surface: WallSurface, quantity: str, top: float | None) -> Colouring:
+    """Values, scale and palette of one of FIELDS, or of the `pressure` of the joints' triangles.
+
+    The scale ends at `top`, rounded up; without it, at the largest value.
+    """
+    title, unit_of, palette = _LOOKS[quantity]
+    raw = surface.joint_pressure if quantity == "pressure" else surface.field(quantity)
+    largest = float(np.nanmax(raw, initial=0.0))
+    end, intervals = nice_ceiling(top or largest or 1.0)
+    scale, unit = unit_of(end)
+    return Colouring(
+        values=raw * scale,
+        title=f"{title} [{unit}]" if unit else title,
+        top=end * scale,
+        intervals=intervals,
+        saturated=largest > end * (1.0 + 1e-9),
+        palette=palette,
+    )
+
+
+def draw(surface: WallSurface, path: Path, job: dict[str, Any]) -> None:
+    """Draw one picture as PNG; `job` has quantity, top, title, towards (to the viewer), up, and maybe a note."""
+    import pyvista
+
+    plotter = new_plotter(pyvista)
+    if job["quantity"] == "resultants":
+        add_glass(pyvista, plotter, surface.points, surface.triangles)
+        _add_resultants(pyvista, plotter, surface)
+    elif job["quantity"] == "pressure":
+        add_glass(pyvista, plotter, surface.points, surface.triangles)
+        _add_joints(pyvista, plotter, surface, colouring(surface, "pressure", job["top"]))
+    else:
+        _add_stones(pyvista, plotter, surface, colouring(surface, job["quantity"], job["top"]))
+    place_camera(pyvista, plotter, surface.points, np.array(job["towards"]), np.array(job["up"]))
+    add_edges(pyvista, plotter, surface.points, surface.edges)
+    save_picture(plotter, path, job["title"], job.get("note", ""))
+
+
+def _length_unit(largest: float) -> tuple[float, str]:
+    if largest >= 0.1:
+        return 1.0, "m"
+    return (1e3, "mm") if largest >= 1e-4 else (1e6, "µm")
+
+
+def _megapascals(_: float) -> tuple[float, str]:
+    return 1e-6, "MPa"
+
+
+def _pascals(largest: float) -> tuple[float, str]:
+    return (1e-6, "MPa") if largest >= 1e5 else (1e-3, "kPa")
+
+
+def _percent(_: float) -> tuple[float, str]:
+    return 100.0, "%"
+
+
+def _ratio(_: float) -> tuple[float, str]:
+    return 1.0, ""
+
+
+# of each quantity: title, factor and unit by the end of the scale, palette
+_LOOKS: dict[str, tuple[str, Callable[[float], tuple[float, str]], tuple[str, float]]] = {
+    "von_mises": ("Von Mises stress", _megapascals, ("inferno_r", 0.85)),
+    "displacement": ("Displacement", _length_unit, ("viridis_r", 1.0)),
+    "principal_tension": ("Largest principal stress, tension", _pascals, ("Reds", 1.0)),
+    "principal_compression": ("Smallest principal stress, compression", _pascals, ("Blues", 1.0)),
+    "utilisation": ("Stress over strength", _ratio, ("YlOrRd", 1.0)),
+    "error": ("Estimated error of the stress", _percent, ("Purples", 1.0)),
+    "pressure": ("Mean pressure of the joints", _pascals, ("inferno_r", 0.85)),
+}
+
+
+def _add_stones(pyvista: Any, plotter: Any, surface: WallSurface, colours: Colouring) -> None:
+    known = np.isfinite(colours.values)[surface.triangles].all(axis=1) & ~surface.fixed
+    for rows, colour in ((~known & surface.fixed, _FIXED), (~known & ~surface.fixed, PLAIN)):
+        if rows.any():
+            mesh = mesh_of(pyvista, surface.points, surface.triangles[rows])
+            plotter.add_mesh(mesh, color=colour, **LIGHT)
+    if known.any():
+        mesh = mesh_of(pyvista, surface.points, surface.triangles[known])
+        mesh.point_data["value"] = colours.values
+        add_coloured(plotter, mesh, colours)
+
+
+def _add_joints(pyvista: Any, plotter: Any, surface: WallSurface, colours: Colouring) -> None:
+    mesh = mesh_of(pyvista, surface.joint_points, surface.joint_triangles)
+    mesh.cell_data["value"] = colours.values
+    add_coloured(plotter, mesh, colours)
+
+
+def _add_resultants(pyvista: Any, plotter: Any, surface: WallSurface) -> None:
+    """A stroke through each joint, along the resultant and as long as it is large."""
+    force = np.linalg.norm(surface.resultants, axis=1)
+    reach = _LONGEST * float(np.linalg.norm(np.ptp(surface.points, axis=0)))
+    half = 0.5 * reach * surface.resultants / force.max(initial=1e-300)
+    for rows, colour in ((surface.in_kern, _INSIDE), (~surface.in_kern, _OUTSIDE)):
+        if not rows.any():
+            continue
+        ends = np.stack([surface.resultant_points[rows] + sign * half[rows] for sign in (-1, 1)], axis=1)
+        count = len(ends)
+        strokes = pyvista.PolyData()
+        strokes.points = ends.reshape(-1, 3)
+        strokes.lines = np.column_stack([np.full(count, 2), np.arange(2 * count).reshape(-1, 2)]).ravel()
+        plotter.add_mesh(strokes, color=colour, line_width=6.0, lighting=False)
+        heads = pyvista.PolyData(surface.resultant_points[rows])
+        plotter.add_mesh(heads, color=colour, point_size=11.0, render_points_as_spheres=True, lighting=False)
+
+
+def _main(job_path: str) -> int:
+    """Draw what a job file asks for; exit code 3 if a library cannot be loaded, its message on stdout."""
+    job = json.loads(Path(job_path).read_text(encoding="utf-8"))
+    try:
+        import pyvista  # noqa: F401
+    except ImportError as error:
+        print(error)
+        return 3
+    surface = load_surface(Path(job["surface"]))
+    for picture in job["pictures"]:
+        draw(surface, Path(picture["path"]), picture)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(_main(sys.argv[1]))

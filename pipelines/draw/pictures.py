@@ -1,0 +1,183 @@
+"""Pictures of a result: what to draw, in a process of its own, and what to say when it cannot be drawn."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.results.result import BodyResult, Outcome, Result
+from mechanics.results.stress_values import volume_quantile
+from mechanics.scene.scene import Fidelity
+from mechanics.stones.materials import Material
+from moma.errors import MissingLibraryError
+from pipelines.draw.offscreen.surfaces import FIELDS, save_surface, stone_fields, wall_surface
+
+__all__ = ["draw_apart", "draw_pictures", "missing", "package_of"]
+
+_TIMEOUT = 300.0  # seconds; software rendering of 10⁵ triangles takes a few
+_PACKAGES = {
+    "libGL": "libgl1",
+    "libGLX": "libglx0",
+    "libOpenGL": "libopengl0",
+    "libEGL": "libegl1",
+    "libOSMesa": "libosmesa6",
+    "libX11": "libx11-6",
+    "libXrender": "libxrender1",
+    "libXcursor": "libxcursor1",
+    "libXext": "libxext6",
+    "libXt": "libxt6",
+    "libSM": "libsm6",
+    "libICE": "libice6",
+}
+_TITLES = {
+    "von_mises": "Von Mises stress",
+    "displacement": "displacement",
+    "principal_tension": "tension",
+    "principal_compression": "compression",
+    "utilisation": "stress over strength",
+    "error": "error of the stress",
+    "pressure": "pressure in the joints",
+    "resultants": "resultants of the joints",
+}
+_NOTES = {
+    "resultants": "strokes: as long as the force is large; blue: within the kern, red: outside",
+}
+_ENDINGS = {
+    Outcome.EQUILIBRIUM: "at equilibrium",
+    Outcome.MOVING: "still moving",
+    Outcome.COLLAPSED: "collapsed",
+}
+
+
+def package_of(message: str) -> str | None:
+    """Debian package of the shared library that a loader's message names; None if it names none."""
+    found = re.search(r"(lib[A-Za-z0-9_+-]+?)(?:-\d[\d.]*)?\.so", message)
+    return _PACKAGES.get(found.group(1)) if found else None
+
+
+def draw_pictures(
+    result: Result, folder: Path, names: Sequence[str], towards: NDArray[np.float64]
+) -> tuple[str, ...]:
+    """Draw the named pictures into a folder, seen from the side `towards`; the file names.
+
+    Pictures for which `missing` has a reason are left out.
+
+    Raises
+    ------
+    MissingLibraryError : VTK cannot be loaded or cannot draw on this machine
+    """
+    wanted = [name for name in names if missing(result, name) is None]
+    if not wanted:
+        return ()
+    up = -np.array(result.scene.gravity)
+    jobs = [
+        {
+            "quantity": name,
+            "path": str((folder / f"{name}.png").absolute()),
+            "top": _top(result, name),
+            "title": f"{result.scene.name}: {_TITLES[name]}, {_ENDINGS[result.outcome]} after {result.time:.3g} s",
+            "note": _NOTES.get(name, ""),
+            "towards": towards.tolist(),
+            "up": up.tolist() if up.any() else [0.0, 0.0, 1.0],
+        }
+        for name in wanted
+    ]
+    with tempfile.TemporaryDirectory() as scratch:
+        surface = Path(scratch) / "surface.npz"
+        save_surface(surface, wall_surface(result))
+        job_file = Path(scratch) / "job.json"
+        job_file.write_text(json.dumps({"surface": str(surface), "pictures": jobs}), encoding="utf-8")
+        draw_apart("pipelines.draw.offscreen.result", job_file)
+    return tuple(f"{name}.png" for name in wanted)
+
+
+def missing(result: Result, name: str) -> str | None:
+    """Why a picture would show nothing of this result; None: it shows something."""
+    stressed = [body.values for body in result.bodies if body.values is not None]
+    if name in ("pressure", "resultants"):
+        return None if result.joints.pressed.any() else "no joint is pressed"
+    if name != "displacement" and not stressed:
+        deforms = any(body.fidelity is Fidelity.DEFORMABLE for body in result.bodies)
+        return "no stress was asked for" if deforms else "no stone deforms"
+    if name == "utilisation" and all(one.utilisation is None for one in stressed):
+        return "no material of a deformable stone has a strength"
+    return None
+
+
+def _top(result: Result, name: str) -> float | None:
+    """End of the scale: what 1 % of the volume exceeds; None: the largest value."""
+    if name not in ("von_mises", "principal_tension", "principal_compression", "utilisation"):
+        return None
+    known = [
+        (_fields_of(body, block.material, name), body.node_volume)
+        for body, block in zip(result.bodies, result.scene.blocks, strict=True)
+        if body.node_volume is not None
+    ]
+    values, volumes = (np.concatenate(column) for column in zip(*known, strict=True))
+    finite = np.isfinite(values)
+    return volume_quantile(values[finite], volumes[finite], 0.99) or None
+
+
+def _fields_of(body: BodyResult, material: Material, name: str) -> NDArray[np.float64]:
+    return stone_fields(body, material)[:, FIELDS.index(name)]
+
+
+def draw_apart(module: str, job_file: Path) -> None:
+    """Run a module that draws on a job; its noise about displays is kept back unless it fails.
+
+    EGL comes first: it needs no X server, and no X libraries either.
+
+    Raises
+    ------
+    MissingLibraryError : VTK cannot be loaded or cannot draw on this machine
+    """
+    reason = ""
+    for window in ("vtkEGLRenderWindow", None):
+        done = _attempt(module, job_file, window)
+        if done.returncode == 0:
+            return
+        if done.returncode == 3:
+            reason = done.stdout.strip()
+            package = package_of(reason) or "libgl1 libxrender1 libegl1"
+            raise MissingLibraryError(
+                f"VTK cannot be loaded: {reason}", remedy=f"install what it needs: apt-get install {package}"
+            )
+        reason = reason or _last_words(done.stderr) or f"it ended with code {done.returncode}"
+    raise MissingLibraryError(
+        f"VTK cannot draw off screen: {reason}",
+        remedy="install software rendering: apt-get install libegl1 libgl1-mesa-dri",
+    )
+
+
+def _attempt(module: str, job_file: Path, window: str | None) -> "subprocess.CompletedProcess[str]":
+    """One process that draws, with the given kind of VTK window; None: the one that VTK would take."""
+    root = str(Path(__file__).resolve().parent.parent)
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([root, os.environ.get("PYTHONPATH", "")])}
+    if window is not None:
+        environment.setdefault("VTK_DEFAULT_OPENGL_WINDOW", window)
+    try:
+        return subprocess.run(
+            [sys.executable, "-m", module, str(job_file)],
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=_TIMEOUT,
+            env=environment,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        raise MissingLibraryError(f"no picture after {_TIMEOUT:.0f} s") from None
+
+
+def _last_words(stderr: str) -> str:
+    """The last line that a process said, without VTK's time stamps and colours."""
+    lines = [re.sub(r"\x1b\[[0-9;]*m", "", line).strip() for line in stderr.splitlines()]
+    last = next((line for line in reversed(lines) if line), "")
+    return re.split(r"(?:WARN|ERR)\| ", last)[-1][:200].rstrip(".")

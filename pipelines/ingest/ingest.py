@@ -1,0 +1,251 @@
+"""Survey files into the database: read, fit, outline, find the depth, extrude, store; one stone at a time."""
+
+import hashlib
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+from sqlalchemy.orm import Session
+
+from archmodel.database.session import home_of, open_database
+from archmodel.store.bulk import first_free_id
+from archmodel.store.stone_record import StoneRecord
+from archmodel.store.stones import store_survey
+from archmodel.tables.entities import Entity, kind_named
+from moma.errors import NoDatabaseError, SurveyError, UsageError
+from pipelines.ingest.frame_records import frame_record
+from pipelines.ingest.kind_rules import KindRule, check_kinds, ruled
+from pipelines.ingest.reading_options import check_survey_file
+from pipelines.ingest.records import stone_record
+from pipelines.ingest.rejects import check_targets, default_path, rejects_text
+from pipelines.ingest.relate import KnownSolids, relate
+from pipelines.ingest.report import IngestReport, Tally
+from pipelines.ingest.spool import Spool
+from pipelines.progress import Listener, Progress, silent
+from survey.extrusion.extrusion import SurveyedBlock
+from survey.formats.reading import ReadingOptions, open_survey
+from survey.records.survey import Reject
+from survey.stones import survey_stones
+
+__all__ = ["ingest"]
+
+
+_PATIENCE = 300.0
+"""How long to wait for another program that writes [s]: not less than a large survey takes, since waiting is cheaper
+than fitting it anew."""
+
+
+def ingest(
+    paths: Sequence[str | Path],
+    url: str,
+    format: str = "moma",
+    progress: Listener = silent,
+    *,
+    options: ReadingOptions | None = None,
+    keep_going: bool = False,
+    rejects: str | Path | None = None,
+    again: bool = False,
+    rules: Sequence[KindRule] = (),
+) -> IngestReport:
+    """Take survey files into the database: all of them, or, if anything is wrong in any, none.
+
+    Parameters
+    ----------
+    paths : survey files
+    url : of the database, made if it does not exist
+    format : name of their format
+    progress : told after every stone
+    options : what the files leave unsaid
+    keep_going : take the good stones of each file, and write the others to a file of rejects with the reasons
+    rejects : that file, if there is one survey file; by default ``NAME.rejects.SUFFIX`` beside each survey file
+    again : stones that are in the database already were measured again: their old measurements are kept as superseded;
+        otherwise they are an error
+    rules : which solids are of which kind
+
+    Raises
+    ------
+    UsageError : no such file, one named twice, no such format, a file of rejects that would replace one of the user's,
+        rules for stones that are no solids
+    SurveyError, GeometryError : at the line or stone that is wrong, or has the code of one in another of the files;
+        the database is not touched
+    DatabaseError : a stone or a file is in the database already; the database is unchanged
+    """
+    surveys = [Path(path) for path in paths]
+    if not surveys:
+        raise UsageError("no survey file", remedy="name at least one")
+    if rejects is not None and len(surveys) > 1:
+        raise UsageError(
+            f"one file of rejects for {len(surveys)} survey files", remedy="take in one file at a time"
+        )
+    if rules and format != "solids":
+        remedy = "give it with --format solids; surveys say the kind of each stone"
+        raise UsageError(f"a rule for solids, and format {format}", where=rules[0].option, remedy=remedy)
+    _check_files(surveys)
+    targets = [Path(rejects) if rejects is not None else default_path(survey) for survey in surveys]
+    if keep_going:
+        check_targets(targets, surveys)
+    with ExitStack() as held:
+        _open_if_there(url, held)
+        check_kinds(rules)
+        spools = [held.enter_context(Spool()) for _ in surveys]
+        tallies = [
+            _measure(path, spool, format, options, rules, keep_going, progress)
+            for path, spool in zip(surveys, spools, strict=True)
+        ]
+        if len(surveys) > 1:
+            _check_codes(tallies, spools)
+        for path, target, tally in zip(surveys, targets, tallies, strict=True):
+            if tally.refused:
+                stations = _listed_stations(tally, options) if format in _LISTS else []
+                text = rejects_text(path, format, tally.refused, stations)
+                held.enter_context(_published(target, text))
+        with open_database(url, lock_timeout=_PATIENCE) as database, database.session() as session:
+            solids = KnownSolids()
+            for tally, spool in zip(tallies, spools, strict=True):
+                stones = _told(spool, tally, progress)
+                # of stones that are measured again, the numbers are not the next ones
+                _store(session, tally, stones if again else _kept(stones, session, solids), again)
+            progress(Progress("relate", 0, None))
+            relate(session, only=[number for tally in tallies for number in tally.stored], solids=solids)
+        reports = tuple(
+            tally.report(target if tally.refused else None)
+            for tally, target in zip(tallies, targets, strict=True)
+        )
+    return IngestReport(database.url, reports)
+
+
+def _open_if_there(url: str, held: ExitStack) -> None:
+    """Open the database early: the kinds that it registers are known then, and what is wrong with it is said first."""
+    try:
+        held.enter_context(open_database(url, create=False))
+    except NoDatabaseError:
+        home_of(url).engine(create=True).dispose()  # whether one could be made
+
+
+def _check_files(surveys: Sequence[Path]) -> None:
+    seen: set[Path] = set()
+    for path in surveys:
+        check_survey_file(path)
+        if path.resolve() in seen:
+            raise UsageError("is named twice", where=str(path), remedy="name each survey file once")
+        seen.add(path.resolve())
+
+
+def _check_codes(tallies: Sequence[Tally], spools: Sequence[Spool]) -> None:
+    """Refuse files that contradict each other before a database is made for them."""
+    places: dict[str, str] = {}
+    for tally, spool in zip(tallies, spools, strict=True):
+        for stone in spool:
+            place = f"{tally.stream.head.path}:{stone.line}"
+            if (first := places.setdefault(stone.code, place)) != place:
+                what = f"the code {stone.code} is taken by the stone at {first}"
+                raise SurveyError(what, where=place, remedy="give each stone a code of its own")
+
+
+_LISTS = ("pnezd", "penzd")
+
+
+def _listed_stations(tally: Tally, options: ReadingOptions | None) -> list[int]:
+    """Lines of the stations that stand among the points of a list, not in its header file."""
+    elsewhere = () if options is None or options.head is None else options.head.stations
+    known = {one.name for one in elsewhere}
+    return [one.line for one in tally.stream.head.stations if one.name not in known]
+
+
+def _measure(
+    path: Path,
+    spool: Spool,
+    format: str,
+    options: ReadingOptions | None,
+    rules: Sequence[KindRule],
+    keep_going: bool,
+    progress: Listener,
+) -> Tally:
+    """The good stones of one file into a spool; the first bad one ends it, or is kept for the rejects."""
+    tally = Tally(path, survey_stones(open_survey(path, format, options)))
+    stage, head, kinds = f"fit {path.name}", tally.stream.head, set[str]()
+    for one in tally.stream.stones:
+        made = one if isinstance(one, Reject) else _of_known_kind(ruled(one, rules), head.path, kinds)
+        if not isinstance(made, Reject):
+            tally.count(made)
+            spool.append(stone_record(made))
+            progress(Progress(stage, tally.stones.total(), None, made.code))
+        elif keep_going:
+            tally.refused.append(made)
+        else:
+            raise made.error
+    if not tally.stones:
+        first = f"; the first: {tally.refused[0].error}" if tally.refused else ""
+        what = f"none of its {len(tally.refused)} stones can be taken in{first}"
+        raise SurveyError(what, where=str(path), remedy="correct the file")
+    return tally
+
+
+def _store(session: Session, tally: Tally, stones: Iterator[StoneRecord], again: bool) -> None:
+    head = tally.stream.head
+    stored = store_survey(
+        session,
+        head.name,
+        head.path,
+        _sha256(tally.path),
+        stones,
+        stations={one.name: one.position.tolist() for one in head.stations},
+        frame=frame_record(tally.stream.transform),
+        again=again,
+    )
+    tally.stored = (*stored.new, *stored.again)
+    tally.again = len(stored.again)
+
+
+def _told(stones: Iterable[StoneRecord], tally: Tally, progress: Listener) -> Iterator[StoneRecord]:
+    total = tally.stones.total()
+    for number, stone in enumerate(stones, start=1):
+        progress(Progress(f"store {tally.path.name}", number, total, stone.code))
+        yield stone
+
+
+def _kept(stones: Iterator[StoneRecord], session: Session, solids: KnownSolids) -> Iterator[StoneRecord]:
+    """The stones on their way to the database, and their solids for their relations."""
+    for number, stone in enumerate(stones, start=first_free_id(session, Entity)):
+        solids.add(number, stone.solid_vertices, stone.solid_faces)
+        yield stone
+
+
+def _of_known_kind(block: SurveyedBlock, path: str, known: set[str]) -> SurveyedBlock | Reject:
+    """The stone, if the hierarchy has its kind; `known` holds kinds that were found there, and is added to."""
+    if block.kind in known:
+        return block
+    try:
+        kind_named(block.kind)
+    except UsageError as error:
+        record = block.face.record
+        where = f"{path}:{record.line}: stone {block.code}"
+        return Reject(block.code, SurveyError(error.what, where=where, remedy=error.remedy), record.spans)
+    known.add(block.kind)
+    return block
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+@contextmanager
+def _published(path: Path, text: bytes) -> Iterator[None]:
+    """A file that appears whole, and only if nothing fails until the end of the block."""
+    part = path.with_name(f"{path.name}.part")
+    try:
+        part.write_bytes(text)
+    except OSError as error:
+        raise UsageError(
+            f"the rejects cannot be written: {error.strerror or error}",
+            where=str(path),
+            remedy="name a file that can be written with --rejects",
+        ) from error
+    try:
+        yield
+        os.replace(part, path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise

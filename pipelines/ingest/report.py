@@ -1,0 +1,166 @@
+"""What became of survey files: counted while their stones go by, and told at the end."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.ingest.frame_records import frame_record
+from survey.extrusion.extrusion import SurveyedBlock
+from survey.geometry.convexity import is_convex
+from survey.records.snapping import Snapping
+from survey.records.survey import Reject
+from survey.stones import SurveyedStream
+
+__all__ = ["FileReport", "IngestReport", "Refusal", "SolidsReport", "Tally"]
+
+
+# coordinates that end so soon may be rounded; with fewer decimals they are whole centimetres by design
+_LEAST_DECIMALS, _MOST_DECIMALS = 3, 6
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A stone that was not taken in, and why."""
+
+    code: str | None
+    reason: str
+
+
+@dataclass(frozen=True)
+class SolidsReport:
+    """What the solids of a file are like.
+
+    Attributes
+    ----------
+    convex : how many are
+    not_convex : codes of the others
+    remarks : what was settled or moved to make them solids with plane faces, by code
+    snapping : what bringing their faces into common planes has changed; None if that was not asked for
+    decimals : of all their coordinates in metres, 3 to 6 at most; None if they have fewer, or more
+    """
+
+    convex: int
+    not_convex: tuple[str, ...]
+    remarks: dict[str, tuple[str, ...]]
+    snapping: Snapping | None
+    decimals: int | None = None
+
+
+@dataclass(frozen=True)
+class FileReport:
+    """What became of one file.
+
+    Attributes
+    ----------
+    path : the file
+    survey : name of the survey in the database
+    stones : how many it holds, by kind
+    rejected : measured points left out as blunders, by stone code
+    rms : root mean square distance of the accepted points from their planes, worst stone [m]
+    worst : code of that stone; empty if none was measured in space
+    shapes : faces that are not one plane, in words, by stone code
+    refused : stones that were not taken in
+    rejects : the file that holds them; None if there are none
+    frame : how the survey was carried into the frame of the site; None if it was there
+    again : how many of the stones were in the database already, and have a new measurement now
+    solids : what they are like, in a file of solids
+    """
+
+    path: str
+    survey: str
+    stones: dict[str, int]
+    rejected: dict[str, int]
+    rms: float
+    worst: str
+    shapes: dict[str, str]
+    refused: tuple[Refusal, ...] = ()
+    rejects: str | None = None
+    frame: dict[str, Any] | None = None
+    again: int = 0
+    solids: SolidsReport | None = None
+
+
+@dataclass(frozen=True)
+class IngestReport:
+    """What became of all files."""
+
+    url: str
+    files: tuple[FileReport, ...]
+
+
+@dataclass
+class Tally:
+    """What is counted while the stones of a file go by."""
+
+    path: Path
+    stream: SurveyedStream
+    stones: Counter[str] = field(default_factory=Counter)
+    rejected: dict[str, int] = field(default_factory=dict)
+    shapes: dict[str, str] = field(default_factory=dict)
+    rms: float = 0.0
+    worst: str = ""
+    refused: list[Reject] = field(default_factory=list)
+    again: int = 0
+    stored: Sequence[int] = ()
+    convex: Counter[bool] = field(default_factory=Counter)
+    not_convex: list[str] = field(default_factory=list)
+    remarks: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    decimals: int = 0
+
+    def count(self, block: SurveyedBlock) -> None:
+        """One more stone that is taken in."""
+        face = block.face
+        self.stones[block.kind] += 1
+        if face.rejected_points:
+            self.rejected[block.code] = len(face.rejected_points)
+        if str(face.shape.kind) not in ("plane", "untested"):
+            self.shapes[block.code] = face.shape.text
+        if face.provenance.source == "solid":
+            self._count_solid(block)
+        if face.provenance.source == "points" and face.fit.rms >= self.rms:
+            self.rms, self.worst = face.fit.rms, block.code
+
+    def _count_solid(self, block: SurveyedBlock) -> None:
+        convex = is_convex(block.solid)
+        self.convex[convex] += 1
+        if not convex:
+            self.not_convex.append(block.code)
+        if block.face.remarks:
+            self.remarks[block.code] = block.face.remarks
+        while self.decimals <= _MOST_DECIMALS and not _has_decimals(block.solid.vertices, self.decimals):
+            self.decimals += 1
+
+    def _solids(self) -> SolidsReport | None:
+        if not self.convex:
+            return None
+        codes = tuple(self.not_convex)
+        decimals = self.decimals if _LEAST_DECIMALS <= self.decimals <= _MOST_DECIMALS else None
+        return SolidsReport(self.convex[True], codes, self.remarks, self.stream.snapping, decimals)
+
+    def report(self, rejects: Path | None) -> FileReport:
+        """What is told of the file; `rejects` is the file that holds the refused stones."""
+        return FileReport(
+            path=self.stream.head.path,
+            survey=self.stream.head.name,
+            stones=dict(sorted(self.stones.items())),
+            rejected=self.rejected,
+            rms=self.rms,
+            worst=self.worst,
+            shapes=self.shapes,
+            refused=tuple(Refusal(one.code, str(one.error)) for one in self.refused),
+            rejects=None if rejects is None else str(rejects),
+            frame=frame_record(self.stream.transform),
+            again=self.again,
+            solids=self._solids(),
+        )
+
+
+def _has_decimals(places: NDArray[np.float64], count: int) -> bool:
+    """Whether coordinates have no more decimals, but for what doubles leave of them."""
+    scaled = places * 10.0**count
+    return bool(np.abs(scaled - np.round(scaled)).max() <= 1e-6)

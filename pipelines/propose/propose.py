@@ -1,0 +1,237 @@
+"""Proposals of what no survey sees: missing stones and the core of walls, from the database and, if asked, into it."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import asdict, dataclass
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from archmodel.database.session import open_database
+from archmodel.query.api import find
+from archmodel.store.hypotheses import store_hypotheses
+from archmodel.store.stone_record import StoneRecord
+from archmodel.store.stones import load_stones
+from archmodel.tables.entities import Entity
+from moma.errors import UsageError
+from pipelines.ingest.records import stone_record, surveyed_block
+from pipelines.ingest.relate import relate
+from pipelines.propose.records import core_record, is_known, record_volume
+from survey.unseen.core.facings import facing_stone
+from survey.unseen.core.propose import propose_infill
+from survey.unseen.core.settings import InfillSettings
+from survey.unseen.missing.propose import propose_missing
+from survey.unseen.missing.settings import MissingSettings
+
+__all__ = ["Facings", "Proposal", "ProposalReport", "Recording", "propose_core", "propose_stones"]
+
+_NO_STONES = frozenset({"infill", "joint", "support"})
+
+Facings = tuple[str, str]
+"""Expressions that name the stones of the two facings of a wall."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """How proposals are put into the database.
+
+    Attributes
+    ----------
+    author : who takes them over; None if nobody says so
+    source : on what grounds; None: those of the proposals themselves
+    """
+
+    author: str | None = None
+    source: str | None = None
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A stone, or a part of the core, that nobody has seen.
+
+    Attributes
+    ----------
+    code, kind, course, zone : as of any entity
+    length, height, depth, volume : its size [m], [m³]
+    outline : (nv, 3) corners of its face [m]
+    evidence : on what it rests, in words
+    depth_source : on what its depth rests
+    notes : what makes it less certain
+    """
+
+    code: str
+    kind: str
+    course: int | None
+    zone: str | None
+    length: float
+    height: float
+    depth: float
+    volume: float
+    outline: tuple[tuple[float, float, float], ...]
+    evidence: str
+    depth_source: str
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ProposalReport:
+    """What was proposed, and what was recorded of it.
+
+    Attributes
+    ----------
+    what : "missing" or "infill"
+    stones : how many stones were looked at
+    proposals : in order; of those that are in the database already none
+    entry : number of the act of recording; None if nothing was recorded
+    related : number of that in which relations were computed; None if none changed
+    """
+
+    what: str
+    stones: int
+    proposals: tuple[Proposal, ...]
+    entry: int | None
+    related: int | None
+
+
+def propose_stones(
+    url: str,
+    where: Sequence[str] = (),
+    settings: MissingSettings | None = None,
+    recording: Recording | None = None,
+) -> ProposalReport:
+    """Propose the stones that are missing in the survey.
+
+    Parameters
+    ----------
+    url : of the database
+    where : expressions; only stones between two that satisfy all of them are proposed
+    settings : what counts as a hole, and what as an opening
+    recording : put the proposals into the database; None: change nothing
+    """
+    settings = settings or MissingSettings()
+    with (
+        open_database(url, create=False) as database,
+        database.session(read_only=recording is None) as session,
+    ):
+        records = _stones(session, ())
+        chosen = {record.code for record in _stones(session, where)} if where else None
+        blocks = [surveyed_block(record) for record in records]
+        found = propose_missing(blocks, settings, taken=_codes(session))
+        kept = _beside(chosen, [(one.block.code, one.beside) for one in found])
+        pairs = [(stone_record(one.block), one.notes) for one in found if one.block.code in kept]
+        return _report("missing", session, len(records), pairs, asdict(settings), recording)
+
+
+def propose_core(
+    url: str,
+    where: Sequence[str] = (),
+    settings: InfillSettings | None = None,
+    recording: Recording | None = None,
+    *,
+    facings: Facings | None = None,
+) -> ProposalReport:
+    """Propose the core of walls with two facings.
+
+    Parameters
+    ----------
+    url : of the database
+    where : expressions; only stones that satisfy all of them count
+    settings : what the core is made of, and how facings are recognised
+    recording : put the proposals into the database; None: change nothing
+    facings : of one wall; None: they are recognised
+
+    Raises
+    ------
+    UsageError
+        if an expression for a facing names no stone, or a stone is in both
+    """
+    settings = settings or InfillSettings()
+    with (
+        open_database(url, create=False) as database,
+        database.session(read_only=recording is None) as session,
+    ):
+        records = _stones(session, where)
+        stones = [facing_stone(surveyed_block(record)) for record in records]
+        named = None if facings is None else _named(session, where, facings)
+        found = propose_infill(stones, settings, facings=named, taken=_codes(session))
+        known = _measured(session, find(session, "infill"))
+        new = [one for one in found if not is_known(one, known)]
+        pairs: list[tuple[StoneRecord, tuple[str, ...]]] = [(core_record(one), ()) for one in new]
+        said = {**asdict(settings), "facings": None if facings is None else list(facings)}
+        return _report("infill", session, len(records), pairs, said, recording)
+
+
+def _stones(session: Session, where: Sequence[str]) -> list[StoneRecord]:
+    """Measured stones, hypotheses among them, but for the core."""
+    found = find(session, "entity", where)
+    return _measured(session, [entity for entity in found if entity.kind not in _NO_STONES])
+
+
+def _measured(session: Session, entities: Sequence[Entity]) -> list[StoneRecord]:
+    return load_stones(session, [entity for entity in entities if entity.volume is not None])
+
+
+def _codes(session: Session) -> set[str]:
+    return set(session.scalars(select(Entity.code)))
+
+
+def _named(session: Session, where: Sequence[str], facings: Facings) -> tuple[set[str], set[str]]:
+    """Codes of the stones of two facings."""
+    codes = []
+    for expression in facings:
+        some = {record.code for record in _stones(session, [*where, expression])}
+        if not some:
+            raise UsageError(
+                f"no stone satisfies {expression!r}", where="--facings", remedy="try it with: moma query"
+            )
+        codes.append(some)
+    return codes[0], codes[1]
+
+
+def _beside(chosen: Collection[str] | None, found: Sequence[tuple[str, tuple[str, str]]]) -> set[str]:
+    """Codes of the proposals between two chosen stones, or between proposals that are."""
+    kept: set[str] = set()
+    for code, beside in found:
+        if chosen is None or all(one in chosen or one in kept for one in beside):
+            kept.add(code)
+    return kept
+
+
+def _report(
+    what: str,
+    session: Session,
+    stones: int,
+    pairs: Sequence[tuple[StoneRecord, tuple[str, ...]]],
+    settings: dict[str, object],
+    recording: Recording | None,
+) -> ProposalReport:
+    entry = related = None
+    if recording is not None and pairs:
+        name = f"moma propose {what}"
+        made, numbers = store_hypotheses(
+            session,
+            name,
+            [record for record, _ in pairs],
+            recording.source or f"{name}: each stone says on what it rests",
+            author=recording.author,
+            settings=settings,
+        )
+        entry = made.id
+        related = relate(session, only=numbers).entry
+    return ProposalReport(what, stones, tuple(_proposal(*pair) for pair in pairs), entry, related)
+
+
+def _proposal(record: StoneRecord, notes: tuple[str, ...]) -> Proposal:
+    return Proposal(
+        code=record.code,
+        kind=record.kind,
+        course=record.course,
+        zone=record.zone,
+        length=record.length,
+        height=record.height,
+        depth=record.depth,
+        volume=record_volume(record),
+        outline=tuple((x, y, z) for x, y, z in record.outline.tolist()),
+        evidence=record.provenance_text,
+        depth_source=record.depth_source,
+        notes=notes,
+    )

@@ -1,0 +1,1 @@
+"""Recording of knowledge from TOML files (`moma record`)."""

@@ -1,0 +1,69 @@
+"""Depths that are known better: the statement, and the solids that follow from it, extruded anew."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from archmodel.assertions.correct import replace_measurement
+from archmodel.assertions.statements import PLAIN, Remark, say_depth
+from archmodel.store.bulk import batches
+from archmodel.store.find_by_code import subjects
+from archmodel.store.revisions import NOTHING, Outcome
+from archmodel.store.stones import load_stones
+from archmodel.tables.entities import Entity
+from archmodel.tables.entries import Entry
+from moma.errors import UsageError
+from pipelines.ingest.records import stone_record, surveyed_block
+
+__all__ = ["record_depth"]
+
+
+def record_depth(
+    session: Session,
+    entry: Entry,
+    codes: Sequence[str],
+    value: float,
+    sigma: float | None = None,
+    remark: Remark = PLAIN,
+) -> Outcome:
+    """Say how deep stones are, and extrude their measured faces to that depth.
+
+    Parameters
+    ----------
+    codes : of the stones
+    value, sigma : depth and its standard deviation [m]
+    remark : its text is the evidence; else the source of the entry is
+
+    Raises
+    ------
+    UsageError
+        if there is no such stone, or it was not measured by its face, so that no solid could follow
+    GeometryError
+        if the face cannot be extruded to this depth
+    """
+    outcome = say_depth(session, entry, subjects(session, codes), value, sigma, remark)
+    evidence = remark.text or entry.source
+    for batch in batches(codes):
+        outcome += _extrude(session, entry, batch, value, sigma, evidence)
+    return outcome
+
+
+def _extrude(
+    session: Session, entry: Entry, codes: Sequence[str], value: float, sigma: float | None, evidence: str
+) -> Outcome:
+    """Solids to a depth; those that have it, on whatever evidence, stay as they are."""
+    outcome = NOTHING
+    entities = session.scalars(select(Entity).where(Entity.code.in_(codes)).order_by(Entity.id)).all()
+    for entity in entities:
+        if entity.measurement is None:
+            raise UsageError(f"{entity.code} was not measured", remedy="take in a survey of its face first")
+    changed = [one for one in entities if (one.depth, one.depth_sigma) != (value, sigma)]
+    for stone in load_stones(session, changed):
+        if stone.provenance == "solid":
+            what = f"the depth of {stone.code} is that of its solid, which was surveyed"
+            raise UsageError(what, remedy="take in a better solid")
+        deeper = replace(stone, depth=value, depth_sigma=sigma, depth_source=evidence, depth_origin="stone")
+        outcome += replace_measurement(session, entry, stone_record(surveyed_block(deeper)), stone.code)
+    return outcome

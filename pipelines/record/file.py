@@ -1,0 +1,136 @@
+"""Files of knowledge: TOML text → a RecordFile in which every key has been checked. No database is read here."""
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Any
+
+from moma.errors import (
+    DatabaseError,
+    GeometryError,
+    MomaError,
+    QueryError,
+    SceneError,
+    SurveyError,
+    UsageError,
+)
+from pipelines.record.keys import ARRAYS, ATTRIBUTE, PROPERTY, RECORD
+from pipelines.toml.lines import Path, key_lines, parse_toml, read_text
+from pipelines.toml.schema import Document, Key, check_table, nearest
+
+__all__ = ["RecordFile", "Table", "parse_record", "read_record"]
+
+
+@dataclass(frozen=True)
+class Table:
+    """One table of an array.
+
+    Attributes
+    ----------
+    path : where it stands, for messages: ("mark", "0")
+    values : of all its keys, those that are not given as None, () or {}
+    """
+
+    path: Path
+    values: Mapping[str, Any]
+
+    @property
+    def name(self) -> str:
+        """Name of the array."""
+        return self.path[0]
+
+
+@dataclass(frozen=True)
+class RecordFile:
+    """A file of knowledge as its author wrote it, checked.
+
+    Attributes
+    ----------
+    document : file and lines, for error messages
+    sha256 : of its text, in hexadecimal
+    record : the table [record]
+    tables : all others, in the order in which they are recorded
+    """
+
+    document: Document
+    sha256: str
+    record: Mapping[str, Any]
+    tables: tuple[Table, ...]
+
+    @contextmanager
+    def at(self, *path: str) -> Iterator[None]:
+        """Let a failure in a with-block name the key that it comes from, if it names no line of this file."""
+        try:
+            yield
+        except (UsageError, DatabaseError, SurveyError, GeometryError) as error:
+            if (error.where or "").startswith(f"{self.document.path}:"):
+                raise
+            what = f"{error.where}: {error.what}" if isinstance(error, QueryError) else error.what
+            cls: type[MomaError] = UsageError if isinstance(error, UsageError) else type(error)
+            raise cls(what, where=self.document.where(*path), remedy=error.remedy) from None
+
+
+def read_record(path: str | FilePath) -> RecordFile:
+    """Read and check a file of knowledge.
+
+    Raises
+    ------
+    UsageError : with file and line, at the first thing that is wrong
+    """
+    return parse_record(read_text(path, UsageError, encoding="utf-8-sig"), str(path))
+
+
+def parse_record(text: str, path: str) -> RecordFile:
+    """Check the text of a file of knowledge; `path` is for the messages."""
+    given = parse_toml(text, path, UsageError, "see docs/knowledge.md for a file to start from")
+    document = Document(path, key_lines(text))
+    try:
+        record, tables = _checked(document, given)
+    except SceneError as error:
+        raise UsageError(error.what, where=error.where, remedy=error.remedy) from None
+    return RecordFile(document, hashlib.sha256(text.encode()).hexdigest(), record, tables)
+
+
+def _checked(document: Document, given: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[Table, ...]]:
+    known = ["record", *ARRAYS]
+    for name, content in given.items():
+        if name not in known:
+            what = f"unknown table [{name}]" if isinstance(content, dict | list) else f"unknown key {name!r}"
+            document.fail(what, name, remedy=nearest(name, known))
+    record = given.get("record", {})
+    if not isinstance(record, dict):
+        document.fail("'record' is not a table", "record", remedy="write [record] on a line of its own")
+    tables = [one for name, keys in ARRAYS.items() for one in _array(document, given, name, keys)]
+    if not tables:
+        document.fail("nothing is recorded", remedy="add a table such as [[material]]; see docs/knowledge.md")
+    return check_table(document, ("record",), record, RECORD), tuple(tables)
+
+
+def _array(document: Document, given: Mapping[str, Any], name: str, keys: tuple[Key, ...]) -> Iterator[Table]:
+    """All tables [[name]], checked."""
+    content = given.get(name, [])
+    if not isinstance(content, list) or not all(isinstance(one, dict) for one in content):
+        document.fail(f"{name!r} is not a list of tables", name, remedy=f"write [[{name}]] above each")
+    for index, table in enumerate(content):
+        path = (name, str(index))
+        values = check_table(document, path, table, keys, f"[[{name}]]")
+        for inner, inner_keys in (("properties", PROPERTY), ("attributes", ATTRIBUTE)):
+            if inner in values:
+                values[inner] = _inner(document, (*path, inner), values[inner], inner_keys)
+        yield Table(path, values)
+
+
+def _inner(document: Document, path: Path, given: Any, keys: tuple[Key, ...]) -> dict[str, dict[str, object]]:
+    """The tables in a table; a plain value stands for its first key."""
+    return {
+        name: check_table(
+            document,
+            (*path, name),
+            content if isinstance(content, dict) else {keys[0].name: content},
+            keys,
+            f"{name} = {{ … }}",
+        )
+        for name, content in given.items()
+    }

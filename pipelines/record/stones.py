@@ -1,0 +1,58 @@
+"""Which stones a file of knowledge means: codes and expressions, asked of the database."""
+
+import re
+from collections.abc import Sequence
+
+from sqlalchemy.orm import Session
+
+from archmodel.query.api import find
+from archmodel.store.find_by_code import Subjects, entity_numbers, subjects
+from moma.errors import UsageError
+from pipelines.record.file import RecordFile, Table
+
+__all__ = ["named_stones", "named_subjects"]
+
+_CODE = re.compile(r"[\w.:/+-]+")  # a text without blanks or comparison is meant as a code
+
+
+def named_stones(session: Session, file: RecordFile, table: Table, key: str = "stones") -> dict[str, int]:
+    """Numbers by code of the stones that a key names, each once: as the list has them, then as the survey has.
+
+    Raises
+    ------
+    UsageError
+        at the key whose expression cannot be understood or that names no stone
+    """
+    found: dict[str, int] = {}
+    items: Sequence[str] = table.values[key]
+    codes = [item for item in items if _CODE.fullmatch(item)]
+    with file.at(*table.path, key):
+        known = entity_numbers(session, codes)
+        for item in items:
+            if item in known:
+                found[item] = known[item]
+                continue
+            matching = find(session, "entity", [item])
+            if not matching:
+                raise UsageError(f"no stone satisfies {item!r}", remedy="try it with: moma query")
+            found.update((one.code, one.id) for one in matching)
+    return found
+
+
+def named_subjects(session: Session, file: RecordFile, table: Table) -> Subjects:
+    """The stones and structures of a table, at least one.
+
+    Raises
+    ------
+    UsageError
+        at the key that names none
+    """
+    stones = named_stones(session, file, table)
+    with file.at(*table.path, "structures"):
+        structures = subjects(session, structures=table.values["structures"])
+    about = Subjects(tuple(stones.values()), structures.structures)
+    with file.at(*table.path):
+        if not len(about):
+            remedy = "give stones = […] or structures = […]"
+            raise UsageError(f"[[{table.name}]] is about nothing", remedy=remedy)
+    return about

@@ -1,0 +1,246 @@
+"""Each table of a file of knowledge, put into the database."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from archmodel.assertions.arrange import declare_members, declare_relation, declare_structure
+from archmodel.assertions.correct import correct
+from archmodel.assertions.declare import PropertyValue, declare_document, declare_material, declare_phase
+from archmodel.assertions.register_kind import register_kind
+from archmodel.assertions.statements import (
+    Remark,
+    say_made_of,
+    say_mason_mark,
+    say_note,
+    say_observation,
+    say_of_phase,
+    say_reference,
+)
+from archmodel.assertions.withdraw import withdraw_members, withdraw_relations, withdraw_statements
+from archmodel.store.find_by_code import held_or_none
+from archmodel.store.hypotheses import withdraw_hypotheses
+from archmodel.store.revisions import NOTHING, Outcome, withdraw
+from archmodel.tables.entries import Entry
+from archmodel.tables.knowledge import (
+    Document,
+    MadeOf,
+    MasonMark,
+    Material,
+    MaterialProperty,
+    Note,
+    Observation,
+    OfPhase,
+    Phase,
+    Reference,
+    Statement,
+)
+from archmodel.tables.structures import Structure
+from moma.errors import UsageError
+from pipelines.record.depth import record_depth
+from pipelines.record.file import RecordFile, Table
+from pipelines.record.stones import named_stones, named_subjects
+
+__all__ = ["record_table"]
+
+_STATEMENTS: Mapping[str, type[Statement]] = {
+    "made_of": MadeOf,
+    "of_phase": OfPhase,
+    "mark": MasonMark,
+    "observation": Observation,
+    "reference": Reference,
+    "note": Note,
+}
+
+_NAMED: Mapping[str, type[Any]] = {
+    "material": Material,
+    "property": Material,
+    "phase": Phase,
+    "document": Document,
+    "structure": Structure,
+}
+
+
+@dataclass(frozen=True)
+class _Work:
+    """One table, and where it goes."""
+
+    session: Session
+    entry: Entry
+    file: RecordFile
+    table: Table
+
+    def __getitem__(self, key: str) -> Any:
+        return self.table.values[key]
+
+    def remark(self) -> Remark:
+        """What is said with every statement; observations are of the file's date if they do not say their own."""
+        seen = self["date"]
+        if seen is None and self.table.name == "observation":
+            seen = self.file.record["date"]
+        return Remark(self["text"], self["document"], self["locator"], seen)
+
+
+def record_table(session: Session, entry: Entry, file: RecordFile, table: Table) -> Outcome:
+    """Put one table into the database, within an entry.
+
+    Raises
+    ------
+    UsageError
+        at the line of the file that is wrong
+    """
+    with file.at(*table.path):
+        return _RECORDERS[table.name](_Work(session, entry, file, table))
+
+
+def _kind(work: _Work) -> Outcome:
+    own = {name: (one["unit"], one["definition"]) for name, one in work["attributes"].items()}
+    return register_kind(
+        work.session,
+        work.entry,
+        work["name"],
+        work["parent"],
+        work["definition"],
+        canon=work["canon"],
+        attributes=own,
+    )
+
+
+def _material(work: _Work) -> Outcome:
+    properties = {name: PropertyValue(**one) for name, one in work["properties"].items()}
+    with work.file.at(*work.table.path, "properties"):
+        return declare_material(work.session, work.entry, work["name"], work["description"], properties)
+
+
+def _phase(work: _Work) -> Outcome:
+    return declare_phase(
+        work.session, work.entry, work["name"], work["begins"], work["ends"], work["description"]
+    )
+
+
+def _document(work: _Work) -> Outcome:
+    return declare_document(
+        work.session,
+        work.entry,
+        work["code"],
+        work["type"],
+        work["title"],
+        place=work["place"],
+        author=work["by"],
+        dated=work["dated"],
+    )
+
+
+def _structure(work: _Work) -> Outcome:
+    outcome = declare_structure(
+        work.session,
+        work.entry,
+        work["kind"],
+        work["code"],
+        title=work["title"],
+        parent=work["parent"],
+        number=work["number"],
+        side=work["side"],
+    )
+    stones = list(named_stones(work.session, work.file, work.table).values())
+    return outcome + declare_members(work.session, work.entry, work["code"], stones, ordered=work["ordered"])
+
+
+def _relation(work: _Work) -> Outcome:
+    of, to = (list(named_stones(work.session, work.file, work.table, key).values()) for key in ("of", "to"))
+    return declare_relation(work.session, work.entry, work["kind"], of, to)
+
+
+def _depth(work: _Work) -> Outcome:
+    codes = list(named_stones(work.session, work.file, work.table))
+    return record_depth(work.session, work.entry, codes, work["value"], work["sigma"], work.remark())
+
+
+def _statement(work: _Work) -> Outcome:
+    """A statement about stones and structures."""
+    session, entry, remark = work.session, work.entry, work.remark()
+    about = named_subjects(session, work.file, work.table)
+    match work.table.name:
+        case "made_of":
+            return say_made_of(session, entry, about, work["material"], remark)
+        case "of_phase":
+            return say_of_phase(session, entry, about, work["phase"], remark)
+        case "mark":
+            return say_mason_mark(session, entry, about, work["sign"], work["place"], remark)
+        case "observation":
+            seen = {key: work[key] for key in ("severity", "place", "at")}
+            return say_observation(session, entry, about, work["type"], **seen, remark=remark)
+        case "reference":
+            return say_reference(session, entry, about, remark)
+        case _:
+            return say_note(session, entry, about, work["key"], remark)
+
+
+def _correction(work: _Work) -> Outcome:
+    values = {**work["set"], **dict.fromkeys(work["unset"])}
+    if not values:
+        raise UsageError("a correction of nothing", remedy='give set = { kind = "quoin" }, say')
+    outcome = NOTHING
+    for code in named_stones(work.session, work.file, work.table):
+        with work.file.at(*work.table.path, "set"):
+            outcome += correct(work.session, work.entry, code, values)
+    return outcome
+
+
+def _withdraw(work: _Work) -> Outcome:
+    what = work["what"]
+    if what in _NAMED:
+        return _withdraw_named(work, what)
+    if what == "relation":
+        of, to = (named_stones(work.session, work.file, work.table, key) for key in ("stones", "to"))
+        if work["kind"] is None:
+            raise UsageError("the relation has no kind", remedy='give kind = "beside", say')
+        return withdraw_relations(
+            work.session, work.entry, work["kind"], list(of.values()), list(to.values())
+        )
+    if what == "hypothesis":
+        named = named_stones(work.session, work.file, work.table)
+        return withdraw_hypotheses(work.session, work.entry, named.values())
+    about = named_subjects(work.session, work.file, work.table)
+    if what == "member":
+        return withdraw_members(work.session, work.entry, about)
+    return withdraw_statements(work.session, work.entry, _STATEMENTS[what], about, work["match"])
+
+
+def _withdraw_named(work: _Work, what: str) -> Outcome:
+    """A material, one property of it, a phase, a document or a structure; once withdrawn, it stays so."""
+    cls, name = _NAMED[what], work["name"]
+    if name is None:
+        raise UsageError(f"the {what} has no name", remedy="give name = …")
+    row = held_or_none(work.session, cls, name)
+    if row is not None and what == "property":
+        row = work.session.scalar(
+            select(MaterialProperty).where(
+                MaterialProperty.material_id == row.id,
+                MaterialProperty.name == work["property"],
+                MaterialProperty.superseded_id.is_(None),
+            )
+        )
+    if row is not None:
+        return withdraw(work.session, work.entry, row)
+    column = cls.name if cls in (Material, Phase) else cls.code
+    if work.session.scalar(select(cls.id).where(column == name).limit(1)) is None:
+        raise UsageError(f"there never was a {cls.__name__.lower()} {name[:40]!r}", remedy="check its name")
+    return Outcome(unchanged=1)
+
+
+_RECORDERS: Mapping[str, Callable[[_Work], Outcome]] = {
+    "kind": _kind,
+    "withdraw": _withdraw,
+    "correction": _correction,
+    "material": _material,
+    "phase": _phase,
+    "document": _document,
+    "structure": _structure,
+    "relation": _relation,
+    "depth": _depth,
+    **dict.fromkeys(_STATEMENTS, _statement),
+}

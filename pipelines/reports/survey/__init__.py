@@ -1,0 +1,1 @@
+"""The survey report (`moma survey-report`)."""

@@ -1,0 +1,169 @@
+"""survey.json: what a survey report says, for programs."""
+
+import json
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipelines.reports.survey.study import SurveyFile, SurveyStudy
+from survey.quality.courses import CourseLine
+from survey.quality.facades import Facade
+from survey.quality.precision import StoneQuality, SurveyQuality
+
+__all__ = ["survey_json", "write_survey_json"]
+
+
+def survey_json(study: SurveyStudy, version: str) -> dict[str, Any]:
+    """What is said of the survey as a whole: metres, degrees where a name says so, null where not known."""
+    content = {
+        "survey": study.name,
+        "version": version,
+        "warnings": study.warnings,
+        "inputs": [_file(one) for one in study.files],
+        "quality": _quality(study.quality, len(study.rejects)),
+        "facades": [_facade(one) for one in study.facades],
+        "kinds": [_record(one) for one in study.usual.values()],
+    }
+    plain: dict[str, Any] = _plain(content)
+    return plain
+
+
+def write_survey_json(path: Path, study: SurveyStudy, content: Mapping[str, Any]) -> None:
+    """Write survey.json: the survey as a whole, then its parts one per line, so that many need little memory.
+
+    Parameters
+    ----------
+    path : survey.json
+    study : with the parts
+    content : what `survey_json` gives, and more if wanted
+    """
+    parts: dict[str, Iterable[dict[str, Any]]] = {
+        "courses": map(_course, study.courses),
+        "course_heights": map(_record, study.course_heights),
+        "contradictions": map(_record, study.contradictions),
+        "remeasure": ({**_record(one), "urgency": one.urgency.name.lower()} for one in study.remeasures),
+        "rejects": (
+            {"code": one.code, "line": _line(one.spans), "reason": str(one.error)} for one in study.rejects
+        ),
+        "stones": _stones(study),
+    }
+    with path.open("w", encoding="utf-8") as out:
+        out.write(json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False).removesuffix("\n}"))
+        for name, rows in parts.items():
+            out.write(f',\n "{name}": [')
+            for number, row in enumerate(rows):
+                out.write(",\n  " if number else "\n  ")
+                out.write(json.dumps(_plain(row), ensure_ascii=False, allow_nan=False))
+            out.write("\n ]")
+        out.write("\n}\n")
+
+
+def _stones(study: SurveyStudy) -> Iterator[dict[str, Any]]:
+    deviations = {one.code: one for one in study.deviations}
+    facade_of = {i: facade.name for facade in study.facades for i in facade.members.tolist()}
+    reasons: dict[str, list[str]] = {}
+    for one in study.remeasures:
+        if one.code is not None:
+            reasons.setdefault(one.code, []).append(one.reason)
+    for i, stone in enumerate(study.stones):
+        yield _stone(stone, facade_of.get(i), deviations.get(stone.code), reasons.get(stone.code, []))
+
+
+def _file(file: SurveyFile) -> dict[str, Any]:
+    control = None
+    if (transform := file.transform) is not None:
+        control = {
+            "scale": transform.scale,
+            "sigma0": transform.sigma0,
+            "redundancy": transform.redundancy,
+            "rejected": transform.rejected,
+            "points": [
+                {"name": name, "residual": residual, "standardised": test, "limit": limit}
+                for name, residual, test, limit in zip(
+                    transform.names,
+                    transform.residuals,
+                    transform.standardised,
+                    transform.limits,
+                    strict=True,
+                )
+            ],
+        }
+    return {
+        "path": file.head.path,
+        "survey": file.head.name,
+        "stones": file.stones,
+        "rejects": file.rejects,
+        "stations": [{"name": one.name, "position": one.position} for one in file.head.stations],
+        "control": control,
+    }
+
+
+def _quality(quality: SurveyQuality, rejects: int) -> dict[str, Any]:
+    values = _record(quality)
+    residuals = values.pop("residuals")
+    return {**values, "rejects": rejects, "residuals": _record(residuals)}
+
+
+def _facade(facade: Facade) -> dict[str, Any]:
+    along, up, outward = facade.frame.axes
+    return {
+        "name": facade.name,
+        "azimuth": facade.azimuth,
+        "area": facade.area,
+        "stones": len(facade.members),
+        "origin": facade.frame.origin,
+        "along": along,
+        "up": up,
+        "outward": outward,
+    }
+
+
+def _course(line: CourseLine) -> dict[str, Any]:
+    values = _record(line)
+    covariance = values.pop("covariance")
+    corners = [values.pop(name) for name in ("codes", "along", "height", "sigma", "deviations")]
+    values["level_sigma"] = math.sqrt(covariance[0, 0])
+    values["slope_sigma"] = line.slope_sigma
+    values["slope_degrees"] = None if line.slope is None else math.degrees(math.atan(line.slope))
+    values["span"] = line.span
+    values["worst"] = {"stone": line.worst[0], "deviation": line.worst[1]}
+    values["finding"] = line.finding
+    values["corners"] = dict(zip(("stone", "along", "height", "sigma", "deviation"), corners, strict=True))
+    return values
+
+
+def _stone(stone: StoneQuality, facade: str | None, deviation: Any, reasons: list[str]) -> dict[str, Any]:
+    left = ("outline", "corner_sigma", "standardised", "worn_corners")
+    values = {name: getattr(stone, name) for name in StoneQuality.__slots__ if name not in left}
+    values["facade"] = facade
+    usual = ("length", "height", "length_score", "height_score")
+    values["deviation"] = None if deviation is None else {name: getattr(deviation, name) for name in usual}
+    values["remeasure"] = reasons
+    return values
+
+
+def _record(value: Any) -> dict[str, Any]:
+    """Fields of a frozen dataclass; not those of values in it."""
+    return {name: getattr(value, name) for name in value.__dataclass_fields__}
+
+
+def _line(spans: tuple[range, ...]) -> int | None:
+    return spans[0].start if spans else None
+
+
+def _plain(value: Any) -> Any:
+    """Numbers and lists as JSON has them; null for what is no number."""
+    if isinstance(value, Mapping):
+        return {key: _plain(one) for key, one in value.items()}
+    if isinstance(value, np.ndarray) and value.dtype.kind == "f" and np.isfinite(value).all():
+        return value.tolist()
+    if isinstance(value, np.ndarray | tuple | list):
+        return [_plain(one) for one in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

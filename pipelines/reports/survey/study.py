@@ -1,0 +1,195 @@
+"""Everything that a survey report says, computed: files in, findings out."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from archmodel.tables.entities import kind_named
+from moma.errors import UsageError
+from pipelines.ingest.reading_options import check_survey_file
+from pipelines.progress import Listener, Progress, silent
+from survey.extrusion.extrusion import SurveyedBlock
+from survey.formats.options import ReadingOptions
+from survey.formats.reading import open_survey
+from survey.quality.canon import Deviation, KindStandard, deviations, standards
+from survey.quality.contradictions import Contradiction, contradictions
+from survey.quality.courses import CourseHeight, CourseLine, course_heights, measure_courses
+from survey.quality.facades import Facade, find_facades
+from survey.quality.precision import StoneQuality, SurveyQuality, appraise, judge_survey
+from survey.quality.remeasure import Remeasure, list_remeasures
+from survey.records.survey import Canon, DepthRule, Reject, SurveyHead
+from survey.registration.site_frame import SiteTransform
+from survey.stones import survey_stones
+
+__all__ = ["SurveyFile", "SurveyStudy", "study_surveys"]
+
+_SOME_DEPTH = DepthRule(None, 0.3, None, "\0")  # a source that no file can say
+_TOLD = 200  # stones between two words on progress
+
+
+@dataclass(frozen=True)
+class SurveyFile:
+    """One file of a report.
+
+    Attributes
+    ----------
+    head : what it says of all its stones
+    transform : into the frame of the site; None if it has no control points
+    stones, rejects : how many were made, how many not
+    """
+
+    head: SurveyHead
+    transform: SiteTransform | None
+    stones: int
+    rejects: int
+
+
+@dataclass(frozen=True)
+class SurveyStudy:
+    """What was found of a survey.
+
+    Attributes
+    ----------
+    name : of the first file
+    files : the files that it lies in
+    stones : all stones that could be made, in the order of the files
+    rejects : those that could not, with reasons
+    quality : all stones together
+    facades : stones that face one way
+    usual : the usual face of each kind
+    deviations : of the stones from it
+    contradictions : stones that are not what their kind means
+    courses : bed lines
+    course_heights : from bed to bed
+    remeasures : what to measure again, most urgent first
+    warnings : what stands in the way of taking the survey into the database
+    """
+
+    name: str
+    files: tuple[SurveyFile, ...]
+    stones: tuple[StoneQuality, ...]
+    rejects: tuple[Reject, ...]
+    quality: SurveyQuality
+    facades: tuple[Facade, ...]
+    usual: dict[str, KindStandard]
+    deviations: tuple[Deviation, ...]
+    contradictions: tuple[Contradiction, ...]
+    courses: tuple[CourseLine, ...]
+    course_heights: tuple[CourseHeight, ...]
+    remeasures: tuple[Remeasure, ...]
+    warnings: tuple[str, ...]
+
+
+def study_surveys(
+    paths: Sequence[str | Path], format: str, options: ReadingOptions, progress: Listener = silent
+) -> SurveyStudy:
+    """Read, fit and judge the stones of survey files.
+
+    Parameters
+    ----------
+    paths : survey files, of one format; together they are one survey
+    format : its name
+    options : what the files may leave unsaid
+    progress : told now and then
+
+    Raises
+    ------
+    UsageError : no such file or format
+    SurveyError : a file that cannot be read at all, or control points that contradict each other
+    """
+    if not paths:
+        raise UsageError("no survey file", remedy="name at least one")
+    stones: list[StoneQuality] = []
+    rejects: list[Reject] = []
+    files = []
+    for path in map(Path, paths):
+        before = len(stones), len(rejects)
+        file = _read(path, format, options, stones, rejects, progress)
+        files.append(replace(file, stones=len(stones) - before[0], rejects=len(rejects) - before[1]))
+    return _judge(tuple(files), tuple(stones), tuple(rejects))
+
+
+def _read(
+    path: Path,
+    format: str,
+    options: ReadingOptions,
+    stones: list[StoneQuality],
+    rejects: list[Reject],
+    progress: Listener,
+) -> SurveyFile:
+    check_survey_file(path)
+    stream = open_survey(path, format, options)
+    survey = survey_stones(replace(stream, head=_with_some_depth(stream.head)))
+    for number, one in enumerate(survey.stones, start=1):
+        if isinstance(one, Reject):
+            rejects.append(one)
+        else:
+            stones.append(_appraised(one))
+        if number % _TOLD == 0:
+            progress(Progress(f"fit {path.name}", number, number + _TOLD))
+    head = replace(survey.head, depth_rules=stream.head.depth_rules)
+    return SurveyFile(head, survey.transform, 0, 0)
+
+
+def _with_some_depth(head: SurveyHead) -> SurveyHead:
+    """The head with a depth for stones of which none is known: their faces can be judged without one."""
+    if any(rule.kind is None for rule in head.depth_rules):
+        return head
+    return replace(head, depth_rules=(*head.depth_rules, _SOME_DEPTH))
+
+
+def _appraised(block: SurveyedBlock) -> StoneQuality:
+    stone = appraise(block)
+    if block.depth.source != _SOME_DEPTH.source:
+        return stone
+    return replace(stone, depth=None, depth_source="not known", depth_origin="none")
+
+
+def _judge(
+    files: tuple[SurveyFile, ...], stones: tuple[StoneQuality, ...], rejects: tuple[Reject, ...]
+) -> SurveyStudy:
+    quality = judge_survey(stones)
+    facades = find_facades(
+        np.array([one.normal for one in stones]).reshape(-1, 3),
+        np.array([one.area for one in stones]),
+        np.array([one.outline.mean(axis=0) for one in stones]).reshape(-1, 3),
+    )
+    usual = standards(stones, _canons(files))
+    odd = contradictions(stones, facades)
+    tilts = [one.transform.covariance[3:6, 3:6] for one in files if one.transform is not None]
+    lines = measure_courses(stones, facades, tilts)
+    return SurveyStudy(
+        name=files[0].head.name,
+        files=files,
+        stones=stones,
+        rejects=rejects,
+        quality=quality,
+        facades=facades,
+        usual=usual,
+        deviations=deviations(stones, usual),
+        contradictions=odd,
+        courses=lines,
+        course_heights=course_heights(lines),
+        remeasures=list_remeasures(stones, rejects, odd, quality),
+        warnings=tuple(_unknown_kinds(quality.kinds)),
+    )
+
+
+def _canons(files: Sequence[SurveyFile]) -> list[Canon]:
+    """The canons of all files; of two for one kind the first holds."""
+    found: dict[str, Canon] = {}
+    for file in files:
+        for canon in file.head.canons:
+            found.setdefault(canon.kind, canon)
+    return list(found.values())
+
+
+def _unknown_kinds(kinds: Mapping[str, int]) -> Iterator[str]:
+    """Kinds that are mistyped, or that nobody has declared; `moma ingest` does not take them."""
+    for kind, count in kinds.items():
+        try:
+            kind_named(kind)
+        except UsageError as error:
+            yield f"{count} stone{'s' if count > 1 else ''} of an {error}"

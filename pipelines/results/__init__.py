@@ -1,0 +1,1 @@
+"""Result files: VTK, CSV and the folder that holds them."""

@@ -1,0 +1,227 @@
+"""Results as files for ParaView: stones and contact points as time series, the joints at the end."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.results.contact_result import ContactResult, JointResult
+from mechanics.results.result import BodyResult, Frame, Result
+from mechanics.results.stress_values import utilisation
+from mechanics.scene.laws.status import STATUSES
+from mechanics.scene.scene import Fidelity
+from mechanics.stones.elasticity import principal, von_mises
+from pipelines.results.vtu import (
+    CELL_TYPES,
+    POLYGON,
+    POLYHEDRON,
+    VERTEX,
+    Cells,
+    Grid,
+    cells_of,
+    write_pvd,
+    write_vtu,
+)
+
+__all__ = ["UNITS", "body_cells", "body_grid", "contact_grid", "joint_grid", "write_frames"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_FIDELITIES = (Fidelity.FIXED, Fidelity.RIGID, Fidelity.DEFORMABLE)
+
+UNITS: Mapping[str, str] = {
+    **dict.fromkeys(("displacement", "gap", "slide", "opening", "sliding", "eccentricity"), "m"),
+    "centre_of_pressure": "m",
+    "velocity": "m/s",
+    **dict.fromkeys(("stress", "von_mises", "principal", "mean_pressure"), "Pa"),
+    **dict.fromkeys(("pressure", "pressure_mean", "pressure_max"), "Pa"),
+    "force": "N",
+    "moment": "N m",
+    "area": "m²",
+}
+"""Units of the arrays; what is not here is a ratio, a direction or a number."""
+
+
+def write_frames(result: Result, folder: Path) -> None:
+    """Write every frame of stones and contacts with their indices `results.pvd` and `contacts.pvd`, and `joints.vtu`.
+
+    What is not computed is NaN: stresses of rigid stones.
+    """
+    cells, digits = body_cells(result), max(4, len(str(len(result.frames) - 1)))
+    series: dict[str, list[tuple[float, str]]] = {"results": [], "contacts": []}
+    for number, frame in enumerate(result.frames):
+        for kind, grid in (
+            ("results", body_grid(result, frame, cells)),
+            ("contacts", contact_grid(frame.contacts)),
+        ):
+            name = f"{kind}_{number:0{digits}d}.vtu"
+            write_vtu(folder / name, grid)
+            series[kind].append((frame.time, name))
+    for kind, datasets in series.items():
+        write_pvd(folder / f"{kind}.pvd", datasets)
+    write_vtu(folder / "joints.vtu", joint_grid(result.joints))
+
+
+def body_cells(result: Result) -> Cells:
+    """The finite elements of deformable stones, one polyhedron for each other one."""
+    connectivity, sizes, types, streams, ends = [], [], [], [], []
+    offset, end = 0, 0
+    for body in result.bodies:
+        if body.element is not None:
+            connectivity.append((body.cells + offset).ravel())
+            sizes.append(np.full(len(body.cells), body.cells.shape[1]))
+            types.append(np.full(len(body.cells), CELL_TYPES[body.element]))
+            ends.append(np.full(len(body.cells), -1))
+        else:
+            connectivity.append(offset + np.unique([node for face in body.faces for node in face]))
+            stream = np.fromiter(_stream(body, offset), dtype=np.int64)
+            sizes.append(np.array([len(connectivity[-1])]))
+            types.append(np.array([POLYHEDRON]))
+            streams.append(stream)
+            end += len(stream)
+            ends.append(np.array([end]))
+        offset += len(body.reference)
+    no_faces = np.zeros(0, dtype=np.int64)
+    return Cells(
+        connectivity=np.concatenate(connectivity).astype(np.int64),
+        offsets=np.cumsum(np.concatenate(sizes)).astype(np.int64),
+        types=np.concatenate(types).astype(np.uint8),
+        faces=np.concatenate(streams) if streams else no_faces,
+        face_offsets=np.concatenate(ends).astype(np.int64) if streams else no_faces,
+    )
+
+
+def _stream(body: BodyResult, offset: int) -> Iterator[int]:
+    """A polyhedron's faces as VTK lists them."""
+    yield len(body.faces)
+    for face in body.faces:
+        yield len(face)
+        yield from (node + offset for node in face)
+
+
+def body_grid(result: Result, frame: Frame, cells: Cells) -> Grid:
+    """All stones in one frame; fields with seven digits, which halves the files.
+
+    Point data: displacement [m], velocity [m/s]; stress (xx, yy, zz, xy, yz, zx), von_mises, principal (σ1 ≥ σ2 ≥ σ3),
+    mean_pressure [Pa]; principal_direction_1, principal_direction_3; utilisation [-].
+    Cell data: stone (index in the scene), fidelity (0 fixed, 1 rigid, 2 deformable), stress_error [-].
+    """
+    bodies = result.bodies
+    stone = np.repeat(np.arange(len(bodies)), [max(len(body.cells), 1) for body in bodies])
+    fidelity = np.array([_FIDELITIES.index(body.fidelity) for body in bodies])
+    error = np.array([np.nan if one is None else one for one in frame.stress_errors])
+    before, now = np.concatenate([body.reference for body in bodies]), np.concatenate(frame.positions)
+    return Grid(
+        points=now,
+        cells=cells,
+        point_data={
+            name: values.astype(np.float32)
+            for name, values in (
+                ("displacement", now - before),
+                ("velocity", np.concatenate(frame.velocities)),
+                *_stresses(result, frame).items(),
+            )
+        },
+        cell_data={
+            "stone": stone.astype(np.int64),
+            "fidelity": fidelity[stone].astype(np.int64),
+            "stress_error": error[stone],
+        },
+        units=UNITS,
+    )
+
+
+def _stresses(result: Result, frame: Frame) -> dict[str, Array]:
+    """What follows from the stress of the points; NaN where there is none."""
+    stress = np.concatenate(
+        [
+            np.full((len(place), 6), np.nan) if one is None else one
+            for place, one in zip(frame.positions, frame.stresses, strict=True)
+        ]
+    )
+    known = np.isfinite(stress[:, 0])
+    values, first, third = (np.full((len(stress), 3), np.nan) for _ in range(3))
+    values[known], directions = principal(stress[known])
+    first[known], third[known] = directions[:, 0], directions[:, 2]
+    used, start = np.full(len(stress), np.nan), 0
+    for block, place in zip(result.scene.blocks, frame.positions, strict=True):
+        rows = slice(start, start := start + len(place))
+        used[rows] = utilisation(values[rows], block.material)
+    return {
+        "stress": stress,
+        "von_mises": von_mises(stress),
+        "principal": values,
+        "principal_direction_1": first,
+        "principal_direction_3": third,
+        "mean_pressure": -values.mean(axis=1),
+        "utilisation": used,
+    }
+
+
+def contact_grid(contacts: ContactResult) -> Grid:
+    """Contact points: force [N], pressure [Pa], normal, gap, opening, slide [m], area [m²], status, bodies, joint."""
+    count = len(contacts.gap)
+    status = np.array([STATUSES.index(str(one)) for one in contacts.status], dtype=np.int64)
+    return Grid(
+        points=contacts.point,
+        cells=cells_of(VERTEX, [[index] for index in range(count)]),
+        point_data={
+            "force": contacts.force,
+            "pressure": contacts.pressure,
+            "normal": contacts.normal,
+            "gap": contacts.gap,
+            "opening": contacts.opening,
+            "slide": contacts.slide,
+            "area": contacts.area,
+            "status": status,
+            "bodies": contacts.bodies.astype(np.int64),
+            "joint": contacts.joint.astype(np.int64),
+        },
+        cell_data={},
+        units=UNITS,
+    )
+
+
+def joint_grid(joints: JointResult) -> Grid:
+    """The polygons of the joints, with what `JointResult` says of each."""
+    # where faces no longer overlap, a point stands for the polygon
+    polygons = [
+        one if len(one) > 2 else np.tile(centre, (3, 1))
+        for one, centre in zip(joints.polygon, joints.centroid, strict=True)
+    ]
+    sizes = np.array([len(one) for one in polygons], dtype=np.int64)
+    ends = np.cumsum(sizes)
+    return Grid(
+        points=np.concatenate([*polygons, np.zeros((0, 3))]),
+        cells=cells_of(POLYGON, [range(end - size, end) for size, end in zip(sizes, ends, strict=True)]),
+        point_data={},
+        cell_data={
+            "bodies": joints.bodies.astype(np.int64),
+            "parted": joints.parted.astype(np.int64),
+            "normal": joints.frame[:, 0],
+            "in_kern": joints.in_kern.astype(np.int64),
+            **{name: getattr(joints, name) for name in _JOINT_ARRAYS},
+        },
+        units=UNITS,
+    )
+
+
+_JOINT_ARRAYS = (
+    "area",
+    "force",
+    "moment",
+    "centre_of_pressure",
+    "eccentricity",
+    "kern",
+    "edge",
+    "pressure_mean",
+    "pressure_max",
+    "gap",
+    "opening",
+    "sliding",
+    "slipping",
+    "open",
+    "friction_use",
+)

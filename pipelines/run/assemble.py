@@ -1,0 +1,175 @@
+"""From the database to a scene: selected stones → simplified solids → closed joints → blocks."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy.orm import Session
+
+from mechanics.scene.scene import Block, Fidelity, Part, Scene
+from mechanics.stones.meshing.elements import Element
+from mechanics.stones.meshing.meshers.choice import Mesher
+from pipelines.ingest.records import surveyed_block
+from pipelines.run.fidelity import Modelled, Wishes, modelled, neighbours
+from pipelines.run.local_frame import entry_about, local_origin, stone_about
+from pipelines.run.remarks import remarks
+from pipelines.scene.file import SceneFile
+from pipelines.scene.laws import law_rules
+from pipelines.scene.loads import build_loads, thrown
+from pipelines.scene.selection import STRESS, Groups, StoneModel, select_groups, select_stones
+from pipelines.scene.settings import MeshSettings
+from pipelines.scene.table_keys import STRESS_PICTURES
+from survey.extrusion.extrusion import SurveyedBlock
+from survey.geometry.solids import Solid
+from survey.geometry.stone_parts import stone_parts
+from survey.joints.close import close_joints
+from survey.joints.report import ClosingReport
+from survey.simplify.simplify import BlockyStone
+
+__all__ = ["Assembly", "assemble", "assemble_stones", "wishes_of"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """A scene that can be simulated, and how it came about.
+
+    Attributes
+    ----------
+    scene : for `mechanics.simulate`, with places counted from `origin`
+    models : the stones as surveyed, in the order of the scene's blocks
+    modelled : by code, how each is modelled, and why
+    simplified : the stones before their joints were closed
+    closing : what became of their joints
+    towards : (3,) mean normal of the faces, from the wall to the observer [-]
+    origin : (3,) of the scene, in the frame of the site [m]
+    remarks : what the scene says that has no effect, and how far its stresses reach
+    """
+
+    scene: Scene
+    models: tuple[StoneModel, ...]
+    modelled: Mapping[str, Modelled]
+    simplified: tuple[BlockyStone, ...]
+    closing: ClosingReport
+    towards: Array
+    origin: Array
+    remarks: tuple[str, ...] = ()
+
+
+def assemble(scene: SceneFile, session: Session) -> Assembly:
+    """Build the scene of a scene file from the stones in the database.
+
+    Raises
+    ------
+    SceneError : a key names no stone, a stone has no material, or a load does not suit its stones
+    GeometryError : a stone is degenerate, or not convex and cannot be cut into convex parts
+    """
+    models = select_stones(scene, session)
+    return assemble_stones(scene, models, select_groups(scene, session, models))
+
+
+def assemble_stones(scene: SceneFile, models: tuple[StoneModel, ...], groups: Groups) -> Assembly:
+    """As `assemble`, of stones that have been selected; the database is not needed."""
+    origin = local_origin([model.record for model in models])
+    stones = [surveyed_block(stone_about(model.record, origin)) for model in models]
+    closed = close_joints(stones, scene.joints)
+    codes = [model.record.code for model in models]
+    chosen = modelled(codes, neighbours(closed.report.joints), wishes_of(scene, models, groups))
+    meshes = _meshes(scene, groups)
+    blocks = tuple(
+        _block(model, chosen[solid.code], solid, meshes.get(solid.code, scene.mesh))
+        for model, solid in zip(models, closed.solids, strict=True)
+    )
+    return Assembly(
+        scene=_scene(scene, blocks, groups, origin),
+        models=models,
+        modelled=chosen,
+        simplified=closed.simplified,
+        closing=closed.report,
+        towards=_facing(stones),
+        origin=origin,
+        remarks=remarks(scene, groups, chosen),
+    )
+
+
+def wishes_of(scene: SceneFile, models: Sequence[StoneModel], groups: Groups) -> Wishes:
+    """What the scene says of how its stones are modelled."""
+    asked = scene.output.pictures or ()
+    pushed = (groups[entry.path][0] for entry in scene.loads if entry.type == "force")
+    return Wishes(
+        named={one.record.code: one.listed for one in models if one.listed is not None},
+        default=scene.bodies.default,
+        stress=None if scene.output.stress is None else groups[STRESS][0],
+        pictures=tuple(name for name in asked if name in STRESS_PICTURES),
+        pushed=frozenset[str]().union(*pushed),
+        ring=scene.bodies.ring,
+    )
+
+
+def _scene(scene: SceneFile, blocks: Sequence[Block], groups: Groups, origin: Array) -> Scene:
+    """The scene of the blocks, with the laws and loads that the file gives them."""
+    document, by_code = scene.document, {block.code: block for block in blocks}
+    materials = {block.code: block.material.name for block in blocks}
+    loads = [entry_about(entry, origin) for entry in scene.loads]
+    velocity = thrown(document, scene.throws, groups, by_code)
+    return Scene(
+        name=scene.name,
+        blocks=tuple(
+            replace(block, velocity=velocity[block.code]) if block.code in velocity else block
+            for block in blocks
+        ),
+        gravity=scene.gravity,
+        contact=replace(scene.contact, rules=law_rules(document, scene.laws, groups, materials)),
+        time=scene.time,
+        solver=scene.solver,
+        loads=build_loads(document, loads, groups, by_code),
+        frame_every=scene.output.frame_every,
+    )
+
+
+def _meshes(scene: SceneFile, groups: Groups) -> dict[str, MeshSettings]:
+    """The meshes of the stones that an entry of [[meshes]] names; of two, the later counts."""
+    meshes: dict[str, MeshSettings] = {}
+    for entry in scene.meshes:
+        given = {key: value for key, value in entry.values.items() if value is not None and key != "stones"}
+        kinds: dict[str, Callable[[str], Any]] = {"element": Element, "mesher": Mesher}
+        own = {key: kinds[key](value) if key in kinds else value for key, value in given.items()}
+        if "size" in own:
+            own["ring_size"] = own["size"]  # what is said of a stone holds in a ring too
+        meshes |= dict.fromkeys(groups[entry.path][0], replace(scene.mesh, **own))
+    return meshes
+
+
+def _block(model: StoneModel, chosen: Modelled, solid: Solid, mesh: MeshSettings) -> Block:
+    return Block(
+        code=solid.code,
+        vertices=solid.vertices,
+        faces=solid.faces,
+        material=model.material,
+        fidelity=chosen.fidelity,
+        mesh_size=mesh.size_of(chosen.ring) if chosen.fidelity is Fidelity.DEFORMABLE else None,
+        element=mesh.element,
+        contact_size=mesh.contact_size,
+        growth=mesh.growth,
+        mesher=mesh.mesher,
+        parts=_parts(solid),
+        stress=chosen.stress,
+    )
+
+
+def _parts(solid: Solid) -> tuple[Part, ...]:
+    """Convex parts of a stone that is not convex."""
+    parts = stone_parts(solid)
+    return tuple(Part(one.vertices, one.faces) for one in parts) if len(parts) > 1 else ()
+
+
+def _facing(stones: Sequence[SurveyedBlock]) -> Array:
+    """(3,) mean normal of the faces, weighted by area."""
+    total = np.zeros(3)
+    for stone in stones:
+        total += stone.face.measures.area * stone.face.fit.normal
+    length = float(np.linalg.norm(total))
+    return total / length if length > 0.0 else stones[0].face.fit.normal

@@ -1,0 +1,271 @@
+"""Is a scene sound, and what will it cost: everything that can be known before it runs."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+
+from archmodel.database.session import open_database
+from mechanics.results.forecast.cost import expected_cost, machine_slowness
+from mechanics.results.forecast.plan import Plan, plan
+from mechanics.scene.scene import Fidelity, Scene
+from mechanics.stones.meshing.report import MeshReport
+from moma.errors import GeometryError, MeshError
+from pipelines.draw.closing_pictures import draw_closing
+from pipelines.draw.elevations.closing_shapes import ClosingShapes, closing_shapes
+from pipelines.results.folder import check_replaceable, replacing
+from pipelines.run.assemble import Assembly, assemble_stones, wishes_of
+from pipelines.run.check_report import (
+    CheckReport,
+    Cost,
+    MaterialUse,
+    MeshQualityReport,
+    MeshUse,
+    StoneModelling,
+)
+from pipelines.run.closing_check import (
+    joints_report,
+    simplification_report,
+)
+from pipelines.run.fidelity import Modelled, modelled
+from pipelines.run.summary import as_json
+from pipelines.scene.array_tables import describe
+from pipelines.scene.file import SceneFile, read_scene
+from pipelines.scene.selection import Groups, StoneModel, select_groups, select_stones
+from pipelines.tuning.profiles import with_profile
+from survey.geometry.solids import Solid
+from survey.geometry.watertight import check_watertight
+from survey.joints.settings import JointMode
+
+__all__ = ["check_scene"]
+
+_INDEX = "check.json"
+_DEEP = 0.005  # metres: less than that is noise of a survey, which the contacts take up
+_NAMED = 6  # stones or pairs of stones that one problem is told of
+
+
+def check_scene(
+    path: str | Path, url: str, pictures: Path | None = None, profile: str | None = None
+) -> CheckReport:
+    """Check a scene file against a database, without running anything.
+
+    What is wrong with the file itself is raised; what is wrong with the stones is in the report.
+
+    Parameters
+    ----------
+    path : of the scene file
+    url : of the database
+    pictures : folder for pictures of the stones and their joints, and for the report as ``check.json``; None: none
+    profile : name of the profile whose settings go before the scene's; None: the scene as it is written
+
+    Raises
+    ------
+    SceneError : the file is wrong, or an expression names no stone
+    DatabaseError : the database cannot be read
+    UsageError : the folder holds something else, or there is no such profile
+    """
+    if pictures is not None:
+        check_replaceable(pictures, _INDEX)
+    scene = read_scene(path)
+    with open_database(url, create=False) as database, database.session(read_only=True) as session:
+        models = select_stones(scene, session)
+        scene = with_profile(scene, profile, models)
+        groups = select_groups(scene, session, models)
+    problems: list[str] = []
+    assembly, needs = None, None
+    try:
+        assembly = assemble_stones(scene, models, groups)
+        problems += _unsound_solids(assembly.scene)
+        problems += _unclosed(assembly) + _alone(assembly) + _overlapping(assembly)
+        needs = plan(assembly.scene)
+        problems += _unsupported(needs)
+    except (GeometryError, MeshError) as error:
+        problems.append(str(error))
+    report = _report(scene, models, groups, assembly, needs, tuple(problems))
+    if pictures is None or assembly is None:
+        return report
+    return _with_pictures(report, assembly, pictures)
+
+
+def _with_pictures(report: CheckReport, assembly: Assembly, folder: Path) -> CheckReport:
+    """The report with its pictures, which lie in the folder, all of them or none."""
+    with replacing(folder, _INDEX) as fresh:
+        files, warnings = draw_closing(fresh, _shapes(report.scene, assembly))
+        report = replace(report, files=(*files, _INDEX), warnings=(*report.warnings, *warnings))
+        (fresh / _INDEX).write_text(as_json(asdict(report)), encoding="utf-8")
+    return report
+
+
+def _hypotheses(assembly: Assembly) -> frozenset[str]:
+    return frozenset(model.record.code for model in assembly.models if model.record.hypothesis)
+
+
+def _shapes(scene: str, assembly: Assembly) -> ClosingShapes:
+    """What the pictures show, about the local origin of the scene."""
+    records = [model.record for model in assembly.models]
+    return closing_shapes(
+        scene,
+        surveyed=[Solid(one.code, one.solid_vertices - assembly.origin, one.solid_faces) for one in records],
+        simple=[one.solid for one in assembly.simplified],
+        closed=[Solid(one.code, one.vertices, one.faces) for one in assembly.scene.blocks],
+        simplified={one.code: one.report.displacement for one in assembly.simplified},
+        closing=assembly.closing,
+        faces=[one.outline - assembly.origin for one in records],
+        hypotheses=_hypotheses(assembly),
+        core=frozenset(one.code for one in records if one.kind == "infill"),
+    )
+
+
+def _report(
+    scene: SceneFile,
+    models: Sequence[StoneModel],
+    groups: Groups,
+    assembly: Assembly | None,
+    needs: Plan | None,
+    problems: tuple[str, ...],
+) -> CheckReport:
+    """What is known: of stones that could not be assembled, or of a scene that could not be meshed, less."""
+    kinds = Counter(model.record.kind for model in models)
+    chosen = _modelled(scene, models, groups) if assembly is None else assembly.modelled
+    bodies = Counter(str(one.fidelity) for one in chosen.values())
+    uses = Counter(model.material for model in models)
+    return CheckReport(
+        scene=scene.name,
+        kinds=dict(sorted(kinds.items())),
+        bodies={str(one): bodies[str(one)] for one in Fidelity},
+        ring=sum(one.ring > 0 for one in chosen.values()),
+        stones=tuple(
+            StoneModelling(code, str(one.fidelity), one.reason, one.stress) for code, one in chosen.items()
+        ),
+        materials=tuple(
+            MaterialUse(one.name, one.density, one.young, one.poisson, count) for one, count in uses.items()
+        ),
+        meshes=() if assembly is None else _meshes(assembly.scene),
+        mesh_quality=None if needs is None else _mesh_quality(needs.meshes),
+        simplification=None if assembly is None else simplification_report(assembly.simplified),
+        joints=None
+        if assembly is None
+        else joints_report(assembly.closing, assembly.origin, _hypotheses(assembly)),
+        cost=None if assembly is None or needs is None else _cost(needs, assembly.scene),
+        laws=tuple(describe(one.entry, groups) for one in scene.laws),
+        loads=tuple(describe(entry, groups) for entry in (*scene.loads, *scene.throws)),
+        problems=problems,
+        warnings=() if assembly is None else assembly.remarks,
+    )
+
+
+def _modelled(scene: SceneFile, models: Sequence[StoneModel], groups: Groups) -> Mapping[str, Modelled]:
+    """How stones are modelled of which no joint is known."""
+    return modelled([one.record.code for one in models], {}, wishes_of(scene, models, groups))
+
+
+def _meshes(scene: Scene) -> tuple[MeshUse, ...]:
+    uses = Counter(
+        (str(block.element), block.mesh_size) for block in scene.blocks if block.mesh_size is not None
+    )
+    return tuple(MeshUse(element, size, count) for (element, size), count in uses.items())
+
+
+def _mesh_quality(meshes: MeshReport) -> MeshQualityReport | None:
+    sharpest, worst = meshes.sharpest, meshes.worst
+    if sharpest is None or worst is None:
+        return None
+    return MeshQualityReport(
+        nodes=meshes.nodes,
+        cells=meshes.cells,
+        distinct=meshes.distinct,
+        how=meshes.how,
+        smallest_angle=sharpest.quality.min_dihedral,
+        sharpest=sharpest.code,
+        smallest_jacobian=worst.quality.min_scaled_jacobian,
+        worst=worst.code,
+        retried={one.code: one.failures for one in meshes.retried},
+    )
+
+
+def _unsound_solids(scene: Scene) -> list[str]:
+    problems = []
+    for block in scene.blocks:
+        try:
+            check_watertight(Solid(block.code, block.vertices, block.faces), convex=not block.parts)
+        except GeometryError as error:
+            problems.append(str(error))
+    return problems
+
+
+def _unclosed(assembly: Assembly) -> list[str]:
+    """Stones of which every joint was to be closed and stays open."""
+    if assembly.closing.mode is JointMode.AS_SURVEYED:
+        return []
+    held = {block.code for block in assembly.scene.blocks if block.fidelity is Fidelity.FIXED}
+    closed = {code for one in assembly.closing.joints if not one.left_open for code in one.stones}
+    left = {
+        code: one.left_open
+        for one in reversed(assembly.closing.joints)
+        for code in one.stones
+        if one.left_open and code not in closed | held
+    }
+    if not left:
+        return []
+    first = min(left)
+    return [
+        f"no joint of these could be closed: {_some(sorted(left))}; of {first}, {left[first]}; look at the survey "
+        "there, or allow more by max_displacement in [joints]"
+    ]
+
+
+def _alone(assembly: Assembly) -> list[str]:
+    """Stones that nothing throws or holds, and that face no other across a joint."""
+    if assembly.closing.mode is JointMode.AS_SURVEYED or len(assembly.models) == 1:
+        return []
+    alone = set(assembly.closing.alone)
+    loose = [
+        block.code
+        for block in assembly.scene.blocks
+        if block.code in alone and block.fidelity is not Fidelity.FIXED and not any(block.velocity)
+    ]
+    if not loose:
+        return []
+    return [
+        f"these face no other stone across a joint: {_some(sorted(loose))}; look at max_width, max_angle and "
+        "min_overlap in [joints], or leave them out"
+    ]
+
+
+def _overlapping(assembly: Assembly) -> list[str]:
+    """Stones that begin deep within each other, and would be driven apart."""
+    deep = [one for one in assembly.closing.overlaps if one.depth > _DEEP]
+    return [
+        f"{' and '.join(one.stones)} lie {one.depth * 1e3:.0f} mm in each other; measure them again, or exclude one"
+        for one in sorted(deep, key=lambda one: -one.volume)[:_NAMED]
+    ]
+
+
+def _some(codes: Sequence[str]) -> str:
+    more = f" and {len(codes) - _NAMED} more" if len(codes) > _NAMED else ""
+    return ", ".join(codes[:_NAMED]) + more
+
+
+def _cost(needs: Plan, scene: Scene) -> Cost:
+    expected = expected_cost(needs, scene, machine_slowness())
+    return Cost(
+        pairs=len(needs.pairs),
+        contacts=needs.contacts,
+        unknowns=needs.unknowns,
+        memory=needs.memory,
+        steps=max(1, round(scene.time.duration / scene.time.step)),
+        step=scene.time.step,
+        seconds=expected.seconds,
+        longest=expected.longest,
+        peak=expected.memory,
+    )
+
+
+def _unsupported(needs: Plan) -> list[str]:
+    """Stones that nothing can hold; mostly a selection or a joint is not what was meant."""
+    if not needs.bodies[Fidelity.FIXED]:
+        return ['no stone is fixed, so nothing holds the others; give [bodies] fixed, e.g. ["course = 1"]']
+    if not needs.loose:
+        return []
+    named = _some(needs.loose)
+    return [f"no chain of touching stones ties these to a fixed one: {named}; they will fall"]

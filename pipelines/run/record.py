@@ -1,0 +1,214 @@
+"""From what a simulation gives back to the record of the run that the database keeps, in the frame of the site."""
+
+import math
+import platform
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, is_dataclass
+from functools import cache
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from archmodel.store.measures import solid_volume
+from archmodel.store.run_record import (
+    ContactArrays,
+    ErrorMeasures,
+    JointArrays,
+    RunRecord,
+    SimplificationRecord,
+    StoneResult,
+)
+from mechanics.results.contact_result import ContactResult, JointResult
+from mechanics.results.result import Errors, Result
+from mechanics.scene.scene import Scene
+from pipelines.results.joints_csv import normal_and_shear
+from pipelines.run.assemble import Assembly
+from pipelines.scene.file import SceneFile
+from survey.joints.report import ClosingReport, Joint
+
+__all__ = [
+    "contact_arrays",
+    "joint_arrays",
+    "run_record",
+    "settings_of",
+    "simplifications",
+    "surveyed_widths",
+    "versions",
+]
+
+Array = NDArray[np.float64]
+
+_LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "scikit-fem", "gmsh", "sqlalchemy")
+
+
+def run_record(
+    result: Result,
+    stones: tuple[StoneResult, ...],
+    scene: SceneFile,
+    assembly: Assembly,
+    summary: Mapping[str, Any],
+    as_of: int | None,
+) -> RunRecord:
+    """All that is kept of a run.
+
+    Parameters
+    ----------
+    result : of the simulation
+    stones : its results by stone
+    scene, assembly : what was simulated, as its author wrote it and as it was built
+    summary : the contents of summary.json
+    as_of : the last entry in the database when the stones were read
+    """
+    return RunRecord(
+        scene=scene.name,
+        scene_text=scene.text,
+        outcome=str(result.outcome),
+        summary=summary,
+        versions=versions(),
+        results=stones,
+        settings=settings_of(scene, assembly.scene),
+        as_of=as_of,
+        steps=result.steps,
+        simulated=result.time,
+        wall=summary["time"]["wall"],
+        errors=_errors(result.errors),
+        joints=joint_arrays(
+            result.joints,
+            assembly.origin,
+            surveyed_widths(result.joints, [block.code for block in result.scene.blocks], assembly.closing),
+        ),
+        contacts=contact_arrays(result.contacts, assembly.origin),
+        simplifications=simplifications(assembly),
+    )
+
+
+def joint_arrays(joints: JointResult, origin: Array, widths: Array) -> JointArrays:
+    """The joints in the frame of the site; places are counted from `origin` (3,), `widths` (nj,) as surveyed [m]."""
+    normal, shear = normal_and_shear(joints)
+    return JointArrays(
+        stones=joints.bodies,
+        centroid=joints.centroid + origin,
+        normal=joints.frame[:, 0],
+        area=joints.area,
+        parted=joints.parted,
+        force_normal=normal,
+        force_shear=shear,
+        pressure_mean=joints.pressure_mean,
+        pressure_max=joints.pressure_max,
+        kern=joints.kern,
+        friction_use=joints.friction_use,
+        slipping=joints.slipping,
+        open=joints.open,
+        gap=joints.gap,
+        opening=joints.opening,
+        sliding=joints.sliding,
+        width=widths,
+    )
+
+
+def contact_arrays(contacts: ContactResult, origin: Array) -> ContactArrays:
+    """The contact points, as `joint_arrays`."""
+    return ContactArrays(
+        stones=contacts.bodies,
+        joint=contacts.joint,
+        point=contacts.point + origin,
+        normal=contacts.normal,
+        force=contacts.force,
+        area=contacts.area,
+        gap=contacts.gap,
+        opening=contacts.opening,
+        slide=contacts.slide,
+        status=contacts.status,
+    )
+
+
+def surveyed_widths(joints: JointResult, codes: Sequence[str], closing: ClosingReport) -> Array:
+    """How wide each joint of a run (nj,) was surveyed [m]; NaN where two stones touch that were not found to face.
+
+    Parameters
+    ----------
+    joints : of the run
+    codes : of its stones, in the order of their numbers
+    closing : what was found of the joints before it. Of several joints of two stones, the one that lies most alike
+    """
+    known: dict[frozenset[str], list[Joint]] = defaultdict(list)
+    for one in closing.joints:
+        known[frozenset(one.stones)].append(one)
+    widths = np.full(len(joints.area), np.nan)
+    for number, (stones, frame) in enumerate(zip(joints.bodies.tolist(), joints.frame, strict=True)):
+        found = known.get(frozenset(codes[stone] for stone in stones))
+        if found:
+            alike = max(found, key=lambda one: abs(float(one.normal @ frame[0])))
+            # stones that were measured into each other say nothing of the mortar between them
+            widths[number] = alike.width if alike.width >= 0.0 else np.nan
+    return widths
+
+
+def simplifications(assembly: Assembly) -> tuple[SimplificationRecord, ...]:
+    """The solids that stood for the stones, compared with those of the survey."""
+    mode, records = str(assembly.closing.mode), []
+    for model, simple, block in zip(assembly.models, assembly.simplified, assembly.scene.blocks, strict=True):
+        surveyed, vertices = model.record.solid_vertices - assembly.origin, block.vertices
+        measured, _ = solid_volume(surveyed, model.record.solid_faces)
+        volume, _ = solid_volume(vertices, block.faces)
+        apart = np.linalg.norm(vertices[:, None] - surveyed[None], axis=2)
+        records.append(
+            SimplificationRecord(
+                code=block.code,
+                mode=mode,
+                displacement_max=float(apart.min(axis=1).max()),
+                volume_change=volume / measured - 1.0,
+                vertices=vertices + assembly.origin,
+                faces=block.faces,
+                shape=str(simple.shape),
+                blockiness=float(simple.report.blockiness),
+                worst_angle=math.radians(simple.report.worst_angle),
+                within_tolerance=bool(simple.report.within),
+            )
+        )
+    return tuple(records)
+
+
+def settings_of(scene: SceneFile, built: Scene) -> dict[str, Any]:
+    """Time, solver, contact and joints as they were used, defaults filled in; laws of single joints are in the text."""
+    contact = built.contact
+    return {
+        "gravity": list(built.gravity),
+        "joints": _values(scene.joints),
+        "contact": {
+            "law": {"type": type(contact.law).__name__, **_values(contact.law)},
+            "alert_distance": contact.alert_distance,
+            "points": contact.points,
+            "placement": str(contact.placement),
+        },
+        "time": _values(built.time),
+        "solver": _values(built.solver),
+    }
+
+
+@cache
+def versions() -> Mapping[str, str]:
+    """Of MOMA, of Python and of the libraries that the numbers come from."""
+    libraries = {name: version(name) for name in _LIBRARIES}
+    return {"moma": version("moma-masonry"), "python": platform.python_version(), **libraries}
+
+
+def _errors(errors: Errors) -> ErrorMeasures:
+    """The error measures; None where one could not be measured."""
+    measured = {name: getattr(errors, name) for name in ErrorMeasures.__dataclass_fields__}
+    return ErrorMeasures(
+        **{name: value if math.isfinite(value) else None for name, value in measured.items()}
+    )
+
+
+def _values(settings: object) -> dict[str, Any]:
+    """Fields of a settings value, choices as texts."""
+    if not is_dataclass(settings) or isinstance(settings, type):
+        return {}
+    return {
+        name: value if isinstance(value, bool | int | float | None) else str(value)
+        for name, value in asdict(settings).items()
+    }

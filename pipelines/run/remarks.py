@@ -1,0 +1,78 @@
+"""What the author of a scene should know of it: what it says without effect, and how far to trust its stresses."""
+
+from collections.abc import Iterator, Mapping
+
+from mechanics.scene.scene import Fidelity
+from pipelines.run.fidelity import Modelled
+from pipelines.scene.file import SceneFile
+from pipelines.scene.selection import STRESS, Groups
+
+__all__ = ["remarks"]
+
+_STRESS = 'ask for their stress by stress in [output], or give default = "deformable" in [bodies]'
+
+
+def remarks(scene: SceneFile, groups: Groups, modelled: Mapping[str, Modelled]) -> tuple[str, ...]:
+    """What has no effect, with its place and what would give it one; and whether stresses are beside rigid stones.
+
+    Parameters
+    ----------
+    scene : as its author wrote it
+    groups : which stones its tables name
+    modelled : by code, how each stone is modelled
+    """
+    soft = {code for code, one in modelled.items() if one.fidelity is Fidelity.DEFORMABLE}
+    return (
+        *_of_meshes(scene, groups, soft),
+        *_of_stress(scene, groups, modelled),
+        *_of_ring(scene, modelled),
+        *_of_surroundings(scene, modelled),
+    )
+
+
+def _of_meshes(scene: SceneFile, groups: Groups, soft: set[str]) -> Iterator[str]:
+    lines, where = scene.document.lines, scene.document.where
+    if ("mesh",) in lines and not soft:
+        yield f"{where('mesh')}: [mesh] has no effect: no stone deforms; {_STRESS}"
+    for entry in scene.meshes:
+        if not groups[entry.path][0] & soft:
+            yield f"{where(*entry.path)}: [[meshes]] has no effect: none of its stones deforms; {_STRESS}"
+
+
+def _of_ring(scene: SceneFile, modelled: Mapping[str, Modelled]) -> Iterator[str]:
+    region = scene.output.stress is not None and any(one.stress for one in modelled.values())
+    ringed = any(one.ring for one in modelled.values())
+    for table, key, used, reason in (
+        ("bodies", "ring", region, "no stress in [output] asks for that of a stone"),
+        ("mesh", "ring_size", ringed, "no stone deforms for the stress of another"),
+    ):
+        if (table, key) not in scene.document.lines:
+            continue
+        if scene.bodies.default is not None:
+            reason = 'it goes with default = "auto" and stress in [output]'
+        elif used:
+            continue
+        yield f"{scene.document.where(table, key)}: {key} has no effect: {reason}"
+
+
+def _of_stress(scene: SceneFile, groups: Groups, modelled: Mapping[str, Modelled]) -> Iterator[str]:
+    where, asked = scene.document.where, groups[STRESS][0]
+    without = sorted(code for code in asked if modelled[code].fidelity is not Fidelity.DEFORMABLE)
+    if asked and len(without) == len(asked):
+        reason = modelled[without[0]].reason
+        yield f"{where(*STRESS)}: stress has no effect: none of its stones deforms ({without[0]}: {reason})"
+    else:
+        rigid = [code for code in without if modelled[code].fidelity is Fidelity.RIGID]
+        if rigid:
+            reason = modelled[rigid[0]].reason
+            yield f"{where(*STRESS)}: {len(rigid)} of the stones of stress have none: {rigid[0]} is rigid ({reason})"
+
+
+def _of_surroundings(scene: SceneFile, modelled: Mapping[str, Modelled]) -> Iterator[str]:
+    rigid = sum(one.fidelity is Fidelity.RIGID for one in modelled.values())
+    if scene.bodies.default is None and rigid and any(one.stress for one in modelled.values()):
+        yield (
+            f"{scene.document.where('bodies')}: {rigid} stones are rigid and spread forces otherwise than elastic "
+            "ones, so stresses may be off by tens of per cent; ring = 99 in [bodies] lets all of them deform, "
+            "coarsely (docs/accuracy.md, section 13)"
+        )

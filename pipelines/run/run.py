@@ -1,0 +1,168 @@
+"""A scene from file to results: assemble, simulate, write, and keep the results in the database."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from archmodel.database.session import open_database
+from archmodel.store.run_record import StoneResult
+from archmodel.store.store_runs import store_run
+from archmodel.tables.entries import latest_entry
+from mechanics.results.result import Outcome, Result
+from mechanics.simulate import simulate
+from moma.errors import DatabaseError, MissingLibraryError
+from pipelines.draw.pictures import draw_pictures, missing
+from pipelines.progress import Listener, Progress, silent
+from pipelines.reports.run import write_report
+from pipelines.results.folder import check_replaceable, replacing
+from pipelines.results.joints_csv import write_joints
+from pipelines.results.vtk import write_frames
+from pipelines.run.assemble import Assembly, assemble_stones
+from pipelines.run.record import run_record
+from pipelines.run.stone_values import stone_results
+from pipelines.run.summary import as_json, summarise
+from pipelines.scene.file import SceneFile, read_scene
+from pipelines.scene.selection import select_groups, select_stones
+from pipelines.tuning.expected_errors import ProfileReport, profile_report
+from pipelines.tuning.profiles import with_profile
+
+__all__ = ["RunReport", "run_scene", "write_results"]
+
+_USUAL = ("von_mises", "displacement")  # pictures where a scene asks for none in particular
+
+
+@dataclass(frozen=True)
+class RunReport:
+    """What a run left behind.
+
+    Attributes
+    ----------
+    folder : where the results lie
+    summary : the contents of summary.json
+    warnings : what went less well than asked
+    run : number of the run in the database
+    """
+
+    folder: Path
+    summary: dict[str, Any]
+    warnings: tuple[str, ...]
+    run: int
+
+
+def run_scene(
+    path: str | Path,
+    url: str,
+    folder: str | Path,
+    progress: Listener = silent,
+    profile: str | None = None,
+) -> RunReport:
+    """Run a scene file on the stones of a database, and write the results into a folder.
+
+    Parameters
+    ----------
+    path : scene file
+    url : of the database
+    folder : of the results; earlier results there are replaced when the new ones are complete
+    progress : told of every stage
+    profile : name of the profile whose settings go before the scene's; None: the scene as it is written
+
+    Raises
+    ------
+    UsageError : the folder holds other things, or there is no such profile
+    SceneError, GeometryError, MeshError, SolverError : see `assemble` and `mechanics.simulate`
+    DatabaseError : the database cannot be read, or not written at the end; the folder is complete then
+    """
+    seconds: dict[str, float] = {}
+    folder, scene = Path(folder), read_scene(path)
+    check_replaceable(folder)
+    with open_database(url, create=False) as database:
+        with _timed(seconds, "blocks"), database.session(read_only=True) as session:
+            as_of, models = latest_entry(session), select_stones(scene, session)
+            scene = with_profile(scene, profile, models)
+            assembly = assemble_stones(scene, models, select_groups(scene, session, models))
+        result = simulate(assembly.scene, progress)
+        seconds |= result.wall_time
+        stones, reached = stone_results(result), profile_report(profile, scene, result)
+        with replacing(folder) as fresh:
+            summary, warnings = write_results(
+                result, stones, scene, assembly, fresh, seconds, progress, reached
+            )
+        record = run_record(result, stones, scene, assembly, summary, as_of)
+        try:
+            with database.session() as session:
+                run = store_run(session, record)
+        except DatabaseError as error:
+            what = f"the results are in {folder}, but could not be stored: {error.what}"
+            raise DatabaseError(what, where=error.where, remedy=error.remedy) from error
+    return RunReport(folder, summary, warnings, run)
+
+
+def write_results(
+    result: Result,
+    stones: tuple[StoneResult, ...],
+    scene: SceneFile,
+    assembly: Assembly,
+    folder: Path,
+    seconds: dict[str, float],
+    progress: Listener = silent,
+    profile: ProfileReport | None = None,
+) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Write all files of a run into an empty folder; the summary, and what could not be done.
+
+    Pictures that cannot be drawn on this machine are a warning; everything else is written.
+    """
+    warnings = list(assembly.remarks)
+    # a relaxed equilibrium counts by its end alone, whose steps are all solved
+    relaxed = result.outcome is Outcome.EQUILIBRIUM and result.scene.time.relaxation
+    if result.errors.unconverged_steps and not relaxed:
+        warnings.append(
+            f"{result.errors.unconverged_steps} of {result.steps} steps were left above the solver's "
+            "tolerance; allow more max_iterations in [solver], or a smaller step in [time]"
+        )
+    if result.static is not None and not result.static.found:
+        warnings.append(
+            f"no static equilibrium was found in {result.static.steps} steps, with balance "
+            f"{result.static.balance:.1e}; the run began at rest, all loads at once"
+        )
+    with _timed(seconds, "files"):
+        progress(Progress("write", 0, 3, "results.pvd"))
+        write_frames(result, folder)
+        write_joints(folder / "joints.csv", result, assembly.origin)
+    with _timed(seconds, "pictures"):
+        progress(Progress("write", 1, 3, "pictures"))
+        pictures, omitted = _pictures(scene, result)
+        warnings += omitted
+        try:
+            draw_pictures(result, folder, pictures, assembly.towards)
+        except MissingLibraryError as error:
+            warnings.append(f"no pictures: {error}")
+    progress(Progress("write", 2, 3, "report.html"))
+    summary = summarise(result, version=version("moma-masonry"), seconds=seconds, profile=profile)
+    write_report(folder / "report.html", result, summary, stones, warnings)
+    (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
+    summary["origin"] = assembly.origin.tolist()
+    summary["warnings"] = warnings
+    summary["files"] = sorted(["summary.json", *(entry.name for entry in folder.iterdir())])
+    (folder / "summary.json").write_text(as_json(summary), encoding="utf-8")
+    progress(Progress("write", 3, 3))
+    return summary, tuple(warnings)
+
+
+def _pictures(scene: SceneFile, result: Result) -> tuple[tuple[str, ...], list[str]]:
+    """The pictures to draw, and what to say of those that were asked for but would show nothing."""
+    asked = _USUAL if scene.output.pictures is None else scene.output.pictures
+    reasons = {name: missing(result, name) for name in asked}
+    omitted = [f"no picture {name}: {reason}" for name, reason in reasons.items() if reason is not None]
+    drawn = tuple(name for name, reason in reasons.items() if reason is None)
+    return drawn, [] if scene.output.pictures is None else omitted
+
+
+@contextmanager
+def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
+    start = time.perf_counter()
+    yield
+    seconds[stage] = time.perf_counter() - start

@@ -1,0 +1,120 @@
+"""summary.json: the run in a few numbers, for people and for programs."""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from mechanics.results.contact_result import JointResult
+from mechanics.results.result import Result
+from mechanics.scene.scene import Fidelity
+from pipelines.run.stone_values import stress_statistics
+from pipelines.tuning.expected_errors import ProfileReport
+from pipelines.tuning.quantities import quantities
+
+__all__ = ["as_json", "summarise"]
+
+
+def summarise(
+    result: Result, *, version: str, seconds: Mapping[str, float], profile: ProfileReport | None = None
+) -> dict[str, Any]:
+    """The contents of summary.json, in SI units.
+
+    Parameters
+    ----------
+    result : of the simulation
+    version : of MOMA
+    seconds : wall time by stage, of the simulation and of what went before and after it [s]
+    profile : at which it ran
+
+    Numbers that are not finite become None: JSON has no word for them.
+    """
+    stress = stress_statistics(result)
+    displacement = max(float(np.linalg.norm(body.displacement, axis=1).max()) for body in result.bodies)
+    fidelities = [body.fidelity for body in result.bodies]
+    summary: dict[str, Any] = {
+        "scene": result.scene.name,
+        "outcome": str(result.outcome),
+        "bodies": {
+            str(one): fidelities.count(one) for one in (Fidelity.RIGID, Fidelity.DEFORMABLE, Fidelity.FIXED)
+        },
+        "contacts": len(result.contacts.gap),
+        "steps": result.steps,
+        "time": {
+            "simulated": result.time,
+            "rest": result.rest_time,
+            "wall": sum(seconds.values()),
+            "by_stage": dict(seconds),
+        },
+        "errors": asdict(result.errors) | {"stress": quantities(result).stress_error},
+        "solver": {"method": str(result.scene.solver.method), "chosen": dict(result.solvers)},
+        "static": None if result.static is None else asdict(result.static),
+        "von_mises": None if stress is None else asdict(stress),
+        "stress": _stress(result),
+        "joints": _joints(result.joints),
+        "energies": asdict(result.energies),
+        "displacement": {"max": displacement},
+        "settlement": {"max": float(result.history.settlement[-1])},
+        "reaction": {"total_vertical": result.reaction, "weight": result.weight},
+        "profile": None if profile is None else asdict(profile),
+        "version": version,
+    }
+    return {key: _finite(value) for key, value in summary.items()}
+
+
+def as_json(value: Mapping[str, Any] | list[Any]) -> str:
+    """JSON text with a final newline; refuses numbers that JSON cannot say."""
+    return json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _stress(result: Result) -> dict[str, Any] | None:
+    """The worst of all deformable stones, each value with its stone; None if none deforms."""
+    values = [(body.code, body.values) for body in result.bodies if body.values is not None]
+    if not values:
+        return None
+    pulled, tension = max(values, key=lambda pair: pair[1].principal_tension)
+    pressed, compression = min(values, key=lambda pair: pair[1].principal_compression)
+    worst, error = max(values, key=lambda pair: pair[1].error)
+    used = [(code, one.utilisation, one.governing) for code, one in values if one.utilisation is not None]
+    code, utilisation, governing = max(used, key=lambda one: one[1], default=(None, None, None))
+    return {
+        "tension": {
+            "value": tension.principal_tension,
+            "stone": pulled,
+            "point": tension.tension_point.tolist(),
+            "direction": tension.tension_direction.tolist(),
+        },
+        "compression": {
+            "value": compression.principal_compression,
+            "stone": pressed,
+            "point": compression.compression_point.tolist(),
+            "direction": compression.compression_direction.tolist(),
+        },
+        "utilisation": {"value": utilisation, "stone": code, "governing": governing},
+        "error": {"value": error.error, "stone": worst},
+    }
+
+
+def _joints(joints: JointResult) -> dict[str, Any]:
+    return {
+        "count": len(joints),
+        "pressed": int(joints.pressed.sum()),
+        "parted": int(joints.parted.sum()),
+        "out_of_kern": int((joints.pressed & ~joints.in_kern).sum()),
+        "largest_opening": float(joints.opening.max(initial=0.0)),
+        "largest_sliding": float(joints.sliding.max(initial=0.0)),
+        "largest_pressure": float(joints.pressure_max.max(initial=0.0)),
+    }
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(one) for key, one in value.items()}
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

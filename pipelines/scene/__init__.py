@@ -1,0 +1,1 @@
+"""Scene files: keys, selection, laws and loads."""

@@ -1,0 +1,136 @@
+"""Tables of which a scene file may hold many: each checked by its type, with its histories read."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Any
+
+from mechanics.scene.loads.accelerogram import Accelerogram
+from mechanics.scene.loads.tables import read_history
+from mechanics.scene.loads.time_series import History
+from pipelines.scene.array_keys import HISTORY_FILE
+from pipelines.toml.lines import Path
+from pipelines.toml.schema import Document, Key, Kind, check_table
+
+__all__ = ["Entry", "describe", "file_beside", "read_entries"]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One table of an array.
+
+    Attributes
+    ----------
+    path : where it stands, for messages: ("loads", "0")
+    type : one of those the array knows
+    values : of all its keys but `type`, defaults filled in, histories read
+    groups : key, and codes or expressions, of each group of stones that it names
+    """
+
+    path: Path
+    type: str
+    values: Mapping[str, Any]
+    groups: tuple[tuple[str, tuple[str, ...]], ...]
+
+
+def read_entries(
+    document: Document,
+    given: Mapping[str, Any],
+    name: str,
+    types: Mapping[str, tuple[Key, ...]],
+    common: tuple[Key, ...] = (),
+) -> tuple[Entry, ...]:
+    """All tables [[name]]; where there is but one type, it is not written."""
+    tables = given.get(name, [])
+    if not isinstance(tables, list) or not all(isinstance(one, dict) for one in tables):
+        document.fail(f"{name!r} is not a list of tables", name, remedy=f"write [[{name}]] above each")
+    return tuple(
+        _entry(document, (name, str(index)), table, types, common) for index, table in enumerate(tables)
+    )
+
+
+def describe(entry: Entry, groups: Mapping[Path, Sequence[frozenset[str]]]) -> str:
+    """An entry in words: its type, its stones, and the values that it gives."""
+    stones = " and ".join(f"{len(codes)} stones" for codes in groups[entry.path])
+    values = ", ".join(
+        f"{name} {_shown(value)}"
+        for name, value in entry.values.items()
+        if value not in (None, ()) and name not in {key for key, _ in entry.groups}
+    )
+    return f"{entry.type}{f', {stones}' if stones else ''}: {values}"
+
+
+def _shown(value: Any) -> str:
+    """A value in a few words."""
+    match value:
+        case tuple() | list():
+            return f"({', '.join(map(_shown, value))})"
+        case History() if len(value.time) == 1:
+            return _shown(value.value[0].tolist())
+        case History():
+            return f"from {value.time[0]:g} s to {value.time[-1]:g} s"
+        case Accelerogram():
+            rest = f"{value.velocity[-1]:.2g} m/s, {value.displacement[-1]:.2g} m"
+            return f"{value.name!r} ({value.duration:g} s, peak {value.peak:.3g} m/s², ends with {rest})"
+        case float():
+            return f"{value:g}"
+        case _:
+            return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def file_beside(document: Document, name: str) -> FilePath:
+    """A file that a scene names; its path is relative to the scene file."""
+    return FilePath(document.path).parent / name
+
+
+def _entry(
+    document: Document,
+    path: Path,
+    table: Mapping[str, Any],
+    types: Mapping[str, tuple[Key, ...]],
+    common: tuple[Key, ...],
+) -> Entry:
+    title, given = f"[[{path[0]}]]", dict(table)
+    kind = next(iter(types))
+    if len(types) > 1:
+        which = Key("type", Kind.TEXT, "What it is.", choices=tuple(types))
+        kind = str(
+            check_table(document, path, {k: v for k, v in table.items() if k == "type"}, [which], title)[
+                "type"
+            ]
+        )
+        given.pop("type")
+        title = f"[[{path[0]}]] of type {kind!r}"
+    keys = (*types[kind], *common)
+    values = check_table(document, path, given, keys, title)
+    for key in keys:
+        if key.kind in (Kind.HISTORY, Kind.VECTOR_HISTORY) and values[key.name] is not None:
+            values[key.name] = _history(document, (*path, key.name), values[key.name], key)
+    return Entry(path, kind, values, tuple(_groups(keys, values)))
+
+
+def _groups(keys: Iterable[Key], values: Mapping[str, Any]) -> Iterable[tuple[str, tuple[str, ...]]]:
+    for key in keys:
+        if key.kind is Kind.STONES:
+            yield key.name, values[key.name]
+        elif key.kind is Kind.GROUPS:
+            for group in values[key.name]:
+                yield key.name, group
+
+
+def _history(document: Document, path: Path, value: Any, key: Key) -> History:
+    """A history from a constant, from { time, value }, or from { file }."""
+    if not isinstance(value, dict):
+        return History.constant(value)
+    vector = key.kind is Kind.VECTOR_HISTORY
+    title = f"{key.name} = {{ … }}"
+    if "file" in value:
+        checked = check_table(document, path, value, [HISTORY_FILE], title)
+        parts = ("x", "y", "z") if vector else (key.name,)
+        columns = ", ".join(["time [s]", *(f"{part} [{key.unit}]" for part in parts)])
+        return read_history(file_beside(document, str(checked["file"])), columns)
+    values = Key("value", Kind.ROWS if vector else Kind.NUMBERS, "Values.", key.unit)
+    time = Key("time", Kind.NUMBERS, "Instants.", "s", at_least=0)
+    checked = check_table(document, path, value, [time, values], title)
+    with document.at(*path):
+        return History(checked["time"], checked["value"])  # type: ignore[arg-type]

@@ -1,0 +1,230 @@
+"""Scene files: TOML text → a SceneFile in which every key has been checked.
+
+Nothing runs and no database is read here; stones are still expressions. docs/scene.md lists the keys.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import (
+    ContactSettings,
+    Fidelity,
+    Method,
+    Placement,
+    SolverSettings,
+    Start,
+    TimeSettings,
+)
+from mechanics.stones.materials import Material, Orthotropy
+from mechanics.stones.meshing.elements import Element
+from mechanics.stones.meshing.meshers.choice import Mesher
+from moma.errors import SceneError
+from pipelines.scene.array_keys import ARRAYS
+from pipelines.scene.array_tables import Entry, read_entries
+from pipelines.scene.laws import BONDS, JointLaw, read_laws
+from pipelines.scene.loads import read_loads, read_throws
+from pipelines.scene.settings import Fidelities, MaterialRule, MeshSettings, Output, Selection
+from pipelines.scene.stone_keys import MATERIAL_KEYS, MESH_KEYS, ORTHOTROPY_KEYS
+from pipelines.scene.table_keys import AUTO, PICTURES, TABLES
+from pipelines.toml.lines import key_lines, parse_toml, read_text
+from pipelines.toml.schema import Document, check_table, nearest
+from survey.joints.settings import JointMode, JointSettings
+
+__all__ = ["SceneFile", "parse_scene", "read_scene"]
+
+
+@dataclass(frozen=True)
+class SceneFile:
+    """A scene as its author wrote it, checked, with all defaults filled in.
+
+    Attributes
+    ----------
+    document : file and lines, for error messages
+    text : the file, as it is kept with the run
+    name : title
+    joints : what becomes of joints
+    gravity : (3,) acceleration [m/s²]
+    mesh : finite elements of deformable stones that no entry of `meshes` names
+    meshes : groups of stones that are meshed otherwise
+    laws : of particular joints; the general law is in `contact`
+    loads, throws : what acts besides gravity, and what begins in motion
+    """
+
+    document: Document
+    text: str
+    name: str
+    selection: Selection
+    materials: tuple[MaterialRule, ...]
+    bodies: Fidelities
+    joints: JointSettings
+    contact: ContactSettings
+    gravity: tuple[float, float, float]
+    mesh: MeshSettings
+    meshes: tuple[Entry, ...]
+    time: TimeSettings
+    solver: SolverSettings
+    output: Output
+    laws: tuple[JointLaw, ...]
+    loads: tuple[Entry, ...]
+    throws: tuple[Entry, ...]
+
+
+def read_scene(path: str | Path) -> SceneFile:
+    """Read and check a scene file.
+
+    Raises
+    ------
+    SceneError : with file and line, at the first thing that is wrong
+    """
+    return parse_scene(read_text(path, SceneError, missing="no such scene file"), str(path))
+
+
+def parse_scene(text: str, path: str) -> SceneFile:
+    """Check the text of a scene file; `path` is for the messages."""
+    given = parse_toml(text, path, SceneError, "see docs/scene.md for a scene to start from")
+    document = Document(path, key_lines(text))
+    tables = _checked_tables(document, given)
+    laws = read_laws(document, given)
+    return SceneFile(
+        document=document,
+        text=text,
+        name=tables["scene"]["name"] or Path(path).stem,
+        selection=Selection(**tables["select"]),
+        materials=_materials(document, given),
+        bodies=_fidelities(**tables["bodies"]),
+        joints=_joints(document, laws, **tables["joints"]),
+        contact=_contact(document, **tables["contact"]),
+        gravity=_gravity(document, **tables["gravity"]),
+        mesh=_mesh(**tables["mesh"]),
+        meshes=read_entries(document, given, "meshes", {"mesh": MESH_KEYS}),
+        time=_time(document, tables["time"]),
+        solver=SolverSettings(**tables["solver"] | {"method": Method(tables["solver"]["method"])}),
+        output=_output(document, **tables["output"]),
+        laws=laws,
+        loads=read_loads(document, given),
+        throws=read_throws(document, given),
+    )
+
+
+def _fidelities(*, default: str, **lists: Any) -> Fidelities:
+    return Fidelities(default=None if default == AUTO else Fidelity(default), **lists)
+
+
+def _mesh(*, element: str, mesher: str, **sizes: Any) -> MeshSettings:
+    return MeshSettings(element=Element(element), mesher=Mesher(mesher), **sizes)
+
+
+def _checked_tables(document: Document, given: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    known = [*TABLES, "materials", *ARRAYS]
+    for name, content in given.items():
+        if name in ARRAYS:
+            continue
+        if name not in known:
+            what = f"unknown table [{name}]" if isinstance(content, dict | list) else f"unknown key {name!r}"
+            document.fail(what, name, remedy=nearest(name, known))
+        if not isinstance(content, dict):
+            document.fail(f"{name!r} is not a table", name, remedy=f"write [{name}] on a line of its own")
+    return {name: check_table(document, (name,), given.get(name, {}), keys) for name, keys in TABLES.items()}
+
+
+def _materials(document: Document, given: Mapping[str, Any]) -> tuple[MaterialRule, ...]:
+    tables = given.get("materials", {})
+    if not tables:
+        document.fail("no material", "materials", remedy="add a table such as [materials.limestone]")
+    rules = []
+    for name, content in tables.items():
+        if not isinstance(content, dict):
+            document.fail(
+                f"{name!r} stands in no material", "materials", name, remedy="write it under [materials.NAME]"
+            )
+        plain = {key: value for key, value in content.items() if key != "orthotropy"}
+        values: dict[str, Any] = check_table(document, ("materials", name), plain, MATERIAL_KEYS)
+        stones = values.pop("stones")
+        if "orthotropy" in content:
+            values["orthotropy"] = _orthotropy(document, name, content["orthotropy"])
+        with document.at("materials", name, "orthotropy"):
+            rules.append(MaterialRule(Material(name, **values), stones))
+    general = [rule.material.name for rule in rules if not rule.stones]
+    if len(general) > 1:
+        document.fail(
+            f"materials {' and '.join(map(repr, general))} both lack 'stones'",
+            "materials",
+            general[1],
+            remedy="only one material can be that of all other stones",
+        )
+    return tuple(rules)
+
+
+def _orthotropy(document: Document, material: str, content: Any) -> Orthotropy:
+    path = ("materials", material, "orthotropy")
+    if not isinstance(content, dict):
+        document.fail("'orthotropy' is not a table", *path, remedy=f"write [{'.'.join(path)}]")
+    values: dict[str, Any] = check_table(document, path, content, ORTHOTROPY_KEYS)
+    axes = values.pop("axes")
+    if axes is None:
+        return Orthotropy(**values)
+    lengths = np.linalg.norm(np.array(axes), axis=1)
+    if len(axes) != 3 or not lengths.all():
+        document.fail(
+            "axes are not three directions", *path, "axes", remedy="give for example [[1, 0, 0], …]"
+        )
+    return Orthotropy(**values, axes=tuple(map(tuple, (np.array(axes) / lengths[:, None]).tolist())))
+
+
+def _joints(document: Document, laws: Sequence[JointLaw], mode: str, **settings: float) -> JointSettings:
+    if mode == JointMode.MORTAR and not any(one.entry.type in BONDS for one in laws):
+        document.fail(
+            'mode = "mortar", but no law says how mortar bonds',
+            "joints",
+            "mode",
+            remedy='add [[laws]] of type "mortar" or "cohesive_zone"',
+        )
+    return JointSettings(mode=JointMode(mode), **settings)
+
+
+def _contact(
+    document: Document,
+    friction: float,
+    dynamic_friction: float | None,
+    restitution: float,
+    placement: str,
+    **settings: Any,
+) -> ContactSettings:
+    with document.at("contact", "dynamic_friction"):
+        law = DryJoint(friction, dynamic_friction, restitution)
+    return ContactSettings(law, placement=Placement(placement), **settings)
+
+
+def _gravity(
+    document: Document, magnitude: float, direction: tuple[float, float, float]
+) -> tuple[float, float, float]:
+    length = float(np.linalg.norm(direction))
+    if length == 0.0:
+        document.fail("direction has no length", "gravity", "direction", remedy="give for example [0, 0, -1]")
+    x, y, z = (magnitude * one / length for one in direction)
+    return x, y, z
+
+
+def _time(document: Document, values: dict[str, Any]) -> TimeSettings:
+    if values["duration"] < values["step"]:
+        document.fail(
+            f"duration = {values['duration']:g} s is shorter than step = {values['step']:g} s",
+            "time",
+            "duration",
+            remedy="give at least one step",
+        )
+    return TimeSettings(**values | {"start": Start(values["start"])})
+
+
+def _output(
+    document: Document, frame_every: int, stress: tuple[str, ...] | None, pictures: tuple[str, ...] | None
+) -> Output:
+    for name in pictures or ():
+        if name not in PICTURES:
+            document.fail(f"unknown picture {name!r}", "output", "pictures", remedy=nearest(name, PICTURES))
+    return Output(frame_every, stress, pictures)

@@ -1,0 +1,83 @@
+"""The laws of particular joints, from [[laws]] of a scene file to rules between groups of stones."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from mechanics.scene.laws.cohesive_zone import CohesiveZone
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.laws.law import Law
+from mechanics.scene.laws.lennard_jones import LennardJones
+from mechanics.scene.laws.mortar import MortarJoint
+from mechanics.scene.scene import LawRule
+from pipelines.scene.array_keys import LAW_KEYS, LAW_TYPES
+from pipelines.scene.array_tables import Entry, read_entries
+from pipelines.toml.schema import Document, nearest
+
+__all__ = ["BONDS", "JointLaw", "law_rules", "read_laws"]
+
+# types of laws that are mortar
+BONDS = ("mortar", "cohesive_zone")
+
+_CLASSES: Mapping[str, type[Law]] = {
+    "dry": DryJoint,
+    "mortar": MortarJoint,
+    "cohesive_zone": CohesiveZone,
+    "lennard_jones": LennardJones,
+}
+
+
+@dataclass(frozen=True)
+class JointLaw:
+    """A law and the table that it was made from; it names two materials, two groups of stones, or neither."""
+
+    entry: Entry
+    law: Law
+
+
+def read_laws(document: Document, given: Mapping[str, Any]) -> tuple[JointLaw, ...]:
+    """Check and make all laws; the stones between which they hold are still expressions."""
+    materials = tuple(given.get("materials", {}))
+    return tuple(
+        _law(document, entry, materials)
+        for entry in read_entries(document, given, "laws", LAW_TYPES, LAW_KEYS)
+    )
+
+
+def _law(document: Document, entry: Entry, materials: Sequence[str]) -> JointLaw:
+    named = entry.values["materials"]
+    if named and entry.values["between"]:
+        remedy = "give one of them, or neither for all joints"
+        document.fail("both 'materials' and 'between'", *entry.path, "between", remedy=remedy)
+    if named and len(named) != 2:
+        remedy = "give two names; twice the same for the joints within one material"
+        document.fail(f"{len(named)} materials", *entry.path, "materials", remedy=remedy)
+    for name in named:
+        if name not in materials:
+            what = f"unknown material {name!r}"
+            document.fail(what, *entry.path, "materials", remedy=nearest(name, materials))
+    parameters = {key.name: entry.values[key.name] for key in LAW_TYPES[entry.type]}
+    with document.at(*entry.path):
+        return JointLaw(entry, _CLASSES[entry.type](**parameters))
+
+
+def law_rules(
+    document: Document,
+    laws: Iterable[JointLaw],
+    groups: Mapping[tuple[str, ...], Sequence[frozenset[str]]],
+    materials: Mapping[str, str],
+) -> tuple[LawRule, ...]:
+    """Rules between groups of codes; `materials` is the name of the material of each stone, by code."""
+    rules = []
+    for one in laws:
+        path, named = one.entry.path, one.entry.values["materials"]
+        sides = list(groups[path])
+        for name in named:
+            side = frozenset(code for code, material in materials.items() if material == name)
+            if not side:
+                what = f"no selected stone is of {name!r}"
+                document.fail(what, *path, "materials", remedy="leave the law out, or select its stones")
+            sides.append(side)
+        first, second = sides or [frozenset(materials)] * 2
+        rules.append(LawRule(first, second, one.law))
+    return tuple(rules)

@@ -1,0 +1,187 @@
+"""What acts on the stones of a scene, from [[loads]] and [[throw]] of a scene file to the loads of the mechanics."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from mechanics.scene.loads.accelerogram import Accelerogram
+from mechanics.scene.loads.forces import StoneForce
+from mechanics.scene.loads.gravity import GravityRamp, TiltingTable
+from mechanics.scene.loads.ground_motion import Component, GroundMotion
+from mechanics.scene.loads.load import Force, GravityChange, Loads, Motion
+from mechanics.scene.loads.motions import ImposedMotion, settlement, spreading
+from mechanics.scene.loads.record_files import read_accelerogram
+from mechanics.scene.loads.record_processing import band_pass, without_drift
+from mechanics.scene.loads.time_series import History
+from mechanics.scene.scene import Block, Fidelity
+from mechanics.stones.polyhedra import mass_properties
+from pipelines.scene.array_keys import LOAD_TYPES, THROW_KEYS
+from pipelines.scene.array_tables import Entry, file_beside, read_entries
+from pipelines.toml.schema import Document
+
+__all__ = ["build_loads", "read_loads", "read_throws", "thrown"]
+
+Codes = frozenset[str]
+Groups = Mapping[tuple[str, ...], Sequence[Codes]]
+Blocks = Mapping[str, Block]
+
+
+def read_loads(document: Document, given: Mapping[str, Any]) -> tuple[Entry, ...]:
+    """Check all loads, and read their records; their stones are still expressions."""
+    entries = read_entries(document, given, "loads", LOAD_TYPES)
+    for entry in entries:
+        if entry.type == "tilt" and (entry.values["rate"] is None) == (entry.values["angle"] is None):
+            document.fail("a tilt by rate or by angle", *entry.path, remedy="give either 'rate' or 'angle'")
+        if entry.type == "motion" and entry.values["pivot"] is None and entry.values["spin"].value.any():
+            document.fail("a spin without a pivot", *entry.path, "spin", remedy="give a point of its axis")
+    return tuple(
+        _with_records(document, entry) if entry.type == "ground_motion" else entry for entry in entries
+    )
+
+
+def read_throws(document: Document, given: Mapping[str, Any]) -> tuple[Entry, ...]:
+    """Check all initial motions; their stones are still expressions."""
+    return read_entries(document, given, "throw", {"throw": THROW_KEYS})
+
+
+def build_loads(document: Document, entries: Iterable[Entry], groups: Groups, blocks: Blocks) -> Loads:
+    """The loads on the blocks, given by code; `groups` are the codes that each entry names.
+
+    Raises
+    ------
+    SceneError : at the entry whose stones do not suit it
+    """
+    gravity: list[GravityChange] = []
+    forces: list[Force] = []
+    motions: list[Motion] = []
+    supports: dict[str, str] = {}
+    for entry in entries:
+        codes, values = groups[entry.path], entry.values
+        with document.at(*entry.path):
+            if entry.type == "gravity_ramp":
+                gravity.append(GravityRamp(values["duration"]))
+            elif entry.type == "tilt":
+                gravity.append(_tilt(values))
+            elif entry.type == "force":
+                forces.append(_force(document, entry, codes[0], blocks))
+            else:
+                _check_supports(document, entry, codes, blocks, supports)
+                motions += _MOTIONS[entry.type](values, codes)
+    return Loads(tuple(gravity), tuple(forces), tuple(motions))
+
+
+def thrown(
+    document: Document, entries: Iterable[Entry], groups: Groups, blocks: Blocks
+) -> dict[str, tuple[float, ...]]:
+    """Initial velocity (6,) [m/s, rad/s] of every stone that begins in motion, by code."""
+    found: dict[str, tuple[float, ...]] = {}
+    for entry in entries:
+        velocity = (*entry.values["velocity"], *(float(np.radians(one)) for one in entry.values["spin"]))
+        for code in sorted(groups[entry.path][0]):
+            if blocks[code].fidelity is Fidelity.FIXED:
+                what = f"stone {code} is thrown, but it is fixed"
+                document.fail(what, *entry.path, "stones", remedy="leave it out, or let it be rigid")
+            if code in found:
+                document.fail(f"stone {code} is thrown twice", *entry.path, "stones", remedy="name it once")
+            found[code] = velocity
+    return found
+
+
+def _with_records(document: Document, entry: Entry) -> Entry:
+    """The entry with its records in the place of their file names."""
+    values = dict(entry.values)
+    if not any(values[axis] for axis in "xyz"):
+        document.fail("a ground motion without a record", *entry.path, remedy="give at least one of x, y, z")
+    for axis in "xyz":
+        if values[axis] is not None:
+            values[axis] = _record(document, entry, axis)
+    return Entry(entry.path, entry.type, values, entry.groups)
+
+
+def _record(document: Document, entry: Entry, axis: str) -> Accelerogram:
+    values = entry.values
+    path = file_beside(document, values[axis])
+    if path.suffix.lower() != ".at2" and values["unit"] is None:
+        what = f"the unit of the acceleration in {values[axis]!r} is not known"
+        document.fail(what, *entry.path, axis, remedy="give 'unit'")
+    record = read_accelerogram(path, values["unit"])
+    with document.at(*entry.path, axis):
+        if values["low"] is not None or values["high"] is not None:
+            record = band_pass(record, values["low"], values["high"], values["order"])
+        return without_drift(record, values["baseline"]) if values["baseline"] else record
+
+
+def _tilt(values: Mapping[str, Any]) -> TiltingTable:
+    if values["angle"] is None:
+        return TiltingTable.at_rate_degrees(values["axis"], values["rate"], values["limit"], values["start"])
+    return TiltingTable(values["axis"], _in_radians(values["angle"]))
+
+
+def _force(document: Document, entry: Entry, codes: Codes, blocks: Blocks) -> StoneForce:
+    values, point = entry.values, entry.values["point"]
+    for code in sorted(codes):
+        if blocks[code].fidelity is not Fidelity.RIGID:
+            what = f"a force on stone {code}, which is {blocks[code].fidelity}"
+            document.fail(what, *entry.path, "stones", remedy="forces act on rigid stones; leave it out")
+    if point is None:
+        return StoneForce(codes, values["force"], follows=values["follows"])
+    if len(codes) > 1:
+        what = f"one point for {len(codes)} stones"
+        document.fail(what, *entry.path, "point", remedy="name one stone, or leave the point out")
+    (code,) = codes
+    block = blocks[code]
+    x, y, z = (np.array(point) - mass_properties(block.vertices, block.faces, code).centroid).tolist()
+    return StoneForce(codes, values["force"], (x, y, z), values["follows"])
+
+
+def _check_supports(
+    document: Document, entry: Entry, groups: Sequence[Codes], blocks: Blocks, taken: dict[str, str]
+) -> None:
+    """Only fixed stones can be moved, and each by one load only; `taken` says by which."""
+    for (key, _), codes in zip(entry.groups, groups, strict=True):
+        for code in sorted(codes):
+            if blocks[code].fidelity is not Fidelity.FIXED:
+                what = f"stone {code} is to be moved, but it is {blocks[code].fidelity}"
+                document.fail(what, *entry.path, key, remedy="name it under 'fixed' in [bodies]")
+            if code in taken:
+                what = f"stone {code} is moved by two loads, {taken[code]} and {entry.type}"
+                document.fail(what, *entry.path, key, remedy="name it in one of them")
+            taken[code] = entry.type
+
+
+def _settlement(values: Mapping[str, Any], groups: Sequence[Codes]) -> tuple[Motion, ...]:
+    return (settlement(groups[0], values["displacement"], values["duration"], values["start"]),)
+
+
+def _spreading(values: Mapping[str, Any], groups: Sequence[Codes]) -> tuple[Motion, ...]:
+    names = ("direction", "distance", "duration", "start")
+    return spreading(groups[0], groups[1], **{name: values[name] for name in names})
+
+
+def _motion(values: Mapping[str, Any], groups: Sequence[Codes]) -> tuple[Motion, ...]:
+    pivot = values["pivot"] or (0.0, 0.0, 0.0)
+    spin = _in_radians(values["spin"])
+    return (ImposedMotion(groups[0], values["velocity"], spin, values["axis"], pivot),)
+
+
+def _ground_motion(values: Mapping[str, Any], groups: Sequence[Codes]) -> tuple[Motion, ...]:
+    turn = np.radians(values["azimuth"])
+    along, across = (np.cos(turn), np.sin(turn), 0.0), (-np.sin(turn), np.cos(turn), 0.0)
+    directions = {"x": along, "y": across, "z": (0.0, 0.0, 1.0)}
+    components = tuple(
+        Component(directions[axis], values[axis]) for axis in "xyz" if values[axis] is not None
+    )
+    return (GroundMotion(groups[0], components, values["scale"], values["start"]),)
+
+
+_MOTIONS: Mapping[str, Callable[[Mapping[str, Any], Sequence[Codes]], tuple[Motion, ...]]] = {
+    "settlement": _settlement,
+    "spreading": _spreading,
+    "motion": _motion,
+    "ground_motion": _ground_motion,
+}
+
+
+def _in_radians(history: History) -> History:
+    return History(history.time, np.radians(history.value), history.outside)

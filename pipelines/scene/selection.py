@@ -1,0 +1,180 @@
+"""Which stones a scene means, and how each is modelled: its expressions, asked of the database."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from sqlalchemy.orm import Session
+
+from archmodel.query.api import MAX_EXPRESSIONS, find, find_rows
+from archmodel.store.stone_record import StoneRecord
+from archmodel.store.stones import load_stones
+from mechanics.scene.scene import Fidelity
+from mechanics.stones.materials import Material
+from moma.errors import QueryError, UsageError
+from pipelines.scene.file import SceneFile
+from pipelines.toml.lines import Path
+from pipelines.toml.schema import nearest
+
+__all__ = ["STRESS", "Groups", "StoneModel", "select_groups", "select_stones"]
+
+_CODE = re.compile(r"[\w.:/+-]+")  # a text without blanks or comparison is meant as a code
+
+
+STRESS = ("output", "stress")
+"""Where a scene names the stones whose stress is wanted."""
+
+# the codes of each group of stones that a table of an array names, by the table's path; and those of STRESS
+Groups = Mapping[Path, tuple[frozenset[str], ...]]
+
+
+@dataclass(frozen=True)
+class StoneModel:
+    """One stone of a scene: as surveyed, of what, and what a list of [bodies] makes it; None: no list names it."""
+
+    record: StoneRecord
+    material: Material
+    listed: Fidelity | None
+
+
+def select_stones(scene: SceneFile, session: Session) -> tuple[StoneModel, ...]:
+    """The stones of a scene, in the order of the survey.
+
+    Raises
+    ------
+    SceneError
+        at the key whose expression cannot be understood or names no stone, or where a stone would have no
+        material, or two
+    """
+    records = _selected(scene, session)
+    materials = _materials(scene, session, records)
+    fidelities = _fidelities(scene, session, records)
+    return tuple(
+        StoneModel(record, materials[code], fidelities.get(code)) for code, record in records.items()
+    )
+
+
+def select_groups(scene: SceneFile, session: Session, models: Sequence[StoneModel]) -> Groups:
+    """Which of the selected stones the meshes, laws, loads and throws of a scene name, and its output of stress.
+
+    Raises
+    ------
+    SceneError : at the key whose expression cannot be understood or names no stone
+    """
+    records = {model.record.code: model.record for model in models}
+    entries = (*scene.meshes, *(one.entry for one in scene.laws), *scene.loads, *scene.throws)
+    groups: dict[Path, tuple[frozenset[str], ...]] = {
+        entry.path: tuple(
+            frozenset(_named(scene, session, records, (*entry.path, key), items))
+            for key, items in entry.groups
+        )
+        for entry in entries
+    }
+    groups[STRESS] = (frozenset(_named(scene, session, records, STRESS, scene.output.stress or ())),)
+    return groups
+
+
+def _selected(scene: SceneFile, session: Session) -> dict[str, StoneRecord]:
+    """Stones by code: of the kind, satisfying all of `where`, less those excluded."""
+    selection, document = scene.selection, scene.document
+    try:
+        entities = find(session, selection.kind, selection.where)
+    except UsageError as error:
+        key = "where" if isinstance(error, QueryError) else "kind"
+        document.fail(error.what, "select", key, remedy=error.remedy)
+    if not entities:
+        document.fail(
+            f"no stone is selected ({', '.join([f'kind {selection.kind}', *selection.where])})",
+            "select",
+            remedy="try the selection with: moma query",
+        )
+    out = _named(
+        scene, session, {one.code: one for one in entities}, ("select", "exclude"), selection.exclude
+    )
+    left = [one for one in entities if one.code not in out]
+    if not left:
+        document.fail("all selected stones are excluded", "select", "exclude", remedy="exclude fewer")
+    return {record.code: record for record in load_stones(session, left)}
+
+
+def _materials(scene: SceneFile, session: Session, records: Mapping[str, StoneRecord]) -> dict[str, Material]:
+    """Material of every stone: that of the one rule that names it, else the general one."""
+    general: Material | None = None
+    found: dict[str, Material] = {}
+    for rule in scene.materials:
+        if not rule.stones:
+            general = rule.material
+            continue
+        path = ("materials", rule.material.name, "stones")
+        for code in _named(scene, session, records, path, rule.stones):
+            if code in found:
+                both = f"{found[code].name!r} and {rule.material.name!r}"
+                scene.document.fail(f"stone {code} is of two materials, {both}", *path, remedy="name it once")
+            found[code] = rule.material
+    if general is not None:
+        return {code: found.get(code, general) for code in records}
+    without = [code for code in records if code not in found]
+    if without:
+        scene.document.fail(
+            f"{len(without)} stones have no material, e.g. {without[0]}",
+            "materials",
+            remedy="leave 'stones' out of one material: it is that of all others",
+        )
+    return found
+
+
+def _fidelities(
+    scene: SceneFile, session: Session, records: Mapping[str, StoneRecord]
+) -> dict[str, Fidelity]:
+    """Fidelity of the stones that a list names."""
+    lists = {
+        Fidelity.RIGID: scene.bodies.rigid,
+        Fidelity.DEFORMABLE: scene.bodies.deformable,
+        Fidelity.FIXED: scene.bodies.fixed,
+    }
+    named = {
+        fidelity: _named(scene, session, records, ("bodies", str(fidelity)), items)
+        for fidelity, items in lists.items()
+    }
+    both = named[Fidelity.RIGID] & named[Fidelity.DEFORMABLE] - named[Fidelity.FIXED]
+    if both:
+        scene.document.fail(
+            f"stone {min(both)} is both rigid and deformable", "bodies", "deformable", remedy="name it in one"
+        )
+    # FIXED comes last: it goes before the others
+    return {code: fidelity for fidelity, codes in named.items() for code in codes}
+
+
+def _named(
+    scene: SceneFile, session: Session, records: Mapping[str, object], key: Path, items: Sequence[str]
+) -> set[str]:
+    """Codes of the selected stones, the keys of `records`, that any of the items, codes or expressions, names."""
+    codes: set[str] = set()
+    for item in items:
+        if item in records:
+            codes.add(item)
+            continue
+        if _CODE.fullmatch(item):
+            scene.document.fail(
+                f"{key[-1]}: {item!r} is not the code of a selected stone",
+                *key,
+                remedy=nearest(item, records),
+            )
+        try:
+            matching = _matching(scene, session, item) & records.keys()
+        except UsageError as error:
+            scene.document.fail(f"{key[-1]}: {error.what}", *key, remedy=error.remedy)
+        if not matching:
+            scene.document.fail(
+                f"{key[-1]}: no selected stone satisfies {item!r}", *key, remedy="try it with: moma query"
+            )
+        codes |= matching
+    return codes
+
+
+def _matching(scene: SceneFile, session: Session, item: str) -> set[str]:
+    """Codes of the stones that satisfy an expression and the selection, so that no others are read."""
+    selection = scene.selection
+    where = [*selection.where[: MAX_EXPRESSIONS - 1], item]
+    rows = find_rows(session, selection.kind, where, columns=("code",))
+    return {str(row["code"]) for row in rows}

@@ -1,0 +1,1 @@
+"""Validated TOML with line numbers in errors."""

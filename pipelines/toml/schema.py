@@ -1,0 +1,243 @@
+"""What a TOML table may hold, and its check: what is unknown, missing or wrong, by name and line."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from datetime import date
+from difflib import get_close_matches
+from enum import Enum
+from math import isfinite
+from typing import NoReturn
+
+from moma.errors import SceneError
+from pipelines.toml.lines import Path, line_of
+
+__all__ = ["REQUIRED", "Document", "Key", "Kind", "check_table", "nearest"]
+
+
+class _Required(Enum):
+    REQUIRED = "required"
+
+
+REQUIRED = _Required.REQUIRED
+
+# TOML's whole numbers have no end, floating-point numbers have
+_HUGE = 10**300
+
+
+class Kind(Enum):
+    """What the value of a key is; the value says it in the words of an error message."""
+
+    NUMBER = "a number"
+    INTEGER = "a whole number"
+    BOOLEAN = "true or false"
+    TEXT = "a text in quotes"
+    TEXTS = "a list of texts in quotes"
+    STONES = "a list of codes or expressions in quotes"
+    GROUPS = "two lists of codes or expressions in quotes"
+    VECTOR = "a list of three numbers"
+    NUMBERS = "a list of numbers"
+    ROWS = "a list of lists of three numbers"
+    HISTORY = "a number or a table { time = […], value = […] }"
+    VECTOR_HISTORY = "a list of three numbers or a table { time = […], value = [[…], …] }"
+    DATE = "a date without quotes, e.g. 2024-05-31"
+    TABLE = "a table { name = value, … }"
+
+
+@dataclass(frozen=True)
+class Key:
+    """One key of a table.
+
+    Attributes
+    ----------
+    name : as written in the file
+    kind : type of its value
+    doc : what it means, one sentence
+    unit : of the value; "-" for a ratio
+    default : used when the key is absent; REQUIRED if it must be given; None if absence has its own meaning
+    above, at_least, below, at_most : bounds of a number
+    choices : the texts or numbers allowed; any if empty
+    """
+
+    name: str
+    kind: Kind
+    doc: str
+    unit: str = ""
+    default: object = REQUIRED
+    above: float | None = None
+    at_least: float | None = None
+    below: float | None = None
+    at_most: float | None = None
+    choices: tuple[str | int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Document:
+    """A TOML text that was read, so that errors can name file and line.
+
+    Attributes
+    ----------
+    path : as the user gave it
+    lines : line of each key
+    """
+
+    path: str
+    lines: Mapping[Path, int] = field(default_factory=dict)
+
+    def where(self, *path: str) -> str:
+        """``file:line`` of a key."""
+        return f"{self.path}:{line_of(self.lines, path)}"
+
+    def fail(self, what: str, *path: str, remedy: str | None = None) -> NoReturn:
+        """Raise a SceneError at a key."""
+        raise SceneError(what, where=self.where(*path), remedy=remedy)
+
+    @contextmanager
+    def at(self, *path: str) -> Iterator[None]:
+        """Let a SceneError of what is made in a with-block name the key that it was made from, if it names none."""
+        try:
+            yield
+        except SceneError as error:
+            if (error.where or "").startswith(f"{self.path}:"):
+                raise
+            self.fail(error.what, *path, remedy=error.remedy)
+
+
+def check_table(
+    document: Document, table: Path, given: Mapping[str, object], keys: Iterable[Key], title: str = ""
+) -> dict[str, object]:
+    """Values of all keys of one table, defaults filled in; raises SceneError at the first that is wrong.
+
+    `title` is what messages call the table; else its header.
+    """
+    known = {key.name: key for key in keys}
+    title = title or f"[{'.'.join(table)}]"
+    for name in given:
+        if name not in known:
+            document.fail(f"unknown key {name!r} in {title}", *table, name, remedy=nearest(name, known))
+    values: dict[str, object] = {}
+    for name, key in known.items():
+        if name in given:
+            values[name] = _checked(document, (*table, name), given[name], key)
+        elif key.default is REQUIRED:
+            document.fail(f"{title} has no {name!r}", *table, remedy=f"give {name}: {_expected(key)}")
+        else:
+            values[name] = key.default
+    return values
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """The remedy for an unknown name: the nearest known ones, or all of them."""
+    names = sorted(known)
+    close = get_close_matches(name, names, n=2, cutoff=0.6)
+    if close:
+        return "did you mean " + " or ".join(repr(one) for one in close) + "?"
+    return "known here: " + ", ".join(names[:20]) + (", …" if len(names) > 20 else "")
+
+
+def _checked(document: Document, path: Path, value: object, key: Key) -> object:
+    typed = _typed(value, key.kind)
+    if typed is None:
+        document.fail(
+            f"{path[-1]} = {_shown(value)} is not {key.kind.value}", *path, remedy=f"give {_expected(key)}"
+        )
+    for number in _numbers(typed):
+        if not _within(number, key):
+            document.fail(
+                f"{path[-1]} = {_shown(value)} is out of range", *path, remedy=f"give {_expected(key)}"
+            )
+    if key.choices and typed not in key.choices:
+        document.fail(
+            f"{path[-1]} = {_shown(value)} is unknown",
+            *path,
+            remedy=nearest(str(value), map(str, key.choices)),
+        )
+    return typed
+
+
+def _typed(value: object, kind: Kind) -> object | None:
+    """The value as the type of its kind, or None if it is another one."""
+    match kind:
+        case Kind.NUMBER:
+            return float(value) if _is_number(value) else None  # type: ignore[arg-type]
+        case Kind.INTEGER:
+            return value if isinstance(value, int) and not isinstance(value, bool) else None
+        case Kind.BOOLEAN:
+            return value if isinstance(value, bool) else None
+        case Kind.TEXT:
+            return value if isinstance(value, str) and value.strip() else None
+        case Kind.TEXTS:
+            return _list_of(value, lambda one: one if isinstance(one, str) and one.strip() else None)
+        case Kind.STONES:
+            return _typed(value, Kind.TEXTS) or None
+        case Kind.GROUPS:
+            groups = _list_of(value, lambda one: _typed([one] if isinstance(one, str) else one, Kind.STONES))
+            return groups if groups is not None and len(groups) == 2 else None
+        case Kind.NUMBERS:
+            return _list_of(value, lambda one: _typed(one, Kind.NUMBER))
+        case Kind.VECTOR:
+            vector = _typed(value, Kind.NUMBERS)
+            return vector if isinstance(vector, tuple) and len(vector) == 3 else None
+        case Kind.ROWS:
+            return _list_of(value, lambda one: _typed(one, Kind.VECTOR))
+        case Kind.HISTORY | Kind.VECTOR_HISTORY:
+            constant = Kind.NUMBER if kind is Kind.HISTORY else Kind.VECTOR
+            return value if isinstance(value, dict) else _typed(value, constant)
+        case Kind.DATE:
+            return value if type(value) is date else None
+        case Kind.TABLE:
+            return value if isinstance(value, dict) else None
+
+
+def _list_of(value: object, typed: Callable[[object], object | None]) -> tuple[object, ...] | None:
+    """All entries of a list as `typed` gives them, or None if it gives None for any."""
+    entries = [typed(one) for one in value] if isinstance(value, list) else [None]
+    return None if any(one is None for one in entries) else tuple(entries)
+
+
+def _numbers(typed: object) -> Iterator[int | float]:
+    """All numbers in a value, its bounds being those of each."""
+    if isinstance(typed, tuple):
+        for one in typed:
+            yield from _numbers(one)
+    elif isinstance(typed, (int, float)) and not isinstance(typed, bool):
+        yield typed
+
+
+def _is_number(value: object) -> bool:
+    if isinstance(value, bool):
+        return False
+    return isinstance(value, float) or (isinstance(value, int) and abs(value) < _HUGE)
+
+
+def _within(number: float, key: Key) -> bool:
+    return (
+        isfinite(number)
+        and (key.above is None or number > key.above)
+        and (key.at_least is None or number >= key.at_least)
+        and (key.below is None or number < key.below)
+        and (key.at_most is None or number <= key.at_most)
+    )
+
+
+def _expected(key: Key) -> str:
+    """What to write, in words: type, unit and bounds."""
+    if key.choices:
+        return " or ".join(f'"{one}"' if isinstance(one, str) else str(one) for one in key.choices)
+    bounds = [
+        f"{words} {bound:g}"
+        for words, bound in (
+            ("greater than", key.above),
+            ("at least", key.at_least),
+            ("less than", key.below),
+            ("at most", key.at_most),
+        )
+        if bound is not None
+    ]
+    unit = f" [{key.unit}]" if key.unit else ""
+    return " and ".join([f"{key.kind.value}{unit}", *bounds]).replace(" and ", ", ", 1)
+
+
+def _shown(value: object) -> str:
+    text = repr(value).lower() if isinstance(value, bool) else repr(value)
+    return text if len(text) <= 60 else text[:57] + "…"

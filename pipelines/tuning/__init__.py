@@ -1,0 +1,1 @@
+"""Profiles: settings chosen by measured error."""

@@ -1,0 +1,144 @@
+"""Profiles: named sets of settings, from a quick look to careful stresses, as `moma run --profile` applies them."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any
+
+from mechanics.scene.scene import Fidelity, Method, Placement, TimeSettings
+from mechanics.stones.meshing.elements import Element
+from moma.errors import UsageError
+from pipelines.scene.file import SceneFile
+from pipelines.scene.selection import StoneModel
+from pipelines.toml.schema import nearest
+from pipelines.tuning.overlay import Overlay, overlaid, typical_width
+
+__all__ = ["PROFILES", "Profile", "profile_named", "settings_of_profile", "with_profile"]
+
+
+@dataclass(frozen=True)
+class Profile:
+    """A named set of settings.
+
+    Attributes
+    ----------
+    name : on the command line
+    about : what it is for
+    rest : settings of scenes that seek an equilibrium or a collapse: θ = 1, or relaxation
+    step, theta : in their place where the scene wants the motion itself: θ < 1 without relaxation [s], [-]
+    """
+
+    name: str
+    about: str
+    rest: Overlay
+    step: float
+    theta: float
+
+    def overlay(self, time: TimeSettings) -> Overlay:
+        """What it changes of a scene with these settings of time."""
+        if time.relaxation or time.theta == 1.0:
+            return self.rest
+        return replace(self.rest, step=self.step, theta=self.theta)
+
+
+_FAST = Profile(
+    "fast",
+    "does it stand, and what do its joints bear: all stones rigid, no stress",
+    Overlay(
+        fidelity=Fidelity.RIGID,
+        element=Element.TET10,
+        cells=1.0,
+        points=4,
+        placement=Placement.CORNERS,
+        step=0.01,
+        theta=1.0,
+        method=Method.AUTO,
+        tolerance=1e-5,
+        # with less, rigid stones in steps so long are not in balance to 10⁻⁴, and never come to rest
+        velocity_tolerance=1e-5,
+        max_iterations=2000,
+    ),
+    step=0.002,
+    theta=0.55,
+)
+_BALANCED = Profile(
+    "balanced",
+    "stresses of the stones that the scene lets deform, one quadratic element across a typical stone",
+    Overlay(
+        element=Element.TET10,
+        cells=1.0,
+        points=4,
+        placement=Placement.CORNERS,
+        step=0.005,
+        theta=1.0,
+        method=Method.AUTO,
+        tolerance=1e-6,
+        velocity_tolerance=1e-4,
+        max_iterations=3000,
+    ),
+    step=0.001,
+    theta=0.51,
+)
+_ACCURATE = Profile(
+    "accurate",
+    "all stones deform, two quadratic elements across a typical stone",
+    Overlay(
+        fidelity=Fidelity.DEFORMABLE,
+        element=Element.TET10,
+        cells=2.0,
+        points=8,
+        placement=Placement.CORNERS,
+        step=0.002,
+        theta=1.0,
+        method=Method.AUTO,
+        tolerance=1e-7,
+        velocity_tolerance=1e-5,
+        max_iterations=5000,
+    ),
+    step=0.0005,
+    theta=0.5,
+)
+PROFILES: Mapping[str, Profile] = MappingProxyType({one.name: one for one in (_FAST, _BALANCED, _ACCURATE)})
+"""From the quickest to the most accurate."""
+
+
+def profile_named(name: str) -> Profile:
+    """The profile of this name.
+
+    Raises
+    ------
+    UsageError : there is none
+    """
+    if name not in PROFILES:
+        raise UsageError(f"unknown profile {name!r}", where="--profile", remedy=nearest(name, PROFILES))
+    return PROFILES[name]
+
+
+def with_profile(scene: SceneFile, name: str | None, models: Iterable[StoneModel]) -> SceneFile:
+    """The scene with the settings of a profile, which go before its own; without a name, as it is.
+
+    Its lists of [bodies], its [[meshes]] and all that says what is asked for stay.
+
+    Parameters
+    ----------
+    scene : as its author wrote it
+    name : of the profile
+    models : the stones of the scene, whose typical smallest width sets the size of the mesh
+
+    Raises
+    ------
+    UsageError : there is no such profile
+    """
+    if name is None:
+        return scene
+    return overlaid(scene, profile_named(name).overlay(scene.time), typical_width(models))
+
+
+def settings_of_profile(profile: Profile, time: TimeSettings) -> dict[str, Any]:
+    """What a profile sets in a scene with these settings of time, by the names of `Overlay`; texts and numbers."""
+    values = vars(profile.overlay(time))
+    return {
+        key: value if isinstance(value, int | float) else str(value)
+        for key, value in values.items()
+        if value is not None
+    }

@@ -1,0 +1,278 @@
+"""What users of a run care about, in numbers that two runs of one scene can be compared by, rigid or not, on any mesh.
+
+Nothing here is said of nodes: meshes differ. Stresses and displacements are those of a stone as a whole, forces those
+of a joint or a support as a whole, since forces at single points of a hyperstatic structure are not unique.
+"""
+
+import math
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechanics.results.result import BodyResult, Result
+from mechanics.scene.scene import Fidelity
+from pipelines.run.stone_values import stress_statistics
+
+__all__ = ["QUANTITIES", "Quantities", "StoneQuantities", "differences", "quantities", "quantities_from"]
+
+Array = NDArray[np.float64]
+
+QUANTITIES: Mapping[str, str] = {
+    "outcome": "1 if the scene ends otherwise, else 0",
+    "von_mises_max": "largest Von Mises stress",
+    "von_mises_p99": "Von Mises stress exceeded in 1 % of the volume",
+    "von_mises_mean": "mean Von Mises stress",
+    "stone_von_mises_p99": "the same of each stone: exceeded in 1 % of its volume",
+    "stone_von_mises_mean": "mean Von Mises stress of each stone",
+    "support_reactions": "vertical reaction of each fixed stone",
+    "joint_forces": "resultant between each two stones",
+    "displacement": "largest displacement",
+    "stone_displacement": "mean displacement of each stone",
+    "settlement": "how far the stone that sank most has sunk: the crown of an arch",
+    "natural_map": "η, how far contacts are from their laws",
+    "penetration": "deepest overlap over the smallest stone's size",
+    "balance": "unbalanced force of a stone over its weight",
+    "reaction": "vertical reaction of all supports against the weight",
+    "energy": "energy that no term of the balance explains",
+}
+"""What runs are compared by, and what it is. The last five have a true value of zero: they are errors themselves."""
+
+_OWN_ERRORS = ("natural_map", "penetration", "balance", "reaction", "energy")
+_NO_MOVEMENT = 1e-6  # of a stone's size: the overlaps of rigid stones at rest are less, and no displacement
+
+
+@dataclass(frozen=True)
+class StoneQuantities:
+    """One stone that is not fixed.
+
+    Attributes
+    ----------
+    volume : [m³]
+    displacement : (3,) mean over its volume; of a rigid stone, over its corners [m]
+    von_mises_max, von_mises_p99, von_mises_mean : None if rigid [Pa]
+    stress_error : relative error of its stress as Zienkiewicz & Zhu (1987) estimate it; None if rigid [-]
+    """
+
+    volume: float
+    displacement: tuple[float, ...]
+    von_mises_max: float | None = None
+    von_mises_p99: float | None = None
+    von_mises_mean: float | None = None
+    stress_error: float | None = None
+
+
+@dataclass(frozen=True)
+class Quantities:
+    """What users of a run care about.
+
+    Attributes
+    ----------
+    outcome : how the run ended
+    size : of a typical stone: cube root of the median volume [m]
+    von_mises_max, von_mises_p99, von_mises_mean : over all deformable stones; None if none deforms [Pa]
+    stones : by code, those that are not fixed
+    support_reactions : of each fixed stone on what it bears, against gravity [N]
+    joint_forces : (3,) resultant on the first of two stones, by their codes as "first|second" in alphabetical order [N]
+    displacement : largest of all points [m]
+    settlement : how far the stone that sank most has sunk [m]
+    errors : those of mechanics.result.Errors that are measured against zero; None where it is not known [-]
+    """
+
+    outcome: str
+    size: float
+    von_mises_max: float | None
+    von_mises_p99: float | None
+    von_mises_mean: float | None
+    stones: Mapping[str, StoneQuantities]
+    support_reactions: Mapping[str, float]
+    joint_forces: Mapping[str, tuple[float, ...]]
+    displacement: float
+    settlement: float
+    errors: Mapping[str, float | None]
+
+    @property
+    def stress_error(self) -> float | None:
+        """Estimated error of the stress of all stones, each weighed by its volume and squared stress [-]."""
+        known = [
+            (one.stress_error, one.volume * one.von_mises_mean**2)
+            for one in self.stones.values()
+            if one.stress_error is not None and one.von_mises_mean is not None
+        ]
+        total = sum(weight for _, weight in known)
+        if total == 0.0:
+            return None
+        return math.sqrt(sum(error**2 * weight for error, weight in known) / total)
+
+    def as_record(self) -> dict[str, Any]:
+        """In plain numbers and texts, for JSON; `quantities_from` reads it."""
+        return asdict(self)
+
+
+def quantities(result: Result) -> Quantities:
+    """What users of a run care about, of its result."""
+    stress = stress_statistics(result)
+    moving = [body for body in result.bodies if body.fidelity is not Fidelity.FIXED]
+    forces = _joint_forces(result)
+    return Quantities(
+        outcome=str(result.outcome),
+        size=float(np.median([body.volume for body in moving])) ** (1 / 3) if moving else 0.0,
+        von_mises_max=None if stress is None else stress.max,
+        von_mises_p99=None if stress is None else stress.p99,
+        von_mises_mean=None if stress is None else stress.mean,
+        stones={body.code: _stone(body) for body in moving},
+        support_reactions=_support_reactions(result),
+        joint_forces={f"{one}|{other}": tuple(force.tolist()) for (one, other), force in forces.items()},
+        displacement=max(float(np.linalg.norm(body.displacement, axis=1).max()) for body in result.bodies),
+        settlement=float(result.history.settlement[-1]),
+        errors={name: _known(getattr(result.errors, name)) for name in _OWN_ERRORS},
+    )
+
+
+def quantities_from(record: Mapping[str, Any]) -> Quantities:
+    """The quantities that `Quantities.as_record` has written."""
+    stones = {
+        code: StoneQuantities(**one | {"displacement": tuple(one["displacement"])})
+        for code, one in record["stones"].items()
+    }
+    joints = {pair: tuple(force) for pair, force in record["joint_forces"].items()}
+    return Quantities(**{**record, "stones": stones, "joint_forces": joints})
+
+
+def differences(found: Quantities, reference: Quantities) -> dict[str, float | None]:
+    """Relative error of each of QUANTITIES; None where one of the two cannot give it.
+
+    With the values a of a run and b of the reference: |a - b| / |b| of single numbers; Σ|a - b| / Σ|b| of the
+    reactions; of joints √(Σ‖a - b‖² / Σ‖b‖²), and of stones so too, weighed by volume. The last five are the
+    run's own errors, whatever those of the reference. Of stresses, stones count that deform in both runs; the p99 of
+    all is known only if those are the same stones. Movements of less than 10⁻⁶ of a stone's size count as that.
+    """
+    both = [(found.stones[code], one) for code, one in reference.stones.items() if code in found.stones]
+    stressed = [(a, b) for a, b in both if a.von_mises_max is not None and b.von_mises_max is not None]
+    ours, theirs = [a for a, _ in stressed], [b for _, b in stressed]
+    alike = _stressed(found) == _stressed(reference)
+    still = _NO_MOVEMENT * reference.size
+    return {
+        "outcome": float(found.outcome != reference.outcome),
+        "von_mises_max": _apart(_largest(ours), _largest(theirs)),
+        "von_mises_p99": _apart(found.von_mises_p99, reference.von_mises_p99) if alike else None,
+        "von_mises_mean": _apart(_mean(ours), _mean(theirs)),
+        "stone_von_mises_p99": _field_apart(stressed, "von_mises_p99"),
+        "stone_von_mises_mean": _field_apart(stressed, "von_mises_mean"),
+        "support_reactions": _reactions_apart(found.support_reactions, reference.support_reactions),
+        "joint_forces": _forces_apart(found.joint_forces, reference.joint_forces),
+        "displacement": _apart(found.displacement, reference.displacement, still),
+        "stone_displacement": _field_apart(both, "displacement", still),
+        "settlement": _apart(found.settlement, reference.settlement, still),
+        **found.errors,
+    }
+
+
+def _stone(body: BodyResult) -> StoneQuantities:
+    moved = np.average(body.displacement, axis=0, weights=body.node_volume)
+    values = body.values
+    return StoneQuantities(
+        volume=body.volume,
+        displacement=tuple(moved.tolist()),
+        von_mises_max=None if values is None else values.von_mises_max,
+        von_mises_p99=None if values is None else values.von_mises_p99,
+        von_mises_mean=None if values is None else values.von_mises_mean,
+        stress_error=None if values is None else _known(values.error),
+    )
+
+
+def _support_reactions(result: Result) -> dict[str, float]:
+    """Of each fixed stone on what it bears, against gravity (along z without) [N]."""
+    gravity = np.array(result.scene.gravity)
+    size = float(np.linalg.norm(gravity))
+    up = -gravity / size if size > 0.0 else np.array([0.0, 0.0, 1.0])
+    lift = result.contacts.force @ up
+    count = len(result.bodies)
+    first, second = result.contacts.bodies.reshape(-1, 2).T
+    # the force is that on the first, so the second bears it up
+    total = np.bincount(second, lift, count) - np.bincount(first, lift, count)
+    return {
+        body.code: float(total[number])
+        for number, body in enumerate(result.bodies)
+        if body.fidelity is Fidelity.FIXED
+    }
+
+
+def _joint_forces(result: Result) -> dict[tuple[str, str], Array]:
+    """Resultant of the contacts between each two stones, on that whose code comes first [N]."""
+    codes = [body.code for body in result.bodies]
+    total: dict[tuple[str, str], Array] = defaultdict(lambda: np.zeros(3))
+    for (first, second), force in zip(result.contacts.bodies.tolist(), result.contacts.force, strict=True):
+        one, other = codes[first], codes[second]
+        if one < other:
+            total[one, other] += force
+        else:
+            total[other, one] -= force
+    return dict(sorted(total.items()))
+
+
+def _known(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else float(value)
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
+def _apart(found: float | None, reference: float | None, least: float = 0.0) -> float | None:
+    if found is None or reference is None:
+        return None
+    scale = max(abs(reference), least)
+    return abs(found - reference) / scale if scale > 0.0 else None
+
+
+def _stressed(of: Quantities) -> set[str]:
+    return {code for code, one in of.stones.items() if one.von_mises_max is not None}
+
+
+def _largest(stones: Iterable[StoneQuantities]) -> float | None:
+    return max((_number(one.von_mises_max) for one in stones), default=None)
+
+
+def _mean(stones: Iterable[StoneQuantities]) -> float | None:
+    """Mean stress of some stones, weighed by their volumes."""
+    known = [(_number(one.von_mises_mean), one.volume) for one in stones]
+    volume = sum(one for _, one in known)
+    return sum(mean * one for mean, one in known) / volume if volume > 0.0 else None
+
+
+def _field_apart(
+    pairs: list[tuple[StoneQuantities, StoneQuantities]], name: str, least: float = 0.0
+) -> float | None:
+    """Difference of a value of each stone over the value, both in the root mean square over the volume."""
+    if not pairs:
+        return None
+    found, true = (
+        np.array([getattr(pair[side], name) for pair in pairs], dtype=float).reshape(len(pairs), -1)
+        for side in (0, 1)
+    )
+    volume = np.array([reference.volume for _, reference in pairs])
+    apart, scale = (
+        float(np.sqrt(np.average((one**2).sum(axis=1), weights=volume))) for one in (found - true, true)
+    )
+    scale = max(scale, least)
+    return apart / scale if scale > 0.0 else None
+
+
+def _reactions_apart(found: Mapping[str, float], reference: Mapping[str, float]) -> float | None:
+    scale = sum(map(abs, reference.values()))
+    return sum(abs(found.get(code, 0.0) - one) for code, one in reference.items()) / scale if scale else None
+
+
+def _forces_apart(
+    found: Mapping[str, tuple[float, ...]], reference: Mapping[str, tuple[float, ...]]
+) -> float | None:
+    """Two stones that touch in one of the runs alone press on each other with nothing in the other."""
+    none = (0.0, 0.0, 0.0)
+    true = {pair: np.array(reference.get(pair, none)) for pair in {*found, *reference}}
+    scale = sum(float(one @ one) for one in true.values())
+    apart = sum(float(np.sum((np.array(found.get(pair, none)) - one) ** 2)) for pair, one in true.items())
+    return math.sqrt(apart / scale) if scale > 0.0 else None

@@ -1,0 +1,187 @@
+"""How long a run will take and how much memory, by those that have ended; and which run comes next."""
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipelines.tuning.tradeoff.grid import Setting
+from pipelines.tuning.tradeoff.store import Measured, Status
+from pipelines.tuning.tradeoff.worker import SHORT
+
+__all__ = ["Choice", "Forecast", "left_out", "next_run"]
+
+_USUAL_POWER = 1.5
+_POWERS = (1.0, 2.5)  # of the unknowns, by which time grows; sparse factors of walls and of solid masonry
+_MEMORY_POWER = 1.3
+_START = 3.0  # seconds: a process begins, and reads what it needs; until it has been measured
+_MODELS_SHARE = 0.7  # of the budget for models of the stones, before their variants take what is left
+_PATIENCE = 2.0  # a run is stopped that takes so many times as long as expected,
+_LEAST_SHARE = 1.0 / 6.0  # but not before so much of the budget is spent on it
+_UNKNOWN_SHARE = 1.0 / 3.0  # the same of a run of which nothing is known
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What runs that have ended say of those to come.
+
+    Attributes
+    ----------
+    settings : of the study, by name
+    ended : runs, by the name of their setting
+    """
+
+    settings: Mapping[str, Setting]
+    ended: Mapping[str, Measured]
+
+    def seconds(self, setting: Setting) -> float | None:
+        """Expected time from the start of the process to its end [s]; None: nothing is known, or of what it varies."""
+        start = self._start()
+        if setting.varied is not None:
+            base = self.ended.get(setting.varied)
+            if base is None or base.status is not Status.DONE:
+                return None
+            return start + _twice(setting.effort * base.wall)
+        near = self._nearest(setting)
+        if near is None:
+            return None
+        known = self.settings[near.name]
+        grown: float = (setting.unknowns / known.unknowns) ** self._power()
+        return start + _twice(grown * setting.effort / known.effort * max(near.wall, 1e-3))
+
+    def memory(self, setting: Setting) -> float | None:
+        """Expected memory of the process [bytes]."""
+        near = self.ended.get(setting.varied) if setting.varied is not None else self._nearest(setting)
+        if near is None or near.memory == 0:
+            return None
+        grown: float = (setting.unknowns / self.settings[near.name].unknowns) ** _MEMORY_POWER
+        least = min(
+            run.memory for run in self.ended.values() if run.memory
+        )  # compiled kernels, whatever the mesh
+        return least + grown * (near.memory - least)
+
+    def _start(self) -> float:
+        """What a process takes besides its work [s]."""
+        spent = [one.elapsed - _twice(one.wall) for one in self.ended.values() if one.status is Status.DONE]
+        return max(float(np.median(spent)), 0.5) if spent else _START
+
+    def _nearest(self, setting: Setting) -> Measured | None:
+        """The model of the same element, or else of any, whose number of unknowns is nearest.
+
+        One that was stopped says something of the same element with more unknowns only.
+        """
+        alike, others = [], []
+        for one in self.ended.values():
+            known = self.settings[one.name]
+            if known.varied is not None or (known.element is None) != (setting.element is None):
+                continue
+            if known.element is setting.element:
+                if one.status is Status.DONE or (
+                    one.status is Status.STOPPED and known.unknowns <= setting.unknowns
+                ):
+                    alike.append(one)
+            elif one.status is Status.DONE:
+                others.append(one)
+        return min(alike or others, key=lambda one: self._apart(setting, one), default=None)
+
+    def _apart(self, setting: Setting, run: Measured) -> float:
+        return abs(math.log(setting.unknowns / self.settings[run.name].unknowns))
+
+    def _power(self) -> float:
+        """By which time grows with the unknowns, of elements of one kind with the other."""
+        slopes = []
+        for one in self.ended.values():
+            for other in self.ended.values():
+                a, b = self.settings[one.name], self.settings[other.name]
+                both = (
+                    one.status is Status.DONE and other.status is Status.DONE and a.varied is b.varied is None
+                )
+                same = a.element is b.element is not None
+                if both and same and b.unknowns > 1.5 * a.unknowns and one.wall > 0.0 and other.wall > 0.0:
+                    slopes.append(math.log(other.wall / one.wall) / math.log(b.unknowns / a.unknowns))
+        return float(np.clip(np.median(slopes), *_POWERS)) if slopes else _USUAL_POWER
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The run that comes next.
+
+    Attributes
+    ----------
+    setting : of it
+    limit : when it is stopped, from its start [s]
+    """
+
+    setting: Setting
+    limit: float
+
+
+def next_run(
+    forecast: Forecast,
+    begun: Collection[str],
+    worth: Collection[str],
+    left: float,
+    budget: float,
+    memory: float,
+) -> Choice | None:
+    """The cheapest run that fits: of models first, until their share of the budget is spent, then of variants.
+
+    Parameters
+    ----------
+    forecast : of this study
+    begun : names of runs that are not to be begun again
+    worth : names of models whose variants are of interest
+    left : time that is left of the budget [s]
+    budget : [s]
+    memory : that a run may take [bytes]
+
+    What the variants leave of the budget goes to the models again, that the reference may be as fine as can be had.
+    """
+    waiting = [one for one in forecast.settings.values() if one.name not in begun]
+    models = [one for one in waiting if one.varied is None]
+    variants = [one for one in waiting if one.varied in worth and forecast.seconds(one) is not None]
+    of_models = left - (1.0 - _MODELS_SHARE) * budget
+    for candidates, time in ((models, of_models), (variants, left), (models, left)):
+        for one in sorted(candidates, key=lambda one: _order(forecast, one)):
+            if _refusal(forecast, one, time, memory) == "":
+                return Choice(one, min(_patience(forecast.seconds(one), budget), left))
+    return None
+
+
+def left_out(forecast: Forecast, setting: Setting, left: float, memory: float) -> str:
+    """Why a setting was not run."""
+    base = forecast.ended.get(setting.varied or "")
+    if setting.varied is not None and (base is None or base.status is not Status.DONE):
+        return f"a variant of {setting.varied!r}, of which there is no result"
+    return (
+        _refusal(forecast, setting, left, memory)
+        or f"a variant of {setting.varied!r}, which is not on the front"
+    )
+
+
+def _refusal(forecast: Forecast, setting: Setting, left: float, memory: float) -> str:
+    expected, needed = forecast.seconds(setting), forecast.memory(setting)
+    if needed is not None and needed > memory:
+        return f"would take about {needed / 2**30:.1f} GiB of memory, there are {memory / 2**30:.1f}"
+    if left <= 0.0:
+        return "the budget is spent"
+    if expected is not None and expected > left:
+        return f"would take about {expected:.0f} s, {left:.0f} s of the budget are left for it"
+    return ""
+
+
+def _order(forecast: Forecast, setting: Setting) -> tuple[float, float]:
+    expected = forecast.seconds(setting)
+    return (0.0 if expected is None else expected, setting.effort * setting.unknowns)
+
+
+def _patience(expected: float | None, budget: float) -> float:
+    if expected is None:
+        return _UNKNOWN_SHARE * budget
+    return max(_PATIENCE * expected, _LEAST_SHARE * budget)
+
+
+def _twice(seconds: float) -> float:
+    """Short work is done twice, see `pipelines.tuning.tradeoff.worker`."""
+    return 2.0 * seconds if seconds < SHORT else seconds

@@ -1,0 +1,242 @@
+"""Which settings a study of speed against accuracy tries on a scene: chosen by what the scene asks for."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain
+
+import numpy as np
+
+from mechanics.scene.scene import Block, Fidelity, Method, Placement
+from mechanics.stones.meshing.elements import Element
+from pipelines.scene.file import SceneFile
+from pipelines.tuning.overlay import Overlay
+from pipelines.tuning.profiles import PROFILES
+
+__all__ = ["Setting", "grid", "setting_name"]
+
+_CELLS = {
+    Element.TET4: (1, 2, 3, 4, 6),
+    Element.HEX8: (1, 2, 3, 4, 6),
+    Element.TET10: (1, 2, 3, 4),
+    Element.HEX20: (1, 2, 3, 4),
+}
+"""Cells across the typical smallest width of a stone, by element. Hex27 has more nodes than hex20 to the same order."""
+
+_RIGID = Overlay(fidelity=Fidelity.RIGID)
+_PLAIN = (Overlay(), _RIGID)
+_LINEAR = (
+    4.0  # times as long as elements of the second order: with them contacts take more iterations to find
+)
+_LOOSER, _TIGHTER = 100.0, 0.01
+_PROFILE = "profile"  # the first word of their names
+_LOOSEST = 1e-2  # of a tolerance: beyond it, contacts do not obey their laws at all
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One point of the study.
+
+    Attributes
+    ----------
+    name : what it changes of the scene, in words
+    overlay : the same for `pipelines.tuning.overlay`
+    unknowns : expected number of velocities, to order settings by their cost
+    element, edge : of the finite elements, None without; and their target edge length [m]
+    coarseness : expected error of their stress, but for a factor: a power of the distance of nodes over the typical
+        smallest width of the stones; infinite without finite elements [-]
+    step, tolerance, points : of the run, changed or not [s], [-], [-]
+    varied : the setting of which this one changes one thing more; None of those that change the model of the stones
+    effort : expected time over that of `varied`; of models, over that of one with as many unknowns that are velocities
+        of rigid stones or of finite elements of the second order [-]
+    """
+
+    name: str
+    overlay: Overlay
+    unknowns: float
+    element: Element | None
+    edge: float
+    coarseness: float
+    step: float
+    tolerance: float
+    points: int
+    varied: str | None = None
+    effort: float = 1.0
+
+
+def grid(
+    scene: SceneFile, blocks: Sequence[Block], width: float, stress: bool = False
+) -> tuple[Setting, ...]:
+    """The settings to try: models of the stones, cheapest first, then variants of these in one more thing.
+
+    Parameters
+    ----------
+    scene : as its author wrote it
+    blocks : of the scene so written
+    width : typical smallest width of the stones, to which cells refer [m]
+    stress : whether the study is after a stress, so that stones must deform
+
+    Where a stone deforms, or has to, it is tried rigid and with finite elements of several kinds and sizes, hexahedra
+    only if they suit the stones. Of rigid stones, other contact points are tried; of all, other tolerances and methods
+    of the solver. Time steps are varied where motion is followed, not where a place of rest is sought by relaxation.
+    """
+    moving = [block for block in blocks if block.fidelity is not Fidelity.FIXED]
+    models = _models(scene, moving, width, stress)
+    settings = [
+        *models,
+        *chain(*(_of_solver(scene, one) for one in models if not one.name.startswith(_PROFILE))),
+        *chain(*(_of_time(scene, one) for one in models)),
+        *chain(*(_of_points(scene, one) for one in models if one.element is None and one.overlay in _PLAIN)),
+    ]
+    return tuple({one.name: one for one in reversed(settings)}.values())[::-1]
+
+
+def setting_name(overlay: Overlay) -> str:
+    """What an overlay changes, in words."""
+    words = []
+    if overlay.fidelity is not None:
+        words.append(str(overlay.fidelity))
+    if overlay.element is not None:
+        words.append(str(overlay.element))
+    if overlay.cells is not None:
+        words.append(f"{overlay.cells:g} cell{'s' if overlay.cells != 1 else ''}")
+    if overlay.points is not None:
+        words.append(f"{overlay.points} points")
+    if overlay.placement is not None:
+        words.append(f"points by {overlay.placement}")
+    if overlay.step is not None:
+        words.append(f"h {overlay.step:g} s")
+    if overlay.theta is not None:
+        words.append(f"θ {overlay.theta:g}")
+    if overlay.method is not None:
+        words.append(f"{overlay.method}")
+    if overlay.tolerance is not None:
+        words.append(f"η {overlay.tolerance:.0e}")
+    return ", ".join(words) or "as written"
+
+
+def _models(scene: SceneFile, moving: Sequence[Block], width: float, stress: bool) -> list[Setting]:
+    """How stones can be modelled, by rising numbers of unknowns."""
+    soft = [block for block in moving if block.fidelity is Fidelity.DEFORMABLE]
+    found = [_model(scene, Overlay(), moving, soft, width)]
+    if soft and not scene.bodies.deformable:
+        found.append(_model(scene, _RIGID, moving, (), width))
+    all_soft = Overlay(fidelity=Fidelity.DEFORMABLE)
+    if stress and not soft:
+        plain, soft = all_soft, list(moving)
+    else:
+        plain = Overlay()
+        if 0 < len(soft) < len(moving):
+            found.append(_model(scene, all_soft, moving, moving, width))
+    for element, counts in _CELLS.items() if soft else ():
+        if element.is_tetrahedron or all(map(_suits_hexahedra, soft)):
+            meshes = [replace(plain, element=element, cells=float(cells)) for cells in counts]
+            found += [_model(scene, one, moving, soft, width) for one in meshes]
+    found += _profiles(scene, moving, () if plain is all_soft else soft, width)
+    return sorted(found, key=lambda one: one.effort * one.unknowns)
+
+
+def _profiles(
+    scene: SceneFile, moving: Sequence[Block], soft: Sequence[Block], width: float
+) -> Iterator[Setting]:
+    """The named profiles; where no stone deforms, without those in which all do."""
+    for profile in PROFILES.values():
+        overlay = profile.overlay(scene.time)
+        if overlay.fidelity is Fidelity.DEFORMABLE and not soft:
+            continue  # the scene asks for no stress
+        deformed = {None: soft, Fidelity.RIGID: (), Fidelity.DEFORMABLE: moving}[overlay.fidelity]
+        yield replace(_model(scene, overlay, moving, deformed, width), name=f"{_PROFILE} {profile.name}")
+
+
+def _of_solver(scene: SceneFile, model: Setting) -> Iterator[Setting]:
+    """Other tolerances, and other methods of the scene as it is written and of rigid stones."""
+    plain, solver = model.overlay in _PLAIN, scene.solver
+    for factor, effort in ((_LOOSER, 1.0), (_TIGHTER, 2.0)) if plain else ((_LOOSER, 1.0),):
+        overlay = replace(
+            model.overlay,
+            tolerance=_other(solver.tolerance, factor),
+            velocity_tolerance=_other(solver.velocity_tolerance, factor),
+        )
+        yield _variant(model, overlay, effort)
+    for method in Method if plain else ():
+        if method is not solver.method:
+            yield _variant(model, replace(model.overlay, method=method), 2.0)
+
+
+def _of_time(scene: SceneFile, model: Setting) -> Iterator[Setting]:
+    """Other time steps, and another damping of the scheme, where there is motion to follow."""
+    time = scene.time
+    if model.overlay not in _PLAIN or time.relaxation:
+        return
+    for factor in (4.0, 2.0, 0.5, 0.25):
+        if factor * time.step <= time.duration:
+            yield _variant(model, replace(model.overlay, step=factor * time.step), 1.0 / factor)
+    for theta in () if time.stop_at_equilibrium else (0.5, 0.6, 1.0):
+        if theta != time.theta:
+            yield _variant(model, replace(model.overlay, theta=theta), 1.0)
+
+
+def _of_points(scene: SceneFile, model: Setting) -> Iterator[Setting]:
+    """Other contact points of flat faces, of rigid stones."""
+    for points in (3, 4, 8):
+        if points != scene.contact.points:
+            yield _variant(model, replace(model.overlay, points=points), points / scene.contact.points)
+    for placement in Placement:
+        if placement is not scene.contact.placement:
+            yield _variant(model, replace(model.overlay, placement=placement), 1.0)
+
+
+def _other(tolerance: float, factor: float) -> float:
+    return min(factor * tolerance, max(_LOOSEST, tolerance))
+
+
+def _model(
+    scene: SceneFile, overlay: Overlay, moving: Sequence[Block], soft: Sequence[Block], width: float
+) -> Setting:
+    """A setting in which these stones of those that move have finite elements."""
+    element = overlay.element or scene.mesh.element
+    edge = scene.mesh.size if overlay.cells is None else width / overlay.cells
+    return Setting(
+        name=setting_name(overlay),
+        overlay=overlay,
+        unknowns=6.0 * (len(moving) - len(soft)) + sum(_unknowns(one, element, edge) for one in soft),
+        element=element if soft else None,
+        edge=edge,
+        coarseness=(edge / width / element.order) ** element.order if soft else math.inf,
+        step=overlay.step or scene.time.step,
+        tolerance=overlay.tolerance or scene.solver.tolerance,
+        points=overlay.points or scene.contact.points,
+        effort=_LINEAR if soft and element.order == 1 else 1.0,
+    )
+
+
+def _variant(model: Setting, overlay: Overlay, effort: float) -> Setting:
+    return replace(
+        model,
+        name=setting_name(overlay),
+        overlay=overlay,
+        step=overlay.step or model.step,
+        tolerance=overlay.tolerance or model.tolerance,
+        points=overlay.points or model.points,
+        varied=model.name,
+        effort=effort,
+    )
+
+
+def _unknowns(block: Block, element: Element, edge: float) -> float:
+    """About as many velocities as the block's nodes have if it were a box with a grid in it."""
+    cells = np.maximum(1.0, np.round(np.ptp(block.vertices, axis=0) / edge))
+    corners = float(np.prod(cells + 1.0))
+    if element is Element.HEX20:
+        corners += float(sum(cells[axis] * np.prod(np.delete(cells + 1.0, axis)) for axis in range(3)))
+    elif element.order == 2:
+        corners = float(np.prod(2.0 * cells + 1.0))
+    return 3.0 * corners
+
+
+def _suits_hexahedra(block: Block) -> bool:
+    """Convex, and each of its corners joins three faces."""
+    joined = np.bincount(
+        np.concatenate([np.array(face) for face in block.faces]), minlength=len(block.vertices)
+    )
+    return not block.parts and block.radius is None and bool((joined == 3).all())

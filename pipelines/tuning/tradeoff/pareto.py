@@ -1,0 +1,216 @@
+"""What a study of speed against accuracy says: errors against the finest run, the front, and what to choose."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from pipelines.tuning.overlay import Overlay
+from pipelines.tuning.quantities import QUANTITIES, differences
+from pipelines.tuning.tradeoff.grid import Setting
+from pipelines.tuning.tradeoff.store import Measured, Status
+
+__all__ = [
+    "Judged",
+    "Recommendation",
+    "Reference",
+    "cheapest",
+    "counted",
+    "front",
+    "judge",
+    "models_of_interest",
+]
+
+_OWN = ("natural_map", "penetration", "balance", "reaction", "energy")
+_COARSER = 1.2  # ratio of sizes from which on two meshes tell something of each other
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What the others are measured against: the finest run that could be afforded, not the truth.
+
+    Attributes
+    ----------
+    name : of its setting
+    errors : of each of QUANTITIES, estimated; None where there is nothing to estimate it by [-]
+    partner : the run by whose difference that is estimated; "" without one
+    ratio : how much finer it is than its partner [-]
+    stress_error : of its stress as Zienkiewicz & Zhu (1987) estimate it; None if no stone deforms [-]
+    """
+
+    name: str
+    errors: Mapping[str, float | None]
+    partner: str
+    ratio: float
+    stress_error: float | None
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One run that is done.
+
+    Attributes
+    ----------
+    run : what was measured
+    errors : of each of QUANTITIES against the reference; those of the reference itself are estimated [-]
+    """
+
+    run: Measured
+    errors: Mapping[str, float | None]
+
+
+@dataclass(frozen=True)
+class Recommendation:
+    """The cheapest setting whose error is below what was asked.
+
+    Attributes
+    ----------
+    name : of the setting
+    error : its error, that of the reference included [-]
+    holds : whether that is below what was asked; if not, it is the smallest that there is
+    """
+
+    name: str
+    error: float
+    holds: bool
+
+
+def judge(
+    settings: Mapping[str, Setting], runs: Mapping[str, Measured]
+) -> tuple[Reference | None, tuple[Judged, ...]]:
+    """The reference, and all runs that are done with their errors; None if there are none.
+
+    The reference is the run with the finest elements, by the distance of their nodes and their order: estimates of the
+    error of a stress are blind to what a mesh of one cell cannot show. Of runs with equal meshes, and where no stone
+    deforms, it is that with the smallest time step, then the smallest tolerance, then the most contact points. Its own
+    error is estimated as if errors fell with the first power of the size of cells or steps, which is slower than
+    those of smooth fields fall, and about what corners and edges of contacts allow: the difference to the next coarser
+    run of its kind over (ratio of the sizes - 1).
+    """
+    done = [run for run in runs.values() if run.status is Status.DONE and run.quantities is not None]
+    if not done:
+        return None, ()
+    ranked = sorted(done, key=lambda run: _fineness(settings[run.name], run))
+    finest = ranked[0]
+    assert finest.quantities is not None
+    reference = _reference(settings, finest, ranked[1:])
+    judged = []
+    for run in done:
+        assert run.quantities is not None
+        errors = differences(run.quantities, finest.quantities)
+        judged.append(Judged(run, reference.errors if run is finest else errors))
+    return reference, tuple(judged)
+
+
+def front(points: Iterable[tuple[float, float]]) -> tuple[int, ...]:
+    """Which of the points (cost, error) no other beats in one of the two without being worse in the other.
+
+    In the order of cost; of equal points the first.
+    """
+    listed = list(points)
+    order = sorted(range(len(listed)), key=lambda one: (*listed[one], one))
+    found: list[int] = []
+    for one in order:
+        if not found or listed[one][1] < listed[found[-1]][1]:
+            found.append(one)
+    return tuple(found)
+
+
+def cheapest(
+    judged: Sequence[Judged], reference: Reference, quantity: str, error: float
+) -> Recommendation | None:
+    """The cheapest run that is surely below an error of a quantity; None if none has it.
+
+    A run that differs by e from a reference that is itself wrong by no more than e_r is wrong by no more than e + e_r.
+    """
+    known = [(one, bound) for one in judged if (bound := _bound(one, reference, quantity)) is not None]
+    if not known:
+        return None
+    below = [(one, bound) for one, bound in known if bound <= error]
+    if below:
+        best, bound = min(below, key=lambda pair: pair[0].run.cpu)
+    else:
+        best, bound = min(known, key=lambda pair: (pair[1], pair[0].run.cpu))
+    return Recommendation(best.run.name, bound, bool(below))
+
+
+def models_of_interest(
+    settings: Mapping[str, Setting], runs: Mapping[str, Measured], quantity: str
+) -> frozenset[str]:
+    """The scene as it is written, if its error is known, and the models on the front of a quantity."""
+    _, judged = judge(settings, runs)
+    known = [
+        (one.run, error)
+        for one in judged
+        if settings[one.run.name].varied is None and (error := counted(one, quantity)) is not None
+    ]
+    best = front((run.cpu, error) for run, error in known)
+    written = {run.name for run, _ in known if run.overlay == Overlay()}
+    return frozenset(known[number][0].name for number in best) | written
+
+
+def counted(one: Judged, quantity: str) -> float | None:
+    """The error of a run; None if it is not known, or if the scene ends otherwise than in the reference [-]."""
+    return None if one.errors["outcome"] else one.errors[quantity]
+
+
+def _bound(one: Judged, reference: Reference, quantity: str) -> float | None:
+    """Error of a run with that of the reference; None if it cannot be told, or the scene ends otherwise."""
+    error, own = counted(one, quantity), reference.errors[quantity]
+    if error is None or own is None:
+        return None
+    return error if one.run.name == reference.name or quantity in _OWN else error + own
+
+
+def _fineness(setting: Setting, run: Measured) -> tuple[float, ...]:
+    """Smaller is finer."""
+    stressed = run.quantities is not None and run.quantities.stress_error is not None
+    return (
+        setting.coarseness if stressed else math.inf,
+        setting.step,
+        setting.tolerance,
+        -setting.points,
+        -run.nodes,
+        float(setting.varied is not None),
+    )
+
+
+def _reference(settings: Mapping[str, Setting], finest: Measured, others: Sequence[Measured]) -> Reference:
+    """The finest run, with its error estimated by the finest of the others that is coarser in mesh or step."""
+    found = _partner(settings, finest, others)
+    assert finest.quantities is not None
+    if found is None:
+        own = dict.fromkeys(QUANTITIES) | {name: finest.quantities.errors[name] for name in _OWN}
+        return Reference(finest.name, own, "", 1.0, finest.quantities.stress_error)
+    partner, ratio = found
+    assert partner.quantities is not None
+    apart = differences(partner.quantities, finest.quantities)
+    errors = {name: None if value is None else value / (ratio - 1.0) for name, value in apart.items()}
+    errors |= {"outcome": 0.0} | {name: finest.quantities.errors[name] for name in _OWN}
+    return Reference(finest.name, errors, partner.name, ratio, finest.quantities.stress_error)
+
+
+def _partner(
+    settings: Mapping[str, Setting], finest: Measured, others: Sequence[Measured]
+) -> tuple[Measured, float] | None:
+    """A run to estimate the error of the finest by, and how much coarser it is; None if all have its mesh and step."""
+    fine = settings[finest.name]
+    alike = [one for one in others if settings[one.name].element is fine.element]
+    meshes = [one for one in others if settings[one.name].element not in (None, fine.element)]
+    by_edge = _coarser(settings, fine, alike, "edge") if fine.element else None
+    if by_edge is None and fine.element and meshes:
+        return meshes[0], 2.0  # of another element: as if it were half as fine
+    found = by_edge or _coarser(settings, fine, alike, "step")
+    if found is None and fine.element is None and others:
+        return others[0], 2.0  # a looser tolerance, fewer points
+    return found
+
+
+def _coarser(
+    settings: Mapping[str, Setting], fine: Setting, runs: Sequence[Measured], size: str
+) -> tuple[Measured, float] | None:
+    """The first of the runs that is coarser in the size of its cells or steps, and by how much."""
+    for one in runs:
+        ratio = getattr(settings[one.name], size) / getattr(fine, size)
+        if ratio > _COARSER:
+            return one, ratio
+    return None

@@ -1,0 +1,178 @@
+"""What a study of speed against accuracy leaves behind: trade.json, trade.csv, trade.png."""
+
+import csv
+import io
+import os
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from importlib.metadata import version
+from typing import Any
+
+from mechanics.scene.scene import Fidelity
+from pipelines.run.summary import as_json
+from pipelines.tuning.quantities import QUANTITIES
+from pipelines.tuning.tradeoff.forecast import Forecast, left_out
+from pipelines.tuning.tradeoff.pareto import Judged, Reference, cheapest, counted, front, judge
+from pipelines.tuning.tradeoff.plot import Panel, Point, trade_png
+from pipelines.tuning.tradeoff.scheduler import Limits
+from pipelines.tuning.tradeoff.store import INDEX, Measured, Status, Store
+from pipelines.tuning.tradeoff.toml import scene_lines
+from pipelines.tuning.tradeoff.worker import overlay_record
+
+__all__ = ["MAIN", "Goal", "study_png", "study_record", "write_study"]
+
+MAIN = (
+    "von_mises_p99",
+    "von_mises_max",
+    "stone_von_mises_mean",
+    "support_reactions",
+    "joint_forces",
+    "displacement",
+)
+"""The quantities that table and plot show, where they are known."""
+
+_COSTS = ("cpu", "wall", "memory", "nodes", "contacts", "steps", "unconverged_steps", "solver")
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What a study is after.
+
+    Attributes
+    ----------
+    scene : its title
+    quantity : by which settings are judged
+    error : below which a setting is recommended [-]
+    width : typical smallest width of the stones [m]
+    """
+
+    scene: str
+    quantity: str
+    error: float
+    width: float
+
+
+def study_record(goal: Goal, forecast: Forecast, left: float, limits: Limits) -> dict[str, Any]:
+    """The contents of trade.json: every setting with what it costs, its errors, or why there is no result."""
+    reference, judged = judge(forecast.settings, forecast.ended)
+    quantity = goal.quantity
+    points = [(one.run.cpu, error) for one in judged if (error := counted(one, quantity)) is not None]
+    names = [one.run.name for one in judged if counted(one, quantity) is not None]
+    best = {names[number] for number in front(points)}
+    rows = [_row(one) | {"front": one.run.name in best} for one in judged]
+    rows.sort(key=lambda row: row["cpu"])
+    for name, setting in forecast.settings.items():
+        run = forecast.ended.get(name)
+        if run is None:
+            reason = left_out(forecast, setting, left, limits.memory / limits.jobs)
+            run = Measured(name, setting.overlay, Status.NOT_BEGUN, 0.0, limits.budget, reason)
+        if run.status is not Status.DONE:
+            rows.append(_row(Judged(run, {})) | {"front": False})
+    return {
+        "scene": goal.scene,
+        "version": version("moma-masonry"),
+        "machine": {"processor": platform.processor() or platform.machine(), "cores": os.cpu_count()},
+        "budget": limits.budget,
+        "jobs": limits.jobs,
+        "spent": sum(run.elapsed for run in forecast.ended.values()) / limits.jobs,
+        "quantities": dict(QUANTITIES),
+        "quantity": quantity,
+        "asked_error": goal.error,
+        "reference": None if reference is None else asdict(reference),
+        "rows": rows,
+        "recommended": _recommended(goal, reference, judged, forecast.ended),
+        "files": ["trade.csv", "trade.json", *(["trade.png"] if reference is not None else [])],
+    }
+
+
+def write_study(store: Store, record: Mapping[str, Any]) -> None:
+    """Write the files of a study; each appears whole or not at all, the index last."""
+    store.write("trade.csv", _as_csv(record["rows"]).encode("utf-8"))
+    if record["reference"] is not None:
+        store.write("trade.png", study_png(record))
+    store.write(INDEX, as_json(record).encode("utf-8"))
+
+
+def _row(one: Judged) -> dict[str, Any]:
+    run = one.run
+    return {
+        "setting": run.name,
+        "overlay": overlay_record(run.overlay),
+        "status": str(run.status),
+        "reason": run.reason,
+        "elapsed": run.elapsed,
+        **{name: getattr(run, name) for name in _COSTS},
+        "outcome": None if run.quantities is None else run.quantities.outcome,
+        "stress_error": None if run.quantities is None else run.quantities.stress_error,
+        "errors": dict(one.errors),
+    }
+
+
+def _recommended(
+    goal: Goal,
+    reference: Reference | None,
+    judged: Sequence[Judged],
+    runs: Mapping[str, Measured],
+) -> dict[str, Any] | None:
+    found = None if reference is None else cheapest(judged, reference, goal.quantity, goal.error)
+    if found is None:
+        return None
+    run = runs[found.name]
+    return {
+        "setting": found.name,
+        "error": found.error,
+        "holds": found.holds,
+        "cpu": run.cpu,
+        "lines": scene_lines(run.overlay, goal.width),
+    }
+
+
+def _as_csv(rows: Sequence[Mapping[str, Any]]) -> str:
+    """One line for each setting; nothing where a value is not known."""
+    plain = [name for name in rows[0] if name not in ("overlay", "errors")]
+    out = io.StringIO()
+    writer = csv.DictWriter(
+        out, [*plain, *(f"error_{name}" for name in QUANTITIES)], extrasaction="ignore", lineterminator="\n"
+    )
+    writer.writeheader()
+    for row in rows:
+        writer.writerow({**row, **{f"error_{name}": value for name, value in row["errors"].items()}})
+    return out.getvalue()
+
+
+def study_png(record: Mapping[str, Any]) -> bytes:
+    """The picture of a study, of the contents of its trade.json."""
+    title = f"{record['scene']}: error against the finest affordable run ({record['reference']['name']})"
+    return trade_png(title, _panels(record), record["asked_error"])
+
+
+def _panels(record: Mapping[str, Any]) -> list[Panel]:
+    """One panel for each main quantity that at least two runs have, that which is asked for first."""
+    done = [row for row in record["rows"] if row["status"] == Status.DONE and not row["errors"]["outcome"]]
+    reference, panels = record["reference"], []
+    for quantity in dict.fromkeys([record["quantity"], *MAIN]):
+        known = [row for row in done if row["errors"][quantity] is not None]
+        if len(known) < 2:
+            continue
+        points = [Point(row["setting"], _kind(row), row["cpu"], row["errors"][quantity]) for row in known]
+        recommended = record["recommended"] if quantity == record["quantity"] else None
+        panels.append(
+            Panel(
+                title=QUANTITIES[quantity],
+                points=tuple(points),
+                front=front((one.cpu, one.error) for one in points),
+                reference=reference["name"],
+                reference_error=reference["errors"][quantity],
+                recommended=None if recommended is None else recommended["setting"],
+            )
+        )
+    return panels
+
+
+def _kind(row: Mapping[str, Any]) -> str:
+    """By what the points of a plot are coloured."""
+    overlay = row["overlay"]
+    if overlay.get("fidelity") == Fidelity.RIGID:
+        return str(Fidelity.RIGID)
+    return str(overlay.get("element") or overlay.get("fidelity") or "as written")

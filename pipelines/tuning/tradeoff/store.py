@@ -1,0 +1,209 @@
+"""What a study of speed against accuracy has measured so far, one file for each run, so that it can go on later."""
+
+import hashlib
+import json
+import os
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from enum import StrEnum
+from functools import singledispatch
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from moma.errors import UsageError
+from pipelines.run.assemble import Assembly
+from pipelines.run.summary import as_json
+from pipelines.scene.file import SceneFile
+from pipelines.tuning.overlay import Overlay
+from pipelines.tuning.quantities import Quantities, quantities_from
+from pipelines.tuning.tradeoff.worker import overlay_from, overlay_record
+
+__all__ = ["INDEX", "Measured", "Status", "Store", "study_key"]
+
+INDEX = "trade.json"
+_RUNS = "runs"
+
+
+class Status(StrEnum):
+    """What became of a run."""
+
+    DONE = "done"
+    FAILED = "failed"
+    STOPPED = "stopped"
+    NOT_BEGUN = "not begun"
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One run that has ended.
+
+    Attributes
+    ----------
+    name, overlay : its setting
+    status : what became of it
+    elapsed : from its start to its end, with the start of the process [s]
+    budget : of the study in which it ended [s]
+    reason : why it failed or was stopped
+    cpu, wall : of the work alone: closing joints, simulating [s]
+    memory, program_memory : the most that its process had at once, and what it had before it began [bytes]
+    nodes : of all finite elements
+    contacts, steps, unconverged_steps : of the run
+    solver : which method found the solutions
+    stages : wall time by stage [s]
+    quantities : what came out; None unless it is done
+    """
+
+    name: str
+    overlay: Overlay
+    status: Status
+    elapsed: float
+    budget: float
+    reason: str = ""
+    cpu: float = 0.0
+    wall: float = 0.0
+    memory: int = 0
+    program_memory: int = 0
+    nodes: int = 0
+    contacts: int = 0
+    steps: int = 0
+    unconverged_steps: int = 0
+    solver: str = ""
+    stages: Mapping[str, float] | None = None
+    quantities: Quantities | None = None
+
+
+@dataclass(frozen=True)
+class Store:
+    """The folder of a study.
+
+    Attributes
+    ----------
+    folder : where it is
+    key : of scene, stones and version, see `study_key`; results of others in the folder are left alone
+    """
+
+    folder: Path
+    key: str
+
+    def prepare(self) -> None:
+        """Make the folder.
+
+        Raises
+        ------
+        UsageError : there is something else, or it cannot be written
+        """
+        where, remedy = str(self.folder), "name another folder"
+        if self.folder.is_symlink() or (self.folder.exists() and not self.folder.is_dir()):
+            raise UsageError("is not a folder", where=where, remedy=remedy)
+        try:
+            if self.folder.is_dir() and any(self.folder.iterdir()) and not (self.folder / _RUNS).is_dir():
+                raise UsageError("holds what no study of MOMA wrote", where=where, remedy=remedy)
+            (self.folder / _RUNS).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise UsageError(f"cannot be written: {error.strerror}", where=where, remedy=remedy) from error
+
+    def load(self) -> dict[str, Measured]:
+        """All runs of this study that have ended, by the name of their setting."""
+        found = {}
+        for file in sorted((self.folder / _RUNS).glob("*.json")):
+            try:
+                record = json.loads(file.read_text(encoding="utf-8"))
+                if record.pop("study") == self.key:
+                    one = _measured(record)
+                    found[one.name] = one
+            except (OSError, ValueError, LookupError, TypeError):
+                continue  # no result of ours: it is measured again
+        return found
+
+    def keep(self, run: Measured) -> None:
+        """Write one run; the file appears whole or not at all."""
+        record = {
+            "study": self.key,
+            **{one.name: getattr(run, one.name) for one in fields(run)},
+            "overlay": overlay_record(run.overlay),
+            "quantities": None if run.quantities is None else run.quantities.as_record(),
+        }
+        name = hashlib.sha256(json.dumps([self.key, record["overlay"]]).encode()).hexdigest()[:16]
+        self.write(f"{_RUNS}/{name}.json", as_json(record).encode("utf-8"))
+
+    def write(self, name: str, content: bytes) -> None:
+        """A file of the folder; it appears whole or not at all.
+
+        Raises
+        ------
+        UsageError : there is no room, or no right to
+        """
+        target = self.folder / name
+        try:
+            handle, fresh = tempfile.mkstemp(prefix=".", suffix=".part", dir=target.parent)
+            try:
+                with os.fdopen(handle, "wb") as file:
+                    file.write(content)
+                Path(fresh).chmod(0o644)
+                os.replace(fresh, target)
+            except BaseException:
+                Path(fresh).unlink(missing_ok=True)
+                raise
+        except OSError as error:
+            raise UsageError(f"cannot be written: {error.strerror}", where=str(target)) from error
+
+
+def _measured(record: dict[str, Any]) -> Measured:
+    known = record["quantities"]
+    return Measured(
+        **record
+        | {
+            "overlay": overlay_from(record["overlay"]),
+            "status": Status(record["status"]),
+            "quantities": None if known is None else quantities_from(known),
+        }
+    )
+
+
+def study_key(scene: SceneFile, assembly: Assembly) -> str:
+    """A number that changes with the scene file, with the stones and loads that it stands for, and with the version."""
+    digest = hashlib.sha256()
+    for part in (version("moma-masonry"), scene.text, assembly.scene):
+        _feed(part, digest)
+    return digest.hexdigest()[:16]
+
+
+@singledispatch
+def _feed(value: object, digest: Any) -> None:
+    """Add a value, with all that it is made of, to the digest."""
+    if is_dataclass(value):
+        for one in fields(value):
+            _feed(one.name, digest)
+            _feed(getattr(value, one.name), digest)
+    else:
+        digest.update(f"{type(value).__name__} {value!r};".encode())
+
+
+@_feed.register
+def _(value: np.ndarray, digest: Any) -> None:
+    digest.update(f"array {value.dtype} {value.shape};".encode())
+    digest.update(np.ascontiguousarray(value).tobytes())
+
+
+@_feed.register(tuple)
+@_feed.register(list)
+def _(value: Any, digest: Any) -> None:
+    digest.update(f"row {len(value)};".encode())
+    for one in value:
+        _feed(one, digest)
+
+
+@_feed.register(dict)
+def _(value: Any, digest: Any) -> None:
+    for key in sorted(value, key=str):
+        _feed(key, digest)
+        _feed(value[key], digest)
+
+
+@_feed.register(frozenset)
+def _(value: Any, digest: Any) -> None:
+    _feed(sorted(value, key=str), digest)

@@ -1,0 +1,112 @@
+"""Speed against accuracy, measured on the user's own scene: runs at many settings, judged by the finest of them."""
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from archmodel.database.session import open_database
+from mechanics.scene.scene import Fidelity
+from moma.errors import UsageError
+from pipelines.progress import Listener, silent
+from pipelines.run.assemble import assemble
+from pipelines.scene.file import read_scene
+from pipelines.toml.schema import nearest
+from pipelines.tuning.overlay import typical_width
+from pipelines.tuning.quantities import QUANTITIES
+from pipelines.tuning.tradeoff.grid import grid
+from pipelines.tuning.tradeoff.report import Goal, study_record, write_study
+from pipelines.tuning.tradeoff.scheduler import Limits, carry_out
+from pipelines.tuning.tradeoff.store import Store, study_key
+from pipelines.tuning.tradeoff.worker import Job
+
+__all__ = ["Asked", "TradeReport", "run_trade"]
+
+_STRESS = "von_mises"  # names with this in them are of stresses
+_MEMORY_SHARE = 0.8  # of the machine's, that runs may take together
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What a study is to find out.
+
+    Attributes
+    ----------
+    budget : time of all runs [s]
+    jobs : runs at a time
+    error : below which a setting is recommended [-]
+    quantity : of which; None: von_mises_p99 if a stone deforms, else support_reactions
+    """
+
+    budget: float = 600.0
+    jobs: int = 1
+    error: float = 0.05
+    quantity: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.quantity is not None and self.quantity not in QUANTITIES:
+            raise UsageError(
+                f"unknown quantity {self.quantity!r}", where="--of", remedy=nearest(self.quantity, QUANTITIES)
+            )
+        cores = os.cpu_count() or 1
+        if not 1 <= self.jobs <= cores:
+            raise UsageError(f"{self.jobs} runs at a time", where="--jobs", remedy=f"give 1 to {cores}")
+        for name, value in (("--budget", self.budget), ("--error", self.error)):
+            if not 0.0 < value < float("inf"):
+                raise UsageError(f"{value:g} is not above zero", where=name, remedy="give a positive number")
+
+
+@dataclass(frozen=True)
+class TradeReport:
+    """What a study found.
+
+    Attributes
+    ----------
+    folder : where it lies
+    record : the contents of trade.json
+    """
+
+    folder: Path
+    record: dict[str, Any]
+
+
+def run_trade(
+    path: str | Path, url: str, folder: str | Path, asked: Asked, progress: Listener = silent
+) -> TradeReport:
+    """Run a scene at many settings and say what each costs and how far it is from the finest.
+
+    Parameters
+    ----------
+    path : scene file
+    url : of the database
+    folder : of the study; runs that it has already are not done again
+    asked : how long it may take, and what is to be recommended
+    progress : told of every run
+
+    Raises
+    ------
+    UsageError : the folder holds other things
+    SceneError, GeometryError, DatabaseError : see `pipelines.run.assemble`
+    """
+    scene = read_scene(path)
+    with open_database(url, create=False) as database, database.session(read_only=True) as session:
+        assembly = assemble(scene, session)
+    width = typical_width(assembly.models)
+    blocks = assembly.scene.blocks
+    soft = any(block.fidelity is Fidelity.DEFORMABLE for block in blocks)
+    quantity = asked.quantity or ("von_mises_p99" if soft else "support_reactions")
+    settings = grid(scene, blocks, width, stress=_STRESS in quantity)
+    store = Store(Path(folder), study_key(scene, assembly))
+    store.prepare()
+    limits = Limits(asked.budget, asked.jobs, _MEMORY_SHARE * _memory(), quantity, scene.solver.threads)
+    job = Job(scene.text, str(path), url, {}, width)
+    forecast, left = carry_out(job, settings, store, limits, progress)
+    goal = Goal(scene.name, quantity, asked.error, width)
+    record = study_record(goal, forecast, left, limits)
+    write_study(store, record)
+    return TradeReport(store.folder, record)
+
+
+def _memory() -> int:
+    """Memory of this machine [bytes]."""
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")

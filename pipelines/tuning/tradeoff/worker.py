@@ -1,0 +1,151 @@
+"""One run of a study of speed against accuracy, in a process of its own: ``python -m
+pipelines.tuning.tradeoff.worker``.
+
+So its CPU time and its memory are its own, and it can be stopped. The job comes as one line of JSON on the standard
+input, which stays open for as long as the parent lives; the answer is one line of JSON on the standard output.
+"""
+
+import ctypes
+import json
+import os
+import resource
+import signal
+import sys
+import threading
+import time
+from dataclasses import dataclass, fields
+from typing import Any
+
+from archmodel.database.session import open_database
+from mechanics.results.result import Result
+from mechanics.scene.scene import Fidelity, Method, Placement
+from mechanics.simulate import simulate
+from mechanics.stones.meshing.elements import Element
+from moma.errors import MomaError
+from pipelines.run.assemble import assemble
+from pipelines.scene.file import SceneFile, parse_scene
+from pipelines.tuning.overlay import Overlay, overlaid
+from pipelines.tuning.quantities import quantities
+
+__all__ = ["FAILED", "SHORT", "Job", "overlay_from", "overlay_record"]
+
+FAILED = 3
+"""Exit code of a run that failed in a way that MOMA foresees; the reason is on the standard output."""
+
+SHORT = 5.0
+"""Work of fewer seconds of CPU time is done twice, since the first time has compiled kernels to read from the disk."""
+_KINDS: dict[str, Any] = {
+    "fidelity": Fidelity,
+    "element": Element,
+    "placement": Placement,
+    "method": Method,
+}
+
+
+@dataclass(frozen=True)
+class Job:
+    """What one run needs to know.
+
+    Attributes
+    ----------
+    text, path : of the scene file; the path is for messages and for files beside it
+    url : of the database
+    overlay : what replaces settings of the scene, see `overlay_record`
+    width : typical smallest width of the stones [m]
+    """
+
+    text: str
+    path: str
+    url: str
+    overlay: dict[str, Any]
+    width: float
+
+
+def overlay_record(overlay: Overlay) -> dict[str, Any]:
+    """What an overlay sets, in plain texts and numbers."""
+    given = {one.name: getattr(overlay, one.name) for one in fields(overlay)}
+    return {
+        name: str(value) if name in _KINDS else value for name, value in given.items() if value is not None
+    }
+
+
+def overlay_from(record: dict[str, Any]) -> Overlay:
+    """The overlay that `overlay_record` has written."""
+    return Overlay(**{name: _KINDS.get(name, _as_it_is)(value) for name, value in record.items()})
+
+
+def _as_it_is(value: Any) -> Any:
+    return value
+
+
+def _measured(job: Job) -> dict[str, Any]:
+    """Run the scene, twice if that is short, and say what it took and what came out."""
+    program = _peak_memory()
+    scene = overlaid(parse_scene(job.text, job.path), overlay_from(job.overlay), job.width)
+    for _ in range(2):
+        cpu, wall = time.process_time(), time.perf_counter()
+        result = _simulated(scene, job.url)
+        cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
+        if cpu > SHORT:
+            break
+    return {
+        "cpu": cpu,
+        "wall": wall,
+        "memory": _peak_memory(),
+        "program_memory": program,
+        "nodes": sum(len(body.reference) for body in result.bodies if body.element is not None),
+        "contacts": len(result.contacts.gap),
+        "steps": result.steps,
+        "unconverged_steps": result.errors.unconverged_steps,
+        "solver": next(iter(result.solvers), ""),
+        "stages": dict(result.wall_time),
+        "quantities": quantities(result).as_record(),
+    }
+
+
+def _simulated(scene: SceneFile, url: str) -> Result:
+    with open_database(url, create=False) as database, database.session(read_only=True) as session:
+        assembly = assemble(scene, session)
+    return simulate(assembly.scene)
+
+
+def _peak_memory() -> int:
+    """The most that this process has had at once [bytes]."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak if sys.platform == "darwin" else 1024 * peak
+
+
+def _end_with_parent(parent: int) -> None:
+    """End this process as soon as its parent has ended, however that came about."""
+    if sys.platform.startswith("linux"):
+        # the kernel does it at once, even amid a long kernel of numba, which the thread below would wait for
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
+        if os.getppid() != parent:
+            os._exit(1)
+    threading.Thread(target=_await_end, daemon=True).start()
+
+
+def _await_end() -> None:
+    while os.read(
+        0, 1024
+    ):  # the parent says nothing more; it ends when the parent's end of the pipe is closed
+        pass
+    os._exit(1)
+
+
+def _main() -> int:
+    # unbuffered, since the rest is for the watch
+    with open(sys.stdin.fileno(), "rb", buffering=0, closefd=False) as channel:
+        asked = json.loads(channel.readline())
+    _end_with_parent(asked.pop("parent"))
+    try:
+        answer = _measured(Job(**asked))
+    except MomaError as error:
+        print(json.dumps({"reason": " ".join(str(error).split())}))
+        return FAILED
+    print(json.dumps(answer, allow_nan=False))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(_main())
