@@ -30,8 +30,8 @@ from benchmarks.building import (
 )
 from benchmarks.memory import peak_bytes
 from benchmarks.processor import processor_clock
-from moma.answers import Question as Query
-from moma.answers import answer
+from moma.cli.text.query import Question as Query
+from moma.cli.text.query import answer
 
 __all__ = ["QUESTIONS", "STEPS", "Question", "main"]
 

@@ -13,7 +13,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from moma.cli import app
-from moma.telling_trade import trade_lines
+from moma.cli.text.tradeoff import trade_lines
 from pipelines.tuning.quantities import QUANTITIES
 from pipelines.tuning.tradeoff import study as trade_module
 from pipelines.tuning.tradeoff.grid import grid

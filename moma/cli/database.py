@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
+from moma.cli.console import reporting
 from moma.cli.options import DEFAULT_DB, Db, Json, Verbose
-from moma.console import reporting
 from moma.errors import UsageError
 
 __all__ = ["migrate"]
@@ -27,7 +27,7 @@ def migrate(
     """Give a database the layout of this program, or of an older one: all of it, or nothing."""
     from archmodel.migrations.migrate import migrate as change
     from archmodel.tables.layout import SCHEMA_VERSION
-    from moma.listing import as_json
+    from moma.cli.text.formats import as_json
 
     if yes and to is None:
         raise UsageError("--yes without --to", remedy="name the older version with --to")

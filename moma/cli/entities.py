@@ -4,8 +4,8 @@ from typing import Annotated
 
 import typer
 
+from moma.cli.console import reporting, say
 from moma.cli.options import DEFAULT_DB, Db, Json, ListFormat, Verbose
-from moma.console import reporting, say
 from moma.errors import UsageError
 
 __all__ = ["query", "schema", "show"]
@@ -41,7 +41,7 @@ def query(
 ) -> None:
     """List the entities of a kind that satisfy conditions."""
     from archmodel.database.session import open_database
-    from moma.answers import Question, answer
+    from moma.cli.text.query import Question, answer
 
     if json and format not in (None, ListFormat.JSON):
         raise UsageError(f"--json and --format {format} ask for two formats", remedy="give one of them")
@@ -81,8 +81,8 @@ def schema(
 
     from archmodel.database.session import open_database
     from archmodel.describe.schema_tree import schema as tree_of
-    from moma.listing import as_json
-    from moma.schema_text import print_schema
+    from moma.cli.text.formats import as_json
+    from moma.cli.text.schema import print_schema
 
     url = db if db is not None or not Path("moma.db").exists() else DEFAULT_DB
     if url is None:
@@ -115,8 +115,8 @@ def show(
     from archmodel.database.session import open_database
     from archmodel.describe import history as past
     from archmodel.query.api import describe
-    from moma.listing import as_json
-    from moma.telling_entities import entity_lines, history_lines
+    from moma.cli.text.entities import entity_lines, history_lines
+    from moma.cli.text.formats import as_json
 
     if history and at is not None:
         raise UsageError("--history and --at ask for two things", remedy="give one of them")

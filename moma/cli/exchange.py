@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from moma.cli.console import reporting
 from moma.cli.options import DEFAULT_DB, Db, Json, Verbose
-from moma.console import reporting
 
 if TYPE_CHECKING:
     from pipelines.exchange import ExchangeReport
@@ -31,7 +31,7 @@ Target = Annotated[
 @reporting
 def export(document: Target, db: Db = DEFAULT_DB, json: Json = False, verbose: Verbose = False) -> None:
     """Write all that the database holds into one JSON document."""
-    from moma.listing import as_json
+    from moma.cli.text.formats import as_json
     from pipelines.exchange import export_database, export_to_stream
 
     if str(document) == "-":
@@ -44,7 +44,7 @@ def export(document: Target, db: Db = DEFAULT_DB, json: Json = False, verbose: V
 @reporting
 def import_(document: Document, db: Db = DEFAULT_DB, json: Json = False, verbose: Verbose = False) -> None:
     """Make a database of such a document: all of it, or none if anything is wrong."""
-    from moma.listing import as_json
+    from moma.cli.text.formats import as_json
     from pipelines.exchange import import_database
 
     report = import_database(document, db)

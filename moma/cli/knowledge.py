@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
+from moma.cli.console import reporting
 from moma.cli.options import DEFAULT_DB, Db, Json, Verbose
-from moma.console import reporting
 
 __all__ = ["record"]
 
@@ -28,8 +28,8 @@ def record(
     verbose: Verbose = False,
 ) -> None:
     """Record knowledge of a building: materials, phases, structures, marks, observations, corrections, …"""
-    from moma.listing import as_json
-    from moma.telling_records import record_lines
+    from moma.cli.text.formats import as_json
+    from moma.cli.text.knowledge import record_lines
     from pipelines.record.record import record as put_in
 
     report = put_in(files, db, author=author, dry_run=dry_run)

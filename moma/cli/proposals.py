@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from moma.cli.console import reporting, say
 from moma.cli.options import DEFAULT_DB, Db, Json, Verbose
-from moma.console import reporting, say
 from moma.errors import UsageError
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def propose(
     verbose: Verbose = False,
 ) -> None:
     """Propose stones that are missing, or the core between two facings; see docs/unseen.md."""
-    from moma.listing import as_json
+    from moma.cli.text.formats import as_json
     from pipelines.propose.propose import Recording, propose_core, propose_stones
     from survey.unseen.core.settings import InfillSettings, InfillShape
 
@@ -116,7 +116,7 @@ def _refuse_others(
 
 
 def _table(report: "ProposalReport") -> str:
-    from moma.listing import as_table
+    from moma.cli.text.formats import as_table
 
     columns = ("code", "kind", "course", "length", "height", "depth", "volume", "notes")
     rows = [{**asdict(one), "notes": "; ".join(one.notes) or None} for one in report.proposals]

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from moma.cli.console import reporting, say
 from moma.cli.options import DEFAULT_DB, Db, Json, Verbose
-from moma.console import reporting, say
 
 if TYPE_CHECKING:
     from pipelines.ingest.relate import RelationReport
@@ -39,7 +39,7 @@ def relate(
     """Compute again what rests on what, and which courses and arches there are; see docs/relations.md."""
     from archmodel.database.session import open_database
     from archmodel.relations.store import held_settings
-    from moma.listing import as_json, as_table
+    from moma.cli.text.formats import as_json, as_table
     from pipelines.ingest.relate import relate as compute
 
     given = {name: value for name, value in (("width", width), ("angle", angle)) if value is not None}
@@ -80,7 +80,7 @@ def load_path(
     """Show all stones on which one rests, directly or through others; with --up, all that rest on it."""
     from archmodel.database.session import open_database
     from archmodel.relations.graph import load_path as follow
-    from moma.listing import as_json, as_table
+    from moma.cli.text.formats import as_json, as_table
 
     with open_database(db, create=False) as database, database.session(read_only=True) as session:
         path = follow(session, code, up=up, as_of=at)

@@ -4,8 +4,8 @@ from typing import Annotated, Any
 
 import typer
 
+from moma.cli.console import reporting, say
 from moma.cli.options import DEFAULT_DB, Db, Json, Verbose
-from moma.console import reporting, say
 from moma.errors import UsageError
 
 __all__ = ["runs"]
@@ -60,7 +60,7 @@ def runs(
     """List the simulation runs, or show one in full, or compare two."""
     from archmodel.database.session import open_database
     from archmodel.describe.runs import compare_runs, describe_run, list_runs
-    from moma.listing import as_json, as_table
+    from moma.cli.text.formats import as_json, as_table
 
     if number is None and against is not None:
         raise UsageError("--against needs a run to compare", remedy=f"moma runs N --against {against}")
@@ -82,7 +82,7 @@ def runs(
 
 def _full(told: dict[str, Any], verbose: bool) -> str:
     """One run as lines and tables; the scene file only if asked for more."""
-    from moma.listing import as_lines, as_table
+    from moma.cli.text.formats import as_lines, as_table
 
     scene_text = told.pop("scene_text")
     tables = {name: told.pop(name) for name in _TABLES}
@@ -96,7 +96,7 @@ def _full(told: dict[str, Any], verbose: bool) -> str:
 
 def _comparison(told: dict[str, Any]) -> str:
     """Two runs beside each other."""
-    from moma.listing import as_lines, as_table
+    from moma.cli.text.formats import as_lines, as_table
 
     names = {"stresses": ("largest changes of Von Mises stress", "Pa")}
     names["displacements"] = ("largest changes of displacement", "m")

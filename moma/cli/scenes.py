@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
+from moma.cli.console import progress_bars, reporting, say
 from moma.cli.options import DEFAULT_DB, Db, Json, Profile, SceneArgument, Verbose
-from moma.console import progress_bars, reporting, say
 
 __all__ = ["check", "run"]
 
@@ -32,9 +32,9 @@ def check(
     verbose: Verbose = False,
 ) -> None:
     """Say whether a scene is sound and what it will cost; run nothing."""
-    from moma.listing import as_json
-    from moma.telling import profile_lines
-    from moma.telling_checks import check_lines
+    from moma.cli.text.checks import check_lines
+    from moma.cli.text.formats import as_json
+    from moma.cli.text.runs_and_surveys import profile_lines
     from pipelines.run.check import check_scene
 
     report = check_scene(scene, db, pictures, profile)
@@ -62,8 +62,8 @@ def run(
     verbose: Verbose = False,
 ) -> None:
     """Simulate a scene; write tables, pictures and a report, and keep the results in the database."""
-    from moma.listing import as_json
-    from moma.telling import run_lines
+    from moma.cli.text.formats import as_json
+    from moma.cli.text.runs_and_surveys import run_lines
     from pipelines.run.run import run_scene
 
     with progress_bars() as listener:

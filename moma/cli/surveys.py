@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from moma.cli.console import progress_bars, reporting, say
 from moma.cli.options import (
     DEFAULT_DB,
     Codes,
@@ -23,7 +24,6 @@ from moma.cli.options import (
     Unit,
     Verbose,
 )
-from moma.console import progress_bars, reporting, say
 from moma.errors import UsageError
 
 __all__ = ["ingest", "survey_report"]
@@ -63,8 +63,8 @@ def ingest(
     verbose: Verbose = False,
 ) -> None:
     """Take survey files into the database: all of them, or none if anything is wrong."""
-    from moma.listing import as_json
-    from moma.telling import ingest_lines
+    from moma.cli.text.formats import as_json
+    from moma.cli.text.runs_and_surveys import ingest_lines
     from pipelines.ingest.ingest import ingest as take_in
     from pipelines.ingest.kind_rules import kind_rules
     from pipelines.ingest.reading_options import reading_options
@@ -106,7 +106,7 @@ def survey_report(
     verbose: Verbose = False,
 ) -> None:
     """Judge survey files: precision, what to measure again, courses, kinds; no database is needed."""
-    from moma.telling import survey_report_lines
+    from moma.cli.text.runs_and_surveys import survey_report_lines
     from pipelines.ingest.reading_options import reading_options
     from pipelines.reports.survey.report import INDEX, report_surveys
 

@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
+from moma.cli.console import progress_bars, reporting, say
 from moma.cli.options import DEFAULT_DB, Db, Json, SceneArgument, Verbose
-from moma.console import progress_bars, reporting, say
 
 __all__ = ["trade"]
 
@@ -43,8 +43,8 @@ def trade(
     verbose: Verbose = False,
 ) -> None:
     """Run a scene at many settings: what does each cost, and how far is it from the finest?"""
-    from moma.listing import as_json
-    from moma.telling_trade import trade_lines
+    from moma.cli.text.formats import as_json
+    from moma.cli.text.tradeoff import trade_lines
     from pipelines.tuning.tradeoff.study import Asked, run_trade
 
     asked = Asked(60.0 * budget, jobs, error, of)

@@ -17,7 +17,7 @@ from archmodel.query.attributes import ATTRIBUTES
 from archmodel.store.stones import store_survey
 from archmodel.tables.entities import kinds
 from moma.cli import app
-from moma.schema_text import print_schema, schema_lines
+from moma.cli.text.schema import print_schema, schema_lines
 from tests.archmodel.conftest import WALL
 from tests.archmodel.furnished import furnish
 from tests.archmodel.stones import SHA

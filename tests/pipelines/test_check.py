@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from moma.cli.text.checks import check_lines, duration
 from moma.errors import UsageError
-from moma.telling_checks import check_lines, duration
 from pipelines.ingest.ingest import ingest
 from pipelines.run.check import check_scene
 from pipelines.run.closing_check import joints_report, simplification_report

@@ -13,8 +13,8 @@ from archmodel.tables.surveys import Measurement
 from mechanics.scene.scene import Fidelity
 from mechanics.simulate import simulate
 from moma.cli import app
+from moma.cli.text.checks import check_lines
 from moma.errors import SceneError
-from moma.telling_checks import check_lines
 from pipelines.ingest.ingest import ingest
 from pipelines.run.assemble import assemble
 from pipelines.run.check import check_scene

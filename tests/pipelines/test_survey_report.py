@@ -11,8 +11,8 @@ import pytest
 from typer.testing import CliRunner
 
 from moma.cli import app
+from moma.cli.text.runs_and_surveys import survey_report_lines
 from moma.errors import SurveyError, UsageError
-from moma.telling import survey_report_lines
 from pipelines.ingest.reading_options import reading_options
 from pipelines.reports.survey import report as survey_report
 from pipelines.reports.survey.report import report_surveys

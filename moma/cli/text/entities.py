@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from moma.listing import as_lines
+from moma.cli.text.formats import as_lines
 
 __all__ = ["entity_lines", "history_lines"]
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from archmodel.query.api import asked_columns, attributes, find_faces, find_rows
 from archmodel.query.attributes import Attribute
 from archmodel.query.geojson import feature_collection, flattened
-from moma.listing import USUAL_COLUMNS, as_csv, as_geojson, as_json, as_table, shown_columns
+from moma.cli.text.formats import USUAL_COLUMNS, as_csv, as_geojson, as_json, as_table, shown_columns
 
 if TYPE_CHECKING:
     from sqlalchemy.orm import Session

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from moma.listing import as_table
+from moma.cli.text.formats import as_table
 
 if TYPE_CHECKING:
     from pipelines.tuning.tradeoff.study import TradeReport
