@@ -1,8 +1,9 @@
-"""How long work tells where it stands, without knowing who listens; light, so that every stage can use it."""
+"""Progress of long work, and who listens to it; light, so that every stage can use it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
-__all__ = ["Progress"]
+__all__ = ["Listener", "Progress", "silent"]
 
 
 @dataclass(frozen=True)
@@ -13,3 +14,10 @@ class Progress:
     done: int
     total: int | None
     text: str = ""
+
+
+Listener = Callable[[Progress], None]
+
+
+def silent(progress: Progress) -> None:
+    """Listen to nothing."""

@@ -15,8 +15,8 @@ from moma.errors import MomaError
 if TYPE_CHECKING:
     from rich.progress import TaskID
 
+    from mechanics.dynamics.progress import Listener
     from mechanics.dynamics.progress import Progress as Told
-    from pipelines.progress import Listener
 
 __all__ = ["progress_bars", "reporting", "say"]
 

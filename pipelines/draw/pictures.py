@@ -158,7 +158,7 @@ def draw_apart(module: str, job_file: Path) -> None:
 
 def _attempt(module: str, job_file: Path, window: str | None) -> "subprocess.CompletedProcess[str]":
     """One process that draws, with the given kind of VTK window; None: the one that VTK would take."""
-    root = str(Path(__file__).resolve().parent.parent)
+    root = str(Path(__file__).resolve().parents[2])
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([root, os.environ.get("PYTHONPATH", "")])}
     if window is not None:
         environment.setdefault("VTK_DEFAULT_OPENGL_WINDOW", window)

@@ -13,6 +13,7 @@ from archmodel.store.bulk import first_free_id
 from archmodel.store.stone_record import StoneRecord
 from archmodel.store.stones import store_survey
 from archmodel.tables.entities import Entity, kind_named
+from mechanics.dynamics.progress import Listener, Progress, silent
 from moma.errors import NoDatabaseError, SurveyError, UsageError
 from pipelines.ingest.frame_records import frame_record
 from pipelines.ingest.kind_rules import KindRule, check_kinds, ruled
@@ -22,7 +23,6 @@ from pipelines.ingest.rejects import check_targets, default_path, rejects_text
 from pipelines.ingest.relate import KnownSolids, relate
 from pipelines.ingest.report import IngestReport, Tally
 from pipelines.ingest.spool import Spool
-from pipelines.progress import Listener, Progress, silent
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.formats.reading import ReadingOptions, open_survey
 from survey.records.survey import Reject

@@ -12,11 +12,11 @@ from archmodel.database.session import open_database
 from archmodel.store.run_record import StoneResult
 from archmodel.store.store_runs import store_run
 from archmodel.tables.entries import latest_entry
+from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.results.result import Outcome, Result
 from mechanics.simulate import simulate
 from moma.errors import DatabaseError, MissingLibraryError
 from pipelines.draw.pictures import draw_pictures, missing
-from pipelines.progress import Listener, Progress, silent
 from pipelines.reports.run import write_report
 from pipelines.results.folder import check_replaceable, replacing
 from pipelines.results.joints_csv import write_joints

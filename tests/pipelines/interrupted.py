@@ -8,9 +8,9 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerProcess
 from pathlib import Path
 
+from mechanics.dynamics.progress import Progress
 from moma.errors import DatabaseError
 from pipelines.ingest.ingest import ingest
-from pipelines.progress import Progress
 
 __all__ = ["Ingest", "wall_survey"]
 

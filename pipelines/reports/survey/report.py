@@ -6,9 +6,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from mechanics.dynamics.progress import Listener, Progress, silent
 from pipelines.draw.elevations.beds import draw_courses
 from pipelines.draw.elevations.survey import draw_elevation, draw_residuals
-from pipelines.progress import Listener, Progress, silent
 from pipelines.reports.survey.document import survey_json, write_survey_json
 from pipelines.reports.survey.page import write_survey_page
 from pipelines.reports.survey.study import SurveyStudy, study_surveys

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from archmodel.tables.entities import kind_named
+from mechanics.dynamics.progress import Listener, Progress, silent
 from moma.errors import UsageError
 from pipelines.ingest.reading_options import check_survey_file
-from pipelines.progress import Listener, Progress, silent
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.formats.options import ReadingOptions
 from survey.formats.reading import open_survey

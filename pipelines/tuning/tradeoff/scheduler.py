@@ -13,7 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, Self
 
-from pipelines.progress import Listener, Progress
+from mechanics.dynamics.progress import Listener, Progress
 from pipelines.tuning.quantities import quantities_from
 from pipelines.tuning.tradeoff.forecast import Choice, Forecast, next_run
 from pipelines.tuning.tradeoff.grid import Setting
@@ -193,7 +193,7 @@ class _Runs:
         return over
 
     def _environment(self) -> dict[str, str]:
-        root = str(Path(__file__).resolve().parent.parent)
+        root = str(Path(__file__).resolve().parents[3])
         path = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
         return os.environ | dict.fromkeys(_THREADS, str(self._limits.threads)) | {"PYTHONPATH": path}
 

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from archmodel.database.session import open_database
+from mechanics.dynamics.progress import Listener, silent
 from mechanics.scene.scene import Fidelity
 from moma.errors import UsageError
-from pipelines.progress import Listener, silent
 from pipelines.run.assemble import assemble
 from pipelines.scene.file import read_scene
 from pipelines.toml.schema import nearest
