@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
@@ -20,6 +19,7 @@ from archmodel.store.store_runs import store_run
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import new_entry
 from archmodel.tables.relations import Relation
+from mechanics.arrays import Array, Ints
 from pipelines.ingest.relate import relate
 
 __all__ = ["COURSES", "RUNS", "relate_all", "store_all_stones", "store_knowledge", "store_results"]
@@ -29,8 +29,6 @@ RUNS = 12
 _HEIGHT, _GAP, _POINTS = 0.29, 0.01, 10
 _ARCH_STONES = 15
 _EVERY = 2000  # stones for each arch
-
-Array = NDArray[np.float64]
 
 
 # --- the stones: a wall in running bond of headers and stretchers, and free arches before it ---
@@ -164,7 +162,7 @@ def _values(more: list[float]) -> dict[str, float]:
     return {"joint_pressure": 1e5 * more[0], "joint_kern": 2.0 * more[1], "joint_opening": 1e-4 * more[2]}
 
 
-def _touching(session: Session) -> NDArray[np.int64]:
+def _touching(session: Session) -> Ints:
     """(n, 2) pairs of stones that have a joint, as indices from 0."""
     rows = session.execute(
         select(Relation.subject_id, Relation.object_id).where(Relation.kind.in_(("rests_on", "beside")))
@@ -173,7 +171,7 @@ def _touching(session: Session) -> NDArray[np.int64]:
     return numbers - 1  # in a new database stones are numbered from 1
 
 
-def _joints(pairs: NDArray[np.int64], rng: np.random.Generator) -> JointArrays:
+def _joints(pairs: Ints, rng: np.random.Generator) -> JointArrays:
     count = len(pairs)
     names = "area force_normal force_shear pressure_mean pressure_max friction_use slipping open gap opening sliding"
     return JointArrays(
@@ -186,7 +184,7 @@ def _joints(pairs: NDArray[np.int64], rng: np.random.Generator) -> JointArrays:
     )
 
 
-def _contacts(pairs: NDArray[np.int64], rng: np.random.Generator) -> ContactArrays:
+def _contacts(pairs: Ints, rng: np.random.Generator) -> ContactArrays:
     count = 4 * len(pairs)
     return ContactArrays(
         stones=np.repeat(pairs, 4, axis=0),

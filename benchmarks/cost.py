@@ -12,12 +12,12 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from benchmarks.child import run_child
 from benchmarks.cost_scenes import Case
 from benchmarks.report import Row, Table, guarded, machine, print_json, print_table, progress
+from mechanics.arrays import Array
 from mechanics.results.forecast.cost import calibration, expected_cost, measures
 from mechanics.results.forecast.cost_rates import Rate
 from mechanics.results.forecast.plan import plan
@@ -26,7 +26,6 @@ from moma.errors import SolverError
 
 __all__ = ["fitted", "main"]
 
-Array = NDArray[np.float64]
 
 _FIT = (
     *(Case("wall", n) for n in (50, 500, 2000)),

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.generated import box_faces
+from mechanics.arrays import Array
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene, Start, TimeSettings
 from mechanics.stones.materials import Material
@@ -15,7 +15,6 @@ from mechanics.stones.meshing.elements import Element
 
 __all__ = ["KINDS", "Case"]
 
-Array = NDArray[np.float64]
 
 _STONE = Material("stone", density=2400.0, young=5e9, poisson=0.2)
 # length, depth and height of a stone [m]

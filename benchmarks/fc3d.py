@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.reference import Siconos
 from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
+from mechanics.arrays import Array
 from mechanics.delassus.stored import StoredDelassus
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.problem.residual import project_on_cone
@@ -24,7 +24,6 @@ from moma.errors import UsageError
 
 __all__ = ["main", "read_problem", "siconos_error"]
 
-Array = NDArray[np.float64]
 
 _SOLVERS = {"auto": Auto, "nsgs": NSGS, "admm": ADMM}
 # η begins at this, or at the tolerance times that, and goes down by this factor, to rounding at most

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.memory import arrays_bytes, peak_bytes
+from mechanics.arrays import Array
 from moma.errors import SurveyError
 from pipelines.ingest.ingest import ingest
 from survey.extrusion.extrusion import SurveyedBlock
@@ -59,7 +59,7 @@ def main() -> None:
 # --- the wall ---
 
 
-def _wall(stones: int) -> Iterator[tuple[str, str, int, NDArray[np.float64]]]:
+def _wall(stones: int) -> Iterator[tuple[str, str, int, Array]]:
     """(code, kind, course, places (14, 3): ten points, then the corners counter-clockwise seen from outside).
 
     Every tenth stone has two points 30 to 300 mm off the face, every twentieth a corner worn by 20 to 80 mm.
@@ -102,7 +102,7 @@ def _write_pnezd(path: Path, stones: int) -> None:
                 file.write(f"{14 * number + k + 1},{y:.4f},{x:.4f},{z:.4f},{code}:{role}\n")
 
 
-def _place(place: NDArray[np.float64]) -> str:
+def _place(place: Array) -> str:
     x, y, z = place
     return f"{x:.4f} {y:.4f} {z:.4f}"
 

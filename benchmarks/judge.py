@@ -3,19 +3,17 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from benchmarks.scenes import BlockScene
 from benchmarks.trace import Touch, Trace
+from mechanics.arrays import Array
 from mechanics.delassus.rigid import RigidDelassus, schedule
 from mechanics.problem.problem import ContactProblem
 from mechanics.problem.residual import natural_map
 from mechanics.stones.polyhedra import mass_properties
 
 __all__ = ["Judge", "Verdict"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array
 from mechanics.scene.scene import Block, Fidelity
 from mechanics.stones.materials import Material
 
@@ -25,7 +25,6 @@ __all__ = [
     "two_spans",
 ]
 
-Array = NDArray[np.float64]
 # a sound limestone
 _STONE = Material("limestone", 2400.0, young=1e10, poisson=0.2)
 

@@ -9,7 +9,6 @@ import time
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
@@ -23,7 +22,6 @@ from mechanics.stones.polyhedra import mass_properties
 
 __all__ = ["main"]
 
-Array = NDArray[np.float64]
 
 _LIMESTONE = Material("limestone", density=2000.0, young=1e10, poisson=0.2)
 _FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))

@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
+from mechanics.arrays import Array, Bools
 from moma.errors import MomaError
 from survey.faces.planes import fit_plane
 
 __all__ = ["main"]
 
-Array = NDArray[np.float64]
 # points → normal, axes (2, 3), standard deviations of the tilts (2,), whether each point was left out (n,)
-Method = Callable[[Array], tuple[Array, Array, Array, NDArray[np.bool_]]]
+Method = Callable[[Array], tuple[Array, Array, Array, Bools]]
 
 _SIGMA = 1.73e-3
 _CRITICAL = 3.29
@@ -90,7 +90,7 @@ def _share_right(method: Method, kind: str, part: float, faces: int) -> float:
     return right / faces
 
 
-def _errors(method: Method, points: Array) -> tuple[Array, NDArray[np.bool_]]:
+def _errors(method: Method, points: Array) -> tuple[Array, Bools]:
     """Tilts over their predicted standard deviations; what has no plane is as wrong as can be."""
     try:
         _, axes, deviations, left_out = method(points)
@@ -147,14 +147,12 @@ def _plane(points: Array, weights: Array) -> tuple[Array, Array, Array, Array]:
     return vectors[2], vectors[:2], _SIGMA / np.maximum(singular[:2], 1e-9), (points - centroid) @ vectors[2]
 
 
-def _least_squares(points: Array) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+def _least_squares(points: Array) -> tuple[Array, Array, Array, Bools]:
     normal, axes, deviations, _ = _plane(points, np.ones(len(points)))
     return normal, axes, deviations, np.zeros(len(points), dtype=bool)
 
 
-def _reweighted(
-    points: Array, weigh: Callable[[Array], Array]
-) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+def _reweighted(points: Array, weigh: Callable[[Array], Array]) -> tuple[Array, Array, Array, Bools]:
     """Iteratively reweighted least squares from plain ones, scale by the median absolute deviation."""
     weights = np.ones(len(points))
     for _ in range(50):
@@ -167,15 +165,15 @@ def _reweighted(
     return normal, axes, deviations, weights < 0.1
 
 
-def _huber(points: Array) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+def _huber(points: Array) -> tuple[Array, Array, Array, Bools]:
     return _reweighted(points, lambda test: 1.345 / np.maximum(test, 1.345))
 
 
-def _tukey(points: Array) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+def _tukey(points: Array) -> tuple[Array, Array, Array, Bools]:
     return _reweighted(points, lambda test: np.square(1.0 - np.minimum(test / 4.685, 1.0) ** 2))
 
 
-def _ransac(points: Array) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+def _ransac(points: Array) -> tuple[Array, Array, Array, Bools]:
     """Most points within 3.29 σ of a plane through three of them (500 draws), then least squares of these."""
     rng = np.random.default_rng(len(points))
     triples = rng.random((500, len(points))).argpartition(3, axis=1)[:, :3]
@@ -191,7 +189,7 @@ def _ransac(points: Array) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
     return normal, axes, deviations, ~accepted
 
 
-def _ours(points: Array) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+def _ours(points: Array) -> tuple[Array, Array, Array, Bools]:
     fit = fit_plane(points, _SIGMA, _OBSERVER)
     left_out = np.zeros(len(points), dtype=bool)
     left_out[list(fit.rejected)] = True

@@ -10,11 +10,11 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.generated import disk_box, running_bond
 from benchmarks.memory import arrays_bytes, peak_bytes
 from benchmarks.scenes import engine_scene
+from mechanics.arrays import Array
 from mechanics.contact.contacts import take
 from mechanics.delassus import rigid
 from mechanics.delassus.assembly import rigid_delassus
@@ -29,7 +29,6 @@ from mechanics.scene.scene import SolverSettings
 
 __all__ = ["main"]
 
-Array = NDArray[np.float64]
 
 # sweeps of the timed step, and timed sweeps for a cache-warm figure
 _STEP_SWEEPS = 50

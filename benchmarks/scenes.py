@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Bools
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import (
     Block,
@@ -21,8 +21,6 @@ from mechanics.stones.materials import Material
 from moma.errors import UsageError
 
 __all__ = ["BlockScene", "engine_scene", "list_scenes", "read_scene", "write_scene"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -43,7 +41,7 @@ class BlockScene:
     name: str
     vertices: tuple[Array, ...]
     faces: tuple[tuple[tuple[int, ...], ...], ...]
-    support: NDArray[np.bool_]
+    support: Bools
     friction: float
     density: float
     gravity: float

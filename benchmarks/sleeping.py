@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.generated import box_faces, running_bond
 from benchmarks.report import Row, Table, guarded, machine, print_json, print_table, progress
+from mechanics.arrays import Array
 from mechanics.dynamics.observers.energy import EnergyBalance
 from mechanics.dynamics.observers.equilibrium import imbalance, support_reaction
 from mechanics.dynamics.simulation import Clock, Simulation
@@ -23,7 +23,6 @@ from mechanics.stones.materials import Material
 
 __all__ = ["SCENES", "main"]
 
-Array = NDArray[np.float64]
 
 _STONE = Material("stone", density=2400.0, young=1e10, poisson=0.2)
 _SLEEPS = (1e-4, 1e-3, 1e-2)

@@ -4,9 +4,9 @@ from collections import Counter
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
+from mechanics.arrays import Array
 from mechanics.dynamics.observers.energy import EnergyBalance, kinetic_energy
 from mechanics.dynamics.observers.equilibrium import imbalance, settlement, speed, support_reaction
 from mechanics.dynamics.progress import Progress
@@ -20,8 +20,6 @@ from mechanics.scene.scene import Scene, Start
 from mechanics.scene.state import State
 
 __all__ = ["simulate"]
-
-Array = NDArray[np.float64]
 
 
 def simulate(scene: Scene, progress: Callable[[Progress], None] | None = None) -> Result:

@@ -12,9 +12,9 @@ from itertools import chain
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from sqlalchemy import JSON, Boolean, Column, Date, Float, Integer, String
 
+from archmodel.arrays import Array
 from archmodel.exchange.json_types import JsonShape, Mismatch
 from archmodel.tables.base import ArrayType, UtcDateTime
 
@@ -155,11 +155,11 @@ _SIMPLE: tuple[tuple[type[Any], Value], ...] = (
 def _array(shape: tuple[int, ...]) -> Value:
     """An array as nested lists; null for NaN."""
 
-    def encode(array: NDArray[np.float64]) -> list[Any]:
+    def encode(array: Array) -> list[Any]:
         nested: list[Any] = array.tolist()
         return nested if np.isfinite(array).all() else _sayable(nested)
 
-    def decode(given: Any) -> NDArray[np.float64]:
+    def decode(given: Any) -> Array:
         flat = _flattened(given, shape, "")
         if {*map(type, flat)} <= {float}:
             array = np.array(flat, dtype=np.float64)
@@ -196,7 +196,7 @@ def _wording(shape: tuple[int, ...]) -> str:
     return f"lists of {' × '.join(str(size) for size in shape)} numbers"
 
 
-def _read_one_by_one(given: Any, flat: list[Any], shape: tuple[int, ...]) -> NDArray[np.float64]:
+def _read_one_by_one(given: Any, flat: list[Any], shape: tuple[int, ...]) -> Array:
     """The slow way, for arrays with NaN, infinities, whole numbers, and mistakes, which it locates."""
     array = np.empty(len(flat))
     for index, item in enumerate(flat):

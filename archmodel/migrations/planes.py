@@ -11,11 +11,10 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
+
+from archmodel.arrays import Array
 
 __all__ = ["Plane", "covariance_of_offset", "plane_of_version_1"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

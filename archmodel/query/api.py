@@ -4,11 +4,10 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
 from sqlalchemy import ColumnElement, select
 from sqlalchemy.orm import Session, object_session
 
+from archmodel.arrays import Array
 from archmodel.describe.entity import describe
 from archmodel.query.attributes import ATTRIBUTES, Attribute, attributes_of
 from archmodel.query.compile import column_named, condition, condition_in
@@ -33,7 +32,6 @@ __all__ = [
     "rows_of",
 ]
 
-Array = NDArray[np.float64]
 
 MAX_EXPRESSIONS = 20
 """Most expressions in one query: together they stay below the number of parameters that SQLite takes."""

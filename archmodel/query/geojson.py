@@ -8,14 +8,13 @@ import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from archmodel.arrays import Array
 from archmodel.query.api import Face
 from moma.errors import UsageError
 
 __all__ = ["MAX_ANGLE", "feature_collection", "flattened"]
 
-Array = NDArray[np.float64]
 
 MAX_ANGLE = math.radians(30.0)
 """Faces that look farther than this from the mean direction are not of one wall [rad]."""

@@ -11,13 +11,12 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from archmodel.arrays import Array
 from archmodel.store.stone_arrays import StoneColumns
 
 __all__ = ["Arch", "ArchJoint", "ArchStone", "arches_among"]
 
-Array = NDArray[np.float64]
 
 _ONE_WAY = 0.9  # length of the mean of unit normals of faces that look one way
 _CROSSED = np.sin(

@@ -8,19 +8,16 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from archmodel.arrays import Array, Bools, Ints
 from archmodel.tables.entities import Header, Quoin, RibSegment, Voussoir, kind_of, kinds
 from archmodel.tables.relations import RELATIONS
 from moma.errors import UsageError
 
 __all__ = ["Contacts", "FoundRelations", "RelationSettings", "StonesOf", "relations_between"]
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 _RESTS_ON, _BESIDE, _BONDED, _ACROSS = (
     RELATIONS.index(name) for name in ("rests_on", "beside", "bonded_with", "across_the_wall")
@@ -87,7 +84,7 @@ class Contacts:
     centroid : (m, 3) [m]
     """
 
-    pairs: Indices
+    pairs: Ints
     area: Array
     gap: Array
     normal: Array
@@ -106,9 +103,9 @@ class FoundRelations:
     normal : (m, 3) from object to subject [-]
     """
 
-    kind: Indices
-    subject: Indices
-    object: Indices
+    kind: Ints
+    subject: Ints
+    object: Ints
     area: Array
     gap: Array
     centroid: Array
@@ -161,10 +158,10 @@ class _Faces:
     back : (m,) the joint is parallel to the faces
     """
 
-    across: Mask
-    opposite: Mask
-    apart: Mask
-    back: Mask
+    across: Bools
+    opposite: Bools
+    apart: Bools
+    back: Bools
 
     @classmethod
     def of(cls, contacts: Contacts, stones: StonesOf, settings: RelationSettings) -> "_Faces":
@@ -183,7 +180,7 @@ class _Faces:
             back=(np.abs(along_one) >= near) & (np.abs(along_two) >= near),
         )
 
-    def bonded(self, names: Sequence[str], first: Indices, second: Indices, rests: Mask) -> Mask:
+    def bonded(self, names: Sequence[str], first: Ints, second: Ints, rests: Bools) -> Bools:
         """Contacts that tie two facings, or two walls, together."""
         header, quoin = (_is_one_of(names, cls) for cls in (Header, Quoin))
         tied = self.opposite & (~self.back | header[first] | header[second])
@@ -191,13 +188,13 @@ class _Faces:
         return np.asarray(tied | (corner & ~self.across))
 
 
-def _is_one_of(names: Sequence[str], *classes: type) -> Mask:
+def _is_one_of(names: Sequence[str], *classes: type) -> Bools:
     """Which stones are of a kind or its subkinds."""
     wanted = {kind_of(cls) for cls in kinds().values() if issubclass(cls, classes)}
     return np.fromiter((name in wanted for name in names), dtype=np.bool_, count=len(names))
 
 
-def _rests(contacts: Contacts, stones: StonesOf, settings: RelationSettings) -> Mask:
+def _rests(contacts: Contacts, stones: StonesOf, settings: RelationSettings) -> Bools:
     """Contacts by which one stone rests on the other."""
     first, second = contacts.pairs[:, 0], contacts.pairs[:, 1]
     arch = _is_one_of(stones.kinds, Voussoir, RibSegment)
@@ -211,13 +208,13 @@ def _rests(contacts: Contacts, stones: StonesOf, settings: RelationSettings) -> 
 
 
 def _contradicted(
-    upper: Indices,
-    lower: Indices,
+    upper: Ints,
+    lower: Ints,
     contacts: Contacts,
-    rests: Mask,
+    rests: Bools,
     count: int,
     settings: RelationSettings,
-) -> Mask:
+) -> Bools:
     """Contacts that would let a stone rest on itself through others: the least steep of each circle.
 
     Beds are not given up: stones that truly lie on one another in a ring stay so.
@@ -238,7 +235,7 @@ def _contradicted(
         given_up[inside[order[first]]] = True
 
 
-def _merged(contacts: Contacts, parts: Sequence[tuple[int, Mask, Indices, Indices, Array]]) -> FoundRelations:
+def _merged(contacts: Contacts, parts: Sequence[tuple[int, Bools, Ints, Ints, Array]]) -> FoundRelations:
     """One relation of a kind for each pair, with the area of all contacts that make it."""
     rows = np.concatenate([np.flatnonzero(mask) for _, mask, _, _, _ in parts])
     kind = np.concatenate([np.full(int(mask.sum()), number) for number, mask, _, _, _ in parts])

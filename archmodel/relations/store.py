@@ -5,10 +5,10 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from sqlalchemy import ColumnElement, select, update
 from sqlalchemy.orm import Session
 
+from archmodel.arrays import Array, Bools, Ints
 from archmodel.relations.classify import FoundRelations, RelationSettings
 from archmodel.store.bulk import batches, insert_rows
 from archmodel.store.revisions import table_of
@@ -19,8 +19,6 @@ from archmodel.tables.relations import RELATIONS, Relation
 
 __all__ = ["Act", "Changes", "held_settings", "store_relations", "supersede"]
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 _SAME = 1e-6
 """Numbers of a joint that differ by less [m, m²] are those of the same joint, computed about another place."""
@@ -83,7 +81,7 @@ class Changes:
 
 
 def store_relations(
-    session: Session, ids: Indices, found: FoundRelations, act: Act, only: Collection[int] | None = None
+    session: Session, ids: Ints, found: FoundRelations, act: Act, only: Collection[int] | None = None
 ) -> dict[str, Changes]:
     """Make the computed relations of the database those that were found.
 
@@ -137,10 +135,10 @@ def supersede(session: Session, table: type[Base], numbers: list[int], act: Act)
 class _Held:
     """Relations that are held now, in the order of their keys; a computed one before a declared one."""
 
-    ids: Indices
-    keys: Indices
-    kinds: Indices
-    declared: NDArray[np.bool_]
+    ids: Ints
+    keys: Ints
+    kinds: Ints
+    declared: Bools
     numbers: Array
 
 
@@ -182,7 +180,7 @@ def _concerning(only: Collection[int] | None) -> Iterator[ColumnElement[bool]]:
         yield one
 
 
-def _keys(kind: Indices, subject: Indices, other: Indices) -> Indices:
+def _keys(kind: Ints, subject: Ints, other: Ints) -> Ints:
     """One number for kind, subject and object, each entity's below 2³⁰."""
     return (kind << 60) | (subject << 30) | other
 
@@ -191,7 +189,7 @@ def _numbers(found: FoundRelations) -> Array:
     return np.column_stack([found.area, found.gap, found.centroid, found.normal])
 
 
-def _rows(ids: Indices, found: FoundRelations, new: Indices, entry: int) -> Iterator[dict[str, Any]]:
+def _rows(ids: Ints, found: FoundRelations, new: Ints, entry: int) -> Iterator[dict[str, Any]]:
     numbers = _numbers(found)
     for batch in batches(new.tolist()):
         rows = np.array(batch)

@@ -5,10 +5,10 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from sqlalchemy import and_, or_, select
 from sqlalchemy.orm import Session, aliased
 
+from archmodel.arrays import Array, Ints
 from archmodel.relations.store import Act, Changes, supersede
 from archmodel.store.bulk import batches, insert_rows
 from archmodel.store.stone_arrays import ENTITY, StoneColumns, id_conditions, joined, stone_columns
@@ -17,8 +17,6 @@ from archmodel.tables.structures import Structure, structure_kind_named
 
 __all__ = ["Part", "along_the_wall", "course_code", "parts_of_survey", "store_parts", "whole_courses"]
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 _ONE_WAY = 0.5  # length of the mean of the faces' directions in plan from which on they look one way
 _LONG = 3.0  # a course so many times as long as wide is a wall, else it runs around a tower
@@ -113,7 +111,7 @@ def whole_courses(session: Session, entities: Collection[int]) -> StoneColumns:
     )
 
 
-def along_the_wall(centres: Array, normals: Array) -> Indices:
+def along_the_wall(centres: Array, normals: Array) -> Ints:
     """Order of the stones of a course, from left to right as one sees them who stands before the wall.
 
     Stones that look all ways lie around a tower: they are ordered to the right, counter-clockwise from above,

@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+
+from archmodel.arrays import Array
 
 __all__ = ["solid_volume", "solid_volumes"]
 
-Array = NDArray[np.float64]
 Faces = Sequence[Sequence[int]]
 
 

@@ -10,6 +10,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from archmodel.arrays import Array, Bools, Ints
+
 __all__ = [
     "STONE_VALUES",
     "ContactArrays",
@@ -20,8 +22,6 @@ __all__ = [
     "StoneResult",
 ]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 STONE_VALUES: Mapping[str, tuple[str, str]] = {
     "von_mises_p99": ("Pa", "Von Mises stress that 1 % of its volume exceeds"),
@@ -111,7 +111,7 @@ class JointArrays:
     centroid: Array
     normal: Array
     area: Array
-    parted: NDArray[np.bool_]
+    parted: Bools
     force_normal: Array
     force_shear: Array
     pressure_mean: Array

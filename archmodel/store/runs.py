@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from archmodel.arrays import Array, Ints
 from archmodel.store.run_record import (
     ContactArrays,
     JointArrays,
@@ -23,8 +24,6 @@ from moma.errors import DatabaseError
 
 __all__ = ["contact_rows", "joint_rows", "plain", "result_row", "run_row", "simplification_row"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _CHUNK = 5_000
 """Rows that are Python objects at a time: of a million contact points the arrays alone are all in memory."""

@@ -9,10 +9,10 @@ from sys import intern
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from sqlalchemy import ColumnElement, Executable, LargeBinary, Text, cast, func, or_, select, type_coerce
 from sqlalchemy.orm import InstrumentedAttribute, Session
 
+from archmodel.arrays import Array, Ints
 from archmodel.store.bulk import batches
 from archmodel.store.revisions import table_of
 from archmodel.tables.entities import Entity
@@ -20,8 +20,6 @@ from archmodel.tables.surveys import Measurement
 
 __all__ = ["ENTITY", "StoneColumns", "id_conditions", "joined", "near_box", "stone_columns", "stone_shapes"]
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 Faces = tuple[tuple[int, ...], ...]
 
 _AT_ONCE = 2000  # rows that are fetched together
@@ -45,7 +43,7 @@ class StoneColumns:
     normals : (n, 3) outward unit normals of their faces; NaN where nothing was measured [-]
     """
 
-    ids: Indices
+    ids: Ints
     kinds: Sequence[str]
     zones: Sequence[str | None]
     courses: Sequence[int | None]

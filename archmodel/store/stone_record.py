@@ -4,11 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
+
+from archmodel.arrays import Array
 
 __all__ = ["StoneRecord"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

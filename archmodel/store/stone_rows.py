@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from archmodel.arrays import Array
 from archmodel.store.measures import solid_volumes
 from archmodel.store.stone_record import StoneRecord
 from archmodel.tables.entities import Entity, kind_named, kind_of
@@ -14,8 +14,6 @@ from archmodel.tables.surveys import Measurement
 from moma.errors import DatabaseError, GeometryError, SurveyError, UsageError
 
 __all__ = ["entity_rows", "measurement_row", "stone_record", "storable"]
-
-Array = NDArray[np.float64]
 
 
 def entity_rows(stones: Sequence[StoneRecord], places: Sequence[str]) -> list[dict[str, object]]:

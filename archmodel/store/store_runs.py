@@ -3,10 +3,10 @@
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
+from archmodel.arrays import Ints
 from archmodel.store.bulk import batches, insert_rows
 from archmodel.store.run_record import RunRecord
 from archmodel.store.runs import contact_rows, joint_rows, plain, result_row, run_row, simplification_row
@@ -18,8 +18,6 @@ from archmodel.tables.surveys import Simplification
 from moma.errors import DatabaseError
 
 __all__ = ["store_run"]
-
-Ints = NDArray[np.int64]
 
 
 def store_run(session: Session, run: RunRecord) -> int:

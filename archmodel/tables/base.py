@@ -5,11 +5,12 @@ from functools import lru_cache
 from json import JSONEncoder
 
 import numpy as np
-from numpy.typing import NDArray
 from sqlalchemy import JSON, DateTime, LargeBinary, String
 from sqlalchemy.engine import Dialect
 from sqlalchemy.orm import DeclarativeBase
 from sqlalchemy.types import TypeDecorator
+
+from archmodel.arrays import Array
 
 __all__ = ["JSON_TYPE", "TEXT", "ArrayType", "Base", "UtcDateTime", "json_text"]
 
@@ -40,7 +41,7 @@ def _text_of_tuple(value: tuple[object, ...]) -> str:
 _ENCODER = JSONEncoder(allow_nan=False, separators=(",", ":"))
 
 
-class ArrayType(TypeDecorator[NDArray[np.float64]]):
+class ArrayType(TypeDecorator[Array]):
     """A float64 array of known shape, stored bit for bit as little-endian bytes.
 
     Arrays come out read-only, since a change in place would never reach the database.
@@ -57,13 +58,13 @@ class ArrayType(TypeDecorator[NDArray[np.float64]]):
         super().__init__()
         self.shape = shape
 
-    def process_bind_param(self, value: NDArray[np.float64] | None, dialect: Dialect) -> bytes | None:
+    def process_bind_param(self, value: Array | None, dialect: Dialect) -> bytes | None:
         """Array to bytes."""
         if value is None:
             return None
         return np.asarray(value, dtype="<f8").reshape(self.shape).tobytes()
 
-    def process_result_value(self, value: bytes | None, dialect: Dialect) -> NDArray[np.float64] | None:
+    def process_result_value(self, value: bytes | None, dialect: Dialect) -> Array | None:
         """Bytes to a read-only array."""
         if value is None:
             return None

@@ -3,10 +3,10 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from sqlalchemy import ForeignKey, Index, text
 from sqlalchemy.orm import Mapped, mapped_column, relationship
 
+from archmodel.arrays import Array
 from archmodel.tables.base import JSON_TYPE, ArrayType, Base
 from archmodel.tables.entries import Entry, Recorded
 
@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from archmodel.tables.entities import Entity
 
 __all__ = ["Measurement", "Simplification", "Survey"]
-
-Array = NDArray[np.float64]
 
 
 class Survey(Base):

@@ -4,9 +4,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.extremes.stones import G
+from mechanics.arrays import Array
 from mechanics.delassus.rigid import RigidDelassus, schedule
 from mechanics.delassus.stored import StoredDelassus
 from mechanics.problem.problem import ContactProblem
@@ -30,7 +30,6 @@ __all__ = [
     "with_last",
 ]
 
-Array = NDArray[np.float64]
 # error of the impulses (nc, 3) of a problem against what is known of its solution, relative
 Truth = Callable[[ContactProblem, Array], float]
 

@@ -6,15 +6,14 @@ time other equations; what it breaks is the least that one of these states leave
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array
 from mechanics.delassus.rigid import RigidDelassus
 from mechanics.delassus.stored import StoredDelassus
 from mechanics.problem.problem import ContactProblem, scale_of
 
 __all__ = ["broken", "judge", "velocity_of"]
 
-Array = NDArray[np.float64]
 
 # the natural map knows a contact's distance from its law to this factor, times 1 + μ
 _SLACK = 10.0

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.extremes.contacts import (
     Box,
@@ -33,13 +32,13 @@ from benchmarks.extremes.stones import (
     volume,
     wall,
 )
+from mechanics.arrays import Array
 from mechanics.delassus.rigid import RigidDelassus
 from mechanics.problem.problem import ContactProblem
 from mechanics.scene.scene import Fidelity, Scene
 
 __all__ = ["VELOCITY_TOLERANCE", "Row", "rows"]
 
-Array = NDArray[np.float64]
 
 # that solvers are asked for; also what each joint of a column may let through of g h, so of the weight above it
 VELOCITY_TOLERANCE = 1e-5

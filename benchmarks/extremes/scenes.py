@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.extremes.cells import Cell, Outcome, attempt
 from benchmarks.extremes.problems import VELOCITY_TOLERANCE
@@ -30,7 +29,6 @@ from mechanics.simulate import simulate
 
 __all__ = ["SceneRow", "run_cells", "scene_rows"]
 
-Array = NDArray[np.float64]
 # what was measured, over what is right where every step is solved
 Check = Callable[[Result], float]
 

@@ -6,7 +6,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechanics.dynamics.simulation import Clock, Simulation
 from mechanics.model.model import build_model
@@ -31,7 +30,6 @@ __all__ = [
     "wall",
 ]
 
-Array = NDArray[np.float64]
 
 G = 9.81
 _FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))

@@ -1,14 +1,12 @@
 """Contact problems at random: few bodies, many contacts, every scale drawn over decades."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array
 from mechanics.delassus.rigid import RigidDelassus, schedule
 from mechanics.problem.problem import ContactProblem
 
 __all__ = ["wild_problem"]
-
-Array = NDArray[np.float64]
 
 
 def wild_problem(seed: int, decades: float) -> ContactProblem:

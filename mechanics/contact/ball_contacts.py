@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
+from mechanics.arrays import Array, Bools, Ints
 from mechanics.contact._kernels.mortar import mortar_rows
 from mechanics.contact.contacts import Contacts
 from mechanics.contact.surfaces import Placed, Surfaces
@@ -13,9 +13,6 @@ from mechanics.scene.state import State
 
 __all__ = ["FaceCells", "ball_contacts", "face_cells"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 # of the radius: where a ball would sink deeper than this before the nodes see it, or rises by more than this over what
 # a node stands for, the mesh is too coarse

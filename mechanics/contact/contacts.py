@@ -4,16 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
+from mechanics.arrays import Array, Ints
 from mechanics.contact._kernels.broad_phase import points_of
 from mechanics.scene.state import State
 
 __all__ = ["Contacts", "gaps", "joined", "material_points", "take"]
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

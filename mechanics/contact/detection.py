@@ -10,9 +10,9 @@ All tolerances are fractions of the stones' own sizes.
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from mechanics.arrays import Array, Bools, Ints
 from mechanics.contact._kernels.balls import ball_points
 from mechanics.contact._kernels.broad_phase import boxes, close_pairs, place
 from mechanics.contact._kernels.narrow_phase import EDGES, FACE_FIRST, interface_points, separating_axes
@@ -25,8 +25,6 @@ from mechanics.scene.state import State
 
 __all__ = ["FLAT", "THIN", "Detector"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # faces whose normals differ by less than 5° lie flat on one another
 FLAT = float(np.cos(np.radians(5.0)))
@@ -40,7 +38,7 @@ class _Pairs:
 
     shapes: Ints
     limit: Array
-    balls: NDArray[np.bool_]
+    balls: Bools
     kind: Ints
     feature: Ints
     axis: Array
@@ -90,7 +88,7 @@ class Detector:
     """
 
     surfaces: Surfaces
-    fixed: NDArray[np.bool_]
+    fixed: Bools
     alert: float
     points: int = 4
     placement: Placement = Placement.CORNERS
@@ -144,17 +142,17 @@ class Detector:
         self._hints.key, self._hints.face = key, hint
         return _Pairs(shapes, limit, balls, kind, feature, axis)
 
-    def _flat_and_meshed(self, pairs: _Pairs, placed: Placed) -> NDArray[np.bool_]:
+    def _flat_and_meshed(self, pairs: _Pairs, placed: Placed) -> Bools:
         """Pairs of flat faces of which one has finite elements."""
         meshed = self.surfaces.meshes.of_face >= 0
         faces = (pairs.kind > 0) & (pairs.kind != EDGES)
-        chosen: NDArray[np.bool_] = faces & meshed[np.where(faces[:, None], pairs.feature, 0)].any(axis=1)
+        chosen: Bools = faces & meshed[np.where(faces[:, None], pairs.feature, 0)].any(axis=1)
         normal = placed.normal[pairs.feature[chosen]]
         chosen[chosen] = -np.einsum("pi,pi->p", normal[:, 0], normal[:, 1]) > FLAT
         return chosen
 
     def _points(
-        self, pairs: _Pairs, but: NDArray[np.bool_], balls: _Singles | None, placed: Placed, nodes: int
+        self, pairs: _Pairs, but: Bools, balls: _Singles | None, placed: Placed, nodes: int
     ) -> Contacts:
         """Contacts in single points: of polyhedra, of all pairs but some, and those of balls."""
         own = self.surfaces

@@ -4,12 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from mechanics.arrays import Array, Bools, Ints
 
 __all__ = ["FaceMesh", "PackedMeshes", "packed_meshes"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # most nodes of a facet
 _WIDEST = 9
@@ -55,7 +54,7 @@ class PackedMeshes:
     facet_ptr: Ints
     facet: Ints
     kind: Ints
-    cut: NDArray[np.bool_]
+    cut: Bools
     fineness: Array
 
 

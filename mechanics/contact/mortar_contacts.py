@@ -1,9 +1,9 @@
 """Contacts of deformable stones: weighted points between flat faces (mortar), single points of a surface elsewhere."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from mechanics.arrays import Array, Bools, Ints
 from mechanics.contact._kernels.mortar import mortar_rows, mortar_shares
 from mechanics.contact._kernels.points import surface_points
 from mechanics.contact.contacts import Contacts
@@ -11,9 +11,6 @@ from mechanics.contact.surfaces import Placed, Surfaces
 
 __all__ = ["mortar_contacts", "surface_weights"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 # two faces as fine, or as large, up to this fraction are the same
 _ALIKE = 1e-6

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Bools
 from mechanics.contact._kernels.overlap import overlap_area
 from mechanics.contact.face_meshes import FaceMesh
 from mechanics.stones.meshing.mesh import SolidMesh
@@ -12,9 +12,6 @@ from mechanics.stones.polyhedra import face_plane
 
 __all__ = ["face_meshes", "part_face_meshes"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 Faces = Sequence[Sequence[int]]
 
 # of the block's size, and of a facet's area: what lies nearer, or overlaps by less, does so by rounding

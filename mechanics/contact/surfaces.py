@@ -4,15 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Ints
 from mechanics.contact.face_meshes import FaceMesh, PackedMeshes, packed_meshes
 from mechanics.stones.polyhedra import face_plane, smallest_width
 
 __all__ = ["Placed", "Surfaces", "surfaces"]
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 # faces of the parts of a body lie in one plane up to this cosine, and this part of its size

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from mechanics.arrays import Array, Ints
 from mechanics.contact.contacts import Contacts, material_points
 from mechanics.delassus.mixed import ELASTIC, NONE, RIGID, MixedDelassus
 from mechanics.delassus.rigid import RigidDelassus, Schedule
@@ -15,9 +15,6 @@ from mechanics.model.rigid import RigidInertia, inverse_inertia_world
 from mechanics.scene.state import State
 
 __all__ = ["local_velocity", "mixed_delassus", "rigid_delassus", "world_impulse"]
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 def rigid_delassus(model: Model, state: State, contacts: Contacts, schedule: Schedule) -> RigidDelassus:

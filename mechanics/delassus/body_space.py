@@ -9,14 +9,13 @@ from numpy.typing import NDArray
 from scipy.sparse import block_diag, coo_array, csc_array, csr_array
 from scipy.sparse.linalg import SuperLU, splu
 
+from mechanics.arrays import Array, Ints
 from mechanics.delassus._kernels import bodies as kernel
 from mechanics.problem.problem import SparseForm
 from moma.errors import SolverError
 
 __all__ = ["BodyForm", "scaled_frames"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # rounds of refinement, and the change of velocities, of what they are, that is rounding alone
 _ROUNDS, _ROUNDING = 2, 1e-14

@@ -4,13 +4,11 @@ from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Ints
 from mechanics.delassus.multifrontal import Cliques, Fronts, fronts
 
 __all__ = ["CondensedForm"]
-
-Array = NDArray[np.float64]
 
 
 class CondensedForm:
@@ -26,7 +24,7 @@ class CondensedForm:
     cliques : as above
     """
 
-    def __init__(self, bodies: NDArray[np.int64], cliques: Cliques) -> None:
+    def __init__(self, bodies: Ints, cliques: Cliques) -> None:
         self._bodies, self.cliques = bodies, cliques
         self._relaxed: dict[float, Callable[[Array], Array]] = {}
 

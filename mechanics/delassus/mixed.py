@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Ints
 from mechanics.delassus._kernels.mixed import apply_delassus, sweep
 from mechanics.delassus.condensed import CondensedForm
 from mechanics.delassus.multifrontal import Cliques
@@ -14,8 +15,6 @@ from mechanics.problem.problem import GaussSeidel
 
 __all__ = ["ELASTIC", "NONE", "RIGID", "MixedDelassus"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 NONE, RIGID, ELASTIC = 0, 1, 2
 

@@ -13,13 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dgetrf, dgetrs
 
+from mechanics.arrays import Array, Ints
 from mechanics.delassus._kernels.fronts import add_into, solve
 from moma.errors import SolverError
 
 __all__ = ["Cliques", "Factors", "Fronts", "fronts"]
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from functools import cached_property
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Bools, Ints
 from mechanics.delassus._kernels import rigid as kernel
 from mechanics.delassus.body_space import BodyForm, scaled_frames
 from mechanics.problem.problem import GaussSeidel
@@ -14,8 +14,6 @@ from mechanics.solvers.first_order.colouring import greedy_colours
 
 __all__ = ["RigidDelassus", "Schedule", "schedule"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # fewer contacts than this are swept in their own order by one thread: there is nothing to win from more
 _WORTH_COLOURS = 2000
@@ -40,7 +38,7 @@ class Schedule:
     colour: Ints
 
 
-def schedule(bodies: Ints, moving: NDArray[np.bool_]) -> Schedule:
+def schedule(bodies: Ints, moving: Bools) -> Schedule:
     """Group the contacts (nc, 2) by candidate and antagonist, and colour the groups if they are many.
 
     Stones of several parts may be either to one another; they have two groups then.

@@ -8,14 +8,13 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array, eye_array
 from scipy.sparse.linalg import SuperLU, splu
 
+from mechanics.arrays import Array
 from mechanics.delassus._kernels.stored import apply, sweep
 from mechanics.problem._kernels import local_factors
 from mechanics.problem.problem import GaussSeidel, SparseForm
 from moma.errors import SolverError
 
 __all__ = ["StoredDelassus", "StoredForm"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

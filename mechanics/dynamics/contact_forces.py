@@ -3,15 +3,12 @@
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Ints
 from mechanics.contact.contacts import Contacts, joined, take
 from mechanics.scene.laws.law import Terms
 
 __all__ = ["Bearing", "both"]
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

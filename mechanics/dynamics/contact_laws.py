@@ -4,8 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Ints
 from mechanics.contact.contacts import Contacts
 from mechanics.delassus.assembly import local_velocity
 from mechanics.delassus.mixed import MixedDelassus
@@ -19,8 +19,6 @@ from mechanics.stones.validation import SMALLEST
 
 __all__ = ["Statement", "state_laws"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # a law that does not act in a step has an infinite bias; solvers get this many times the fastest free velocity
 _NEVER = 1e3

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Bools, Ints
 from mechanics.contact.contacts import Contacts, gaps, take
 from mechanics.contact.detection import Detector
 from mechanics.delassus.assembly import (
@@ -35,7 +35,6 @@ from moma.errors import SolverError
 
 __all__ = ["Clock", "Simulation", "Step", "detector"]
 
-Array = NDArray[np.float64]
 
 # contacts of rigid stones are found anew when one has moved by more than this part of the smallest width since last
 # time: where stones rest, nothing is to be found; where they move, W is that of the very instant
@@ -138,7 +137,7 @@ class _Touching:
 
     contacts: Contacts
     place: Array
-    law: NDArray[np.int64]
+    law: Ints
     operator: RigidDelassus | MixedDelassus
     sparse: Callable[[], Form]
     configuration: State
@@ -192,7 +191,7 @@ class Simulation:
         self._first = True
 
     @property
-    def asleep(self) -> NDArray[np.bool_]:
+    def asleep(self) -> Bools:
         """Which bodies sleep (nb,)."""
         return self._sleep.asleep
 
@@ -319,7 +318,7 @@ class Simulation:
             for _, bodies in self.model.motions
         )
 
-    def _restless(self, predicted: State, solved: _Solved) -> NDArray[np.bool_]:
+    def _restless(self, predicted: State, solved: _Solved) -> Bools:
         """Sleeping bodies (nb,) that a solution of this step leaves out of balance."""
         asleep = self._sleep.asleep
         if not asleep.any():
@@ -329,7 +328,7 @@ class Simulation:
             force = world_impulse(touching.contacts, solved.impulse) / self._step
             return self._sleep.restless(self.model, predicted, solved.kick.load, touching.contacts, force)
 
-    def _wake(self, bodies: NDArray[np.bool_], state: State) -> None:
+    def _wake(self, bodies: Bools, state: State) -> None:
         """Let bodies (nb,) take part again, with what they bore."""
         if not bodies.any():
             return

@@ -10,8 +10,8 @@ solved anew. So no step ends with a sleeping stone that is further out of balanc
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Bools
 from mechanics.contact.contacts import Contacts, material_points
 from mechanics.dynamics.contact_forces import Bearing, both
 from mechanics.dynamics.observers.equilibrium import displacement, speed, wrenches
@@ -20,8 +20,6 @@ from mechanics.scene.state import State
 
 __all__ = ["RINGS", "Sleep", "held_model"]
 
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 # steps over which a stone must rest
 _STEPS = 50

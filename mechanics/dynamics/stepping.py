@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from mechanics.arrays import Array, Ints
 from mechanics.contact.contacts import Contacts
 from mechanics.delassus.assembly import world_impulse
 from mechanics.delassus.mixed import MixedDelassus
@@ -27,9 +27,6 @@ __all__ = [
     "kicked",
     "predict",
 ]
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

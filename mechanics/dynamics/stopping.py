@@ -1,8 +1,8 @@
 """When does a run end, and how: at rest, still moving, or collapsed."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array
 from mechanics.dynamics.observers.equilibrium import displacement, seen_from_supports, speed
 from mechanics.model.model import Model
 from mechanics.problem.problem import ContactSolution
@@ -11,7 +11,6 @@ from mechanics.scene.state import State
 
 __all__ = ["LASTING", "Watch"]
 
-Array = NDArray[np.float64]
 
 # so many steps in a row must be in balance
 LASTING = 5

@@ -1,15 +1,13 @@
 """What is remembered from step to step of contacts that persist: the solver's solution and the laws' own variables."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Ints
 from mechanics.problem.problem import ContactSolution, ContactStart
 from mechanics.scene.laws.law import BOND, STATE
 
 __all__ = ["Memory"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # the bits of a key below those that name the pair of shapes
 _POINT_BITS = 24

@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array
 from scipy.sparse.linalg import splu
 
+from mechanics.arrays import Array, Ints
 from mechanics.model.dissection import dissection
 from mechanics.stones.elasticity import (
     ElasticOperators,
@@ -32,8 +32,6 @@ from mechanics.stones.meshing.mesh import SolidMesh
 
 __all__ = ["Compliance", "Deformable", "deformable"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # from so many nodes on, nested dissection leaves less fill-in than least degree
 _LARGE = 1500

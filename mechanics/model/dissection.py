@@ -1,15 +1,13 @@
 """In which order to eliminate the nodes of a stone: nested dissection by place (George 1973)."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from mechanics.arrays import Array, Ints
 from mechanics.stones.meshing.mesh import SolidMesh
 
 __all__ = ["dissection"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # so few nodes are eliminated as they come
 _LEAF = 40

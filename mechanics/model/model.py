@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Bools, Ints
 from mechanics.contact._kernels.narrow_phase import MAX_CORNERS
 from mechanics.contact.face_meshes import FaceMesh
 from mechanics.contact.part_faces import face_meshes, part_face_meshes
@@ -26,8 +26,6 @@ from moma.errors import GeometryError, SceneError
 
 __all__ = ["Model", "build_model"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # contact keys number the faces of a stone in six bits
 _MAX_FACES = 64
@@ -58,8 +56,8 @@ class Model:
     """
 
     scene: Scene
-    fixed: NDArray[np.bool_]
-    elastic: NDArray[np.bool_]
+    fixed: Bools
+    elastic: Bools
     motions: tuple[tuple[Motion, Ints], ...]
     forces: tuple[tuple[Force, Ints], ...]
     laws: LawTable
@@ -199,7 +197,7 @@ def _indices(scene: Scene, codes: frozenset[str]) -> Ints:
     return np.array([b for b, block in enumerate(scene.blocks) if block.code in codes], dtype=np.int64)
 
 
-def _groups(scene: Scene, rule: LawRule) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def _groups(scene: Scene, rule: LawRule) -> tuple[Bools, Bools]:
     _check_codes(scene, rule.first | rule.second, "a law")
     codes = [block.code for block in scene.blocks]
     first, second = (np.array([code in group for code in codes]) for group in (rule.first, rule.second))

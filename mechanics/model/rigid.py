@@ -3,13 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Bools
 from mechanics.model._kernels import fly
 
 __all__ = ["RigidInertia", "free_flight", "inverse_inertia_world"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -30,9 +28,9 @@ class RigidInertia:
     inverse_inertia: Array
 
     @property
-    def moving(self) -> NDArray[np.bool_]:
+    def moving(self) -> Bools:
         """(nb,) bodies that impulses move."""
-        moving: NDArray[np.bool_] = self.inverse_mass > 0
+        moving: Bools = self.inverse_mass > 0
         return moving
 
 

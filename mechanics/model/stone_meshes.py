@@ -8,9 +8,7 @@ on the order of the blocks.
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
+from mechanics.arrays import Array
 from mechanics.model.deformable import Deformable, deformable
 from mechanics.model.touching import touching_faces
 from mechanics.scene.scene import Block, Fidelity
@@ -21,8 +19,6 @@ from mechanics.stones.meshing.quality import MeshQuality, mesh_quality
 from mechanics.stones.meshing.report import MeshReport, StoneMesh
 
 __all__ = ["StoneWorkshop"]
-
-Array = NDArray[np.float64]
 
 
 class StoneWorkshop:

@@ -3,16 +3,15 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from mechanics.arrays import Array
 from mechanics.scene.scene import Block
 from mechanics.stones.convex_polygons import moments, overlaps
 from mechanics.stones.polyhedra import face_plane
 
 __all__ = ["touching_faces"]
 
-Array = NDArray[np.float64]
 
 # faces look at each other within about 15 degrees
 _FACING = -0.966

@@ -3,17 +3,14 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Ints
 from mechanics.planar._kernels.disks import find_disks, sort_contacts
 from mechanics.planar._kernels.grid import build_grid
 from mechanics.planar._kernels.walls import end_neighbours, find_walls
 from mechanics.planar.model import PlanarModel, PlanarState
 
 __all__ = ["PlanarContacts", "PlanarDetector"]
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

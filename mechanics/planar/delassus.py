@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 
+from mechanics.arrays import Array, Ints
 from mechanics.planar._kernels.sweep import (
     apply,
     diagonals,
@@ -21,8 +22,6 @@ from mechanics.solvers.first_order.colouring import greedy_colours
 
 __all__ = ["PlanarDelassus", "PlanarGaussSeidel"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # contacts of one colour from which several threads pay: some 20 µs of work for one
 _GRAIN = 2000

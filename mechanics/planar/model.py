@@ -3,14 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Bools
 from mechanics.planar.scene import PlanarScene
 from mechanics.scene.laws.table import LawTable, law_table
 
 __all__ = ["PlanarModel", "PlanarState", "build_planar_model"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -50,7 +48,7 @@ class PlanarModel:
     radius: Array
     mass: Array
     moment: Array
-    fixed: NDArray[np.bool_]
+    fixed: Bools
     inertia: Array
     half: Array
     laws: LawTable

@@ -1,8 +1,8 @@
 """What is measured while a scene of the plane runs: energy, balance, rest, reactions."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array
 from mechanics.dynamics.stopping import LASTING
 from mechanics.planar.contacts import PlanarContacts
 from mechanics.planar.model import PlanarModel, PlanarState
@@ -11,7 +11,6 @@ from mechanics.results.result import Outcome
 
 __all__ = ["PlanarEnergy", "PlanarWatch", "disk_speed", "imbalance", "kinetic_energy", "world_force"]
 
-Array = NDArray[np.float64]
 
 # every disk rests below this part of the speed √(g · width) of a fall over its own width
 _REST_SPEED = 1e-4

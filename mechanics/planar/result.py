@@ -5,13 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Ints
 from mechanics.planar.scene import PlanarScene
 from mechanics.results.result import Errors, Outcome
 
 __all__ = ["PlanarContactResult", "PlanarFrame", "PlanarHistory", "PlanarResult"]
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,8 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Bools, Ints
 from mechanics.dynamics.simulation import Clock
 from mechanics.dynamics.warm_start import Memory
 from mechanics.planar.contacts import PlanarContacts, PlanarDetector
@@ -18,8 +18,6 @@ from moma.errors import SolverError
 
 __all__ = ["PlanarSimulation", "PlanarStep"]
 
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 # so many times a step is taken anew when it was seen to bring together what was not watched
 _LOOKS = 3
@@ -66,7 +64,7 @@ class _Stated:
     acting: Bools
     approach: Approach
     terms: Terms
-    law: NDArray[np.int64]
+    law: Ints
 
 
 @dataclass(frozen=True)

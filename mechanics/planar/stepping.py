@@ -10,16 +10,13 @@ not sink in, bit by bit, where the wall speeds up.
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Ints
 from mechanics.planar.model import PlanarModel, PlanarState
 from mechanics.scene.loads.load import Motion
 from moma.errors import SceneError
 
 __all__ = ["Drive", "fly", "load_velocity", "space"]
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 class Drive:

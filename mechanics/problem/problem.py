@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
+from mechanics.arrays import Array
 from mechanics.problem.validation import check_problem
 
 __all__ = [
@@ -28,8 +28,6 @@ __all__ = [
     "SparseForm",
     "scale_of",
 ]
-
-Array = NDArray[np.float64]
 
 
 class GaussSeidel(Protocol):

@@ -3,14 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array
 from mechanics.problem._kernels import natural_errors
 from mechanics.problem.problem import ContactProblem, scale_of
 
 __all__ = ["Residual", "natural_map", "project_on_cone", "residual"]
 
-Array = NDArray[np.float64]
 
 # of the impulse that would stop the fastest contact: less than this is none
 _NOTHING = 1e-8

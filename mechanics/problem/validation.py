@@ -3,14 +3,13 @@
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array
 from mechanics.stones.validation import LARGEST, SMALLEST
 from moma.errors import SolverError
 
 __all__ = ["check_compliance", "check_problem", "require_finite"]
 
-Array = NDArray[np.float64]
 
 _WHERE = "contact problem"
 _UNITS = "take units in which they are nearer to 1"

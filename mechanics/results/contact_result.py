@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Bools, Ints
+
 __all__ = ["ContactResult", "JointResult"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # by this much a number that may be at most one may exceed it
 _ROUNDING = 1e-9
@@ -77,7 +77,7 @@ class JointResult:
     """
 
     bodies: Ints
-    parted: NDArray[np.bool_]
+    parted: Bools
     polygon: tuple[Array, ...]
     frame: Array
     centroid: Array
@@ -102,12 +102,12 @@ class JointResult:
         return len(self.bodies)
 
     @property
-    def pressed(self) -> NDArray[np.bool_]:
+    def pressed(self) -> Bools:
         """(nj,) it bears compression."""
         return np.isfinite(self.kern)
 
     @property
-    def in_kern(self) -> NDArray[np.bool_]:
+    def in_kern(self) -> Bools:
         """(nj,) it bears compression, within the kern."""
-        inside: NDArray[np.bool_] = self.kern <= 1.0 + _ROUNDING
+        inside: Bools = self.kern <= 1.0 + _ROUNDING
         return inside

@@ -6,8 +6,8 @@ The joints in which a run begins keep their numbers while it runs, also those th
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Bools, Ints
 from mechanics.contact.contacts import Contacts, material_points
 from mechanics.contact.detection import FLAT
 from mechanics.model.model import Model
@@ -16,8 +16,6 @@ from mechanics.stones.convex_polygons import following
 
 __all__ = ["Faces", "Interfaces", "find_interfaces", "placed_faces"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # those of the start may open by as much as this before a contact at their edge is no longer theirs
 _HINGED = float(np.cos(np.radians(45.0)))
@@ -46,7 +44,7 @@ class Faces:
     corner: Array
     count: Ints
     size: Array
-    flat: NDArray[np.bool_]
+    flat: Bools
 
 
 @dataclass(frozen=True)

@@ -12,15 +12,13 @@ presses everywhere, and the resultant is within the kern, if p ≥ 0 in all corn
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Bools, Ints
 from mechanics.results.interfaces import Faces
 from mechanics.stones.convex_polygons import following, moments, overlaps
 
 __all__ = ["Section", "eccentricity", "sections"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # faces that overlap by less than this part of the smaller one no longer make a joint
 _THIN = 1e-6
@@ -144,6 +142,6 @@ def eccentricity(section: Section, force: Array, moment: Array, least: float) ->
     return place, kern, edge
 
 
-def _largest(values: Array, meant: NDArray[np.bool_]) -> Array:
+def _largest(values: Array, meant: Bools) -> Array:
     largest: Array = np.where(meant, values, -np.inf).max(axis=1, initial=-np.inf)
     return np.where(np.isfinite(largest), largest, np.nan)

@@ -4,8 +4,8 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Bools, Ints
 from mechanics.contact.contacts import Contacts, material_points
 from mechanics.dynamics.simulation import Step
 from mechanics.model.model import Model
@@ -17,8 +17,6 @@ from mechanics.scene.state import State
 
 __all__ = ["StartingJoints", "joint_results", "parting", "starting_joints"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # over the size of the smaller stone
 _CLOSED = 1e-2
@@ -41,7 +39,7 @@ class StartingJoints:
     state: State
     face: Ints
     section: Section
-    closed: NDArray[np.bool_]
+    closed: Bools
 
 
 def starting_joints(model: Model, start: State, contacts: Contacts) -> StartingJoints:
@@ -267,7 +265,7 @@ def _at_most(section: Section, values: Array) -> Array:
     return largest
 
 
-def _share(joint: Ints, area: Array, chosen: NDArray[np.bool_], count: int) -> Array:
+def _share(joint: Ints, area: Array, chosen: Bools, count: int) -> Array:
     """Part (nj,) of the area of the contacts of each joint; zero where there are none."""
     return np.nan_to_num(_ratio(_sums(joint, area * chosen, count), _sums(joint, area, count)))
 

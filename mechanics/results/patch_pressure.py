@@ -5,13 +5,12 @@ large there and means nothing. Taken together with their neighbours they do mean
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
+
+from mechanics.arrays import Array, Ints
 
 __all__ = ["patch_pressure"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # radius of a patch, over the mean distance of the contact points of a joint
 _REACH = 1.5

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array
 from mechanics.contact.contacts import material_points
 from mechanics.dynamics.simulation import Step
 from mechanics.model.deformable import Deformable
@@ -30,9 +30,6 @@ from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import SolidMesh
 
 __all__ = ["Observer", "positions", "surface_polygons", "velocities"]
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 # parts of a facet that have all its nodes for corners, counter-clockwise seen from outside

@@ -4,9 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-import numpy as np
-from numpy.typing import NDArray
-
+from mechanics.arrays import Array, Ints
 from mechanics.results.contact_result import ContactResult, JointResult
 from mechanics.results.stress_values import StressValues
 from mechanics.scene.scene import Fidelity, Scene
@@ -22,9 +20,6 @@ __all__ = [
     "Result",
     "StaticStart",
 ]
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 class Outcome(StrEnum):

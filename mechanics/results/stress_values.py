@@ -6,14 +6,13 @@ Stress is positive in tension. Principal stresses are σ1 ≥ σ2 ≥ σ3.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Bools
 from mechanics.stones.elasticity import principal, von_mises
 from mechanics.stones.materials import Material
 
 __all__ = ["StressValues", "stress_values", "utilisation", "volume_quantile"]
 
-Array = NDArray[np.float64]
 
 # tension below this part of a stone's mean stress is the rounding of forces and of stresses
 _NO_TENSION = 1e-3
@@ -134,5 +133,5 @@ def volume_quantile(values: Array, volume: Array, part: float) -> float:
     return float(values[order][min(int(np.searchsorted(below, part)), len(values) - 1)])
 
 
-def _share(where: NDArray[np.bool_], volume: Array) -> float:
+def _share(where: Bools, volume: Array) -> float:
     return float(volume[where].sum() / volume.sum())

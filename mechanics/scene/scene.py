@@ -3,9 +3,7 @@
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-import numpy as np
-from numpy.typing import NDArray
-
+from mechanics.arrays import Array
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.law import Law
 from mechanics.scene.loads.load import Loads
@@ -46,7 +44,7 @@ class Fidelity(StrEnum):
 class Part:
     """A convex part of a stone: corners (nv, 3) [m], and faces counter-clockwise seen from outside."""
 
-    vertices: NDArray[np.float64]
+    vertices: Array
     faces: tuple[tuple[int, ...], ...]
 
 
@@ -74,7 +72,7 @@ class Block:
     """
 
     code: str
-    vertices: NDArray[np.float64]
+    vertices: Array
     faces: tuple[tuple[int, ...], ...]
     material: Material
     fidelity: Fidelity = Fidelity.RIGID

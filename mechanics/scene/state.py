@@ -2,12 +2,9 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
+from mechanics.arrays import Array
 
 __all__ = ["State"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,10 @@ A polygon is a row of corners (m, 2), counter-clockwise, of which the first `cou
 """
 
 import numpy as np
-from numpy.typing import NDArray
+
+from mechanics.arrays import Array, Bools, Ints
 
 __all__ = ["following", "moments", "overlaps"]
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 def following(count: Ints, most: int) -> Ints:
@@ -29,9 +27,7 @@ def overlaps(first: Array, first_count: Ints, second: Array, second_count: Ints)
     return polygon, count
 
 
-def _clipped(
-    polygon: Array, count: Ints, a: Array, b: Array, wanted: NDArray[np.bool_]
-) -> tuple[Array, Ints]:
+def _clipped(polygon: Array, count: Ints, a: Array, b: Array, wanted: Bools) -> tuple[Array, Ints]:
     """Keep what lies to the left of the lines a → b (n, 2), in those rows that are wanted."""
     number, most = polygon.shape[:2]
     place = np.arange(most)

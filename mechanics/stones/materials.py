@@ -4,14 +4,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array
 from mechanics.stones.validation import LARGEST, sane
 from moma.errors import SceneError
 
 __all__ = ["Material", "Orthotropy", "fourth_order"]
 
-Array = NDArray[np.float64]
 
 # tensor components of the six stresses and strains, in the order xx, yy, zz, xy, yz, zx
 _FIRST, _SECOND = (0, 1, 2, 0, 1, 2), (0, 1, 2, 1, 2, 0)

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Ints
 from moma.errors import GeometryError
 
 __all__ = [
@@ -18,7 +18,6 @@ __all__ = [
     "united",
 ]
 
-Array = NDArray[np.float64]
 Faces = Sequence[Sequence[int]]
 
 
@@ -38,7 +37,7 @@ class MassProperties:
     inertia: Array
 
 
-def fan(faces: Faces) -> NDArray[np.int64]:
+def fan(faces: Faces) -> Ints:
     """Triangles (nt, 3) of all faces, each face cut from its first corner."""
     return np.array([(f[0], f[i], f[i + 1]) for f in faces for i in range(1, len(f) - 1)], dtype=np.int64)
 

@@ -3,8 +3,9 @@
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mechanics.arrays import Array
 from moma.errors import SceneError
 
 __all__ = ["LARGEST", "SMALLEST", "Rule", "check_corners", "finite", "refuse_unless", "sane"]
@@ -42,7 +43,7 @@ def finite(values: ArrayLike, count: int) -> bool:
     return np.shape(values) == (count,) and bool((np.abs(values) <= LARGEST).all())
 
 
-def check_corners(where: str, vertices: NDArray[np.float64]) -> None:
+def check_corners(where: str, vertices: Array) -> None:
     """Refuse corners (nv, 3) that are no numbers, no wider than a point, or too far away for their width [m].
 
     Raises

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from moma.errors import MissingLibraryError
+from pipelines.arrays import Array, Ints
 from pipelines.draw.elevations.closing import draw_moved
 from pipelines.draw.elevations.closing_shapes import ClosingShapes, DrawnJoint
 from pipelines.draw.elevations.joints import draw_joints
@@ -23,8 +23,6 @@ from survey.quality.facades import Facade, find_facades
 
 __all__ = ["closing_surface", "draw_closing", "draw_elevations", "draw_in_space", "flat_facades", "viewpoint"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _FLAT = 0.2  # depth of a facade over its extent, up to which an elevation shows it truly
 _LOOKING = np.cos(np.radians(25.0))  # mean of the normals' components square to it

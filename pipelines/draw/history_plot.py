@@ -4,9 +4,9 @@ import io
 import logging
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechanics.results.result import History
+from pipelines.arrays import Array
 
 __all__ = ["history_svg"]
 
@@ -37,6 +37,6 @@ def history_svg(history: History) -> str:
     return text[text.index("<svg") :]
 
 
-def _positive(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _positive(values: Array) -> Array:
     """Zeros cannot be drawn on a logarithmic axis: leave gaps there."""
     return np.where(values > 0.0, values, np.nan)

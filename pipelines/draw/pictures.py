@@ -10,13 +10,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechanics.results.result import BodyResult, Outcome, Result
 from mechanics.results.stress_values import volume_quantile
 from mechanics.scene.scene import Fidelity
 from mechanics.stones.materials import Material
 from moma.errors import MissingLibraryError
+from pipelines.arrays import Array
 from pipelines.draw.offscreen.surfaces import FIELDS, save_surface, stone_fields, wall_surface
 
 __all__ = ["draw_apart", "draw_pictures", "missing", "package_of"]
@@ -62,9 +62,7 @@ def package_of(message: str) -> str | None:
     return _PACKAGES.get(found.group(1)) if found else None
 
 
-def draw_pictures(
-    result: Result, folder: Path, names: Sequence[str], towards: NDArray[np.float64]
-) -> tuple[str, ...]:
+def draw_pictures(result: Result, folder: Path, names: Sequence[str], towards: Array) -> tuple[str, ...]:
     """Draw the named pictures into a folder, seen from the side `towards`; the file names.
 
     Pictures for which `missing` has a reason are left out.
@@ -125,7 +123,7 @@ def _top(result: Result, name: str) -> float | None:
     return volume_quantile(values[finite], volumes[finite], 0.99) or None
 
 
-def _fields_of(body: BodyResult, material: Material, name: str) -> NDArray[np.float64]:
+def _fields_of(body: BodyResult, material: Material, name: str) -> Array:
     return stone_fields(body, material)[:, FIELDS.index(name)]
 
 

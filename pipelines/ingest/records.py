@@ -4,7 +4,6 @@ from dataclasses import replace
 from typing import get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from archmodel.store.stone_record import StoneRecord
 from survey.extrusion.depth import Depth, Origin
@@ -16,8 +15,6 @@ from survey.geometry.solids import Solid
 from survey.records.survey import BlockRecord, Extrusion
 
 __all__ = ["stone_record", "surveyed_block"]
-
-Array = NDArray[np.float64]
 
 
 def stone_record(block: SurveyedBlock) -> StoneRecord:

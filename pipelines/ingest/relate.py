@@ -4,7 +4,6 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from sqlalchemy import ColumnElement, func, select
 from sqlalchemy.orm import Session
 
@@ -28,11 +27,11 @@ from archmodel.store.stone_arrays import (
     stone_shapes,
 )
 from archmodel.tables.entities import Entity
+from pipelines.arrays import Array, Ints
 from survey.geometry.adjacency import Polyhedra, PolyhedraBuilder, find_touching
 
 __all__ = ["KnownSolids", "RelationReport", "relate"]
 
-Array = NDArray[np.float64]
 Faces = tuple[tuple[int, ...], ...]
 
 
@@ -170,7 +169,7 @@ def _read_missing(session: Session, wanted: set[int] | None, solids: KnownSolids
 
 def _relations(
     stones: StoneColumns, solids: KnownSolids, settings: RelationSettings, only: set[int] | None
-) -> tuple[FoundRelations, NDArray[np.int64]]:
+) -> tuple[FoundRelations, Ints]:
     """Relations among the stones, and the numbers of the entities that they speak of, growing."""
     ids = np.array(solids.ids, dtype=np.int64)
     wanted = np.isin(ids, stones.ids)

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipelines.arrays import Array
 from pipelines.ingest.frame_records import frame_record
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.convexity import is_convex
@@ -160,7 +160,7 @@ class Tally:
         )
 
 
-def _has_decimals(places: NDArray[np.float64], count: int) -> bool:
+def _has_decimals(places: Array, count: int) -> bool:
     """Whether coordinates have no more decimals, but for what doubles leave of them."""
     scaled = places * 10.0**count
     return bool(np.abs(scaled - np.round(scaled)).max() <= 1e-6)

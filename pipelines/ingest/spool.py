@@ -13,10 +13,10 @@ from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from archmodel.store.stone_record import StoneRecord
 from moma.errors import SurveyError
+from pipelines.arrays import Array
 
 __all__ = ["Spool"]
 
@@ -79,9 +79,9 @@ class _Numbers:
     shape: tuple[int, ...]
 
 
-def _packed(stones: Sequence[StoneRecord]) -> tuple[list[dict[str, Any]], NDArray[np.float64]]:
+def _packed(stones: Sequence[StoneRecord]) -> tuple[list[dict[str, Any]], Array]:
     """The stones without their arrays, and all of these in one: a dozen small ones each would take much longer."""
-    numbers: list[NDArray[np.float64]] = []
+    numbers: list[Array] = []
     states = []
     for stone in stones:
         state = dict(vars(stone))
@@ -93,7 +93,7 @@ def _packed(stones: Sequence[StoneRecord]) -> tuple[list[dict[str, Any]], NDArra
     return states, np.concatenate(numbers)
 
 
-def _unpacked(states: Sequence[dict[str, Any]], numbers: NDArray[np.float64]) -> Iterator[StoneRecord]:
+def _unpacked(states: Sequence[dict[str, Any]], numbers: Array) -> Iterator[StoneRecord]:
     """The stones again; their arrays are views."""
     start = 0
     for state in states:

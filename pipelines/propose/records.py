@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from archmodel.store.stone_record import StoneRecord
+from pipelines.arrays import Array
 from pipelines.ingest.records import stone_record
 from survey.extrusion.imported_solids import block_of_solid
 from survey.faces.faces import Provenance
@@ -17,7 +17,6 @@ from survey.unseen.core.propose import InfillProposal
 
 __all__ = ["core_record", "is_known", "record_volume"]
 
-Array = NDArray[np.float64]
 
 _FAR = 1000.0  # metres before the wall, from where its front is seen squarely
 _SAME = 1e-3  # metres, and part of a volume: proposals that differ by less are the same

@@ -1,9 +1,9 @@
 """The joints of a run, for its report."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechanics.results.result import Result
+from pipelines.arrays import Array
 from pipelines.reports.html_tables import kilopascals, millimetres, ratio, table
 
 __all__ = ["joint_sections"]
@@ -35,7 +35,7 @@ def joint_sections(result: Result) -> list[str]:
     ]
 
 
-def _section(result: Result, title: str, order: NDArray[np.float64], words: str = "") -> list[str]:
+def _section(result: Result, title: str, order: Array, words: str = "") -> list[str]:
     """A table of the ten joints that come first in an order; nothing where there is none but -inf."""
     first = [int(number) for number in np.argsort(-order, kind="stable")[:10] if np.isfinite(order[number])]
     if not first:

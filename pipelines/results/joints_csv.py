@@ -5,10 +5,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechanics.results.contact_result import JointResult
 from mechanics.results.result import Result
+from pipelines.arrays import Array
 
 __all__ = ["JOINT_COLUMNS", "normal_and_shear", "write_joints"]
 
@@ -37,7 +37,7 @@ JOINT_COLUMNS: Mapping[str, str] = {
 """Columns, and what they hold."""
 
 
-def write_joints(path: Path, result: Result, origin: NDArray[np.float64]) -> None:
+def write_joints(path: Path, result: Result, origin: Array) -> None:
     """Write the table, joints in the order of `Result.joints`, with places in the frame of the site.
 
     Parameters
@@ -56,14 +56,14 @@ def write_joints(path: Path, result: Result, origin: NDArray[np.float64]) -> Non
             writer.writerow([codes[first], codes[second], *map(_cell, numbers)])
 
 
-def normal_and_shear(joints: JointResult) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def normal_and_shear(joints: JointResult) -> tuple[Array, Array]:
     """Resultants across the joints (nj,), compression positive, and the size of what acts along them (nj,) [N]."""
     n = joints.frame[:, 0]
     normal = np.einsum("ji,ji->j", joints.force, n)
     return normal, np.linalg.norm(joints.force - normal[:, None] * n, axis=1)
 
 
-def _columns(joints: JointResult) -> dict[str, NDArray[np.float64]]:
+def _columns(joints: JointResult) -> dict[str, Array]:
     normal, shear = normal_and_shear(joints)
     values = {
         name: getattr(joints, name)

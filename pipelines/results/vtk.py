@@ -4,7 +4,6 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechanics.results.contact_result import ContactResult, JointResult
 from mechanics.results.result import BodyResult, Frame, Result
@@ -12,6 +11,7 @@ from mechanics.results.stress_values import utilisation
 from mechanics.scene.laws.status import STATUSES
 from mechanics.scene.scene import Fidelity
 from mechanics.stones.elasticity import principal, von_mises
+from pipelines.arrays import Array
 from pipelines.results.vtu import (
     CELL_TYPES,
     POLYGON,
@@ -26,8 +26,6 @@ from pipelines.results.vtu import (
 
 __all__ = ["UNITS", "body_cells", "body_grid", "contact_grid", "joint_grid", "write_frames"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _FIDELITIES = (Fidelity.FIXED, Fidelity.RIGID, Fidelity.DEFORMABLE)
 

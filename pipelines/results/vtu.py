@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechanics.stones.meshing.elements import Element
+from pipelines.arrays import Array, Ints
 
 __all__ = [
     "CELL_TYPES",
@@ -35,7 +36,6 @@ CELL_TYPES: Mapping[Element, int] = {
     Element.HEX27: 29,
 }
 
-Ints = NDArray[np.int64]
 Arrays = Mapping[str, NDArray[np.generic]]
 _LEVEL = 1  # of compression: more takes long and saves little
 _NAMES = {"f8": "Float64", "f4": "Float32", "i8": "Int64", "i4": "Int32", "u1": "UInt8"}
@@ -73,7 +73,7 @@ class Grid:
     units : of the arrays, by name; none for what is a ratio or a number
     """
 
-    points: NDArray[np.float64]
+    points: Array
     cells: Cells
     point_data: Arrays
     cell_data: Arrays

@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from sqlalchemy.orm import Session
 
 from mechanics.scene.scene import Block, Fidelity, Part, Scene
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.meshers.choice import Mesher
+from pipelines.arrays import Array
 from pipelines.ingest.records import surveyed_block
 from pipelines.run.fidelity import Modelled, Wishes, modelled, neighbours
 from pipelines.run.local_frame import entry_about, local_origin, stone_about
@@ -29,8 +29,6 @@ from survey.joints.report import ClosingReport
 from survey.simplify.simplify import BlockyStone
 
 __all__ = ["Assembly", "assemble", "assemble_stones", "wishes_of"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipelines.arrays import Array
 from survey.joints.report import ClosingReport
 from survey.simplify.simplify import BlockyStone
 
@@ -20,7 +20,6 @@ __all__ = [
     "simplification_report",
 ]
 
-Array = NDArray[np.float64]
 
 _DEEP = 0.005  # metres: stones that were measured farther into each other want looking at
 

@@ -8,14 +8,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from archmodel.store.stone_record import StoneRecord
+from pipelines.arrays import Array
 from pipelines.scene.array_tables import Entry
 
 __all__ = ["entry_about", "local_origin", "stone_about"]
 
-Array = NDArray[np.float64]
 
 _FAR = 10_000.0
 """Coordinates up to this are exact enough as they are [m]."""

@@ -10,7 +10,6 @@ from importlib.metadata import version
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from archmodel.store.measures import solid_volume
 from archmodel.store.run_record import (
@@ -24,6 +23,7 @@ from archmodel.store.run_record import (
 from mechanics.results.contact_result import ContactResult, JointResult
 from mechanics.results.result import Errors, Result
 from mechanics.scene.scene import Scene
+from pipelines.arrays import Array
 from pipelines.results.joints_csv import normal_and_shear
 from pipelines.run.assemble import Assembly
 from pipelines.scene.file import SceneFile
@@ -39,7 +39,6 @@ __all__ = [
     "versions",
 ]
 
-Array = NDArray[np.float64]
 
 _LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "scikit-fem", "gmsh", "sqlalchemy")
 

@@ -4,16 +4,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from archmodel.store.run_record import StoneResult
 from mechanics.results.contact_result import JointResult
 from mechanics.results.result import BodyResult, Result
 from mechanics.results.stress_values import StressValues, volume_quantile
+from pipelines.arrays import Array, Ints
 
 __all__ = ["StressStatistics", "stone_results", "stress_statistics"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -106,7 +104,7 @@ def _joint_values(joints: JointResult, count: int) -> dict[str, Array]:
     }
 
 
-def _largest(bodies: NDArray[np.int64], values: Array, count: int) -> Array:
+def _largest(bodies: Ints, values: Array, count: int) -> Array:
     """Largest of the values (n,) of the pairs of bodies (n, 2) that each body (count,) is in; NaN without one."""
     largest = np.full(count, -np.inf)
     known = np.isfinite(values)

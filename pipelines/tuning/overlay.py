@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechanics.scene.scene import Block, Fidelity, Method, Placement, Scene
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.polyhedra import smallest_width
+from pipelines.arrays import Array
 from pipelines.scene.file import SceneFile
 from pipelines.scene.selection import StoneModel
 
@@ -93,7 +93,7 @@ def typical_width(models: Iterable[StoneModel]) -> float:
     return _median_width((one.record.solid_vertices, one.record.solid_faces) for one in models)
 
 
-def _median_width(solids: Iterable[tuple[NDArray[np.float64], tuple[tuple[int, ...], ...]]]) -> float:
+def _median_width(solids: Iterable[tuple[Array, tuple[tuple[int, ...], ...]]]) -> float:
     return float(np.median([smallest_width(vertices, faces) for vertices, faces in solids]))
 
 

@@ -11,15 +11,14 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechanics.results.result import BodyResult, Result
 from mechanics.scene.scene import Fidelity
+from pipelines.arrays import Array
 from pipelines.run.stone_values import stress_statistics
 
 __all__ = ["QUANTITIES", "Quantities", "StoneQuantities", "differences", "quantities", "quantities_from"]
 
-Array = NDArray[np.float64]
 
 QUANTITIES: Mapping[str, str] = {
     "outcome": "1 if the scene ends otherwise, else 0",

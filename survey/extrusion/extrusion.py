@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from moma.errors import GeometryError
+from survey.arrays import Array
 from survey.extrusion._kernels import corner_deviations
 from survey.extrusion.depth import Depth
 from survey.faces.faces import Face
@@ -15,7 +15,6 @@ from survey.records.survey import Extrusion
 
 __all__ = ["SurveyedBlock", "extrude", "hidden_side", "prism"]
 
-Array = NDArray[np.float64]
 
 _STRAIGHT = Extrusion()
 _FLATTEST = np.cos(np.radians(60.0))  # a direction farther from the normal leaves a sliver, not a stone

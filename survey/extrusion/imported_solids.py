@@ -3,9 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from moma.errors import GeometryError
+from survey.arrays import Array
 from survey.extrusion.depth import Depth
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.faces.faces import Provenance, face_on
@@ -16,7 +16,6 @@ from survey.records.survey import BlockRecord, Extrusion, SolidRecord
 
 __all__ = ["block_of_solid"]
 
-Array = NDArray[np.float64]
 
 _UPRIGHT = 0.9  # a side whose normal rises more steeply (sine) is a bed or a top, not a face
 _ALIKE = 0.01  # sides whose areas differ by less may be the front and the back of one stone

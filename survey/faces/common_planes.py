@@ -19,11 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from survey.arrays import Array
 from survey.faces.planes import FaceFit
 
 __all__ = ["CommonPlane", "PlaneEstimate", "common_plane"]
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 _MOST_STUDENT = 3.0  # ν/(ν - 2) where ν is 3; it does not exist for two

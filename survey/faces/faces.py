@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from moma.errors import GeometryError
+from survey.arrays import Array
 from survey.faces.outline import OutlineMeasures, level_direction, measure_outline, outline_polygon
 from survey.faces.planes import FaceFit, fit_plane
 from survey.faces.shapes import FaceShape, judge_shape
@@ -15,7 +15,6 @@ from survey.records.survey import BlockRecord
 
 __all__ = ["Face", "Provenance", "Source", "face_on", "outline_face"]
 
-Array = NDArray[np.float64]
 
 Source = Literal["points", "photograph", "solid", "hypothesis"]
 """What a face can be known from."""

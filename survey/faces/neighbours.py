@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from survey.arrays import Array
 from survey.faces.planes import FaceFit
 
 __all__ = ["MeasuredFace", "Neighbours"]
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 _SAME_WAY = float(np.cos(np.radians(30.0)))  # faces turned farther belong to another wall

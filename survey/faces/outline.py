@@ -4,13 +4,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from moma.errors import GeometryError
+from survey.arrays import Array
 
 __all__ = ["Outline", "OutlineMeasures", "level_direction", "measure_outline", "outline_polygon"]
 
-Array = NDArray[np.float64]
 Point = tuple[float, float]
 
 _NEAREST = 1e-3  # metres: corners nearer than this are one corner measured twice, however precise

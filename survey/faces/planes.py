@@ -21,13 +21,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from moma.errors import GeometryError
+from survey.arrays import Array
 
 __all__ = ["FaceFit", "fit_plane"]
 
-Array = NDArray[np.float64]
 
 _NOWHERE = np.full(3, math.nan)
 _LARGEST_TILT = math.radians(10.0)  # standard deviation of a tilt beyond which there is no plane to speak of

@@ -12,16 +12,16 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import fdtri
 
+from survey.arrays import Array, Bools
 from survey.faces._kernels.shapes import fit_columns, fit_two_planes, grow_columns, truncated_sum
 from survey.faces.planes import FaceFit
 from survey.faces.shapes import FaceShape, ShapeKind, likely_ratio
 
 __all__ = ["explain_heights"]
 
-Array = NDArray[np.float64]
 
 _CURVED = 16.27  # chi-square of the 3 parameters of a quadric at 0.1 %
 _CURVED_WITHOUT = 7.81  # the same at 5 %: what must be left of it without any one point
@@ -54,7 +54,7 @@ class _Heights:
     v: Array
     z: Array
     root: Array
-    off: NDArray[np.bool_]
+    off: Bools
     known: bool
 
 
@@ -102,7 +102,7 @@ def _curved(face: _Heights) -> tuple[float, FaceShape] | None:
     return score, _curvature(coefficients / unit, covariance * scale / np.outer(unit, unit), held, count)
 
 
-def _best_start(design: Array, face: _Heights) -> tuple[NDArray[np.bool_], float]:
+def _best_start(design: Array, face: _Heights) -> tuple[Bools, float]:
     """Points that a quadric explains, grown from all points or from those on the plane; and what it leaves."""
     fewest = max(7, len(face.z) // 2 + 2)
     best, least = ~face.off, math.inf
@@ -116,9 +116,7 @@ def _best_start(design: Array, face: _Heights) -> tuple[NDArray[np.bool_], float
     return best, least
 
 
-def _squares(
-    design: Array, face: _Heights, chosen: NDArray[np.bool_]
-) -> tuple[float, tuple[Array, Array] | None, Array]:
+def _squares(design: Array, face: _Heights, chosen: Bools) -> tuple[float, tuple[Array, Array] | None, Array]:
     """Sum of squares of the chosen points, (coefficients, covariance), and (n,) the sum without each point."""
     width = design.shape[1]
     inverse, residuals, lever = np.empty((width, width)), face.z.copy(), np.zeros_like(face.z)

@@ -4,14 +4,12 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from survey.arrays import Array
 from survey.faces.planes import FaceFit
 
 __all__ = ["FaceShape", "ShapeKind", "judge_shape", "likely_ratio"]
-
-Array = NDArray[np.float64]
 
 
 class ShapeKind(StrEnum):

@@ -15,16 +15,13 @@ from itertools import chain
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array, Bools, Ints
 from survey.geometry._kernels.adjacency import GROUPS, face_planes, touching_faces
 from survey.geometry._kernels.between import hidden, thinnest_of
 from survey.geometry.near_solids import boxes_of, near_pairs
 
 __all__ = ["Polyhedra", "PolyhedraBuilder", "Touching", "find_touching", "open_to_each_other"]
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -40,9 +37,9 @@ class Polyhedra:
     """
 
     vertices: Array
-    corners: Indices
-    face_starts: Indices
-    solid_starts: Indices
+    corners: Ints
+    face_starts: Ints
+    solid_starts: Ints
 
     def __len__(self) -> int:
         return len(self.solid_starts) - 1
@@ -64,7 +61,7 @@ class PolyhedraBuilder:
     _corners: bytearray = field(default_factory=bytearray)
     _face_counts: bytearray = field(default_factory=bytearray)
     _solid_counts: list[int] = field(default_factory=list)
-    _known: dict[tuple[tuple[int, ...], ...], tuple[Indices, bytes]] = field(default_factory=dict)
+    _known: dict[tuple[tuple[int, ...], ...], tuple[Ints, bytes]] = field(default_factory=dict)
 
     def add(self, vertices: Array, faces: tuple[tuple[int, ...], ...]) -> None:
         """One more solid: vertices (nv, 3), and faces counter-clockwise seen from outside."""
@@ -102,7 +99,7 @@ class Touching:
     centroid : (m, 3) of the shared area, half-way between the two faces [m]
     """
 
-    pairs: Indices
+    pairs: Ints
     area: Array
     gap: Array
     normal: Array
@@ -119,7 +116,7 @@ def find_touching(
     *,
     overlap: float = 0.02,
     share: float = 0.03,
-    among: NDArray[np.bool_] | None = None,
+    among: Bools | None = None,
 ) -> Touching:
     """Find the solids that face each other across a joint.
 
@@ -156,9 +153,7 @@ def find_touching(
     return _touching(all_pairs[seen], all_rows[seen], origin)
 
 
-def open_to_each_other(
-    pairs: Indices, rows: Array, solid: Any, planes: Any, width: float
-) -> NDArray[np.bool_]:
+def open_to_each_other(pairs: Ints, rows: Array, solid: Any, planes: Any, width: float) -> Bools:
     """Contacts (m,) between which no third, thinner solid lies.
 
     Parameters
@@ -174,11 +169,11 @@ def open_to_each_other(
     both = both[np.argsort(both[:, 0], kind="stable")]
     starts = np.searchsorted(both[:, 0], np.arange(len(thinnest) + 1))
     near = (starts, np.ascontiguousarray(both[:, 1]))
-    out: NDArray[np.bool_] = ~hidden(pairs, rows, near, solid, planes, thinnest, 0.5 * width)
+    out: Bools = ~hidden(pairs, rows, near, solid, planes, thinnest, 0.5 * width)
     return out
 
 
-def _touching(pairs: Indices, rows: Array, origin: Array) -> Touching:
+def _touching(pairs: Ints, rows: Array, origin: Array) -> Touching:
     order = np.lexsort((pairs[:, 1], pairs[:, 0]))
     return Touching(
         pairs=pairs[order],

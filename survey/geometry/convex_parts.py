@@ -15,9 +15,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from moma.errors import GeometryError
+from survey.arrays import Array
 from survey.geometry.convexity import ReflexEdge, flatness, is_convex, reflex_edges
 from survey.geometry.half_spaces import intersection
 from survey.geometry.solids import Solid, planes_of_solid, volume_of
@@ -25,7 +25,6 @@ from survey.geometry.watertight import triangulate
 
 __all__ = ["convex_parts"]
 
-Array = NDArray[np.float64]
 Place = tuple[float, float, float]
 Plane = tuple[float, float, float, float]
 

@@ -3,13 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from survey.geometry.solids import Solid, highest_corner, planes_of_solid
 
 __all__ = ["ReflexEdge", "flatness", "is_convex", "reflex_edges"]
 
-Array = NDArray[np.float64]
 
 _FLAT = 1e-9  # of its size: corners so little in front of a plane are on it, and edges so shallow are none
 _WARPS = 4.0  # times by which two faces that are not quite planes may seem to stand in front of each other

@@ -5,14 +5,13 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array, Bools, Ints
 from survey.geometry._kernels.cutting import FULL, cut_out
 from survey.geometry.solids import Solid, area_vector
 
 __all__ = ["CutStone", "common_part", "cut_stones", "joins_three", "moves"]
 
-Array = NDArray[np.float64]
 Faces = tuple[tuple[int, ...], ...]
 
 _NEAR = 1e-10  # metres: a corner that is as near as that to a plane lies on it
@@ -120,7 +119,7 @@ def _alike(solids: Sequence[Solid], planes: Mapping[int, Array]) -> dict[Faces, 
 
 
 @lru_cache(maxsize=1024)
-def _meeting(faces: Faces) -> NDArray[np.int64] | None:
+def _meeting(faces: Faces) -> Ints | None:
     """The three faces (nv, 3) that meet at each corner; None if there are other numbers of them."""
     count = max(max(face) for face in faces) + 1
     at: list[list[int]] = [[] for _ in range(count)]
@@ -130,7 +129,7 @@ def _meeting(faces: Faces) -> NDArray[np.int64] | None:
     return np.array(at) if all(len(own) == 3 for own in at) else None
 
 
-def _moved(faces: Faces, planes: Array) -> tuple[Array, NDArray[np.bool_]]:
+def _moved(faces: Faces, planes: Array) -> tuple[Array, Bools]:
     """Corners (n, nv, 3) where the planes (n, nf, 4) of each one's faces cross, and whether these stay the faces."""
     corners, wide = _crossings(faces, planes)
     meeting = _meeting(faces)
@@ -142,7 +141,7 @@ def _moved(faces: Faces, planes: Array) -> tuple[Array, NDArray[np.bool_]]:
     return corners, below & wide.all(axis=1)
 
 
-def _crossings(faces: Faces, planes: Array) -> tuple[Array, NDArray[np.bool_]]:
+def _crossings(faces: Faces, planes: Array) -> tuple[Array, Bools]:
     """Corners (n, nv, 3) where the planes (n, nf, 4) of each one's faces cross, and (n, nv) whether at wide angles."""
     meeting = _meeting(faces)
     assert meeting is not None

@@ -9,13 +9,12 @@ it alike.
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array
 from survey.geometry.solids import area_vector
 
 __all__ = ["fold", "warp"]
 
-Array = NDArray[np.float64]
 Polygon = tuple[int, ...]
 
 _ALIKE = 1e-6  # of a polygon's size: warps that differ by less are alike

@@ -7,13 +7,12 @@ once, so that what is cut stays closed whatever rounding does.
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array
 from survey.geometry.solids import Solid
 
 __all__ = ["intersection"]
 
-Array = NDArray[np.float64]
 Place = tuple[float, float, float]
 Plane = tuple[float, float, float, float]
 Polygon = tuple[int, ...]

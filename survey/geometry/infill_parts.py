@@ -8,15 +8,13 @@ from collections.abc import Iterator, Sequence
 from itertools import permutations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array, Bools
 from survey.geometry.solids import Solid, area_vector, volume_of
 from survey.geometry.watertight import triangulate
 
 __all__ = ["grid_parts"]
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Box = tuple[tuple[int, int], ...]
 
 _FAMILY = float(np.cos(np.radians(25.0)))  # planes that are nearer to parallel are of one family
@@ -93,7 +91,7 @@ def _nodes(families: Sequence[Array]) -> Array:
     return np.asarray(np.linalg.solve(planes[..., :3], planes[..., 3:])[..., 0], dtype=np.float64)
 
 
-def _inside(solid: Solid, nodes: Array) -> Mask:
+def _inside(solid: Solid, nodes: Array) -> Bools:
     """Which cells are in a solid: seen from the middle of one, its faces fill the whole sphere."""
     shape = tuple(n - 1 for n in nodes.shape[:3])
     corners = [nodes[a : a + shape[0], b : b + shape[1], c : c + shape[2]] for a, b, c in np.ndindex(2, 2, 2)]
@@ -116,7 +114,7 @@ def _angles(points: Array, triangles: Array) -> Array:
     return out
 
 
-def _boxes(filled: Mask, order: Sequence[int]) -> list[Box]:
+def _boxes(filled: Bools, order: Sequence[int]) -> list[Box]:
     """Boxes of cells: from the first that is left as far as it goes, along one axis after the other."""
     left, boxes = filled.copy(), []
     for first in np.argwhere(filled).tolist():

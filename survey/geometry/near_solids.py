@@ -3,19 +3,17 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array, Bools, Ints
 from survey.geometry._kernels.boxes import count_near, list_near, morton_codes
 
 __all__ = ["boxes_of", "near_pairs"]
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 _PAIRS = 1 << 15  # neighbours that are looked at in one go, so that memory does not grow with the crowd
 
 
-def boxes_of(faces: Array, starts: Indices, width: float) -> Array:
+def boxes_of(faces: Array, starts: Ints, width: float) -> Array:
     """Boxes (n, 6) of solids from those of their faces, wider by half a joint on all sides."""
     out = np.empty((len(starts) - 1, 6))
     out[:, :3] = np.minimum.reduceat(faces[:, :3], starts[:-1]) - 0.5 * width
@@ -23,7 +21,7 @@ def boxes_of(faces: Array, starts: Indices, width: float) -> Array:
     return out
 
 
-def near_pairs(boxes: Array, wanted: NDArray[np.bool_]) -> Iterator[Indices]:
+def near_pairs(boxes: Array, wanted: Bools) -> Iterator[Ints]:
     """Pairs of overlapping boxes, about `_PAIRS` at a time."""
     centres = boxes[:, :3] + boxes[:, 3:]
     low, extent = centres.min(axis=0), np.ptp(centres, axis=0)

@@ -17,14 +17,13 @@ corners are, so that it leaves nothing behind.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array
 from scipy.sparse.linalg import splu
 
+from survey.arrays import Array, Ints
+
 __all__ = ["Settled", "settle"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _STEPS = 30
 _POLISH = 4

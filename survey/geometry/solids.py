@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from survey.arrays import Array
 
 __all__ = ["Solid", "area_vector", "highest_corner", "planes_of_solid", "volume_of"]
 
@@ -20,18 +21,18 @@ class Solid:
     """
 
     code: str
-    vertices: NDArray[np.float64]
+    vertices: Array
     faces: tuple[tuple[int, ...], ...]
 
 
-def area_vector(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
+def area_vector(polygon: Array) -> Array:
     """Area times normal of a polygon (n, 3) in space, counter-clockwise about it [m²]."""
     corners = polygon - polygon[0]
-    out: NDArray[np.float64] = 0.5 * np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
+    out: Array = 0.5 * np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
     return out
 
 
-def planes_of_solid(solid: Solid) -> NDArray[np.float64]:
+def planes_of_solid(solid: Solid) -> Array:
     """Planes (nf, 4) of a solid's faces: outward unit normals [-], and offsets d of n·x = d about the origin [m]."""
     rows = np.empty((len(solid.faces), 4))
     for row, face in zip(rows, solid.faces, strict=True):

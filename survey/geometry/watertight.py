@@ -5,6 +5,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from moma.errors import GeometryError
+from survey.arrays import Array
 from survey.geometry.solids import Solid, area_vector, highest_corner
 
 __all__ = ["check_watertight", "triangulate"]
@@ -54,7 +55,7 @@ def triangulate(solid: Solid) -> NDArray[np.intp]:
     return np.array(triangles, dtype=np.intp)
 
 
-def _ears(vertices: NDArray[np.float64], face: tuple[int, ...]) -> list[tuple[int, int, int]]:
+def _ears(vertices: Array, face: tuple[int, ...]) -> list[tuple[int, int, int]]:
     if len(face) == 3:
         return [(face[0], face[1], face[2])]
     rest, triangles = list(face), []
@@ -68,7 +69,7 @@ def _ears(vertices: NDArray[np.float64], face: tuple[int, ...]) -> list[tuple[in
     return triangles
 
 
-def _is_ear(vertices: NDArray[np.float64], rest: list[int], k: int, normal: NDArray[np.float64]) -> bool:
+def _is_ear(vertices: Array, rest: list[int], k: int, normal: Array) -> bool:
     ids = (rest[k - 1], rest[k], rest[(k + 1) % len(rest)])
     corners = vertices[list(ids)]
     inward = np.cross(normal, np.roll(corners, -1, axis=0) - corners)

@@ -9,18 +9,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from survey.arrays import Array, Bools, Ints
 from survey.geometry.adjacency import Polyhedra
 from survey.joints.facing import FacePlanes, FacingFaces
 from survey.joints.settings import JointSettings
 
 __all__ = ["bent"]
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 _FINE = 0.5  # of the straightness: how near to the chain corners are to be, if they can
 _FEW = 0.1  # part of the sound corners that may be off the chain
@@ -47,8 +44,8 @@ class _Bed:
     origin: Array
     place: Array
     height: Array
-    lower: Indices
-    upper: Indices
+    lower: Ints
+    upper: Ints
 
 
 @dataclass(frozen=True)
@@ -67,7 +64,7 @@ class _Chain:
     heights: Array
     slant: float
     residuals: Array
-    number: Indices
+    number: Ints
 
     def off(self, far: float) -> float:
         """Part of the sound corners that are farther than that from the chain [-]."""
@@ -79,10 +76,10 @@ def bent(
     planes: FacePlanes,
     sound: Bools,
     facing: FacingFaces,
-    links: Indices,
+    links: Ints,
     settings: JointSettings,
     off: float,
-) -> tuple[Array, Indices] | None:
+) -> tuple[Array, Ints] | None:
     """Planes of a joint that one plane does not fit.
 
     Parameters
@@ -120,7 +117,7 @@ def bent(
     return (_planes(bed, coarse[0]), coarse[0].number) if coarse else None
 
 
-def _bed(planes: FacePlanes, facing: FacingFaces, links: Indices) -> _Bed:
+def _bed(planes: FacePlanes, facing: FacingFaces, links: Ints) -> _Bed:
     pairs, centroid = facing.faces[links], facing.centroid[links]
     reference = planes.normals[pairs[int(facing.area[links].argmax()), 0]]
     out_of_first = (planes.normals[pairs[:, 0]] * reference).sum(axis=1) > 0.0
@@ -200,7 +197,7 @@ def _slopes(bed: _Bed, ends: list[int]) -> Array:
 
 def _changes(
     bed: _Bed, ends: list[int], slopes: Array, extents: dict[int, tuple[float, float]]
-) -> tuple[Indices, list[float]]:
+) -> tuple[Ints, list[float]]:
     """Plane (m,) of each link, and where (n - 1) along the bed one plane follows another [m]."""
     order = np.argsort(bed.place, kind="stable")
     x = bed.place[order]
@@ -220,7 +217,7 @@ def _changes(
     return of_link, knots
 
 
-def _fitted(solids: Polyhedra, sound: Bools, bed: _Bed, posts: Array, number: Indices) -> _Chain:
+def _fitted(solids: Polyhedra, sound: Bools, bed: _Bed, posts: Array, number: Ints) -> _Chain:
     """The chain through posts that is nearest to the corners on either hand."""
     rows, hands = [], []
     for side, sign in ((bed.lower, -1.0), (bed.upper, 1.0)):

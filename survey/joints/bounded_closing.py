@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from moma.errors import GeometryError
+from survey.arrays import Array, Bools, Ints
 from survey.geometry._kernels.convexity import highest_corners
 from survey.geometry.adjacency import Polyhedra
 from survey.geometry.cutting import cut_stones, joins_three, moves
@@ -19,9 +19,6 @@ from survey.simplify.simplify import BlockyStone
 
 __all__ = ["Building", "Cut", "as_building", "close_within_bounds"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 _ROUNDS = 10  # in which single joints are left open; then all of a stone that is still moved too far
 _CONVEX = 1e-6  # of a stone's size: a corner that stands out of a face's plane by less does so by rounding

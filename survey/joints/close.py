@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.solids import Solid, planes_of_solid
 from survey.geometry.stone_parts import stone_parts
@@ -29,7 +29,6 @@ from survey.simplify.simplify import BlockyStone, simplify
 
 __all__ = ["ClosedStones", "close_joints"]
 
-Array = NDArray[np.float64]
 
 _ROUNDS = 4  # in which closing joints shows further ones, beside worn corners
 _MEETS = 1e-6  # metres: faces that are nearer share a plane

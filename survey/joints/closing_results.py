@@ -4,8 +4,8 @@ from collections import defaultdict
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array
 from survey.geometry.adjacency import Polyhedra
 from survey.geometry.cutting import moves
 from survey.joints.bounded_closing import Building, Cut
@@ -16,7 +16,6 @@ from survey.joints.settings import JointSettings
 
 __all__ = ["closing_report"]
 
-Array = NDArray[np.float64]
 # area, centroid and normal of faces in contact, by the pair of stones
 _Contacts = dict[tuple[int, int], list[tuple[float, Array, Array]]]
 

@@ -11,10 +11,10 @@ plane of their own.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from survey.arrays import Array, Bools, Ints
 from survey.geometry.adjacency import Polyhedra
 from survey.joints._kernels import fit_middle_planes
 from survey.joints._kernels_continuing import continuing_faces
@@ -24,9 +24,6 @@ from survey.joints.settings import JointSettings
 
 __all__ = ["ContactPlanes", "StoneFaces", "contact_planes", "some_links"]
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 _ALIKE = 0.985  # cosine of 10°: faces of neighbours that are turned by more do not continue each other
 _FEW = 0.25  # part of the corners of a joint that may be off it
@@ -53,8 +50,8 @@ class StoneFaces:
     sound: Bools
     kept: Bools
 
-    def corners(self, face: int) -> Indices:
-        """Indices of a face's corners."""
+    def corners(self, face: int) -> Ints:
+        """Ints of a face's corners."""
         starts = self.solids.face_starts
         return self.solids.corners[starts[face] : starts[face + 1]]
 
@@ -72,17 +69,17 @@ class ContactPlanes:
 
     normals: Array
     offsets: Array
-    of_link: Indices
-    side: Indices
+    of_link: Ints
+    side: Ints
 
 
 @dataclass(frozen=True)
 class _Groups:
     """Faces of several joints, one after the other: (k,) face, hand ±1; (n + 1,) starts; normals (n, 3)."""
 
-    faces: Indices
+    faces: Ints
     hands: Array
-    starts: Indices
+    starts: Ints
     normals: Array
 
 
@@ -107,7 +104,7 @@ def contact_planes(faces: StoneFaces, facing: FacingFaces, settings: JointSettin
     return found.planes()
 
 
-def _add_joints(found: "_Found", links: Indices, settings: JointSettings) -> None:
+def _add_joints(found: "_Found", links: Ints, settings: JointSettings) -> None:
     """Planes of the joints that these links make."""
     faces, facing = found.faces, some_links(found.facing, links)
     label = _joints(faces, facing, settings)
@@ -141,15 +138,15 @@ class _Found:
     facing: FacingFaces
     normals: list[Array]
     offsets: list[float]
-    of_link: Indices
+    of_link: Ints
 
-    def add_many(self, planes: Array, links: Indices, number: Indices) -> None:
+    def add_many(self, planes: Array, links: Ints, number: Ints) -> None:
         """Planes (n, 4), and which of them (m,) each link has."""
         self.of_link[links] = len(self.normals) + number
         self.normals += list(planes[:, :3])
         self.offsets += planes[:, 3].tolist()
 
-    def add_bent(self, links: Indices, settings: JointSettings, off: float) -> bool:
+    def add_bent(self, links: Ints, settings: JointSettings, off: float) -> bool:
         """A joint that is bent but not broken: several planes; False if that is not what it is."""
         found = bent(
             self.faces.solids, self.faces.planes, self.faces.sound, self.facing, links, settings, off
@@ -159,7 +156,7 @@ class _Found:
         self.add_many(found[0], links, found[1])
         return True
 
-    def add_each(self, links: Indices, usual: float, settings: JointSettings) -> None:
+    def add_each(self, links: Ints, usual: float, settings: JointSettings) -> None:
         """A plane for each pair."""
         part, number = some_links(self.facing, links), np.arange(len(links))
         planes, _ = _fitted(self.faces, _gathered(self.faces, part, number, len(links)), usual, settings)
@@ -200,7 +197,7 @@ class _Found:
         return ContactPlanes(normals, np.array(self.offsets), self.of_link, side)
 
 
-def some_links(facing: FacingFaces, links: Indices) -> FacingFaces:
+def some_links(facing: FacingFaces, links: Ints) -> FacingFaces:
     """Only these pairs."""
     return replace(
         facing,
@@ -212,7 +209,7 @@ def some_links(facing: FacingFaces, links: Indices) -> FacingFaces:
     )
 
 
-def _joints(faces: StoneFaces, facing: FacingFaces, settings: JointSettings) -> Indices:
+def _joints(faces: StoneFaces, facing: FacingFaces, settings: JointSettings) -> Ints:
     """Number (m,) of the joint that each pair belongs to, in the order of their first pair."""
     if not len(facing):
         return np.zeros(0, np.int64)
@@ -223,16 +220,16 @@ def _joints(faces: StoneFaces, facing: FacingFaces, settings: JointSettings) -> 
     _, first, number = np.unique(label[facing.faces[:, 0]], return_index=True, return_inverse=True)
     rank = np.empty(len(first), np.int64)
     rank[np.argsort(first, kind="stable")] = np.arange(len(first))
-    out: Indices = rank[number]
+    out: Ints = rank[number]
     return out
 
 
-def _continuing(faces: StoneFaces, facing: FacingFaces, settings: JointSettings) -> Indices:
+def _continuing(faces: StoneFaces, facing: FacingFaces, settings: JointSettings) -> Ints:
     """Faces (m, 2) of neighbours that lie in one plane."""
     solids, planes = faces.solids, faces.planes
     joined = np.zeros(len(planes.areas), np.bool_)
     joined[facing.faces] = True
-    found: Indices = continuing_faces(
+    found: Ints = continuing_faces(
         planes.owner[facing.faces],
         (solids.vertices, solids.corners, solids.face_starts, solids.solid_starts),
         planes.normals,
@@ -244,7 +241,7 @@ def _continuing(faces: StoneFaces, facing: FacingFaces, settings: JointSettings)
     return found
 
 
-def _gathered(faces: StoneFaces, facing: FacingFaces, label: Indices, count: int) -> _Groups:
+def _gathered(faces: StoneFaces, facing: FacingFaces, label: Ints, count: int) -> _Groups:
     """The faces of each joint, each once, and on which hand of it they are."""
     of_face = np.repeat(label, 2) * len(faces.planes.areas) + facing.faces.ravel()
     unique = np.unique(of_face)

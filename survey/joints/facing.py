@@ -3,17 +3,14 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array, Bools, Ints
 from survey.geometry._kernels.adjacency import face_planes, facing_faces
 from survey.geometry.adjacency import Polyhedra, open_to_each_other
 from survey.geometry.near_solids import boxes_of, near_pairs
 from survey.joints.settings import JointSettings
 
 __all__ = ["FacePlanes", "FacingFaces", "find_facing", "planes_of"]
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -34,8 +31,8 @@ class FacePlanes:
     offsets: Array
     areas: Array
     boxes: Array
-    convex: NDArray[np.bool_]
-    owner: Indices
+    convex: Bools
+    owner: Ints
 
 
 @dataclass(frozen=True)
@@ -51,7 +48,7 @@ class FacingFaces:
     normal : (m, 3) unit normal, from the second to the first [-]
     """
 
-    faces: Indices
+    faces: Ints
     area: Array
     gap: Array
     centroid: Array

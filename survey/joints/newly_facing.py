@@ -7,16 +7,14 @@ lies too far back. Once the joints beside it are closed, and the corner with the
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array, Ints
 from survey.geometry.adjacency import Polyhedra
 from survey.joints.bounded_closing import Building, Cut
 from survey.joints.facing import FacingFaces, find_facing, planes_of
 from survey.joints.settings import JointSettings
 
 __all__ = ["newly_facing"]
-
-Array = NDArray[np.float64]
 
 
 def newly_facing(building: Building, facing: FacingFaces, cut: Cut, settings: JointSettings) -> FacingFaces:
@@ -50,7 +48,7 @@ def newly_facing(building: Building, facing: FacingFaces, cut: Cut, settings: Jo
     )
 
 
-def _surveyed_faces(building: Building, cut: Cut) -> NDArray[np.int64]:
+def _surveyed_faces(building: Building, cut: Cut) -> Ints:
     """The surveyed face that each face of the stones now was; -1 for one that came with a bend of its bed."""
     out = []
     for i, solid in enumerate(cut.solids):
@@ -60,7 +58,7 @@ def _surveyed_faces(building: Building, cut: Cut) -> NDArray[np.int64]:
     return np.concatenate(out)
 
 
-def _height(building: Building, faces: NDArray[np.int64], found: FacingFaces, links: list[int]) -> Array:
+def _height(building: Building, faces: Ints, found: FacingFaces, links: list[int]) -> Array:
     """Where the planes of surveyed faces lie along the normal of a joint, seen from its middle [m]."""
     normals, offsets = building.faces.planes.normals[faces], building.faces.planes.offsets[faces]
     centroid, normal = found.centroid[links], found.normal[links]

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array, Bools
 from survey.geometry._kernels.convexity import deepest_overlaps
 from survey.geometry.cutting import common_part, cut_stones, moves
 from survey.geometry.near_solids import boxes_of, near_pairs
@@ -13,8 +13,6 @@ from survey.geometry.solids import Solid, volume_of
 
 __all__ = ["Overlapping", "find_overlaps", "part_stones"]
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 _LEAST = 1e-10  # metres: solids that share a plane lie so deep in each other by rounding
 _ON_PLANE = 1e-8  # metres
@@ -89,7 +87,7 @@ class _Parting:
     originals: Sequence[Solid]
     solids: list[Solid]
     planes: dict[int, Array]
-    free: dict[int, NDArray[np.bool_]]
+    free: dict[int, Bools]
     bound: float
 
     def part(self, found: Overlapping) -> None:
@@ -177,7 +175,7 @@ def part_stones(
     originals: Sequence[Solid],
     solids: Sequence[Solid],
     planes: Mapping[int, Array],
-    free: Mapping[int, NDArray[np.bool_]],
+    free: Mapping[int, Bools],
     bound: float,
 ) -> tuple[list[Solid], list[Overlapping]]:
     """Part stones that lie in each other; a stone only gets smaller, so that no new overlap comes about.

@@ -3,14 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from survey.arrays import Array
 from survey.joints.settings import JointMode
 
 __all__ = ["ClosingReport", "Gap", "Joint", "Overlap"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,15 +9,13 @@ made parallel to the opposite side, if it is about so.
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array, Bools, Ints
 from survey.geometry.solids import Solid
 from survey.joints.contact_planes import StoneFaces
 
 __all__ = ["mended_planes"]
 
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 _ALIKE = 0.985  # cosine of 10°
 _NEAR = 0.03  # metres by which a neighbour's corner may be off a side that it continues
@@ -27,7 +25,7 @@ def mended_planes(
     faces: StoneFaces,
     rows: Array,
     free: Bools,
-    neighbours: NDArray[np.int64],
+    neighbours: Ints,
     solids: Sequence[Solid],
     reach: float,
 ) -> Array:

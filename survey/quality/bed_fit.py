@@ -14,9 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from survey.arrays import Array
+
 __all__ = ["BedCorners", "BedScatter", "fit_bed", "pool", "scatter_of"]
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 _FREEDOM = 5  # differences between corners of one stone from which κ can be told from 1

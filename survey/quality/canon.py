@@ -5,14 +5,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array
 from survey.quality.precision import StoneQuality
 from survey.records.survey import Canon
 
 __all__ = ["ENOUGH", "Deviation", "KindStandard", "deviations", "standards"]
 
-Array = NDArray[np.float64]
 
 ENOUGH = 5
 """Stones of a kind from which a median and its scatter can be had."""

@@ -22,15 +22,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array
 from survey.quality.facades import Facade
 from survey.quality.precision import StoneQuality
 from survey.quality.wedges import Wedge, sloped_side, wedges
 
 __all__ = ["SIGNIFICANT", "Contradiction", "contradictions"]
 
-Array = NDArray[np.float64]
 
 SIGNIFICANT = 3.0
 """Standard deviations of the measurement beyond which a stone contradicts its kind."""

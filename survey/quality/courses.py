@@ -12,9 +12,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import stdtr
 
+from survey.arrays import Array
 from survey.quality.bed_fit import BedCorners, BedScatter, fit_bed, pool, scatter_of
 from survey.quality.facades import Facade
 from survey.quality.precision import StoneQuality
@@ -30,7 +30,6 @@ __all__ = [
     "measure_courses",
 ]
 
-Array = NDArray[np.float64]
 
 ENOUGH = 5
 """Stones from which the scatter of a course's beds can be estimated: with fewer, τ is uncertain by half."""

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from survey.arrays import Array, Bools
 from survey.quality.walls import WallPlane, upright_frame
 
 __all__ = ["LEVEL", "WIDEST", "Facade", "find_facades"]
 
-Array = NDArray[np.float64]
 
 WIDEST = 30.0
 """How far a face may be turned from the mean of its facade [degrees]."""
@@ -87,7 +87,7 @@ def _turns(normals: Array, areas: Array, standing: NDArray[np.intp]) -> Iterable
         left = left[~mine]
 
 
-def _gather(level: Array, areas: Array) -> NDArray[np.bool_]:
+def _gather(level: Array, areas: Array) -> Bools:
     """Which of some plan directions, (n, 2), belong to the facade of the largest area."""
     mean, mine = _peak(level, areas), np.ones(len(level), dtype=bool)
     for count in range(_ROUNDS):

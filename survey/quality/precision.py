@@ -9,11 +9,11 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
+from survey.arrays import Array, Ints
 from survey.extrusion.extrusion import SurveyedBlock
 
 __all__ = ["Histogram", "StoneQuality", "SurveyQuality", "appraise", "judge_survey"]
 
-Array = NDArray[np.float64]
 
 _SIGNIFICANT = 3.0  # standard deviations beyond which sigma0 is not 1 by chance
 _TOLERANCE = 0.1  # relative: nobody states a sigma better than this, so a smaller error of it is none
@@ -105,7 +105,7 @@ class Histogram:
     """
 
     edges: Array
-    counts: NDArray[np.int64]
+    counts: Ints
     expected: Array
 
 

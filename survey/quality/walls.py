@@ -3,11 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from survey.arrays import Array
 
 __all__ = ["WallPlane", "upright_frame"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -5,16 +5,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from survey.arrays import Array
 from survey.quality.facades import Facade
 from survey.quality.precision import StoneQuality
 from survey.quality.walls import upright_frame
 
 __all__ = ["Wedge", "sloped_side", "wedges"]
 
-Array = NDArray[np.float64]
 
 _ARCH = ("voussoir", "keystone")
 _REACH = 3.0  # neighbours in the arch are nearer than so many times the stone's larger dimension

@@ -4,9 +4,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from moma.errors import MomaError, SurveyError
+from survey.arrays import Array
 from survey.records.snapping import Snapping
 
 __all__ = [
@@ -26,7 +26,6 @@ __all__ = [
     "SurveyStream",
 ]
 
-Array = NDArray[np.float64]
 
 OBSERVER = "observer"
 """Name of the station from which all stones were seen that do not name another."""

@@ -12,15 +12,15 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from moma.errors import GeometryError
-from survey.registration.outliers import Mask, Verdict, find_blunders, point_tests
+from survey.arrays import Array, Bools
+from survey.registration.outliers import Verdict, find_blunders, point_tests
 from survey.registration.projective import Frame, direct_homography, frame_of, linearised, mapped_points
 
 __all__ = ["Homography", "fit_homography"]
 
-Array = NDArray[np.float64]
 
 _MAX_STEPS = 30
 _CLOSE = 1e-12  # step of the reduced parameters, which are of the order of 1, that is rounding
@@ -165,7 +165,7 @@ def _without_blunders(marks: _Marks, names: list[str]) -> Homography:
     _check_spread(marks, names)
     fits: dict[bytes, tuple[Homography, Verdict]] = {}
 
-    def judge(accepted: Mask) -> Verdict | None:
+    def judge(accepted: Bools) -> Verdict | None:
         if _aligned(marks, accepted) is not None:
             return None
         try:
@@ -211,7 +211,7 @@ def _check_spread(marks: _Marks, names: list[str]) -> None:
         )
 
 
-def _aligned(marks: _Marks, accepted: Mask) -> tuple[int, ...] | None:
+def _aligned(marks: _Marks, accepted: Bools) -> tuple[int, ...] | None:
     """Points on a line with at most one other distinct point besides; None if four are in general position."""
     index = np.flatnonzero(accepted)
     for points, sigma in ((marks.image, marks.image_sigma), (marks.plane, marks.plane_sigma)):
@@ -238,7 +238,7 @@ def _beyond(marks: _Marks) -> tuple[int, ...]:
     return tuple(np.flatnonzero(few if 0 < 2 * few.sum() < len(few) else np.ones(len(u))).tolist())
 
 
-def _adjust(marks: _Marks, accepted: Mask) -> tuple[Homography, Verdict] | None:
+def _adjust(marks: _Marks, accepted: Bools) -> tuple[Homography, Verdict] | None:
     """Least squares; None if some point is not in front of the camera."""
     frames = frame_of(marks.image[accepted]), frame_of(marks.plane[accepted])
     u, y = frames[0].reduce(marks.image), frames[1].reduce(marks.plane)
@@ -267,7 +267,7 @@ def _adjust(marks: _Marks, accepted: Mask) -> tuple[Homography, Verdict] | None:
 
 def _result(
     marks: _Marks,
-    accepted: Mask,
+    accepted: Bools,
     fitted: tuple[Array, Frame, Frame],
     terms: tuple[Array, Array, Array, Array],
 ) -> tuple[Homography, Verdict]:

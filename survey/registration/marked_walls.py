@@ -9,18 +9,17 @@ the wall are left out.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 from scipy.special import stdtrit
 
 from moma.errors import GeometryError
+from survey.arrays import Array
 from survey.faces.planes import FaceFit, fit_plane
 from survey.records.survey import Photograph
 from survey.registration.homography import Homography, fit_homography
 
 __all__ = ["OFF_SQUARE", "MarkedWall", "wall_of_marks"]
 
-Array = NDArray[np.float64]
 
 OFF_SQUARE = float(np.tan(np.radians(15.0)))
 """Standard deviation of the tangent of a line of sight whose station is not known, against the wall's normal."""

@@ -16,13 +16,12 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtri
+
+from survey.arrays import Array, Bools
 
 __all__ = ["LEVEL", "Blunders", "Verdict", "find_blunders", "point_tests"]
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 LEVEL = 1e-3
 """Probability that a sound point, or a sound set of points, is called wrong: Baarda's α₀."""
@@ -50,10 +49,10 @@ class Verdict:
     redundancy: int
     tests: Array
     limits: Array
-    accepted: Mask
+    accepted: Bools
 
     @property
-    def failed(self) -> Mask:
+    def failed(self) -> Bools:
         """(n,) fitted points that contradict the others."""
         return self.accepted & (np.nan_to_num(self.tests) > self.limits)
 
@@ -80,7 +79,7 @@ class Blunders:
 
 
 def point_tests(
-    residuals: Array, covariances: Array, effects: Array, parameters: Array, accepted: Mask
+    residuals: Array, covariances: Array, effects: Array, parameters: Array, accepted: Bools
 ) -> tuple[Array, Array]:
     """Test the residual of every point against its own covariance.
 
@@ -110,7 +109,7 @@ def point_tests(
     return tests, np.sqrt(chdtri(np.maximum(freedom, 1), LEVEL))
 
 
-def find_blunders(count: int, smallest: int, judge: Callable[[Mask], Verdict | None]) -> Blunders:
+def find_blunders(count: int, smallest: int, judge: Callable[[Bools], Verdict | None]) -> Blunders:
     """Find the fewest points that have to be left out so that the others agree.
 
     Parameters
@@ -144,7 +143,7 @@ def _subsets(count: int, size: int, best: tuple[int, ...]) -> Iterable[tuple[int
 
 
 def _judged(
-    subsets: Iterable[tuple[int, ...]], everything: Mask, judge: Callable[[Mask], Verdict | None]
+    subsets: Iterable[tuple[int, ...]], everything: Bools, judge: Callable[[Bools], Verdict | None]
 ) -> list[tuple[float, tuple[int, ...], bool]]:
     """Sum of squares, subset and whether all agree once the subset is left out."""
     out = []
@@ -166,7 +165,7 @@ def _decide(explanations: list[tuple[float, tuple[int, ...]]], whole: Verdict | 
     return Blunders(suspects=tuple(sorted({i for subset in rivals for i in subset})))
 
 
-def _suspects(count: int, whole: Verdict | None, judge: Callable[[Mask], Verdict | None]) -> tuple[int, ...]:
+def _suspects(count: int, whole: Verdict | None, judge: Callable[[Bools], Verdict | None]) -> tuple[int, ...]:
     """Points of which something is wrong: those that alone could be it, else those that fail, else all."""
     everything = np.ones(count, dtype=bool)
     single = _judged(combinations(range(count), 1), everything, judge)

@@ -12,9 +12,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from moma.errors import GeometryError, MomaError, SurveyError
+from survey.arrays import Array
 from survey.faces.common_planes import CommonPlane, PlaneEstimate, common_plane
 from survey.faces.neighbours import MeasuredFace, Neighbours
 from survey.faces.planes import FaceFit, fit_plane
@@ -23,7 +23,6 @@ from survey.registration.marked_walls import OFF_SQUARE, MarkedWall, wall_of_mar
 
 __all__ = ["LiftedFace", "lift", "lift_faces", "plane_of_wall"]
 
-Array = NDArray[np.float64]
 
 _COARSEST = 0.1  # standard deviation of a corner over the size of the stone, beyond which it is refused
 _SMALLEST = 1e-3  # metres between the farthest corners

@@ -8,11 +8,10 @@ denominator of a camera that has all points in front of it cannot vanish amid th
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from survey.arrays import Array
 
 __all__ = ["Frame", "direct_homography", "frame_of", "linearised", "mapped_points"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

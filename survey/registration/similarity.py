@@ -12,13 +12,12 @@ adjusted point x̂ᵢ = xᵢ + s σ_x²/σᵢ² Rᵀ rᵢ. Taken at the measured
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from survey.registration.outliers import Mask, Verdict, point_tests
+from survey.arrays import Array, Bools
+from survey.registration.outliers import Verdict, point_tests
 
 __all__ = ["Similarity", "adjust_similarity", "best_similarity"]
 
-Array = NDArray[np.float64]
 
 _MAX_STEPS = 30
 _CLOSE = 1e-14  # step, relative to the size of the set, that is rounding
@@ -84,7 +83,7 @@ def adjust_similarity(
     source: Array,
     target: Array,
     sigmas: tuple[Array, Array],
-    accepted: Mask,
+    accepted: Bools,
     mirrored: bool = False,
 ) -> Similarity:
     """Fit a similarity in space to points that are uncertain in both frames.
@@ -181,7 +180,7 @@ def _turn(angles: Array) -> Array:
 
 
 def _result(
-    data: tuple[Array, Array, tuple[Array, Array], Mask],
+    data: tuple[Array, Array, tuple[Array, Array], Bools],
     fitted: tuple[Array, float, Array],
     centres: tuple[Array, Array],
     size: float,

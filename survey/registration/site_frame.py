@@ -16,17 +16,17 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import ndtri
 
 from moma.errors import SurveyError
+from survey.arrays import Array, Bools
 from survey.records.survey import BlockRecord, ControlPoint, Extrusion, SolidRecord, SurveyHead
-from survey.registration.outliers import LEVEL, Mask, Verdict, find_blunders
+from survey.registration.outliers import LEVEL, Verdict, find_blunders
 from survey.registration.similarity import Similarity, adjust_similarity
 
 __all__ = ["SiteTransform", "fit_similarity", "record_to_site", "to_site"]
 
-Array = NDArray[np.float64]
 Stone = TypeVar("Stone", bound=BlockRecord | SolidRecord)
 
 _WEAKEST_ANGLE = 0.1  # radians: a rotation less certain than this is not determined
@@ -269,7 +269,7 @@ def _without_blunders(
             remedy="look for two axes that are exchanged, or one that runs the other way",
         )
 
-    def judge(accepted: Mask) -> Verdict | None:
+    def judge(accepted: Bools) -> Verdict | None:
         if accepted.sum() < 3 or any(
             _spread(points[accepted])[1] <= width
             for points, width in zip((measured, site), least, strict=True)

@@ -3,8 +3,8 @@
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array, Ints
 from survey.geometry.solids import Solid
 from survey.simplify._kernels.blockiness import (
     area_vectors,
@@ -25,9 +25,6 @@ __all__ = [
     "solid_planes",
     "solid_volume",
 ]
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 
 def about(solid: Solid, origin: Array) -> Solid:
@@ -91,12 +88,12 @@ def common_share(solid: Solid, convex: Solid) -> float:
     return min(max(share, 0.0), 1.0)
 
 
-def _arrays(solid: Solid) -> tuple[Array, Indices, Indices]:
+def _arrays(solid: Solid) -> tuple[Array, Ints, Ints]:
     return np.ascontiguousarray(solid.vertices), *_corners(solid.faces)
 
 
 @lru_cache(maxsize=1024)
-def _corners(faces: tuple[tuple[int, ...], ...]) -> tuple[Indices, Indices]:
+def _corners(faces: tuple[tuple[int, ...], ...]) -> tuple[Ints, Ints]:
     """The corners of all faces one after the other, and where each face begins."""
     corners = np.array([i for face in faces for i in face], dtype=np.int64)
     return corners, np.cumsum([0, *(len(face) for face in faces)], dtype=np.int64)

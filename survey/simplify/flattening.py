@@ -10,14 +10,13 @@ from collections.abc import Container
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array
 from survey.geometry.solids import Solid
 from survey.simplify.blockiness import face_vectors, from_edges
 
 __all__ = ["FlatSolid", "flatten"]
 
-Array = NDArray[np.float64]
 Face = tuple[int, ...]
 
 _SAME_SIDE = 0.9  # cosine between normals, which are poor in thin triangles: heights decide

@@ -1,9 +1,9 @@
 """Stones that came as closed solids: hexahedra, wedges and prisms where they are so but for rounding, else general."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from moma.errors import GeometryError
+from survey.arrays import Array
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.folds import fold, warp
 from survey.geometry.plane_network import settle
@@ -16,7 +16,6 @@ from survey.simplify.squaring import SimplifyBounds
 
 __all__ = ["simplify_solid"]
 
-Array = NDArray[np.float64]
 
 _PLANE = 5e-9  # metres: what rounding in a national grid bends a plane face
 _CONVEX = 1e-10  # of a stone's size: a corner above a face by less is on it

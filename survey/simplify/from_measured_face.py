@@ -1,9 +1,9 @@
 """Stones whose face was measured: a hexahedron, wedge or prism on as few corners of it as are honest."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from moma.errors import GeometryError
+from survey.arrays import Array, Bools
 from survey.extrusion.extrusion import SurveyedBlock, hidden_side, prism
 from survey.geometry.solids import Solid
 from survey.simplify.blockiness import (
@@ -20,7 +20,6 @@ from survey.simplify.worn_corners import restore_worn
 
 __all__ = ["simplify_face"]
 
-Array = NDArray[np.float64]
 
 _EQUAL = 1e-12  # of a stone's size: coordinates that differ by less are the same
 _SLIVER = 1e-6  # metres, and part of its length: what is thinner encloses nothing
@@ -124,7 +123,7 @@ def _nearest_hexahedron(block: SurveyedBlock, flat: Array, axes: Array) -> Solid
     return prism(block.code, corners, hidden)
 
 
-def _said(squared: SquaredFace, worn: NDArray[np.bool_], along_points: int) -> str:
+def _said(squared: SquaredFace, worn: Bools, along_points: int) -> str:
     """What was done to a measured face, in words."""
     count, restored = len(squared.corners), int((squared.source < 0).sum())
     left_out = len(worn) - (count - restored) - along_points

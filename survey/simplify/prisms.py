@@ -1,15 +1,13 @@
 """Solids that are prisms: their corners in the order of a stone, visible ones first."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array
 from survey.extrusion.extrusion import prism
 from survey.geometry.solids import Solid
 from survey.simplify.blockiness import solid_planes
 
 __all__ = ["as_prism", "box_around"]
-
-Array = NDArray[np.float64]
 
 
 def as_prism(solid: Solid, outward: Array, first: Array) -> Solid | None:

@@ -3,14 +3,10 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
-import numpy as np
-from numpy.typing import NDArray
-
+from survey.arrays import Array, Bools
 from survey.geometry.solids import Solid
 
 __all__ = ["BlockShape", "SimpleSolid", "Simplified", "prism_shape"]
-
-Array = NDArray[np.float64]
 
 
 class BlockShape(StrEnum):
@@ -63,7 +59,7 @@ class SimpleSolid:
     """A simplified solid; its attributes are those of a `BlockyStone`."""
 
     solid: Solid
-    sound: NDArray[np.bool_]
+    sound: Bools
     shape: BlockShape
     report: Simplified
 

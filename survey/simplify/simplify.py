@@ -8,9 +8,7 @@ and says why.
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from survey.arrays import Bools
 from survey.extrusion.depth import Depth
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.faces.faces import Face
@@ -51,7 +49,7 @@ class BlockyStone:
     depth: Depth
     extrusion: Extrusion
     solid: Solid
-    sound: NDArray[np.bool_]
+    sound: Bools
     shape: BlockShape
     report: Simplified
 

@@ -11,13 +11,12 @@ than a worn corner can have lost, the face keeps its five corners or more: a cro
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array, Bools, Ints
 from survey.simplify._kernels.squaring import square
 
 __all__ = ["SimplifyBounds", "SquaredFace", "nearest_quadrilateral", "square_face"]
 
-Array = NDArray[np.float64]
 
 _BOUNDLESS = np.array([np.inf, np.inf, np.inf, np.inf, 0.0])
 
@@ -58,14 +57,12 @@ class SquaredFace:
     """
 
     corners: Array
-    source: NDArray[np.int64]
+    source: Ints
     width: float
     dent: float
 
 
-def square_face(
-    flat: Array, worn: NDArray[np.bool_], tolerance: float, bounds: SimplifyBounds
-) -> SquaredFace:
+def square_face(flat: Array, worn: Bools, tolerance: float, bounds: SimplifyBounds) -> SquaredFace:
     """Take out the corners of a face that it does not need.
 
     Distances are those of the measured corners from the sides of the new outline, and of restored corners from

@@ -11,13 +11,12 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array, Bools
 from survey.simplify.squaring import SquaredFace
 
 __all__ = ["restore_worn"]
 
-Array = NDArray[np.float64]
 
 _FEWEST_BESIDE_SOUND = 4  # points that tell how wide the margin is
 _FEWEST_BESIDE_WORN = 2  # ... and where a side ran: one finds it, another checks
@@ -25,7 +24,7 @@ _REACH = 0.5  # of the side's length, that one of them beside no other side must
 
 
 def restore_worn(
-    face: SquaredFace, worn: NDArray[np.bool_], points: Array, tolerance: float, farthest: float
+    face: SquaredFace, worn: Bools, points: Array, tolerance: float, farthest: float
 ) -> tuple[SquaredFace, int]:
     """Put worn corners where the sides beside them meet.
 
@@ -86,7 +85,7 @@ def _margin(
     return float(heights[best].mean())
 
 
-def _clear(corners: Array, side: int, points: Array, beside: float) -> NDArray[np.bool_]:
+def _clear(corners: Array, side: int, points: Array, beside: float) -> Bools:
     """Which points (np,) are not beside any other side, so that they can only be those of this one."""
     count = len(corners)
     clear = np.ones(len(points), dtype=np.bool_)
@@ -102,7 +101,7 @@ def _direction(
     anchor: Array,
     run: Array,
     points: Array,
-    clear: NDArray[np.bool_],
+    clear: Bools,
     margin: float,
     tolerance: float,
     farthest: float,

@@ -8,14 +8,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from random import Random
 
-import numpy as np
-from numpy.typing import NDArray
-
 from moma.errors import GeometryError
+from survey.arrays import Array
 
 __all__ = ["Line", "PlannedStone", "crossing", "fill", "level", "upright"]
 
-Array = NDArray[np.float64]
 
 WIDTHS = {"header": (0.31, 0.46), "stretcher": (0.48, 0.80)}
 _TILT = math.radians(0.8)  # largest tilt of a head joint off the perpendicular

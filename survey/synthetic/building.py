@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from random import Random
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array
 from survey.extrusion.depth import depth_for
 from survey.extrusion.extrusion import SurveyedBlock, extrude, prism
 from survey.faces.faces import outline_face
@@ -19,7 +19,6 @@ from survey.synthetic.shared_faces import TrueJoint, true_joints
 
 __all__ = ["Building", "Draft", "flat_stone", "measured_building", "observer"]
 
-Array = NDArray[np.float64]
 
 SOURCE = "synthetic value, chosen for this building"
 SEEN = "synthetic value, as if measured on a side that can be seen"

@@ -7,14 +7,12 @@ from itertools import pairwise
 from random import Random
 
 import numpy as np
-from numpy.typing import NDArray
 
 from moma.errors import GeometryError
 from survey.synthetic.bond import WIDTHS, Line, PlannedStone, crossing, fill, level, upright
 
 __all__ = ["CLEARANCES", "Bed", "Piece", "fill_run", "planned"]
 
-Array = NDArray[np.float64]
 
 CLEARANCES = (0.09, 0.06, 0.03)  # wished for between head joints of neighbouring courses, then allowed [m]
 _REST = 2.4  # the end of a run is filled as a whole, so that it comes out [m]

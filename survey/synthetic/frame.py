@@ -5,15 +5,14 @@ from dataclasses import dataclass
 from random import Random
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array
 from survey.extrusion.extrusion import prism
 from survey.geometry.solids import Solid
 from survey.synthetic.bond import PlannedStone
 
 __all__ = ["TrueStone", "WallFrame", "build_stone", "wall_frame"]
 
-Array = NDArray[np.float64]
 
 ORIGIN = (12.4, 38.25, 6.83)  # foot of the window's axis in the local site frame [m]
 AZIMUTH = math.radians(7.0)  # of the wall against the x axis

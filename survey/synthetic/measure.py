@@ -5,15 +5,14 @@ from dataclasses import dataclass, replace
 from random import Random
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array
 from survey.records.survey import BlockRecord
 from survey.synthetic.bond import Line, crossing
 from survey.synthetic.frame import TrueStone, WallFrame
 
 __all__ = ["SIGMA", "Measured", "add_blunders", "measure_stone"]
 
-Array = NDArray[np.float64]
 
 SIGMA = (
     0.00173  # of one coordinate: 3 mm in space (√3 · 1.73 mm), the mean error of a photogrammetric point [m]

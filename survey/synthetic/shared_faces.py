@@ -8,13 +8,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array
 from survey.geometry.solids import Solid, area_vector
 
 __all__ = ["TrueJoint", "true_joints"]
 
-Array = NDArray[np.float64]
 Point = tuple[float, float]
 
 _COPLANAR = 1e-9  # largest distance of two faces that are one plane but for rounding [m]

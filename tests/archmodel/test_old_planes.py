@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from archmodel.arrays import Array
 from archmodel.migrations.planes import covariance_of_offset, plane_of_version_1
 
-Array = NDArray[np.float64]
 SIGMA = 0.002
 
 

@@ -3,11 +3,10 @@
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array
 from survey.geometry.solids import Solid, area_vector
 
-Array = NDArray[np.float64]
 Polygon = tuple[int, ...]
 
 

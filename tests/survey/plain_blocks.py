@@ -5,16 +5,14 @@ from itertools import pairwise
 
 import numpy as np
 from assemblies import prism
-from numpy.typing import NDArray
 
+from survey.arrays import Array
 from survey.extrusion.depth import Depth
 from survey.extrusion.extrusion import SurveyedBlock, extrude
 from survey.extrusion.imported_solids import block_of_solid
 from survey.faces.faces import outline_face
 from survey.geometry.solids import Solid
 from survey.records.survey import BlockRecord, SolidRecord
-
-Array = NDArray[np.float64]
 
 DEPTH = Depth(0.4, None, "test", "kind", 1)
 OBSERVER = np.array([0.5, -9.0, 0.5])

@@ -6,10 +6,8 @@ from itertools import combinations
 from statistics import NormalDist
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from survey.arrays import Array, Bools
 
 LIMIT = 3.29
 EROSION = 0.03

@@ -4,13 +4,12 @@ from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 from scipy.sparse import coo_array
 
+from survey.arrays import Array
 from survey.geometry.solids import Solid
 
-Array = NDArray[np.float64]
 FACETS = 8  # of the friction cone; a pyramid inside the cone, so that what it allows Coulomb allows
 
 

@@ -1,13 +1,11 @@
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
+from survey.arrays import Array
 from survey.faces.common_planes import common_plane
 from survey.faces.planes import FaceFit
-
-Array = NDArray[np.float64]
 
 FRAME: Array = Rotation.from_rotvec([0.4, -0.3, 0.9]).as_matrix()  # columns: along, up, outward
 PLACE = np.array([3.1e6, 5.2e6, 120.0])

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from moma.errors import GeometryError
@@ -15,7 +14,6 @@ from survey.geometry.convexity import is_convex, reflex_edges
 from survey.geometry.solids import Solid, planes_of_solid
 from survey.geometry.watertight import check_watertight
 
-Array = NDArray[np.float64]
 Cell = tuple[int, ...]
 
 

@@ -2,12 +2,12 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from moma.errors import SurveyError
+from survey.arrays import Array
 from survey.records.survey import (
     BlockRecord,
     ControlPoint,
@@ -20,8 +20,6 @@ from survey.records.survey import (
 )
 from survey.registration.similarity import best_similarity
 from survey.registration.site_frame import SiteTransform, fit_similarity, record_to_site, to_site
-
-Array = NDArray[np.float64]
 
 TURN: Array = Rotation.from_rotvec([0.3, -0.5, 2.0]).as_matrix()
 WALL = np.array(

@@ -1,13 +1,11 @@
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
 from moma.errors import GeometryError
+from survey.arrays import Array
 from survey.registration.homography import fit_homography
-
-Array = NDArray[np.float64]
 
 # an oblique view of a wall of some 8 m × 6 m on a photograph of 4000 × 3000 pixels
 CAMERA = np.array([[0.0022, 0.0001, -4.0], [0.0002, -0.0021, 5.0], [6e-5, -2e-5, 1.0]])

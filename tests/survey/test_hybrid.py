@@ -2,17 +2,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from moma.errors import GeometryError, MomaError, SurveyError
+from survey.arrays import Array
 from survey.faces.neighbours import Neighbours
 from survey.faces.planes import FaceFit, fit_plane
 from survey.records.survey import BlockRecord, Photograph, PhotoMark, Station, SurveyHead
 from survey.registration.marked_walls import MarkedWall, wall_of_marks
 from survey.registration.photographed_stones import LiftedFace, lift, lift_faces, plane_of_wall
-
-Array = NDArray[np.float64]
 
 FOCAL, MIDDLE = 4000.0, np.array([3000.0, 2000.0])
 LENGTH, HEIGHT, JOINT = 0.6, 0.3, 0.01

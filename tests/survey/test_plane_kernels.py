@@ -4,15 +4,14 @@ import math
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from plane_twin import accepted_points, compact, plane_of, triple_planes
 
+from survey.arrays import Array, Bools
 from survey.faces._kernels.planes import leverages, weighted_plane
 from survey.faces._kernels.robust_fit import fit_face
 from survey.faces._kernels.shapes import fit_columns, fit_two_planes, grow_columns, truncated_sum
 from survey.faces._kernels.triples import beside_the_rest, search_triples, smallest
 
-Array = NDArray[np.float64]
 SIGMA = 0.002
 
 
@@ -165,7 +164,7 @@ def test_two_planes_are_the_best_of_all_lines() -> None:
     assert way[0] > 0.8
 
 
-def lateral_plane(u: Array, v: Array, z: Array, chosen: NDArray[np.bool_]) -> Array:
+def lateral_plane(u: Array, v: Array, z: Array, chosen: Bools) -> Array:
     design = np.column_stack([np.ones_like(u), u, v])
     out: Array = design @ np.linalg.lstsq(design[chosen], z[chosen])[0]
     return out

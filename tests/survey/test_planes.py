@@ -3,12 +3,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from moma.errors import GeometryError
+from survey.arrays import Array
 from survey.faces.planes import fit_plane
-
-Array = NDArray[np.float64]
 
 # Reference case P01, "TLS plane, exact checkerboard set" (closed form): x in {-3,-1,1,3},
 # y in {-1.5,-.5,.5,1.5}, z = ±0.01 alternating, i + j odd → +

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from survey.arrays import Array
 from survey.faces.planes import fit_plane
 from survey.faces.shapes import FaceShape, ShapeKind, judge_shape
 
-Array = NDArray[np.float64]
 SIGMA = 0.002
 OBSERVER = np.array([0.0, 0.0, 5.0])
 # heights of points (n, 2)

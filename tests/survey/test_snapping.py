@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scipy.optimize import linprog, minimize
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
+from survey.arrays import Array
 from survey.formats.options import ReadingOptions
 from survey.formats.solids.reader import open_solids
 from survey.geometry.convex_parts import convex_parts
@@ -25,8 +25,6 @@ from survey.joints.snapping.snapping import snap
 from survey.records.snapping import Snapping
 from survey.records.survey import Reject, SolidRecord
 from tests.survey.assemblies import dome, groin, obj, prism, rounded, wall
-
-Array = NDArray[np.float64]
 
 
 def read(path: Path, text: str, **options: float) -> tuple[list[Solid], Snapping | None]:

@@ -6,14 +6,13 @@ from itertools import permutations
 
 import numpy as np
 from convex_overlap import overlaps
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array
 from survey.geometry.solids import Solid, area_vector
 from survey.geometry.watertight import check_watertight
 from survey.joints.close import ClosedStones
 from survey.synthetic.shared_faces import TrueJoint, true_joints
 
-Array = NDArray[np.float64]
 Pair = tuple[str, str]
 
 

@@ -3,11 +3,9 @@
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array
 from survey.geometry.solids import Solid, area_vector
-
-Array = NDArray[np.float64]
 
 
 def planes_of(solid: Solid) -> Array:

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scenes import CORNERS, FACES, G
 
+from mechanics.arrays import Array, Bools
 from mechanics.dynamics.simulation import Clock, Simulation, Step
 from mechanics.model.model import Model, build_model
 from mechanics.scene.laws.dry_joint import DryJoint
@@ -14,8 +14,6 @@ from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene, Solve
 from mechanics.simulate import simulate
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
-
-Array = NDArray[np.float64]
 
 ELEMENTS = [*Element]
 
@@ -69,7 +67,7 @@ def mean_between(body, low, high) -> Array:
     return part @ body.stress[body.cells[:, :corners]].mean(axis=1) / part.sum()
 
 
-def inner(body, margin) -> NDArray[np.bool_]:
+def inner(body, margin) -> Bools:
     """(n,) which nodes lie farther than `margin` from the block's sides, in x and y [m]."""
     low, high = body.reference.min(axis=0) + margin, body.reference.max(axis=0) - margin
     inside = (body.reference > low) & (body.reference < high)

@@ -4,8 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array
 from mechanics.dynamics.simulation import Clock, Simulation, Step
 from mechanics.model.model import Model, build_model
 from mechanics.scene.laws.dry_joint import DryJoint
@@ -19,8 +19,6 @@ from mechanics.scene.scene import (
     TimeSettings,
 )
 from mechanics.stones.materials import Material
-
-Array = NDArray[np.float64]
 
 FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
 CORNERS = np.array(

@@ -14,14 +14,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scenes import G, box, dynamic, follow, ground, moved, rotation
 from scipy.integrate import solve_ivp
 
 from mechanics.scene.loads.load import Loads, Pose
 from mechanics.scene.scene import Block
 
-Array = NDArray[np.float64]
 SLENDER = (0.25, 1.0)
 
 

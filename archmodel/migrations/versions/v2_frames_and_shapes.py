@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 from alembic import op
-from numpy.typing import NDArray
 from sqlalchemy import Connection, Row, Select, Table, func, select
 
+from archmodel.arrays import Array
 from archmodel.migrations.layouts import version1, version2
 from archmodel.migrations.planes import covariance_of_offset, plane_of_version_1
 from archmodel.migrations.steps import begin_layout, carry, carry_rows, end_layout, read
@@ -162,9 +162,9 @@ def _measurement_down(row: Row[Any], names: list[str]) -> dict[str, Any]:
     return {name: values[name] for name in names}
 
 
-def _array(stored: bytes, *shape: int) -> NDArray[np.float64]:
+def _array(stored: bytes, *shape: int) -> Array:
     return np.frombuffer(stored, dtype="<f8").reshape(shape)
 
 
-def _bytes(array: NDArray[np.float64]) -> bytes:
+def _bytes(array: Array) -> bytes:
     return array.astype("<f8").tobytes()

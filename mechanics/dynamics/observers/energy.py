@@ -12,8 +12,8 @@ bodies that turn leave a remainder of the order of their strain. W_ext holds the
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array
 from mechanics.model.model import Model
 from mechanics.model.stone_groups import ElasticGroup
 from mechanics.scene.state import State
@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from mechanics.dynamics.simulation import Step
 
 __all__ = ["EnergyBalance", "elastic_energy", "kinetic_energy"]
-
-Array = NDArray[np.float64]
 
 
 def kinetic_energy(model: Model, state: State) -> float:

@@ -3,8 +3,8 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Ints
 from mechanics.contact.contacts import Contacts, material_points
 from mechanics.dynamics.observers._kernels import largest_displacement, largest_speed
 from mechanics.model.model import Model
@@ -20,8 +20,6 @@ __all__ = [
     "support_reaction",
     "wrenches",
 ]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -82,7 +80,7 @@ def _undeformed(model: Model, state: State) -> Array:
     return place
 
 
-def wrenches(state: State, body: NDArray[np.int64], point: Array, force: Array, count: int) -> Array:
+def wrenches(state: State, body: Ints, point: Array, force: Array, count: int) -> Array:
     """Sums (count, 6) of forces and of their moments about the centres of the bodies."""
     wrench = np.column_stack([force, np.cross(point - state.centre[body], force)])
     # without contacts bincount forgets that forces are no integers

@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from mechanics.arrays import Bools, Ints
 from mechanics.dynamics.simulation import detector
 from mechanics.model.model import Model, build_model
 from mechanics.results.forecast.workload import Amounts, amounts
@@ -16,7 +16,6 @@ from mechanics.stones.meshing.report import MeshReport
 
 __all__ = ["Plan", "plan"]
 
-Ints = NDArray[np.int64]
 
 _NUMBER = 8  # bytes of a floating-point number
 _CONTACT_NUMBERS = (
@@ -86,7 +85,7 @@ def _memory(model: Model, bodies: Ints) -> int:
     return numbers * _NUMBER
 
 
-def _loose(pairs: Ints, fixed: NDArray[np.bool_]) -> Ints:
+def _loose(pairs: Ints, fixed: Bools) -> Ints:
     """Indices of the bodies that no chain of touching bodies ties to a fixed one."""
     count = len(fixed)
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))

@@ -3,14 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Ints
 from mechanics.delassus.multifrontal import fronts
 from mechanics.model.model import Model
 
 __all__ = ["Amounts", "amounts"]
-
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

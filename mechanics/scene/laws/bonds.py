@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Bools
 from mechanics.scene.laws.law import BOND, REST, Approach
 
 __all__ = ["BROKEN", "WHOLE", "bonded", "with_bonds"]
@@ -33,7 +33,7 @@ def with_bonds(contacts: Approach) -> Approach:
     return replace(contacts, state=state, first=False)
 
 
-def bonded(contacts: Approach) -> NDArray[np.bool_]:
+def bonded(contacts: Approach) -> Bools:
     """Which contacts (n,) are bonded, whole or damaged."""
-    holds: NDArray[np.bool_] = contacts.state[:, BOND] > 0
+    holds: Bools = contacts.state[:, BOND] > 0
     return holds

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array
 from mechanics.scene.laws.bonds import BROKEN, bonded, with_bonds
 from mechanics.scene.laws.dry_joint import DryJoint, at_limit, slid
 from mechanics.scene.laws.law import BOND, OPENING, REST, SLIDING, SLIP, Approach, Terms
@@ -12,8 +12,6 @@ from mechanics.scene.laws.mortar import held_tension
 from mechanics.scene.laws.parameters import require_positive
 
 __all__ = ["CohesiveZone"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -3,14 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Bools
 from mechanics.scene.laws.law import REST, SLIDING, Approach, Terms
 from mechanics.scene.laws.parameters import require_at_least_zero, require_between
 
 __all__ = ["DryJoint", "at_limit", "gap_bias", "slid"]
 
-Array = NDArray[np.float64]
 
 # an impulse lies on its cone, to rounding
 _ON_CONE = 1.0 - 1e-9
@@ -28,19 +27,19 @@ def gap_bias(contacts: Approach) -> Array:
     return bias
 
 
-def at_limit(terms: Terms, impulse: Array) -> NDArray[np.bool_]:
+def at_limit(terms: Terms, impulse: Array) -> Bools:
     """Which contacts (n,) are pressed, or held by cohesion, and at the limit of their cone."""
     tangential = np.linalg.norm(impulse[:, 1:], axis=1)
     limit = terms.friction * impulse[:, 0] + terms.cohesion
-    on_cone: NDArray[np.bool_] = (tangential >= _ON_CONE * limit) & ((tangential > 0) | (impulse[:, 0] > 0))
+    on_cone: Bools = (tangential >= _ON_CONE * limit) & ((tangential > 0) | (impulse[:, 0] > 0))
     return on_cone
 
 
-def slid(contacts: Approach, terms: Terms, impulse: Array, velocity: Array) -> NDArray[np.bool_]:
+def slid(contacts: Approach, terms: Terms, impulse: Array, velocity: Array) -> Bools:
     """Which contacts (n,) have slid in the step that gave r̃ (n, d) [N s] and u (n, d) [m/s]."""
     acceleration = contacts.yielding * np.linalg.norm(impulse, axis=1) / contacts.step
     drift = _DRIFT * np.sqrt(acceleration * contacts.size)
-    moved: NDArray[np.bool_] = at_limit(terms, impulse) & (np.linalg.norm(velocity[:, 1:], axis=1) > drift)
+    moved: Bools = at_limit(terms, impulse) & (np.linalg.norm(velocity[:, 1:], axis=1) > drift)
     return moved
 
 

@@ -10,12 +10,10 @@ To add a law, write one class with the members of `Law`; nothing else changes.
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
+from mechanics.arrays import Array
 
 __all__ = ["BOND", "OPENING", "REST", "SLIDING", "SLIP", "STATE", "Approach", "Law", "Terms"]
 
-Array = NDArray[np.float64]
 
 # columns of the internal variables that a contact carries from step to step
 BOND, SLIDING, OPENING, SLIP, REST = range(5)

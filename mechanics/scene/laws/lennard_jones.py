@@ -3,15 +3,13 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.law import Approach, Terms
 from mechanics.scene.laws.parameters import require_positive
 
 __all__ = ["LennardJones"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

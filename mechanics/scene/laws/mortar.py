@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array
 from mechanics.scene.laws.bonds import BROKEN, bonded, with_bonds
 from mechanics.scene.laws.dry_joint import DryJoint, at_limit, slid
 from mechanics.scene.laws.law import BOND, REST, SLIDING, SLIP, Approach, Terms
@@ -12,7 +12,6 @@ from mechanics.scene.laws.parameters import require_at_least_zero
 
 __all__ = ["MortarJoint", "held_tension"]
 
-Array = NDArray[np.float64]
 
 # of a body's size: a bond at its tensile limit has broken when it is open by this,
 _OPENED = 1e-6

@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from mechanics.arrays import Array
 from mechanics.scene.laws.dry_joint import at_limit
 from mechanics.scene.laws.law import BOND, Terms
 
 __all__ = ["STATUSES", "contact_status"]
 
-Array = NDArray[np.float64]
 
 STATUSES = ("open", "stick", "slip", "bonded", "broken")
 

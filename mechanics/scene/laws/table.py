@@ -4,14 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Bools, Ints
 from mechanics.scene.laws.law import Approach, Law, Terms
 
 __all__ = ["LawTable", "law_table"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 _PER_CONTACT = ("gap", "speed", "area", "size", "yielding", "state")
 
 
@@ -26,7 +24,7 @@ class LawTable:
     """
 
     laws: tuple[Law, ...]
-    groups: NDArray[np.bool_]
+    groups: Bools
 
     def of(self, bodies: Ints) -> Ints:
         """Index of the law of each contact, given its bodies (nc, 2); of two rules, the later holds."""
@@ -59,15 +57,13 @@ class LawTable:
         return state
 
 
-def law_table(
-    general: Law, rules: Sequence[tuple[NDArray[np.bool_], NDArray[np.bool_], Law]], bodies: int
-) -> LawTable:
+def law_table(general: Law, rules: Sequence[tuple[Bools, Bools, Law]], bodies: int) -> LawTable:
     """The table of a general law and of rules, each with the bodies (nb,) of its two groups."""
     groups = np.array([[first, second] for first, second, _ in rules], dtype=bool).reshape(-1, 2, bodies)
     return LawTable((general, *(law for _, _, law in rules)), groups)
 
 
-def _some(contacts: Approach, rows: NDArray[np.bool_]) -> Approach:
+def _some(contacts: Approach, rows: Bools) -> Approach:
     parts = {name: getattr(contacts, name)[rows] for name in _PER_CONTACT}
     return Approach(
         **parts,

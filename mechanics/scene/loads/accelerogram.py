@@ -4,13 +4,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array
 from moma.errors import SceneError
 
 __all__ = ["Accelerogram"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

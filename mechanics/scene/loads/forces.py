@@ -3,15 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array
 from mechanics.scene.loads.time_series import History
 from mechanics.stones.validation import finite, refuse_unless
 from moma.errors import SceneError
 
 __all__ = ["StoneForce"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

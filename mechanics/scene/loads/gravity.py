@@ -3,15 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from mechanics.arrays import Array
 from mechanics.scene.loads.time_series import History
 from moma.errors import SceneError
 
 __all__ = ["GravityRamp", "TiltingTable"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechanics.scene.loads.accelerogram import Accelerogram
 from mechanics.scene.loads.load import Pose
@@ -12,8 +11,6 @@ from mechanics.scene.loads.time_series import History
 from moma.errors import SceneError
 
 __all__ = ["Component", "GroundMotion"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

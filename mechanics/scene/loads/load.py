@@ -7,12 +7,9 @@ changes [s], infinity if it never ceases to: before that no scene has come to it
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
+from mechanics.arrays import Array
 
 __all__ = ["Force", "GravityChange", "Loads", "Motion", "Pose"]
-
-Array = NDArray[np.float64]
 
 
 class GravityChange(Protocol):

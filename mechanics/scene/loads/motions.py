@@ -4,7 +4,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from mechanics.scene.loads.load import Pose
@@ -14,7 +13,6 @@ from moma.errors import SceneError
 
 __all__ = ["ImposedMotion", "settlement", "spreading"]
 
-Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
 
 

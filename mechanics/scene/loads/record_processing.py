@@ -6,15 +6,13 @@ Both follow what the PEER database documents of its own records (Ancheta et al. 
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import signal
 
+from mechanics.arrays import Array
 from mechanics.scene.loads.accelerogram import Accelerogram
 from moma.errors import SceneError
 
 __all__ = ["band_pass", "without_drift"]
-
-Array = NDArray[np.float64]
 
 
 def without_drift(record: Accelerogram, degree: int = 6) -> Accelerogram:

@@ -6,17 +6,15 @@ from pathlib import Path
 from typing import NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Ints
 from mechanics.scene.loads.time_series import History
 from moma.errors import SceneError
 
 __all__ = ["fail_at", "number_at", "numbered_lines", "read_columns", "read_history"]
 
-Array = NDArray[np.float64]
 
-
-def read_columns(path: str | Path, columns: str) -> tuple[NDArray[np.int64], Array]:
+def read_columns(path: str | Path, columns: str) -> tuple[Ints, Array]:
     """Line numbers (n,) and numbers (n, k) of a text file with k columns.
 
     Columns are parted by commas, semicolons, tabs or blanks; one header line, comments (#) and blank lines are

@@ -5,13 +5,13 @@ from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mechanics.arrays import Array
 from moma.errors import SceneError
 
 __all__ = ["History", "Outside"]
 
-Array = NDArray[np.float64]
 
 # of its span: rounding by which a time may lie outside a history that ends
 _ROUNDING = 1e-9

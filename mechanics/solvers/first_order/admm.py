@@ -13,8 +13,8 @@ back, is solved for exactly; only the elastic compliance decides how fast the it
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array
 from mechanics.problem._kernels import admm_right_side, admm_update
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, scale_of
 from mechanics.problem.residual import project_on_cone, residual
@@ -22,7 +22,6 @@ from moma.errors import SolverError
 
 __all__ = ["ADMM"]
 
-Array = NDArray[np.float64]
 
 # looks between two balances of the penalty, by how much it may change at a time, and its bounds over W
 _BALANCE_LOOKS, _LEAST_CHANGE, _MOST_CHANGE, _BOUNDS = 2, 2.0, 5.0, (1e-4, 1.0)

@@ -1,11 +1,11 @@
 """Anderson acceleration of a fixed-point iteration (Anderson 1965; Walker & Ni 2011)."""
 
 import numpy as np
-from numpy.typing import NDArray
+
+from mechanics.arrays import Array
 
 __all__ = ["Anderson"]
 
-Array = NDArray[np.float64]
 
 # of the trace of the Gram matrix: keeps the small least-squares problem solvable
 _REGULAR = 1e-12

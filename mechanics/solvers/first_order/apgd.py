@@ -13,15 +13,14 @@ renewed in each iteration: held until the inner programme is solved it takes thr
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, scale_of
 from mechanics.problem.residual import project_on_cone, residual
 from mechanics.solvers._kernels.apgd import curvature, momentum, project_step
 
 __all__ = ["APGD"]
 
-Array = NDArray[np.float64]
 
 # by how much L grows where it was too small, at least, and by how much it forgets in each iteration
 _GROWTH, _FORGETTING = 2.0, 0.97

@@ -1,14 +1,14 @@
 """Colours of contacts: two contacts of one colour share no body that moves, so a colour may be swept in parallel."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Bools, Ints
 from mechanics.solvers._kernels.colouring import first_fit
 
 __all__ = ["greedy_colours"]
 
 
-def greedy_colours(bodies: NDArray[np.int64], moving: NDArray[np.bool_]) -> NDArray[np.int64]:
+def greedy_colours(bodies: Ints, moving: Bools) -> Ints:
     """The smallest colour, from 0, that no earlier contact of its moving bodies has.
 
     Low colours are large, high ones small; there are at most as many as the contacts of two bodies that touch.
@@ -24,5 +24,5 @@ def greedy_colours(bodies: NDArray[np.int64], moving: NDArray[np.bool_]) -> NDAr
     -------
     (n,) colours
     """
-    colour: NDArray[np.int64] = first_fit(np.ascontiguousarray(bodies, dtype=np.int64), moving)
+    colour: Ints = first_fit(np.ascontiguousarray(bodies, dtype=np.int64), moving)
     return colour

@@ -2,16 +2,13 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from mechanics.arrays import Array
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, GaussSeidel
 from mechanics.problem.residual import Residual, project_on_cone, residual
 from mechanics.solvers.first_order.anderson import Anderson
 
 __all__ = ["NSGS"]
 
-Array = NDArray[np.float64]
 
 # an extrapolation this many times worse than the sweeps alone is not kept, and the old iterates are worthless
 _BAD = 10.0

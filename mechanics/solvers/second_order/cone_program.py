@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import block_array, block_diag, coo_array, csc_array, diags_array, eye_array, triu, vstack
 
+from mechanics.arrays import Array, Bools, Ints
 from mechanics.delassus.condensed import CondensedForm
 from mechanics.delassus.stored import StoredForm
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, SparseForm, scale_of
@@ -27,7 +27,6 @@ from moma.errors import SolverError
 
 __all__ = ["ConeProgram"]
 
-Array = NDArray[np.float64]
 
 _NAME = "cone programme"
 # gap and feasibility that Clarabel is asked for: what it can just reach; η is about the root of it
@@ -172,9 +171,7 @@ def _settings(clarabel: Any) -> Any:
     return settings
 
 
-def _energy(
-    problem: ContactProblem, kept: NDArray[np.int64], scale: float
-) -> tuple[Any, "csc_array[np.float64] | None"]:
+def _energy(problem: ContactProblem, kept: Ints, scale: float) -> tuple[Any, "csc_array[np.float64] | None"]:
     """Quadratic part over (y, r) or r alone, in units of `scale`, and Â y - H r = 0, if y is there."""
     form = None if problem.sparse is None else problem.sparse()
     if isinstance(form, StoredForm):
@@ -203,7 +200,7 @@ def _sum_of_cliques(form: CondensedForm, size: int) -> "csc_array[np.float64]":
 
 
 def _cones(
-    problem: ContactProblem, rough: NDArray[np.bool_], kept: NDArray[np.int64], unit: float, clarabel: Any
+    problem: ContactProblem, rough: Bools, kept: Ints, unit: float, clarabel: Any
 ) -> tuple[Any, Array, list[Any]]:
     """Rows, right side and kinds of: (μ r_N + k, r_T) in a second-order cone, r_N ≥ 0."""
     d, k = problem.u_free.shape[1], problem.cohesion

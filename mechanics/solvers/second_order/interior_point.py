@@ -15,8 +15,8 @@ one.
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Ints
 from mechanics.delassus.rigid import RigidDelassus
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, scale_of
 from mechanics.problem.residual import residual
@@ -29,8 +29,6 @@ from moma.errors import SolverError
 
 __all__ = ["InteriorPoint"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _NAME = "interior point"
 # below this friction a contact has no cone, only a side

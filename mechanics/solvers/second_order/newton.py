@@ -4,8 +4,8 @@ from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, scale_of
 from mechanics.problem.residual import Residual, project_on_cone, residual
 from mechanics.solvers.second_order.shifted_systems import shifted_system
@@ -13,7 +13,6 @@ from moma.errors import SolverError
 
 __all__ = ["Newton", "projection_derivative"]
 
-Array = NDArray[np.float64]
 
 # keeps D invertible where a contact is open, and 1 - D where it sticks, as between rigid stones W is singular
 _SOFT, _GIVE = 1e-7, 1e-9

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Ints
 from mechanics.delassus.rigid import RigidDelassus
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, scale_of
 from mechanics.problem.residual import Residual, project_on_cone, residual
@@ -23,8 +23,6 @@ from moma.errors import SolverError
 
 __all__ = ["ProximalNewton"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # α over η and the scale of W; from where a cold start is held, and the least, below which rounding would win
 _SHARE, _HOLD, _LEAST = 0.1, 1e-4, 1e-11

@@ -13,15 +13,14 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array
 from mechanics.delassus.rigid import RigidDelassus
 from mechanics.problem.problem import ContactProblem, Delassus, Form, GaussSeidel, scale_of
 from mechanics.solvers.second_order.shifted_systems import shifted_system
 
 __all__ = ["equilibrated"]
 
-Array = NDArray[np.float64]
 
 # an operator that says to be measured against something else than its mean diagonal differs by more than this
 _OTHER = 1e-6

@@ -3,13 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array
 from moma.errors import SolverError
 
 __all__ = ["Scaling", "divide", "product", "reach", "scaling"]
 
-Array = NDArray[np.float64]
 
 _MIRROR = np.array([1.0, -1.0, -1.0])
 

@@ -4,17 +4,16 @@ from collections.abc import Callable
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import block_array, bsr_array, csc_array
 from scipy.sparse.linalg import splu
 
+from mechanics.arrays import Array
 from mechanics.delassus.stored import StoredForm
 from mechanics.problem.problem import ContactProblem, Delassus, ShiftedForm, SparseForm
 from moma.errors import SolverError
 
 __all__ = ["ShiftedSystem", "shifted_system"]
 
-Array = NDArray[np.float64]
 
 # of the right side: what a solution may leave of it
 _LOST = 1e-9

@@ -5,9 +5,9 @@ from functools import reduce
 from operator import add
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array, coo_array, csc_array, dia_array
 
+from mechanics.arrays import Array, Ints
 from mechanics.stones.materials import Material, fourth_order
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import SolidMesh
@@ -15,7 +15,6 @@ from mechanics.stones.meshing.shape_functions import Integration, integration
 
 __all__ = ["MASS_ORDER", "STIFFNESS_ORDER", "ElasticOperators", "elastic_operators", "node_volumes"]
 
-Array = NDArray[np.float64]
 
 # Polynomial order of what is integrated. The Jacobian is constant in a tetrahedron, of order 2 in each direction in a
 # hexahedron. M and the forces of the patch test, Jacobian times shape function gradients, are exact.
@@ -120,7 +119,7 @@ def _gather(mesh: SolidMesh, values: Array) -> Array:
     return sums
 
 
-def _assembled(cells: NDArray[np.int64], size: int, blocks: Array) -> "csc_array[np.float64]":
+def _assembled(cells: Ints, size: int, blocks: Array) -> "csc_array[np.float64]":
     """Sum the blocks (nc, k, k, b, b) of pairs of nodes; symmetric to the last bit, if those of the cells are."""
     k, width = cells.shape[1], blocks.shape[-1]
     pair = (np.repeat(cells, k, axis=1) * size + np.tile(cells, (1, k))).ravel()

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
+from mechanics.arrays import Array, Bools, Ints
 from mechanics.stones.elasticity.stress import SAMPLE_ORDER
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import SolidMesh
@@ -13,8 +13,6 @@ from mechanics.stones.meshing.shape_functions import integration
 
 __all__ = ["recovery"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # directions, and quadratic terms, that a patch sees with less than this part of the largest variance are left out
 _UNSEEN = 0.03
@@ -138,7 +136,7 @@ def _spread(mesh: SolidMesh) -> Array:
     return spread
 
 
-def _rows(matrix: "csr_array[np.float64]", rows: Ints) -> tuple[Ints, NDArray[np.bool_]]:
+def _rows(matrix: "csr_array[np.float64]", rows: Ints) -> tuple[Ints, Bools]:
     """Columns (nr, m) of some rows, filled up with the first of each, and which of them are the row's own."""
     start, count = matrix.indptr[rows], np.diff(matrix.indptr)[rows]
     place = np.arange(count.max())
@@ -146,9 +144,7 @@ def _rows(matrix: "csr_array[np.float64]", rows: Ints) -> tuple[Ints, NDArray[np
     return matrix.indices[start[:, None] + np.where(held, place, 0)].astype(np.int64), held
 
 
-def _fit(
-    points: Array, held: NDArray[np.bool_], size: Array, corner: Array, target: Array, order: int
-) -> Array:
+def _fit(points: Array, held: Bools, size: Array, corner: Array, target: Array, order: int) -> Array:
     """Weights (np, nt, m) of the values at points (np, m, 3) of patches for targets (np, nt, 3).
 
     Coordinates are turned and stretched so that the points of each patch have unit variance along each axis: the

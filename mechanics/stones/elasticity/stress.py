@@ -1,8 +1,8 @@
 """Stress of one stone from the displacement of its nodes, and how far it can be trusted."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array
 from mechanics.stones.elasticity.operators import MASS_ORDER
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
@@ -11,7 +11,6 @@ from mechanics.stones.meshing.shape_functions import Integration, integration
 
 __all__ = ["SAMPLE_ORDER", "sampled_stress", "stress_error"]
 
-Array = NDArray[np.float64]
 
 # the rule whose points have the best stress: the centroid, four points of a tetrahedron, 2 × 2 × 2 (Barlow 1976)
 SAMPLE_ORDER = {Element.TET4: 1, Element.TET10: 2, Element.HEX8: 1, Element.HEX20: 3, Element.HEX27: 3}

@@ -1,11 +1,10 @@
 """Stress tensors: components, Von Mises, principal values."""
 
 import numpy as np
-from numpy.typing import NDArray
+
+from mechanics.arrays import Array
 
 __all__ = ["from_voigt", "principal", "to_voigt", "von_mises"]
-
-Array = NDArray[np.float64]
 
 
 def von_mises(stress: Array) -> Array:

@@ -8,12 +8,11 @@ from collections.abc import Callable, Collection, Hashable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from mechanics.arrays import Array, Ints
 
 __all__ = ["Motion", "classes", "motion", "translation"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Faces = tuple[tuple[int, ...], ...]
 
 # corners that differ by less than this part of a stone's size are the same

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Ints
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.shape_functions import integration, jacobians
 from mechanics.stones.polyhedra import face_plane, face_planes, mass_properties
@@ -12,8 +12,6 @@ from moma.errors import MeshError
 
 __all__ = ["SolidMesh", "boundary_facets", "solid_mesh", "tet_mesh"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Faces = tuple[tuple[int, ...], ...]
 
 # a boundary facet may lie off the stone's face by this fraction of the stone's size

@@ -5,15 +5,13 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Ints
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import SolidMesh
 
 __all__ = ["MeshQuality", "cell_quality", "mesh_quality"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # cells that are computed in one go: some 30 MB for each of a few arrays
 _BATCH = 100_000

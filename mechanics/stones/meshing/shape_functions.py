@@ -9,15 +9,13 @@ from functools import cache
 
 import numpy as np
 import skfem
-from numpy.typing import NDArray
 from skfem.quadrature import get_quadrature
 
+from mechanics.arrays import Array, Ints
 from mechanics.stones.meshing.elements import Element
 
 __all__ = ["Integration", "Tabulated", "integration", "jacobians", "reference_points", "tabulated"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _SKFEM = {
     Element.TET4: skfem.ElementTetP1,

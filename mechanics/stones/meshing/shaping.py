@@ -3,16 +3,14 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Ints
 from mechanics.stones.meshing.mesh import SolidMesh
 from mechanics.stones.meshing.meshers._kernels.shaping import improve
 from mechanics.stones.polyhedra import face_planes
 
 __all__ = ["improve_cells", "improved"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Faces = tuple[tuple[int, ...], ...]
 
 # tetrahedra shaped worse than this (1: regular, 0: flat) are improved, in at most so many rounds

@@ -3,13 +3,12 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array
 from mechanics.stones.polyhedra import face_plane
 
 __all__ = ["SizeField", "as_field", "graded"]
 
-Array = NDArray[np.float64]
 Faces = tuple[tuple[int, ...], ...]
 
 

@@ -1,14 +1,13 @@
 """What makes a stone impossible to mesh, said before anything is tried."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Bools
 from mechanics.stones.polyhedra import face_plane, face_planes, fan, mass_properties
 from moma.errors import GeometryError, MeshError
 
 __all__ = ["CONVEX", "check_meshable", "is_convex"]
 
-Array = NDArray[np.float64]
 Faces = tuple[tuple[int, ...], ...]
 
 # fractions of a stone's size: corners off their face's plane, corners in one place, the thickness of a flat stone
@@ -116,11 +115,11 @@ def _check_crossings(vertices: Array, faces: Faces, where: str) -> None:
                 )
 
 
-def _pierced(a: Array, b: Array, triangles: Array) -> NDArray[np.bool_]:
+def _pierced(a: Array, b: Array, triangles: Array) -> Bools:
     """Triangles whose plane a line from a to b passes through, strictly."""
     normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     start, end = (((point - triangles[:, 0]) * normal).sum(axis=1) for point in (a, b))
-    crossed: NDArray[np.bool_] = start * end < 0
+    crossed: Bools = start * end < 0
     return crossed
 
 

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipelines.arrays import Array
 from pipelines.draw.elevations.sheets import FLAG, INK, PALE, PLAIN, new_sheet, save_sheet
 from survey.quality.courses import SIGNIFICANT, CourseLine
 
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_courses"]
 
-Array = NDArray[np.float64]
 
 _LARGEST = 0.45  # the largest deviation of a bed is drawn so large, in distances between courses
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.arrays import Array
 from pipelines.draw.elevations.closing_shapes import ClosingShapes, DrawnStone
 from pipelines.draw.elevations.sheet import (
     CODES,
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
 
 __all__ = ["SeenFace", "back_to_front", "draw_moved", "guess_key", "hatch", "name_stones", "seen"]
 
-Array = NDArray[np.float64]
 SeenFace = tuple[Array, tuple[int, ...]]
 
 _UNKNOWN = "#dcd9d4"

@@ -4,15 +4,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipelines.arrays import Array
 from pipelines.draw.elevations.joint_polygons import joint_polygon
 from survey.geometry.solids import Solid, area_vector
 from survey.joints.report import ClosingReport, Joint
 
 __all__ = ["ClosingShapes", "DrawnJoint", "DrawnStone", "Place", "closing_shapes", "places"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

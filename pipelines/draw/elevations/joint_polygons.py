@@ -3,13 +3,12 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipelines.arrays import Array
 from survey.geometry.solids import Solid, area_vector
 
 __all__ = ["joint_polygon"]
 
-Array = NDArray[np.float64]
 
 _FACING = np.cos(np.radians(45.0))  # a face that is turned farther from the joint is not a side of it
 _NOTHING = 1e-10  # areas below are none [m²]

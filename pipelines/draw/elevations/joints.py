@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipelines.arrays import Array
 from pipelines.draw.elevations.closing import back_to_front, guess_key, hatch, name_stones, seen
 from pipelines.draw.elevations.closing_shapes import ClosingShapes, DrawnJoint, Place
 from pipelines.draw.elevations.sheet import elevated, extent, frame_elevation, sheet_size
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_joints"]
 
-Array = NDArray[np.float64]
 
 _STONE, _OVERLAP, _NEGATIVE = "#efede9", "#000000", "#cc79a7"
 _EDGE_ON = np.sin(np.radians(50.0))  # a joint that is turned farther to the viewer lies behind the faces

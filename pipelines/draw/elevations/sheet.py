@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipelines.arrays import Array
 from pipelines.draw.elevations.sheets import INK
 from survey.quality.facades import Facade
 
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 __all__ = ["CODES", "elevated", "extent", "frame_elevation", "palette", "sheet_size", "write_codes"]
 
-Array = NDArray[np.float64]
 
 CODES = 250
 """Stones that can be named on an elevation."""

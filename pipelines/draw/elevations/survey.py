@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipelines.draw.elevations.sheet import (
     CODES,
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_elevation", "draw_residuals"]
 
-Array = NDArray[np.float64]
 
 _UNKNOWN = "#dcd9d4"
 _ROBUST = 98.0  # per cent of the stones that the colour scale reaches

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipelines.arrays import Array, Ints
 from pipelines.draw.offscreen.parts import (
     LIGHT,
     PLAIN,
@@ -29,8 +29,6 @@ from pipelines.draw.offscreen.parts import (
 
 __all__ = ["ClosingSurface", "draw", "load_surface", "save_surface"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _GAP, _OVERLAP, _BALL = "#d55e00", "#000000", 26.0  # colours, and the size of a sign [px]
 _MOVED, _WIDTH = ("YlGnBu", 0.9), ("viridis_r", 1.0)

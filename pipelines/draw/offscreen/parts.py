@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from pipelines.arrays import Array, Ints
 
 __all__ = [
     "INK",
@@ -24,7 +25,6 @@ __all__ = [
     "save_picture",
 ]
 
-Array = NDArray[np.float64]
 
 _SIZE = (1600, 1300)
 _EDGE = "#3a3733"
@@ -98,12 +98,12 @@ def add_coloured(plotter: Any, mesh: Any, colours: Colouring, *, lit: bool = Tru
     _add_scalar_bar(plotter, colours)
 
 
-def add_glass(pyvista: Any, plotter: Any, points: Array, triangles: NDArray[np.int64]) -> None:
+def add_glass(pyvista: Any, plotter: Any, points: Array, triangles: Ints) -> None:
     """The stones, so that one sees what is in their joints."""
     plotter.add_mesh(mesh_of(pyvista, points, triangles), color=PLAIN, opacity=0.15, lighting=False)
 
 
-def add_edges(pyvista: Any, plotter: Any, points: Array, edges: NDArray[np.int64]) -> None:
+def add_edges(pyvista: Any, plotter: Any, points: Array, edges: Ints) -> None:
     """Edges of the stones, a hair before their faces so that they are not drawn half hidden."""
     toward = plotter.camera.position - np.array(plotter.camera.focal_point)
     lines = pyvista.PolyData()
@@ -120,7 +120,7 @@ def _palette(name: str, part: float) -> Any:
     return ListedColormap(colormaps[name](np.linspace(0.0, part, 256)))
 
 
-def mesh_of(pyvista: Any, points: Array, triangles: NDArray[np.int64]) -> Any:
+def mesh_of(pyvista: Any, points: Array, triangles: Ints) -> Any:
     """Triangles on points, as PyVista has them."""
     return pyvista.PolyData(points, faces=np.column_stack([np.full(len(triangles), 3), triangles]).ravel())
 

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipelines.draw.offscreen.parts import (
     LIGHT,
@@ -30,7 +29,6 @@ from pipelines.draw.offscreen.surfaces import WallSurface, load_surface
 
 __all__ = ["colouring", "draw"]
 
-Array = NDArray[np.float64]
 
 _FIXED = "#a3a09a"
 _INSIDE, _OUTSIDE = "#1f5f8b", "#c4302b"  # resultants within and outside the kern

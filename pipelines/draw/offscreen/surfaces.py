@@ -4,19 +4,16 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechanics.results.contact_result import JointResult
 from mechanics.results.result import BodyResult, Result
 from mechanics.results.stress_values import utilisation
 from mechanics.scene.scene import Fidelity
 from mechanics.stones.materials import Material
+from pipelines.arrays import Array, Bools, Ints
 
 __all__ = ["FIELDS", "WallSurface", "load_surface", "save_surface", "stone_fields", "wall_surface"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 FIELDS = ("von_mises", "displacement", "principal_tension", "principal_compression", "utilisation", "error")
 """Columns of `WallSurface.fields`."""
@@ -47,8 +44,8 @@ class WallSurface:
 
     points: Array
     triangles: Ints
-    deformable: Flags
-    fixed: Flags
+    deformable: Bools
+    fixed: Bools
     edges: Ints
     fields: Array
     joint_points: Array
@@ -56,7 +53,7 @@ class WallSurface:
     joint_pressure: Array
     resultant_points: Array
     resultants: Array
-    in_kern: Flags
+    in_kern: Bools
 
     def field(self, name: str) -> Array:
         """(n,) one of FIELDS."""

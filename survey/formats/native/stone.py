@@ -4,8 +4,8 @@ import math
 import re
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array
 from survey.formats.fields import FARTHEST
 from survey.formats.native.cursor import Cursor
 from survey.formats.native.header import missing, read_extrusion
@@ -165,7 +165,7 @@ class StoneReader:
         if self._photograph is None and corners < _FEWEST_CORNERS:
             raise cursor.fail(f"stone {self.code} has {corners} vertices", "a face needs 3 vertices or more")
 
-    def _all_sigmas(self, common: float) -> NDArray[np.float64] | None:
+    def _all_sigmas(self, common: float) -> Array | None:
         if not self._sigmas:
             return None
         order = [(word, k) for word in ("point", "vertex") for k in range(len(self._places[word]))]
@@ -177,5 +177,5 @@ def _first(value: object, word: str, cursor: Cursor) -> None:
         raise cursor.fail(f"a second {word!r}", f"keep one {word!r} line")
 
 
-def _array(rows: list[tuple[float, ...]], columns: int) -> NDArray[np.float64]:
+def _array(rows: list[tuple[float, ...]], columns: int) -> Array:
     return np.array(rows, dtype=np.float64).reshape(-1, columns)

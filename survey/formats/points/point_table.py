@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from moma.errors import SurveyError
+from survey.arrays import Array
 from survey.formats.fields import shown
 from survey.records.survey import BlockRecord, Reject, SurveyHead
 
@@ -161,7 +161,7 @@ class PointTable:
             spans=stone.spans(),
         )
 
-    def _precision(self, stone: TableStone) -> tuple[float, NDArray[np.float64] | None]:
+    def _precision(self, stone: TableStone) -> tuple[float, Array | None]:
         """Of the stone, and of its points if they differ."""
         sigmas = np.array([*stone.point_sigmas, *stone.vertex_sigmas])
         sigmas[np.isnan(sigmas)] = self._sigma
@@ -170,7 +170,7 @@ class PointTable:
         return math.sqrt(float(sigmas @ sigmas) / len(sigmas)), sigmas
 
 
-def _rows(flat: "array[float]") -> NDArray[np.float64]:
+def _rows(flat: "array[float]") -> Array:
     return np.array(flat, dtype=np.float64).reshape(-1, 3)
 
 

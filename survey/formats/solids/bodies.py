@@ -9,9 +9,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from moma.errors import GeometryError, SurveyError
+from survey.arrays import Array
 from survey.formats.solids.body_groups import body_groups, signed_volume
 from survey.formats.solids.flat_faces import merge_flat, rounding
 from survey.geometry.folds import fold, warp
@@ -20,7 +20,6 @@ from survey.geometry.watertight import check_watertight
 
 __all__ = ["ClosedBody", "RawBody", "closed_bodies"]
 
-Array = NDArray[np.float64]
 Polygon = tuple[int, ...]
 
 _COARSEST = 1e-3  # metres: a third of what a point is measured to

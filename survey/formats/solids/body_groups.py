@@ -11,14 +11,13 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from moma.errors import GeometryError
+from survey.arrays import Array
 from survey.geometry.solids import area_vector
 
 __all__ = ["body_groups", "signed_volume"]
 
-Array = NDArray[np.float64]
 Polygon = tuple[int, ...]
 Edge = tuple[int, int]
 

@@ -10,9 +10,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from survey.arrays import Array
+
 __all__ = ["merge_flat", "rounding"]
 
-Array = NDArray[np.float64]
 Polygon = tuple[int, ...]
 
 _BULGE = 1e-4  # of a polygon's size: what rounding to a few digits does to a plane one

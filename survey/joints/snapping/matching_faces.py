@@ -10,17 +10,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array
 from survey.geometry._kernels.adjacency import face_planes
 from survey.geometry.adjacency import Polyhedra
 from survey.geometry.solids import Solid, area_vector
 from survey.joints.snapping._kernels import matching_faces, near_pairs
 
 __all__ = ["Match", "common_planes", "find_matches"]
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

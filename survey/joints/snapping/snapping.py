@@ -13,8 +13,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array, Ints
 from survey.geometry.folds import fold
 from survey.geometry.plane_network import Settled, settle
 from survey.geometry.solids import Solid
@@ -24,8 +24,6 @@ from survey.records.snapping import OpenContact, Snapping
 
 __all__ = ["snap"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Polygon = tuple[int, ...]
 
 _EXACT = 1e-12  # of the size of all: farther from its planes no corner may stay

@@ -9,16 +9,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
+from survey.arrays import Array
 from survey.extrusion.extrusion import prism
 from survey.geometry.solids import Solid
 from survey.synthetic.shared_faces import TrueJoint, true_joints
 
 __all__ = ["RoundedAssembly", "angled_pier", "hexagonal_dome", "rounded"]
 
-Array = NDArray[np.float64]
 
 _GOLDEN = math.pi * (3.0 - math.sqrt(5.0))  # turn from point to point of a spiral that fills a sphere evenly
 _NEAR = 14  # points among which the neighbours of one on the sphere are

@@ -6,7 +6,6 @@ from itertools import pairwise
 from random import Random
 
 import numpy as np
-from numpy.typing import NDArray
 
 from survey.extrusion.extrusion import prism
 from survey.synthetic.bond import PlannedStone
@@ -15,7 +14,6 @@ from survey.synthetic.frame import TrueStone, WallFrame
 
 __all__ = ["barrel_vault", "semicircular_arch"]
 
-Array = NDArray[np.float64]
 
 _FOOT = np.array([14.2, 31.75, 5.6])  # of the axis in the site [m]
 _AZIMUTH = math.radians(23.0)  # of a vault's span, of an arch's face against the x axis

@@ -4,8 +4,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array
 from survey.geometry.half_spaces import intersection
 from survey.geometry.solids import Solid, volume_of
 from survey.unseen.core.courses import Stretch, Strip, height_of, place_of, stretches, strips
@@ -14,7 +14,6 @@ from survey.unseen.core.settings import InfillSettings
 
 __all__ = ["CoreBlock", "core_blocks"]
 
-Array = NDArray[np.float64]
 
 _OUT = np.array([0.0, 0.0, 1.0])
 _ON_PLANE = 1e-10  # metres: corners so near to a plane lie on it

@@ -5,15 +5,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import label
 
+from survey.arrays import Array, Bools
 from survey.geometry.solids import Solid
 
 __all__ = ["CellGrid", "grid_solids"]
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Node = tuple[int, int, int]
 
 # corners of each side of a cell, counter-clockwise seen from outside; axes: along, up, from the front to the back
@@ -42,7 +40,7 @@ class CellGrid:
     places: Array
     beds: Array
     levels: Array
-    filled: Mask
+    filled: Bools
 
 
 def grid_solids(grid: CellGrid) -> Iterator[Solid]:
@@ -53,7 +51,7 @@ def grid_solids(grid: CellGrid) -> Iterator[Solid]:
         yield _solid(grid, parts == number)
 
 
-def _solid(grid: CellGrid, filled: Mask) -> Solid:
+def _solid(grid: CellGrid, filled: Bools) -> Solid:
     """The solid of connected cells; planes that cut nothing of it are left out."""
     planes = [grid.places, grid.beds, grid.levels]
     for axis in range(3):
@@ -68,7 +66,7 @@ def _solid(grid: CellGrid, filled: Mask) -> Solid:
     return Solid("", vertices, tuple(faces))
 
 
-def _rectangles(filled: Mask, side: Node) -> Iterator[tuple[Node, Node]]:
+def _rectangles(filled: Bools, side: Node) -> Iterator[tuple[Node, Node]]:
     """The free sides of cells that look one way, put together: first and last cell of each rectangle."""
     padded = np.pad(filled, 1)
     free = (padded & ~np.roll(padded, [-s for s in side], axis=(0, 1, 2)))[1:-1, 1:-1, 1:-1]
@@ -110,7 +108,7 @@ def _turns(loop: list[Node]) -> Iterator[Node]:
             yield here
 
 
-def _coarser(filled: Mask, planes: Array, axis: int) -> tuple[Mask, Array]:
+def _coarser(filled: Bools, planes: Array, axis: int) -> tuple[Bools, Array]:
     """The cells without planes that have the same on both sides all over, and without empty layers at the ends."""
     layers = np.moveaxis(filled, axis, 0)
     used = np.flatnonzero(layers.reshape(len(layers), -1).any(axis=1))
@@ -127,7 +125,7 @@ def _node(planes: list[Array], node: Node) -> Array:
     return out
 
 
-def _without_edges(filled: Mask) -> Mask:
+def _without_edges(filled: Bools) -> Bools:
     """Empty cells until no two touch along an edge alone, or at a corner alone, the fewest that will do in turn."""
     filled = filled.copy()
     while True:
@@ -137,7 +135,7 @@ def _without_edges(filled: Mask) -> Mask:
         filled[max(touching, key=lambda cell: (touching[cell], cell))] = False
 
 
-def _touching(filled: Mask) -> Counter[Node]:
+def _touching(filled: Bools) -> Counter[Node]:
     """Cells that touch others where they must not, and how often."""
     found: Counter[Node] = Counter()
     padded = np.pad(filled, 1)

@@ -7,14 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array
 from survey.unseen.core.facings import FacingStone, FacingWall
 from survey.unseen.core.settings import InfillSettings
 
 __all__ = ["Stretch", "Strip", "height_of", "place_of", "stretches", "strips"]
 
-Array = NDArray[np.float64]
 
 _ALONG, _UP = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
 _OFF_BED = 0.03  # metres: a corner farther from the bed of its course is left out of it

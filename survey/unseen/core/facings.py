@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, cKDTree
 
 from moma.errors import GeometryError
+from survey.arrays import Array
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.solids import Solid, area_vector
 from survey.quality.walls import WallPlane, upright_frame
@@ -18,7 +19,6 @@ from survey.unseen.core.settings import InfillSettings
 
 __all__ = ["FacingStone", "FacingWall", "facing_stone", "find_walls", "wall_between"]
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 _CONVEX = 1e-7  # metres that a corner of a convex solid may stand in front of a face

@@ -9,10 +9,8 @@ behind them; nor has an opening, or a hole where a stone is missing.
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from moma.errors import UsageError
+from survey.arrays import Array
 from survey.geometry.solids import Solid, volume_of
 from survey.unseen.core.blocks import core_blocks
 from survey.unseen.core.facings import FacingStone, FacingWall, find_walls, wall_between
@@ -20,8 +18,6 @@ from survey.unseen.core.settings import InfillSettings, InfillShape
 from survey.unseen.core.storeys import core_storeys
 
 __all__ = ["InfillProposal", "propose_infill"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

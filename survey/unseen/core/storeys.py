@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array
 from survey.geometry.solids import Solid
 from survey.unseen.core.cells import CellGrid, grid_solids
 from survey.unseen.core.courses import Strip, height_of, stretches, strips
@@ -20,7 +20,6 @@ from survey.unseen.core.settings import InfillSettings
 
 __all__ = ["CoreStorey", "core_storeys"]
 
-Array = NDArray[np.float64]
 Interval = tuple[float, float]
 
 _OUT = np.array([0.0, 0.0, 1.0])

@@ -5,17 +5,16 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial.distance import cdist
 
+from survey.arrays import Array
 from survey.unseen.missing.settings import MissingSettings
 from survey.unseen.missing.sides import Elevation, FlatStone, Line, line_through, meeting
 
 __all__ = ["ArchGap", "arch_gaps", "voussoir_outlines"]
 
-Array = NDArray[np.float64]
 Ends = tuple[int, int]
 
 _WEDGES = {"voussoir", "keystone"}

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array
 from survey.extrusion.depth import Depth
 from survey.extrusion.extrusion import SurveyedBlock, extrude
 from survey.faces.common_planes import PlaneEstimate, common_plane
@@ -17,7 +17,6 @@ from survey.unseen.missing.sides import Elevation, FlatStone
 
 __all__ = ["MissingFace", "is_plausible", "stone_of"]
 
-Array = NDArray[np.float64]
 
 _SHORTEST = 0.05  # metres
 _ENOUGH = 3  # faces that have a common plane

@@ -4,16 +4,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from survey.arrays import Array, Ints
 from survey.unseen.missing.settings import MissingSettings
 from survey.unseen.missing.sides import Elevation, FlatStone, Line
 
 __all__ = ["CourseGap", "Gaps", "Hole", "find_gaps", "find_holes", "opening_signs"]
 
-Array = NDArray[np.float64]
 
 _UP, _DOWN = np.array([0.0, 1.0]), np.array([0.0, -1.0])
 _LEVEL = np.array([1.0, 0.0])
@@ -48,8 +47,8 @@ class CourseGap:
     stop: float
     lower: Line
     upper: Line
-    below: NDArray[np.int64]
-    above: NDArray[np.int64]
+    below: Ints
+    above: Ints
 
     @property
     def width(self) -> float:
@@ -227,7 +226,7 @@ def _bed(members: Sequence[FlatStone], towards: Array, start: float, stop: float
     return _fitted(np.concatenate([ends for ends, one in zip(near, usual, strict=True) if one][:_AROUND]))
 
 
-def _stones_at(elevation: Elevation, places: Array, bed: Line, above: float) -> NDArray[np.int64]:
+def _stones_at(elevation: Elevation, places: Array, bed: Line, above: float) -> Ints:
     """Which stone is at places along a bed, some way above it; -1 where there is none."""
     found = np.full(len(places), -1, dtype=np.int64)
     points = np.array([[place, bed.at_place(place) + above] for place in places.tolist()])

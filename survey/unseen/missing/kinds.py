@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from itertools import combinations_with_replacement, permutations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array
 from survey.extrusion.depth import Depth
 from survey.unseen.missing.gaps import CourseGap
 from survey.unseen.missing.settings import MissingSettings
@@ -24,7 +24,6 @@ from survey.unseen.missing.sides import Elevation, FlatStone
 
 __all__ = ["Filling", "UsualKind", "depth_of_kind", "likeliest", "split", "usual_kinds"]
 
-Array = NDArray[np.float64]
 
 _PARTICULAR = {
     "jamb",

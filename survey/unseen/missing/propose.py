@@ -10,8 +10,8 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.solids import area_vector
 from survey.unseen.missing.arches import ArchGap, arch_gaps, voussoir_outlines
@@ -25,7 +25,6 @@ from survey.unseen.missing.sides import Elevation, FlatStone, Line, elevations, 
 
 __all__ = ["MissingStone", "propose_missing"]
 
-Array = NDArray[np.float64]
 
 _LEFT, _RIGHT, _UPRIGHT = np.array([-1.0, 0.0]), np.array([1.0, 0.0]), np.array([0.0, 1.0])
 _USUAL_JOINT = 0.01  # metres, where no joint can be measured

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from survey.arrays import Array
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.faces.neighbours import Neighbours
 from survey.quality.facades import find_facades
@@ -17,7 +17,6 @@ from survey.quality.walls import WallPlane
 
 __all__ = ["Elevation", "FlatStone", "Line", "elevations", "line_through", "meeting"]
 
-Array = NDArray[np.float64]
 
 _FACING = float(np.cos(np.radians(50.0)))  # a side looks a way if its normal is not farther from it
 _NEARLY = float(np.cos(np.radians(12.0)))  # how far wear may turn a side

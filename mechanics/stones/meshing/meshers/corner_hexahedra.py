@@ -5,8 +5,8 @@ centres of its three faces and the centre of the stone; each of these into n × 
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Ints
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import SolidMesh, solid_mesh
 from mechanics.stones.meshing.sizes import SizeField, as_field
@@ -14,8 +14,6 @@ from moma.errors import MeshError
 
 __all__ = ["mesh_at_corners"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Faces = tuple[tuple[int, ...], ...]
 
 _CORNERS = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)])

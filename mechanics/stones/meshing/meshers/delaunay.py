@@ -8,9 +8,9 @@ moves keep to the faces that a point lies on, so the mesh fills the stone exactl
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import Delaunay, QhullError
 
+from mechanics.arrays import Array, Bools, Ints
 from mechanics.stones.meshing.mesh import SolidMesh, tet_mesh
 from mechanics.stones.meshing.meshers._kernels.sampling import lay_points
 from mechanics.stones.meshing.meshers._kernels.shaping import relax
@@ -22,9 +22,6 @@ from moma.errors import MeshError
 
 __all__ = ["mesh_with_delaunay"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 Faces = tuple[tuple[int, ...], ...]
 
 # points on a regular lattice lie by fours on a plane and by fives on a sphere, where Delaunay makes flat tetrahedra:

@@ -4,8 +4,8 @@ from enum import IntEnum
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array, Ints
 from mechanics.stones.meshing.mesh import SolidMesh, tet_mesh
 from mechanics.stones.meshing.shaping import improved
 from mechanics.stones.meshing.sizes import SizeField, as_field
@@ -13,7 +13,6 @@ from moma.errors import MeshError, MissingLibraryError
 
 __all__ = ["Algorithm", "mesh_with_gmsh"]
 
-Array = NDArray[np.float64]
 Faces = tuple[tuple[int, ...], ...]
 
 # what gmsh's wheel needs from a bare Debian or Ubuntu
@@ -121,7 +120,7 @@ def _set_sizes(gmsh: Any, field: SizeField) -> None:
     fields.setAsBackgroundMesh(least)
 
 
-def _generate(mesh: Any) -> tuple[Array, NDArray[np.int64]]:
+def _generate(mesh: Any) -> tuple[Array, Ints]:
     mesh.generate(3)
     tags, coordinates, _ = mesh.getNodes()
     kinds, _, node_tags = mesh.getElements(3)

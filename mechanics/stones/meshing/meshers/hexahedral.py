@@ -1,8 +1,8 @@
 """Structured hexahedra for stones with six faces and eight corners."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechanics.arrays import Array
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import SolidMesh, solid_mesh
 from mechanics.stones.meshing.sizes import SizeField, as_field
@@ -10,7 +10,6 @@ from moma.errors import MeshError
 
 __all__ = ["mesh_with_hexahedra"]
 
-Array = NDArray[np.float64]
 Faces = tuple[tuple[int, ...], ...]
 
 # so many parts a direction is measured in where the size changes

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from moma.errors import SurveyError
+from survey.arrays import Ints
 from survey.formats.fields import FARTHEST
 from survey.formats.solids.bodies import RawBody
 from survey.formats.solids.msh.sections import MshFile
@@ -25,7 +25,7 @@ _FACES = {  # of gmsh's types of the first and second order, their corners count
     **dict.fromkeys((7, 14, 19), _PYRAMID),
 }
 
-Cells = list[tuple[int, NDArray[np.int64]]]
+Cells = list[tuple[int, Ints]]
 
 
 def msh_bodies(path: Path) -> Iterator[RawBody]:

@@ -3,17 +3,15 @@
 import re
 
 import numpy as np
-from numpy.typing import NDArray
 
 from moma.errors import SurveyError
+from survey.arrays import Array, Ints
 from survey.formats.fields import shown
 
 __all__ = ["MshNumbers"]
 
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII).fullmatch
 _REMEDY = "export MSH 2.2 or 4.1"
-
-Integers = NDArray[np.int64]
 
 
 class MshNumbers:
@@ -103,7 +101,7 @@ class MshNumbers:
             raise self.fail(f"a count of {count}")
         return count
 
-    def sizes(self, count: int) -> Integers:
+    def sizes(self, count: int) -> Ints:
         """Read numbers of things."""
         return self._take(count, "i8").astype(np.int64)
 
@@ -111,7 +109,7 @@ class MshNumbers:
         """Read one number of things."""
         return int(self.sizes(1)[0])
 
-    def counts(self, count: int) -> Integers:
+    def counts(self, count: int) -> Ints:
         """Read numbers that are text even in binary files of format 2.2."""
         if not self.binary:
             return self._take(count, "i8").astype(np.int64)
@@ -120,15 +118,15 @@ class MshNumbers:
             raise self.fail(f"{shown(line.decode('latin-1'))} is not a count")
         return np.array([int(line)])
 
-    def integers(self, count: int) -> Integers:
+    def integers(self, count: int) -> Ints:
         """Read whole numbers."""
         return self._take(count, "i4").astype(np.int64)
 
-    def reals(self, count: int) -> NDArray[np.float64]:
+    def reals(self, count: int) -> Array:
         """Read numbers."""
         return self._take(count, "f8").astype(np.float64)
 
-    def records(self, count: int) -> tuple[Integers, NDArray[np.float64]]:
+    def records(self, count: int) -> tuple[Ints, Array]:
         """Read the nodes of format 2.2: a number and three coordinates each."""
         if not self.binary:
             rows = self.reals(4 * self.plausible(count)).reshape(-1, 4)
@@ -166,7 +164,7 @@ class MshNumbers:
             self._at += len(line) + 1
         self._at = stop
 
-    def _take(self, count: int, kind: str) -> NDArray[np.float64] | NDArray[np.int64]:
+    def _take(self, count: int, kind: str) -> Array | Ints:
         if count < 0:
             raise self.fail(f"a count of {count}")
         if self.binary:

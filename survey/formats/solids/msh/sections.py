@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from moma.errors import SurveyError
+from survey.arrays import Array, Ints
 from survey.formats.fields import shown
 from survey.formats.solids.msh.numbers import MshNumbers
 
@@ -55,7 +55,6 @@ _NODES = dict(  # of each type of element
     )
 )
 _NAME = re.compile(r'\s*(\d+)\s+(-?\d+)\s+"(.*)"\s*', re.ASCII)
-Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -71,9 +70,9 @@ class Elements:
     """
 
     type: int
-    nodes: Integers
-    entity: Integers
-    physical: Integers
+    nodes: Ints
+    entity: Ints
+    physical: Ints
 
 
 @dataclass
@@ -88,11 +87,11 @@ class MshFile:
     """
 
     path: Path
-    points: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))
+    points: Array = field(default_factory=lambda: np.empty((0, 3)))
     elements: list[Elements] = field(default_factory=list)
     names: dict[int, str] = field(default_factory=dict)
-    _tags: Integers = field(default_factory=lambda: np.empty(0, dtype=np.int64))  # of the points, ascending
-    _order: Integers = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    _tags: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))  # of the points, ascending
+    _order: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     _physical: dict[tuple[int, int], int] = field(
         default_factory=dict
     )  # of entities, by dimension and number
@@ -164,7 +163,7 @@ class MshFile:
         tags, points = numbers.records(total)
         self._set_nodes(tags, points, total)
 
-    def _set_nodes(self, tags: Integers, points: NDArray[np.float64], total: int) -> None:
+    def _set_nodes(self, tags: Ints, points: Array, total: int) -> None:
         self._order = np.argsort(tags, kind="stable")
         self._tags = tags[self._order]
         if len(tags) != total or (np.diff(self._tags) == 0).any() or len(self.points):
@@ -187,7 +186,7 @@ class MshFile:
     def _read_elements_2(self) -> None:
         numbers = self._numbers
         (total,) = numbers.counts(1).tolist()
-        read, rows = 0, dict[tuple[int, int], list[Integers]]()
+        read, rows = 0, dict[tuple[int, int], list[Ints]]()
         while read < total:
             kind, count, tags = numbers.element_head()
             width = (1 if numbers.binary else 0) + tags + self._node_count(kind)
@@ -207,7 +206,7 @@ class MshFile:
             )
         return _NODES[kind]
 
-    def _add(self, kind: int, tags: Integers, entity: Integers, physical: Integers) -> None:
+    def _add(self, kind: int, tags: Ints, entity: Ints, physical: Ints) -> None:
         places = np.searchsorted(self._tags, tags)
         places = np.minimum(places, len(self._tags) - 1)
         if tags.size and not (len(self._tags) and (self._tags[places] == tags).all()):
