@@ -13,9 +13,9 @@ from archmodel.assertions.statements import say_mason_mark, say_of_phase
 from archmodel.database.session import Database
 from archmodel.store.find_by_code import Subjects
 from archmodel.store.run_record import ContactArrays, ErrorMeasures, JointArrays, RunRecord, StoneResult
+from archmodel.store.runs import store_run
 from archmodel.store.stone_record import StoneRecord
 from archmodel.store.stones import store_survey
-from archmodel.store.store_runs import store_run
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import new_entry
 from archmodel.tables.relations import Relation

@@ -7,13 +7,12 @@ from functools import lru_cache
 import numpy as np
 
 from archmodel.arrays import Array
-from archmodel.store.measures import solid_volumes
 from archmodel.store.stone_record import StoneRecord
 from archmodel.tables.entities import Entity, kind_named, kind_of
 from archmodel.tables.surveys import Measurement
 from moma.errors import DatabaseError, GeometryError, SurveyError, UsageError
 
-__all__ = ["entity_rows", "measurement_row", "stone_record", "storable"]
+__all__ = ["entity_rows", "measurement_row", "solid_volume", "solid_volumes", "stone_record", "storable"]
 
 
 def entity_rows(stones: Sequence[StoneRecord], places: Sequence[str]) -> list[dict[str, object]]:
@@ -214,3 +213,54 @@ def _check_solid(stone: StoneRecord, place: str) -> None:
     if any(len(face) < 3 or min(face) < 0 or max(face) >= count for face in stone.solid_faces):
         what = f"a face of the solid is not a polygon on its {count} vertices"
         raise GeometryError(what, where=place)
+
+
+Faces = Sequence[Sequence[int]]
+
+
+def solid_volume(vertices: Array, faces: Faces) -> tuple[float, Array]:
+    """Volume [m³] and centroid (3,) [m] of a closed polyhedron, by the divergence theorem.
+
+    The volume is negative if the faces are clockwise seen from outside.
+
+    Parameters
+    ----------
+    vertices : (nv, 3) [m]
+    faces : vertex indices of each planar face, counter-clockwise seen from outside
+    """
+    volumes, centroids = _alike(vertices[None], faces)
+    return float(volumes[0]), centroids[0]
+
+
+def solid_volumes(solids: Sequence[tuple[Array, tuple[tuple[int, ...], ...]]]) -> tuple[Array, Array]:
+    """As `solid_volume` of many solids, (n,) and (n, 3); those with the same faces are computed together.
+
+    Parameters
+    ----------
+    solids : (vertices, faces) of each
+    """
+    groups: dict[tuple[int, tuple[tuple[int, ...], ...]], list[int]] = {}
+    for number, (vertices, faces) in enumerate(solids):
+        groups.setdefault((len(vertices), faces), []).append(number)
+    volumes, centroids = np.empty(len(solids)), np.empty((len(solids), 3))
+    for (_, faces), members in groups.items():
+        volumes[members], centroids[members] = _alike(np.stack([solids[i][0] for i in members]), faces)
+    return volumes, centroids
+
+
+def _alike(vertices: Array, faces: Faces) -> tuple[Array, Array]:
+    """Volumes (n,) and centroids (n, 3) of solids that differ in their vertices (n, nv, 3) only."""
+    origin = vertices.mean(axis=1)  # sums of small numbers, wherever the site's frame has its origin
+    fans = np.array([(face[0], face[i], face[i + 1]) for face in faces for i in range(1, len(face) - 1)])
+    local = vertices - origin[:, None]
+    a, b, c = (local[:, fans[:, k]] for k in range(3))
+    ux, uy, uz = np.moveaxis(b, 2, 0)
+    vx, vy, vz = np.moveaxis(c, 2, 0)
+    signed = a[..., 0] * (uy * vz - uz * vy)
+    signed += a[..., 1] * (uz * vx - ux * vz)
+    signed += a[..., 2] * (ux * vy - uy * vx)
+    volume = signed.sum(axis=1) / 6.0
+    moment = np.einsum("ij,ijk->ik", signed, a + b + c) / 24.0
+    with np.errstate(invalid="ignore", divide="ignore"):
+        offset = np.where(volume[:, None] != 0.0, moment / volume[:, None], 0.0)
+    return volume, origin + offset

@@ -11,7 +11,7 @@ from mechanics.contact.contacts import Contacts
 from mechanics.delassus.assembly import world_impulse
 from mechanics.delassus.mixed import MixedDelassus
 from mechanics.delassus.rigid import RigidDelassus
-from mechanics.model._kernels_elastic import deform, rigid_part
+from mechanics.model._kernels import deform, rigid_part
 from mechanics.model.deformable import Compliance
 from mechanics.model.model import Model
 from mechanics.model.rigid import free_flight, inverse_inertia_world

@@ -4,16 +4,14 @@ from typing import Annotated
 
 import typer
 
-from moma.cli.database import migrate
+from moma.cli.database import export, import_, migrate
 from moma.cli.entities import query, schema, show
-from moma.cli.exchange import export, import_
 from moma.cli.knowledge import record
 from moma.cli.proposals import propose
 from moma.cli.relations import load_path, relate
 from moma.cli.runs import runs
-from moma.cli.scenes import check, run
+from moma.cli.scenes import check, run, trade
 from moma.cli.surveys import ingest, survey_report
-from moma.cli.trade import trade
 
 __all__ = ["app", "main"]
 

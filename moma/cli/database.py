@@ -1,7 +1,9 @@
 """The command that changes the layout of a database."""
 
+import sys
 from dataclasses import asdict
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -9,7 +11,7 @@ from moma.cli.console import reporting
 from moma.cli.options import DEFAULT_DB, Db, Json, Verbose
 from moma.errors import UsageError
 
-__all__ = ["migrate"]
+__all__ = ["export", "import_", "migrate"]
 
 
 @reporting
@@ -43,3 +45,50 @@ def migrate(
         print(f"dropped: {one}")
     if done.backup is not None:
         print(f"as it was: {done.backup}")
+
+
+if TYPE_CHECKING:
+    from pipelines.exchange import ExchangeReport
+
+
+Document = Annotated[
+    Path, typer.Argument(metavar="FILE.json", help="The document, or FILE.json.gz; see docs/exchange.md.")
+]
+
+Target = Annotated[
+    Path,
+    typer.Argument(
+        metavar="FILE.json",
+        help="The document, or FILE.json.gz, or - for standard output; see docs/exchange.md.",
+    ),
+]
+
+
+@reporting
+def export(document: Target, db: Db = DEFAULT_DB, json: Json = False, verbose: Verbose = False) -> None:
+    """Write all that the database holds into one JSON document."""
+    from moma.cli.text.formats import as_json
+    from pipelines.exchange import export_database, export_to_stream
+
+    if str(document) == "-":
+        export_to_stream(db, sys.stdout.buffer)
+        return
+    report = export_database(db, document)
+    print(as_json(asdict(report)) if json else "\n".join(_lines(report, "from", verbose)))
+
+
+@reporting
+def import_(document: Document, db: Db = DEFAULT_DB, json: Json = False, verbose: Verbose = False) -> None:
+    """Make a database of such a document: all of it, or none if anything is wrong."""
+    from moma.cli.text.formats import as_json
+    from pipelines.exchange import import_database
+
+    report = import_database(document, db)
+    print(as_json(asdict(report)) if json else "\n".join(_lines(report, "into", verbose)))
+
+
+def _lines(report: "ExchangeReport", way: str, verbose: bool) -> list[str]:
+    """How many rows were carried; of empty sections too if `verbose`."""
+    total = sum(report.rows.values())
+    lines = [f"{report.path}: {total} rows {way} {report.database} ({report.bytes / 1e6:.1f} MB)"]
+    return lines + [f"  {count:>8} {name}" for name, count in report.rows.items() if count or verbose]

@@ -15,10 +15,9 @@ from archmodel.store.stones import store_survey
 from archmodel.tables.entities import Entity, kind_named
 from mechanics.dynamics.progress import Listener, Progress, silent
 from moma.errors import NoDatabaseError, SurveyError, UsageError
-from pipelines.ingest.frame_records import frame_record
 from pipelines.ingest.kind_rules import KindRule, check_kinds, ruled
 from pipelines.ingest.reading_options import check_survey_file
-from pipelines.ingest.records import stone_record
+from pipelines.ingest.records import frame_record, stone_record
 from pipelines.ingest.rejects import check_targets, default_path, rejects_text
 from pipelines.ingest.relate import KnownSolids, relate
 from pipelines.ingest.report import IngestReport, Tally

@@ -1,7 +1,8 @@
 """Between the survey pillar's stones and the records that the database keeps of them."""
 
+import math
 from dataclasses import replace
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 
@@ -13,8 +14,9 @@ from survey.faces.planes import FaceFit
 from survey.faces.shapes import FaceShape, ShapeKind
 from survey.geometry.solids import Solid
 from survey.records.survey import BlockRecord, Extrusion
+from survey.registration.site_frame import SiteTransform
 
-__all__ = ["stone_record", "surveyed_block"]
+__all__ = ["frame_record", "stone_record", "surveyed_block"]
 
 
 def stone_record(block: SurveyedBlock) -> StoneRecord:
@@ -149,3 +151,33 @@ def _kept_face(stone: StoneRecord, measured: BlockRecord) -> Face:
         measured,
     )
     return replace(face, remarks=stone.remarks)
+
+
+def frame_record(transform: SiteTransform | None) -> dict[str, Any] | None:
+    """The transform with its precision and what each control point says of it; None if there is none."""
+    if transform is None:
+        return None
+    points = zip(transform.names, transform.residuals.tolist(), transform.standardised.tolist(), strict=True)
+    return {
+        "rotation": transform.rotation.tolist(),
+        "scale": transform.scale,
+        "survey_centre": transform.survey_centre.tolist(),
+        "site_centre": transform.site_centre.tolist(),
+        "covariance": transform.covariance.tolist(),
+        "sigma0": _finite(transform.sigma0),
+        "redundancy": transform.redundancy,
+        "scale_test": _finite(transform.scale_test),
+        "control": [
+            {
+                "name": name,
+                "residual": residual,
+                "standardised": _finite(standardised),
+                "rejected": name in transform.rejected,
+            }
+            for name, residual, standardised in points
+        ],
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

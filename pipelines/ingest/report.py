@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pipelines.arrays import Array
-from pipelines.ingest.frame_records import frame_record
+from pipelines.ingest.records import frame_record
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.convexity import is_convex
 from survey.records.snapping import Snapping

@@ -4,7 +4,7 @@ import numpy as np
 
 from mechanics.results.result import Result
 from pipelines.arrays import Array
-from pipelines.reports.html_tables import kilopascals, millimetres, ratio, table
+from pipelines.reports.html import kilopascals, millimetres, ratio, table
 
 __all__ = ["joint_sections"]
 

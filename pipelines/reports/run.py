@@ -8,8 +8,7 @@ from typing import Any
 from archmodel.store.run_record import StoneResult
 from mechanics.results.result import Result
 from pipelines.draw.history_plot import history_svg
-from pipelines.reports.html import figure, page
-from pipelines.reports.html_tables import megapascals, millimetres, percent, ratio, scientific, table
+from pipelines.reports.html import figure, megapascals, millimetres, page, percent, ratio, scientific, table
 from pipelines.reports.joints import joint_sections
 
 __all__ = ["write_report"]

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from archmodel.store.measures import solid_volume
 from archmodel.store.run_record import (
     ContactArrays,
     ErrorMeasures,
@@ -20,6 +19,7 @@ from archmodel.store.run_record import (
     SimplificationRecord,
     StoneResult,
 )
+from archmodel.store.stone_rows import solid_volume
 from mechanics.results.contact_result import ContactResult, JointResult
 from mechanics.results.result import Errors, Result
 from mechanics.scene.scene import Scene

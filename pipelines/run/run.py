@@ -10,7 +10,7 @@ from typing import Any
 
 from archmodel.database.session import open_database
 from archmodel.store.run_record import StoneResult
-from archmodel.store.store_runs import store_run
+from archmodel.store.runs import store_run
 from archmodel.tables.entries import latest_entry
 from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.results.result import Outcome, Result

@@ -4,12 +4,15 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
+import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import fdtri
 
-from survey.arrays import Array
+from survey.arrays import Array, Bools
+from survey.faces._kernels.shapes import fit_columns, fit_two_planes, grow_columns, truncated_sum
 from survey.faces.planes import FaceFit
 
-__all__ = ["FaceShape", "ShapeKind", "judge_shape", "likely_ratio"]
+__all__ = ["FaceShape", "ShapeKind", "explain_heights", "judge_shape", "likely_ratio"]
 
 
 class ShapeKind(StrEnum):
@@ -65,7 +68,7 @@ def judge_shape(fit: FaceFit, points: ArrayLike, sigma: ArrayLike | None) -> Fac
     if known and not fit.rejected and fit.sigma0**2 <= likely_ratio(fit.redundancy, 1.2816):
         return FaceShape(ShapeKind.PLANE, f"plane: {count} points, rms {fit.rms * 1e3:.1f} mm")
     # with numba, which readers of verdicts do without
-    from survey.faces.shape_models import explain_heights
+    from survey.faces.shapes import explain_heights
 
     return explain_heights(fit, points, sigma)
 
@@ -74,3 +77,195 @@ def likely_ratio(redundancy: int, quantile: float) -> float:
     """Ratio of variances that chance exceeds as rarely as a normal quantile: chi-square by Wilson and Hilferty."""
     spread = 2.0 / (9.0 * redundancy)
     return (1.0 - spread + quantile * math.sqrt(spread)) ** 3
+
+
+_CURVED = 16.27  # chi-square of the 3 parameters of a quadric at 0.1 %
+_CURVED_WITHOUT = 7.81  # the same at 5 %: what must be left of it without any one point
+_CURVED_BEYOND_TWO = 22.0  # what two blunders count that a quadric can be bent through
+_STRIP = 24.4  # the same for a strip along an edge: 2 parameters
+_SECOND_PLANE = 26.9  # squares that a second plane must explain: 3 parameters at 0.1 %, 200 lines tried
+_SEARCH = 10.6  # of these, what the search of the line is worth: 2 ln 200
+_WIDER = 5.0  # by how much wider scatter must be the better explanation
+_EXACT = 1e-13  # scatter over size that is rounding
+_STEEPEST = math.radians(60.0)  # a second plane turned farther is another side of the stone, or blunders
+_SCATTERED = 1.0 / 3.0  # share of points off the plane beyond which they are not isolated
+
+
+def explain_heights(fit: FaceFit, points: ArrayLike, sigma: ArrayLike | None) -> FaceShape:
+    """Judge the shape of a face on which something is not as chance would have it; arguments as of `judge_shape`."""
+    if not fit.sigma0 > _EXACT * fit.singular_values[0]:
+        return FaceShape(ShapeKind.PLANE, f"plane: {len(fit.residuals) - len(fit.rejected)} points, exactly")
+    scene = _heights(fit, points, sigma)
+    verdicts = [one for one in (_curved(scene), _bevelled(scene)) if one is not None]
+    if verdicts:
+        return min(verdicts, key=lambda one: one[0])[1]
+    return _eroded(scene) or _plane_or_rough(fit, scene)
+
+
+@dataclass(frozen=True)
+class _Heights:
+    """Heights z above the plane at the places (u, v) on it, all (n,) [m]; root (n,) is 1/σ [1/m]."""
+
+    u: Array
+    v: Array
+    z: Array
+    root: Array
+    off: Bools
+    known: bool
+
+
+def _heights(fit: FaceFit, points: ArrayLike, sigma: ArrayLike | None) -> _Heights:
+    lateral = (np.asarray(points, dtype=np.float64) - fit.centroid) @ fit.axes.T
+    z, off = fit.residuals, np.zeros(len(fit.residuals), dtype=bool)
+    off[list(fit.rejected)] = True
+    known, root = sigma is not None, np.empty_like(z)
+    root[:] = 1.0 / np.asarray(fit.sigma0 if sigma is None else sigma, dtype=np.float64)
+    u, v = (np.ascontiguousarray(column) for column in lateral.T)
+    return _Heights(u, v, z, root, off, known)
+
+
+def _curved(face: _Heights) -> tuple[float, FaceShape] | None:
+    """A quadric, with what it leaves unexplained, if it says significantly more than the plane."""
+    count = len(face.z)
+    if count < 7:
+        return None
+    flatness = truncated_sum(face.root, face.z)
+    if face.known and flatness <= _CURVED:
+        return None
+    size = max(float(np.abs(face.u).max()), float(np.abs(face.v).max()))
+    u, v = face.u / size, face.v / size
+    design = np.column_stack([np.ones(count), u, v, u * u, u * v, v * v])
+    chosen, score = _best_start(design, face)
+    held = int(chosen.sum())
+    enough = _CURVED if face.off.sum() < 2 else _CURVED_BEYOND_TWO
+    if held < max(7, count - max(1, count // 10)):
+        return None
+    flat, _, flat_without = _squares(design[:, :3].copy(), face, chosen)
+    bent, found, bent_without = _squares(design, face, chosen)
+    if found is None:
+        return None
+    excess = bent / (held - 6)
+    rough = not face.known or excess > likely_ratio(held - 6, 3.0902)
+    scale = max(excess, 1e-300) if rough else 1.0
+    critical = 3.0 * fdtri(3, held - 6, 0.999) if rough else _CURVED
+    if not (flatness - score) / scale > enough:
+        return None
+    least = (flat_without - bent_without)[chosen].min()  # one blunder at a corner bends a quadric by itself
+    if (flat - bent) / scale <= critical or least / scale <= _CURVED_WITHOUT:
+        return None
+    coefficients, covariance = found
+    unit = size ** np.array([0, 1, 1, 2, 2, 2])
+    return score, _curvature(coefficients / unit, covariance * scale / np.outer(unit, unit), held, count)
+
+
+def _best_start(design: Array, face: _Heights) -> tuple[Bools, float]:
+    """Points that a quadric explains, grown from all points or from those on the plane; and what it leaves."""
+    fewest = max(7, len(face.z) // 2 + 2)
+    best, least = ~face.off, math.inf
+    for start in (np.ones_like(face.off), ~face.off):
+        chosen = grow_columns(design, face.z, face.root, start, fewest)
+        residuals, lever = face.z.copy(), np.empty_like(face.z)
+        fit_columns(design, face.z, face.root, chosen, np.empty((6, 6)), residuals, lever)
+        score = truncated_sum(face.root, residuals)
+        if score < least:
+            best, least = chosen, score
+    return best, least
+
+
+def _squares(design: Array, face: _Heights, chosen: Bools) -> tuple[float, tuple[Array, Array] | None, Array]:
+    """Sum of squares of the chosen points, (coefficients, covariance), and (n,) the sum without each point."""
+    width = design.shape[1]
+    inverse, residuals, lever = np.empty((width, width)), face.z.copy(), np.zeros_like(face.z)
+    coefficients = fit_columns(design, face.z, face.root, chosen, inverse, residuals, lever)
+    squares = (face.root * residuals) ** 2
+    total = float(squares[chosen].sum())
+    without = total - squares / np.maximum(1.0 - lever, 1e-9)
+    return total, None if math.isnan(coefficients[0]) else (coefficients, inverse), without
+
+
+def _curvature(coefficients: Array, covariance: Array, held: int, count: int) -> FaceShape:
+    """Principal curvatures at the centroid of z = z₀ + p u + q v + a u² + b uv + c v², positive towards the observer.
+
+    Eigenvalues of the second fundamental form in the first (do Carmo 1976, section 3.3).
+    """
+    slope, (a, b, c) = coefficients[1:3], coefficients[3:]
+    stretch = math.sqrt(1.0 + float(slope @ slope))
+    inverse = np.linalg.inv(np.linalg.cholesky(np.eye(2) + np.outer(slope, slope)))
+    values, vectors = np.linalg.eigh(inverse @ np.array([[2.0 * a, b], [b, 2.0 * c]]) @ inverse.T / stretch)
+    order = np.argsort(-np.abs(values))
+    curvature = -values[order]
+    directions = (inverse.T @ vectors[:, order]).T
+    change = np.array([[2.0 * e * e, 2.0 * e * f, 2.0 * f * f] for e, f in directions]) / stretch
+    deviation = np.sqrt(np.einsum("ki,ij,kj->k", change, covariance[3:, 3:], change))
+    side = "outwards" if curvature[0] > 0.0 else "inwards"
+    radius = 1.0 / abs(curvature[0])
+    text = (
+        f"curved {side}: radius {radius:.3g} m ± {deviation[0] * radius**2:.2g} m, "
+        f"across it {curvature[1]:.2g} ± {deviation[1]:.2g} 1/m, by {held} of {count} points"
+    )
+    return FaceShape(ShapeKind.CURVED, text, curvature=curvature, curvature_sigma=deviation)
+
+
+def _bevelled(face: _Heights) -> tuple[float, FaceShape] | None:
+    """A second plane beyond a line, with what both leave unexplained, if it says enough more than one."""
+    flat = truncated_sum(face.root, face.z)
+    if face.off.sum() < 2 or flat <= _STRIP:
+        return None
+    score, within, far, way, plane = fit_two_planes(face.u, face.v, face.z, face.root)
+    redundancy = max(len(face.z) - 6, 1)
+    scale = max(within / redundancy, 1.0 if face.known else 0.0)
+    enough = _STRIP if math.isnan(plane[2]) else _SECOND_PLANE
+    if not flat - score > enough * max(scale, 1e-300):
+        return None
+    score += _SEARCH
+    beyond = tuple(np.flatnonzero(far).tolist())
+    count, height = len(face.z), float(face.z[far].mean())
+    if math.isnan(plane[2]):
+        return score, _strip(beyond, face)
+    angle = math.atan(math.hypot(plane[1], plane[2]))
+    if angle > _STEEPEST:
+        return None
+    across = way[0] * face.u[far] + way[1] * face.v[far]
+    deviation = 1.0 / math.sqrt(float(((face.root[far] * (across - across.mean())) ** 2).sum()))
+    text = (
+        f"bevelled: {len(beyond)} of {count} points on a second plane turned {math.degrees(angle):.1f}° "
+        f"± {math.degrees(deviation):.1f}°, {_side(height)}"
+    )
+    return score, FaceShape(ShapeKind.BEVELLED, text, bevel_angle=angle, bevel_points=beyond)
+
+
+def _strip(beyond: tuple[int, ...], face: _Heights) -> FaceShape:
+    height = face.z[list(beyond)]
+    text = f"bevelled: {len(beyond)} of {len(face.z)} points along one edge, {_side(float(height.mean()))}"
+    return FaceShape(ShapeKind.BEVELLED, text, bevel_points=beyond)
+
+
+def _side(height: float) -> str:
+    return f"{abs(height) * 1e3:.0f} mm {'in front' if height > 0.0 else 'behind'} on average"
+
+
+def _eroded(face: _Heights) -> FaceShape | None:
+    """An edge that fell behind the face, though not to a plane: all points off the plane lie beyond one line."""
+    lost = int(face.off.sum())
+    if lost < 3 or (face.z[face.off] > 0.0).any():
+        return None
+    for angle in np.linspace(0.0, 2.0 * math.pi, 72, endpoint=False):
+        across = math.cos(angle) * face.u + math.sin(angle) * face.v
+        sound = int((across[~face.off] >= across[face.off].min()).sum())
+        if 3 * sound <= lost:
+            return _strip(tuple(np.flatnonzero(face.off).tolist()), face)
+    return None
+
+
+def _plane_or_rough(fit: FaceFit, face: _Heights) -> FaceShape:
+    count, lost = len(face.z), len(fit.rejected)
+    if lost > _SCATTERED * count:
+        return FaceShape(ShapeKind.ROUGH, f"rough: {lost} of {count} points off the plane, in no order")
+    ratio = max(float(((face.root * face.z) ** 2).mean()), 1.0)
+    # twice the negative logarithms of the likelihoods of wider scatter, and of blunders on a plane
+    wider, isolated = count * (1.0 + math.log(ratio)), truncated_sum(face.root, face.z)
+    if face.known and (fit.sigma0**2 > likely_ratio(fit.redundancy, 3.0902) or wider + _WIDER < isolated):
+        text = f"rough: points scatter {math.sqrt(ratio):.1f} times their standard deviation"
+        return FaceShape(ShapeKind.ROUGH, f"{text}, rms {fit.rms * 1e3:.1f} mm of {count - lost} points")
+    without = f" without {lost} isolated ones" if lost else ""
+    return FaceShape(ShapeKind.PLANE, f"plane: {count - lost} points{without}, rms {fit.rms * 1e3:.1f} mm")

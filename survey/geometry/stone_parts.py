@@ -1,10 +1,16 @@
 """Convex parts of any stone."""
 
-from survey.geometry.convex_parts import convex_parts
-from survey.geometry.infill_parts import grid_parts
-from survey.geometry.solids import Solid
+from collections.abc import Iterator, Sequence
+from itertools import permutations
 
-__all__ = ["stone_parts"]
+import numpy as np
+
+from survey.arrays import Array, Bools
+from survey.geometry.convex_parts import convex_parts
+from survey.geometry.solids import Solid, area_vector, volume_of
+from survey.geometry.watertight import triangulate
+
+__all__ = ["grid_parts", "stone_parts"]
 
 _MANY = 40  # faces of a solid from which it is first looked at as a storey of infill
 
@@ -22,3 +28,135 @@ def stone_parts(solid: Solid) -> tuple[Solid, ...]:
         if it has too many parts
     """
     return (grid_parts(solid) if len(solid.faces) > _MANY else None) or convex_parts(solid)
+
+
+Box = tuple[tuple[int, int], ...]
+
+_FAMILY = float(np.cos(np.radians(25.0)))  # planes that are nearer to parallel are of one family
+_SAME = 1e-7  # metres: faces whose corners are nearer to each other's planes lie in one
+_VOLUME = 1e-6  # by more of its volume the parts of a solid do not differ from it
+_AT_ONCE = 2_000_000  # solid angles that are computed together
+
+_BOX = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+"""Faces of a box whose corner k is at bits k₂ k₁ k₀ of its three axes, seen from outside if these are right-handed."""
+
+
+def grid_parts(solid: Solid) -> tuple[Solid, ...] | None:
+    """Cut a solid into hexahedra that fill it without overlap.
+
+    Parameters
+    ----------
+    solid : closed, with planar faces
+
+    Returns
+    -------
+    The parts, all under the solid's code; None if its faces are not in three families of planes that nowhere cross
+    """
+    origin = solid.vertices.mean(axis=0)
+    local = Solid(solid.code, solid.vertices - origin, solid.faces)
+    families = _families(local)
+    if families is None:
+        return None
+    nodes = _nodes(families)
+    filled = _inside(local, nodes)
+    best = min((_boxes(filled, order) for order in permutations(range(3))), key=len)
+    parts = [_part(solid.code, nodes, box) for box in best]
+    whole = volume_of(local)
+    if abs(sum(volume_of(part) for part in parts) - whole) > _VOLUME * whole:
+        return None
+    return tuple(Solid(part.code, part.vertices + origin, part.faces) for part in parts)
+
+
+def _families(solid: Solid) -> list[Array] | None:
+    """The planes (n, 4) of each of three families, one after the other; None if there are not, or planes cross."""
+    polygons = [solid.vertices[list(face)] for face in solid.faces]
+    groups: list[list[Array]] = []
+    for polygon in polygons:
+        vector = area_vector(polygon)
+        plane = np.append(vector, float(vector @ polygon.mean(axis=0))) / np.linalg.norm(vector)
+        group = next((one for one in groups if abs(one[0][:3] @ plane[:3]) > _FAMILY), None)
+        if group is None:
+            groups.append(group := [])
+        elif group[0][:3] @ plane[:3] < 0.0:
+            plane = -plane
+        if not any(np.abs(polygon @ one[:3] - one[3]).max() < _SAME for one in group):
+            group.append(plane)
+    if len(groups) != 3:
+        return None
+    families = [_in_order(group, solid.vertices) for group in groups]
+    return (
+        None if any(family is None for family in families) else [one for one in families if one is not None]
+    )
+
+
+def _in_order(planes: Sequence[Array], places: Array) -> Array | None:
+    """Planes one after the other along their mean normal; None if two cross where the solid is."""
+    mean = np.sum([plane[:3] for plane in planes], axis=0)
+    heights = np.array([(plane[3] - places @ plane[:3]) / (plane[:3] @ mean) for plane in planes])
+    order = np.argsort(heights.mean(axis=1))
+    if len(planes) < 2 or (np.diff(heights[order], axis=0) <= 0.0).any():
+        return None
+    return np.array([planes[k] for k in order])
+
+
+def _nodes(families: Sequence[Array]) -> Array:
+    """Where three planes, one of each family, meet: (n0, n1, n2, 3) [m]."""
+    i, j, k = np.meshgrid(*(np.arange(len(family)) for family in families), indexing="ij")
+    planes = np.stack([families[0][i], families[1][j], families[2][k]], axis=-2)
+    return np.asarray(np.linalg.solve(planes[..., :3], planes[..., 3:])[..., 0], dtype=np.float64)
+
+
+def _inside(solid: Solid, nodes: Array) -> Bools:
+    """Which cells are in a solid: seen from the middle of one, its faces fill the whole sphere."""
+    shape = tuple(n - 1 for n in nodes.shape[:3])
+    corners = [nodes[a : a + shape[0], b : b + shape[1], c : c + shape[2]] for a, b, c in np.ndindex(2, 2, 2)]
+    middles = np.mean(corners, axis=0, dtype=np.float64).reshape(-1, 3)
+    triangles = solid.vertices[triangulate(solid)]
+    inside = [
+        _angles(middles[start : start + _AT_ONCE // len(triangles)], triangles) > 2.0 * np.pi
+        for start in range(0, len(middles), _AT_ONCE // len(triangles))
+    ]
+    return np.concatenate(inside).reshape(shape)
+
+
+def _angles(points: Array, triangles: Array) -> Array:
+    """Solid angles (n,) under which points see a closed surface (van Oosterom and Strackee 1983)."""
+    a, b, c = (triangles[None, :, k] - points[:, None] for k in range(3))
+    la, lb, lc = (np.linalg.norm(one, axis=2) for one in (a, b, c))
+    volume = (a * np.cross(b, c)).sum(axis=2)
+    scale = la * lb * lc + (a * b).sum(axis=2) * lc + (b * c).sum(axis=2) * la + (c * a).sum(axis=2) * lb
+    out: Array = np.abs(2.0 * np.arctan2(volume, scale).sum(axis=1))
+    return out
+
+
+def _boxes(filled: Bools, order: Sequence[int]) -> list[Box]:
+    """Boxes of cells: from the first that is left as far as it goes, along one axis after the other."""
+    left, boxes = filled.copy(), []
+    for first in np.argwhere(filled).tolist():
+        if not left[tuple(first)]:
+            continue
+        spans = [[p, p + 1] for p in first]
+        for axis in order:
+            for stop in range(spans[axis][1], left.shape[axis]):
+                layer = [slice(*span) for span in spans]
+                layer[axis] = slice(stop, stop + 1)
+                if not left[tuple(layer)].all():
+                    break
+                spans[axis][1] = stop + 1
+        left[tuple(slice(*span) for span in spans)] = False
+        boxes.append(tuple((a, b) for a, b in spans))
+    return boxes
+
+
+def _part(code: str, nodes: Array, box: Box) -> Solid:
+    """The hexahedron of a box of cells."""
+    vertices = np.array([nodes[place] for place in _corners(box)])
+    part = Solid(code, vertices, _BOX)
+    return part if volume_of(part) > 0.0 else Solid(code, vertices, tuple(face[::-1] for face in _BOX))
+
+
+def _corners(box: Box) -> Iterator[tuple[int, int, int]]:
+    for i in box[0]:
+        for j in box[1]:
+            for k in box[2]:
+                yield i, j, k

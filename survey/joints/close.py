@@ -13,22 +13,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from survey.arrays import Array
+from survey.arrays import Array, Ints
 from survey.extrusion.extrusion import SurveyedBlock
+from survey.geometry.adjacency import Polyhedra
 from survey.geometry.solids import Solid, planes_of_solid
 from survey.geometry.stone_parts import stone_parts
 from survey.joints.bounded_closing import Building, Cut, as_building, close_within_bounds
-from survey.joints.closing_results import closing_report
 from survey.joints.contact_planes import ContactPlanes
-from survey.joints.facing import FacingFaces, find_facing
-from survey.joints.newly_facing import newly_facing
+from survey.joints.facing import FacingFaces, find_facing, planes_of
 from survey.joints.overlaps import find_overlaps, part_stones
-from survey.joints.report import ClosingReport
+from survey.joints.report import ClosingReport, closing_report
 from survey.joints.settings import JointMode, JointSettings
 from survey.simplify.simplify import BlockyStone, simplify
 
-__all__ = ["ClosedStones", "close_joints"]
-
+__all__ = ["ClosedStones", "close_joints", "newly_facing"]
 
 _ROUNDS = 4  # in which closing joints shows further ones, beside worn corners
 _MEETS = 1e-6  # metres: faces that are nearer share a plane
@@ -133,3 +131,52 @@ def _as_surveyed(building: Building, facing: FacingFaces) -> Cut:
     contact = ContactPlanes(first[:, :3], first[:, 3], of_link, np.ones(len(facing), np.int64))
     reasons = ["" if one else _AS_SURVEYED for one in shared.tolist()]
     return Cut(contact, reasons, list(building.solids), planes, free, {})
+
+
+def newly_facing(building: Building, facing: FacingFaces, cut: Cut, settings: JointSettings) -> FacingFaces:
+    """The pairs of faces that are known, and those of further stones that face each other now.
+
+    Parameters
+    ----------
+    building : the stones as surveyed
+    facing : pairs that are known
+    cut : the stones with the joints of these closed
+    settings : what counts as a joint; a joint that shows now is at most half as wide
+    """
+    solids = Polyhedra.gather((solid.vertices, solid.faces) for solid in cut.solids)
+    found = find_facing(solids, planes_of(solids), replace(settings, max_width=0.5 * settings.max_width))
+    pairs, owner = _surveyed_faces(building, cut)[found.faces], building.faces.planes.owner
+    known = set(map(tuple, owner[facing.faces].tolist()))
+    fresh = [
+        k
+        for k, (first, second) in enumerate(pairs.tolist())
+        if first >= 0 and second >= 0 and (int(owner[first]), int(owner[second])) not in known
+    ]
+    width = _height(building, pairs[fresh, 0], found, fresh) - _height(
+        building, pairs[fresh, 1], found, fresh
+    )
+    return FacingFaces(
+        np.concatenate([facing.faces, pairs[fresh]]),
+        np.concatenate([facing.area, found.area[fresh]]),
+        np.concatenate([facing.gap, width]),
+        np.concatenate([facing.centroid, found.centroid[fresh]]),
+        np.concatenate([facing.normal, found.normal[fresh]]),
+    )
+
+
+def _surveyed_faces(building: Building, cut: Cut) -> Ints:
+    """The surveyed face that each face of the stones now was; -1 for one that came with a bend of its bed."""
+    out = []
+    for i, solid in enumerate(cut.solids):
+        rows = building.rows(i)
+        of_face = np.array(cut.of_face.get(i, range(len(solid.faces))), np.int64)
+        out.append(np.where(of_face < rows.stop - rows.start, rows.start + of_face, -1))
+    return np.concatenate(out)
+
+
+def _height(building: Building, faces: Ints, found: FacingFaces, links: list[int]) -> Array:
+    """Where the planes of surveyed faces lie along the normal of a joint, seen from its middle [m]."""
+    normals, offsets = building.faces.planes.normals[faces], building.faces.planes.offsets[faces]
+    centroid, normal = found.centroid[links], found.normal[links]
+    out: Array = (offsets - (normals * centroid).sum(axis=1)) / (normals * normal).sum(axis=1)
+    return out

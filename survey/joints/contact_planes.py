@@ -16,8 +16,7 @@ from scipy.sparse.csgraph import connected_components
 
 from survey.arrays import Array, Bools, Ints
 from survey.geometry.adjacency import Polyhedra
-from survey.joints._kernels import fit_middle_planes
-from survey.joints._kernels_continuing import continuing_faces
+from survey.joints._kernels import continuing_faces, fit_middle_planes
 from survey.joints.bent_beds import bent
 from survey.joints.facing import FacePlanes, FacingFaces
 from survey.joints.settings import JointSettings

@@ -6,8 +6,7 @@ import numpy as np
 
 from survey.arrays import Array, Bools, Ints
 from survey.geometry._kernels.adjacency import face_planes, facing_faces
-from survey.geometry.adjacency import Polyhedra, open_to_each_other
-from survey.geometry.near_solids import boxes_of, near_pairs
+from survey.geometry.adjacency import Polyhedra, boxes_of, near_pairs, open_to_each_other
 from survey.joints.settings import JointSettings
 
 __all__ = ["FacePlanes", "FacingFaces", "find_facing", "planes_of"]

@@ -7,8 +7,8 @@ import numpy as np
 
 from survey.arrays import Array, Bools
 from survey.geometry._kernels.convexity import deepest_overlaps
+from survey.geometry.adjacency import boxes_of, near_pairs
 from survey.geometry.cutting import common_part, cut_stones, moves
-from survey.geometry.near_solids import boxes_of, near_pairs
 from survey.geometry.solids import Solid, volume_of
 
 __all__ = ["Overlapping", "find_overlaps", "part_stones"]

@@ -1,12 +1,20 @@
 """What closing the joints of a building found, changed, and left open."""
 
+from collections import defaultdict
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from survey.arrays import Array
-from survey.joints.settings import JointMode
+from survey.geometry.adjacency import Polyhedra
+from survey.geometry.cutting import moves
+from survey.joints.bounded_closing import Building, Cut
+from survey.joints.facing import FacePlanes, FacingFaces, find_facing, planes_of
+from survey.joints.overlaps import Overlapping
+from survey.joints.settings import JointMode, JointSettings
 
-__all__ = ["ClosingReport", "Gap", "Joint", "Overlap"]
+__all__ = ["ClosingReport", "Gap", "Joint", "Overlap", "closing_report"]
 
 
 @dataclass(frozen=True)
@@ -99,3 +107,156 @@ class ClosingReport:
     def largest_displacement(self) -> float:
         """Largest distance that any corner moved [m]."""
         return max((float(moved.max()) for moved in self.displacement.values()), default=0.0)
+
+
+# area, centroid and normal of faces in contact, by the pair of stones
+_Contacts = dict[tuple[int, int], list[tuple[float, Array, Array]]]
+
+_MEETS = 1e-6  # metres: faces of two stones that are nearer are in contact
+_SAME_WAY = 0.999  # cosine: contacts of two stones that look so much alike are of one joint
+_MOST_LOST = 0.5  # of the area in which two stones face each other: if more does not touch, a gap is reported
+_BENT = "the bed is bent or stepped here, and stones stay convex"
+
+
+def closing_report(
+    building: Building,
+    facing: FacingFaces,
+    cut: Cut,
+    overlaps: list[Overlapping],
+    settings: JointSettings,
+) -> ClosingReport:
+    """Tell joints, movements, gaps and overlaps.
+
+    Parameters
+    ----------
+    building : the stones before
+    facing : the pairs of faces that were to be closed
+    cut : what became of them, the solids in their last state
+    overlaps : stones that lie in each other still
+    settings : as they were closed
+    """
+    now = Polyhedra.gather((solid.vertices, solid.faces) for solid in cut.solids)
+    planes = planes_of(now)
+    joints = _joints(building, facing, cut, _contacts(now, planes, settings))
+    codes = [stone.code for stone in building.stones]
+    joined = {code for joint in joints for code in joint.stones}
+    facing_area = facing.area.tolist()
+    within = {frozenset(one.codes) for one in overlaps}
+    gaps = [
+        Gap(joint.stones, max(joint.width, 0.0), facing_area[k], joint.centroid, joint.left_open or _BENT)
+        for k, joint in enumerate(joints)
+        if (joint.left_open and frozenset(joint.stones) not in within)
+        or (not joint.left_open and joint.area < _MOST_LOST * facing_area[k])
+    ]
+    return ClosingReport(
+        mode=settings.mode,
+        joints=tuple(joints),
+        displacement={
+            code: moves(old, new) for code, old, new in zip(codes, building.solids, cut.solids, strict=True)
+        },
+        volume_change=dict(zip(codes, _volume_changes(building, cut, _volumes(now, planes)), strict=True)),
+        alone=tuple(code for code in codes if code not in joined),
+        gaps=tuple(gaps),
+        overlaps=_overlaps(building, overlaps),
+    )
+
+
+def _overlaps(building: Building, found: list[Overlapping]) -> tuple[Overlap, ...]:
+    """One entry for each two stones; what parts of a stone share with another is added up."""
+    together: dict[tuple[str, str], list[Overlapping]] = defaultdict(list)
+    for one in found:
+        together[one.codes].append(one)
+    out = []
+    for codes, parts in together.items():
+        volume = sum(one.volume for one in parts)
+        place = sum((one.volume * one.part.vertices.mean(axis=0) for one in parts), np.zeros(3)) / volume
+        out.append(Overlap(codes, volume, max(one.depth for one in parts), place + building.origin))
+    return tuple(out)
+
+
+def _volume_changes(building: Building, cut: Cut, after: Array) -> list[float]:
+    """New volume (n,) over old, minus 1, of each stone; zero for one that is as it was."""
+    before = _volumes(building.faces.solids, building.faces.planes)
+    out: list[float] = (after / before - 1.0).tolist()
+    pairs = zip(building.solids, cut.solids, out, strict=True)
+    return [0.0 if old is new else change for old, new, change in pairs]
+
+
+def _volumes(solids: Polyhedra, planes: FacePlanes) -> Array:
+    """Volumes (n,), by the divergence theorem [m³]."""
+    cones = planes.areas * planes.offsets / 3.0
+    out: Array = np.add.reduceat(cones, solids.solid_starts[:-1])
+    return out
+
+
+def _joints(building: Building, facing: FacingFaces, cut: Cut, touching: _Contacts) -> list[Joint]:
+    """All joints in the order of `facing`."""
+    planes, codes = building.faces.planes, [stone.code for stone in building.stones]
+    pairs = planes.owner[facing.faces]
+    cosines = -(planes.normals[facing.faces[:, 0]] * planes.normals[facing.faces[:, 1]]).sum(axis=1)
+    opening = np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0)))
+    joints = []
+    for k in range(len(facing)):
+        plane, reason = int(cut.contact.of_link[k]), cut.reasons[k]
+        area, centroid, normal = float(facing.area[k]), facing.centroid[k], facing.normal[k]
+        if not reason:
+            # the plane leads out of the first stone, the joint's normal into it
+            normal = -cut.contact.side[k] * cut.contact.normals[plane]
+            area, middle = _shared(touching.get((int(pairs[k, 0]), int(pairs[k, 1])), []), normal)
+            centroid = centroid if middle is None else middle
+        joints.append(
+            Joint(
+                stones=(codes[pairs[k, 0]], codes[pairs[k, 1]]),
+                plane=plane if not reason else -1,
+                width=float(facing.gap[k]) if reason else _width(building, facing, cut, k),
+                opening=float(opening[k]),
+                area=area,
+                centroid=centroid + building.origin,
+                normal=normal,
+                left_open=reason,
+            )
+        )
+    return joints
+
+
+def _width(building: Building, facing: FacingFaces, cut: Cut, link: int) -> float:
+    """How far the sound corners of the two faces lie apart, seen along the normal of their plane [m].
+
+    Corners that were seen count; hidden ones follow from them, and open a joint like a wedge where faces are turned.
+    """
+    faces, plane = building.faces, int(cut.contact.of_link[link])
+    side, total = float(cut.contact.side[link]), 0.0
+    for face, out in zip(facing.faces[link].tolist(), (side, -side), strict=True):
+        stone = int(faces.planes.owner[face])
+        rows = building.rows(stone)
+        begin, end = faces.solids.face_starts[[rows.start, rows.stop]]
+        first = int(faces.solids.corners[begin:end].min())
+        corners = faces.corners(face)
+        sound = corners[faces.sound[corners]]
+        seen = sound[sound < first + len(building.stones[stone].sound)]
+        known = seen if len(seen) else sound
+        if not len(known):
+            return float(facing.gap[link])
+        heights = faces.solids.vertices[known] @ cut.contact.normals[plane] - cut.contact.offsets[plane]
+        total -= out * float(heights.mean())
+    return total
+
+
+def _contacts(solids: Polyhedra, planes: FacePlanes, settings: JointSettings) -> _Contacts:
+    """All faces that are in contact now."""
+    close = replace(settings, max_width=_MEETS, max_angle=0.01, min_overlap=0.0)
+    found = find_facing(solids, planes, close)
+    out = defaultdict(list)
+    for k, (i, j) in enumerate(planes.owner[found.faces].tolist()):
+        out[i, j].append((float(found.area[k]), found.centroid[k], found.normal[k]))
+    return out
+
+
+def _shared(contacts: list[tuple[float, Array, Array]], normal: Array) -> tuple[float, Array | None]:
+    """Area and centroid of the contacts that look along a normal."""
+    alike = [(area, centroid) for area, centroid, own in contacts if own @ normal > _SAME_WAY]
+    total = sum(area for area, _ in alike)
+    if not total > 0.0:
+        return 0.0, None
+    middle: Array = np.sum([area * centroid for area, centroid in alike], axis=0) / total
+    return total, middle

@@ -16,9 +16,8 @@ from scipy.special import stdtr
 
 from survey.arrays import Array
 from survey.quality.bed_fit import BedCorners, BedScatter, fit_bed, pool, scatter_of
-from survey.quality.facades import Facade
+from survey.quality.facades import Facade, WallPlane
 from survey.quality.precision import StoneQuality
-from survey.quality.walls import WallPlane
 
 __all__ = [
     "ENOUGH",

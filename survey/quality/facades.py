@@ -7,10 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from survey.arrays import Array, Bools
-from survey.quality.walls import WallPlane, upright_frame
 
-__all__ = ["LEVEL", "WIDEST", "Facade", "find_facades"]
-
+__all__ = ["LEVEL", "WIDEST", "Facade", "WallPlane", "find_facades", "upright_frame"]
 
 WIDEST = 30.0
 """How far a face may be turned from the mean of its facade [degrees]."""
@@ -19,6 +17,25 @@ LEVEL = 45.0
 """A face that looks up or down by more than this is of no facade: a floor, a soffit, a coping [degrees]."""
 
 _ROUNDS = 50  # until the mean direction and the stones it takes agree; three or four do as a rule
+
+
+@dataclass(frozen=True)
+class WallPlane:
+    """Frame of the wall's mean plane.
+
+    Attributes
+    ----------
+    origin : (3,) mean of the stones' corners [m]
+    axes : (3, 3) rows: along the wall (level, if the wall stands), up, outward normal [-]
+    """
+
+    origin: Array
+    axes: Array
+
+    def flatten(self, points: Array) -> Array:
+        """Project points (…, 3) square onto the wall plane, (…, 2)."""
+        flat: Array = (points - self.origin) @ self.axes[:2].T
+        return flat
 
 
 @dataclass(frozen=True)
@@ -128,3 +145,18 @@ def _facade(name: str, rows: NDArray[np.intp], normals: Array, areas: Array, cen
     standing = name.startswith("facade")
     azimuth = float(np.degrees(np.arctan2(normal[0], normal[1])) % 360.0) if standing else None
     return Facade(name, rows, upright_frame(normal, origin), azimuth, float(weights.sum()))
+
+
+def upright_frame(normal: Array, origin: Array) -> WallPlane:
+    """The frame in which one stands before a wall: along it to the right, up, towards the viewer.
+
+    Parameters
+    ----------
+    normal : (3,) unit outward normal of the wall [-]
+    origin : (3,) [m]
+    """
+    # up the wall where it stands; for a floor or a vault's soffit any direction in the plane serves
+    upward = np.array([0.0, 0.0, 1.0]) if abs(normal[2]) < 0.9 else np.array([0.0, 1.0, 0.0])
+    along = np.cross(upward, normal)
+    along /= np.linalg.norm(along)
+    return WallPlane(origin, np.array([along, np.cross(normal, along), normal]))

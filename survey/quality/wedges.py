@@ -8,9 +8,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from survey.arrays import Array
-from survey.quality.facades import Facade
+from survey.quality.facades import Facade, upright_frame
 from survey.quality.precision import StoneQuality
-from survey.quality.walls import upright_frame
 
 __all__ = ["Wedge", "sloped_side", "wedges"]
 

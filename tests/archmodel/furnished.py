@@ -6,7 +6,7 @@ Every table has rows that are no longer held, which no query may find.
 from sqlalchemy.orm import Session
 
 from archmodel.database.session import Database
-from archmodel.store.store_runs import store_run
+from archmodel.store.runs import store_run
 from archmodel.tables.entities import Entity, Voussoir
 from archmodel.tables.entries import Entry, new_entry
 from archmodel.tables.knowledge import (

@@ -21,7 +21,7 @@ from archmodel.database.session import Database
 from archmodel.describe.entity import describe
 from archmodel.store.find_by_code import subjects
 from archmodel.store.run_record import JointArrays
-from archmodel.store.store_runs import store_run
+from archmodel.store.runs import store_run
 from archmodel.tables.entries import new_entry
 from tests.archmodel.stones import run_record
 

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from archmodel.store.measures import solid_volume, solid_volumes
+from archmodel.store.stone_rows import solid_volume, solid_volumes
 from tests.archmodel.stones import BOX_FACES, box_stone
 
 sizes = st.tuples(*[st.floats(0.05, 5.0)] * 3)

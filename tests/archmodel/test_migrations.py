@@ -19,8 +19,8 @@ from sqlalchemy import MetaData, inspect, select, text
 from archmodel.database.session import open_database
 from archmodel.migrations.migrate import migrate
 from archmodel.store.run_record import JointArrays, SimplificationRecord
+from archmodel.store.runs import store_run
 from archmodel.store.stones import load_stones, store_survey
-from archmodel.store.store_runs import store_run
 from archmodel.tables import layout
 from archmodel.tables.entities import Corbel, Entity, Joint
 from archmodel.tables.entries import new_entry

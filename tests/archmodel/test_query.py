@@ -5,7 +5,7 @@ import pytest
 from archmodel.database.session import Database
 from archmodel.query.api import attributes, describe, find, find_rows, row_of, rows_of
 from archmodel.query.attributes import ATTRIBUTES
-from archmodel.store.store_runs import store_run
+from archmodel.store.runs import store_run
 from archmodel.tables.entities import Header, Keystone, Voussoir
 from moma.errors import DatabaseError, QueryError, UsageError
 from tests.archmodel.stones import run_record

@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 from archmodel.database.session import Database
 from archmodel.describe.runs import compare_runs, describe_run, list_runs
 from archmodel.store.run_record import ErrorMeasures, JointArrays, SimplificationRecord
-from archmodel.store.store_runs import store_run
+from archmodel.store.runs import store_run
 from moma.errors import UsageError
 from tests.archmodel.stones import run_record
 

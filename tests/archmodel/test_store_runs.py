@@ -16,8 +16,8 @@ from archmodel.store.run_record import (
     SimplificationRecord,
     StoneResult,
 )
+from archmodel.store.runs import store_run
 from archmodel.store.stones import store_survey
-from archmodel.store.store_runs import store_run
 from archmodel.tables.entities import Entity
 from archmodel.tables.runs import ContactPoint, EntityResult, JointResult, Run
 from archmodel.tables.surveys import Simplification

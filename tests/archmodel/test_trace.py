@@ -9,7 +9,7 @@ from sqlalchemy import insert, select, update
 from archmodel.database.session import Database
 from archmodel.describe.trace import trace
 from archmodel.store.run_record import SimplificationRecord
-from archmodel.store.store_runs import store_run
+from archmodel.store.runs import store_run
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import latest_entry, new_entry
 from archmodel.tables.surveys import Measurement

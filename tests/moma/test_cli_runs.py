@@ -6,8 +6,8 @@ import pytest
 from typer.testing import CliRunner
 
 from archmodel.database.session import open_database
+from archmodel.store.runs import store_run
 from archmodel.store.stones import store_survey
-from archmodel.store.store_runs import store_run
 from moma.cli import app
 from tests.archmodel.stones import SHA, box_stone, run_record
 

@@ -14,7 +14,7 @@ from pipelines.draw.closing_pictures import (
     viewpoint,
 )
 from pipelines.draw.elevations.closing_shapes import closing_shapes, places
-from pipelines.draw.elevations.sheets import FLAG
+from pipelines.draw.elevations.sheet import FLAG
 from pipelines.draw.offscreen.closing import load_surface, save_surface
 from survey.geometry.solids import Solid, area_vector
 from survey.joints.report import ClosingReport, Gap, Joint, Overlap

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from two_facings_by_hand import contains, facing
 
-from survey.geometry.infill_parts import grid_parts
 from survey.geometry.solids import Solid, volume_of
+from survey.geometry.stone_parts import grid_parts
 from survey.geometry.watertight import check_watertight
 from survey.synthetic.buildings.facings import two_facings
 from survey.unseen.core.cells import CellGrid, grid_solids

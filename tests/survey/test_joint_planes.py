@@ -8,8 +8,7 @@ from plain_blocks import as_stone, bond, cuboid, drawn, moved
 from scipy.spatial.transform import Rotation
 
 from survey.geometry.solids import Solid
-from survey.joints._kernels import fit_middle_planes
-from survey.joints._kernels_continuing import continuing_faces
+from survey.joints._kernels import continuing_faces, fit_middle_planes
 from survey.joints.bounded_closing import as_building, close_within_bounds
 from survey.joints.contact_planes import contact_planes
 from survey.joints.facing import find_facing

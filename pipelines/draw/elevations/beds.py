@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipelines.arrays import Array
-from pipelines.draw.elevations.sheets import FLAG, INK, PALE, PLAIN, new_sheet, save_sheet
+from pipelines.draw.elevations.sheet import FLAG, INK, PALE, PLAIN, new_sheet, save_sheet
 from survey.quality.courses import SIGNIFICANT, CourseLine
 
 if TYPE_CHECKING:

@@ -11,14 +11,17 @@ from pipelines.arrays import Array
 from pipelines.draw.elevations.closing_shapes import ClosingShapes, DrawnStone
 from pipelines.draw.elevations.sheet import (
     CODES,
+    INK,
+    PALE,
     elevated,
     extent,
     frame_elevation,
+    new_sheet,
     palette,
+    save_sheet,
     sheet_size,
     write_codes,
 )
-from pipelines.draw.elevations.sheets import INK, PALE, new_sheet, save_sheet
 from pipelines.draw.offscreen.parts import nice_ceiling
 from survey.geometry.solids import Solid, area_vector
 from survey.geometry.watertight import triangulate

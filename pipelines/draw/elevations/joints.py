@@ -10,8 +10,16 @@ import numpy as np
 from pipelines.arrays import Array
 from pipelines.draw.elevations.closing import back_to_front, guess_key, hatch, name_stones, seen
 from pipelines.draw.elevations.closing_shapes import ClosingShapes, DrawnJoint, Place
-from pipelines.draw.elevations.sheet import elevated, extent, frame_elevation, sheet_size
-from pipelines.draw.elevations.sheets import FLAG, PALE, new_sheet, save_sheet
+from pipelines.draw.elevations.sheet import (
+    FLAG,
+    PALE,
+    elevated,
+    extent,
+    frame_elevation,
+    new_sheet,
+    save_sheet,
+    sheet_size,
+)
 from pipelines.draw.offscreen.parts import nice_ceiling
 from survey.quality.facades import Facade
 

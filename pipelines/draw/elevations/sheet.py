@@ -1,20 +1,36 @@
 """What elevations have in common: the plane that they are drawn in, the sheet, the axes, the codes of the stones."""
 
+import logging
 import math
+import warnings
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pipelines.arrays import Array
-from pipelines.draw.elevations.sheets import INK
 from survey.quality.facades import Facade
+
+__all__ = [
+    "CODES",
+    "FLAG",
+    "INK",
+    "PALE",
+    "PLAIN",
+    "elevated",
+    "extent",
+    "frame_elevation",
+    "new_sheet",
+    "palette",
+    "save_sheet",
+    "sheet_size",
+    "write_codes",
+]
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.colors import Colormap
-
-__all__ = ["CODES", "elevated", "extent", "frame_elevation", "palette", "sheet_size", "write_codes"]
 
 
 CODES = 250
@@ -89,3 +105,30 @@ def palette(unknown: str) -> "Colormap":
     from matplotlib.colors import ListedColormap
 
     return ListedColormap(colormaps[_PALETTE](np.linspace(0.0, _LIGHTER, 256))).with_extremes(bad=unknown)
+
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+_DPI = 150
+INK, PALE = "#222222", "#a9a59e"
+FLAG, PLAIN = "#d55e00", "#0072b2"  # vermilion and blue of Okabe and Ito: told apart by everybody
+
+
+def new_sheet(size: tuple[float, float]) -> "Figure":
+    """An empty figure of so many inches, without a window."""
+    # matplotlib tells on stderr that it builds its font cache, once per machine
+    logging.getLogger("matplotlib.font_manager").setLevel(logging.ERROR)
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=size, layout="constrained")
+
+
+def save_sheet(figure: "Figure", path: Path) -> None:
+    """Write a figure as PNG."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings(
+            "ignore", "Glyph"
+        )  # codes in scripts that the font does not have show as boxes
+        figure.savefig(path, dpi=_DPI)

@@ -9,14 +9,18 @@ import numpy as np
 
 from pipelines.draw.elevations.sheet import (
     CODES,
+    FLAG,
+    INK,
+    PALE,
     elevated,
     extent,
     frame_elevation,
+    new_sheet,
     palette,
+    save_sheet,
     sheet_size,
     write_codes,
 )
-from pipelines.draw.elevations.sheets import FLAG, INK, PALE, new_sheet, save_sheet
 from pipelines.draw.offscreen.parts import nice_ceiling
 from survey.quality.facades import Facade
 from survey.quality.precision import Histogram, StoneQuality

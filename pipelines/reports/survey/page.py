@@ -5,8 +5,7 @@ from collections.abc import Iterable, Mapping
 from html import escape
 from pathlib import Path
 
-from pipelines.reports.html import figure, page
-from pipelines.reports.html_tables import table
+from pipelines.reports.html import figure, page, table
 from pipelines.reports.survey.study import SurveyFile, SurveyStudy
 from survey.quality.canon import Deviation
 from survey.quality.courses import CourseHeight, CourseLine

@@ -14,7 +14,7 @@ from moma.errors import GeometryError
 from survey.arrays import Array
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.solids import Solid, area_vector
-from survey.quality.walls import WallPlane, upright_frame
+from survey.quality.facades import WallPlane, upright_frame
 from survey.unseen.core.settings import InfillSettings
 
 __all__ = ["FacingStone", "FacingWall", "facing_stone", "find_walls", "wall_between"]

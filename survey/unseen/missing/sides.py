@@ -12,8 +12,7 @@ import numpy as np
 from survey.arrays import Array
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.faces.neighbours import Neighbours
-from survey.quality.facades import find_facades
-from survey.quality.walls import WallPlane
+from survey.quality.facades import WallPlane, find_facades
 
 __all__ = ["Elevation", "FlatStone", "Line", "elevations", "line_through", "meeting"]
 

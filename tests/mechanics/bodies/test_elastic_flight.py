@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from mechanics.dynamics.observers.energy import elastic_energy, kinetic_energy
 from mechanics.dynamics.simulation import Clock, Simulation
 from mechanics.dynamics.stepping import predict
-from mechanics.model._kernels_elastic import deform, rigid_part
+from mechanics.model._kernels import deform, rigid_part
 from mechanics.model.model import build_model
 from mechanics.scene.scene import Fidelity
 from mechanics.stones.meshing.elements import Element
