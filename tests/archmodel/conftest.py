@@ -9,7 +9,7 @@ import pytest
 from archmodel.database.session import Database, open_database
 from archmodel.store.stone_record import StoneRecord
 from archmodel.store.stones import store_survey
-from tests.archmodel.recycling import Recycled
+from tests.archmodel.reused_databases import Recycled
 from tests.archmodel.stones import SHA, box_stone
 from tests.postgresql import Server
 

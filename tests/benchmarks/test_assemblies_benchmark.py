@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.survey.assemblies import groin, obj
-
-ROOT = Path(__file__).resolve().parents[2]
+from tests.paths import ROOT
+from tests.survey.joints.assemblies import groin, obj
 
 
 @pytest.mark.slow

@@ -5,7 +5,6 @@ import json
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,8 +13,8 @@ from benchmarks import fc3d, lmgc90
 from benchmarks.generated import running_bond
 from benchmarks.scenes import write_scene
 from moma.errors import UsageError
+from tests.paths import ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
 SIDES = (
     "step",
     "first",

@@ -2,7 +2,6 @@
 
 import itertools
 import re
-from pathlib import Path
 
 import pytest
 
@@ -12,8 +11,8 @@ from benchmarks.profiles import measured_rows, ratios
 from pipelines.tuning.expected_errors import BOUNDS, TYPICAL
 from pipelines.tuning.measured_errors import COLLAPSE
 from pipelines.tuning.profiles import PROFILES
+from tests.paths import ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
 # less is what solver and balance leave
 LEAST = 1e-4
 CASES = {case.name: case for case in collapse.CASES}

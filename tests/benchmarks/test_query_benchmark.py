@@ -4,7 +4,6 @@ import json
 import math
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 from sqlalchemy import func, select
@@ -16,8 +15,8 @@ from archmodel.tables.runs import ContactPoint, EntityResult, JointResult
 from archmodel.tables.structures import Arch
 from benchmarks import query_child
 from benchmarks.building import COURSES, RUNS
+from tests.paths import ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
 STONES = 2000
 
 

@@ -23,7 +23,7 @@ from mechanics.scene.laws.law import STATE
 from mechanics.scene.scene import Block, ContactSettings, Fidelity, Part, Placement, Scene, TimeSettings
 from mechanics.scene.state import State
 from mechanics.stones.materials import Material
-from tests.pipelines.handmade import BOX_FACES, box
+from tests.pipelines.results_by_hand import BOX_FACES, box
 
 LIMESTONE = Material("limestone", density=2000.0, young=1e9, poisson=0.2)
 TURN = Rotation.from_rotvec([0.4, -0.7, 1.1]).as_matrix()

@@ -1,5 +1,4 @@
 import json
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -10,8 +9,9 @@ from survey.faces.faces import outline_face
 from survey.formats.native.reader import read_moma
 from survey.joints.close import ClosedStones, close_joints
 from survey.records.survey import Survey
+from tests.paths import ROOT
 
-SAMPLE = Path(__file__).parents[2] / "data" / "samples" / "window"
+SAMPLE = ROOT / "data" / "samples" / "window"
 
 
 @pytest.fixture(scope="session")

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from assemblies import prism
 
 from survey.arrays import Array
 from survey.extrusion.depth import Depth
@@ -13,6 +12,7 @@ from survey.extrusion.imported_solids import block_of_solid
 from survey.faces.faces import outline_face
 from survey.geometry.solids import Solid
 from survey.records.survey import BlockRecord, SolidRecord
+from tests.survey.joints.assemblies import prism
 
 DEPTH = Depth(0.4, None, "test", "kind", 1)
 OBSERVER = np.array([0.5, -9.0, 0.5])

@@ -6,7 +6,6 @@ This proves the table of methods and laws in docs/theory.md; the last test holds
 import re
 from dataclasses import dataclass, replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,6 +21,7 @@ from mechanics.scene.scene import ContactSettings, Fidelity, Method, Placement, 
 from mechanics.solvers.choice import choose_planar_solver, choose_solver
 from moma.errors import SolverError
 from tests.mechanics.shapes import brick, ground, posed, scene
+from tests.paths import ROOT
 
 RIGID, SOFT = Fidelity.RIGID, Fidelity.DEFORMABLE
 STEP, G = 2e-3, 9.81
@@ -254,7 +254,7 @@ def test_a_method_that_does_not_suit_the_plane_is_refused():
 
 
 def test_the_table_of_methods_is_that_of_these_tests():
-    text = (Path(__file__).parents[3] / "docs/theory.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs/theory.md").read_text(encoding="utf-8")
     rows = {m[1]: m[0] for m in re.finditer(r"^\| `([a-z-]+)` \|.*$", text, re.MULTILINE)}
     assert set(rows) == {str(one) for one in METHODS}
     for method, row in rows.items():

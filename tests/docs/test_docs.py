@@ -1,0 +1,139 @@
+"""The commands of the documentation run as they are written; the main job runs on rigid stones here."""
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+
+import pytest
+
+from tests.paths import ROOT
+
+PAGES = ("README.md", "docs/howto/first-run.md", "docs/howto/survey.md")
+SCENE = "data/samples/window/window.toml"
+
+
+def blocks(page, language):
+    text = (ROOT / page).read_text(encoding="utf-8")
+    return re.findall(rf"^```{language}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+
+
+def commands(page):
+    """The moma commands of a page, in order."""
+    lines = [line.strip() for block in blocks(page, "bash") for line in block.splitlines()]
+    return [shlex.split(line, comments=True) for line in lines if line.startswith("moma ")]
+
+
+@pytest.fixture
+def place(tmp_path):
+    """A folder in which the documentation's paths exist, with a scene that is quick to run."""
+    sample = tmp_path / "data/samples/window"
+    sample.mkdir(parents=True)
+    (sample / "window.moma").symlink_to(ROOT / "data/samples/window/window.moma")
+    (tmp_path / "docs/howto").mkdir(parents=True)
+    for folder in ("survey", "query"):
+        (tmp_path / "docs/howto" / folder).symlink_to(ROOT / "docs/howto" / folder)
+    (sample / "knowledge.toml").symlink_to(ROOT / "data/samples/window/knowledge.toml")
+    text = (ROOT / SCENE).read_text(encoding="utf-8")
+    assert 'default = "deformable"' in text
+    quick = text.replace('default = "deformable"', 'default = "rigid"').replace(
+        "[materials", 'where = ["course <= 3"]\n\n[materials', 1
+    )
+    (sample / "window.toml").write_text(quick, encoding="utf-8")
+    return tmp_path
+
+
+def execute(arguments, folder):
+    environment = {name: value for name, value in os.environ.items() if name != "MOMA_DB"}
+    environment["PYTHONPATH"] = str(ROOT)
+    return subprocess.run(arguments, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_the_commands_run_in_their_order(page, place):
+    found = commands(page)
+    assert found
+    for command in found:
+        done = execute([sys.executable, "-m", *command], place)
+        assert done.returncode == 0, (command, done.stderr)
+        assert "error" not in done.stderr, (command, done.stderr)
+
+
+def test_the_python_of_the_readme_runs(place):
+    (script,) = blocks("README.md", "python")
+    done = execute([sys.executable, "-W", "error", "-c", script], place)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("W03-")
+
+
+def test_the_python_of_the_how_to_on_rigid_blocks_prints_what_it_says(place):
+    page = "docs/howto/rigid-blocks.md"
+    done = execute([sys.executable, "-W", "error", "-c", "\n".join(blocks(page, "python"))], place)
+    assert done.returncode == 0, done.stderr
+    said = "".join(blocks(page, "text")).splitlines()
+    energy = said.pop(1)
+    printed = done.stdout.splitlines()
+    assert float(printed.pop(1).split()[-1]) < 1e-12, energy
+    assert printed == said
+
+
+def test_what_the_how_to_on_surveys_shows_is_what_the_files_and_commands_say(place):
+    page = "docs/howto/survey.md"
+    said = [
+        path.read_text(encoding="utf-8") for path in (ROOT / "docs/howto/survey").iterdir() if path.is_file()
+    ]
+    shown_whole = [
+        one for one in commands(page) if "data/samples/window/window.moma" in one or "--keep-going" in one
+    ]
+    said += [execute([sys.executable, "-m", *command], place).stdout for command in shown_whole]
+    said.append((place / "rejects.txt").read_text(encoding="utf-8"))
+    known = set("\n".join(said).splitlines())
+    shown = [line for block in blocks(page, "text") for line in block.splitlines()]
+    assert len(shown) > 20
+    assert [line for line in shown if line not in known] == []
+
+
+def test_the_questions_of_the_how_to_on_queries_have_the_answers_it_shows(place):
+    page = "docs/howto/query.md"
+    text = (ROOT / page).read_text(encoding="utf-8")
+    pieces = re.findall(r"^```(bash|text|python)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    questions = 0
+    for (language, block), (following, answer) in zip(pieces, [*pieces[1:], ("", "")], strict=True):
+        for number, line in enumerate(block.splitlines() if language == "bash" else []):
+            command = shlex.split(line)
+            done = execute([sys.executable, "-m", *command], place)
+            assert done.returncode == 0, (command, done.stderr)
+            shown = answer if following == "text" and number == 0 else ""
+            if command[1] == "query" and "--format" not in command:
+                assert done.stdout == shown, command  # the whole answer
+            else:
+                assert set(untimed(shown)) <= set(untimed(done.stdout)), command
+            questions += command[1] not in ("ingest", "record", "run")
+    assert questions >= 15
+    (script,) = blocks(page, "python")
+    done = execute([sys.executable, "-W", "error", "-c", script], place)
+    assert done.stdout.split() == ["W10-03", "10", "W10-06", "10"], done.stderr
+
+
+def untimed(text):
+    """Lines without the instants in them, which differ from day to day."""
+    return re.sub(r"\d{4}-\d\d-\d\dT[:\d]+\+00:00", "", text).splitlines()
+
+
+def test_the_links_of_the_pages_lead_somewhere():
+    for page in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]:
+        for link in re.findall(r"\]\(([^)#]+)", page.read_text(encoding="utf-8")):
+            if "://" not in link:
+                assert (page.parent / link).exists(), (page.name, link)
+
+
+def test_the_makefile_makes_what_the_readme_says():
+    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+    asked = {
+        line.split()[1]
+        for block in blocks("README.md", "bash")
+        for line in block.splitlines()
+        if "make " in line
+    }
+    assert asked <= targets

@@ -1,0 +1,185 @@
+"""docs/formats.md is true of the survey files that are read, and of the files that a run writes."""
+
+import re
+import shlex
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from moma.cli import app
+from pipelines.results.joints_csv import JOINT_COLUMNS
+from pipelines.results.vtk import body_cells, body_grid, contact_grid, joint_grid
+from pipelines.run.summary import summarise
+from survey.formats.native import reader as moma_ascii
+from survey.formats.native.header import HeadReader
+from survey.formats.native.stone import STONE_WORDS
+from survey.formats.points.csv import NEEDED, OPTIONAL
+from survey.formats.reading import FORMATS, ReadingOptions, open_survey, with_header
+from survey.geometry.solids import Solid
+from survey.records.survey import Reject
+from tests.paths import ROOT
+from tests.pipelines.results_by_hand import deformable_body, result_of, rigid_body
+from tests.survey.joints.assemblies import dome, obj
+
+PAGE = (ROOT / "docs" / "formats.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def result():
+    return result_of(
+        [
+            rigid_body("base", (0, 0, 0), (1, 1, 1)),
+            deformable_body("D1", (0, 0, 1), (1, 1, 3), lambda points: np.ones(len(points)), 1.0),
+        ]
+    )
+
+
+def rows(heading, columns):
+    """Cells of the table under a heading."""
+    section = re.split(r"\n## |\n# (?=[A-Z])", PAGE.split(f"\n## {heading}")[1])[0]
+    found = [[cell.strip() for cell in line.strip().strip("|").split("|")] for line in section.splitlines()]
+    return [row for row in found if len(row) == columns and row[0].startswith("`")]
+
+
+def test_every_array_is_documented_with_its_place_and_unit(result):
+    frame = result.frames[-1]
+    for heading, grid in (
+        ("Stones", body_grid(result, frame, body_cells(result))),
+        ("Contact points", contact_grid(frame.contacts)),
+        ("Joints", joint_grid(result.joints)),
+    ):
+        written = [
+            (f"`{name}`", on, grid.units.get(name, ""))
+            for on, data in (("points", grid.point_data), ("cells", grid.cell_data))
+            for name in data
+        ]
+        assert [tuple(row[:3]) for row in rows(heading, 4)] == written
+
+
+def test_every_column_of_the_joints_is_documented():
+    assert rows("Joints", 2) == [[f"`{name}`", meaning] for name, meaning in JOINT_COLUMNS.items()]
+
+
+def test_every_key_of_the_summary_is_documented(result):
+    section = PAGE.split("\n## `summary.json`")[1].split("\n## ")[0]
+    named = set(re.findall(r"`(\w+)`", section))
+    summary = summarise(result, version="1", seconds={})
+    assert set(summary) <= named
+    assert set(summary["joints"]) <= named
+    assert set(summary["stress"]) <= named
+
+
+def examples(language):
+    """The examples of a format: what is behind its name, and the text."""
+    return re.findall(rf"^```{language}(?: ([^\n]*))?\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
+
+
+def stones(path, text, format, **options):
+    path.write_text(text, encoding="utf-8")
+    stream = open_survey(path, format, ReadingOptions(**options))
+    found = list(stream.blocks)
+    assert not [one.error for one in found if isinstance(one, Reject)]
+    return stream.head, found
+
+
+def test_the_native_example_is_read(tmp_path):
+    ((_, text),) = examples("moma")
+    head, (first, second) = stones(tmp_path / "a.moma", text, "moma")
+    assert (head.name, len(head.stations), len(head.control)) == ("north wall, bay 3", 2, 3)
+    assert (len(head.depth_rules), len(head.canons), head.extrusion.tail) == (4, 1, 0.9)
+    assert [len(one.marks) for one in head.photographs] == [4]
+    assert (first.zone, first.station, first.depth, first.notes) == (
+        "west bay",
+        "S2",
+        0.51,
+        {"edge": "eroded"},
+    )
+    assert (len(first.vertices), len(first.points), first.sigmas[3]) == (4, 2, 0.010)
+    assert (second.photograph, second.image.shape, len(second.vertices)) == ("P1", (4, 2), 0)
+
+
+def test_the_header_file_is_read(tmp_path):
+    ((_, text),) = examples("moma-head")
+    path = tmp_path / "head.moma"
+    path.write_text(text, encoding="utf-8")
+    options = with_header(ReadingOptions(), path)
+    assert (len(options.head.stations), len(options.head.depth_rules), options.sigma) == (1, 1, 0.004)
+
+
+def test_the_tables_are_read(tmp_path):
+    (_, one), (_, other) = examples("csv")
+    _, (block,) = stones(tmp_path / "a.csv", one, "csv")
+    assert (block.code, block.depth, block.sigmas.tolist()) == ("W01-01", 0.51, [0.003, 0.003, 0.003, 0.010])
+    _, (block,) = stones(tmp_path / "b.csv", other, "csv")
+    assert (block.zone, block.depth, block.depth_sigma) == ("west bay", 0.45, 0.02)
+    assert block.depth_source == "drilled; see report"
+    assert block.points.tolist() == [[10.16, 37.98, 6.86]]
+
+
+def test_the_point_lists_are_read(tmp_path):
+    (first, one), (template, other) = examples("pnezd")
+    assert first == ""
+    head, (block,) = stones(tmp_path / "a.txt", one, "pnezd")
+    assert [station.name for station in head.stations] == ["S1"]
+    assert block.kind == "ashlar"
+    _, (again,) = stones(tmp_path / "b.txt", other, "pnezd", codes=template)
+    assert (again.kind, again.course, again.names) == ("header", 1, ("104", "101", "102", "103"))
+    np.testing.assert_array_equal(again.vertices, block.vertices)
+    np.testing.assert_array_equal(again.points, block.points)
+
+
+def test_the_solid_is_read(tmp_path):
+    ((_, text),) = examples("obj")
+    _, (solid,) = stones(tmp_path / "a.obj", text, "solids")
+    assert (solid.code, solid.kind, [len(face) for face in solid.faces]) == ("W1", "header", [4] * 6)
+
+
+def test_the_grammar_is_that_of_the_reader():
+    """The one beside the code has remarks, and the same productions."""
+    ((_, grammar),) = examples("ebnf")
+    lines = re.sub(r"\(\* .*? \*\)", "", moma_ascii.__doc__).splitlines()
+    beside = [line.strip() for line in lines if re.match(r"    (\w+ +=|  +\|) ", line)]
+    assert beside == [line.strip() for line in grammar.splitlines()]
+
+
+def test_every_word_of_the_native_format_is_explained():
+    heads, stone, _ = PAGE.split("\n## The native format")[1].split("\n### ")[0].split("|---|---|")[1:]
+    named = [re.findall(r"^\| (`.*?) \|", text, re.MULTILINE) for text in (heads, stone)]
+    words = [set(re.findall(r"`(\w+)`", " ".join(one))) for one in named]
+    assert words[0] == set(HeadReader().takers)
+    assert words[1] == set(STONE_WORDS) - {"end"}
+
+
+def test_every_column_of_the_tables_is_explained():
+    names = [name for row in rows("Tables of points", 2) for name in re.findall(r"`(\w+)`", row[0])]
+    assert names == [*NEEDED, *OPTIONAL]
+
+
+def test_every_format_is_explained():
+    table = PAGE.split("\n## ")[0]
+    named = [
+        name for row in re.findall(r"^\| (`.*?) \|", table, re.MULTILINE) for name in row.split("`")[1::2]
+    ]
+    assert [name for name in named if not name.startswith("-")] == list(FORMATS)
+
+
+def test_the_commands_for_solids_do_what_they_say(tmp_path, monkeypatch):
+    """On two rings of a dome, rounded to a millimetre, the lower of which stands on the ground."""
+    section = PAGE.split("\n## Closed solids")[1].split("\n# Result files")[0]
+    found = re.findall(r"^```sh\n(.*?)^```$", section, re.MULTILINE | re.DOTALL)
+    assert [line.split()[1] for text in found for line in text.splitlines()] == ["ingest", "ingest"]
+    stones = [Solid(one.code, one.vertices - np.array([0, 0, 0.49]), one.faces) for one in dome(2)]
+    (tmp_path / "vault.obj").write_text(obj(stones, 3))
+    monkeypatch.chdir(tmp_path)
+    printed = []
+    for number, text in enumerate(found):
+        for line in text.splitlines():
+            command = [*shlex.split(line)[1:], "--db", f"sqlite:///{number}.db"]
+            done = CliRunner().invoke(app, command)
+            assert done.exit_code == 0, done.output
+            printed.append(done.stdout)
+    assert "20 stones of survey 'vault' (20 ashlar)" in printed[0]
+    assert "0 convex, 20 not" in printed[0]
+    assert "contacts brought into" in printed[0]
+    assert "(10 support, 10 voussoir)" in printed[1]

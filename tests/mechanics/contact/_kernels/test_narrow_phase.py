@@ -1,0 +1,337 @@
+"""The contact points of two faces or two edges, against clipping twins and the moments of their overlap."""
+
+import numpy as np
+import pytest
+from hypothesis import assume, example, given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from mechanics.contact._kernels import narrow_phase as kernel
+from mechanics.contact.surfaces import surfaces
+from tests.mechanics.contact.polygons import clip, moments, overlap
+from tests.mechanics.shapes import ellipse, prism
+from tests.pipelines.results_by_hand import BOX_FACES, box
+
+FLAT, THIN = np.cos(np.radians(5.0)), 1e-6
+UP = np.array([0.0, 0.0, 1.0])
+seeds = st.integers(0, 2**32 - 1)
+coordinate = st.integers(-128, 128).map(lambda i: i / 64)
+
+
+# --- clipping ---
+
+
+def clipped(ring, a, b, side=2, slack=1e-9):
+    """Kept corners (n, 3) and their labels."""
+    x, y, z = (np.zeros(kernel.MAX_POINTS) for _ in range(3))
+    label = np.zeros(kernel.MAX_POINTS, dtype=np.int64)
+    count = len(ring)
+    x[:count], y[:count], z[:count], label[:count] = *ring.T, np.arange(count)
+    scratch = np.zeros_like(x), np.zeros_like(x), np.zeros_like(x), np.zeros_like(label)
+    count = kernel.clip(x, y, z, label, count, *a, *b, side, slack, *scratch)
+    return np.column_stack([x, y, z])[:count], label[:count].tolist()
+
+
+def assert_same_ring(found, expected, atol):
+    """The same corners in the same order round, wherever it begins; corners that fall together count once."""
+
+    def distinct(ring):
+        apart = np.linalg.norm(ring - np.roll(ring, 1, axis=0), axis=1) > atol
+        return ring[apart]
+
+    found, expected = distinct(found), distinct(expected)
+    assert len(found) == len(expected)
+    if len(found):
+        begin = np.linalg.norm(expected - found[0], axis=1).argmin()
+        np.testing.assert_allclose(found, np.roll(expected, -begin, axis=0), atol=atol)
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.integers(3, 8), st.tuples(coordinate, coordinate), st.tuples(coordinate, coordinate))
+def test_clipping_keeps_what_lies_left_of_the_line(sides, a, b):
+    assume(a != b)
+    ring = np.column_stack([ellipse(sides, (1.0, 0.7), 0.3), np.linspace(0, 1, sides)])
+    found, label = clipped(ring, a, b)
+    a, b = np.array([*a, 0.0]), np.array([*b, 0.0])
+    assert_same_ring(found, clip(ring, a, np.cross(b - a, UP)), atol=1e-8)
+    assert len(set(label)) == len(label)
+
+
+def test_clipping_along_an_edge_takes_nothing_and_renames_nothing():
+    square = np.array([(0, 0, 0.1), (1, 0, 0.2), (1, 1, 0.3), (0, 1, 0.4)])
+    for a, b in zip(square[:, :2], np.roll(square[:, :2], -1, axis=0), strict=True):
+        for nudge in (-1e-10, 0.0, 1e-10):
+            found, label = clipped(square, a + nudge, b + nudge)
+            np.testing.assert_array_equal(found, square)
+            assert label == [0, 1, 2, 3]
+
+
+def test_points_are_named_after_the_edge_that_begins_in_them():
+    square = np.column_stack([box((0, 0, 0), (1, 1, 0))[:4, :2], np.zeros(4)])
+    # what lies left of x = 1/2, upwards: corners 0 and 3, and both cuts
+    found, label = clipped(square, (0.5, 0), (0.5, 1), side=5)
+    np.testing.assert_allclose(found[:, :2], [(0, 0), (0.5, 0), (0.5, 1), (0, 1)])
+    assert label == [0, kernel.MAX_CORNERS + 5, 2, 3]
+
+
+# --- the points of two faces ---
+
+
+def points_of(first, second, kind, feature, axis=UP, points=4, inner=False, limit=0.1):
+    """Contact points of one pair with a given feature: place, frame, nearest, area."""
+    stones = first, second
+    packed = surfaces(
+        [corners for corners, _ in stones], [faces for _, faces in stones],
+        [None] * sum(len(faces) for _, faces in stones), [0, 1],
+    )  # fmt: skip
+    return kernel.interface_points(
+        np.array([[0, 1]]), np.array([kind]), np.array([feature]), np.array([axis]), np.array([limit]),
+        points, inner, FLAT, THIN, packed.vptr, packed.vertex, packed.fptr, packed.cptr, packed.corner,
+        packed.normal, packed.eptr, packed.edge_a, packed.edge_b, packed.shape_size, packed.face_area,
+    )  # fmt: skip
+
+
+class Stack:
+    """A prism on a prism, both random; the upper one may be tilted about a point of its bottom."""
+
+    def __init__(self, seed, degrees=0.0, swap=False):
+        rng = np.random.default_rng(seed)
+        lower = ellipse(int(rng.integers(3, 9)), rng.uniform(0.5, 1.0, 2), rng.uniform(0, 6))
+        upper = ellipse(
+            int(rng.integers(3, 9)), rng.uniform(0.3, 1.0, 2), rng.uniform(0, 6), rng.uniform(-0.6, 0.6, 2)
+        )
+        self.gap = rng.uniform(-0.05, 0.05)
+        tilt = Rotation.from_rotvec(np.radians(degrees) * np.array([0.6, 0.8, 0.0]))
+        lower, (corners, faces) = prism(lower, -1.0, 0.0), prism(upper, 0.0, 0.8)
+        upper = tilt.apply(corners) + self.gap * UP, faces
+        self.bottom = upper[0][list(faces[0])]  # clockwise seen from above
+        self.top = lower[0][list(lower[1][1])]
+        self.sides = len(lower[1])
+        if swap:
+            self.stones, self.kind, self.feature = (upper, lower), kernel.FACE_SECOND, [len(faces) + 1, 0]
+        else:
+            self.stones, self.kind, self.feature = (lower, upper), kernel.FACE_FIRST, [1, self.sides]
+
+    @property
+    def common(self):
+        """Corners (n, 3) of the upper face above the lower one, clockwise seen from above."""
+        return overlap(self.top, self.bottom, UP)
+
+    def points(self, **settings):
+        return points_of(*self.stones, self.kind, self.feature, **settings)
+
+
+def sorted_rows(rows):
+    return rows[np.lexsort(np.round(rows, 9).T)]
+
+
+def large_enough(stack):
+    common = stack.common
+    assume(len(common) > 2)
+    area = moments(common[:, :2])[0]
+    assume(area > 1e-3)
+    return area
+
+
+@settings(max_examples=100, deadline=None)
+@given(seeds, st.sampled_from([0.0, 2.0, 4.0, 12.0, 40.0]), st.booleans())
+def test_the_points_are_the_corners_of_the_overlap_within_the_alert_distance(seed, degrees, swap):
+    stack = Stack(seed, degrees, swap)
+    whole, common = large_enough(stack), stack.common
+    near = common[common[:, 2] <= 0.1]
+    place, frame, nearest, area = stack.points(points=16)
+    assert len(place) == len(near)
+    np.testing.assert_allclose(sorted_rows(nearest[:, 0]), sorted_rows(near), atol=1e-9)
+    np.testing.assert_allclose(nearest[:, 1], nearest[:, 0] * [1, 1, 0], atol=1e-12)  # straight below
+    np.testing.assert_allclose(frame[:, 0], np.tile(UP, (len(place), 1)), atol=1e-14)
+    np.testing.assert_array_equal(place[:, 0], 0)
+    np.testing.assert_array_equal(place[:, 1], 0 if swap else 1)  # the upper one is the candidate
+    assert len(set(place[:, 2].tolist())) == len(place)
+    if len(near):
+        assert area.sum() == pytest.approx(whole, rel=1e-10)
+
+
+def shares_twin(x, area, centroid):
+    """The shares nearest to even ones that add up to the area and have its centroid; see `point_areas`."""
+    count, even = len(x), area / len(x)
+    rows = np.vstack([np.ones(count), x.T])
+    share = (
+        even + np.linalg.lstsq(rows, np.array([area, *(area * centroid)]) - rows @ np.full(count, even))[0]
+    )
+    part = min(1.0, 0.9 * even / max(even - share.min(), 1e-300))
+    return even + part * (share - even), part == 1.0
+
+
+@settings(max_examples=100, deadline=None)
+@given(seeds, st.sampled_from([3, 4, 8, 16]))
+def test_the_areas_add_up_to_the_overlap_and_have_its_centroid(seed, points):
+    stack = Stack(seed)
+    large_enough(stack)
+    whole, first, _ = moments(stack.common[:, :2])
+    _, _, nearest, area = stack.points(points=points)
+    assert area.sum() == pytest.approx(whole, rel=1e-12)
+    expected, exact = shares_twin(nearest[:, 0, :2], whole, first / whole)
+    np.testing.assert_allclose(area, expected, rtol=1e-8, atol=1e-10)
+    assert area.min() > 0.0999 * whole / len(area)
+    if exact:
+        np.testing.assert_allclose(area @ nearest[:, 0, :2], first, atol=1e-11)
+
+
+def spread_twin(x, wanted):
+    """Corner by corner, leave out the one that cuts off the smallest triangle; of equals, the first."""
+    chosen = list(range(len(x)))
+    while len(chosen) > wanted:
+        before, after = x[np.roll(chosen, 1)], x[np.roll(chosen, -1)]
+        edges = x[chosen] - before, after - before
+        area = np.abs(edges[0][:, 0] * edges[1][:, 1] - edges[0][:, 1] * edges[1][:, 0])
+        out = int(np.flatnonzero(area <= area.min() * (1 + 1e-6))[0])
+        del chosen[out]
+    return chosen
+
+
+def test_points_on_an_edge_go_before_corners():
+    """Two equally deep stones whose long edges cross by a hair: the crossing is no corner."""
+    x = np.array([0.55, 1.0, 1.0, 0.825, 0.55])
+    y = np.array([-0.125, -0.125, 0.125, 0.125 + 1e-9, 0.125])
+    chosen = np.empty(5, dtype=np.int64)
+    kernel._spread(x, y, 5, 4, chosen)
+    np.testing.assert_array_equal(chosen[:4], [0, 1, 2, 4])
+
+
+@settings(max_examples=100, deadline=None)
+@given(seeds, st.sampled_from([3, 4, 8]))
+def test_of_many_corners_those_that_cut_off_most_are_kept(seed, points):
+    stack = Stack(seed)
+    large_enough(stack)
+    everything = stack.points(points=32)
+    kept = stack.points(points=points)
+    assert len(kept[0]) == min(points, len(everything[0]))
+    rows = spread_twin(everything[2][:, 0, :2], len(kept[0]))
+    if len(kept[0]) < len(everything[0]):
+        np.testing.assert_array_equal(kept[0], everything[0][rows])
+        np.testing.assert_array_equal(kept[2], everything[2][rows])
+
+
+@settings(max_examples=100, deadline=None)
+@given(seeds, st.sampled_from([3, 4, 8]), st.sampled_from([0.0, 3.0]), st.booleans())
+@example(seed=0, points=4, degrees=0.0, swap=False)
+def test_inner_points_carry_area_centroid_and_second_moments_exactly(seed, points, degrees, swap):
+    stack = Stack(seed, degrees, swap)
+    large_enough(stack)
+    whole, first, second = moments(stack.common[:, :2])
+    place, _, nearest, area = stack.points(points=points, inner=True)
+    x = nearest[:, 1, :2]
+    assert len(place) == points
+    assert len(set(place[:, 2].tolist())) == points
+    np.testing.assert_allclose(area, whole / points, rtol=1e-12)
+    np.testing.assert_allclose(area @ x, first, atol=1e-12 * whole)
+    np.testing.assert_allclose(np.einsum("p,pi,pj->ij", area, x, x), second, atol=1e-12 * whole)
+    # on both faces, one straight above the other
+    np.testing.assert_allclose(nearest[:, 0, :2], x, atol=1e-13)
+    n = np.cross(*(stack.bottom[1:3] - stack.bottom[0]))
+    np.testing.assert_allclose((nearest[:, 0] - stack.bottom[0]) @ n, 0.0, atol=1e-12)
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds, st.booleans(), st.sampled_from([0.0, 3.0]))
+def test_a_single_point_is_the_centroid_of_the_overlap(seed, inner, degrees):
+    stack = Stack(seed, degrees)
+    large_enough(stack)
+    whole, first, _ = moments(stack.common[:, :2])
+    place, _, nearest, area = stack.points(points=1, inner=inner)
+    assert len(place) == 1
+    np.testing.assert_allclose(nearest[0, 1, :2], first / whole, atol=1e-12)
+    assert area[0] == pytest.approx(whole, rel=1e-12)
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds)
+def test_a_single_point_of_faces_that_do_not_lie_flat_is_the_deepest(seed):
+    stack = Stack(seed, 20.0)
+    large_enough(stack)
+    lowest = stack.common[stack.common[:, 2].argmin()]
+    _, _, nearest, _ = stack.points(points=1)
+    if lowest[2] <= 0.1:
+        np.testing.assert_allclose(nearest[0, 0], lowest, atol=1e-9)
+    else:
+        assert len(nearest) == 0
+
+
+def test_a_face_on_a_smaller_one_touches_in_the_smaller_ones_corners():
+    small = prism(ellipse(4, (0.6, 0.6), 0.3), -1.0, 0.0)
+    large = prism(ellipse(4, (3.0, 3.0)), 0.02, 1.0)
+    place, _, nearest, area = points_of(small, large, kernel.FACE_FIRST, [1, 6])
+    np.testing.assert_allclose(sorted_rows(nearest[:, 1]), sorted_rows(small[0][4:]), atol=1e-13)
+    np.testing.assert_allclose(area, 0.6**2 / 2, rtol=1e-12)
+    assert len(set(place[:, 2].tolist())) == 4
+
+
+@pytest.mark.parametrize(("shift", "count"), [(0.0, 4), (1 - 2e-6, 4), (1 - 5e-7, 0), (1.0, 0), (1.1, 0)])
+def test_flat_faces_that_overlap_by_less_than_a_millionth_do_not_touch(shift, count):
+    lower = box((0, 0, -1), (1, 1, 0)), BOX_FACES
+    upper = box((shift, 0, 0), (1 + shift, 1, 1)), BOX_FACES
+    place, *_ = points_of(lower, upper, kernel.FACE_FIRST, [1, 6])
+    assert len(place) == count
+
+
+def test_frames_turn_with_the_reference_stone():
+    """t1 runs along the first edge of its face, and the frame is right-handed."""
+    stack = Stack(3)
+    _, frame, _, _ = stack.points()
+    edge = stack.top[1] - stack.top[0]
+    np.testing.assert_allclose(frame[:, 1], np.tile(edge / np.linalg.norm(edge), (len(frame), 1)), atol=1e-13)
+    np.testing.assert_allclose(np.cross(frame[:, 0], frame[:, 1]), frame[:, 2], atol=1e-14)
+
+
+# --- edges ---
+
+
+@settings(max_examples=60, deadline=None)
+@given(seeds)
+def test_two_edges_touch_in_the_feet_of_their_common_normal(seed):
+    rng = np.random.default_rng(seed)
+    first, second = ((box(-half, half) @ Rotation.random(random_state=rng).as_matrix().T, BOX_FACES)
+                     for half in rng.uniform(0.3, 0.6, (2, 3)))  # fmt: skip
+    packed = surfaces([first[0], second[0]], [BOX_FACES] * 2, [None] * 12, [0, 1])
+    one, two = int(rng.integers(12)), int(12 + rng.integers(12))
+    a, b, c, d = (
+        packed.vertex[end]
+        for end in (packed.edge_a[one], packed.edge_b[one], packed.edge_a[two], packed.edge_b[two])
+    )
+    axis = np.cross(b - a, d - c)
+    assume(np.linalg.norm(axis) > 0.1)
+    axis /= np.linalg.norm(axis)
+    # brought together so that inner points of both edges lie one over the other, 0.01 apart
+    s, t = rng.uniform(0.1, 0.9, 2)
+    shift = a + s * (b - a) + 0.01 * axis - (c + t * (d - c))
+    second = second[0] + shift, BOX_FACES
+    place, frame, nearest, area = points_of(first, second, kernel.EDGES, [one, two], axis)
+    assert place[:, :2].tolist() == [[0, 0]]
+    np.testing.assert_allclose(nearest[0, 0], a + s * (b - a), atol=1e-12)
+    np.testing.assert_allclose(nearest[0, 1], nearest[0, 0] + 0.01 * axis, atol=1e-12)
+    np.testing.assert_allclose(frame[0, 0], -axis, atol=1e-14)  # towards the first, which is the candidate
+    np.testing.assert_allclose(frame[0] @ frame[0].T, np.eye(3), atol=1e-13)
+    assert area[0] == 0.0
+
+
+@settings(max_examples=60, deadline=None)
+@given(seeds)
+def test_shares_of_an_area_follow_their_twin(seed):
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(1, 9))
+    x, share = rng.uniform(-1, 1, (count, 2)), np.zeros(count)
+    centroid = rng.dirichlet(np.ones(count)) @ x
+    kernel.point_areas(*x.T.copy(), count, 0.7, *centroid, share)
+    expected, _ = shares_twin(x, 0.7, centroid)
+    assert share.sum() == pytest.approx(0.7, rel=1e-12)
+    if count > 2 and np.linalg.matrix_rank(x - x.mean(axis=0), tol=1e-3) == 2:
+        np.testing.assert_allclose(share, expected, atol=1e-9)
+
+
+def test_shares_do_not_jump_where_one_would_vanish():
+    """Three corners of a rectangle: its centroid lies on the line between two of them."""
+    x, share = np.array([(0.0, 0), (1, 0), (1, 2)]), np.zeros(3)
+    for nudge in (-1e-12, 0.0, 1e-12):
+        kernel.point_areas(*x.T.copy(), 3, 2.0, 0.5 + nudge, 1.0, share)
+        # exact would be 1, 0, 1; a tenth of an even share for the second, the rest as even as before
+        np.testing.assert_allclose(share, np.array([29, 2, 29]) / 30, atol=1e-10)

@@ -1,0 +1,194 @@
+"""W in the plane and its sweeps against dense matrices and a solver that tries all cases."""
+
+from dataclasses import replace
+
+import numba
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mechanics.planar import delassus
+from mechanics.planar._kernels.sweep import solve_local
+from mechanics.planar.delassus import PlanarDelassus
+from mechanics.problem.problem import ContactProblem, ContactStart
+from mechanics.problem.residual import natural_map
+from mechanics.solvers.first_order.nsgs import NSGS
+from tests.mechanics.planar.shapes import dense, random_problem
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_products_are_those_of_the_dense_matrices(seed):
+    arrays = random_problem(seed)
+    operator = PlanarDelassus(*arrays)
+    ht, compliance = dense(*arrays)
+    w = ht @ compliance @ ht.T
+    r = np.random.default_rng(seed).normal(size=(len(arrays[0]), 2))
+    v = np.random.default_rng(seed).normal(size=(len(arrays[3]), 3))
+    np.testing.assert_allclose(operator.apply(r).ravel(), w @ r.ravel(), atol=1e-12)
+    np.testing.assert_allclose(operator.velocity_change(r).ravel(), compliance @ ht.T @ r.ravel(), atol=1e-12)
+    np.testing.assert_allclose(operator.relative_velocity(v).ravel(), ht @ v.ravel(), atol=1e-12)
+    blocks = w.reshape(len(r), 2, len(r), 2)
+    np.testing.assert_allclose(
+        operator.diagonal, np.einsum("ciCj->cCij", blocks)[np.arange(len(r)), np.arange(len(r))], atol=1e-12
+    )
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_sparse_form_is_the_same_w(seed):
+    arrays = random_problem(seed)
+    ht, compliance = dense(*arrays)
+    form = PlanarDelassus(*arrays).sparse()
+    inertia, lift = form.inertia.toarray(), form.lift.toarray()
+    np.testing.assert_allclose(lift.T @ np.linalg.inv(inertia) @ lift, ht @ compliance @ ht.T, atol=1e-12)
+    np.testing.assert_array_equal(form.across.toarray(), lift.T)
+
+
+def all_solutions(w, b, mu, k):
+    """Every (r_N, r_T) with u = W r + b, 0 ≤ u_N ⊥ r_N ≥ 0 and Coulomb's law, by trying open, stick and both slips."""
+    found = []
+    tiny = 1e-9 * (np.abs(b).max() + k * np.abs(w).max()) + 1e-300
+
+    def holds(r):
+        u = w @ r + b
+        limit = mu * r[0] + k
+        normal = r[0] >= 0 and u[0] >= -tiny and (r[0] == 0 or abs(u[0]) <= tiny * 10)
+        sticks = abs(u[1]) <= tiny * 10 and abs(r[1]) <= limit * (1 + 1e-9)
+        slips = abs(abs(r[1]) - limit) <= 1e-9 * limit and r[1] * u[1] <= tiny * abs(r[1])
+        return normal and (sticks or slips)
+
+    sticking = -b[1] / w[1, 1]
+    found.append(("open", np.array([0.0, np.clip(sticking, -k, k)])))
+    found.append(("stick", -np.linalg.solve(w, b)))
+    for s in (1.0, -1.0):
+        slope = w[0, 0] + s * mu * w[0, 1]
+        if slope != 0:
+            n = -(b[0] + s * k * w[0, 1]) / slope
+            found.append(("slip", np.array([n, s * (mu * n + k)])))
+    return [(name, r) for name, r in found if holds(r)]
+
+
+numbers = st.floats(-10, 10).filter(lambda x: x == 0 or abs(x) > 1e-3)
+
+
+@settings(deadline=None, max_examples=500)
+@given(
+    st.floats(0.1, 10),
+    st.floats(0.1, 10),
+    st.floats(-0.99, 0.99),
+    numbers,
+    numbers,
+    st.one_of(st.just(0.0), st.floats(0.01, 10)),
+    st.one_of(st.just(0.0), st.floats(0.01, 10)),
+)
+def test_a_local_solution_is_one_of_all_and_the_first_in_order(nn, tt, coupling, bn, bt, mu, k):
+    nt = coupling * np.sqrt(nn * tt)
+    w, b = np.array([[nn, nt], [nt, tt]]), np.array([bn, bt])
+    r = np.array(solve_local(nn, nt, tt, bn, bt, mu, k))
+    solutions = all_solutions(w, b, mu, k)
+    assert solutions
+    # at the border between two cases both say the same
+    distance = [np.abs(r - one).max() for _, one in solutions]
+    assert min(distance) <= 1e-7 * (1 + np.abs(r).max())
+    if mu * abs(nt) < 0.99 * nn:
+        # one solution only, so all that hold are the same
+        assert max(distance) <= 1e-5 * (1 + np.abs(r).max())
+
+
+@pytest.mark.parametrize(("bn", "bt"), [(0.1, 0.2), (0.2, 0.5), (0.1, 1.0)])
+def test_where_a_contact_may_stay_open_or_jam_it_stays_open(bn, bt):
+    # friction lifts a rod that is pushed ahead of its lower end (Painlevé): pressed, it would need the pressure
+    w, b = np.array([[1.0, 0.8], [0.8, 1.0]]), np.array([bn, bt])
+    assert {name for name, _ in all_solutions(w, b, 3.0, 0.0)} == {"open", "stick", "slip"}
+    assert solve_local(1.0, 0.8, 1.0, bn, bt, 3.0, 0.0) == (0.0, 0.0)
+
+
+def gauss_seidel_twin(arrays, shift, friction, cohesion, order, sweeps):
+    """Sweeps with the dense matrix, every second one backwards."""
+    ht, compliance = dense(*arrays)
+    w = ht @ compliance @ ht.T
+    r = np.zeros(2 * len(shift))
+    for n in range(sweeps):
+        for c in order if n % 2 == 0 else order[::-1]:
+            own = slice(2 * c, 2 * c + 2)
+            block = w[own, own]
+            b = w[own] @ r + shift[c] - block @ r[own]
+            r[own] = all_solutions(block, b, friction[c], cohesion[c])[0][1]
+    return r.reshape(-1, 2)
+
+
+def with_loads(seed, count):
+    rng = np.random.default_rng(seed)
+    shift = rng.normal(size=(count, 2)) - [0.5, 0.0]
+    return shift, rng.uniform(0, 0.6, count), rng.uniform(0, 0.2, count) * (rng.random(count) < 0.5)
+
+
+@pytest.mark.parametrize("levers", [True, False])
+def test_sweeps_are_those_of_the_dense_twin(levers):
+    arrays = random_problem(3, bodies=20, contacts=25, levers=levers)
+    # with μ |W_NT| < W_NN no local problem has two solutions, between which rounding might choose
+    shift, friction, cohesion = with_loads(3, 25)
+    operator = PlanarDelassus(*arrays)
+    coupling = np.abs(operator.diagonal[:, 0, 1]) / operator.diagonal[:, 0, 0]
+    friction = np.minimum(friction, 0.9 / np.maximum(coupling, 1e-3))
+    r = np.zeros((25, 2))
+    operator.gauss_seidel(shift, friction, cohesion)(r, 7)
+    twin = gauss_seidel_twin(arrays, shift, friction, cohesion, operator.colouring[0], 7)
+    np.testing.assert_allclose(r, twin, atol=1e-9)
+    assert (r[:, 0] > 0).any()
+    assert (r[:, 0] == 0).any()
+
+
+def test_sweeps_lead_to_a_solution_of_the_whole_problem():
+    arrays = random_problem(5, bodies=40, contacts=45, levers=False)
+    shift, friction, cohesion = with_loads(5, 45)
+    problem = ContactProblem(PlanarDelassus(*arrays), shift, np.zeros(45), friction, cohesion)
+    none = np.zeros((45, 2))
+    solution = NSGS(1e-12, max_iterations=20000)(problem, ContactStart(none, none))
+    assert solution.converged
+    assert natural_map(problem, solution.impulse) <= 1e-12
+
+
+def test_swept_in_two_calls_it_is_swept_the_same_to_rounding():
+    arrays = random_problem(6, bodies=30, contacts=40)
+    shift, friction, cohesion = with_loads(6, 40)
+    run = PlanarDelassus(*arrays).gauss_seidel(shift, 0.1 * friction, cohesion)
+    once, twice = np.zeros((40, 2)), np.zeros((40, 2))
+    run(once, 8)
+    run(twice, 4)
+    run(twice, 4)
+    np.testing.assert_allclose(once, twice, atol=1e-12)
+
+
+def lattice(side):
+    """Contacts of a square lattice of disks, with loads."""
+    place = np.arange(side * side).reshape(side, side)
+    pairs = [(place[:, :-1], place[:, 1:]), (place[:-1], place[1:])]
+    bodies = np.concatenate([np.column_stack([a.ravel(), b.ravel()]) for a, b in pairs])
+    rng = np.random.default_rng(0)
+    angle = rng.uniform(0, 2 * np.pi, len(bodies))
+    normal = np.column_stack([np.cos(angle), np.sin(angle)])
+    lever = np.tile([0.0, -1.0, 0.0, 1.0], (len(bodies), 1))
+    inertia = np.tile([1.0, 2.0], (side * side, 1))
+    inertia[::7] = 0.0
+    moves = (inertia[bodies, 0] > 0).any(axis=1)
+    return PlanarDelassus(bodies[moves], normal[moves], lever[moves], inertia)
+
+
+def test_any_number_of_threads_and_any_grain_give_the_same_bits(monkeypatch):
+    operator = lattice(60)
+    count = len(operator.bodies)
+    shift, friction, cohesion = with_loads(1, count)
+    before = numba.get_num_threads()
+    results = []
+    for number in (1, 2, 3):
+        run = replace(operator, threads=number).gauss_seidel(shift, friction, cohesion)
+        for grain in (1, int(np.median(np.diff(operator.colouring[1])))):
+            monkeypatch.setattr(delassus, "_GRAIN", grain)
+            r = np.zeros((count, 2))
+            run(r, 11)
+            results.append(r)
+    assert (results[0][:, 0] > 0).sum() > 100
+    for r in results[1:]:
+        np.testing.assert_array_equal(r, results[0])
+    assert numba.get_num_threads() == before

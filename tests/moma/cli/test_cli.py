@@ -1,0 +1,279 @@
+"""The command line: what it prints, its exit codes, and one line for every mistake."""
+
+import csv
+import io
+import json
+import subprocess
+import sys
+import time
+
+import pytest
+from typer.testing import CliRunner
+
+import moma
+from moma.cli import app
+from tests.paths import ROOT
+
+SAMPLE = ROOT / "data/samples/window"
+COMMANDS = ("ingest", "survey-report", "query", "show", "check", "run")
+
+
+@pytest.fixture(scope="module")
+def database(tmp_path_factory):
+    """A database with the sample in it; tests do not write into it."""
+    url = f"sqlite:///{tmp_path_factory.mktemp('db') / 'window.db'}"
+    done = CliRunner().invoke(app, ["ingest", str(SAMPLE / "window.moma"), "--db", url])
+    assert done.exit_code == 0, done.output
+    return url
+
+
+def invoke(*arguments):
+    return CliRunner().invoke(app, [str(one) for one in arguments])
+
+
+def fails(code, *arguments):
+    """Standard error of a command that must fail: one line."""
+    done = invoke(*arguments)
+    assert done.exit_code == code, done.output
+    assert done.stdout == ""
+    lines = done.stderr.splitlines()
+    assert len(lines) == 1
+    assert lines[0].startswith("moma: error: ")
+    return lines[0]
+
+
+def test_help_is_fast():
+    """Under 0.5 s; the best of three, because the machine may be busy with other things."""
+    spent = []
+    for _ in range(3):
+        start = time.perf_counter()
+        done = subprocess.run(
+            [sys.executable, "-m", "moma", "--help"], capture_output=True, text=True, check=True
+        )
+        spent.append(time.perf_counter() - start)
+    assert all(command in done.stdout for command in COMMANDS)
+    assert min(spent) < 0.5
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_explains_itself(command):
+    done = invoke(command, "--help")
+    assert done.exit_code == 0
+    assert "--json" in done.stdout
+    assert ("--db" in done.stdout) == (command != "survey-report")
+
+
+def test_version():
+    assert invoke("--version").stdout == f"moma {moma.__version__}\n"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("ingset",), ("query",), ("query", "header", "--format", "xml"), ("query", "header", "--sort")],
+)
+def test_wrong_use_ends_in_2(arguments):
+    assert invoke(*arguments).exit_code == 2
+
+
+def test_ingest_tells_what_it_found(tmp_path):
+    url = f"sqlite:///{tmp_path / 'new.db'}"
+    done = invoke("ingest", SAMPLE / "window.moma", "--db", url, "--json")
+    assert done.exit_code == 0, done.output
+    (file,) = json.loads(done.stdout)["files"]
+    assert sum(file["stones"].values()) == 98
+    again = fails(1, "ingest", SAMPLE / "window.moma", "--db", url)
+    assert "in the database already" in again
+
+
+@pytest.mark.parametrize(
+    ("written", "instead", "said"),
+    [
+        ("  vertex ", "  vertex ab ", ""),
+        ("stone W01-01 header", "stone W01-01 heder", "unknown kind 'heder'; did you mean header?"),
+        ("depth stretcher ", "depth quoin ", "no depth is known for a stretcher"),
+    ],
+)
+def test_a_bad_survey_is_one_line_and_makes_no_database(tmp_path, written, instead, said):
+    text = (SAMPLE / "window.moma").read_text(encoding="utf-8")
+    line = text[: text.index(written)].count("\n") + 1
+    bad = tmp_path / "bad.moma"
+    bad.write_text(text.replace(written, instead, 1), encoding="utf-8")
+    message = fails(1, "ingest", bad, "--db", f"sqlite:///{tmp_path / 'new.db'}")
+    assert f"{bad}:" in message
+    assert said in message
+    assert said or f"{bad}:{line}: " in message
+    assert not (tmp_path / "new.db").exists()
+
+
+def test_one_bad_file_keeps_the_others_out(tmp_path, database):
+    bad = tmp_path / "bad.moma"
+    bad.write_text("moma-survey 1\nrubbish\n", encoding="utf-8")
+    url = f"sqlite:///{tmp_path / 'new.db'}"
+    assert ":2: " in fails(1, "ingest", SAMPLE / "window.moma", bad, "--db", url)
+    assert not (tmp_path / "new.db").exists()
+
+
+def test_a_missing_survey_file_is_wrong_use(tmp_path):
+    assert "no such file" in fails(
+        2, "ingest", tmp_path / "none.moma", "--db", f"sqlite:///{tmp_path / 'n.db'}"
+    )
+
+
+def test_query_gives_the_same_in_every_format(database):
+    question = ("query", "voussoir", "--where", "depth < 0.44", "--db", database)
+    rows = json.loads(invoke(*question, "--json").stdout)
+    assert [row["code"] for row in rows] == [f"V{number}" for number in range(1, 8)]
+    assert {row["kind"] for row in rows} == {"voussoir", "keystone"}
+    listed = list(csv.DictReader(io.StringIO(invoke(*question, "--format", "csv").stdout)))
+    assert [row["code"] for row in listed] == [row["code"] for row in rows]
+    assert float(listed[0]["volume"]) == rows[0]["volume"]
+    assert list(listed[0]) == list(rows[0])
+    table = invoke(*question)
+    assert table.stdout.splitlines()[0].split()[:3] == ["code", "kind", "depth"]
+    assert len(table.stdout.splitlines()) == 2 + 7
+    assert "von_mises_max" not in table.stdout  # nothing was computed yet
+    assert "7 found" in table.stderr
+
+
+def test_a_column_that_is_asked_for_is_shown(database):
+    done = invoke("query", "header", "--where", "redundancy > 3 and course = 2", "--db", database)
+    assert "redundancy" in done.stdout.splitlines()[0]
+
+
+def test_nothing_found_is_no_error(database):
+    done = invoke("query", "header", "--where", "depth > 5", "--db", database)
+    assert (done.exit_code, done.stdout) == (0, "")
+    assert (
+        json.loads(invoke("query", "header", "--where", "depth > 5", "--db", database, "--json").stdout) == []
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("query", "heder"), "did you mean header?"),
+        (("query", "header", "--where", "dept > 0.4"), "did you mean depth"),
+        (("query", "header", "--where", "depth >"), "character"),
+        (("query", "header", "--json", "--format", "csv"), "two formats"),
+        (("show", "V44"), "did you mean V4?"),
+    ],
+)
+def test_a_wrong_question_is_one_line_with_a_remedy(database, arguments, said):
+    assert said in fails(2, *arguments, "--db", database)
+
+
+def test_a_missing_database_is_named_and_not_made(tmp_path, monkeypatch):
+    monkeypatch.setenv("MOMA_DB", f"sqlite:///{tmp_path / 'none.db'}")
+    assert "none.db" in fails(1, "query", "header")
+    assert "moma ingest" in fails(1, "show", "V1")
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_database_comes_from_the_environment(database, monkeypatch):
+    monkeypatch.setenv("MOMA_DB", database)
+    assert json.loads(invoke("show", "V4", "--json").stdout)["kind"] == "keystone"
+
+
+def test_show_tells_what_it_is_and_what_was_measured(database):
+    text = invoke("show", "V4", "--db", database).stdout
+    for words in ("keystone", "voussoir", "ashlar", "normal", "rms", "0.42 m", "synthetic"):
+        assert words in text
+
+
+RIGID = """
+[scene]
+name = "Low"
+[select]
+where = ["course <= 2"]
+[materials.limestone]
+density = 2350.0
+young = 12e9
+poisson = 0.2
+[bodies]
+default = "rigid"
+fixed = ["course = 1"]
+"""
+
+
+@pytest.fixture
+def scene(tmp_path):
+    """A scene that takes a second."""
+    path = tmp_path / "low.toml"
+    path.write_text(RIGID, encoding="utf-8")
+    return path
+
+
+def test_check_tells_the_plan(scene, database):
+    text = invoke("check", scene, "--db", database)
+    assert text.exit_code == 0
+    assert "sound" in text.stdout
+    plan = json.loads(invoke("check", scene, "--db", database, "--json").stdout)
+    assert plan["bodies"]["rigid"] + plan["bodies"]["fixed"] == sum(plan["kinds"].values())
+    assert plan["cost"]["unknowns"] == 6 * plan["bodies"]["rigid"]
+    assert plan["cost"]["contacts"] >= 3 * plan["bodies"]["rigid"]
+    low, likely, high = plan["cost"]["seconds"]
+    assert 0.0 < low <= likely <= high
+    assert plan["cost"]["peak"] > plan["cost"]["memory"] > 0
+    assert "of one processor" in text.stdout
+    assert plan["joints"]["max_displacement"] < 0.1
+    assert plan["problems"] == []
+
+
+@pytest.mark.parametrize(
+    ("written", "instead", "said"),
+    [
+        ('fixed = ["course = 1"]', "", "no stone is fixed"),
+        (
+            '"course <= 2"',
+            '"course in (1, 4)"',
+            "no chain of touching stones ties these to a fixed one: W04-01",
+        ),
+        ("[scene]", "[joints]\nmax_displacement = 0.001\n[scene]", "max_displacement"),
+    ],
+)
+def test_an_unsound_scene_ends_in_1_with_its_problem(scene, database, written, instead, said):
+    scene.write_text(RIGID.replace(written, instead), encoding="utf-8")
+    done = invoke("check", scene, "--db", database)
+    assert done.exit_code == 1
+    assert any(said in line for line in done.stdout.splitlines() if line.startswith("problem: "))
+    assert json.loads(invoke("check", scene, "--db", database, "--json").stdout)["problems"]
+
+
+@pytest.mark.parametrize("command", ["check", "run"])
+def test_a_wrong_scene_is_wrong_use(command, scene, database):
+    scene.write_text(RIGID.replace("density", "densty"), encoding="utf-8")
+    assert "low.toml:7: unknown key 'densty'" in fails(2, command, scene, "--db", database)
+    assert "no such scene file" in fails(2, command, scene.with_name("none.toml"), "--db", database)
+    scene.write_text(RIGID.replace("course <= 2", "course > 99"), encoding="utf-8")
+    assert "no stone is selected" in fails(2, command, scene, "--db", database)
+
+
+def test_run_tells_how_it_ended_and_query_knows_it(scene, tmp_path):
+    url = f"sqlite:///{tmp_path / 'own.db'}"
+    assert invoke("ingest", SAMPLE / "window.moma", "--db", url).exit_code == 0
+    done = invoke("run", scene, "--db", url, "--out", tmp_path / "out", "-v")
+    assert done.exit_code == 0, done.output
+    assert done.stdout.startswith("Low: equilibrium after ")
+    assert str(tmp_path / "out/report.html") in done.stdout
+    rows = json.loads(invoke("query", "entity", "--where", "fidelity = rigid", "--db", url, "--json").stdout)
+    assert rows
+    assert all(row["course"] == 2 for row in rows)
+    summary = json.loads(invoke("run", scene, "--db", url, "--out", tmp_path / "out", "--json").stdout)
+    assert summary["bodies"]["rigid"] == len(rows)
+
+
+def test_an_unexpected_error_is_one_line_and_whole_with_v(database, monkeypatch):
+    def broken(*_):
+        raise ZeroDivisionError("by hand")
+
+    monkeypatch.setattr("archmodel.query.api.describe", broken)
+    message = fails(1, "show", "V4", "--db", database)
+    assert "unexpected ZeroDivisionError: by hand" in message
+    assert isinstance(invoke("show", "V4", "--db", database, "-v").exception, ZeroDivisionError)
+
+
+def test_a_foreseen_error_shows_its_traceback_with_v(database):
+    done = invoke("show", "nobody", "--db", database, "-v")
+    assert done.exit_code == 2
+    assert "Traceback" in done.stderr
+    assert done.stderr.splitlines()[-1].startswith("moma: error: ")

@@ -1,0 +1,67 @@
+"""moma migrate."""
+
+import json
+from collections.abc import Callable
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from moma.cli import app
+from tests.archmodel.migrations.old_databases import make_old, rows_of
+
+
+def moma(*arguments: str) -> Result:
+    return CliRunner().invoke(app, list(arguments))
+
+
+@pytest.fixture
+def old(new_url: Callable[[], str]) -> str:
+    """The URL of a database of version 1."""
+    url = new_url()
+    make_old(url, 1)
+    return url
+
+
+def test_an_old_database_is_refused_with_the_command_that_helps(old: str) -> None:
+    refused = moma("query", "header", "--db", old)
+    assert refused.exit_code == 1
+    command = refused.stderr.partition("; moma ")[2].split()
+    done = moma(*command)
+    assert done.exit_code == 0, done.stderr
+    assert "from version 1 to 4" in done.stdout
+    assert "W01-01" in moma("query", "header", "--db", old).stdout
+    assert "has version 4 already" in moma(*command).stdout
+
+
+def test_going_down_asks_for_consent_where_something_is_lost(old: str) -> None:
+    assert moma("migrate", "--db", old).exit_code == 0
+    before = rows_of(old, 4)
+    refused = moma("migrate", "--db", old, "--to", "1")
+    assert refused.exit_code == 2
+    assert "cannot hold: what kind of evidence depths have (9); " in refused.stderr
+    assert "give --yes" in refused.stderr
+    assert rows_of(old, 4) == before
+    done = moma("migrate", "--db", old, "--to", "1", "--yes", "--json")
+    assert done.exit_code == 0
+    told = json.loads(done.stdout)
+    assert (told["before"], told["after"], len(told["lost"])) == (4, 1, 2)
+    assert (told["backup"] is None) == old.startswith("postgresql")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (["--yes"], 2, "--yes without --to"),
+        (["--to", "9"], 2, "version 9 of the layout is not known; name one up to 4"),
+        (["--to", "0"], 2, "version 0 of the layout is not known"),
+        (["--db", "sqlite:///none.db"], 1, "there is no database"),
+    ],
+)
+def test_wrong_use_is_one_line(
+    arguments: list[str], code: int, said: str, monkeypatch: pytest.MonkeyPatch, tmp_path: object
+) -> None:
+    monkeypatch.chdir(str(tmp_path))
+    refused = moma("migrate", *arguments)
+    assert refused.exit_code == code
+    assert said in refused.stderr
+    assert refused.stderr.count("\n") == 1

@@ -1,0 +1,8 @@
+"""Places of the repository that tests read."""
+
+from pathlib import Path
+
+__all__ = ["ROOT", "SAMPLE"]
+
+ROOT = Path(__file__).resolve().parents[1]
+SAMPLE = ROOT / "data/samples/window"

@@ -1,0 +1,399 @@
+"""Survey reports: whole or not at all, and true of surveys whose faults are known."""
+
+import json
+import subprocess
+import sys
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from moma.cli import app
+from moma.cli.text.runs_and_surveys import survey_report_lines
+from moma.errors import SurveyError, UsageError
+from pipelines.ingest.reading_options import reading_options
+from pipelines.reports.survey import report as survey_report
+from pipelines.reports.survey.report import report_surveys
+from pipelines.reports.survey.study import study_surveys
+from tests.paths import ROOT
+
+SAMPLE = ROOT / "data/samples/window/window.moma"
+WALL = ROOT / "docs/howto/survey"
+CODES = "{block} {kind} {course} {role}"
+
+HEAD = "moma-survey 1\nname {name}\nobserver 0 -9 0\nsigma 0.002\ndepth header 0.4 source guess\n"
+SQUARE = "  vertex 0 0 0\n  vertex 0.4 0.001 0\n  vertex 0.4 0 0.3\n  vertex 0 0.001 0.3\n  point 0.2 0 0.1\n"
+
+
+@pytest.fixture(scope="module")
+def window(tmp_path_factory):
+    return report_surveys([SAMPLE], tmp_path_factory.mktemp("report") / "window")
+
+
+@pytest.fixture(scope="module")
+def wall(tmp_path_factory):
+    options = reading_options(WALL / "head.moma", CODES)
+    return report_surveys([WALL / "points.txt"], tmp_path_factory.mktemp("report") / "wall", "pnezd", options)
+
+
+def survey_file(folder, text, name="wall (x)"):
+    path = folder / "wall.moma"
+    path.write_text(HEAD.format(name=name) + text, encoding="utf-8")
+    return path
+
+
+def contents(report):
+    return json.loads((report.folder / "survey.json").read_text(encoding="utf-8"))
+
+
+class Page(HTMLParser):
+    """Elements that were opened and not closed, and what the page asks other files for."""
+
+    def __init__(self):
+        super().__init__()
+        self.open, self.sources, self.text = [], [], []
+
+    def handle_starttag(self, tag, attributes):
+        if tag not in ("meta", "img"):
+            self.open.append(tag)
+        self.sources += [value for name, value in attributes if name in ("src", "href")]
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+
+def test_the_folder_holds_what_its_index_names(window):
+    names = {entry.name for entry in window.folder.iterdir()}
+    assert names == {"survey.json", "report.html", "elevation.png", "courses.png", "residuals.png"}
+    assert set(contents(window)["files"]) == names
+    for name in names:
+        if name.endswith(".png"):
+            assert (window.folder / name).read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+
+
+def test_the_numbers_are_those_of_the_sample(window):
+    content = contents(window)
+    quality = content["quality"]
+    assert (quality["stones"], quality["rejects"], len(content["stones"])) == (98, 0, 98)
+    assert abs(quality["sigma0"] - 1.0) < 3.0 * quality["sigma0_sigma"]  # its noise is what it says
+    assert "is right" in quality["verdict"]
+    assert sum(quality["residuals"]["counts"]) == sum(len(one.standardised) for one in window.study.stones)
+    (facade,) = content["facades"]
+    assert facade["stones"] == 98
+    assert content["contradictions"] == []
+    first = content["stones"][0]
+    assert (first["code"], first["kind"], first["course"], first["facade"]) == (
+        "W01-01",
+        "header",
+        1,
+        "facade 1",
+    )
+    assert first["depth"] == pytest.approx(0.51)
+    assert first["depth_origin"] == "stone"
+
+
+def test_the_true_beds_of_the_sample_are_level_and_found_so(window):
+    """12 level courses: slopes over their standard deviations are Student's t, of which none exceeds 4."""
+    lines = window.study.courses
+    assert [line.course for line in lines] == list(range(1, 13))
+    assert all(line.finding == "level and straight" for line in lines)
+    scores = np.array([line.slope / line.slope_sigma for line in lines])
+    assert abs(scores).max() < 4.0
+    assert 0.3 < (scores**2).mean() < 2.5  # of 12 values with variance 1.4 or so
+    truth = json.loads((SAMPLE.parent / "truth.json").read_text(encoding="utf-8"))["stones"]
+    for line in lines:
+        # the true bed of a course is where the true stones stand: half a joint, 4 to 7.5 mm, below the measured
+        beds = [min(v[2] for v in one["vertices"]) for one in truth if one["code"] in line.stones]
+        assert 0.002 < line.level - np.median(beds) < 0.0095
+
+
+def test_the_report_is_one_page_that_needs_nothing_else(window, wall):
+    for report in (window, wall):
+        page = Page()
+        page.feed((report.folder / "report.html").read_text(encoding="utf-8"))
+        assert page.open == []
+        assert all(source.startswith("data:image/png;base64,") for source in page.sources)
+        assert len(page.sources) == 3
+        text = " ".join(page.text)
+        for heading in ("What to measure again", "Courses", "Kinds", "Stones", report.study.name):
+            assert heading in text
+
+
+def test_what_is_wrong_with_the_synthetic_wall_is_found(wall):
+    """The faults that docs/howto/survey/wall.py makes, and nothing else."""
+    content = contents(wall)
+    (rejected,) = content["rejects"]
+    assert rejected["code"] == "G05-03"
+    assert "112.423O" in rejected["reason"]
+    assert {one["code"] for one in content["remeasure"]} == {"G05-03", "G06-05", "G02-04"}
+    assert [one["urgency"] for one in content["remeasure"][:2]] == ["missing", "unchecked"]
+    assert {one["code"] for one in content["contradictions"]} == {"G02-04"}
+    (blunder,) = [one for one in content["stones"] if one["blunders"]]
+    assert blunder["code"] == "G03-02"
+    assert blunder["blunders"][0].isdigit()  # as the instrument numbered it
+    control = content["inputs"][0]["control"]
+    assert control["rejected"] == ["C4"]
+    (moved,) = [one for one in control["points"] if one["name"] == "C4"]
+    assert abs(moved["residual"][0]) == pytest.approx(0.04, abs=0.012)
+    text = "\n".join(survey_report_lines(wall, False))
+    for words in ("G05-03", "C4", "G02-04", "4 not level or not straight"):
+        assert words in text
+
+
+def test_the_sag_of_the_lower_courses_is_measured_with_its_precision(wall):
+    """The wall sagged by 14 mm when four courses stood; the four above are straight."""
+    for line in wall.study.courses:
+        truth = -0.014 if line.course <= 4 else 0.0
+        assert abs(line.sag - truth) < 3.5 * line.sag_sigma
+        assert ("sags" in line.finding) == (line.course <= 4)
+
+
+def test_a_survey_says_the_same_in_the_frame_of_the_site(wall, tmp_path):
+    """Without its control points it stays in the frame of the instrument; on site coordinates are 5·10⁶ m."""
+    head = tmp_path / "head.moma"
+    lines = (WALL / "head.moma").read_text(encoding="utf-8").splitlines(keepends=True)
+    head.write_text("".join(line for line in lines if not line.startswith("control")), encoding="utf-8")
+    bare = study_surveys([WALL / "points.txt"], "pnezd", reading_options(head, CODES))
+    site = wall.study
+    scale = site.files[0].transform.scale
+    assert abs(site.stones[0].outline[0][1]) > 5e6
+    assert abs(bare.stones[0].outline).max() < 200.0
+    for one, other in zip(bare.stones, site.stones, strict=True):
+        assert one.rms == pytest.approx(other.rms / scale, rel=1e-5)
+        assert one.blunders == other.blunders
+    for one, other in zip(bare.courses, site.courses, strict=True):
+        # control points 5 m apart with 3 mm tilt the frame by a milliradian at most
+        assert one.slope == pytest.approx(other.slope, abs=1.5e-3)
+        assert one.sag == pytest.approx(other.sag, abs=2e-4)
+        assert one.finding == other.finding
+
+
+def test_a_bad_stone_is_in_the_report_and_does_not_stop_it(tmp_path):
+    text = (
+        f"stone A header course 1\n{SQUARE}end\n"
+        f"stone B header course 1\n  station T9\n{SQUARE}end\n"
+        "stone C header course 1\n  vertex 0 0 0\n  vertex 1 0 0\n  vertex 2 0 0\nend\n"
+        "stone D header course 1\n  vertex 0 0 0\n  vertex 1 0\nend\n"
+    )
+    report = report_surveys([survey_file(tmp_path, text)], tmp_path / "out")
+    content = contents(report)
+    assert [one["code"] for one in content["stones"]] == ["A"]
+    reasons = {one["code"]: one["reason"] for one in content["rejects"]}
+    assert set(reasons) == {"B", "C", "D"}
+    assert "T9" in reasons["B"]
+    assert "line" in reasons["C"]
+
+
+def test_a_mistyped_kind_is_told_before_the_database_refuses_it(tmp_path):
+    path = survey_file(tmp_path, f"stone A heder course 1\n  depth 0.4 source measured\n{SQUARE}end\n")
+    report = report_surveys([path], tmp_path / "out")
+    (warning,) = contents(report)["warnings"]
+    assert warning == "1 stone of an unknown kind 'heder'; did you mean header?"
+    assert "did you mean header?" in (report.folder / "report.html").read_text(encoding="utf-8")
+
+
+def test_a_survey_without_a_single_good_stone_is_still_reported(tmp_path):
+    report = report_surveys(
+        [survey_file(tmp_path, "stone B header\n  vertex 0 0 0\nend\n")], tmp_path / "out"
+    )
+    content = contents(report)
+    assert (content["stones"], len(content["rejects"])) == ([], 1)
+    assert content["quality"]["sigma0"] is None
+    assert set(content["files"]) == {"survey.json", "report.html"}
+
+
+def test_a_course_of_one_corner_is_drawn_where_it_is(tmp_path):
+    """The face is a triangle that stands on its side, and one of its two lower corners is worn."""
+    places = (
+        (0.05, 0.02),
+        (0.15, 0.02),
+        (0.25, 0.02),
+        (0.3, 0.03),
+        (0.2, 0.15),
+        (0.15, 0.2),
+        (0.25, 0.2),
+        (0.2, 0.25),
+    )
+    rows = "".join(f"  point {x} 0 {z}\n" for x, z in places)
+    text = f"  vertex 0 0 0\n  vertex 0.4 0.03 0\n  vertex 0.2 0 0.3\n{rows}"
+    report = report_surveys(
+        [survey_file(tmp_path, f"stone A header course 1\n{text}end\n")], tmp_path / "out"
+    )
+    (line,) = contents(report)["courses"]
+    assert (line["slope"], line["left_out"]) == (None, 1)
+    assert "courses.png" in contents(report)["files"]
+
+
+def test_a_file_that_cannot_be_read_leaves_no_folder(tmp_path):
+    bad = tmp_path / "bad.moma"
+    bad.write_text("not a survey\n", encoding="utf-8")
+    with pytest.raises(SurveyError, match=r"bad\.moma:1"):
+        report_surveys([bad], tmp_path / "out")
+    with pytest.raises(UsageError, match="no such file"):
+        report_surveys([tmp_path / "none.moma"], tmp_path / "out")
+    with pytest.raises(UsageError, match="unknown format"):
+        report_surveys([SAMPLE], tmp_path / "out", "dxf")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_report_takes_the_place_of_an_earlier_one_only_when_it_is_complete(tmp_path, monkeypatch):
+    path = survey_file(tmp_path, f"stone A header course 1\n{SQUARE}end\n")
+    first = contents(report_surveys([path], tmp_path / "out"))
+
+    def fail(*arguments):
+        raise RuntimeError("disk full")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(survey_report, "write_survey_page", fail)
+        with pytest.raises(RuntimeError):
+            report_surveys([path], tmp_path / "out")
+        with pytest.raises(RuntimeError):
+            report_surveys([path], tmp_path / "new")
+    assert contents(report_surveys([path], tmp_path / "out")) == first
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["out", "wall.moma"]
+    (tmp_path / "out" / "thesis.txt").write_text("mine", encoding="utf-8")
+    with pytest.raises(UsageError, match=r"thesis\.txt"):
+        report_surveys([path], tmp_path / "out")
+
+
+def test_names_are_escaped(tmp_path):
+    text = f"stone A header course 1\n  depth 0.4 source <script>alert(1)</script> & more\n{SQUARE}end\n"
+    report = report_surveys([survey_file(tmp_path, text, name="<b>wall & tower")], tmp_path / "out")
+    page = (report.folder / "report.html").read_text(encoding="utf-8")
+    assert "<script>" not in page
+    assert "<b>" not in page
+    assert "&lt;b&gt;wall &amp; tower" in page
+
+
+def test_several_files_are_one_survey_with_a_picture_per_facade(tmp_path):
+    other = tmp_path / "other.moma"
+    turned = SQUARE.replace(" 0.001 ", " 0 ")  # the same stone lying: a face that looks up
+    lying = "".join(
+        f"  {word} {x} {z} {y}\n" for word, x, y, z in (line.split() for line in turned.splitlines())
+    )
+    other.write_text(
+        HEAD.format(name="floor").replace("0 -9 0", "0 0 9") + f"stone F header\n{lying}end\n",
+        encoding="utf-8",
+    )
+    first = survey_file(tmp_path, f"stone A header course 1\n{SQUARE}end\n")
+    content = contents(report_surveys([first, other], tmp_path / "out"))
+    assert [one["name"] for one in content["facades"]] == ["facade 1", "faces up"]
+    assert content["facades"][1]["azimuth"] is None
+    assert {"elevation.png", "elevation-2.png", "courses.png"} <= set(content["files"])
+    assert [one["stones"] for one in content["inputs"]] == [1, 1]
+
+
+def test_stones_on_a_photograph_say_where_their_plane_is_from(tmp_path):
+    report = report_surveys([WALL / "gable.moma"], tmp_path / "gable")
+    content = contents(report)
+    lifted = [one for one in content["stones"] if one["source"] == "photograph"]
+    assert (len(lifted), len(content["stones"])) == (7, 14)
+    assert all(one["provenance"].startswith("photograph P1, in the plane of ") for one in lifted)
+    assert all(one["sigma0"] is None for one in lifted)
+    measured = max(one["dimension_sigma"] for one in content["stones"] if one["source"] == "points")
+    assert (
+        min(one["dimension_sigma"] for one in lifted) > measured
+    )  # 1.5 px are 4 mm on this wall, a point is 2 mm
+    for one in lifted:  # stones 0.63 m by 0.30 m
+        for value, truth in ((one["length"], 0.63), (one["height"], 0.30)):
+            assert (
+                abs(value / content["inputs"][0]["control"]["scale"] - truth) < 4.0 * one["dimension_sigma"]
+            )
+    assert "photograph P1" in (report.folder / "report.html").read_text(encoding="utf-8")
+
+
+def test_solids_have_an_elevation_and_no_residuals(tmp_path):
+    """A cube of 0.4 m, modelled: nothing of it was measured."""
+    corners = [(x, y, z) for z in (0, 0.4) for y in (0, 0.4) for x in (0, 0.4)]
+    sides = [(1, 3, 4, 2), (5, 6, 8, 7), (1, 2, 6, 5), (2, 4, 8, 6), (4, 3, 7, 8), (3, 1, 5, 7)]
+    lines = [
+        "o A1:header",
+        *(f"v {x} {y} {z}" for x, y, z in corners),
+        *(f"f {' '.join(map(str, side))}" for side in sides),
+    ]
+    (tmp_path / "cube.obj").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    (tmp_path / "head.moma").write_text("moma-survey 1\nobserver 0.2 -9 0.2\n", encoding="utf-8")
+    options = reading_options(tmp_path / "head.moma")
+    report = report_surveys([tmp_path / "cube.obj"], tmp_path / "out", "solids", options)
+    content = contents(report)
+    (stone,) = content["stones"]
+    assert (stone["source"], stone["depth_origin"], stone["kind"]) == ("solid", "solid", "header")
+    assert (stone["length"], stone["depth"]) == pytest.approx((0.4, 0.4))
+    assert stone["dimension_sigma"] is None
+    assert content["quality"]["sigma0"] is None
+    text = "\n".join(survey_report_lines(report, True))
+    assert "nan" not in text
+    assert "nothing was measured" in text
+    assert set(content["files"]) == {"survey.json", "report.html", "elevation.png"}
+    assert "nan" not in " ".join(content["quality"]["verdict"].split())
+
+
+def test_the_files_of_the_how_to_are_what_its_script_makes(tmp_path):
+    subprocess.run([sys.executable, WALL / "wall.py", tmp_path], check=True)
+    for path in tmp_path.iterdir():
+        assert path.read_bytes() == (WALL / path.name).read_bytes(), path.name
+    assert {path.name for path in tmp_path.iterdir()} == {"points.txt", "head.moma", "gable.moma"}
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def invoke(*arguments):
+    return CliRunner().invoke(app, ["survey-report", *map(str, arguments)])
+
+
+def test_the_command_needs_no_database_and_says_where_its_report_lies(place):
+    done = invoke(SAMPLE)
+    assert done.exit_code == 0, done.output
+    assert "out/survey-window/report.html" in done.stdout
+    assert "98 stones" in done.stdout
+    assert [entry.name for entry in place.iterdir()] == ["out"]
+
+
+def test_the_command_prints_json_for_programs_and_takes_the_options_of_readers(place):
+    done = invoke(
+        WALL / "points.txt", "--format", "pnezd", "--codes", CODES, "--header", WALL / "head.moma",
+        "--sigma", "0.004", "--out", "wall", "--json",
+    )  # fmt: skip
+    assert done.exit_code == 0, done.output
+    content = json.loads(done.stdout)
+    assert content == json.loads((place / "wall/survey.json").read_text(encoding="utf-8"))
+    assert "sigma is too large" in content["quality"]["verdict"]  # 2 mm are right, 4 were stated
+    assert content["quality"]["sigma"] == pytest.approx(0.004, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("none.moma",), "no such file"),
+        ((SAMPLE, "--sigma", "0"), "--sigma"),
+        ((SAMPLE, "--header", "none"), "--header"),
+        ((SAMPLE, "--out", ROOT), "holds what no run of MOMA wrote"),
+    ],
+)
+def test_wrong_use_is_told_in_one_line(place, arguments, words):
+    done = invoke(*arguments)
+    assert done.exit_code == 2
+    assert words in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert list(place.iterdir()) == []
+
+
+def test_faces_are_judged_before_any_depth_is_known(tmp_path):
+    path = survey_file(tmp_path, f"stone A stretcher\n{SQUARE}end\nstone B header\n{SQUARE}end\n")
+    report = report_surveys([path], tmp_path / "report")
+    assert not report.study.rejects
+    a, b = report.study.stones
+    assert (a.depth, a.depth_sigma, a.depth_origin) == (None, None, "none")
+    assert (b.depth, b.depth_origin) == (0.4, "kind")
+    assert a.rms == b.rms
+    assert any("1 stones without a depth" in line for line in survey_report_lines(report, False))
+    (stone,) = [one for one in contents(report)["stones"] if one["code"] == "A"]
+    assert stone["depth"] is None

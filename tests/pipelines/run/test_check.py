@@ -1,0 +1,168 @@
+"""`moma check`: what it tells of simplified stones, joints and meshes, and the folder of its pictures."""
+
+import json
+from dataclasses import asdict
+
+import numpy as np
+import pytest
+
+from moma.cli.text.checks import check_lines, duration
+from moma.errors import UsageError
+from pipelines.ingest.ingest import ingest
+from pipelines.run.check import check_scene
+from pipelines.run.closing_check import joints_report, simplification_report
+from survey.joints.report import ClosingReport, Gap, Joint, Overlap
+from survey.joints.settings import JointMode
+from survey.simplify.simplify import simplify
+from survey.synthetic.buildings.walls import wall
+from tests.paths import ROOT
+
+SURVEY = ROOT / "data/samples/window/window.moma"
+PLACE, UP = np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.0, 1.0])
+SCENE = """
+[scene]
+name = "Low courses"
+[select]
+where = ["course <= 2"]
+[materials.limestone]
+density = 2350.0
+young = 12e9
+poisson = 0.2
+[bodies]
+default = "rigid"
+fixed = ["course = 1"]
+"""
+
+
+@pytest.fixture(scope="module")
+def url(tmp_path_factory):
+    place = f"sqlite:///{tmp_path_factory.mktemp('check') / 'window.db'}"
+    ingest([SURVEY], place)
+    return place
+
+
+@pytest.fixture
+def scene(tmp_path):
+    path = tmp_path / "low.toml"
+    path.write_text(SCENE)
+    return path
+
+
+def joint(stones, plane, width, area, left_open=""):
+    return Joint(stones, plane, width, 0.5, area, PLACE, UP, left_open)
+
+
+REPORT = ClosingReport(
+    mode=JointMode.CLOSE,
+    joints=(
+        joint(("A", "B"), 0, 0.010, 0.3),
+        joint(("B", "C"), 0, 0.020, 0.1),
+        joint(("C", "D"), -1, 0.040, 0.1, "too wide"),
+    ),
+    displacement={"A": np.array([0.001, 0.004]), "B": np.array([0.006, 0.002]), "E": np.zeros(0)},
+    volume_change={"A": 0.02, "B": -0.05},
+    alone=("E",),
+    gaps=(Gap(("A", "D"), 0.01, 0.1, PLACE, "bent"), Gap(("C", "D"), 0.04, 0.1, PLACE, "too wide")),
+    overlaps=(Overlap(("A", "E"), 1e-6, 0.001, PLACE), Overlap(("B", "E"), 1e-5, 0.002, PLACE)),
+)
+
+
+def test_joints_are_counted_and_what_remains_has_its_place_on_the_site():
+    told = joints_report(REPORT, np.array([100.0, 200.0, 0.0]))
+    assert (told.mode, told.count, told.planes, told.left_open) == ("close", 2, 1, {"too wide": 1})
+    assert told.mean_width == pytest.approx((0.3 * 10 + 0.1 * 20 + 0.1 * 40) / 0.5 * 1e-3)
+    assert told.area == pytest.approx(0.4)
+    assert (told.max_displacement, told.worst_stone, told.max_volume_change) == (0.006, "B", 0.05)
+    assert told.displacement == {"A": 0.004, "B": 0.006, "E": 0.0}
+    assert [one.stones for one in told.gaps] == [("C", "D"), ("A", "D")]  # the largest first
+    assert [one.stones for one in told.overlaps] == [("B", "E"), ("A", "E")]
+    assert told.gaps[0].place == (101.0, 202.0, 3.0)
+    empty = joints_report(ClosingReport(JointMode.AS_SURVEYED, (), {}, {}, (), (), ()), np.zeros(3))
+    assert (empty.count, empty.mean_width, empty.worst_stone) == (0, 0.0, None)
+
+
+def test_simplified_stones_are_told_by_shape_and_by_what_the_survey_bears_out():
+    stones = [simplify(one) for one in wall(30, 3).blocks()]
+    told = simplification_report(stones)
+    assert told is not None
+    assert sum(told.shapes.values()) == len(stones) > 20
+    assert told.blockiness == min(one.report.blockiness for one in stones)
+    assert {one.code for one in told.outside} == {one.code for one in stones if not one.report.within}
+    assert told.displacement[told.worst_stone] == told.max_displacement == max(told.displacement.values())
+    assert set(told.general) == {one.code for one in stones if one.shape == "polyhedron"}
+    assert simplification_report([]) is None
+
+
+def test_a_scene_is_told_with_its_stones_and_joints(scene, url):
+    report = check_scene(scene, url)
+    assert report.problems == ()
+    assert report.simplification is not None
+    assert sum(report.simplification.shapes.values()) == sum(report.kinds.values()) == 18
+    assert report.joints is not None
+    assert report.joints.mode == "close"
+    assert report.joints.count > 18
+    assert json.loads(json.dumps(asdict(report), allow_nan=False))["joints"]["gaps"] == []
+    lines = "\n".join(check_lines(report, verbose=False))
+    assert "simplified: 18 hexahedra; corners moved by" in lines
+    assert f"joints (close): {report.joints.count} closed on {report.joints.planes} planes" in lines
+    assert "0 left open" in lines
+    assert "W01-02 moved by" in "\n".join(check_lines(report, verbose=True))
+    assert report.mesh_quality is None
+
+
+def test_meshes_are_told_with_their_quality(scene, url):
+    scene.write_text(SCENE.replace('"rigid"', '"deformable"') + "[mesh]\nsize = 0.4\n")
+    quality = check_scene(scene, url).mesh_quality
+    assert quality is not None
+    assert 0.0 < quality.smallest_jacobian <= 1.0
+    assert 0.0 < quality.smallest_angle <= 90.0
+    assert sum(quality.how.values()) == 8
+    assert "smallest scaled Jacobian" in "\n".join(check_lines(check_scene(scene, url), verbose=False))
+
+
+def test_what_is_left_open_is_listed_with_reasons_and_is_a_problem_where_nothing_closes(scene, url):
+    scene.write_text(SCENE + "[joints]\nmax_displacement = 0.001\n")
+    report = check_scene(scene, url)
+    assert report.joints is not None
+    assert len(report.joints.gaps) >= 18
+    lines = check_lines(report, verbose=False)
+    assert sum(" over " in line and " open by " in line for line in lines) == 5
+    assert any(line.endswith("more, with -v") for line in lines)
+    every = check_lines(report, verbose=True)
+    assert sum(" over " in line and " open by " in line for line in every) == len(report.joints.gaps)
+    assert any("max_displacement" in one for one in report.problems)
+    scene.write_text(SCENE + '[joints]\nmode = "as-surveyed"\n')
+    report = check_scene(scene, url)
+    assert not any("could be closed" in one for one in report.problems)
+    assert report.joints is not None
+    assert (report.joints.mode, report.joints.count) == ("as-surveyed", 0)
+
+
+def test_pictures_and_the_report_lie_in_a_folder_of_their_own(scene, url, tmp_path):
+    folder = tmp_path / "pictures"
+    report = check_scene(scene, url, folder)
+    assert report.warnings == ()
+    assert sorted(one.name for one in folder.iterdir()) == sorted(report.files)
+    assert {"joints.png", "moved.png", "joints-3d.png", "check.json"} <= {*report.files}
+    told = json.loads((folder / "check.json").read_text())
+    assert told["joints"]["count"] == report.joints.count  # type: ignore[union-attr]
+    check_scene(scene, url, folder)  # in place of the earlier ones
+    (folder / "notes.txt").write_text("mine")
+    with pytest.raises(UsageError, match=r"notes\.txt"):
+        check_scene(scene, url, folder)
+    assert (folder / "notes.txt").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("seconds", "told"),
+    [
+        (0.123, "0.12 s"),
+        (9.96, "10 s"),
+        (100.0, "100 s"),
+        (121.0, "2 min"),
+        (7000.0, "117 min"),
+        (7300.0, "2 h"),
+    ],
+)
+def test_times_are_told_in_the_unit_in_which_one_thinks_of_them(seconds, told):
+    assert duration(seconds) == told

@@ -1,0 +1,255 @@
+"""From survey file to results in folder and database, on the two lowest courses of the sample."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from archmodel.database.session import open_database
+from archmodel.query.api import describe, find_rows
+from archmodel.store.run_record import STONE_VALUES
+from mechanics.results.result import Outcome
+from mechanics.scene.scene import Fidelity
+from moma.errors import MissingLibraryError, SceneError, UsageError
+from pipelines.ingest.ingest import ingest
+from pipelines.ingest.records import surveyed_block
+from pipelines.run import run as run_module
+from pipelines.run.assemble import assemble
+from pipelines.run.run import run_scene, write_results
+from pipelines.run.stone_values import stone_results
+from pipelines.scene.file import parse_scene
+from pipelines.scene.selection import select_stones
+from tests.paths import ROOT
+from tests.pipelines.results_by_hand import result_of, rigid_body
+
+SURVEY = ROOT / "data/samples/window/window.moma"
+
+LOW = """
+[scene]
+name = "Two courses"
+[select]
+where = ["course <= 2"]
+[materials.limestone]
+density = 2350.0
+young = 12e9
+poisson = 0.2
+[bodies]
+default = "rigid"
+deformable = ["W02-02"]
+fixed = ["course = 1"]
+[mesh]
+size = 0.3
+[time]
+step = 0.005
+"""
+
+
+@pytest.fixture(scope="module")
+def url(tmp_path_factory):
+    """The sample in a database that tests only read."""
+    url = f"sqlite:///{tmp_path_factory.mktemp('db') / 'window.db'}"
+    ingest([SURVEY], url)
+    return url
+
+
+@pytest.fixture
+def session(url):
+    with open_database(url, create=False) as database, database.session(read_only=True) as session:
+        yield session
+
+
+def selected(text, session):
+    return select_stones(parse_scene(text, "scene.toml"), session)
+
+
+def test_fixed_goes_before_the_other_lists_and_the_default_comes_last(session):
+    text = LOW.replace('["W02-02"]', '["course = 1 and depth < 0.4", "W02-02"]')
+    blocks = assemble(parse_scene(text, "scene.toml"), session).scene.blocks
+    fidelity = {block.code: block.fidelity for block in blocks}
+    assert fidelity["W02-02"] is Fidelity.DEFORMABLE
+    assert fidelity["W02-01"] is Fidelity.RIGID
+    assert all((one is Fidelity.FIXED) == code.startswith("W01") for code, one in fidelity.items())
+
+
+def test_excluded_stones_are_left_out_by_code_or_expression(session):
+    text = LOW.replace("[materials", 'exclude = ["W02-01", "course = 2 and depth > 0.4"]\n[materials', 1)
+    codes = {model.record.code for model in selected(text, session)}
+    deep = {row["code"] for row in find_rows(session, "entity", ["course = 2 and depth > 0.4"])}
+    every = {row["code"] for row in find_rows(session, "entity", ["course <= 2"])}
+    assert deep
+    assert codes == every - deep - {"W02-01"}
+
+
+def test_every_stone_has_the_material_of_its_rule(session):
+    text = (
+        LOW
+        + '[materials.granite]\ndensity = 2700\nyoung = 5e10\npoisson = 0.25\nstones = ["kind = header"]\n'
+    )
+    for model in selected(text, session):
+        assert (model.material.name == "granite") == (model.record.kind == "header")
+
+
+@pytest.mark.parametrize(
+    ("written", "instead", "line", "said"),
+    [
+        ('"course <= 2"', '"course > 99"', 4, "no stone is selected"),
+        ('"course <= 2"', '"curse <= 2"', 5, "unknown attribute 'curse'"),
+        ("where", 'kind = "vossoir"\nwhere', 5, "unknown kind 'vossoir'; did you mean voussoir"),
+        ('"W02-02"', '"W02-20"', 12, "'W02-20' is not the code of a selected stone; did you mean 'W02-0"),
+        ('"W02-02"', '"V4"', 12, "'V4' is not the code of a selected stone"),
+        ('"course = 1"', '"course = 7"', 13, "fixed: no selected stone satisfies 'course = 7'"),
+        ('"course = 1"', '"course = = 1"', 13, "fixed: "),
+        (
+            'deformable = ["W02-02"]',
+            'rigid = ["W02-02"]\ndeformable = ["W02-02"]',
+            13,
+            "both rigid and deformable",
+        ),
+        ("poisson = 0.2", 'poisson = 0.2\nstones = ["W02-02"]', 6, "stones have no material, e.g. W01-01"),
+        ("[materials", 'exclude = ["course <= 2"]\n[materials', 6, "all selected stones are excluded"),
+    ],
+)
+def test_a_selection_that_fails_is_named_with_its_line(session, written, instead, line, said):
+    assert written in LOW
+    with pytest.raises(SceneError) as caught:
+        selected(LOW.replace(written, instead, 1), session)
+    assert str(caught.value).startswith(f"scene.toml:{line}: ")
+    assert said in str(caught.value)
+
+
+def test_a_stone_from_the_database_is_the_stone_that_was_surveyed(session):
+    models = selected("[materials.a]\ndensity = 1\nyoung = 1\npoisson = 0\n", session)
+    assert len(models) == 98
+    for model in models:
+        block = surveyed_block(model.record)
+        assert np.allclose(block.solid.vertices, model.record.solid_vertices, rtol=0, atol=1e-12)
+        assert block.face.rejected_points == model.record.rejected
+
+
+def test_closed_stones_touch_and_open_ones_do_not(session):
+    closed = assemble(parse_scene(LOW, "scene.toml"), session)
+    opened = assemble(parse_scene(LOW + '[joints]\nmode = "as-surveyed"\n', "scene.toml"), session)
+    assert (opened.closing.mode, opened.closing.largest_displacement) == ("as-surveyed", 0.0)
+    assert closed.closing.largest_displacement > 0.0
+    assert closed.towards == pytest.approx([0.12, -0.99, 0.0], abs=0.02)
+
+    def bed(assembly):
+        """Upper side of the fixed course, lower side of the next, at their middles [m]."""
+        z = {block.code: block.vertices[:, 2] for block in assembly.scene.blocks}
+        top = max(one.max() for code, one in z.items() if code.startswith("W01"))
+        return min(one.min() for code, one in z.items() if code.startswith("W02")) - top
+
+    assert bed(closed) < bed(opened)
+    by_code = {block.code: block for block in closed.scene.blocks}
+    assert by_code["W02-02"].mesh_size == 0.3
+    assert by_code["W02-01"].mesh_size is None
+
+
+def test_a_run_writes_its_folder_and_keeps_its_results(tmp_path):
+    url = f"sqlite:///{tmp_path / 'own.db'}"
+    ingest([SURVEY], url)
+    (tmp_path / "low.toml").write_text(LOW, encoding="utf-8")
+    heard = []
+    done = run_scene(tmp_path / "low.toml", url, tmp_path / "out", heard.append)
+    assert {report.stage for report in heard} == {"mesh", "step", "write"}
+    summary = json.loads((tmp_path / "out/summary.json").read_text(encoding="utf-8"))
+    assert summary == done.summary
+    assert summary["outcome"] == "equilibrium"
+    assert summary["bodies"]["deformable"] == 1
+    assert summary["errors"]["reaction"] < 1e-3
+    assert sorted(summary["files"]) == sorted(one.name for one in (tmp_path / "out").iterdir())
+    assert {"report.html", "results.pvd", "joints.csv", "von_mises.png", "scene.toml"} <= set(
+        summary["files"]
+    )
+    with open_database(url, create=False) as database, database.session(read_only=True) as session:
+        rows = find_rows(session, "entity", ["von_mises_max > 0"])
+        worst = find_rows(session, "entity", ["stress_error > 0 and principal_compression < 0"])
+        bearing = find_rows(session, "entity", ["joint_pressure > 1000", "joint_kern < 3"])
+        (run,) = describe(session, "W02-02")["runs"]
+        assert len(find_rows(session, "entity", ["fidelity = fixed"])) == summary["bodies"]["fixed"]
+    assert [row["code"] for row in rows] == [row["code"] for row in worst] == ["W02-02"]
+    assert 0 < rows[0]["stress_error"] < 1
+    assert rows[0]["utilisation"] is None  # no strengths
+    assert {"W02-02", "W01-03"} <= {row["code"] for row in bearing}
+    assert set(run["values"]) <= {*STONE_VALUES, "volume", "mass"}
+    assert summary["stress"]["error"]["stone"] == "W02-02"
+    assert summary["joints"]["count"] >= summary["joints"]["pressed"] > 8
+    assert run["scene"] == "Two courses"
+    assert rows[0]["von_mises_max"] == pytest.approx(summary["von_mises"]["max"])
+    # once more, in the place of the first
+    again = run_scene(tmp_path / "low.toml", url, tmp_path / "out")
+    assert again.run > done.run
+    assert again.summary["von_mises"] == done.summary["von_mises"]
+
+
+def test_a_picture_that_shows_nothing_is_a_warning(tmp_path):
+    url = f"sqlite:///{tmp_path / 'own.db'}"
+    ingest([SURVEY], url)
+    text = LOW.replace('deformable = ["W02-02"]\n', "") + '[output]\npictures = ["error", "resultants"]\n'
+    (tmp_path / "low.toml").write_text(text, encoding="utf-8")
+    done = run_scene(tmp_path / "low.toml", url, tmp_path / "out")
+    idle, omitted = done.warnings
+    assert "[mesh] has no effect: no stone deforms" in idle
+    assert omitted == "no picture error: no stone deforms"
+    assert [name for name in done.summary["files"] if name.endswith(".png")] == ["resultants.png"]
+
+
+def test_without_pictures_the_rest_is_written_and_a_warning_says_what_to_install(tmp_path, monkeypatch):
+    def no_pictures(*_):
+        raise MissingLibraryError("libGL.so.1: not there", remedy="apt-get install libgl1")
+
+    monkeypatch.setattr(run_module, "draw_pictures", no_pictures)
+    url = f"sqlite:///{tmp_path / 'own.db'}"
+    ingest([SURVEY], url)
+    (tmp_path / "low.toml").write_text(LOW.replace('deformable = ["W02-02"]\n', ""), encoding="utf-8")
+    done = run_scene(tmp_path / "low.toml", url, tmp_path / "out")
+    assert done.warnings[1:] == ("no pictures: libGL.so.1: not there; apt-get install libgl1",)
+    assert "apt-get install libgl1" in (tmp_path / "out/report.html").read_text(encoding="utf-8")
+    assert (tmp_path / "out/results.pvd").exists()
+
+
+def test_a_place_that_is_taken_is_refused_before_anything_runs(tmp_path, url, monkeypatch):
+    monkeypatch.setattr(run_module, "simulate", None)  # must not be reached
+    (tmp_path / "low.toml").write_text(LOW, encoding="utf-8")
+    with pytest.raises(UsageError, match=r"low\.toml"):
+        run_scene(tmp_path / "low.toml", url, tmp_path)
+
+
+def test_a_static_start_is_told_and_a_warning_where_there_is_none(tmp_path):
+    url = f"sqlite:///{tmp_path / 'own.db'}"
+    ingest([SURVEY], url)
+    text = LOW + 'start = "equilibrium"\n[output]\npictures = []\n'
+    (tmp_path / "low.toml").write_text(text, encoding="utf-8")
+    done = run_scene(tmp_path / "low.toml", url, tmp_path / "out")
+    assert done.summary["static"]["found"]
+    assert done.warnings == ()
+    assert "Began in static equilibrium" in (tmp_path / "out/report.html").read_text(encoding="utf-8")
+    # without the course that holds them up, the stones fall
+    falling = (
+        text.replace('where = ["course <= 2"]', 'where = ["course in (1, 3)"]')
+        + "[joints]\nmode = 'as-surveyed'\n"
+    )
+    (tmp_path / "falling.toml").write_text(falling.replace('["W02-02"]', '["W03-02"]'), encoding="utf-8")
+    done = run_scene(tmp_path / "falling.toml", url, tmp_path / "out2")
+    assert not done.summary["static"]["found"]
+    assert any("no static equilibrium was found" in one for one in done.warnings)
+
+
+@pytest.mark.parametrize(
+    ("relaxation", "outcome", "warned"),
+    [(False, "equilibrium", True), (True, "equilibrium", False), (True, "moving", True)],
+)
+def test_unsolved_steps_are_a_warning_unless_only_the_end_counts(
+    tmp_path, session, relaxation, outcome, warned
+):
+    scene = parse_scene(
+        LOW + f"relaxation = {str(relaxation).lower()}\n[output]\npictures = []\n", "scene.toml"
+    )
+    assembly = assemble(scene, session)
+    by_hand = result_of(
+        [rigid_body("a", (0, 0, 0), (1, 1, 1))], outcome=Outcome(outcome), pairs=(), forces=()
+    )
+    result = replace(by_hand, scene=replace(assembly.scene, blocks=assembly.scene.blocks[:1]))
+    _, warnings = write_results(result, stone_results(result), scene, assembly, tmp_path, {})
+    assert any("1 of 10 steps" in one for one in warnings) == warned

@@ -1,0 +1,261 @@
+"""Scene files: every mistake is named with its line, its value and a remedy, before anything runs."""
+
+import re
+import tomllib
+from dataclasses import fields
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import ContactSettings, SolverSettings, Start, TimeSettings
+from mechanics.stones.meshing.elements import Element
+from moma.errors import MomaError, SceneError, UsageError
+from pipelines.record.file import parse_record
+from pipelines.scene.file import parse_scene, read_scene
+from pipelines.scene.settings import MeshSettings
+from pipelines.scene.stone_keys import MATERIAL_KEYS, ORTHOTROPY_KEYS
+from pipelines.scene.table_keys import TABLES
+from pipelines.toml.lines import key_lines
+from pipelines.toml.schema import REQUIRED
+from survey.joints.settings import JointSettings
+from tests.paths import ROOT
+
+SAMPLE = ROOT / "data/samples/window/window.toml"
+STONE = "[materials.stone]\ndensity = 2000\nyoung = 1e10\npoisson = 0.2\n"
+
+
+def message_of(text):
+    with pytest.raises(SceneError) as caught:
+        parse_scene(text, "scene.toml")
+    assert caught.value.exit_code == 2
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def test_the_smallest_scene_has_a_material_and_defaults_for_the_rest():
+    scene = parse_scene(STONE, "dir/tower.toml")
+    assert scene.name == "tower"
+    assert scene.gravity == (0.0, 0.0, -9.81)
+    assert (scene.bodies.default, scene.bodies.ring) == (None, 3)  # as the outputs need it
+    assert scene.output.stress is None
+    assert scene.materials[0].material.density == 2000.0
+    assert scene.contact.law.friction == 0.6
+
+
+def test_damping_strengths_and_the_way_to_start_are_read():
+    scene = parse_scene(
+        STONE
+        + "mass_damping = 2\nstiffness_damping = 1e-4\ntensile_strength = 2e6\ncompressive_strength = 3e7\n"
+        + "[time]\nstart = 'equilibrium'\nlumped_mass = true\n[mesh]\nelement = 'hex20'\n",
+        "scene.toml",
+    )
+    material = scene.materials[0].material
+    assert (material.mass_damping, material.stiffness_damping) == (2.0, 1e-4)
+    assert (material.tensile_strength, material.compressive_strength) == (2e6, 3e7)
+    assert (scene.time.start, scene.time.lumped_mass) == (Start.EQUILIBRIUM, True)
+    assert scene.mesh == MeshSettings(0.2, Element.HEX20)
+
+
+LAYERS = "[materials.stone.orthotropy]\nyoung = [3e9, 2e9, 1e9]\nshear = [1e9, 1e9, 1e9]\npoisson = [0.2, 0.1, 0.1]\n"
+
+
+def test_a_material_may_have_axes_of_its_own():
+    scene = parse_scene(STONE + LAYERS + "axes = [[0, 3, 0], [-1, 0, 0], [0, 0, 1]]\n", "scene.toml")
+    orthotropy = scene.materials[0].material.orthotropy
+    assert orthotropy.young == (3e9, 2e9, 1e9)
+    assert orthotropy.axes == ((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    assert parse_scene(STONE, "scene.toml").materials[0].material.orthotropy is None
+
+
+def test_the_sample_scene_is_valid():
+    scene = read_scene(SAMPLE)
+    assert scene.bodies.fixed == ("course = 1",)
+    assert scene.text == SAMPLE.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "said"),
+    [
+        ("[contact]\nfrictoin = 0.6\n", 2, "unknown key 'frictoin' in [contact]; did you mean 'friction'?"),
+        ("[contcat]\n", 1, "unknown table [contcat]; did you mean 'contact'?"),
+        ("\nname = 'x'\n", 2, "unknown key 'name'"),
+        (
+            "[contact]\nfriction = 'high'\n",
+            2,
+            "friction = 'high' is not a number; give a number [-], at least 0",
+        ),
+        ("[contact]\nfriction = true\n", 2, "friction = true is not a number"),
+        ("[contact]\nfriction = -0.1\n", 2, "friction = -0.1 is out of range"),
+        ("[contact]\nfriction = nan\n", 2, "friction = nan is out of range"),
+        ("[time]\nstep = 0.0\n", 2, "give a number [s], greater than 0"),
+        ("[time]\n# slower\ntheta = 0.4\n", 3, "at least 0.5 and at most 1"),
+        ("[time]\nstep = 0.1\nduration = 0.01\n", 3, "shorter than step"),
+        ("[solver]\nmax_iterations = 1.5\n", 2, "not a whole number"),
+        ("[bodies]\ndefault = 'elastic'\n", 2, "known here: auto, deformable, rigid"),
+        ("[bodies]\nfixed = 'course = 1'\n", 2, "not a list of texts"),
+        ("[gravity]\ndirection = [0, 0]\n", 2, "not a list of three numbers"),
+        ("[gravity]\ndirection = [0, 0, 0]\n", 2, "direction has no length"),
+        ("[output]\npictures = ['von_mise']\n", 2, "did you mean 'von_mises'?"),
+        ("[joints]\nmode = 'shut'\n", 2, "mode = 'shut' is unknown"),
+        ("[mesh]\nelement = 'tet5'\n", 2, "element = 'tet5' is unknown; did you mean 'tet4'"),
+        ("[time]\nstart = 'still'\n", 2, "start = 'still' is unknown; known here: equilibrium, rest"),
+        ("[time]\nstep = \n", 2, "not TOML"),
+        ("[time\n", 1, "not TOML"),
+        ("time = 3\n", 1, "'time' is not a table"),
+    ],
+)
+def test_a_mistake_is_named_with_its_line(text, line, said):
+    message = message_of(text + STONE) if "not TOML" not in said else message_of(text)
+    assert message.startswith(f"scene.toml:{line}: ")
+    assert said in message
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "said"),
+    [
+        ("[scene]\nname = 'x'\n", 1, "no material"),
+        ("[materials]\ndensity = 2000\n", 2, "'density' stands in no material"),
+        ("[materials.a]\ndensity = 2000\nyoung = 1e10\n", 1, "[materials.a] has no 'poisson'"),
+        (STONE.replace("0.2", "0.5"), 4, "poisson = 0.5 is out of range"),
+        (
+            STONE + LAYERS.replace("3e9", "0"),
+            6,
+            "is out of range; give a list of three numbers [Pa], greater than 0",
+        ),
+        (STONE + LAYERS.replace("shear", "sheer"), 7, "unknown key 'sheer'"),
+        (STONE + LAYERS + "axes = [[1, 0, 0]]\n", 9, "axes are not three directions"),
+        (
+            STONE + LAYERS + "axes = [[1, 0, 0], [0, 1, 0], [0, 1, 1]]\n",
+            5,
+            "give three unit vectors at right angles",
+        ),
+        (STONE + LAYERS.replace("0.2, 0.1", "5.0, 0.1"), 5, "poisson"),
+        (STONE + "orthotropy = 3\n", 5, "'orthotropy' is not a table"),
+        (STONE + "tensile_strength = 0\n", 5, "give a number [Pa], greater than 0"),
+        (STONE + "stiffness_damping = -1e-4\n", 5, "give a number [s], at least 0"),
+        (STONE + STONE.replace("stone", "brick"), 5, "'stone' and 'brick' both lack 'stones'"),
+    ],
+)
+def test_a_mistake_in_the_materials_is_named_with_its_line(text, line, said):
+    message = message_of(text)
+    assert message.startswith(f"scene.toml:{line}: ")
+    assert said in message
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(SceneError, match="no such scene file"):
+        read_scene(tmp_path / "none.toml")
+    (tmp_path / "latin.toml").write_bytes(b"[scene]\nname = '\xe9glise'\n")
+    with pytest.raises(SceneError, match="not UTF-8"):
+        read_scene(tmp_path / "latin.toml")
+    with pytest.raises(SceneError, match="cannot be read"):
+        read_scene(tmp_path)
+
+
+@given(st.text(max_size=200) | st.text(alphabet="[]{}=\"'#\n.a1 -,", max_size=60))
+def test_no_text_makes_the_reader_fail_in_another_way(text):
+    try:
+        parse_scene(text, "scene.toml")
+    except MomaError as error:
+        message = str(error)
+    else:
+        return
+    assert re.match(r"scene\.toml:\d+: ", message)
+
+
+@given(
+    st.dictionaries(
+        st.sampled_from(["a", "b-1", "c_2", '"d.e"', "'f'", "g.h"]),
+        st.sampled_from(
+            ["1", '"# no comment"', "[1,\n 2, # two\n 3]", '"""\n[x]\ny = 1\n"""', "{ p = 1 }", "'='"]
+        ),
+        max_size=6,
+    ),
+    st.integers(0, 3),
+)
+def test_key_lines_agree_with_where_the_keys_were_written(keys, blank):
+    lines = ["# head", *[""] * blank, "[table]"]
+    written = {}
+    for key, value in keys.items():
+        written[key] = len("\n".join(lines).split("\n")) + 1
+        lines.append(f"{key} = {value} # end")
+    text = "\n".join(lines)
+    found = key_lines(text)
+    assert set(_paths(tomllib.loads(text))) == set(found)
+    for key, line in written.items():
+        path = tuple(part.strip("\"'") for part in ([key] if key[0] in "\"'" else key.split(".")))
+        assert found[("table", *path)] == line
+
+
+def _paths(tables, above=()):
+    """Paths of all keys, but of those inside inline tables, which stand on their table's line."""
+    for name, value in tables.items():
+        path = (*above, name)
+        yield path
+        if isinstance(value, dict) and "p" not in value:
+            yield from _paths(value, path)
+
+
+@pytest.mark.parametrize(
+    ("table", "settings"),
+    [
+        ("time", TimeSettings),
+        ("solver", SolverSettings),
+        ("joints", JointSettings),
+    ],
+)
+def test_every_setting_has_a_key_with_its_default(table, settings):
+    keys = {key.name: key.default for key in TABLES[table]}
+    assert keys == {one.name: one.default for one in fields(settings)}
+
+
+def test_every_setting_of_the_contact_has_a_key_with_its_default():
+    keys = {key.name: key.default for key in TABLES["contact"]}
+    settings = {one.name: one.default for one in (*fields(DryJoint), *fields(ContactSettings))}
+    assert keys == {name: value for name, value in settings.items() if name not in ("law", "rules")}
+
+
+def test_every_key_of_a_scene_is_documented_with_its_unit_and_default():
+    documented = (ROOT / "docs/scene.md").read_text(encoding="utf-8")
+    materials = {"materials.NAME": MATERIAL_KEYS, "materials.NAME.orthotropy": ORTHOTROPY_KEYS}
+    for table, keys in {**TABLES, **materials}.items():
+        section = documented.split(f"## `[{table}]`")[1].split("\n## ")[0]
+        rows = [line for line in section.splitlines() if line.startswith("| `")]
+        assert [row.split("`")[1] for row in rows] == [key.name for key in keys]
+        for row, key in zip(rows, keys, strict=True):
+            _, _, unit, default, doc, _ = (cell.strip() for cell in row.split("|"))
+            assert unit == (key.unit or ""), key.name
+            assert default == default_text(key), key.name
+            assert key.doc in doc, key.name
+
+
+def default_text(key):
+    """A default as the documentation writes it."""
+    if key.default is REQUIRED:
+        return "required"
+    if key.default is None:
+        return ""
+    if isinstance(key.default, bool):
+        return f"`{str(key.default).lower()}`"
+    if isinstance(key.default, tuple):
+        quoted = (f'"{one}"' if isinstance(one, str) else f"{one:g}" for one in key.default)
+        return f"`[{', '.join(quoted)}]`"
+    return f'`"{key.default}"`' if isinstance(key.default, str) else f"`{key.default:g}`"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            "[scene]\nname = " + "[" * 3000 + "]" * 3000,
+            r"wild\.toml:2: not TOML: lists or tables are nested too",
+        ),
+        ("[scene]\nx = 1\ny = " + "1" * 5000, r"wild\.toml:3: not TOML: a number has thousands of digits"),
+    ],
+)
+def test_toml_that_breaks_its_reader_is_an_error_with_a_line(text, message):
+    for parse in (parse_scene, parse_record):
+        with pytest.raises(UsageError, match=message):
+            parse(text, "wild.toml")

@@ -1,0 +1,173 @@
+"""The generated buildings are what they say: solids without gaps, joints known otherwise, faces as measured."""
+
+import numpy as np
+import pytest
+
+from survey.geometry.solids import area_vector
+from survey.geometry.watertight import check_watertight
+from survey.synthetic.building import Building
+from survey.synthetic.buildings.assemblies import angled_pier, hexagonal_dome
+from survey.synthetic.buildings.facings import two_facings
+from survey.synthetic.buildings.openings import Arch
+from survey.synthetic.buildings.quoins import corner
+from survey.synthetic.buildings.vaults import barrel_vault, semicircular_arch
+from survey.synthetic.buildings.walls import wall
+from tests.survey.unseen.statics import area_of, centroid, contacts, near_pairs, overlap_depth
+
+BUILDINGS = {
+    "wall": lambda: wall(20),
+    "segmental": lambda: wall(70, arch=Arch.SEGMENTAL),
+    "semicircular": lambda: wall(98, arch=Arch.SEMICIRCULAR),
+    "sagging": lambda: wall(60, seed=3, sag=0.05),
+    "snecked": lambda: wall(100, snecked=0.1),
+    "vault": lambda: barrel_vault(9, 3),
+    "rings": lambda: barrel_vault(9, 3, bonded=False),
+    "arch": semicircular_arch,
+    "corner": lambda: corner(4, 2.0),
+    "facings": lambda: two_facings(3.0, 5).building,
+}
+
+
+@pytest.fixture(scope="module", params=BUILDINGS)
+def building(request: pytest.FixtureRequest) -> Building:
+    return BUILDINGS[request.param]()
+
+
+def test_solids_are_convex_and_do_not_overlap(building: Building) -> None:
+    for solid in building.solids:
+        check_watertight(solid, convex=True)
+    solids = building.solids
+    assert max(overlap_depth(solids[i], solids[j]) for i, j in near_pairs(solids)) < 1e-9
+
+
+def test_joints_are_those_that_another_clipping_finds(building: Building) -> None:
+    solids = building.solids
+    other = {}
+    for i, j in near_pairs(solids):
+        area = sum(area_of(polygon) for _, polygon in contacts(solids[i], solids[j]))
+        if area > 1e-3:
+            other[solids[i].code, solids[j].code] = area
+    own: dict[tuple[str, str], float] = {}
+    for joint in building.joints:
+        own[joint.stones] = own.get(joint.stones, 0.0) + joint.area
+    assert {pair for pair, area in own.items() if area > 1e-3} == set(other)
+    for pair, area in other.items():
+        assert own[pair] == pytest.approx(area, rel=1e-9), pair
+    for joint in building.joints:
+        first, second = (next(s for s in solids if s.code == code) for code in joint.stones)
+        assert (first.vertices.mean(axis=0) - second.vertices.mean(axis=0)) @ joint.normal > 0.0
+
+
+def test_faces_are_measured_where_they_are(building: Building) -> None:
+    """Planes within a degree; corners at most a joint, a bevel and noise from true ones."""
+    for block, solid, record in zip(building.blocks(), building.solids, building.survey.blocks, strict=True):
+        assert block.code == solid.code == record.code
+        corners = solid.vertices[list(solid.faces[0])]
+        normal = area_vector(corners) / np.linalg.norm(area_vector(corners))
+        assert block.face.fit.normal @ normal > np.cos(np.radians(1.0)), block.code
+        apart = np.linalg.norm(block.face.outline[:, None] - corners[None], axis=2)
+        assert apart.min(axis=1).max() < 0.09, block.code
+
+
+def test_a_building_is_the_same_for_the_same_seed() -> None:
+    first, again, other = wall(20), wall(20), wall(20, seed=2)
+    for a, b in zip(first.survey.blocks, again.survey.blocks, strict=True):
+        assert a.code == b.code
+        np.testing.assert_array_equal(a.vertices, b.vertices)
+    assert not np.array_equal(first.survey.blocks[0].vertices, other.survey.blocks[0].vertices)
+
+
+def test_the_joints_of_an_arch_are_thickness_times_depth() -> None:
+    joints = semicircular_arch(17, thickness=0.5, depth=0.6).joints
+    np.testing.assert_allclose([joint.area for joint in joints], [0.3] * 16, rtol=1e-12)
+
+
+def test_beds_sag_by_what_was_asked_for() -> None:
+    building = wall(120, seed=3, sag=0.08)
+    last = building.solids[-1].code[:3]
+    # the upper corners of the faces of the top course: those before the last in a face's polygon, and the last
+    upper = np.concatenate(
+        [s.vertices[list(s.faces[0])][-2:] for s in building.solids if s.code.startswith(last)]
+    )
+    along = np.linalg.norm(upper[:, :2] - upper[np.argmin(upper[:, 0]), :2], axis=1)
+    curvature = np.polyfit(along, upper[:, 2], 2)[0]
+    assert curvature * 25.0 == pytest.approx(0.08, rel=0.02)
+
+
+def test_snecks_reach_through_two_courses() -> None:
+    building = wall(100, snecked=0.1)
+    tall = [s for s in building.solids if np.ptp(s.vertices[:, 2]) > 0.5]
+    assert len(tall) >= 4
+    assert {r.code for r in building.survey.blocks} >= {s.code for s in tall}
+
+
+def test_the_volume_of_a_core_is_what_no_stone_fills() -> None:
+    made = two_facings(3.0, 6, storeys=2)
+    assert len(made.core_volumes) == 2
+    assert len(made.through) >= 1
+    solids, rng = made.building.solids, np.random.default_rng(5)
+    depth = [np.ptp((s.vertices - s.vertices[0]) @ _out(s)) for s in solids if s.code in made.through]
+    assert depth == pytest.approx([made.thickness] * len(depth), abs=1e-9)
+    # a box about the wall in its own axes, sampled; what is in no stone and behind both faces is core
+    axes = made_axes(solids)
+    local = np.concatenate([s.vertices for s in solids]) @ axes.T
+    low, high = local.min(axis=0), local.max(axis=0)
+    low[2], high[2] = low[2] + 0.02, high[2] - 0.02  # the relief of the faces is a few millimetres
+    points = rng.uniform(low, high, (60_000, 3))
+    free = np.ones(len(points), bool)
+    for solid in solids:
+        planes = _planes(solid, axes)
+        free &= ((points @ planes[:, :3].T - planes[:, 3]) > 0.0).any(axis=1)
+    assert free.mean() * np.prod(high - low) == pytest.approx(made.core_volume, rel=0.02)
+
+
+def _out(solid) -> np.ndarray:
+    vector = area_vector(solid.vertices[list(solid.faces[0])])
+    return vector / np.linalg.norm(vector)
+
+
+def made_axes(solids) -> np.ndarray:
+    """Along, up and out of a wall, from a stone's own sides, which are square to the wall."""
+    solid = next(s for s in solids if s.code.startswith("T"))
+    up = solid.vertices[3] - solid.vertices[0]
+    along = solid.vertices[1] - solid.vertices[0]
+    axes = np.array([along, up, np.cross(along, up)])
+    return axes / np.linalg.norm(axes, axis=1)[:, None]
+
+
+def _planes(solid, axes) -> np.ndarray:
+    rows = []
+    for face in solid.faces:
+        corners = solid.vertices[list(face)] @ axes.T
+        normal = area_vector(corners)
+        rows.append([*normal, normal @ corners[0]])
+    return np.array(rows)
+
+
+def test_rounded_assemblies_are_within_half_a_millimetre_of_the_truth() -> None:
+    for made in (hexagonal_dome(60), angled_pier()):
+        for solid, true in zip(made.solids, made.truth, strict=True):
+            check_watertight(solid)
+            assert 1e-5 < np.abs(solid.vertices - true.vertices).max() <= 0.5e-3 + 1e-12
+        assert all(joint.area > 1e-6 for joint in made.joints)
+
+
+def test_the_dome_is_half_a_shell_of_mostly_hexagons() -> None:
+    made = hexagonal_dome(90, radius=3.0, thickness=0.3)
+    for solid in made.truth:
+        check_watertight(solid, convex=True)
+    volume = sum(centroid(solid)[0] for solid in made.truth)
+    # faces are tangent planes: a little more than the shell between two spheres
+    assert volume == pytest.approx(2.0 / 3.0 * np.pi * (3.3**3 - 3.0**3), rel=0.03)
+    assert sum(len(solid.faces) == 8 for solid in made.truth) > 50
+    # every side that does not stand on the ground is a joint: 6 sides of 72 inner stones and so on, each shared by two
+    sides = sum(len(solid.faces) - 2 for solid in made.truth) - len(made.base)
+    assert len(made.joints) == sides // 2
+
+
+def test_an_angled_pier_is_full() -> None:
+    made = angled_pier(courses=6, wing=2.2, height=0.3)
+    volume = sum(centroid(solid)[0] for solid in made.parts)
+    assert volume == pytest.approx(6 * 0.3 * (2.2 * 0.4 + 1.8 * 0.4), rel=1e-12)
+    bed = sum(joint.area for joint in made.joints if abs(joint.normal[2]) > 0.9)
+    assert bed == pytest.approx(5 * (2.2 * 0.4 + 1.8 * 0.4), rel=1e-9)

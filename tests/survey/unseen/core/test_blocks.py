@@ -1,0 +1,188 @@
+"""The core of a wall as blocks: closed, on common planes with the stones, as large as it truly is."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from moma.errors import GeometryError, UsageError
+from pipelines.ingest.records import surveyed_block
+from pipelines.propose.records import core_record
+from survey.geometry.solids import area_vector, volume_of
+from survey.geometry.watertight import check_watertight
+from survey.joints.close import close_joints
+from survey.joints.settings import JointSettings
+from survey.synthetic.buildings.facings import two_facings
+from survey.unseen.core.facings import facing_stone
+from survey.unseen.core.propose import propose_infill
+from survey.unseen.core.settings import InfillSettings
+from tests.survey.unseen.core.two_facings import HALF, boxes_meet, contains, depth_of_overlap, facing
+
+BEDS = [0.0, 0.3, 0.62, 0.9]
+FRONT = [
+    [(0.7, 0.3), (0.4, 0.5), (0.9, 0.3)],
+    [(0.4, 0.5), (0.8, 0.3), (0.8, 0.3)],
+    [(0.8, 0.3), (0.4, 0.5), (0.8, 0.25)],
+]
+BACK = [
+    [(0.5, 0.25), (0.9, 0.25), (0.6, 0.4)],
+    [(1.0, 0.25), (0.4, 0.4), (0.6, 0.25)],
+    [(0.6, 0.25), (0.4, 0.4), (1.0, 0.25)],
+]
+
+
+def core_of(front, back):
+    """True volume of the core between facings of whole rows."""
+    whole = 2.0 * HALF * 2.0 * BEDS[-1]
+    return whole - sum(
+        length * depth * (BEDS[k + 1] - BEDS[k])
+        for rows in (front, back)
+        for k, row in enumerate(rows)
+        for length, depth in row
+    )
+
+
+def unit_planes(solid):
+    vectors = np.array([area_vector(solid.vertices[list(face)]) for face in solid.faces])
+    normals = vectors / np.linalg.norm(vectors, axis=1)[:, None]
+    centres = np.array([solid.vertices[list(face)].mean(axis=0) for face in solid.faces])
+    return normals, (normals * centres).sum(axis=1)
+
+
+def test_the_core_of_plain_facings_is_what_the_stones_leave():
+    stones = facing(FRONT, BEDS) + facing(BACK, BEDS, back=True)
+    core = propose_infill(stones)
+    assert sum(one.volume for one in core) == pytest.approx(core_of(FRONT, BACK), rel=1e-12)
+    assert [one.code for one in core[:2]] == ["I1-01-01", "I1-01-02"]
+    assert {one.course for one in core} == {1, 2, 3}
+    for one in core:
+        check_watertight(one.solid, convex=True)
+        assert volume_of(one.solid) == pytest.approx(one.volume, rel=1e-12)
+
+
+def test_every_block_shares_planes_with_the_stones_that_its_evidence_names():
+    stones = {one.code: one for one in facing(FRONT, BEDS) + facing(BACK, BEDS, back=True)}
+    for block in propose_infill(list(stones.values())):
+        normals, offsets = unit_planes(block.solid)
+        named = [code for code in stones if code in block.evidence]
+        assert len(named) == 2
+        for code in named:
+            hidden = -stones[code].normal
+            plane = hidden @ stones[code].solid.vertices[4]
+            meets = (normals @ hidden < -1.0 + 1e-12) & (np.abs(offsets + plane) < 1e-9)
+            assert meets.sum() == 1, (block.code, code)
+
+
+@settings(max_examples=8, deadline=None)
+@given(
+    rotation=st.tuples(*[st.floats(-0.06, 0.06)] * 2, st.floats(-3.0, 3.0)),
+    shift=st.tuples(*[st.sampled_from([0.0, 3.7, -41.0])] * 3),
+    joint=st.sampled_from([0.0, 0.004, 0.008]),
+    data=st.data(),
+)
+def test_no_block_overlaps_anything_wherever_the_wall_stands(rotation, shift, joint, data):
+    def row():
+        cuts = sorted(data.draw(st.lists(st.integers(6, 34), min_size=1, max_size=4, unique=True)))
+        lengths = np.diff([0, *cuts, 40]) * 0.05
+        return [(length, data.draw(st.sampled_from([0.22, 0.3, 0.46, 0.6]))) for length in lengths.tolist()]
+
+    rows = [[row() for _ in BEDS[1:]] for _ in range(2)]
+    stones = [
+        stone
+        for back in (False, True)
+        for stone in facing(rows[back], BEDS, back=back, joint=joint, placed=(rotation, np.array(shift)))
+    ]
+    core = propose_infill(stones)
+    for block in core:
+        check_watertight(block.solid, convex=True)
+    solids = [block.solid.vertices for block in core]
+    for one, other in combinations(solids, 2):
+        assert not boxes_meet(one, other) or depth_of_overlap(one, other) < 1e-7
+    for one in solids:
+        for stone in stones:
+            other = stone.solid.vertices
+            assert not boxes_meet(one, other) or depth_of_overlap(one, other) < 1e-7
+
+
+def test_where_headers_meet_there_is_no_core_and_their_neighbours_keep_theirs():
+    front = [[(0.8, 0.3), (0.4, 0.5), (0.8, 0.3)]]
+    back = [[(0.8, 0.3), (0.4, 0.5), (0.8, 0.3)]]
+    beds = BEDS[:2]
+    core = propose_infill(facing(front, beds) + facing(back, beds, back=True))
+    assert [round(one.volume, 12) for one in core] == [round(0.8 * 0.3 * 0.4, 12)] * 2
+    header = np.array([[1.0, 0.0, 0.15], [1.0, 0.19, 0.15], [1.0, -0.19, 0.15]])
+    assert not any(contains(one.solid, header).any() for one in core)
+
+
+def test_a_stone_that_goes_through_parts_the_core():
+    front = [[(0.8, 0.3), (0.4, 1.0), (0.8, 0.3)]]
+    back = [[(0.8, 0.3), (0.4, None), (0.8, 0.3)]]
+    core = propose_infill(facing(front, BEDS[:2]) + facing(back, BEDS[:2], back=True))
+    assert [round(one.volume, 12) for one in core] == [round(0.8 * 0.3 * 0.4, 12)] * 2
+
+
+def test_neither_an_opening_nor_a_missing_stone_is_filled():
+    front = [[(0.7, 0.3), (0.6, None), (0.7, 0.3)]]
+    back = [[(1.0, 0.3), (1.0, 0.3)]]
+    core = propose_infill(facing(front, BEDS[:2]) + facing(back, BEDS[:2], back=True))
+    assert sum(one.volume for one in core) == pytest.approx(1.4 * 0.3 * 0.4, rel=1e-12)
+
+
+def test_faces_across_a_room_make_no_wall():
+    one = facing(FRONT, BEDS)
+    other = facing(BACK, BEDS, back=True, placed=((0.0, 0.0, 0.0), np.array([0.0, 3.0, 0.0])))
+    assert propose_infill(one + other) == ()
+    assert len(propose_infill(one + other, InfillSettings(max_thickness=4.5))) > 0
+
+
+def test_facings_can_be_named():
+    front, back = facing(FRONT, BEDS), facing(BACK, BEDS, back=True)
+    named = tuple([stone.code for stone in side] for side in (front, back))
+    assert len(propose_infill(front + back, facings=named)) == len(propose_infill(front + back))
+    with pytest.raises(UsageError, match="in both facings"):
+        propose_infill(front, facings=(named[0], named[0]))
+    with pytest.raises(UsageError, match="no stones"):
+        propose_infill(front, facings=named)
+    with pytest.raises(GeometryError, match="out of parallel"):
+        propose_infill(front, facings=(named[0][:4], named[0][4:]))
+
+
+def test_codes_that_are_taken_are_not_given_again():
+    stones = facing(FRONT, BEDS) + facing(BACK, BEDS, back=True)
+    assert propose_infill(stones, taken=["I1-01-01"])[0].code == "I2-01-01"
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_the_core_of_a_surveyed_wall_is_as_large_as_it_truly_is(closed):
+    wall = two_facings(5.0, 6, 4)
+    blocks = wall.building.blocks()
+    solids = wall.building.solids if closed else [block.solid for block in blocks]
+    stones = [facing_stone(block, solid) for block, solid in zip(blocks, solids, strict=True)]
+    core = propose_infill(stones)
+    # 3 mm of noise on either side of a core of half a metre
+    assert sum(one.volume for one in core) == pytest.approx(wall.core_volume, rel=0.006)
+    for one in core:
+        for stone in stones:
+            other = stone.solid.vertices
+            assert (
+                not boxes_meet(one.solid.vertices, other)
+                or depth_of_overlap(one.solid.vertices, other) < 1e-6
+            )
+
+
+def test_the_core_takes_part_in_closing_the_joints():
+    wall = two_facings(3.0, 4, 2)
+    blocks = wall.building.blocks()
+    core = [surveyed_block(core_record(one)) for one in propose_infill([facing_stone(one) for one in blocks])]
+    report = close_joints([*blocks, *core], JointSettings()).report
+    mine = {one.code for one in core}
+    joints = [joint for joint in report.joints if mine & set(joint.stones)]
+    closed = sum(joint.area for joint in joints if not joint.left_open)
+    assert report.overlaps == ()
+    assert closed > 0.95 * sum(joint.area for joint in joints)
+    # every block is held by a stone in front and one behind
+    for code in mine:
+        beside = {other for joint in joints if code in joint.stones for other in joint.stones} - mine
+        assert {other[0] for other in beside} >= {"F", "B"}, code
