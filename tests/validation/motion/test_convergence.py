@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from test_sliding import low_block
 
 from tests.validation.motion.test_rocking import SLENDER, angles, housner, rocking, slenderness
 from tests.validation.motion.test_rotation import body_rates, euler, plate
+from tests.validation.motion.test_sliding import low_block
 from tests.validation.scenes import G, dynamic, follow, ground, moved
 
 
