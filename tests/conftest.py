@@ -1,12 +1,17 @@
-"""What tests of several packages share: databases of each kind that there is."""
+"""Fixtures that tests of several packages share: databases of each kind; and kernels that are compiled once."""
 
+import os
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
+from tests.kernel_locks import compile_once
 from tests.postgresql import Server, Unavailable, running_server
+
+if "PYTEST_XDIST_WORKER" in os.environ:
+    compile_once()
 
 
 @pytest.fixture(scope="session")

@@ -1,4 +1,4 @@
-"""The layout of the packages: rooms of a dozen entries, public names that exist, docstrings and kernels in our style."""
+"""The layout of the packages: rooms of a dozen entries, public names that exist, docstrings and kernels as agreed."""
 
 import ast
 import importlib

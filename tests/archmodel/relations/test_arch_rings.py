@@ -184,6 +184,7 @@ def test_it_does_not_matter_where_an_arch_stands_and_how_its_stones_are_numbered
     assert site.found() == [ranks([int(i) for i in place])]
 
 
+@pytest.mark.slow
 def test_time_grows_with_the_stones_and_no_faster():
     spent = []
     for many in (100, 400):

@@ -42,6 +42,7 @@ def fails(code, *arguments):
     return lines[0]
 
 
+@pytest.mark.slow
 def test_help_is_fast():
     """Under 0.5 s; the best of three, because the machine may be busy with other things."""
     spent = []

@@ -186,6 +186,7 @@ def test_the_verdict_does_not_depend_on_place_or_order(seed: int, relief: Relief
         np.testing.assert_allclose(here.curvature, there.curvature, rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_a_clean_face_is_judged_in_microseconds() -> None:
     rng = np.random.default_rng(9)
     points = np.column_stack([margin(rng, 14), np.zeros(14)]) + rng.normal(0.0, 0.5 * SIGMA, (14, 3))

@@ -343,6 +343,7 @@ def test_the_joints_of_the_sample_are_those_of_the_true_wall(truth, blocks):
     assert {tuple(pair) for pair in wider.pairs.tolist()} == areas.keys()
 
 
+@pytest.mark.slow
 def test_ten_thousand_stones_take_less_than_a_second():
     blocks, joints = wall(100, 100)
     solids = gathered(solids_of(blocks))
