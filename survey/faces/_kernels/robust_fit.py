@@ -17,6 +17,7 @@ _LARGEST_TILT = math.radians(10.0)  # standard deviation of a tilt that no plane
 _GRAZING = 0.17  # cosine between normal and line of sight below which a face is not measured: 80°
 _NARROW = 0.15  # width over length of a part of the points that is not the whole face
 _MANY = 50  # points of which none has much to say alone
+_ROUNDING = 32.0 * 2.0**-52  # residual over largest coordinate that is rounding: 7 nm at 1,000 km
 _FEWEST = 4  # points that a plane is never grown from fewer than
 
 
@@ -203,6 +204,23 @@ def _check(xyz, sigma):
 
 
 @njit(cache=True)
+def _is_exact(xyz, local, frame):
+    """Return whether all points lie on one plane as exactly as their coordinates can be stored.
+
+    Nothing can then be a blunder: a point far beside the others lies on their plane to rounding, and without a known
+    precision the residuals, the only measure of the scatter, hold rounding and no errors.
+    """
+    largest, farthest = 0.0, 0.0
+    for i in range(xyz.shape[0]):
+        height = 0.0
+        for k in range(3):
+            largest = max(largest, abs(xyz[i, k]))
+            height += (local[k, i] - frame[0, k]) * frame[3, k]
+        farthest = max(farthest, abs(height))
+    return farthest <= _ROUNDING * largest
+
+
+@njit(cache=True)
 def _part(local, root, kept):
     """The points of a compact face, their 1/σ, and that all are accepted."""
     m = kept.shape[0]
@@ -237,18 +255,23 @@ def fit_face(xyz, sigma, known, observer):
         root[i] = 1.0 / sigma[i]
         for k in range(3):
             local[k, i] = xyz[i, k] - xyz[0, k]
-    kept = beside_the_rest(local)
-    near, near_root, sound = _part(local, root, kept)
+    sound, kept = accepted.copy(), np.arange(n)
+    near, near_root = local, root
     total = weighted_plane(near, near_root, sound, frame, work)
-    narrow = max(_NARROW * frame[4, 0], 3.0 / _LARGEST_TILT if known else 0.0)
-    if kept.shape[0] < n and not frame[4, 1] > narrow:  # most points lie along one edge, or close together
-        kept = np.arange(n)
-        near, near_root, sound = _part(local, root, kept)
-        total = weighted_plane(near, near_root, sound, frame, work)
+    exact = _is_exact(xyz, local, frame)
+    beside = kept if exact else beside_the_rest(local)
+    if beside.shape[0] < n:
+        part, part_root, part_sound = _part(local, root, beside)
+        part_total = weighted_plane(part, part_root, part_sound, frame, work)
+        narrow = max(_NARROW * frame[4, 0], 3.0 / _LARGEST_TILT if known else 0.0)
+        if frame[4, 1] > narrow:
+            kept, near, near_root, sound, total = beside, part, part_root, part_sound, part_total
+        else:  # most points lie along one edge, or close together
+            total = weighted_plane(near, near_root, sound, frame, work)
     m = kept.shape[0]
     if total > 0.0 and m > 3:
         leverages(near, near_root, frame, total, residuals[:m], lever[:m])
-        if not (known and _is_clean(near_root, residuals[:m], lever[:m])):
+        if not (exact or (known and _is_clean(near_root, residuals[:m], lever[:m]))):
             view = _view(near, frame, xyz[0], observer)
             sound = _without_blunders(near, near_root, known, view, frame, work)
             total = weighted_plane(near, near_root, sound, frame, work)

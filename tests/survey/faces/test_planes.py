@@ -1,7 +1,7 @@
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from moma.errors import GeometryError
@@ -233,6 +233,9 @@ def test_weights_follow_the_precision_of_each_point() -> None:
 
 @settings(max_examples=150, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(4, 40), st.floats(1e-4, 1e3), st.floats(-1e6, 1e6))
+@example(
+    seed=153005111, count=10, size=1.0, away=0.0
+)  # one corner alone, far from nine points close together
 def test_exact_planes_are_recovered_at_any_size_and_place(
     seed: int, count: int, size: float, away: float
 ) -> None:
@@ -240,10 +243,11 @@ def test_exact_planes_are_recovered_at_any_size_and_place(
     turn = _rotation(rng.normal(size=3))
     flat = np.column_stack([rng.uniform(-size, size, (count, 2)), np.zeros(count)])
     flat[:3, :2] = size * np.array([[-1, -1], [1, -1], [0, 1]])
-    fit = fit_plane(flat @ turn.T + away, 0.003 * size, observer=2 * size * turn[:, 2] + away)
     rounding = 1e-14 + 4 * np.spacing(abs(away) + size) / size
-    assert np.linalg.norm(fit.normal - turn[:, 2]) < 20 * rounding
-    assert fit.rejected == ()
+    for sigma in (0.003 * size, None):
+        fit = fit_plane(flat @ turn.T + away, sigma, observer=2 * size * turn[:, 2] + away)
+        assert np.linalg.norm(fit.normal - turn[:, 2]) < 20 * rounding
+        assert fit.rejected == ()
 
 
 @settings(max_examples=100, deadline=None)
