@@ -142,7 +142,7 @@ def fit_two_planes(u, v, z, root):
 
     Outputs
     -------
-    score, least : float64, sum of squares of both planes in units of sigma, truncated; and of the points within the limit
+    score, least : float64, sum of squares of both planes in units of sigma, truncated, and of points within the limit
     far : (n,) bool, points beyond the line
     way : (2,) float64, direction across the line towards them [-]
     plane : (3,) float64, coefficients of the second plane less the first, on 1 [m], along the line and across it [-];
