@@ -14,6 +14,16 @@ EROSION = 0.03
 GRAZING = 0.17
 TILT = math.radians(10.0)
 
+# Reference case P01, "TLS plane, exact checkerboard set" (closed form): x in {-3,-1,1,3},
+# y in {-1.5,-.5,.5,1.5}, z = ±0.01 alternating, i + j odd → +
+CHECKERBOARD = np.array(
+    [
+        (x, y, 0.01 if (i + j) % 2 else -0.01)
+        for i, x in enumerate((-3.0, -1.0, 1.0, 3.0))
+        for j, y in enumerate((-1.5, -0.5, 0.5, 1.5))
+    ]
+)
+
 
 @dataclass(frozen=True)
 class Plane:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import mpmath
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 # rows of 9 R and 3 R for rotations R by integer quaternions: rational, so whatever they turn is known exactly
 NINTHS = np.array([[1, -8, 4], [4, 4, 7], [-8, 1, 4]])
@@ -12,15 +13,7 @@ THIRDS = np.array([[2, -1, 2], [2, 2, -1], [-1, 2, 2]])
 
 def turned(rng):
     """Random rotation (3, 3), uniform."""
-    q = rng.normal(size=4)
-    w, x, y, z = q / np.linalg.norm(q)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    return Rotation.from_quat(np.roll(rng.normal(size=4), -1)).as_matrix()
 
 
 @dataclass
