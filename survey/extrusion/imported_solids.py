@@ -51,7 +51,7 @@ def block_of_solid(record: SolidRecord, viewpoint: Array | None, path: str) -> S
     if not depth > _SHALLOWEST:
         raise GeometryError(
             f"it reaches {depth * 1e3:.2g} mm behind its largest side",
-            remedy="look at the solid, or say where it is seen from",
+            remedy="check the solid, or give its viewpoint",
         )
     measured = BlockRecord(
         code=record.code,

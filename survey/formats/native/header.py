@@ -227,7 +227,7 @@ def read_extrusion(cursor: Cursor) -> Extrusion:
     """Read ``[along DX DY DZ] [tail T]``."""
     remedy = "write: extrude [along DX DY DZ] [tail T]"
     if not cursor.peek():
-        raise cursor.fail("extrude says nothing", remedy)
+        raise cursor.fail("extrude has no values", remedy)
     direction = np.array(cursor.row("along")) if cursor.keyword("along") else None
     if direction is not None and not direction.any():
         raise cursor.fail("the direction has no length", remedy)

@@ -125,7 +125,7 @@ def _read_head(
             if line.split("#", 1)[0].split() != MAGIC.split():
                 raise cursor.fail(
                     "this is not a MOMA survey",
-                    f"the first line must be '{MAGIC}'; of another format say which (--format csv, pnezd, …)",
+                    f"the first line must be '{MAGIC}'; name any other format (--format csv, pnezd, …)",
                 )
             begun = True
         elif word == "stone":

@@ -113,7 +113,7 @@ class CodeTemplate:
             else:
                 first, second = names[0], names[1]
                 raise UsageError(
-                    f"code template {self.text!r} can be read in two ways: {between[0]!r} does not tell "
+                    f"code template {self.text!r} can be read in two ways: {between[0]!r} does not separate "
                     f"{{{first}}} from {{{second}}}",
                     remedy="separate them by a character that neither of them has, such as a blank",
                 )

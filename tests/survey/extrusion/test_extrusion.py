@@ -36,7 +36,7 @@ def deep(value=0.5, sigma=0.02):
 
 
 def behind(block):
-    """Hidden corner behind each measured corner, in the order of CORNERS."""
+    """Return the hidden corner behind each measured corner, in the order of CORNERS."""
     order = np.argsort(block.face.corner_of)
     return block.solid.vertices[4:][order], block.vertex_sigma[:4][order], block.vertex_sigma[4:][order]
 
@@ -180,7 +180,7 @@ def test_far_from_the_origin_nothing_is_lost():
 
 
 def twin_of(block):
-    """What the kernel computes, in matrices."""
+    """Compute the result of the kernel in matrices."""
     face, fit, tail, count = block.face, block.face.fit, block.extrusion.tail, len(block.face.outline)
     hidden, direction = block.solid.vertices[count:], block.extrusion.direction
     into = -fit.normal if direction is None else direction / np.linalg.norm(direction)

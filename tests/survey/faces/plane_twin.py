@@ -1,4 +1,4 @@
-"""The plane of a face without its blunders, as `survey.faces.planes` finds it, in slow and readable numpy."""
+"""The robust plane of a face as `survey.faces.planes` finds it, in slow and readable numpy."""
 
 import math
 from dataclasses import dataclass
@@ -59,7 +59,7 @@ def largest_sum(redundancy: int) -> float:
 
 
 def accepted_points(points: Array, sigma: Array, known: bool, observer: Array | None) -> Bools:
-    """What `fit_plane` does not reject, (n,)."""
+    """Return the points that `fit_plane` accepts, (n,)."""
     kept = compact(points)
     part = plane_of(points - points[0], 1.0 / sigma, kept)
     wide = part is not None and part.singular[1] > max(0.15 * part.singular[0], 3.0 / TILT if known else 0.0)

@@ -165,7 +165,7 @@ def simulated(rng, sigmas, place=(0.0, 0.0, 0.0), inner=10):
 
 
 def heights_off(true, fit, places):
-    """How far the fitted plane is from the true one at places on the true one, along the fitted normal."""
+    """Return the distance of the fitted plane from places on the true one, along the fitted normal."""
     return (fit.centroid - places) @ fit.normal
 
 
