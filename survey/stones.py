@@ -1,4 +1,4 @@
-"""From a survey file to stones with a hidden side: the whole way, one stone at a time."""
+"""The whole way from a survey file to stones with a hidden side, one stone at a time."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -21,16 +21,15 @@ __all__ = ["SurveyedStream", "survey_stones"]
 
 @dataclass(frozen=True)
 class SurveyedStream:
-    """A survey on its way to stones.
+    """A survey and the stones made from it.
 
     Attributes
     ----------
     head : of the survey, in the frame of the site
     transform : from the frame of the survey to that of the site; None if they are the same
-    stones : the stones with their hidden side, in the frame of the site, and what could not become one. Those
-        measured on photographs come last, since they need the faces of their neighbours. To be gone through
-        once.
-    snapping : of solids, what bringing their faces into common planes has changed; None if that was not asked for
+    stones : the stones with their hidden side, in the frame of the site, and the rejects; an iterator to be
+        consumed once. Stones measured on photographs come last, because they need the faces of their neighbours.
+    snapping : of solids, the changes that brought their faces into common planes; None if not asked for
     """
 
     head: SurveyHead
@@ -40,7 +39,7 @@ class SurveyedStream:
 
 
 def survey_stones(stream: SurveyStream) -> SurveyedStream:
-    """Make stones of what was measured.
+    """Make stones of the records of a survey.
 
     A stone that cannot be made comes as a Reject, whose error names file, line and stone.
 
@@ -48,6 +47,16 @@ def survey_stones(stream: SurveyStream) -> SurveyedStream:
     ------
     SurveyError, GeometryError
         if the control points do not tie the survey to the site
+
+    Examples
+    --------
+    >>> from survey.formats.reading import open_survey
+    >>> made = survey_stones(open_survey("data/samples/window/window.moma", "moma"))
+    >>> stone = next(made.stones)
+    >>> stone.code, stone.kind, stone.depth.value
+    ('W01-01', 'header', 0.51)
+    >>> round(stone.face.measures.area, 3)
+    0.116
     """
     transform = fit_similarity(stream.head.control) if stream.head.control else None
     head = stream.head if transform is None else to_site(stream.head, transform)
@@ -87,7 +96,7 @@ def _made(item: BlockRecord | SolidRecord, head: SurveyHead) -> SurveyedBlock | 
 
 
 def _behind(record: BlockRecord, head: SurveyHead, lifted: LiftedFace) -> SurveyedBlock | Reject:
-    """The stone of a face that was lifted from a photograph."""
+    """Make the stone of a face that was lifted from a photograph."""
     sigmas = np.concatenate([record.point_sigmas, lifted.sigma])
     corners = replace(record, vertices=lifted.outline, sigmas=sigmas)
     shape = FaceShape(ShapeKind.UNTESTED, "not tested: its plane was taken over from others")

@@ -1,7 +1,7 @@
-"""How deep a stone is: the evidence, in its order.
+"""Depth of a stone by the best evidence.
 
-What was measured on the stone comes first; then the archaeologist's rule for its kind in its course or part of
-the building; then the rule for its kind; then what holds for the whole structure.
+A measurement on the stone itself comes first; then the archaeologist's rule for its kind in its course or part of
+the building; then the rule for its kind; then the rule for the whole structure.
 """
 
 from collections.abc import Sequence
@@ -14,8 +14,7 @@ from survey.records.survey import BlockRecord, DepthRule
 __all__ = ["Depth", "Origin", "depth_for"]
 
 Origin = Literal["stone", "rule", "kind", "structure", "solid"]
-"""Where a depth comes from: the stone itself, a rule for course or zone, its kind, the structure; or a solid
-that another program made."""
+"""Origin of a depth: the stone itself, a rule for course or zone, its kind, the structure, or an imported solid."""
 
 
 @dataclass(frozen=True)
@@ -27,8 +26,8 @@ class Depth:
     value : [m]
     sigma : standard deviation [m]; None if not known
     source : the evidence, in words
-    origin : what kind of evidence it is
-    line : line of the survey file that says so
+    origin : kind of the evidence
+    line : line of the survey file that states it
     """
 
     value: float
@@ -49,7 +48,7 @@ def depth_for(record: BlockRecord, rules: Sequence[DepthRule]) -> Depth:
     Raises
     ------
     SurveyError
-        if nothing is known of the stone's depth, or two rules hold for it and neither is more particular
+        if no rule gives the stone's depth, or two equally specific rules do
     """
     if record.depth is not None:
         source = record.depth_source or "measured on the stone"
@@ -60,7 +59,7 @@ def depth_for(record: BlockRecord, rules: Sequence[DepthRule]) -> Depth:
         raise SurveyError(
             f"no depth is known for a {record.kind}",
             where=where,
-            remedy=f"measure it, or say 'depth {record.kind} D source TEXT' in the head of the survey or a header file",
+            remedy=f"measure it, or state 'depth {record.kind} D source TEXT' in the head of the survey or a header file",
         )
     best = max(holding, key=_rank)
     alike = sorted(rule.line for rule in holding if _rank(rule) == _rank(best))
@@ -85,7 +84,7 @@ def _holds(rule: DepthRule, record: BlockRecord) -> bool:
 
 
 def _rank(rule: DepthRule) -> int:
-    """How particular a rule is: structure 0, kind 1, kind in a course or zone 2, in a course of a zone 3."""
+    """Return how specific a rule is: structure 0, kind 1, kind in a course or zone 2, in a course of a zone 3."""
     if rule.kind is None:
         return 0
     return 1 + (rule.courses is not None) + (rule.zone is not None)

@@ -1,4 +1,4 @@
-"""The hidden side: a face moved into the wall by the stone's depth, and how well it is known."""
+"""Extrusion: a face moved into the wall by the stone's depth, with the precision of its corners."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -7,7 +7,7 @@ import numpy as np
 
 from moma.errors import GeometryError
 from survey.arrays import Array
-from survey.extrusion._kernels import corner_deviations
+from survey.extrusion._kernels import FacePlane, HiddenSide, corner_deviations
 from survey.extrusion.depth import Depth
 from survey.faces.faces import Face
 from survey.geometry.solids import Solid
@@ -22,17 +22,17 @@ _FLATTEST = np.cos(np.radians(60.0))  # a direction farther from the normal leav
 
 @dataclass(frozen=True)
 class SurveyedBlock:
-    """A stone as measured, with its hidden half.
+    """A measured stone with its hidden side.
 
     Attributes
     ----------
     code, kind, course : as in the survey
     face : its visible face
     depth : its depth, with the evidence
-    extrusion : how its hidden side lies
+    extrusion : direction and size of its hidden side
     solid : between the face and the hidden face; the nv visible corners first, then the hidden ones
-    vertex_sigma : (2 nv, 3) standard deviations of the solid's corners along x, y and z [m]; NaN where the
-        depth's is not known
+    vertex_sigma : (2 nv, 3) standard deviations of the solid's corners along x, y and z [m]; NaN where that of the
+        depth is not known
     """
 
     code: str
@@ -51,8 +51,8 @@ def extrude(face: Face, depth: Depth, extrusion: Extrusion = _STRAIGHT) -> Surve
     Parameters
     ----------
     face : visible face
-    depth : how deep the stone is, along the direction of extrusion
-    extrusion : direction, and size of the tail; by default square to the face and as large as it
+    depth : along the direction of extrusion
+    extrusion : direction, and size of the tail; by default square to the face and as large as the face
 
     Returns
     -------
@@ -77,7 +77,7 @@ def extrude(face: Face, depth: Depth, extrusion: Extrusion = _STRAIGHT) -> Surve
 
 
 def hidden_side(corners: Array, normal: Array, depth: float, extrusion: Extrusion) -> Array:
-    """Hidden corners (nv, 3) behind visible ones: mean + tail · (corner - mean) + depth · direction [m]."""
+    """Return the hidden corners (nv, 3) behind visible ones: mean + tail · (corner - mean) + depth · direction [m]."""
     hidden = corners + depth * _direction(normal, extrusion)
     if extrusion.tail != 1.0:
         hidden -= (1.0 - extrusion.tail) * (corners - corners.mean(axis=0))
@@ -96,7 +96,7 @@ def _prism_faces(count: int) -> tuple[tuple[int, ...], ...]:
 
 
 def _direction(normal: Array, extrusion: Extrusion) -> Array:
-    """Unit vector from the face into the wall."""
+    """Return the unit vector from the face into the wall."""
     if extrusion.direction is None:
         return -normal
     direction: Array = extrusion.direction / np.linalg.norm(extrusion.direction)
@@ -110,32 +110,23 @@ def _direction(normal: Array, extrusion: Extrusion) -> Array:
 
 
 def _vertex_sigma(face: Face, depth: Depth, extrusion: Extrusion, hidden: Array) -> Array:
-    """First-order propagation of the errors of corner, plane and depth, which are independent.
+    """Propagate the independent errors of corner, plane and depth to first order.
 
     In the plane a corner is as precise as it was measured; square to it, it is as precise as the plane is
     there: tilts θ and height η of the plane raise the place (u₁, u₂) by η + θ₁ u₁ + θ₂ u₂. Behind the face,
     a hidden corner moves along by the error of the depth, and, where the direction is square to the face, by
     depth · θ as the normal turns.
     """
-    fit, tail, count = face.fit, extrusion.tail, len(face.outline)
-    direction = _direction(fit.normal, extrusion)
-    square_to_face = extrusion.direction is None
-    out: Array = corner_deviations(
-        face.outline,
-        hidden,
-        # the height of a slanting tail is that of the visible place it lies behind
-        np.zeros(3) if square_to_face else depth.value * direction,
-        square_to_face,
-        face.record.vertex_sigmas[list(face.corner_of)],
-        fit.normal,
-        fit.centroid,
-        fit.axes,
-        fit.covariance,
-        # the tail of a corner also moves with the mean of all of them
-        tail + (1.0 - tail) / count,
-        (1.0 - tail) / count,
-        np.nan if depth.sigma is None else depth.sigma**2,
-        depth.value,
-        direction,
+    fit = face.fit
+    behind = HiddenSide(
+        corners=hidden,
+        direction=_direction(fit.normal, extrusion),
+        square_to_face=extrusion.direction is None,
+        tail=extrusion.tail,
+        depth=depth.value,
+        depth_variance=np.nan if depth.sigma is None else depth.sigma**2,
     )
+    plane = FacePlane(fit.normal, fit.centroid, fit.axes, fit.covariance)
+    deviations = face.record.vertex_sigmas[list(face.corner_of)]
+    out: Array = corner_deviations(face.outline, deviations, plane, behind)
     return out

@@ -1,4 +1,4 @@
-"""Stones that another program made: which side of the solid is the face, and how deep the stone is behind it."""
+"""Imported solids: the visible side of each, and the depth of the stone behind it."""
 
 from dataclasses import replace
 
@@ -17,24 +17,24 @@ from survey.records.survey import BlockRecord, Extrusion, SolidRecord
 __all__ = ["block_of_solid"]
 
 
-_UPRIGHT = 0.9  # a side whose normal rises more steeply (sine) is a bed or a top, not a face
-_ALIKE = 0.01  # sides whose areas differ by less may be the front and the back of one stone
-_SHALLOWEST = 1e-6  # metres behind the face
-_HAND = np.array([-0.11, -1.0, 0.013])  # where the front is then: square to as few walls as can be
+_UPRIGHT = 0.9  # slope (sine) of a normal beyond which the side is a bed or a top, not a face
+_ALIKE = 0.01  # relative difference of areas below which two sides may be front and back of one stone
+_SHALLOWEST = 1e-6  # least depth behind the face [m]
+_HAND = np.array([-0.11, -1.0, 0.013])  # side taken as the front then; aligned with hardly any wall
 
 
 def block_of_solid(record: SolidRecord, viewpoint: Array | None, path: str) -> SurveyedBlock:
-    """The stone of a closed solid, with the side that is seen as its face.
+    """Make a stone of a closed solid, with its visible side as the face.
 
-    That is the side with the largest area as seen from the viewpoint; without one, the largest upright side. Of
-    a front and a back that are as large it is, for all stones of a wall, the one on the same hand. The depth is
-    how far the solid reaches behind it.
+    The face is the side with the largest area as seen from the viewpoint; without one, the largest upright side. Of
+    a front and a back of equal area it is the one on the same hand for all stones of a wall. The depth is the
+    extent of the solid behind it.
 
     Parameters
     ----------
     record : the solid
-    viewpoint : (3,) where the observer stood [m]; None if not known
-    path : of the file that it comes from, for the provenance
+    viewpoint : (3,) position of the observer [m]; None if not known
+    path : of the source file, for the provenance
 
     Returns
     -------
@@ -51,7 +51,7 @@ def block_of_solid(record: SolidRecord, viewpoint: Array | None, path: str) -> S
     if not depth > _SHALLOWEST:
         raise GeometryError(
             f"it reaches {depth * 1e3:.2g} mm behind its largest side",
-            remedy="look at the solid, or say where it is seen from",
+            remedy="check the solid, or give its viewpoint",
         )
     measured = BlockRecord(
         code=record.code,
@@ -79,7 +79,7 @@ def block_of_solid(record: SolidRecord, viewpoint: Array | None, path: str) -> S
 
 
 def _visible_side(record: SolidRecord, viewpoint: Array | None) -> tuple[Array, Array]:
-    """Corners (nv, 3) and outward normal (3,) of the side that is the face."""
+    """Return corners (nv, 3) and outward normal (3,) of the visible side."""
     sides = [record.vertices[list(face)] for face in record.faces]
     vectors = np.array([area_vector(side) for side in sides])
     origin = record.vertices.mean(axis=0)
@@ -91,14 +91,14 @@ def _visible_side(record: SolidRecord, viewpoint: Array | None) -> tuple[Array, 
             f"its sides enclose {volume:.3g} m³",
             remedy="look for corners out of place, or sides seen from inside",
         )
-    worth = _worth(vectors, sides, viewpoint)
-    alike = np.flatnonzero(worth >= worth.max() - _ALIKE * abs(worth.max()))
-    seen = int(alike[np.argmax(vectors[alike] @ _HAND)]) if viewpoint is None else int(worth.argmax())
+    areas = _visible_areas(vectors, sides, viewpoint)
+    alike = np.flatnonzero(areas >= areas.max() - _ALIKE * abs(areas.max()))
+    seen = int(alike[np.argmax(vectors[alike] @ _HAND)]) if viewpoint is None else int(areas.argmax())
     return sides[seen], vectors[seen] / np.linalg.norm(vectors[seen])
 
 
-def _worth(vectors: Array, sides: list[Array], viewpoint: Array | None) -> Array:
-    """How much each side is the face, by its area as it is seen."""
+def _visible_areas(vectors: Array, sides: list[Array], viewpoint: Array | None) -> Array:
+    """Return the area of each side as seen from the viewpoint, without one its area if it is upright [m²]."""
     areas: Array = np.linalg.norm(vectors, axis=1)
     if viewpoint is None:
         upright = np.abs(vectors[:, 2]) <= _UPRIGHT * areas
@@ -109,7 +109,7 @@ def _worth(vectors: Array, sides: list[Array], viewpoint: Array | None) -> Array
 
 
 def _plane(polygon: Array, normal: Array) -> FaceFit:
-    """The plane of a side, without any precision."""
+    """Fit the plane of a side, without precision."""
     centroid = polygon.mean(axis=0)
     residuals = (polygon - centroid) @ normal
     flat = polygon - centroid - np.outer(residuals, normal)

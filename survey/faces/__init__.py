@@ -1,1 +1,5 @@
-"""Stone faces: measured points → robust plane → outline."""
+"""Stone faces: measured points → robust plane → outline.
+
+Public: `fit_plane`, `FaceFit` (planes); `outline_face`, `Face` (faces); `judge_shape`, `FaceShape` (shapes);
+`common_plane`, `PlaneEstimate` (common_planes); `Neighbours` (neighbours); `outline_polygon` (outline).
+"""

@@ -1,15 +1,15 @@
-"""The plane that measured faces suggest for one that was not measured, and how far real faces differ from it.
+"""The common plane of measured faces, and the prediction of a face that was not measured.
 
 The faces of a wall scatter about a common plane: each stands out by a height aⱼ at its centroid and is tilted by two
-angles, of variances that the wall itself must tell. Heights and tilts of n faces are 3 n observations of the three
-parameters of the plane; the variance of each of the two groups follows from its own residuals over its own
-redundancy (Förstner 1979), and the face that nobody measured is one more draw from the same scatter:
+angles, with variances that are estimated from the wall itself. Heights and tilts of n faces are 3 n observations of the
+three parameters of the plane; the variance of each of the two groups follows from its own residuals over its own
+redundancy (Förstner 1979), and the unmeasured face is one more draw from the same scatter:
 
     variance = scatter between faces + variance of the common plane.
 
 With few faces the scatter is uncertain itself. Then the prediction follows Student's distribution, whose variance is
 ν/(ν - 2) times larger for ν degrees of freedom. A sill or a cornice does not belong to the plane: a face whose height
-is farther off than the scatter of all others makes likely (Student's test, 0.1 %) is left out.
+is an outlier against the scatter of all others (Student's test, 0.1 %) is left out.
 """
 
 from collections.abc import Sequence
@@ -27,15 +27,15 @@ __all__ = ["CommonPlane", "PlaneEstimate", "common_plane"]
 Indices = NDArray[np.intp]
 
 _MOST_STUDENT = 3.0  # ν/(ν - 2) where ν is 3; it does not exist for two
-_ROUNDS = 50
-_LEAST_FACES = 3
-_FEW = 30  # faces up to which they are examined one by one
-_LEVEL = 1e-3  # probability that some face of a wall is called outstanding by chance
+_ROUNDS = 50  # of the alternation between plane and variances; a dozen suffice
+_LEAST_FACES = 3  # a plane has three parameters
+_FEW = 30  # number of faces up to which they are examined one by one
+_LEVEL = 1e-3  # probability that some face of a wall is called an outlier by chance
 
 
 @dataclass(frozen=True)
 class PlaneEstimate:
-    """Where a face lies that was not measured itself.
+    """A predicted plane of a face that was not measured itself.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class PlaneEstimate:
     axes : (2, 3) unit directions in the plane [-]
     covariance : (3, 3) of two tilts [rad] and the height at `centroid` [m]; tilt i turns the normal towards -axes[i]
     scatter : standard deviation of the heights of faces about the plane [m]
-    text : what it is the plane of
+    text : origin of the prediction, in words
     """
 
     centroid: Array
@@ -55,18 +55,18 @@ class PlaneEstimate:
     text: str
 
     def height_sigma(self, points: Array) -> Array:
-        """Standard deviation of the face's height at places (n, 3), (n,) [m]."""
+        """Compute the standard deviation of the face's height at places (n, 3), (n,) [m]."""
         arms = self._arms(points)
         out: Array = np.sqrt(((arms @ self.covariance) * arms).sum(axis=1))
         return out
 
     def corrected(self, points: Array, sigmas: Array, text: str) -> "PlaneEstimate":
-        """The estimate after some points (n, 3) of the face were measured, with their precision (n,) [m]."""
+        """Correct the estimate by points (n, 3) measured on the face, with their precision (n,) [m]."""
         arms = self._arms(points)
         gain = self.covariance @ arms.T @ np.linalg.inv(arms @ self.covariance @ arms.T + np.diag(sigmas**2))
         step = gain @ ((points - self.centroid) @ self.normal)
-        keep = np.eye(3) - gain @ arms  # in this form rounding leaves no variance negative (Joseph)
-        normal, axes = _turned(self.normal, self.axes, step)
+        keep = np.eye(3) - gain @ arms  # Joseph's form: rounding makes no variance negative
+        normal, axes = _tilted(self.normal, self.axes, step)
         return PlaneEstimate(
             centroid=self.centroid + step[2] * self.normal,
             normal=normal,
@@ -90,7 +90,7 @@ class CommonPlane:
     covariance : (3, 3) of the two tilts [rad] and the height at `centroid` [m] of the plane itself
     height_scatter : standard deviation of the heights of faces at their centroids, about the plane [m]
     tilt_scatter : standard deviation of either tilt of a face against the plane [rad]
-    members : which of the faces are meant; others stand out of the plane or behind it
+    members : indices of the faces that belong to the plane; the others stand out of it or lie behind
     """
 
     centroid: Array
@@ -102,7 +102,7 @@ class CommonPlane:
     members: tuple[int, ...] = ()
 
     def face_at(self, place: Array, text: str) -> PlaneEstimate:
-        """Predict a face that has its corners around a place (3,) [m]; `text` says what it is the plane of."""
+        """Predict a face that has its corners around a place (3,) [m]; `text` is the origin of the prediction."""
         lateral = self.axes @ (place - self.centroid)
         carry = np.eye(3)
         carry[2, :2] = lateral
@@ -118,12 +118,12 @@ class CommonPlane:
 
 
 def common_plane(fits: Sequence[FaceFit], place: Array) -> CommonPlane:
-    """The plane about which three or more faces scatter, without those that stand out of it.
+    """Estimate the plane about which three or more faces scatter, without outliers.
 
     Parameters
     ----------
     fits : planes of the faces, turned less than 90° from each other
-    place : (3,) near them, to be the centre of the computation [m]
+    place : (3,) near them, the origin of the computation [m]
 
     Returns
     -------
@@ -140,8 +140,8 @@ def common_plane(fits: Sequence[FaceFit], place: Array) -> CommonPlane:
         slopes=-normals[:, :2] / normals[:, 2:],
         variances=np.column_stack([own[:, 2], own[:, :2].mean(axis=1)]),
     )
-    members, best = _without_outstanding(faces)
-    normal, axes = _turned(frame[2], frame[:2], best.step)
+    members, best = _without_outliers(faces)
+    normal, axes = _tilted(frame[2], frame[:2], best.step)
     scatter = [
         float(np.sqrt(max(variance * _student(freedom) - measured, 0.0)))
         for variance, freedom, measured in zip(
@@ -177,13 +177,13 @@ class _Faces:
     variances: Array
 
     def only(self, some: Indices) -> "_Faces":
-        """Some of the faces."""
+        """Return some of the faces."""
         return _Faces(self.arms[some], self.heights[some], self.slopes[some], self.variances[some])
 
 
 @dataclass(frozen=True)
 class _Adjusted:
-    """Slopes and height of the common plane, their covariance; variance and redundancy of heights and of slopes."""
+    """An adjusted common plane: slopes and height, their covariance; variance and redundancy of heights and slopes."""
 
     step: Array
     cofactors: Array
@@ -191,8 +191,8 @@ class _Adjusted:
     freedom: tuple[float, float]
 
 
-def _without_outstanding(faces: _Faces) -> tuple[Indices, _Adjusted]:
-    """Leave out the farthest face, then the next, and so on; keep out as many as the last one proves outstanding.
+def _without_outliers(faces: _Faces) -> tuple[Indices, _Adjusted]:
+    """Remove the farthest face, then the next, and so on; leave out all up to the last proven outlier.
 
     Tested after its own removal, a face cannot hide another (generalised extreme studentised deviate; Rosner 1983).
     """
@@ -203,7 +203,7 @@ def _without_outstanding(faces: _Faces) -> tuple[Indices, _Adjusted]:
     for _ in range(most):
         some = faces.only(members)
         inner = _studentised(some, best)
-        # one at a time where each counts; where there are many, all that are as far out as half the farthest
+        # one at a time where each counts; among many, all that are at least half as far out as the farthest
         out = inner >= (inner.max() if len(members) <= _FEW else 0.5 * inner.max())
         rest = np.flatnonzero(~out)
         if len(rest) < max(_LEAST_FACES + 1, len(everything) // 2):
@@ -220,7 +220,7 @@ def _without_outstanding(faces: _Faces) -> tuple[Indices, _Adjusted]:
 
 
 def _studentised(faces: _Faces, best: _Adjusted) -> Array:
-    """Residual of each height over its standard deviation, (n,) [-]."""
+    """Compute the residual of each height over its standard deviation, (n,) [-]."""
     carried = ((faces.arms @ best.cofactors) * faces.arms).sum(axis=1)
     variance = np.maximum(best.variances[0] - carried, 1e-6 * best.variances[0])
     out: Array = np.abs(faces.heights - faces.arms @ best.step) / np.sqrt(variance)
@@ -228,14 +228,14 @@ def _studentised(faces: _Faces, best: _Adjusted) -> Array:
 
 
 def _predicted_residuals(faces: _Faces, best: _Adjusted) -> Array:
-    """Residual of heights that were not part of the fit over their standard deviation, (n,) [-]."""
+    """Compute the residual of heights outside the fit over their standard deviation, (n,) [-]."""
     carried = ((faces.arms @ best.cofactors) * faces.arms).sum(axis=1)
     out: Array = np.abs(faces.heights - faces.arms @ best.step) / np.sqrt(best.variances[0] + carried)
     return out
 
 
 def _adjust(faces: _Faces) -> _Adjusted:
-    """Least squares with a variance for the heights and one for the slopes, both from the residuals."""
+    """Fit by least squares with one variance for the heights and one for the slopes, both from the residuals."""
     arms, heights, slopes, count = faces.arms, faces.heights, faces.slopes, len(faces.heights)
     by_heights, by_slopes = arms.T @ arms, np.diag([count, count, 0.0])
     least = np.maximum(faces.variances.mean(axis=0), 1e-16).tolist()
@@ -263,8 +263,8 @@ def _student(freedom: float) -> float:
     return freedom / (freedom - 2.0) if freedom > 3.0 else _MOST_STUDENT
 
 
-def _turned(normal: Array, axes: Array, step: Array) -> tuple[Array, Array]:
-    """Normal and axes of a plane after it was tilted by two slopes along its axes."""
+def _tilted(normal: Array, axes: Array, step: Array) -> tuple[Array, Array]:
+    """Tilt a plane by two slopes along its axes; return its normal and axes."""
     tilted = normal - step[:2] @ axes
     new: Array = tilted / float(np.linalg.norm(tilted))
     along: Array = axes[0] - (axes[0] @ new) * new
@@ -273,7 +273,7 @@ def _turned(normal: Array, axes: Array, step: Array) -> tuple[Array, Array]:
 
 
 def _frame(normal: Array) -> Array:
-    """(3, 3) right-handed, rows: two directions square to the normal, the normal."""
+    """Return a right-handed frame (3, 3), rows: two directions perpendicular to the normal, and the normal."""
     along = np.cross(np.eye(3)[int(np.argmin(np.abs(normal)))], normal)
     along /= np.linalg.norm(along)
     return np.array([along, np.cross(normal, along), normal])

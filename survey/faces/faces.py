@@ -17,17 +17,17 @@ __all__ = ["Face", "Provenance", "Source", "face_on", "outline_face"]
 
 
 Source = Literal["points", "photograph", "solid", "hypothesis"]
-"""What a face can be known from."""
+"""Kinds of evidence for a face."""
 
 
 @dataclass(frozen=True)
 class Provenance:
-    """How a face came to be known.
+    """The origin of a face.
 
     Attributes
     ----------
-    source : from points measured in space, from a photograph, or from a solid that another program made; a
-        hypothesis is a face that nobody has seen
+    source : points measured in space, a photograph, or an imported solid; a hypothesis is a face that nobody has
+        seen
     text : the same in words, with names
     """
 
@@ -47,15 +47,15 @@ class Face:
     code, kind, course : as in the survey
     fit : the plane
     outline : (nv, 3) the measured corners moved onto the plane, counter-clockwise seen from outside [m]
-    shape : whether one plane is what the face is
+    shape : verdict on whether one plane describes the face
     measures : its size
-    provenance : how it came to be known
-    record : the stone as it was measured
-    corner_of : (nv,) which measured corner each corner of the outline is
+    provenance : its origin
+    record : the stone as measured
+    corner_of : (nv,) index of the measured corner of each corner of the outline
     rejected_points : indices of `BlockRecord.points` that the fit left out
     rejected_vertices : indices of `outline` whose measured corners lie off the plane: broken or eroded
         corners
-    remarks : what was changed to make the outline a polygon, in words
+    remarks : changes that made the outline a polygon, in words
     """
 
     code: str
@@ -76,15 +76,15 @@ class Face:
 def outline_face(record: BlockRecord, observer: Array | None) -> Face:
     """Fit the plane of a stone's face and put its corners on it.
 
-    Plane and normal come from the points *and* the corners together: corners lie farthest apart, so they hold
-    a third of what is known of the tilt of a small face. An eroded or bevelled corner that fell behind the
-    face is left out by the same test as any other blunder, so it does not tilt the plane. Indices of
+    Plane and normal come from the points *and* the corners together: corners lie farthest apart, so they carry
+    a third of the information on the tilt of a small face. An eroded or bevelled corner that fell behind the
+    face is left out by the same test as any other outlier, so it does not tilt the plane. Indices of
     `fit.residuals` and `fit.rejected` count the points first, then the corners.
 
     Parameters
     ----------
     record : one stone of a survey, measured in space
-    observer : (3,) where it was seen from [m]; None: the corners are taken as counter-clockwise from outside
+    observer : (3,) viewpoint [m]; None: the corners run counter-clockwise seen from outside
 
     Returns
     -------
@@ -121,14 +121,14 @@ def face_on(
     *,
     keep_order: bool = False,
 ) -> Face:
-    """The face of a stone whose plane is known, and its corners on that plane.
+    """Make the face of a stone from its known plane and its corners on that plane.
 
     Parameters
     ----------
     fit : the plane
     corners : (n, 3) in the order of the record, on the plane [m]
     shape, provenance, record : as in Face
-    keep_order : the order of the corners has told which side is outside, and must not cross itself
+    keep_order : refuse an outline that crosses itself, because the order of the corners defined the outer side
 
     Raises
     ------
@@ -157,7 +157,7 @@ def face_on(
 
 
 def _handedness(fit: FaceFit) -> float:
-    """1 if the axes and the normal of a plane are right-handed, else -1."""
+    """Return 1 if the axes and the normal of a plane are right-handed, otherwise -1."""
     (ax, ay, az), (bx, by, bz) = fit.axes.tolist()
     nx, ny, nz = fit.normal.tolist()
     turn = nx * (ay * bz - az * by) + ny * (az * bx - ax * bz) + nz * (ax * by - ay * bx)
@@ -165,16 +165,16 @@ def _handedness(fit: FaceFit) -> float:
 
 
 def _remarks(merged: tuple[int, ...], reordered: bool) -> tuple[str, ...]:
-    said = []
+    out = []
     if merged:
-        said.append(f"corners {', '.join(str(i + 1) for i in merged)} were measured twice and are left out")
+        out.append(f"corners {', '.join(str(i + 1) for i in merged)} were measured twice and are left out")
     if reordered:
-        said.append("the corners were not listed in order around the face and have been put in order")
-    return tuple(said)
+        out.append("the corners were not listed in order around the face and have been put in order")
+    return tuple(out)
 
 
 def _outside(vertices: Array) -> Array:
-    """Some point in front of the face, if its corners run counter-clockwise."""
+    """Return a point in front of a face whose corners run counter-clockwise."""
     towards = area_vector(vertices)
     out: Array = vertices.mean(axis=0) + towards / max(float(np.linalg.norm(towards)), 1e-300)
     return out

@@ -1,4 +1,4 @@
-"""Measured faces, searched by place: the neighbours of a stone, and the faces of its wall."""
+"""Spatial search among measured faces: the neighbours of a stone, and the faces of its wall."""
 
 from collections.abc import Sequence
 from typing import Protocol
@@ -15,13 +15,13 @@ __all__ = ["MeasuredFace", "Neighbours"]
 Indices = NDArray[np.intp]
 
 _SAME_WAY = float(np.cos(np.radians(30.0)))  # faces turned farther belong to another wall
-_ENOUGH = 3  # neighbours that it takes to speak of their plane
-_REACH = 0.5  # how near a neighbour has to come, in sizes of the stone
-_LEANING = 0.03  # how far a wall may leave the plane of the marks, per distance from them
+_ENOUGH = 3  # least number of neighbours that define a plane
+_REACH = 0.5  # largest distance of a neighbour, in sizes of the stone
+_LEANING = 0.03  # deviation of a wall from the plane of the marks, per distance from them
 
 
 class MeasuredFace(Protocol):
-    """What has to be known of a face: its code, its plane and its outline (nv, 3) [m]."""
+    """A face with a code, a plane and an outline."""
 
     @property
     def code(self) -> str:
@@ -29,15 +29,15 @@ class MeasuredFace(Protocol):
 
     @property
     def fit(self) -> FaceFit:
-        """Its plane."""
+        """Plane of the face."""
 
     @property
     def outline(self) -> Array:
-        """(nv, 3) corners in order [m]."""
+        """Corners in order, (nv, 3) [m]."""
 
 
 class Neighbours:
-    """Measured faces, to be searched by place.
+    """An index of measured faces by place.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Neighbours:
         self._tree = cKDTree(self._centres) if faces else None
 
     def near(self, outline: Array, normal: Array) -> Indices:
-        """Faces that face the same way and come within half the size of an outline (nv, 3), if three do."""
+        """Find three or more faces that face the same way within half the size of an outline (nv, 3); else none."""
         if self._tree is None:
             return np.empty(0, dtype=np.intp)
         centre = outline.mean(axis=0)
@@ -78,7 +78,7 @@ class Neighbours:
         return near if len(near) >= _ENOUGH else near[:0]
 
     def _distances(self, outline: Array, found: Indices) -> Array:
-        """Distance of each of some faces from an outline: that of the nearest corner from an edge, (k,) [m]."""
+        """Compute the distance of some faces from an outline: of the nearest corner from an edge, (k,) [m]."""
         counts = self._counts[found]
         first = np.cumsum(counts) - counts
         rows = np.repeat(self._starts[found] - first, counts) + np.arange(counts.sum())
@@ -88,7 +88,7 @@ class Neighbours:
         return out
 
     def on_wall(self, centre: Array, normal: Array, size: float) -> Indices:
-        """Faces of the wall that goes through a place: same way, and near its plane, if three do."""
+        """Find three or more faces of the wall through a place: parallel to it and near its plane; else none."""
         arms = self._centres - centre
         heights = np.abs(arms @ normal)
         along = np.sqrt(np.maximum((arms**2).sum(axis=1) - heights**2, 0.0))
@@ -97,17 +97,17 @@ class Neighbours:
         return found if len(found) >= _ENOUGH else found[:0]
 
     def outward(self, centre: Array, normal: Array, size: float) -> Array:
-        """The normal of a wall through a place, turned the way most faces look that lie on it."""
+        """Turn the normal of a wall through a place to the side that most of its faces look to."""
         ahead, behind = self.on_wall(centre, normal, size), self.on_wall(centre, -normal, size)
         return -normal if len(behind) > len(ahead) else normal
 
     def fits(self, found: Indices) -> list[FaceFit]:
-        """Planes of some faces."""
+        """Return the planes of some faces."""
         return [self._fits[i] for i in found]
 
 
 def _to_segments(points: Array, starts: Array, ends: Array) -> Array:
-    """Distances of points (p, 3) from segments (e, 3) to (e, 3), (p, e) [m]."""
+    """Compute the distances of points (p, 3) from segments (e, 3) to (e, 3), (p, e) [m]."""
     run = ends - starts
     length = np.maximum((run**2).sum(axis=1), 1e-300)
     from_start = points[:, None] - starts[None]

@@ -1,4 +1,4 @@
-"""The outline of a face in its own plane: its order, its sense, its size."""
+"""The outline of a face in its own plane: order, orientation and size."""
 
 import math
 from dataclasses import dataclass
@@ -12,9 +12,9 @@ __all__ = ["Outline", "OutlineMeasures", "level_direction", "measure_outline", "
 
 Point = tuple[float, float]
 
-_NEAREST = 1e-3  # metres: corners nearer than this are one corner measured twice, however precise
-_NOISE = 2.0  # ... and so are those nearer than so many standard deviations of a coordinate
-_LEVEL = 0.05  # a face whose normal is nearer to the vertical than this (sine) has no level direction
+_NEAREST = 1e-3  # corners nearer than this are one corner measured twice, however precise [m]
+_NOISE = 2.0  # so are corners nearer than this many standard deviations of a coordinate
+_LEVEL = 0.05  # sine of the angle between normal and vertical below which a face has no level direction
 
 
 @dataclass(frozen=True)
@@ -24,9 +24,9 @@ class Outline:
     Attributes
     ----------
     corners : (nv, 2) in the plane of the face, counter-clockwise [m]
-    source : which of the given corners each one is; of corners that were merged, the first
-    merged : given corners that were taken as one with a corner before them
-    reordered : whether the corners were given in an order in which the outline crosses itself
+    source : index of the given corner of each; of merged corners, the first
+    merged : given corners that were merged with one before them
+    reordered : whether the outline crossed itself in the given order
     """
 
     corners: Array
@@ -43,10 +43,10 @@ class OutlineMeasures:
     ----------
     area : [m²]
     perimeter : [m]
-    length, height : extents along the level direction of the face and square to it [m]; of a level face, the
-        larger and the smaller principal extent
-    skew : by how much the angle between the two middle lines of a face of four corners differs from a right
-        one, either way [rad]; None for other faces
+    length, height : extents along the level direction of the face and perpendicular to it [m]; of a level face,
+        the larger and the smaller principal extent
+    skew : difference of the angle between the two middle lines of a face of four corners from a right angle, its
+        absolute value [rad]; None for other faces
     """
 
     area: float
@@ -59,18 +59,18 @@ class OutlineMeasures:
 def outline_polygon(flat: Array, sigma: float, *, keep_order: bool = False) -> Outline:
     """Make a simple polygon, counter-clockwise, of the measured corners of a face.
 
-    Corners that were measured twice are merged. An outline that crosses itself is put in order if its corners
-    all stand out: then one order alone goes around them.
+    Corners measured twice are merged. An outline that crosses itself is put in order if its corners are in
+    convex position: then only one order goes around them.
 
     Parameters
     ----------
     flat : (n, 2) corners in the plane of the face, seen from outside [m]
     sigma : standard deviation of a coordinate [m]
-    keep_order : refuse an outline that crosses itself, since its order tells which side is outside
+    keep_order : refuse an outline that crosses itself, because its order defines the outer side
 
     Returns
     -------
-    Outline, which says what was changed
+    Outline, with the changes made
 
     Raises
     ------
@@ -116,14 +116,14 @@ def measure_outline(flat: Array, level: Array | None) -> OutlineMeasures:
     flat : (nv, 2) corners, counter-clockwise [m]
     level : (2,) unit vector of the level direction in the plane; None if the face itself is level
     """
-    lies = level is None
+    lying = level is None
     if level is None:
         level = np.linalg.svd(flat - flat.mean(axis=0), full_matrices=False)[2][0]
     c, s = level.tolist()
     points = [(x, y) for x, y in (flat - flat[0]).tolist()]
     along, across = [c * x + s * y for x, y in points], [c * y - s * x for x, y in points]
     length, height = max(along) - min(along), max(across) - min(across)
-    if lies and length < height:  # corners that crowd spread most along the shorter one
+    if lying and length < height:  # crowded corners can spread most along the shorter extent
         length, height = height, length
     return OutlineMeasures(
         area=_signed_area(points),
@@ -135,7 +135,7 @@ def measure_outline(flat: Array, level: Array | None) -> OutlineMeasures:
 
 
 def level_direction(normal: Array, axes: Array) -> Array | None:
-    """Level direction in a plane, (2,) in its axes (2, 3); None if the plane itself is level."""
+    """Return the level direction in a plane, (2,) in its axes (2, 3); None if the plane itself is level."""
     along = np.array([-normal[1], normal[0], 0.0])
     size = math.hypot(along[0], along[1])
     if size <= _LEVEL:
@@ -145,7 +145,7 @@ def level_direction(normal: Array, axes: Array) -> Array | None:
 
 
 def _distinct(points: list[Point], nearest: float) -> tuple[list[int], list[int]]:
-    """Corners that are not the one before them measured again, and those that are."""
+    """Separate corners from repetitions of the corner before them."""
     order: list[int] = [0]
     merged: list[int] = []
     for i in range(1, len(points)):
@@ -156,7 +156,7 @@ def _distinct(points: list[Point], nearest: float) -> tuple[list[int], list[int]
 
 
 def _unique(points: list[Point], order: list[int], nearest: float) -> list[int]:
-    """Corners that are none of those before them measured again, be it much later."""
+    """Drop repetitions of any earlier corner, wherever they come."""
     unique: list[int] = []
     for i in order:
         if all(math.dist(points[i], points[k]) >= nearest for k in unique):
@@ -165,7 +165,7 @@ def _unique(points: list[Point], order: list[int], nearest: float) -> list[int]:
 
 
 def _first_crossing(points: list[Point]) -> tuple[int, int] | None:
-    """Numbers of two sides that cross or touch though they are not neighbours; None if there are none."""
+    """Find two sides that cross or touch and are not neighbours; return their numbers, or None."""
     count = len(points)
     if count > 40:
         return _first_crossing_of_many(np.array(points))
@@ -177,7 +177,7 @@ def _first_crossing(points: list[Point]) -> tuple[int, int] | None:
 
 
 def _cross(a: Point, b: Point, c: Point, d: Point) -> bool:
-    """Whether the segments a–b and c–d have a point in common; parallel ones are taken apart."""
+    """Return whether the segments a–b and c–d have a point in common; parallel ones never do."""
     ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], d[0] - c[0], d[1] - c[1]
     wx, wy = c[0] - a[0], c[1] - a[1]
     denominator = ux * vy - uy * vx
@@ -188,7 +188,7 @@ def _cross(a: Point, b: Point, c: Point, d: Point) -> bool:
 
 
 def _first_crossing_of_many(points: Array) -> tuple[int, int] | None:
-    """As `_first_crossing`, one side against all later ones at a time."""
+    """Do as `_first_crossing`, testing one side against all later ones at a time."""
     sides = np.roll(points, -1, axis=0) - points
     for i in range(len(points) - 2):
         later = slice(i + 2, len(points) - (i == 0))
@@ -204,7 +204,7 @@ def _first_crossing_of_many(points: Array) -> tuple[int, int] | None:
 
 
 def _around(points: list[Point], order: list[int]) -> list[int] | None:
-    """The one order in which an outline goes around corners that all stand out; None if some do not."""
+    """Return the order in which an outline goes around corners in convex position; None if they are not."""
     x = math.fsum(points[i][0] for i in order) / len(order)
     y = math.fsum(points[i][1] for i in order) / len(order)
     around = sorted(order, key=lambda i: math.atan2(points[i][1] - y, points[i][0] - x))

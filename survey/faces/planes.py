@@ -1,20 +1,20 @@
-"""Least-squares planes through surveyed face points, robust to blunders.
+"""Least-squares planes through surveyed face points, robust to outliers.
 
 The plane n·x = d minimises Σ w (n·x - d)², w = 1/σ². With the weighted centroid c taken out, n is the right
 singular vector of the smallest singular value. In the axes e₁, e₂ of the other two singular vectors the normal
 equations are diagonal, so the Gauss–Markov covariance is closed form and diagonal: the tilts θᵢ (δn = -Σ θᵢ eᵢ)
-have variance σ²/sᵢ², the height at the centroid σ²/Σw. The offset d at the origin of coordinates would say
-little of a face 10⁶ m away.
+have variance σ²/sᵢ², the height at the centroid σ²/Σw. The offset d at the origin of coordinates would be
+useless for a face 10⁶ m away.
 
-Blunders: one that is as far out as a stone is wide turns a least-squares plane so much that its own residual
+Outliers: one that is as far out as a stone is wide turns a least-squares plane so much that its own residual
 looks harmless, so residuals of the first fit cannot be trusted. The search starts from planes through triples
 of points: the one of least median distance (Rousseeuw 1984), which tolerates almost half of the points being
 wrong, and, where the precision is known, those of least truncated squares. From each the fit grows one point at
 a time: a point enters, or leaves again, by the test of its standardised residual (Baarda 1968, α₀ = 0.1 %). The
 one with the least truncated squares is kept, where a point that lies a little in front of the face counts twice:
 stones erode and mortar recedes behind the face, and nothing grows out of it. Points far beside the face are left
-out first: where they happen to lie near its plane prolonged, they would outvote all others. What other
-estimators make of such faces is measured in docs/decisions/012-robust-planes.md.
+out first, unless all points lie on one plane to rounding: where they happen to lie near the prolonged plane, they
+would outvote all others. Other estimators are compared on such faces in docs/decisions/012-robust-planes.md.
 """
 
 import math
@@ -30,7 +30,7 @@ __all__ = ["FaceFit", "fit_plane"]
 
 
 _NOWHERE = np.full(3, math.nan)
-_LARGEST_TILT = math.radians(10.0)  # standard deviation of a tilt beyond which there is no plane to speak of
+_LARGEST_TILT = math.radians(10.0)  # standard deviation of a tilt beyond which a plane is refused
 
 
 @dataclass(frozen=True)
@@ -47,13 +47,13 @@ class FaceFit:
     covariance : (3, 3) of two tilts [rad] and the height of the plane at `centroid` [m], diagonal; tilt i turns
         the normal towards -axes[i]
     rms : root mean square of the accepted residuals [m]
-    sigma0 : sqrt(Σ w r² / redundancy), 1 if the points are as precise as was said; in metres if no precision was
+    sigma0 : sqrt(Σ w r² / redundancy), 1 if the points are as precise as stated; in metres if no precision was
         given; nan without redundancy, because three points fit any plane
     redundancy : number of accepted points minus 3
-    rejected : indices of the points left out as blunders
+    rejected : indices of the outliers, which the fit leaves out
     residuals : (n,) signed distance of every given point from the plane, towards the observer [m]
-    standardised : (n,) residual over its own standard deviation: sqrt(1 - h) of the point's where it is part of
-        the fit, sqrt(1 + h) where it was rejected, h its leverage; nan where no other point checks it [-]
+    standardised : (n,) residual over its own standard deviation, which is that of the point times sqrt(1 - h) in
+        the fit and sqrt(1 + h) where it was rejected, h its leverage; nan where no other point checks it [-]
     """
 
     normal: Array
@@ -70,7 +70,7 @@ class FaceFit:
     standardised: Array
 
     def height_sigma(self, points: ArrayLike) -> Array:
-        """Standard deviation of the plane's height at places on or near it.
+        """Compute the standard deviation of the plane's height at places on or near it.
 
         Parameters
         ----------
@@ -87,13 +87,13 @@ class FaceFit:
 
 
 def fit_plane(points: ArrayLike, sigma: ArrayLike | None, observer: ArrayLike | None = None) -> FaceFit:
-    """Fit a plane to the points of a face and leave blunders out.
+    """Fit a plane to the points of a face and leave outliers out.
 
     Parameters
     ----------
     points : (n, 3) surveyed points, n ≥ 3 [m]
     sigma : standard deviation of a coordinate, one for all or (n,) [m]; None if unknown: then all points weigh
-        the same and the covariance is scaled by what the residuals say
+        the same and the residuals scale the covariance
     observer : (3,) the normal looks towards this point [m]; without it, its largest component is positive
 
     Returns
@@ -106,11 +106,17 @@ def fit_plane(points: ArrayLike, sigma: ArrayLike | None, observer: ArrayLike | 
         if a number is wrong, if there are fewer than three distinct points, if they lie on one line or on a strip
         so narrow that a tilt has a standard deviation of more than 10°. A face turned so far puts the hidden side
         of a stone 0.4 m deep 70 mm aside, and the first-order covariance no longer describes it.
+
+    Examples
+    --------
+    >>> face = [(x, 0.0, z) for x in (0.0, 0.3, 0.6) for z in (0.0, 0.2, 0.4)]
+    >>> fit = fit_plane([*face, (0.3, 0.08, 0.1)], 0.003, observer=(0.3, -5.0, 0.0))
+    >>> [round(float(component), 6) + 0.0 for component in fit.normal]
+    [0.0, -1.0, 0.0]
+    >>> fit.rejected  # 80 mm behind the face
+    (9,)
     """
-    from survey.faces._kernels.robust_fit import (  # with numba, which readers of fits do without
-        FINE,
-        fit_face,
-    )
+    from survey.faces._kernels.robust_fit import FINE, fit_face  # numba: readers of fits do without it
 
     xyz = np.ascontiguousarray(points, dtype=np.float64)
     if xyz.ndim != 2 or xyz.shape[1] != 3 or len(xyz) < 3:
@@ -149,7 +155,7 @@ def fit_plane(points: ArrayLike, sigma: ArrayLike | None, observer: ArrayLike | 
 
 
 def _refusal(status: int, xyz: Array, deviations: Array) -> GeometryError:
-    """Say why there is no plane."""
+    """Return the error that explains why there is no plane."""
     from survey.faces._kernels.robust_fit import NOT_FINITE, SIGMA
 
     if status == NOT_FINITE:
@@ -184,7 +190,7 @@ def _unknown_tilt(xyz: Array, tilt: float) -> GeometryError:
 
 
 def _extent(xyz: Array) -> tuple[float, float]:
-    """Length and width of a narrow set of points [m]."""
+    """Return length and width of a narrow set of points [m]."""
     centred = xyz - xyz[0]
     centred -= centred.mean(axis=0)
     along = np.linalg.svd(centred, full_matrices=False)[2]

@@ -1,4 +1,4 @@
-"""Whether one plane is the shape of a face, or it is bevelled, curved or rough."""
+"""Shape of a face: one plane, or bevelled, curved or rough."""
 
 import math
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ __all__ = ["FaceShape", "ShapeKind", "explain_heights", "judge_shape", "likely_r
 
 
 class ShapeKind(StrEnum):
-    """What the points of a face lie on."""
+    """Kinds of shape of a face."""
 
     PLANE = "plane"
     BEVELLED = "bevelled"
@@ -50,13 +50,13 @@ class FaceShape:
 
 
 def judge_shape(fit: FaceFit, points: ArrayLike, sigma: ArrayLike | None) -> FaceShape:
-    """Judge from the residuals whether one plane is the shape of a face.
+    """Judge from the residuals whether one plane describes a face.
 
     Parameters
     ----------
     fit : the plane through the points
-    points : (n, 3) as they were given to `fit_plane` [m]
-    sigma : as it was given to `fit_plane` [m]
+    points : (n, 3) as given to `fit_plane` [m]
+    sigma : as given to `fit_plane` [m]
 
     Returns
     -------
@@ -67,32 +67,29 @@ def judge_shape(fit: FaceFit, points: ArrayLike, sigma: ArrayLike | None) -> Fac
     known, count = sigma is not None, len(fit.residuals)
     if known and not fit.rejected and fit.sigma0**2 <= likely_ratio(fit.redundancy, 1.2816):
         return FaceShape(ShapeKind.PLANE, f"plane: {count} points, rms {fit.rms * 1e3:.1f} mm")
-    # with numba, which readers of verdicts do without
-    from survey.faces.shapes import explain_heights
-
     return explain_heights(fit, points, sigma)
 
 
 def likely_ratio(redundancy: int, quantile: float) -> float:
-    """Ratio of variances that chance exceeds as rarely as a normal quantile: chi-square by Wilson and Hilferty."""
+    """Return the ratio of variances that chance exceeds as rarely as a normal quantile (Wilson and Hilferty)."""
     spread = 2.0 / (9.0 * redundancy)
     return (1.0 - spread + quantile * math.sqrt(spread)) ** 3
 
 
 _CURVED = 16.27  # chi-square of the 3 parameters of a quadric at 0.1 %
-_CURVED_WITHOUT = 7.81  # the same at 5 %: what must be left of it without any one point
-_CURVED_BEYOND_TWO = 22.0  # what two blunders count that a quadric can be bent through
-_STRIP = 24.4  # the same for a strip along an edge: 2 parameters
+_CURVED_WITHOUT = 7.81  # the same at 5 %: must remain without any one point
+_CURVED_BEYOND_TWO = 22.0  # truncated squares of two outliers that a quadric can be bent through
+_STRIP = 24.4  # squares that a strip along an edge must explain: 2 parameters
 _SECOND_PLANE = 26.9  # squares that a second plane must explain: 3 parameters at 0.1 %, 200 lines tried
-_SEARCH = 10.6  # of these, what the search of the line is worth: 2 ln 200
-_WIDER = 5.0  # by how much wider scatter must be the better explanation
+_SEARCH = 10.6  # share of these that the search of the line accounts for: 2 ln 200
+_WIDER = 5.0  # advantage in likelihood that wider scatter needs as an explanation
 _EXACT = 1e-13  # scatter over size that is rounding
-_STEEPEST = math.radians(60.0)  # a second plane turned farther is another side of the stone, or blunders
+_STEEPEST = math.radians(60.0)  # a second plane turned farther is another side of the stone, or outliers
 _SCATTERED = 1.0 / 3.0  # share of points off the plane beyond which they are not isolated
 
 
 def explain_heights(fit: FaceFit, points: ArrayLike, sigma: ArrayLike | None) -> FaceShape:
-    """Judge the shape of a face on which something is not as chance would have it; arguments as of `judge_shape`."""
+    """Judge the shape of a face whose residuals exceed chance; arguments as of `judge_shape`."""
     if not fit.sigma0 > _EXACT * fit.singular_values[0]:
         return FaceShape(ShapeKind.PLANE, f"plane: {len(fit.residuals) - len(fit.rejected)} points, exactly")
     scene = _heights(fit, points, sigma)
@@ -104,7 +101,7 @@ def explain_heights(fit: FaceFit, points: ArrayLike, sigma: ArrayLike | None) ->
 
 @dataclass(frozen=True)
 class _Heights:
-    """Heights z above the plane at the places (u, v) on it, all (n,) [m]; root (n,) is 1/σ [1/m]."""
+    """Heights z above the plane at places (u, v) on it, all (n,) [m]; root (n,) is 1/σ [1/m]; off marks outliers."""
 
     u: Array
     v: Array
@@ -125,7 +122,7 @@ def _heights(fit: FaceFit, points: ArrayLike, sigma: ArrayLike | None) -> _Heigh
 
 
 def _curved(face: _Heights) -> tuple[float, FaceShape] | None:
-    """A quadric, with what it leaves unexplained, if it says significantly more than the plane."""
+    """Return a quadric and the squares it leaves unexplained, if it explains significantly more than the plane."""
     count = len(face.z)
     if count < 7:
         return None
@@ -150,7 +147,7 @@ def _curved(face: _Heights) -> tuple[float, FaceShape] | None:
     critical = 3.0 * fdtri(3, held - 6, 0.999) if rough else _CURVED
     if not (flatness - score) / scale > enough:
         return None
-    least = (flat_without - bent_without)[chosen].min()  # one blunder at a corner bends a quadric by itself
+    least = (flat_without - bent_without)[chosen].min()  # one outlier at a corner bends a quadric by itself
     if (flat - bent) / scale <= critical or least / scale <= _CURVED_WITHOUT:
         return None
     coefficients, covariance = found
@@ -159,7 +156,7 @@ def _curved(face: _Heights) -> tuple[float, FaceShape] | None:
 
 
 def _best_start(design: Array, face: _Heights) -> tuple[Bools, float]:
-    """Points that a quadric explains, grown from all points or from those on the plane; and what it leaves."""
+    """Grow the points that a quadric explains from all points or from those on the plane; return the better."""
     fewest = max(7, len(face.z) // 2 + 2)
     best, least = ~face.off, math.inf
     for start in (np.ones_like(face.off), ~face.off):
@@ -173,7 +170,7 @@ def _best_start(design: Array, face: _Heights) -> tuple[Bools, float]:
 
 
 def _squares(design: Array, face: _Heights, chosen: Bools) -> tuple[float, tuple[Array, Array] | None, Array]:
-    """Sum of squares of the chosen points, (coefficients, covariance), and (n,) the sum without each point."""
+    """Return the sum of squares of the chosen points, (coefficients, covariance), and (n,) the sum without each."""
     width = design.shape[1]
     inverse, residuals, lever = np.empty((width, width)), face.z.copy(), np.zeros_like(face.z)
     coefficients = fit_columns(design, face.z, face.root, chosen, inverse, residuals, lever)
@@ -184,7 +181,7 @@ def _squares(design: Array, face: _Heights, chosen: Bools) -> tuple[float, tuple
 
 
 def _curvature(coefficients: Array, covariance: Array, held: int, count: int) -> FaceShape:
-    """Principal curvatures at the centroid of z = z₀ + p u + q v + a u² + b uv + c v², positive towards the observer.
+    """Compute the principal curvatures of z = z₀ + p u + q v + a u² + b uv + c v², positive towards the observer.
 
     Eigenvalues of the second fundamental form in the first (do Carmo 1976, section 3.3).
     """
@@ -207,7 +204,7 @@ def _curvature(coefficients: Array, covariance: Array, held: int, count: int) ->
 
 
 def _bevelled(face: _Heights) -> tuple[float, FaceShape] | None:
-    """A second plane beyond a line, with what both leave unexplained, if it says enough more than one."""
+    """Return a second plane beyond a line and the squares both leave, if they explain enough more than one plane."""
     flat = truncated_sum(face.root, face.z)
     if face.off.sum() < 2 or flat <= _STRIP:
         return None
@@ -245,7 +242,7 @@ def _side(height: float) -> str:
 
 
 def _eroded(face: _Heights) -> FaceShape | None:
-    """An edge that fell behind the face, though not to a plane: all points off the plane lie beyond one line."""
+    """Return an edge eroded to no plane: all points off the plane lie behind it and beyond one line."""
     lost = int(face.off.sum())
     if lost < 3 or (face.z[face.off] > 0.0).any():
         return None
@@ -262,7 +259,7 @@ def _plane_or_rough(fit: FaceFit, face: _Heights) -> FaceShape:
     if lost > _SCATTERED * count:
         return FaceShape(ShapeKind.ROUGH, f"rough: {lost} of {count} points off the plane, in no order")
     ratio = max(float(((face.root * face.z) ** 2).mean()), 1.0)
-    # twice the negative logarithms of the likelihoods of wider scatter, and of blunders on a plane
+    # twice the negative logarithms of the likelihoods of wider scatter, and of outliers from a plane
     wider, isolated = count * (1.0 + math.log(ratio)), truncated_sum(face.root, face.z)
     if face.known and (fit.sigma0**2 > likely_ratio(fit.redundancy, 3.0902) or wider + _WIDER < isolated):
         text = f"rough: points scatter {math.sqrt(ratio):.1f} times their standard deviation"

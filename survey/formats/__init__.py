@@ -1,1 +1,4 @@
-"""Readers of survey files, each with line-numbered errors."""
+"""Readers of survey files, with line-numbered errors.
+
+Public: `open_survey`, `read_survey`, `FORMATS` (reading); `ReadingOptions` (options).
+"""

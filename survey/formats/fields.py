@@ -1,20 +1,20 @@
-"""Fields of a text survey: the strict reading of numbers and names that all formats share."""
+"""Strict parsing of numbers and names, shared by all formats."""
 
 import math
 import re
 
 from moma.errors import SurveyError
 
-__all__ = ["CODE", "FARTHEST", "KIND", "parse_course", "parse_length", "parse_number", "shown"]
+__all__ = ["CODE", "FARTHEST", "KIND", "parse_course", "parse_length", "parse_number", "shown", "unreadable"]
 
 CODE = re.compile(r"[^\W_][\w.+/:-]{0,63}")
-"""The name of a stone."""
+"""Pattern of the name of a stone."""
 
 KIND = re.compile(r"[a-z][a-z0-9_-]{0,31}")
-"""The name of a kind of stone."""
+"""Pattern of the name of a kind of stone."""
 
 FARTHEST = 1e8
-"""No site frame reaches farther, and sums of squares stay finite [m]."""
+"""Largest coordinate: no site frame reaches farther, and sums of squares stay finite [m]."""
 
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
@@ -53,5 +53,11 @@ def parse_course(text: str, where: str) -> int:
 
 
 def shown(text: str) -> str:
-    """Quote what was found, cut to what fits on a line."""
+    """Quote a text, cut to fit on a line."""
     return repr(text if len(text) <= 40 else text[:37] + "…")
+
+
+def unreadable(path: object, error: Exception, remedy: str = "give an existing file") -> SurveyError:
+    """Make the error of a file that the operating system cannot read."""
+    reason = getattr(error, "strerror", None) or error
+    return SurveyError(f"cannot be read: {reason}", where=str(path), remedy=remedy)

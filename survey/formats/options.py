@@ -1,4 +1,4 @@
-"""What a reader is told besides the name of the file, and how strict it is."""
+"""Options of the readers, and the reading of a whole file at once."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,19 +11,19 @@ __all__ = ["ReadingOptions", "whole"]
 
 @dataclass(frozen=True)
 class ReadingOptions:
-    """What a survey file may leave unsaid.
+    """Values that a survey file may leave out.
 
     Attributes
     ----------
-    codes : how the descriptions of point lists, and the names of solids, are made up of the fields
+    codes : template of the descriptions of point lists and of the names of solids, with the fields
         {block}, {kind}, {course}, {zone} and {role}; None: "{block}:{role}" for point lists, "{block}:{kind}"
         for solids
-    kind : of stones that do not say it
-    sigma : standard deviation of a coordinate, where the file does not say it [m]
+    kind : of stones without a kind in the file
+    sigma : standard deviation of a coordinate, where the file states none [m]
     head : from a header file, for formats that have no head of their own
     unit : length of the unit in which solids are given [m]
-    flat : polygons of solids whose corners lie so near to a plane are taken for plane [m], and those as near as `snap`
-    snap : faces of neighbouring solids that match but for so much are brought into one plane [m]; 0: none is
+    flat : distance from a plane within which the corners of a polygon of a solid count as plane [m]; at least `snap`
+    snap : tolerance within which matching faces of neighbouring solids are brought into one plane [m]; 0: none is
     """
 
     codes: str | None = None
@@ -35,7 +35,7 @@ class ReadingOptions:
     snap: float = 0.0
 
     def head_for(self, path: Path) -> SurveyHead:
-        """Make the head of a file that has none of its own: that of the header file, under the file's own path."""
+        """Make the head of a file without one of its own: that of the header file, under the file's own path."""
         head = self.head or SurveyHead("", "")
         return replace(head, name=head.name or path.stem, path=str(path))
 
@@ -56,7 +56,7 @@ def whole(stream: SurveyStream, path: Path) -> Survey:
             raise one.error
         if not isinstance(one, BlockRecord):
             raise UsageError(
-                "the file holds solids, not measured faces", where=str(path), remedy="go through its stream"
+                "the file holds solids, not measured faces", where=str(path), remedy="iterate over its stream"
             )
         blocks.append(one)
     return Survey(stream.head, tuple(blocks))

@@ -1,4 +1,4 @@
-"""One way to read every format of survey."""
+"""Common entry to the readers of all survey formats."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -21,13 +21,11 @@ __all__ = [
 ]
 
 Reader = Callable[[Path, ReadingOptions], SurveyStream]
-"""What begins to read a file."""
+"""A function that begins to read a file."""
 
 
 def _open_solids(path: Path, options: ReadingOptions) -> SurveyStream:
-    from survey.formats.solids.reader import (
-        open_solids,
-    )  # which needs trimesh: half a second that others are spared
+    from survey.formats.solids.reader import open_solids  # imports trimesh, which takes half a second
 
     return open_solids(path, options)
 
@@ -42,18 +40,18 @@ FORMATS: Mapping[str, Reader] = {
 """Readers by the name of their format."""
 
 
-def open_survey(path: Path, format: str, options: ReadingOptions | None = None) -> SurveyStream:
-    """Begin to read a survey file; its stones come one by one.
+def open_survey(path: Path | str, format: str, options: ReadingOptions | None = None) -> SurveyStream:
+    """Open a survey file, whose stones are then read one by one.
 
     Parameters
     ----------
     path : the file
     format : one of `FORMATS`
-    options : what the file may leave unsaid
+    options : values that the file may leave out
 
     Returns
     -------
-    SurveyStream : the head, and the stones, of which a wrong one comes as a Reject
+    SurveyStream : the head, and the stones; a wrong stone comes as a Reject
 
     Raises
     ------
@@ -62,14 +60,23 @@ def open_survey(path: Path, format: str, options: ReadingOptions | None = None) 
         of the file is
     UsageError
         if there is no such format, or the options do not suit it
+
+    Examples
+    --------
+    >>> stream = open_survey("data/samples/window/window.moma", "moma")
+    >>> stream.head.name
+    'window bay (synthetic)'
+    >>> stone = next(stream.blocks)
+    >>> stone.code, stone.vertices.shape, stone.sigma
+    ('W01-01', (4, 3), 0.00173)
     """
     if format not in FORMATS:
         raise UsageError(f"unknown format {format!r}", remedy=f"known formats: {', '.join(FORMATS)}")
     return FORMATS[format](Path(path), options or ReadingOptions())
 
 
-def read_survey(path: Path, format: str, options: ReadingOptions | None = None) -> Survey:
-    """Read a survey file as a whole, or not at all.
+def read_survey(path: Path | str, format: str, options: ReadingOptions | None = None) -> Survey:
+    """Read a survey file completely, and refuse it if any stone is wrong.
 
     Parameters
     ----------
@@ -78,7 +85,7 @@ def read_survey(path: Path, format: str, options: ReadingOptions | None = None) 
     Raises
     ------
     SurveyError
-        of the first stone that is wrong, else as `open_survey`
+        of the first stone that is wrong; otherwise as `open_survey`
     UsageError
         as `open_survey`
     """

@@ -1,41 +1,41 @@
-"""The lines of a text file, one by one, once it is sure that it is text.
+"""Lines of a text file, one by one, after a check that it is text.
 
-A file is gone through twice, each time in blocks of whole lines, so that memory does not grow with it: first to
-find its encoding and what no text has, then for its lines. UTF-8 is tried first, with or without its mark (BOM):
-hardly any text in another encoding is valid UTF-8 by chance. Everything else is taken as Latin-1, with the quotation
-marks and dashes that Windows adds to it (code page 1252), in which nearly every byte means something; what betrays
-other encodings and binary files are control characters, which are refused.
+A file is read twice, each time in blocks of whole lines, so that memory does not grow with it: first to find its
+encoding and to refuse control characters, then for its lines. UTF-8 is tried first, with or without a byte order
+mark: hardly any text in another encoding is valid UTF-8 by chance. Everything else is taken as Latin-1, with the
+quotation marks and dashes that Windows adds to it (code page 1252), in which nearly every byte is a character; other
+encodings and binary files show by their control characters.
 """
 
 from collections.abc import Iterator
 from pathlib import Path
 
 from moma.errors import SurveyError
+from survey.formats.fields import unreadable
 
 __all__ = ["TextLines"]
 
-_BLOCK = 1 << 18
-_LONGEST = 1 << 16  # bytes of one line: no table that people write comes near
+_BLOCK = 1 << 18  # bytes read at a time
+_LONGEST = 1 << 16  # bytes of one line: far beyond any table that people write
 _MARK = b"\xef\xbb\xbf"
 _CONTROLS = bytes([*range(9), 11, 12, *range(14, 32), 127])  # all but tab, line feed and carriage return
 _SAVE_AS = "save the file as UTF-8 text"
 
 
 class TextLines:
-    """The lines of a text file, to be iterated over as (number counted from 1, text without its end).
+    """The lines of a text file, an iterable of (number counted from 1, text without its end).
 
-    Only line feeds, or carriage returns with line feeds, end a line, so that numbers agree with what an editor
-    shows.
+    Only line feeds, or carriage returns with line feeds, end a line, so that numbers agree with those of an editor.
 
     Attributes
     ----------
     path : as text, for messages
     encoding : "utf-8" or "cp1252", of which Latin-1 is a part
-    end : number of the line on which the file ends
+    end : number of the last line
     """
 
     def __init__(self, path: Path) -> None:
-        """Look through the file.
+        """Check the whole file.
 
         Raises
         ------
@@ -56,7 +56,14 @@ class TextLines:
             for line in lines:
                 number += 1
                 yield number, line
-                # a last line may end in a carriage return alone: what strips blanks strips it
+                # a last line may end in a carriage return alone; stripping blanks removes it
+
+    def rows(self) -> Iterator[tuple[int, str]]:
+        """Iterate over the lines of a table, without comments and rows of nothing but separators."""
+        for number, line in self:
+            text = line.strip(" \t,;")
+            if text and not text.startswith("#"):
+                yield number, line
 
     def fail(self, line: int, what: str, remedy: str) -> SurveyError:
         """Make an error that names a line of this file."""
@@ -82,7 +89,7 @@ class TextLines:
         return "utf-8"
 
     def _check_characters(self) -> int:
-        """Refuse control characters; returns the number of the last line."""
+        """Refuse control characters; return the number of the last line."""
         line = 1
         for block in self._blocks():
             if self._has_controls(block):
@@ -105,11 +112,11 @@ class TextLines:
                 raise self.fail(number, f"control character 0x{code:02x}: this is not plain text", _SAVE_AS)
 
     def _decoded(self, data: bytes) -> str:
-        """Text in which bytes that mean nothing are halves of surrogate pairs."""
+        """Decode bytes; invalid ones become lone surrogates."""
         return data.decode(self.encoding, "surrogateescape")
 
     def _blocks(self) -> Iterator[bytes]:
-        """Blocks of whole lines."""
+        """Read blocks of whole lines."""
         line, rest = 1, b""
         try:
             with Path(self.path).open("rb") as handle:
@@ -124,15 +131,12 @@ class TextLines:
                     if len(rest) > _LONGEST:
                         break
         except (OSError, ValueError) as error:
-            reason = getattr(error, "strerror", None) or error
-            raise SurveyError(
-                f"cannot be read: {reason}", where=self.path, remedy="give an existing survey file"
-            ) from error
+            raise unreadable(self.path, error, "give an existing survey file") from error
         if rest:
             yield self._checked(rest, line)
 
     def _checked(self, block: bytes, line: int) -> bytes:
-        """The block, if none of its lines is too long."""
+        """Return the block unless one of its lines is too long."""
         start = 0
         while (stop := start + _LONGEST) < len(block):
             found = block.rfind(b"\n", start, stop + 1) + 1

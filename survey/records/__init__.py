@@ -1,1 +1,5 @@
-"""The content of a survey file, before anything is computed."""
+"""Records of a survey file, before anything is computed.
+
+Public: `BlockRecord`, `SolidRecord`, `Reject`, `Survey`, `SurveyHead`, `SurveyStream`, `DepthRule`,
+`Extrusion` (survey); `Snapping` (snapping).
+"""

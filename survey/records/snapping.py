@@ -1,4 +1,4 @@
-"""What bringing the faces of solids into common planes has changed, and what it has left open."""
+"""Report on bringing the faces of solids into common planes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,13 +8,13 @@ __all__ = ["OpenContact", "Snapping"]
 
 @dataclass(frozen=True)
 class OpenContact:
-    """Two stones whose faces match, but could not be brought into one plane.
+    """Two stones with matching faces that could not be brought into one plane.
 
     Attributes
     ----------
     stones : codes of the two
-    area : that their faces share [m²]
-    reason : why, in words
+    area : shared by their faces [m²]
+    reason : in words
     """
 
     stones: tuple[str, str]
@@ -24,15 +24,15 @@ class OpenContact:
 
 @dataclass(frozen=True)
 class Snapping:
-    """What bringing faces into common planes has changed.
+    """Changes made to bring faces into common planes.
 
     Attributes
     ----------
-    tolerance : within which it was done [m]
-    contacts : pairs of faces that share a plane now
-    planes : how many planes these are
-    moved : by code, how far the corner of the stone moved that moved farthest [m]
-    folded : by code, how many free faces had to be folded
+    tolerance : largest movement allowed [m]
+    contacts : number of pairs of faces that now share a plane
+    planes : number of these planes
+    moved : by code, the largest movement of a corner of the stone [m]
+    folded : by code, the number of free faces that had to be folded
     left_open : contacts that could not be closed
     """
 
@@ -45,5 +45,5 @@ class Snapping:
 
     @property
     def largest_movement(self) -> float:
-        """How far the corner moved that moved farthest [m]."""
+        """Largest movement of a corner [m]."""
         return max(self.moved.values(), default=0.0)

@@ -1,4 +1,4 @@
-"""What a survey file says, before anything is computed from it."""
+"""Contents of a survey file, before anything is computed from them."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -28,12 +28,12 @@ __all__ = [
 
 
 OBSERVER = "observer"
-"""Name of the station from which all stones were seen that do not name another."""
+"""Name of the station from which stones without a station of their own were seen."""
 
 
 @dataclass(frozen=True)
 class Station:
-    """Where an instrument, or the observer, stood.
+    """Position of an instrument or of the observer.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class Station:
 
 @dataclass(frozen=True)
 class ControlPoint:
-    """A point whose place is known in the frame of the survey and in that of the site.
+    """A point known in the frame of the survey and in that of the site.
 
     Attributes
     ----------
@@ -71,11 +71,11 @@ class ControlPoint:
 
 @dataclass(frozen=True)
 class PhotoMark:
-    """A point of the wall that is seen on a photograph and known in space.
+    """A point of the wall seen on a photograph and known in space.
 
     Attributes
     ----------
-    image : (2,) its place on the photograph, u to the right, v down or up alike [px]
+    image : (2,) its place on the photograph, u to the right, v either down or up [px]
     position : (3,) in the frame of the survey [m]
     sigma : standard deviation of each coordinate of `position` [m]
     line : line of the file, counted from 1
@@ -95,7 +95,7 @@ class Photograph:
     ----------
     name : unique in its survey
     sigma : standard deviation of a coordinate measured on it [px]
-    marks : what ties it to the wall, four or more
+    marks : four or more points that tie it to the wall
     station : name of the station that it was taken from; None if not known
     line : line of the file, counted from 1
     """
@@ -109,7 +109,7 @@ class Photograph:
 
 @dataclass(frozen=True)
 class DepthRule:
-    """How deep stones are that nobody measured.
+    """The depth of stones that were not measured individually.
 
     Attributes
     ----------
@@ -133,13 +133,13 @@ class DepthRule:
 
 @dataclass(frozen=True)
 class Canon:
-    """What archaeologists hold for the usual face of a kind of stone.
+    """The usual face of a kind of stone, according to archaeologists.
 
     Attributes
     ----------
     kind : the kind of stone
     length, height : of its face, level and upwards [m]
-    sigma : how much sound stones differ from it, standard deviation [m]
+    sigma : standard deviation of sound stones from it [m]
     source : the evidence, in words
     line : line of the file, counted from 1
     """
@@ -154,7 +154,7 @@ class Canon:
 
 @dataclass(frozen=True)
 class Extrusion:
-    """How the hidden side lies behind the face.
+    """Direction and size of the hidden side behind the face.
 
     Attributes
     ----------
@@ -168,18 +168,18 @@ class Extrusion:
 
 @dataclass(frozen=True)
 class SurveyHead:
-    """What a survey file says of all its stones together.
+    """The data of a survey file that all its stones share.
 
     Attributes
     ----------
     name : name of the survey
     path : the file it was read from
-    stations : where instruments and observers stood
-    control : points known in the frame of the site too; none: the survey is in that frame
+    stations : positions of instruments and observers
+    control : points also known in the frame of the site; without any, the survey is in that frame
     photographs : on which stones were measured
-    depth_rules : how deep stones are
-    canons : what archaeologists hold for the usual dimensions, at most one per kind
-    extrusion : of stones that do not say their own
+    depth_rules : depths of stones without a depth of their own
+    canons : usual dimensions, at most one per kind
+    extrusion : of stones without an extrusion of their own
     """
 
     name: str
@@ -192,7 +192,7 @@ class SurveyHead:
     extrusion: Extrusion = Extrusion()
 
     def viewpoint(self, station: str | None) -> Array | None:
-        """Where a stone was seen from, (3,) [m]: its own station, else the observer, else the only station.
+        """Return the viewpoint of a stone, (3,) [m]: its own station, then the observer, then the only station.
 
         Raises
         ------
@@ -211,29 +211,29 @@ class SurveyHead:
 
 @dataclass(frozen=True)
 class BlockRecord:
-    """One stone as it was measured.
+    """One stone as measured.
 
     Attributes
     ----------
     code : the stone's name, unique in its survey
-    kind : what sort of stone it is, e.g. "header"
+    kind : e.g. "header"
     course : number of its course, counted from the ground; None if it belongs to none
     vertices : (nv, 3) corners of the visible face, in order around it, nv ≥ 3 [m]; none on a photograph
     points : (np, 3) further points on the visible face [m]
     sigma : standard deviation of one measured coordinate [m]; of those in `sigmas`, root mean square
-    depth : depth measured on this very stone [m]; None if it was not
+    depth : depth measured on the stone itself [m]; None if it was not
     depth_sigma : its standard deviation [m]; None if not known
     depth_source : evidence for the depth; None if there is no depth
     line : line of the file on which the record begins, counted from 1
     notes : the surveyor's remarks, e.g. {"edge": "eroded"}
-    zone : part of the building, e.g. "north wall"; None if not said
-    station : name of the station that saw it; None if not said
-    photograph : name of the photograph that the corners were measured on; None: they were measured in space
+    zone : part of the building, e.g. "north wall"; None if not stated
+    station : name of the station that it was seen from; None if not stated
+    photograph : name of the photograph that the corners were measured on; None if they were measured in space
     image : (nv, 2) the corners on that photograph [px]
     sigmas : (np + nv,) standard deviation of a coordinate of each point, then of each corner [m]; None: all
         `sigma`
     names : of each point, then of each corner, as the instrument numbers them; () if they have none
-    extrusion : how its hidden side lies; None: as the survey says
+    extrusion : of its hidden side; None: as for the whole survey
     spans : lines of the file that it was read from
     """
 
@@ -273,18 +273,18 @@ class BlockRecord:
 
 @dataclass(frozen=True)
 class SolidRecord:
-    """One closed stone as another program made it.
+    """One closed stone imported from another program.
 
     Attributes
     ----------
     code : the stone's name, unique in its file
-    kind : what sort of stone it is
+    kind : e.g. "header"
     course : number of its course; None if it belongs to none
     vertices : (nv, 3) [m]
     faces : vertex indices of each planar face, counter-clockwise seen from outside
     line : line of the file on which it begins, counted from 1; 0 in a binary file
     spans : lines of the file that it was read from
-    remarks : what was settled or moved to make it a solid with plane faces, in words
+    remarks : changes that made it a solid with plane faces, in words
     """
 
     code: str
@@ -299,13 +299,13 @@ class SolidRecord:
 
 @dataclass(frozen=True)
 class Reject:
-    """What could not be read as a stone, and why.
+    """Part of a file that could not be read as a stone, with the reason.
 
     Attributes
     ----------
-    code : of the stone; None if not even that can be read
+    code : of the stone; None if it cannot be read either
     error : with the place and the remedy
-    spans : lines of the file that it was to be read from
+    spans : its lines of the file
     """
 
     code: str | None
@@ -315,14 +315,14 @@ class Reject:
 
 @dataclass(frozen=True)
 class SurveyStream:
-    """A survey file that is being read: its head, and its stones one by one.
+    """A survey file while it is read: its head, and its stones one by one.
 
     Attributes
     ----------
-    head : what holds for all stones
-    blocks : the stones in the order of the file; a stone that is wrong comes as a Reject, a file that is
-        wrong as a whole raises SurveyError. To be gone through once.
-    snapping : of solids, what bringing their faces into common planes has changed; None if that was not asked for
+    head : data shared by all stones
+    blocks : the stones in the order of the file, an iterator to be consumed once; a wrong stone comes as a
+        Reject, a file that is wrong as a whole raises SurveyError
+    snapping : of solids, the changes that brought their faces into common planes; None if not asked for
     """
 
     head: SurveyHead
@@ -336,7 +336,7 @@ class Survey:
 
     Attributes
     ----------
-    head : what holds for all stones
+    head : data shared by all stones
     blocks : the stones, in the order of the file
     """
 

@@ -16,16 +16,16 @@ from numpy.typing import ArrayLike
 
 from moma.errors import GeometryError
 from survey.arrays import Array, Bools
-from survey.registration.outliers import Verdict, find_blunders, point_tests
+from survey.registration.outliers import Verdict, find_outliers, point_tests
 from survey.registration.projective import Frame, direct_homography, frame_of, linearised, mapped_points
 
 __all__ = ["Homography", "fit_homography"]
 
 
-_MAX_STEPS = 30
+_MAX_STEPS = 30  # of the adjustment; good marks need four
 _CLOSE = 1e-12  # step of the reduced parameters, which are of the order of 1, that is rounding
-_TESTABLE = 5  # points that have to be left once blunders are out: any four agree exactly
-_APART = 5.0  # standard deviations that a point has to lie from another, or off a line, to be told from it
+_TESTABLE = 5  # least number of points without the outliers: any four agree exactly
+_APART = 5.0  # least distance of a point from another or from a line, in standard deviations
 
 
 @dataclass(frozen=True)
@@ -35,16 +35,16 @@ class Homography:
     Attributes
     ----------
     reduced : (3, 3) [[A, b], [cᵀ, 1]]
-    image_frame, plane_frame : how coordinates of the image and of the plane are reduced
+    image_frame, plane_frame : frames of the reduced coordinates of the image and of the plane
     covariance : (8, 8) of the first eight entries of `reduced`, row by row
     residuals : (n, 2) point of the plane minus mapped image point [m]
     image_residuals : (n, 2) image point minus mapped point of the plane [px]
     standardised : (n,) length of each residual in terms of its own standard deviations; nan where the other
         points do not control it [-]
     limits : (n,) value of `standardised` that a sound point exceeds once in a thousand [-]
-    sigma0 : sqrt(Σ rᵀ Q⁻¹ r / redundancy), 1 if the points are as precise as was said; nan without redundancy
+    sigma0 : sqrt(Σ rᵀ Q⁻¹ r / redundancy), 1 if the points are as precise as stated; nan without redundancy
     redundancy : twice the number of accepted points minus 8
-    rejected : indices of the points left out as blunders
+    rejected : indices of the outliers, which the fit leaves out
     """
 
     reduced: Array
@@ -61,13 +61,13 @@ class Homography:
 
     @property
     def matrix(self) -> Array:
-        """(3, 3) from homogeneous image coordinates [px] to those of the plane [m], last entry 1."""
+        """Matrix (3, 3) from homogeneous image coordinates [px] to those of the plane [m], last entry 1."""
         full = np.linalg.inv(self.plane_frame.matrix) @ self.reduced @ self.image_frame.matrix
         out: Array = full / full[2, 2]
         return out
 
     def horizon(self, image: ArrayLike) -> Array:
-        """Denominator at image points (…, 2): 1 amid the marks, 0 where the camera looks along the plane [-]."""
+        """Return the denominator at image points (…, 2): 1 amid the marks, 0 on the horizon of the plane [-]."""
         u = self.image_frame.reduce(np.asarray(image, dtype=np.float64))
         out: Array = u @ self.reduced[2, :2] + 1.0
         return out
@@ -81,7 +81,7 @@ class Homography:
         return out
 
     def covariance_at(self, image: ArrayLike, image_sigma: ArrayLike) -> Array:
-        """Covariance of mapped image points, from the homography and their own precision.
+        """Compute the covariance of mapped image points from the homography and their own precision.
 
         Parameters
         ----------
@@ -108,7 +108,7 @@ def fit_homography(
     plane_sigma: ArrayLike,
     names: Sequence[str] | None = None,
 ) -> Homography:
-    """Fit the homography that maps a photograph to a plane, and leave blunders out.
+    """Fit the homography that maps a photograph to a plane, and leave outliers out.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def fit_homography(
     ------
     GeometryError
         if there are fewer than four points, if all but one are on a line, if no camera has all of them in
-        front of it, or if points contradict each other and it cannot be told which is wrong; the error names
+        front of it, or if points contradict each other and the wrong one cannot be identified; the error names
         the points
 
     References
@@ -135,7 +135,7 @@ def fit_homography(
     § 4.4 and 5.2
     """
     u, y = np.asarray(image, dtype=np.float64), np.asarray(plane, dtype=np.float64)
-    called = [f"mark {i + 1}" for i in range(len(u))] if names is None else list(names)
+    labels = [f"mark {i + 1}" for i in range(len(u))] if names is None else list(names)
     if len(u) < 4 or u.shape != y.shape or u.shape[1:] != (2,):
         raise GeometryError(
             f"a homography needs (n ≥ 4, 2) points in image and plane, found {u.shape} and {y.shape}",
@@ -147,7 +147,7 @@ def fit_homography(
     values = np.hstack([u, y, sigmas.T])
     if not (np.isfinite(values).all() and (sigmas >= 0.0).all() and (sigmas.sum(axis=0) > 0.0).all()):
         raise GeometryError("coordinates must be finite and sigma positive", remedy="correct the marks")
-    return _without_blunders(_Marks(u, y, sigmas[0], sigmas[1]), called)
+    return _without_outliers(_Marks(u, y, sigmas[0], sigmas[1]), labels)
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ class _Marks:
     plane_sigma: Array
 
 
-def _without_blunders(marks: _Marks, names: list[str]) -> Homography:
+def _without_outliers(marks: _Marks, names: list[str]) -> Homography:
     everything = np.ones(len(names), dtype=bool)
     _check_spread(marks, names)
     fits: dict[bytes, tuple[Homography, Verdict]] = {}
@@ -169,17 +169,17 @@ def _without_blunders(marks: _Marks, names: list[str]) -> Homography:
         if _aligned(marks, accepted) is not None:
             return None
         try:
-            # a mark that is left out may lie on the horizon
+            # an outlier may lie on the horizon
             with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
                 fit = _adjust(marks, accepted)
-        except np.linalg.LinAlgError:  # far from any homography a step may lose its footing
+        except np.linalg.LinAlgError:  # far from any homography a step may become singular
             return None
         if fit is None:
             return None
         fits[accepted.tobytes()] = fit
         return fit[1]
 
-    found = find_blunders(len(names), _TESTABLE, judge)
+    found = find_outliers(len(names), _TESTABLE, judge)
     accepted = everything.copy()
     accepted[list(found.rejected)] = False
     if not found.suspects:
@@ -195,7 +195,7 @@ def _without_blunders(marks: _Marks, names: list[str]) -> Homography:
     worst = int(np.argmax(lengths))
     raise GeometryError(
         f"the {len(names)} marks contradict each other: {names[worst]} is {lengths[worst]:.1f} px off, all are "
-        f"{fit.sigma0:.1f} times less precise than was said, and it cannot be told which is wrong",
+        f"{fit.sigma0:.1f} times less precise than stated, and the wrong one cannot be identified",
         where=", ".join(names[i] for i in found.suspects),
         remedy="measure these again, leave a wrong one out, state a larger sigma, or mark more points",
     )
@@ -205,14 +205,14 @@ def _check_spread(marks: _Marks, names: list[str]) -> None:
     line = _aligned(marks, np.ones(len(names), dtype=bool))
     if line is not None:
         raise GeometryError(
-            "the marks lie on one line but for one, or coincide: they fix no homography",
+            "all marks but one lie on one line, or marks coincide: they determine no homography",
             where=", ".join(names[i] for i in line),
             remedy="mark four points of which no three are on a line",
         )
 
 
 def _aligned(marks: _Marks, accepted: Bools) -> tuple[int, ...] | None:
-    """Points on a line with at most one other distinct point besides; None if four are in general position."""
+    """Return the points of a line that all but one distinct point lie on; None if four are in general position."""
     index = np.flatnonzero(accepted)
     for points, sigma in ((marks.image, marks.image_sigma), (marks.plane, marks.plane_sigma)):
         local = points[index] - points[index[0]]
@@ -230,7 +230,7 @@ def _aligned(marks: _Marks, accepted: Bools) -> tuple[int, ...] | None:
 
 
 def _beyond(marks: _Marks) -> tuple[int, ...]:
-    """Marks that the direct linear transform puts behind the camera: the fewer side; all if that says nothing."""
+    """Return the marks that the direct linear transform puts behind the camera; all if it is inconclusive."""
     u, y = frame_of(marks.image).reduce(marks.image), frame_of(marks.plane).reduce(marks.plane)
     matrix = direct_homography(u, y)
     side = np.zeros(len(u), dtype=bool) if matrix is None else u @ matrix[2, :2] + 1.0 <= 0.0
@@ -239,12 +239,12 @@ def _beyond(marks: _Marks) -> tuple[int, ...]:
 
 
 def _adjust(marks: _Marks, accepted: Bools) -> tuple[Homography, Verdict] | None:
-    """Least squares; None if some point is not in front of the camera."""
+    """Fit by least squares; return None if some point is not in front of the camera."""
     frames = frame_of(marks.image[accepted]), frame_of(marks.plane[accepted])
     u, y = frames[0].reduce(marks.image), frames[1].reduce(marks.plane)
     variances = (marks.image_sigma * frames[0].scale) ** 2, (marks.plane_sigma * frames[1].scale) ** 2
     matrix = direct_homography(u[accepted], y[accepted])
-    # a blunder may lie anywhere: only accepted points have to be in front of the camera
+    # an outlier may lie anywhere: only accepted points have to be in front of the camera
     if matrix is None or (u[accepted] @ matrix[2, :2] + 1.0).min() <= 0.0:
         return None
     adjusted = u.copy()

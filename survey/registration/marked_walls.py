@@ -2,8 +2,8 @@
 
 Where the photograph's station is known, every mark is moved along the line of sight onto the common plane: there it
 appears at the same image point, however far it stands out of the wall. Where it is not known, marks can only be
-dropped square to the plane: the farther one stands out, the less it tells, and those that stand out of the relief of
-the wall are left out.
+projected square to the plane: the farther one stands out, the less weight it has, and those that stand out of the
+relief of the wall are left out.
 """
 
 from dataclasses import dataclass, replace
@@ -22,12 +22,12 @@ __all__ = ["OFF_SQUARE", "MarkedWall", "wall_of_marks"]
 
 
 OFF_SQUARE = float(np.tan(np.radians(15.0)))
-"""Standard deviation of the tangent of a line of sight whose station is not known, against the wall's normal."""
+"""Standard deviation of the tangent between a line of sight from an unknown station and the wall's normal."""
 
-_GRAZING = float(np.sin(np.radians(10.0)))  # a flatter sight fixes nothing
-_FARTHEST = 0.5  # how far corners may lie outside the marks, in sizes of these
-_RELIEF = 0.1  # how far faces of the wall may stand out of it, in distances between marks
-_NEAREST_HORIZON = 0.05  # share of the distance amid the marks
+_GRAZING = float(np.sin(np.radians(10.0)))  # flattest useful line of sight
+_FARTHEST = 0.5  # largest distance of corners outside the marks, in sizes of these
+_RELIEF = 0.1  # largest distance of faces from the plane of the wall, in distances between marks
+_NEAREST_HORIZON = 0.05  # least denominator of the homography; 1 amid the marks
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class MarkedWall:
     sigma : standard deviation of a coordinate measured on it [px]
     fit : plane of the marks
     homography : from the photograph to the plane, in its `axes` about its `centroid`
-    viewpoint : (3,) where it was taken from [m]; None if not known
+    viewpoint : (3,) position of the camera [m]; None if not known
     marks : (m, 2) accepted marks [px]
     hull : (k, 3) half-planes a·u + b ≤ 0 around the accepted marks, |a| = 1 [px]
     size : largest distance between two of these [px]
@@ -62,7 +62,7 @@ class MarkedWall:
         return _RELIEF * float(np.linalg.norm(corners[:, None] - corners[None], axis=2).max())
 
     def facing(self, outward: Array) -> "MarkedWall":
-        """The same, with the normal turned to the side that a direction (3,) points to."""
+        """Return the same wall with its normal turned to the side that a direction (3,) points to."""
         if self.fit.normal @ outward >= 0.0:
             return self
         fit = self.fit
@@ -76,7 +76,7 @@ class MarkedWall:
         return replace(self, fit=turned)
 
     def on_plane(self, image: Array) -> tuple[Array, Array]:
-        """Corners (n, 2) [px] on the plane of the marks, (n, 3) [m], and their covariance in it, (n, 2, 2) [m²].
+        """Map corners (n, 2) [px] to the plane of the marks, (n, 3) [m], with their covariance in it, (n, 2, 2) [m²].
 
         Raises
         ------
@@ -111,13 +111,13 @@ def wall_of_marks(
     Parameters
     ----------
     photograph : with four or more marks
-    viewpoint : (3,) where it was taken from [m]; None if not known
+    viewpoint : (3,) position of the camera [m]; None if not known
     observer : (3,) a point on the outer side of the wall [m], where the viewpoint is not known
 
     Raises
     ------
     GeometryError
-        if the marks fix no plane or no homography, or contradict each other; the error names their lines
+        if the marks determine no plane or no homography, or contradict each other; the error names their lines
     """
     where = f"photograph {photograph.name} (line {photograph.line})"
     marks = photograph.marks
@@ -142,7 +142,7 @@ def _tied(photograph: Photograph, viewpoint: Array | None, observer: Array | Non
     if viewpoint is None:
         kept = np.setdiff1d(kept, fit.rejected)
         flat = positions - fit.centroid
-        # how far each stands out is itself known no better than the relief
+        # the distance of each from the plane is itself uncertain by the relief
         relief = np.sqrt(np.mean(fit.residuals[kept] ** 2))
         sigmas = np.hypot(sigmas, OFF_SQUARE * np.hypot(fit.residuals, relief))
     else:
@@ -173,7 +173,7 @@ def _tied(photograph: Photograph, viewpoint: Array | None, observer: Array | Non
 
 
 def _plane(positions: Array, sigmas: Array, towards: Array | None) -> FaceFit:
-    """Plane of the marks. They scatter about it as the stones do that bear them, not only as they were measured."""
+    """Fit the plane of the marks, which scatter like the stones that they are on, not only by measurement."""
     free = len(positions) - 3
     deviation = max(_deviation(positions), 1e-12)
     plain = fit_plane(positions, np.maximum(sigmas, deviation), towards)
@@ -189,14 +189,14 @@ def _plane(positions: Array, sigmas: Array, towards: Array | None) -> FaceFit:
 
 
 def _deviation(positions: Array) -> float:
-    """Standard deviation of points from their plane of least squares [m]."""
+    """Return the standard deviation of points from their least-squares plane [m]."""
     local = positions - positions[0]
     singular = np.linalg.svd(local - local.mean(axis=0), compute_uv=False)
     return float(singular[2]) / float(np.sqrt(len(positions) - 3))
 
 
 def _along_sight(positions: Array, fit: FaceFit, viewpoint: Array) -> tuple[Array, Array]:
-    """Marks moved along their lines of sight onto the plane, from its centroid (n, 3) [m]; tan of their slant."""
+    """Move marks along their lines of sight onto the plane, (n, 3) from its centroid [m]; return tan of the slant."""
     rays = positions - viewpoint
     ahead = -(rays @ fit.normal)
     lengths = np.linalg.norm(rays, axis=1)

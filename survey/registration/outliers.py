@@ -1,13 +1,13 @@
-"""Which measured points contradict the others: tests of single points, and the smallest set that explains all.
+"""Outliers among measured points: tests of single points, and the smallest set that explains all contradictions.
 
 Every point carries a residual of two or three coordinates. In a linear adjustment with known precision, the
-square Tᵢ = rᵢᵀ Qᵢ⁻¹ rᵢ of a point's residual over its own covariance Qᵢ is what the sum of squares loses when the
-point is left out, and follows chi-square if the point is sound (Baarda 1968; here in its form for vectors,
-Förstner 1987, with α₀ = 0.1 %). One blunder is safely found by the largest T; two may hide each other, and a
-blunder of metres turns the whole frame, so the search refits: it leaves out one point, then two, and so on, and
-takes the first set whose absence makes all others agree. Where two sets do that about equally well, nobody can
-tell which one is wrong, and the search says so; unless the test is failed so narrowly that the choice matters
-little, as sound points do now and then: then the likelier set is taken.
+square Tᵢ = rᵢᵀ Qᵢ⁻¹ rᵢ of a point's residual over its own covariance Qᵢ is the decrease of the sum of squares when
+the point is left out, and follows chi-square if the point is sound (Baarda 1968; here in its form for vectors,
+Förstner 1987, with α₀ = 0.1 %). A single outlier is safely found by the largest T; two may hide each other, and an
+outlier of metres turns the whole frame, so the search refits: it leaves out one point, then two, and so on, and
+takes the first set whose absence makes all others agree. Where two sets do that about equally well, the search
+reports that the wrong one cannot be identified; unless the test fails so narrowly that the choice matters little, as
+happens with sound points now and then: then the likelier set is taken.
 """
 
 import math
@@ -20,28 +20,28 @@ from scipy.special import chdtri
 
 from survey.arrays import Array, Bools
 
-__all__ = ["LEVEL", "Blunders", "Verdict", "find_blunders", "point_tests"]
+__all__ = ["LEVEL", "Outliers", "Verdict", "find_outliers", "point_tests"]
 
 
 LEVEL = 1e-3
-"""Probability that a sound point, or a sound set of points, is called wrong: Baarda's α₀."""
+"""Probability that a sound point, or a sound set of points, is rejected: Baarda's α₀."""
 
-_CONTROLLED = 1e-3  # part of an error that shows in the point's own residual, below which it cannot be tested
-_MAX_SUBSETS = 600  # beyond, only sets that contain the best smaller one are tried
+_CONTROLLED = 1e-3  # share of an error in the point's own residual below which it cannot be tested
+_MAX_SUBSETS = 600  # number beyond which only sets that contain the best smaller one are tried
 _RIVAL = 6.0  # difference of the sums of squares at which one explanation is 20 times likelier than another
-_NARROW = 1.5  # a test beyond its limit by less than this factor may well be chance
+_NARROW = 1.5  # factor of a test beyond its limit below which chance is a plausible reason
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """How a set of points agrees with its own best fit.
+    """Agreement of a set of points with its own best fit.
 
     Attributes
     ----------
     squares : sum of squared residuals over their variances [-]
     redundancy : number of its degrees of freedom
     tests : (n,) square root of the test quantity T of every point, nan where it cannot be tested [-]
-    limits : (n,) what chance exceeds once in a thousand [-]
+    limits : (n,) values of `tests` that chance exceeds once in a thousand [-]
     accepted : (n,) the points that were fitted
     """
 
@@ -53,25 +53,25 @@ class Verdict:
 
     @property
     def failed(self) -> Bools:
-        """(n,) fitted points that contradict the others."""
+        """Fitted points that contradict the others, (n,)."""
         return self.accepted & (np.nan_to_num(self.tests) > self.limits)
 
     @property
     def consistent(self) -> bool:
-        """Whether the sum of squares and every fitted point pass their tests."""
+        """True if the sum of squares and every fitted point pass their tests."""
         if self.redundancy == 0:
             return True
         return self.squares <= float(chdtri(self.redundancy, LEVEL)) and not self.failed.any()
 
 
 @dataclass(frozen=True)
-class Blunders:
-    """What the search found.
+class Outliers:
+    """Result of the search.
 
     Attributes
     ----------
     rejected : points whose absence makes all others agree
-    suspects : not empty: something is wrong, in some of these points, and it cannot be told in which
+    suspects : points of which some are wrong, without evidence as to which; empty if the search succeeded
     """
 
     rejected: tuple[int, ...] = ()
@@ -89,11 +89,11 @@ def point_tests(
     covariances : (n, d, d) of the observations
     effects : (n, d, p) derivatives of the adjusted values by the parameters
     parameters : (p, p) covariance of the parameters
-    accepted : (n,) points that took part in the fit: their residual is less than their error, others' more
+    accepted : (n,) points of the fit, whose residuals are smaller than their errors; those of the others are larger
 
     Returns
     -------
-    tests, limits : (n,) square root of T, nan if nothing of the point is controlled; its limit at `LEVEL`
+    tests, limits : (n,) square root of T, nan if the other points do not control it; its limit at `LEVEL`
     """
     whiten = np.linalg.inv(np.linalg.cholesky(covariances))
     own = whiten @ effects
@@ -109,7 +109,7 @@ def point_tests(
     return tests, np.sqrt(chdtri(np.maximum(freedom, 1), LEVEL))
 
 
-def find_blunders(count: int, smallest: int, judge: Callable[[Bools], Verdict | None]) -> Blunders:
+def find_outliers(count: int, smallest: int, judge: Callable[[Bools], Verdict | None]) -> Outliers:
     """Find the fewest points that have to be left out so that the others agree.
 
     Parameters
@@ -120,12 +120,12 @@ def find_blunders(count: int, smallest: int, judge: Callable[[Bools], Verdict | 
 
     Returns
     -------
-    Blunders
+    Outliers
     """
     everything = np.ones(count, dtype=bool)
     whole = judge(everything)
     if whole is not None and whole.consistent:
-        return Blunders()
+        return Outliers()
     best: tuple[int, ...] = ()
     for size in range(1, min(count - smallest, (count - 1) // 2) + 1):
         tried = _judged(_subsets(count, size, best), everything, judge)
@@ -133,7 +133,7 @@ def find_blunders(count: int, smallest: int, judge: Callable[[Bools], Verdict | 
         if explanations:
             return _decide(explanations, whole)
         best = min(tried)[1] if tried else best
-    return Blunders(suspects=_suspects(count, whole, judge))
+    return Outliers(suspects=_suspects(count, whole, judge))
 
 
 def _subsets(count: int, size: int, best: tuple[int, ...]) -> Iterable[tuple[int, ...]]:
@@ -145,7 +145,7 @@ def _subsets(count: int, size: int, best: tuple[int, ...]) -> Iterable[tuple[int
 def _judged(
     subsets: Iterable[tuple[int, ...]], everything: Bools, judge: Callable[[Bools], Verdict | None]
 ) -> list[tuple[float, tuple[int, ...], bool]]:
-    """Sum of squares, subset and whether all agree once the subset is left out."""
+    """Return for each subset the sum of squares, itself, and whether all others agree without it."""
     out = []
     for subset in subsets:
         accepted = everything.copy()
@@ -156,17 +156,17 @@ def _judged(
     return out
 
 
-def _decide(explanations: list[tuple[float, tuple[int, ...]]], whole: Verdict | None) -> Blunders:
+def _decide(explanations: list[tuple[float, tuple[int, ...]]], whole: Verdict | None) -> Outliers:
     least, best = min(explanations)
     rivals = [subset for squares, subset in explanations if squares - least < _RIVAL]
     narrow = whole is not None and not (np.nan_to_num(whole.tests) > _NARROW * whole.limits).any()
     if len(rivals) == 1 or narrow:
-        return Blunders(rejected=best)
-    return Blunders(suspects=tuple(sorted({i for subset in rivals for i in subset})))
+        return Outliers(rejected=best)
+    return Outliers(suspects=tuple(sorted({i for subset in rivals for i in subset})))
 
 
 def _suspects(count: int, whole: Verdict | None, judge: Callable[[Bools], Verdict | None]) -> tuple[int, ...]:
-    """Points of which something is wrong: those that alone could be it, else those that fail, else all."""
+    """Return the points that could be the only wrong one; without any, those that fail; otherwise all."""
     everything = np.ones(count, dtype=bool)
     single = _judged(combinations(range(count), 1), everything, judge)
     alone = tuple(subset[0] for _, subset, consistent in single if consistent)

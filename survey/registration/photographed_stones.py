@@ -1,11 +1,11 @@
 """Stones measured on a photograph: their corners lifted to the plane of their neighbours.
 
-The homography of the photograph (`survey.registration.marked_walls`) takes the corners to the plane of the marks. The
-face itself lies elsewhere: its plane is predicted from its neighbours' (`survey.faces.common_planes`), else from all
-faces of the wall, else it is that of the marks, and points measured on the face correct the prediction. From the
+The homography of the photograph (`survey.registration.marked_walls`) maps the corners to the plane of the marks. The
+plane of the face itself is predicted from its neighbours (`survey.faces.common_planes`); with too few of these, from
+all faces of the wall; otherwise it is that of the marks. Points measured on the face correct the prediction. From the
 plane of the marks the corners move to the face along the line of sight, so that it covers in space what it covers on
-the photograph; where the station is not known they move square to the marks' plane, which is exact for a sight that
-is square.
+the photograph; where the station is not known they move square to the marks' plane, which is exact for a perpendicular
+line of sight.
 """
 
 from collections.abc import Iterator, Sequence
@@ -24,25 +24,25 @@ from survey.registration.marked_walls import OFF_SQUARE, MarkedWall, wall_of_mar
 __all__ = ["LiftedFace", "lift", "lift_faces", "plane_of_wall"]
 
 
-_COARSEST = 0.1  # standard deviation of a corner over the size of the stone, beyond which it is refused
-_SMALLEST = 1e-3  # metres between the farthest corners
-_ROUNDING = 1e-9  # radians, metres: standard deviations below are none
+_COARSEST = 0.1  # largest standard deviation of a corner over the size of the stone
+_SMALLEST = 1e-3  # least distance between the farthest corners [m]
+_ROUNDING = 1e-9  # standard deviation that is rounding [rad, m]
 _CRITICAL = 3.29  # two-sided normal quantile of Baarda's α₀ = 0.1 %
-_GRAZING = float(np.sin(np.radians(10.0)))
+_GRAZING = float(np.sin(np.radians(10.0)))  # flattest useful line of sight
 
 
 @dataclass(frozen=True)
 class LiftedFace:
-    """The outline of a stone that was measured on a photograph, in space.
+    """The outline in space of a stone that was measured on a photograph.
 
     Attributes
     ----------
     outline : (nv, 3) corners in the order of the record, on the plane [m]
-    fit : the plane as any other, with the covariance that is predicted for it. It has no residuals, unless of
-        points measured on the face; where these fix it alone `fit` is theirs. Else `rms` is the standard
-        deviation of the heights of the neighbours about their plane, `redundancy` 0 and `sigma0` nan
+    fit : the plane, with its predicted covariance. Where points measured on the face determine it alone, it is their
+        fit, with residuals. Otherwise it has none: `rms` is the standard deviation of the heights of the
+        neighbours about their plane, `redundancy` 0 and `sigma0` nan
     sigma : (nv,) standard deviation of each corner in the plane, along any direction [m]
-    text : how it came about, e.g. "photograph P1, in the plane of W01-02, W01-03 and W02-01"
+    text : origin of the plane, e.g. "photograph P1, in the plane of W01-02, W01-03 and W02-01"
     """
 
     outline: Array
@@ -57,14 +57,14 @@ def lift_faces(
     faces: Sequence[MeasuredFace],
     head: SurveyHead,
 ) -> Iterator[tuple[BlockRecord, LiftedFace | MomaError]]:
-    """Lift stones that were measured on photographs, in order; one that cannot be lifted comes with its error.
+    """Lift stones that were measured on photographs, in order; a stone that cannot be lifted comes with its error.
 
     Parameters
     ----------
     records : stones measured on a photograph
     photographs : of the survey
     faces : measured in space, of the whole survey
-    head : of the survey; its stations say where photographs were taken from
+    head : of the survey, with the stations that photographs were taken from
     """
     neighbours = Neighbours(faces)
     known = {photograph.name: photograph for photograph in photographs}
@@ -93,12 +93,12 @@ def lift(
     record : with its corners on the photograph, in `image`
     wall : the photograph and the plane of its marks
     neighbours : faces measured in space
-    whole : plane to take where fewer than three neighbours are near, see `plane_of_wall`; None: that of the marks
+    whole : plane used where fewer than three neighbours are near, see `plane_of_wall`; None: that of the marks
 
     Raises
     ------
     GeometryError
-        if a corner lies far outside the marks, is seen at a grazing angle, or is known no better than to a tenth
+        if a corner lies far outside the marks, is seen at a grazing angle, or has a standard deviation over a tenth
         of the size of the stone
     """
     if len(record.image) < 3:
@@ -121,7 +121,7 @@ def lift(
 
 
 def plane_of_wall(wall: MarkedWall, neighbours: Neighbours) -> CommonPlane | None:
-    """The plane of all faces that lie on the wall of a photograph and face its way; None if there are not three."""
+    """Fit the common plane of all faces on the wall of a photograph that face its way; None without three."""
     found = neighbours.on_wall(wall.fit.centroid, wall.fit.normal, wall.relief)
     if not len(found):
         return None
@@ -149,7 +149,7 @@ def _wall(
 def _predicted(
     on_marks: Array, wall: MarkedWall, neighbours: Neighbours, whole: CommonPlane | None
 ) -> PlaneEstimate:
-    """The plane of the neighbours, else of the wall, else of the marks, as it is predicted for one face."""
+    """Predict the plane of one face from its neighbours, otherwise from the wall, otherwise from the marks."""
     place = on_marks.mean(axis=0)
     near = neighbours.near(on_marks, wall.fit.normal)
     if len(near):
@@ -161,7 +161,7 @@ def _predicted(
     fit = wall.fit
     used = len(fit.residuals) - len(fit.rejected)
     scatter = fit.rms * float(np.sqrt(used / max(fit.redundancy, 1)))
-    # nothing is known of tilts but that corners and middles of faces scatter alike
+    # no tilts are known: assume that corners and middles of faces scatter alike
     reach = 0.5 * _size(on_marks)
     marks = CommonPlane(fit.centroid, fit.normal, fit.axes, fit.covariance, scatter, scatter / reach)
     return marks.face_at(place, "in the plane of its marks")
@@ -170,7 +170,7 @@ def _predicted(
 def _face_plane(
     record: BlockRecord, plane: PlaneEstimate, on_marks: Array, wall: MarkedWall
 ) -> tuple[FaceFit | None, PlaneEstimate]:
-    """The plane that points on the face fix, or the predicted one corrected by them."""
+    """Return the plane fitted to points on the face, or the predicted one corrected by them."""
     count = len(record.points)
     if count == 0:
         return None, plane
@@ -181,7 +181,7 @@ def _face_plane(
         try:
             fit = fit_plane(record.points, sigmas, record.points[0] + 1e3 * wall.fit.normal)
         except GeometryError:
-            pass  # on a line, say: they still correct the prediction
+            pass  # for example points on a line, which still correct the prediction
         else:
             if fit.height_sigma(on_marks).max() <= plane.height_sigma(on_marks).max():
                 return fit, PlaneEstimate(
@@ -189,23 +189,23 @@ def _face_plane(
                 )
             sound[list(fit.rejected)] = False
     points, sigmas = record.points[sound], sigmas[sound]
-    said = [f"{plane.text}, corrected by {words}"]
+    remarks = [f"{plane.text}, corrected by {words}"]
     if not sound.all():
-        said.append(f"{count - len(points)} of them left out")
-    # the stone may well stand out: what was measured on it counts for more than what is around it
+        remarks.append(f"{count - len(points)} of them left out")
+    # the stone may stand out, so its own points outweigh its surroundings
     heights = (points - plane.centroid) @ plane.normal
     tests = np.abs(heights) / np.hypot(plane.height_sigma(points), sigmas)
     if tests.max() > _CRITICAL:
-        said.append(
+        remarks.append(
             f"which lie up to {np.abs(heights).max() * 1e3:.0f} mm off ({tests.max():.1f} standard deviations)"
         )
-    return None, plane.corrected(points, sigmas, ", ".join(said))
+    return None, plane.corrected(points, sigmas, ", ".join(remarks))
 
 
 def _moved(
     on_marks: Array, covariances: Array, wall: MarkedWall, plane: PlaneEstimate
 ) -> tuple[Array, Array]:
-    """Corners moved onto the face's plane (nv, 3), and the standard deviation of each in it (nv,) [m]."""
+    """Move corners onto the face's plane, (nv, 3); return the standard deviation of each in it too, (nv,) [m]."""
     down = (on_marks - plane.centroid) @ plane.normal
     rays = (
         np.tile(-wall.fit.normal, (len(on_marks), 1)) if wall.viewpoint is None else on_marks - wall.viewpoint
@@ -217,10 +217,10 @@ def _moved(
             where=f"photograph {wall.name}",
             remedy="measure the stone in space",
         )
-    per_height = rays / slant[:, None]  # way of a corner as the plane rises by a metre
+    per_height = rays / slant[:, None]  # movement of a corner as the plane rises by 1 m
     corners = on_marks - per_height * down[:, None]
     scale = 1.0 if wall.viewpoint is None else 1.0 - down / slant
-    # how corners follow their places on the plane of the marks, in the axes of either plane
+    # derivative of corners by their places on the plane of the marks, in the axes of either plane
     follow = plane.axes @ (np.eye(3) - per_height[:, :, None] * plane.normal) @ wall.fit.axes.T
     own = scale * scale * np.trace(follow @ covariances @ follow.transpose(0, 2, 1), axis1=1, axis2=2)
     height = plane.height_sigma(corners) ** 2
@@ -231,10 +231,10 @@ def _moved(
 
 
 def _as_fit(plane: PlaneEstimate, outline: Array) -> FaceFit:
-    """A predicted plane as a fit, about the place where its height does not depend on its tilts."""
+    """Express a predicted plane as a fit, about the place where its height does not depend on its tilts."""
     tilts, directions = np.linalg.eigh(plane.covariance[:2, :2])
     axes, tilts = directions.T @ plane.axes, np.maximum(tilts, _ROUNDING**2)
-    # no correlation beyond 1, where rounding is all that is left of a variance
+    # limit correlations to 1 where a variance is rounding alone
     most = np.sqrt(tilts * plane.covariance[2, 2])
     across = np.clip(directions.T @ plane.covariance[:2, 2], -most, most)
     # smallest spread of the tilts first, as the axis along which a measured face is longest
@@ -257,7 +257,7 @@ def _as_fit(plane: PlaneEstimate, outline: Array) -> FaceFit:
 
 
 def _size(outline: Array) -> float:
-    """Largest distance between two corners [m]."""
+    """Return the largest distance between two corners [m]."""
     return float(np.linalg.norm(outline[:, None] - outline[None], axis=2).max())
 
 

@@ -16,31 +16,31 @@ __all__ = ["Frame", "direct_homography", "frame_of", "linearised", "mapped_point
 
 @dataclass(frozen=True)
 class Frame:
-    """Reduced coordinates (p - centre) · scale: mean distance √2 from the origin."""
+    """Frame of reduced coordinates (p - centre) · scale, at a mean distance of √2 from the origin."""
 
     centre: Array
     scale: float
 
     def reduce(self, points: Array) -> Array:
-        """Reduced coordinates of points (…, 2)."""
+        """Reduce the coordinates of points (…, 2)."""
         out: Array = (points - self.centre) * self.scale
         return out
 
     @property
     def matrix(self) -> Array:
-        """(3, 3) of homogeneous coordinates."""
+        """Matrix (3, 3) for homogeneous coordinates."""
         s, (x, y) = self.scale, self.centre
         return np.array([[s, 0.0, -s * x], [0.0, s, -s * y], [0.0, 0.0, 1.0]])
 
 
 def frame_of(points: Array) -> Frame:
-    """Frame in which points (n, 2) lie about the origin, at a mean distance of √2."""
+    """Make the frame in which points (n, 2) lie about the origin, at a mean distance of √2."""
     centre = points[0] + (points - points[0]).mean(axis=0)
     return Frame(centre, float(np.sqrt(2.0) / np.linalg.norm(points - centre, axis=1).mean()))
 
 
 def direct_homography(u: Array, y: Array) -> Array | None:
-    """Direct linear transform of reduced points, last entry 1; None if that vanishes."""
+    """Compute the direct linear transform of reduced points, last entry 1; None if that vanishes."""
     ones, zeros = np.ones((len(u), 1)), np.zeros((len(u), 3))
     plain = np.hstack([u, ones])
     rows = np.vstack(
@@ -57,7 +57,7 @@ def direct_homography(u: Array, y: Array) -> Array | None:
 
 
 def mapped_points(matrix: Array, u: Array) -> tuple[Array, Array, Array]:
-    """Mapped points (…, 2), their derivatives by the point (…, 2, 2) and by the parameters (…, 2, 8)."""
+    """Map points, (…, 2); return the derivatives by the point (…, 2, 2) and by the parameters (…, 2, 8) too."""
     below = u @ matrix[2, :2] + 1.0
     mapped = (u @ matrix[:2, :2].T + matrix[:2, 2]) / below[..., None]
     by_point = (matrix[:2, :2] - mapped[..., :, None] * matrix[2, :2]) / below[..., None, None]
@@ -72,7 +72,7 @@ def mapped_points(matrix: Array, u: Array) -> tuple[Array, Array, Array]:
 def linearised(
     matrix: Array, u: Array, adjusted: Array, y: Array, variances: tuple[Array, Array]
 ) -> tuple[Array, Array, Array, Array]:
-    """Misclosures (n, 2), their covariances (n, 2, 2), derivatives by point and by parameter at `adjusted`."""
+    """Return misclosures (n, 2), their covariances (n, 2, 2), derivatives by point and by parameter at `adjusted`."""
     mapped, by_point, by_parameter = mapped_points(matrix, adjusted)
     misclosures = y - mapped - np.einsum("nij,nj->ni", by_point, u - adjusted)
     of_image, of_plane = variances[0][:, None, None], variances[1][:, None, None]

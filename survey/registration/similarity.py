@@ -19,7 +19,7 @@ from survey.registration.outliers import Verdict, point_tests
 __all__ = ["Similarity", "adjust_similarity", "best_similarity"]
 
 
-_MAX_STEPS = 30
+_MAX_STEPS = 30  # of the adjustment; good points need four
 _CLOSE = 1e-14  # step, relative to the size of the set, that is rounding
 
 
@@ -50,13 +50,13 @@ class Similarity:
 def best_similarity(
     source: Array, target: Array, weights: Array, mirrored: bool = False
 ) -> tuple[Array, float, Array, Array]:
-    """Closed-form similarity of least squares.
+    """Compute the least-squares similarity in closed form.
 
     Parameters
     ----------
     source, target : (n, d) corresponding points in the plane, d = 2, or in space, d = 3
     weights : (n,)
-    mirrored : find the best similarity among the reflections, not among the rotations
+    mirrored : search among reflections instead of rotations
 
     Returns
     -------
@@ -68,7 +68,7 @@ def best_similarity(
     Umeyama (1991), Least-squares estimation of transformation parameters between two point patterns
     """
     share = weights / weights.sum()
-    # about a point of the set, so that the sums lose nothing where coordinates are large
+    # about a point of the set, so that the sums keep their precision where coordinates are large
     source_centre = source[0] + share @ (source - source[0])
     target_centre = target[0] + share @ (target - target[0])
     x, y = source - source_centre, target - target_centre
@@ -93,7 +93,7 @@ def adjust_similarity(
     source, target : (n, 3) corresponding points [m]
     sigmas : (n,) and (n,) standard deviation of a coordinate of the source, of the target [m]
     accepted : (n,) points to fit; they must not lie on one line
-    mirrored : find the best reflection instead
+    mirrored : search among reflections instead of rotations
 
     Returns
     -------
@@ -113,7 +113,7 @@ def adjust_similarity(
     for _ in range(_MAX_STEPS):
         residuals, weights, arms = _linearised(x, y, (sx, sy), rotation, scale, shift)
         squares = float(weights[some] @ (residuals[some] ** 2).sum(axis=1))
-        if squares > least * (1.0 + 1e-9):  # sets that no similarity fits may drive the steps astray
+        if squares > least * (1.0 + 1e-9):  # steps may diverge for sets that no similarity fits
             rotation, scale, shift = before
             break
         least, before = squares, (rotation, scale, shift)
@@ -137,7 +137,7 @@ def adjust_similarity(
 def _linearised(
     x: Array, y: Array, variances: tuple[Array, Array], rotation: Array, scale: float, shift: Array
 ) -> tuple[Array, Array, Array]:
-    """Misclosures (n, 3), their weights (n,) and the adjusted points less the shift (n, 3)."""
+    """Return misclosures (n, 3), their weights (n,) and the adjusted points less the shift (n, 3)."""
     moved = scale * x @ rotation.T
     residuals = y - shift - moved
     weights = 1.0 / (variances[1] + scale**2 * variances[0])
@@ -145,7 +145,7 @@ def _linearised(
 
 
 def _design(arms: Array) -> Array:
-    """Derivatives of the transformed points by translation, rotation and relative scale, (n, 3, 7)."""
+    """Return the derivatives of transformed points by translation, rotation and relative scale, (n, 3, 7)."""
     out = np.zeros((len(arms), 3, 7))
     out[:, [0, 1, 2], [0, 1, 2]] = 1.0
     out[:, [1, 2, 0], [3, 4, 5]] = -arms[:, [2, 0, 1]]
@@ -170,7 +170,7 @@ def _step(residuals: Array, weights: Array, arms: Array, size: float) -> Array:
 
 
 def _turn(angles: Array) -> Array:
-    """Rotation by a vector of angles (Rodrigues)."""
+    """Return the rotation by a vector of angles (Rodrigues)."""
     angle = float(np.linalg.norm(angles))
     wx, wy, wz = angles
     cross = np.array([[0.0, -wz, wy], [wz, 0.0, -wx], [-wy, wx, 0.0]])

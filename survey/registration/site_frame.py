@@ -1,14 +1,14 @@
-"""The frame of the site: what ties a survey to it, and everything measured moved into it.
+"""Transformation of a survey into the frame of the site.
 
 A survey is measured in a frame of its own, tied to that of the site by control points known in both. The transform
 is a similarity,
 
     x_site = site_centre + s R (x - survey_centre),
 
-about centres amid the control points, so that coordinates of 10⁶ m lose nothing. It is adjusted with the precision
-of both sides (`survey.registration.similarity`) and its points are tested (`survey.registration.outliers`): a point
-that contradicts all others is left out and named, and where it cannot be told which point is wrong the transform is
-refused.
+about centres amid the control points, so that coordinates of 10⁶ m lose no precision. It is adjusted with the
+precision of both sides (`survey.registration.similarity`) and its points are tested (`survey.registration.outliers`):
+a point that contradicts all others is left out and named, and where the wrong point cannot be identified the transform
+is refused.
 """
 
 from collections.abc import Sequence
@@ -22,15 +22,15 @@ from scipy.special import ndtri
 from moma.errors import SurveyError
 from survey.arrays import Array, Bools
 from survey.records.survey import BlockRecord, ControlPoint, Extrusion, SolidRecord, SurveyHead
-from survey.registration.outliers import LEVEL, Verdict, find_blunders
+from survey.registration.outliers import LEVEL, Verdict, find_outliers
 from survey.registration.similarity import Similarity, adjust_similarity
 
 __all__ = ["SiteTransform", "fit_similarity", "record_to_site", "to_site"]
 
 Stone = TypeVar("Stone", bound=BlockRecord | SolidRecord)
 
-_WEAKEST_ANGLE = 0.1  # radians: a rotation less certain than this is not determined
-_TESTABLE = 4  # points that have to be left once blunders are out: any three nearly agree by themselves
+_WEAKEST_ANGLE = 0.1  # standard deviation of a rotation beyond which it is not determined [rad]
+_TESTABLE = 4  # least number of points without the outliers: any three nearly agree by themselves
 
 
 @dataclass(frozen=True)
@@ -49,9 +49,9 @@ class SiteTransform:
     standardised : (n,) length of each residual in terms of its own standard deviations; nan where the other
         points do not control it [-]
     limits : (n,) value of `standardised` that a sound point exceeds once in a thousand [-]
-    sigma0 : sqrt(Σ |r|²/σ² / redundancy), 1 if the control points are as precise as was said [-]
+    sigma0 : sqrt(Σ |r|²/σ² / redundancy), 1 if the control points are as precise as stated [-]
     redundancy : three times the number of accepted points minus 7
-    rejected : names of the points left out as blunders
+    rejected : names of the outliers, which the fit leaves out
     """
 
     rotation: Array
@@ -74,7 +74,7 @@ class SiteTransform:
 
     @property
     def scale_differs(self) -> bool:
-        """Whether the scale differs from 1 by more than chance does once in a thousand."""
+        """True if the scale differs from 1 by more than chance does once in a thousand."""
         return abs(self.scale_test) > -float(ndtri(LEVEL / 2.0))
 
     def apply(self, points: ArrayLike) -> Array:
@@ -89,7 +89,7 @@ class SiteTransform:
         return out
 
     def sigma_at(self, points: ArrayLike) -> Array:
-        """Standard deviation of transformed points that comes from the transform, along the site's axes.
+        """Compute the standard deviation of transformed points due to the transform, along the site's axes.
 
         It is common to neighbouring points: it moves the wall, not the stones of the wall against each other.
 
@@ -114,7 +114,7 @@ class SiteTransform:
 
 
 def fit_similarity(control: Sequence[ControlPoint]) -> SiteTransform:
-    """Find the similarity that takes a survey into the frame of the site, and leave blunders out.
+    """Fit the similarity that takes a survey into the frame of the site, and leave outliers out.
 
     Parameters
     ----------
@@ -128,8 +128,8 @@ def fit_similarity(control: Sequence[ControlPoint]) -> SiteTransform:
     ------
     SurveyError
         if there are fewer than three points, if they coincide or lie on one line in either frame, if one
-        frame is the mirror image of the other, or if points contradict each other and it cannot be told which
-        is wrong; the error names the points
+        frame is the mirror image of the other, or if points contradict each other and the wrong one cannot be
+        identified; the error names the points
     """
     if len(control) < 3:
         raise SurveyError(
@@ -144,7 +144,7 @@ def fit_similarity(control: Sequence[ControlPoint]) -> SiteTransform:
     least = _widths_needed(measured, site, sigmas)
     _check_spread(control, measured, least[0], "in the survey")
     _check_spread(control, site, least[1], "on site")
-    fit = _without_blunders(control, measured, site, (sigmas[0], sigmas[1]), least)
+    fit = _without_outliers(control, measured, site, (sigmas[0], sigmas[1]), least)
     verdict = fit.verdict
     return SiteTransform(
         rotation=fit.rotation,
@@ -163,10 +163,10 @@ def fit_similarity(control: Sequence[ControlPoint]) -> SiteTransform:
 
 
 def to_site(head: SurveyHead, transform: SiteTransform) -> SurveyHead:
-    """Move what a survey says of all its stones into the site frame.
+    """Move the head of a survey into the site frame.
 
     Control points stay as they were measured in either frame. Depths and canonical dimensions stay too: they
-    are measured with a tape, and owe nothing to the scale of the survey.
+    are measured with a tape and do not depend on the scale of the survey.
     """
     return replace(
         head,
@@ -186,7 +186,7 @@ def to_site(head: SurveyHead, transform: SiteTransform) -> SurveyHead:
 
 
 def record_to_site(record: Stone, transform: SiteTransform) -> Stone:
-    """Move a stone as it was measured into the site frame; its depth, measured with a tape, stays."""
+    """Move a measured stone into the site frame; its depth, measured with a tape, stays."""
     if isinstance(record, SolidRecord):
         return replace(record, vertices=transform.apply(record.vertices))
     return replace(
@@ -206,7 +206,7 @@ def _turned(extrusion: Extrusion, transform: SiteTransform) -> Extrusion:
 
 
 def _named(control: Sequence[ControlPoint]) -> str:
-    """Names of control points with their lines, for the place of an error."""
+    """Return the names of control points with their lines, for the place of an error."""
     words = [f"{point.name} (line {point.line})" if point.line else point.name for point in control]
     return f"control point{'s' if len(words) > 1 else ''} {', '.join(words)}"
 
@@ -225,7 +225,7 @@ def _check_values(control: Sequence[ControlPoint], measured: Array, site: Array,
 
 
 def _widths_needed(measured: Array, site: Array, sigmas: Array) -> tuple[float, float]:
-    """How far points have to lie off a line, in either frame, to fix the rotation about it [m]."""
+    """Return the least distance of points from a line, in either frame, that determines the rotation about it [m]."""
     extents = [float(np.linalg.norm(np.ptp(points, axis=0))) for points in (measured, site)]
     ratio = extents[1] / extents[0] if min(extents) > 0.0 else 1.0  # the survey may be in millimetres
     needed = float(np.hypot(ratio * sigmas[0], sigmas[1]).max()) / _WEAKEST_ANGLE
@@ -246,12 +246,12 @@ def _check_spread(control: Sequence[ControlPoint], points: Array, least: float, 
 
 
 def _spread(points: Array) -> Array:
-    """Extents of a set of points along its principal directions, roots of sums of squares, (3,) [m]."""
+    """Return the extents of a set of points along its principal directions, roots of sums of squares, (3,) [m]."""
     local = points - points[0]
     return np.linalg.svd(local - local.mean(axis=0), compute_uv=False)
 
 
-def _without_blunders(
+def _without_outliers(
     control: Sequence[ControlPoint],
     measured: Array,
     site: Array,
@@ -277,7 +277,7 @@ def _without_blunders(
             return None
         return adjust_similarity(measured, site, sigmas, accepted).verdict
 
-    found = find_blunders(len(control), _TESTABLE, judge)
+    found = find_outliers(len(control), _TESTABLE, judge)
     if found.suspects:
         raise _contradiction(control, plain, found.suspects)
     accepted = everything.copy()
@@ -294,8 +294,8 @@ def _contradiction(
     more = "" if len(control) > _TESTABLE else ", or add control points: five or more show which one is wrong"
     return SurveyError(
         f"the {len(control)} control points contradict each other: {control[worst].name} is "
-        f"{lengths[worst]:.3g} m off, all are {sigma0:.1f} times less precise than was said, and it cannot be "
-        "told which is wrong",
+        f"{lengths[worst]:.3g} m off, all are {sigma0:.1f} times less precise than stated, and the wrong one "
+        "cannot be identified",
         where=_named([control[i] for i in suspects]),
         remedy=f"measure these again, leave a wrong one out or state a larger sigma{more}",
     )

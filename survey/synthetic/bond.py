@@ -14,7 +14,7 @@ from survey.arrays import Array
 __all__ = ["Line", "PlannedStone", "crossing", "fill", "level", "upright"]
 
 
-WIDTHS = {"header": (0.31, 0.46), "stretcher": (0.48, 0.80)}
+WIDTHS = {"header": (0.31, 0.46), "stretcher": (0.48, 0.80)}  # least and largest width of each kind [m]
 _TILT = math.radians(0.8)  # largest tilt of a head joint off the perpendicular
 
 
@@ -26,13 +26,13 @@ class Line:
     direction: tuple[float, float]
 
     def at(self, t: float) -> float:
-        """Where the line crosses height t."""
+        """Return s where the line crosses height t."""
         return self.point[0] + (t - self.point[1]) * self.direction[0] / self.direction[1]
 
 
 @dataclass(frozen=True)
 class PlannedStone:
-    """One stone as the masons meant it, without mortar.
+    """One stone as the masons planned it, without mortar.
 
     Attributes
     ----------
@@ -49,18 +49,18 @@ class PlannedStone:
 
 
 def level(t: float) -> Line:
-    """Bed line at height t."""
+    """Return the bed line at height t."""
     return Line((0.0, t), (1.0, 0.0))
 
 
 def upright(s: float, t: float, rng: Random | None = None) -> Line:
-    """Head joint through (s, t): true masons' work with `rng`, up to 0.8° off; exactly upright without."""
+    """Return the head joint through (s, t): up to 0.8° off with `rng`, as masons work; exactly upright without."""
     tilt = 0.0 if rng is None else rng.uniform(-_TILT, _TILT)
     return Line((s, t), (math.sin(tilt), math.cos(tilt)))
 
 
 def crossing(a: Line, b: Line) -> tuple[float, float]:
-    """Point in which two lines cross."""
+    """Return the point in which two lines cross."""
     (px, py), (ux, uy) = a.point, a.direction
     (qx, qy), (vx, vy) = b.point, b.direction
     along = ((qx - px) * vy - (qy - py) * vx) / (ux * vy - uy * vx)
@@ -70,17 +70,18 @@ def crossing(a: Line, b: Line) -> tuple[float, float]:
 def fill(
     rng: Random, start: float, stop: float, below: Iterable[float], clearance: float
 ) -> list[tuple[str, float]]:
-    """Fill a stretch of a course with headers and stretchers, as they come to hand.
+    """Fill a stretch of a course with headers and stretchers in random order.
 
     Parameters
     ----------
-    rng : source of chance
+    rng : random numbers
     start, stop : ends of the stretch [m]
-    below : head joints of the course below: no joint comes nearer to them than `clearance` [m]
+    below : head joints of the course below [m]
+    clearance : least distance of a joint from those below [m]
 
     Returns
     -------
-    (kind, where the stone ends) from left to right; the last ends at `stop`
+    (kind, end of the stone) from left to right; the last ends at `stop`
     """
     avoid = list(below)
     for _ in range(20_000):

@@ -1,4 +1,4 @@
-"""A synthetic building: its true stones with closed joints, and how a surveyor finds them, with open ones."""
+"""A synthetic building: its true stones with closed joints, and its survey, with open ones."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -22,21 +22,21 @@ __all__ = ["Building", "Draft", "flat_stone", "measured_building", "observer"]
 
 SOURCE = "synthetic value, chosen for this building"
 SEEN = "synthetic value, as if measured on a side that can be seen"
-DEPTH_SIGMA = 0.03
+DEPTH_SIGMA = 0.03  # standard deviation of a depth by rule [m]
 
 
 @dataclass(frozen=True)
 class Draft:
-    """A true stone that waits to be measured.
+    """A true stone before its measurement.
 
     Attributes
     ----------
-    stone : as it truly is
-    frame : in which its plan lies
+    stone : its true geometry
+    frame : of its plan
     quad : (4, 2) the four corners that a surveyor sees, counter-clockwise [m]
-    side_of : which side of `quad` each side of the plan belongs to
+    side_of : side of `quad` that each side of the plan belongs to
     zone, station : as in a survey's record
-    seen_depth : whether its depth can be seen, and is measured
+    seen_depth : whether its depth is visible and measured
     """
 
     stone: TrueStone
@@ -50,12 +50,12 @@ class Draft:
 
 @dataclass(frozen=True)
 class Building:
-    """A synthetic building: no such one exists.
+    """A synthetic building.
 
     Attributes
     ----------
-    name : says what it is
-    survey : what a surveyor measured of it
+    name : a description
+    survey : the measurements of a surveyor
     solids : the true stones, closed joints, convex; in the order of the survey
     joints : all true joints
     base : codes of the stones that stand on the ground
@@ -68,7 +68,7 @@ class Building:
     base: tuple[str, ...]
 
     def blocks(self) -> list[SurveyedBlock]:
-        """The surveyed stones: planes fitted, outlines extruded by their depth."""
+        """Make the surveyed stones: fit planes, extrude outlines by their depth."""
         head = self.survey.head
         return [
             extrude(outline_face(one, head.viewpoint(one.station)), depth_for(one, head.depth_rules))
@@ -77,7 +77,7 @@ class Building:
 
 
 def flat_stone(plan: PlannedStone, depth: float, frame: WallFrame) -> TrueStone:
-    """A stone whose face lies in the frame's plane itself."""
+    """Make a stone whose face lies in the plane of the frame."""
     corners = frame.place(plan.corners)
     solid = prism(plan.code, corners, corners - depth * frame.axes[2])
     return TrueStone(plan, frame.axes[2], float(frame.axes[2] @ frame.origin), depth, solid)
@@ -91,16 +91,16 @@ def measured_building(
     base: Sequence[str],
     rng: Random,
 ) -> Building:
-    """Measure a building; sides that truly touch a stone are surveyed half a joint inside.
+    """Measure a building; sides in contact with another stone are surveyed half a joint inside.
 
     Parameters
     ----------
     name : of the survey
     drafts : the true stones
-    depths : by kind, what is known of depths [m]
-    stations : where the surveyor stood
+    depths : by kind [m]
+    stations : of the surveyor
     base : codes of the stones on the ground
-    rng : source of chance
+    rng : random numbers
     """
     joints = true_joints([draft.stone.solid for draft in drafts])
     touched = {(code, face) for joint in joints for code, face in zip(joint.stones, joint.faces, strict=True)}
@@ -112,12 +112,12 @@ def measured_building(
 
 
 def observer(position: Array) -> Station:
-    """The usual place from which all is seen."""
+    """Make the station from which the whole building is seen."""
     return Station(OBSERVER, np.round(position, 4))
 
 
 def _measured(draft: Draft, touched: set[tuple[str, int]], rng: Random) -> BlockRecord:
-    """Measure one face, and the depth where it can be seen."""
+    """Measure one face, and the depth where it is visible."""
     stone, code = draft.stone, draft.stone.plan.code
     touching = {side for i, side in enumerate(draft.side_of) if (code, 2 + i) in touched}
     joint = (0 in touching, 1 in touching, 2 in touching, 3 in touching)

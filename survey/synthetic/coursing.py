@@ -14,13 +14,13 @@ from survey.synthetic.bond import WIDTHS, Line, PlannedStone, crossing, fill, le
 __all__ = ["CLEARANCES", "Bed", "Piece", "fill_run", "planned"]
 
 
-CLEARANCES = (0.09, 0.06, 0.03)  # wished for between head joints of neighbouring courses, then allowed [m]
-_REST = 2.4  # the end of a run is filled as a whole, so that it comes out [m]
+CLEARANCES = (0.09, 0.06, 0.03)  # preferred, then allowed, between head joints of neighbouring courses [m]
+_REST = 2.4  # length of the end of a run, which is filled as a whole so that it ends at the stop [m]
 
 
 @dataclass(frozen=True)
 class Piece:
-    """One stone of a course: what it is, and the lines it lies between."""
+    """One stone of a course: its kind, and the lines that it lies between."""
 
     kind: str
     left: Line
@@ -34,14 +34,14 @@ class Bed:
     Attributes
     ----------
     height : at s = 0 [m]
-    corners : (s, t) from left to right, where it bends; none if it is level
+    corners : (s, t) of its bends from left to right; none if it is level
     """
 
     height: float
     corners: tuple[tuple[float, float], ...] = ()
 
     def crossing(self, line: Line) -> tuple[float, float]:
-        """Where a line that is nearly upright meets the bed."""
+        """Return the point where a nearly upright line meets the bed."""
         if not self.corners:
             return crossing(line, level(self.height))
         before = bisect_left(self.corners, (line.at(self.height), 0.0)) - 1
@@ -50,7 +50,7 @@ class Bed:
         return crossing(line, Line((s, t), (to_s - s, to_t - t)))
 
     def bends(self, start: float, stop: float) -> list[tuple[float, float]]:
-        """Corners of the bed between two places, ends left out."""
+        """Return the corners of the bed strictly between two places."""
         return [(s, t) for s, t in self.corners if start + 1e-6 < s < stop - 1e-6]
 
 
@@ -59,9 +59,9 @@ def fill_run(rng: Random, start: Line, stop: Line, height: float, below: Sequenc
 
     Parameters
     ----------
-    rng : source of chance
+    rng : random numbers
     start, stop : lines at its ends
-    height : at which stones are measured off [m]
+    height : at which the widths of stones are measured [m]
     below : head joints of the course below, sorted [m]
     """
     for clearance in CLEARANCES:
@@ -78,7 +78,7 @@ def fill_run(rng: Random, start: Line, stop: Line, height: float, below: Sequenc
 def planned(
     code: str, piece: Piece, bottom: Bed, top: Bed, course: int
 ) -> tuple[PlannedStone, tuple[int, ...]]:
-    """The outline of a stone between two beds, and which of its four sides each side belongs to."""
+    """Outline a stone between two beds; return the side of four that each side belongs to, too."""
     lower = [bottom.crossing(piece.left), bottom.crossing(piece.right)]
     bends = bottom.bends(lower[0][0], lower[1][0])
     corners = [lower[0], *bends, lower[1], top.crossing(piece.right), top.crossing(piece.left)]
@@ -89,7 +89,7 @@ def planned(
 def _ends(
     rng: Random, start: float, stop: float, below: Sequence[float], clearance: float
 ) -> list[tuple[str, float]]:
-    """Kinds of the stones, and where each ends."""
+    """Return the kind and the end of each stone."""
     out: list[tuple[str, float]] = []
     while stop - start > _REST:
         kind, end = _next(rng, start, [kind for kind, _ in out[-2:]], below, clearance)

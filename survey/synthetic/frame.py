@@ -1,4 +1,4 @@
-"""Where the wall stands in the site, and the true stones in space."""
+"""Frame of the wall in the site, and the true stones in space."""
 
 import math
 from dataclasses import dataclass
@@ -35,14 +35,14 @@ class WallFrame:
     axes: Array
 
     def place(self, flat: Array, out: float = 0.0) -> Array:
-        """Points (n, 2) of the wall plane, moved out by `out` [m], in the site (n, 3)."""
+        """Place points (n, 2) of the wall plane, moved out by `out` [m], in the site (n, 3)."""
         placed: Array = self.origin + flat @ self.axes[:2] + out * self.axes[2]
         return placed
 
 
 @dataclass(frozen=True)
 class TrueStone:
-    """A stone as it truly is, joints closed.
+    """A stone in its true geometry, joints closed.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class TrueStone:
     solid: Solid
 
     def on_face(self, frame: WallFrame, flat: Array) -> Array:
-        """Points (n, 2) of the wall plane moved square to the wall onto the true face."""
+        """Move points (n, 2) of the wall plane square to the wall onto the true face."""
         placed = frame.place(flat)
         lift = (self.offset - placed @ self.normal) / (frame.axes[2] @ self.normal)
         out: Array = placed + np.outer(lift, frame.axes[2])

@@ -1,4 +1,4 @@
-"""Measuring the true wall: open joints, worn corners, noise and blunders."""
+"""Simulated measurement of the true wall: open joints, worn corners, noise and blunders."""
 
 import math
 from dataclasses import dataclass, replace
@@ -14,28 +14,29 @@ from survey.synthetic.frame import TrueStone, WallFrame
 __all__ = ["SIGMA", "Measured", "add_blunders", "measure_stone"]
 
 
-SIGMA = (
-    0.00173  # of one coordinate: 3 mm in space (√3 · 1.73 mm), the mean error of a photogrammetric point [m]
-)
-HALF_JOINT = (0.004, 0.0075)  # each stone ends so far from the true joint: joints are 8 to 15 mm open [m]
-ERODED, BEVELLED = 0.16, 0.10  # share of stones with one such corner
-BACK_OF_WORN_EDGE = (0.012, 0.025)  # how far worn surface lies behind the face [m]
-CUT_BY_EROSION, CUT_BY_BEVEL = (0.02, 0.035), (0.03, 0.06)  # how far a corner is cut back along its sides [m]
-MARGIN = (0.008, 0.02)  # points are measured on the dressed margin, so far from the arris [m]
+# of one coordinate [m]: 3 mm in space (√3 · 1.73 mm), the mean error of a photogrammetric point
+SIGMA = 0.00173
+HALF_JOINT = (0.004, 0.0075)  # distance of each stone from the true joint: joints are 8 to 15 mm open [m]
+ERODED = 0.16  # share of stones with an eroded corner
+BEVELLED = 0.10  # share of stones with a bevelled corner
+BACK_OF_WORN_EDGE = (0.012, 0.025)  # distance of worn surface behind the face [m]
+CUT_BY_EROSION = (0.02, 0.035)  # length cut off the sides at an eroded corner [m]
+CUT_BY_BEVEL = (0.03, 0.06)  # length cut off the sides at a bevelled corner [m]
+MARGIN = (0.008, 0.02)  # distance of points on the dressed margin from the arris [m]
 BLUNDER = (0.03, 0.30)  # size of a gross error [m]
 COUNTS = (17, 20)  # points on one face
 
 
 @dataclass(frozen=True)
 class Measured:
-    """A stone's record and what is true of it.
+    """A stone's record and its truth.
 
     Attributes
     ----------
     record : as it goes into the survey file
     half_joints : (4,) distance of each measured side from the true joint; 0 on free sides [m]
     worn : "eroded", "bevelled" or None
-    worn_corner : which corner of the true quadrilateral is worn; None if none is
+    worn_corner : index of the worn corner of the true quadrilateral; None if there is none
     worn_points : indices of points that lie on worn surface behind the face
     worn_vertices : indices of vertices that lie behind the face
     blunders : indices of points with a gross error
@@ -65,7 +66,7 @@ def measure_stone(stone: TrueStone, frame: WallFrame, rng: Random) -> Measured:
             : rng.randint(1, 2)
         ]
         points_behind[nearest] = [rng.uniform(*BACK_OF_WORN_EDGE) for _ in nearest]
-    if rng.random() < 0.1:  # some surveyors go round the stone the other way
+    if rng.random() < 0.1:  # some surveyors go around the stone the other way
         flat, behind = flat[::-1], behind[::-1]
     record = BlockRecord(
         code=stone.plan.code,
@@ -106,7 +107,7 @@ def add_blunders(measured: list[Measured], normals: list[Array], count: int, rng
 
 
 def _inset(corners: Array, distances: tuple[float, ...]) -> Array:
-    """Move each side of a counter-clockwise polygon inwards, and cross neighbouring sides again."""
+    """Move each side of a counter-clockwise polygon inwards and intersect neighbouring sides again."""
     lines = []
     for k, distance in enumerate(distances):
         (x, y), (to_x, to_y) = corners[k], corners[(k + 1) % len(corners)]
@@ -117,7 +118,7 @@ def _inset(corners: Array, distances: tuple[float, ...]) -> Array:
 
 
 def _corners(visible: Array, worn: str | None, corner: int | None, rng: Random) -> tuple[Array, Array]:
-    """Corners that the surveyor finds, and how far each lies behind the face."""
+    """Return the corners that the surveyor finds, and the distance of each behind the face."""
     if worn is None or corner is None:
         return visible, np.zeros(4)
     here, before, after = visible[corner], visible[corner - 1], visible[(corner + 1) % 4]
@@ -139,7 +140,7 @@ def _towards(start: Array, stop: Array) -> Array:
 
 
 def _margin_points(visible: Array, count: int, rng: Random) -> Array:
-    """Points along the dressed margin, closest near its corners, two of them further in."""
+    """Choose points along the dressed margin, densest near its corners, and two further in."""
     ring = _inset(visible, (rng.uniform(*MARGIN),) * 4)
     edges = np.roll(ring, -1, axis=0) - ring
     reach = np.cumsum(np.hypot(edges[:, 0], edges[:, 1]))
@@ -155,13 +156,13 @@ def _margin_points(visible: Array, count: int, rng: Random) -> Array:
 
 
 def _spread(share: float) -> float:
-    """Push a place along a side (0 to 1) towards its ends: points far apart say most about the tilt."""
+    """Push a place along a side (0 to 1) towards its ends: points far apart determine the tilt best."""
     u = 2.0 * share - 1.0
     return 0.5 + 0.5 * math.copysign(math.sqrt(abs(u)), u)
 
 
 def _noisy(points: Array, rng: Random) -> Array:
-    """Add the noise of measurement and round to a tenth of a millimetre, as the file gives it."""
+    """Add the noise of measurement and round to a tenth of a millimetre, as in the file."""
     noise = np.array([[rng.gauss(0.0, SIGMA) for _ in range(3)] for _ in points])
     out: Array = np.round(points + noise, 4) + 0.0  # + 0.0: no negative zeros
     return out

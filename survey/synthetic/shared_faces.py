@@ -1,6 +1,6 @@
-"""The true joints of a building: where its solids, built without gaps, share faces to the last bits.
+"""The true joints of a building, where its solids, built without gaps, share faces to the last bits.
 
-Found slowly and exactly, by cutting coplanar faces with each other, from nothing but the true solids.
+They are found slowly and exactly from the true solids alone, by intersecting coplanar faces.
 """
 
 from collections.abc import Iterator, Sequence
@@ -16,14 +16,14 @@ __all__ = ["TrueJoint", "true_joints"]
 
 Point = tuple[float, float]
 
-_COPLANAR = 1e-9  # largest distance of two faces that are one plane but for rounding [m]
-_OPPOSITE = 1e-12  # 1 + cosine of their normals [-]
-_SMALLEST = 1e-8  # shared area that is more than rounding [m²]
+_COPLANAR = 1e-9  # distance of two faces in one plane, due to rounding [m]
+_OPPOSITE = 1e-12  # 1 + cosine of their normals, due to rounding [-]
+_SMALLEST = 1e-8  # least shared area, above rounding [m²]
 
 
 @dataclass(frozen=True)
 class TrueJoint:
-    """A plane piece of surface that two stones share.
+    """A plane contact surface of two stones.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ def _faces(solid: Solid, origin: Array) -> _Faces:
 
 
 def _near(faces: Sequence[_Faces]) -> Iterator[tuple[int, int]]:
-    """Pairs i < j whose boxes touch, by a sweep along the longest axis."""
+    """Find pairs i < j whose boxes touch, by a sweep along the longest axis."""
     low = np.array([one.low for one in faces]) - _COPLANAR
     high = np.array([one.high for one in faces]) + _COPLANAR
     axis = int(np.argmax(high.max(axis=0) - low.min(axis=0)))
@@ -100,7 +100,7 @@ def _near(faces: Sequence[_Faces]) -> Iterator[tuple[int, int]]:
 
 
 def _shared(first: _Faces, second: _Faces) -> Iterator[tuple[int, int, float, Array]]:
-    """Face of each, area and centroid of every plane piece that two solids share."""
+    """Find the face of each, area and centroid of every plane piece that two solids share."""
     opposite = first.normals @ second.normals.T <= -1.0 + _OPPOSITE
     coplanar = np.abs(first.offsets[:, None] + second.offsets[None, :]) <= _COPLANAR
     for a, b in np.argwhere(opposite & coplanar):
@@ -117,7 +117,7 @@ def _shared(first: _Faces, second: _Faces) -> Iterator[tuple[int, int, float, Ar
 
 
 def _common(polygon: list[Point], cutter: list[Point]) -> list[Point]:
-    """What two convex polygons, both counter-clockwise, share: one is cut by each side of the other."""
+    """Intersect two convex polygons, both counter-clockwise: cut one by each side of the other."""
     for k, (x, y) in enumerate(cutter):
         to_x, to_y = cutter[(k + 1) % len(cutter)]
         heights = [(to_x - x) * (q - y) - (to_y - y) * (p - x) for p, q in polygon]

@@ -1,4 +1,4 @@
-"""From what was measured to stones: frames, stations, photographs, rejects, one stone at a time."""
+"""From records to stones: frames, stations, photographs, rejects, one stone at a time."""
 
 import weakref
 from dataclasses import replace
@@ -67,7 +67,7 @@ def control(count=4):
 
 
 def to_site(record):
-    """The stone as if it had been measured in the frame of the site."""
+    """Return the stone as if it had been measured in the frame of the site."""
     if isinstance(record, SolidRecord):
         return replace(record, vertices=SITE + record.vertices @ TURN.T)
     extrusion = record.extrusion

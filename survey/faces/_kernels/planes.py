@@ -1,26 +1,66 @@
 """Numba kernels of the plane through a face: weighted least squares, and its precision.
 
-Points are held as columns `local` (3, n), measured from the first point of the face, so that site coordinates of
-10⁶ m lose nothing; `root` (n,) is 1/σ. A plane is held in `frame` (5, 3): its centroid, the directions of largest and
-of smaller spread, the normal, and the singular values of the weighted centred points, largest first.
+A plane is held in `frame` (5, 3) float64: its centroid [m], the unit directions of largest and of smaller spread, the
+unit normal, and the singular values of the weighted centred points [-], largest first.
 """
 
 import math
+from typing import NamedTuple
 
+import numpy as np
 from numba import njit
 
-__all__ = ["leverages", "orient", "precision", "weighted_plane"]
+from survey.arrays import Array
+
+__all__ = ["Points", "cross", "dot", "leverages", "orient", "precision", "weighted_plane"]
 
 _COLLINEAR = 1e-9  # second singular value over the first below which there is no plane
-_UNCHECKED = 1e-9  # share of the others in a point's residual below which they say nothing of it
+_UNCHECKED = 1e-9  # share of the other points in a residual below which they do not check it
+
+
+class Points(NamedTuple):
+    """Points of a face and their weights.
+
+    Attributes
+    ----------
+    local : (3, n) float64, from the first point of the face, so that site coordinates of 10⁶ m lose nothing [m]
+    root : (n,) float64, 1/σ of a coordinate [1/m]
+    """
+
+    local: Array
+    root: Array
+
+
+@njit(cache=True, inline="always")
+def dot(u, v):
+    """Return the scalar product of two vectors of three components."""
+    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+
+
+@njit(cache=True, inline="always")
+def cross(u, v):
+    """Return the vector product of two vectors of three components, as a tuple."""
+    return u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
 
 
 @njit(cache=True)
-def weighted_plane(local, root, accepted, frame, work):
-    """Plane of the accepted points into `frame`; returns their total weight, 0 if they lie on one line.
+def weighted_plane(points, accepted, frame, work):
+    """Fit the plane of the accepted points by weighted least squares.
 
     One-sided Jacobi (Demmel & Veselić 1992) on the weighted centred points, without squaring them.
+
+    Inputs
+    ------
+    points : Points
+    accepted : (n,) bool
+    work : (3, n) float64, overwritten
+
+    Outputs
+    -------
+    frame : (5, 3) float64, the plane
+    total weight of the accepted points, Σ 1/σ² [1/m²]; 0 if they lie on one line
     """
+    local, root = points
     n, m, total = root.shape[0], 0, 0.0
     for i in range(n):
         if accepted[i]:
@@ -45,7 +85,7 @@ def weighted_plane(local, root, accepted, frame, work):
 
 @njit(cache=True)
 def _jacobi(work, m, frame):
-    """Rotate pairs of columns until all are orthogonal; sort them by length."""
+    """Rotate pairs of columns until all are orthogonal, then sort them by length."""
     for _ in range(30):
         turned = False
         for p in range(2):
@@ -83,8 +123,21 @@ def _jacobi(work, m, frame):
 
 
 @njit(cache=True)
-def leverages(local, root, frame, total, residuals, lever):
-    """Signed distances from the plane, and the share of each observation in its own fit."""
+def leverages(points, frame, total, residuals, lever):
+    """Compute signed distances from a plane, and the share of each observation in its own fit.
+
+    Inputs
+    ------
+    points : Points
+    frame : (5, 3) float64, the plane
+    total : float64, total weight of the accepted points [1/m²]
+
+    Outputs
+    -------
+    residuals : (n,) float64 [m]
+    lever : (n,) float64 [-]
+    """
+    local, root = points
     for i in range(root.shape[0]):
         u, v, r = 0.0, 0.0, 0.0
         for k in range(3):
@@ -98,7 +151,14 @@ def leverages(local, root, frame, total, residuals, lever):
 
 @njit(cache=True)
 def orient(frame, origin, observer):
-    """Turn the normal to the observer, or up its largest component; make the three axes right-handed."""
+    """Turn the normal towards the observer and make the three axes right-handed.
+
+    Inputs
+    ------
+    frame : (5, 3) float64, the plane, turned in place
+    origin : (3,) float64, first point of the face [m]
+    observer : (3,) float64 [m]; nan if unknown: the largest component of the normal becomes positive
+    """
     along = 0.0
     for k in range(3):
         along += frame[3, k] * (observer[k] - origin[k] - frame[0, k])
@@ -108,14 +168,12 @@ def orient(frame, origin, observer):
     for k in range(3):
         frame[3, k] = math.copysign(1.0, along) * frame[3, k]
         frame[1, k] = math.copysign(1.0, first) * frame[1, k]
-    for k in range(3):
-        p, q = (k + 1) % 3, (k + 2) % 3
-        frame[2, k] = frame[3, p] * frame[1, q] - frame[3, q] * frame[1, p]
+    frame[2, 0], frame[2, 1], frame[2, 2] = cross(frame[3], frame[1])
 
 
 @njit(cache=True)
 def _largest_of(vector):
-    """Its component of largest size."""
+    """Return the component of largest size."""
     out = vector[0]
     for k in range(1, 3):
         if abs(vector[k]) > abs(out):
@@ -124,8 +182,26 @@ def _largest_of(vector):
 
 
 @njit(cache=True)
-def precision(origin, root, known, accepted, total, frame, residuals, lever, covariance):
-    """Precision of the plane; `lever` becomes the standardised residuals, the centroid moves to the site."""
+def precision(origin, root, known, accepted, total, frame, residuals, lever):
+    """Compute the precision of a fitted plane and move its centroid into the frame of the site.
+
+    Inputs
+    ------
+    origin : (3,) float64, first point of the face [m]
+    root : (n,) float64, 1/σ [1/m]
+    known : bool, whether σ was given; otherwise the residuals scale the covariance
+    accepted : (n,) bool
+    total : float64, total weight of the accepted points [1/m²]
+    frame : (5, 3) float64, the plane, changed in place
+    residuals : (n,) float64 [m]
+    lever : (n,) float64, leverages, replaced by the standardised residuals; nan where no other point checks one [-]
+
+    Outputs
+    -------
+    covariance : (3, 3) float64 of two tilts [rad] and the height at the centroid [m]
+    (offset [m], root mean square of the accepted residuals [m], σ₀ [-])
+    """
+    covariance = np.zeros((3, 3))
     n, count, squares, plain = root.shape[0], 0, 0.0, 0.0
     for i in range(n):
         if accepted[i]:
@@ -148,4 +224,4 @@ def precision(origin, root, known, accepted, total, frame, residuals, lever, cov
         offset += frame[3, k] * frame[0, k]
         frame[0, k] += origin[k]
         frame[4, k] /= math.sqrt(total / count)
-    return offset, math.sqrt(plain / count), sigma0
+    return covariance, (offset, math.sqrt(plain / count), sigma0)

@@ -1,31 +1,32 @@
-"""Numba kernels that fit a face and leave its blunders out; arrays as in `_kernels_planes`."""
+"""Numba kernels of the robust fit of a face, which leaves outliers out; planes are held as in `planes`."""
 
 import math
 
 import numpy as np
 from numba import njit
 
-from survey.faces._kernels.planes import leverages, orient, precision, weighted_plane
+from survey.faces._kernels.planes import Points, dot, leverages, orient, precision, weighted_plane
 from survey.faces._kernels.triples import STARTS, beside_the_rest, cost, search_triples, smallest
 
 __all__ = ["COLLINEAR", "FINE", "NOT_FINITE", "SIGMA", "fit_face"]
 
-FINE, NOT_FINITE, SIGMA, COLLINEAR = 0, 1, 2, 3  # what `fit_face` found
+FINE, NOT_FINITE, SIGMA, COLLINEAR = 0, 1, 2, 3  # status of `fit_face`
 
 _CRITICAL = 3.29  # two-sided normal quantile of Baarda's α₀ = 0.1 %
-_LARGEST_TILT = math.radians(10.0)  # standard deviation of a tilt that no plane among others may exceed
-_GRAZING = 0.17  # cosine between normal and line of sight below which a face is not measured: 80°
-_NARROW = 0.15  # width over length of a part of the points that is not the whole face
-_MANY = 50  # points of which none has much to say alone
-_FEWEST = 4  # points that a plane is never grown from fewer than
+_LARGEST_TILT = math.radians(10.0)  # standard deviation of a tilt that no candidate plane may exceed
+_GRAZING = 0.17  # cosine between normal and line of sight below which nobody measures a face: 80°
+_NARROW = 0.15  # width over length below which a subset of the points is not the whole face
+_MANY = 50  # points beyond which a single one hardly matters, and all are sorted at once
+_ROUNDING = 32.0 * 2.0**-52  # residual over largest coordinate that is rounding: 7 nm at 1,000 km
+_FEWEST = 4  # smallest set of points that a plane may shrink to
 
 
 @njit(cache=True)
-def _view(local, frame, origin, observer):
-    """Direction (3,) to the observer, and the least cosine between it and the normal; nothing without an observer.
+def _view(frame, origin, observer):
+    """Return the direction (3,) to the observer and the least cosine between it and the normal; zeros without one.
 
-    A plane that is seen edge-on holds all points of an edge of the face, however far out they are; nobody measures
-    a face so.
+    A plane seen edge-on holds all points of an edge of the face, however far out they are, but nobody measures a face
+    edge-on.
     """
     view = np.zeros(4)
     squares, along = 0.0, 0.0
@@ -44,14 +45,14 @@ def _view(local, frame, origin, observer):
 
 @njit(cache=True)
 def _largest_sum(redundancy):
-    """Sum of squares that chance exceeds once in a thousand: chi-square after Wilson and Hilferty."""
+    """Return the sum of squares that chance exceeds once in a thousand: chi-square after Wilson and Hilferty."""
     spread = 2.0 / (9.0 * redundancy)
     return redundancy * (1.0 - spread + 3.09 * math.sqrt(spread)) ** 3
 
 
 @njit(cache=True)
 def _is_clean(root, residuals, lever):
-    """Whether the plain fit passes every test; the sum catches blunders that hide each other."""
+    """Return whether the plain fit passes every test; the sum of squares catches outliers that hide each other."""
     total = 0.0
     for i in range(root.shape[0]):
         square = (root[i] * residuals[i]) ** 2
@@ -63,7 +64,7 @@ def _is_clean(root, residuals, lever):
 
 @njit(cache=True)
 def _consistency(part):
-    """Standard deviation of the smallest `part` of normal errors, in units of that of all."""
+    """Return the standard deviation of the smallest `part` of normal errors, in units of that of all."""
     z = 0.0
     for _ in range(60):
         step = (math.erf(z / math.sqrt(2.0)) - part) / (
@@ -78,9 +79,9 @@ def _consistency(part):
 
 @njit(cache=True)
 def _scale(squares, count, total, known):
-    """Standard deviation of the `count` accepted points of `total` in units of sigma.
+    """Estimate the standard deviation of the `count` accepted points of `total`, in units of sigma.
 
-    With a known precision it is 1, or more where the face itself is clearly rough. Without, the best part of all
+    With a known precision it is 1, or more where the face itself is clearly rough. Without one, the best part of all
     points looks too good by a factor known for normal errors (the consistency factor of least trimmed squares).
     """
     redundancy = max(count - 3, 1)
@@ -91,8 +92,9 @@ def _scale(squares, count, total, known):
 
 
 @njit(cache=True)
-def _nearest(distances, size, local, root, accepted, frame, work):
-    """Accept the points nearest to a plane, and then to the plane through them, until they stay the same."""
+def _nearest(distances, size, points, accepted, frame, work):
+    """Accept the `size` points nearest to a plane, refit, and repeat until the set no longer changes."""
+    root = points.root
     n = root.shape[0]
     lever = np.empty(n)
     for _ in range(20):
@@ -106,32 +108,33 @@ def _nearest(distances, size, local, root, accepted, frame, work):
             accepted[i] = near
         if same:
             break
-        total = weighted_plane(local, root, accepted, frame, work)
+        total = weighted_plane(points, accepted, frame, work)
         if total == 0.0:
             break
-        leverages(local, root, frame, total, distances, lever)
+        leverages(points, frame, total, distances, lever)
         for i in range(n):
             distances[i] = root[i] * abs(distances[i])
 
 
 @njit(cache=True)
-def _grow(accepted, majority, local, root, known, view, frame, work):
-    """Add the best point, or drop the worst, one at a time, until the next one is a blunder.
+def _grow(accepted, majority, points, known, view, frame, work):
+    """Add the best point, or drop the worst, one at a time, until the next one is an outlier.
 
-    Of many points none has much to say alone, so at first all are sorted at once.
+    Among many points a single one hardly matters, so at first all are sorted at once.
 
-    Returns the sum of squares of all points in units of sigma in which no blunder counts more than the limit.
+    Returns the sum of squares of all points in units of sigma, truncated at the limit of an outlier.
     """
+    root = points.root
     n = root.shape[0]
     residuals, lever, tests = np.empty(n), np.empty(n), np.empty(n)
     truncated = np.inf
     for step in range(4 * n):
-        total = weighted_plane(local, root, accepted, frame, work)
+        total = weighted_plane(points, accepted, frame, work)
         if total == 0.0:
             return np.inf
-        leverages(local, root, frame, total, residuals, lever)
+        leverages(points, frame, total, residuals, lever)
         squares, count, truncated = 0.0, 0, 0.0
-        along = frame[3, 0] * view[0] + frame[3, 1] * view[1] + frame[3, 2] * view[2]
+        along = dot(frame[3], view)
         side = 0.0 if along == 0.0 else math.copysign(1.0, along)
         for i in range(n):
             square = (root[i] * residuals[i]) ** 2
@@ -165,25 +168,25 @@ def _grow(accepted, majority, local, root, known, view, frame, work):
 
 
 @njit(cache=True)
-def _without_blunders(local, root, known, view, frame, work):
-    """Accepted points, from the best of the starts.
+def _without_outliers(points, known, view, frame, work):
+    """Return the points accepted from the best of the starts.
 
-    The least median sees half of the points only; with a known precision all of them can be judged, and less than half
-    may be good.
+    The least median looks at half of the points only; with a known precision all of them can be judged, and fewer than
+    half may be good.
     """
-    n = root.shape[0]
+    n = points.root.shape[0]
     size = min(n // 2 + 2, n)  # of p = 3 parameters: the majority that tolerates most blunders
-    starts = search_triples(local, root, size, known, view)
+    starts = search_triples(points, size, known, view)
     accepted, other = np.zeros(n, dtype=np.bool_), np.empty(n, dtype=np.bool_)
-    _nearest(starts[0], size, local, root, accepted, frame, work)
-    score = _grow(accepted, size, local, root, known, view, frame, work)
+    _nearest(starts[0], size, points, accepted, frame, work)
+    score = _grow(accepted, size, points, known, view, frame, work)
     for rank in range(1, 1 + STARTS):
         count = 0
         for i in range(n):
             other[i] = starts[rank, i] <= _CRITICAL
             count += other[i]
         if count > _FEWEST:
-            rival = _grow(other, _FEWEST, local, root, known, view, frame, work)
+            rival = _grow(other, _FEWEST, points, known, view, frame, work)
             if rival < score:
                 score = rival
                 accepted[:] = other
@@ -194,6 +197,7 @@ def _without_blunders(local, root, known, view, frame, work):
 
 @njit(cache=True)
 def _check(xyz, sigma):
+    """Return the status of the input."""
     for i in range(xyz.shape[0]):
         if not (math.isfinite(xyz[i, 0]) and math.isfinite(xyz[i, 1]) and math.isfinite(xyz[i, 2])):
             return NOT_FINITE
@@ -203,61 +207,92 @@ def _check(xyz, sigma):
 
 
 @njit(cache=True)
-def _part(local, root, kept):
-    """The points of a compact face, their 1/σ, and that all are accepted."""
-    m = kept.shape[0]
-    if m == root.shape[0]:
-        return local, root, np.ones(m, dtype=np.bool_)
-    near, near_root = np.empty((3, m)), np.empty(m)
-    for i in range(m):
-        near_root[i] = root[kept[i]]
+def _is_exact(xyz, local, frame):
+    """Return whether all points lie on one plane as exactly as their coordinates can be stored.
+
+    Then no point is an outlier: one far beside the others still lies on their plane to rounding, and without a known
+    precision the residuals, the only measure of the scatter, are rounding errors alone.
+    """
+    largest, farthest = 0.0, 0.0
+    for i in range(xyz.shape[0]):
+        height = 0.0
         for k in range(3):
-            near[k, i] = local[k, kept[i]]
-    return near, near_root, np.ones(m, dtype=np.bool_)
+            largest = max(largest, abs(xyz[i, k]))
+            height += (local[k, i] - frame[0, k]) * frame[3, k]
+        farthest = max(farthest, abs(height))
+    return farthest <= _ROUNDING * largest
+
+
+@njit(cache=True)
+def _subset(points, kept):
+    """Return some of the points."""
+    m = kept.shape[0]
+    near, root = np.empty((3, m)), np.empty(m)
+    for i in range(m):
+        root[i] = points.root[kept[i]]
+        for k in range(3):
+            near[k, i] = points.local[k, kept[i]]
+    return Points(near, root)
 
 
 @njit(cache=True)
 def fit_face(xyz, sigma, known, observer):
-    """Plane of a face (n, 3) without its blunders.
+    """Fit the plane of a face and leave outliers out.
 
-    Returns
+    Inputs
+    ------
+    xyz : (n, 3) float64, n ≥ 3 [m]
+    sigma : (n,) float64, standard deviation of a coordinate [m]
+    known : bool, whether sigma was given; otherwise it is 1 throughout
+    observer : (3,) float64 [m]; nan if unknown
+
+    Outputs
     -------
-    status, frame (5, 3) with the centroid in the frame of the points, accepted (n,), residuals (n,), standardised (n,),
-    covariance (3, 3), (offset, rms, sigma0)
+    status : FINE, NOT_FINITE, SIGMA or COLLINEAR
+    frame : (5, 3) float64, the plane, its centroid in the frame of the points
+    accepted : (n,) bool
+    residuals, standardised : (n,) float64 [m], [-]
+    covariance : (3, 3) float64 of two tilts [rad] and the height at the centroid [m]
+    (offset [m], root mean square residual [m], σ₀ [-])
     """
     n = xyz.shape[0]
     local, work, frame = np.empty((3, n)), np.empty((3, n)), np.zeros((5, 3))
     accepted, residuals, lever = np.ones(n, dtype=np.bool_), np.zeros(n), np.zeros(n)
-    covariance = np.zeros((3, 3))
     status = _check(xyz, sigma)
     if status != FINE:
-        return status, frame, accepted, residuals, lever, covariance, (0.0, 0.0, 0.0)
+        return status, frame, accepted, residuals, lever, np.zeros((3, 3)), (0.0, 0.0, 0.0)
     root = np.empty(n)
     for i in range(n):
         root[i] = 1.0 / sigma[i]
         for k in range(3):
             local[k, i] = xyz[i, k] - xyz[0, k]
-    kept = beside_the_rest(local)
-    near, near_root, sound = _part(local, root, kept)
-    total = weighted_plane(near, near_root, sound, frame, work)
-    narrow = max(_NARROW * frame[4, 0], 3.0 / _LARGEST_TILT if known else 0.0)
-    if kept.shape[0] < n and not frame[4, 1] > narrow:  # most points lie along one edge, or close together
-        kept = np.arange(n)
-        near, near_root, sound = _part(local, root, kept)
-        total = weighted_plane(near, near_root, sound, frame, work)
+    points = Points(local, root)
+    near, kept, sound = points, np.arange(n), np.ones(n, dtype=np.bool_)
+    total = weighted_plane(points, sound, frame, work)
+    exact = _is_exact(xyz, local, frame)
+    compact = kept if exact else beside_the_rest(local)
+    if compact.shape[0] < n:
+        near = _subset(points, compact)
+        total = weighted_plane(near, sound, frame, work)
+        narrow = max(_NARROW * frame[4, 0], 3.0 / _LARGEST_TILT if known else 0.0)
+        if frame[4, 1] > narrow:
+            kept, sound = compact, sound[: compact.shape[0]].copy()
+        else:  # most points lie along one edge, or close together
+            near = points
+            total = weighted_plane(points, sound, frame, work)
     m = kept.shape[0]
-    if total > 0.0 and m > 3:
-        leverages(near, near_root, frame, total, residuals[:m], lever[:m])
-        if not (known and _is_clean(near_root, residuals[:m], lever[:m])):
-            view = _view(near, frame, xyz[0], observer)
-            sound = _without_blunders(near, near_root, known, view, frame, work)
-            total = weighted_plane(near, near_root, sound, frame, work)
+    if total > 0.0 and m > 3 and not exact:
+        leverages(near, frame, total, residuals[:m], lever[:m])
+        if not (known and _is_clean(near.root, residuals[:m], lever[:m])):
+            view = _view(frame, xyz[0], observer)
+            sound = _without_outliers(near, known, view, frame, work)
+            total = weighted_plane(near, sound, frame, work)
     accepted[:] = False
     for i in range(m):
         accepted[kept[i]] = sound[i]
     if total == 0.0:
-        return COLLINEAR, frame, accepted, residuals, lever, covariance, (0.0, 0.0, 0.0)
+        return COLLINEAR, frame, accepted, residuals, lever, np.zeros((3, 3)), (0.0, 0.0, 0.0)
     orient(frame, xyz[0], observer)
-    leverages(local, root, frame, total, residuals, lever)
-    numbers = precision(xyz[0], root, known, accepted, total, frame, residuals, lever, covariance)
+    leverages(points, frame, total, residuals, lever)
+    covariance, numbers = precision(xyz[0], root, known, accepted, total, frame, residuals, lever)
     return FINE, frame, accepted, residuals, lever, covariance, numbers

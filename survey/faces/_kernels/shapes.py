@@ -1,7 +1,7 @@
 """Numba kernels of other shapes than one plane: a quadric, and two planes that meet along a line.
 
-Heights `z` (n,) above the plane of a face are explained by columns of `design` (n, p) at places (u, v) on it; `root`
-(n,) is 1/σ.
+Heights `z` (n,) float64 above the plane of a face [m] are explained by columns of `design` (n, p) float64 at places
+(u, v) on it; `root` (n,) float64 is 1/σ [1/m].
 """
 
 import math
@@ -11,18 +11,28 @@ from numba import njit
 
 __all__ = ["fit_columns", "fit_two_planes", "grow_columns", "truncated_sum"]
 
-_LIMIT = 3.29**2  # square of a standardised residual beyond which a point is a blunder: α₀ = 0.1 %
-_DIRECTIONS = 24  # in which a line is looked for that parts the points
+_LIMIT = 3.29**2  # square of a standardised residual beyond which a point is an outlier: α₀ = 0.1 %
+_DIRECTIONS = 24  # directions tried for the line that divides the points
 _TILTED = 6.63  # chi-square of one parameter at 1 %
-_FLATTEST = 3.0  # spread of points across a strip over their σ below which its tilt is not asked for
+_FLATTEST = 3.0  # spread of points across a strip over their σ below which its tilt is not estimated
 
 
 @njit(cache=True)
 def fit_columns(design, z, root, chosen, inverse, residuals, lever):
-    """Weighted least squares on the chosen points: coefficients (p,); `inverse` (p, p) is their covariance.
+    """Fit the columns to the chosen points by weighted least squares.
 
-    Residuals and leverages are of all points. The columns are few and scaled to one, so normal equations do.
-    Returns coefficients of nan if the points do not determine them.
+    The columns are few and scaled to 1, so normal equations are accurate enough.
+
+    Inputs
+    ------
+    design, z, root : as above
+    chosen : (n,) bool
+
+    Outputs
+    -------
+    inverse : (p, p) float64, covariance of the coefficients
+    residuals, lever : (n,) float64 of all points [m], [-]
+    coefficients (p,) float64; nan if the points do not determine them
     """
     n, p = design.shape
     normal, right = np.zeros((p, p)), np.zeros(p)
@@ -50,7 +60,7 @@ def fit_columns(design, z, root, chosen, inverse, residuals, lever):
 
 @njit(cache=True)
 def _invert(matrix, inverse):
-    """Gauss and Jordan on a symmetric positive matrix; False if it is singular."""
+    """Invert a symmetric positive matrix by Gauss–Jordan elimination; return False if it is singular."""
     p = matrix.shape[0]
     work = matrix.copy()
     for a in range(p):
@@ -74,7 +84,7 @@ def _invert(matrix, inverse):
 
 @njit(cache=True)
 def truncated_sum(root, residuals):
-    """Sum of squares in units of sigma in which no blunder counts more than the limit."""
+    """Return the sum of squares in units of sigma, each truncated at the limit of an outlier."""
     out = 0.0
     for i in range(root.shape[0]):
         out += min((root[i] * residuals[i]) ** 2, _LIMIT)
@@ -83,7 +93,18 @@ def truncated_sum(root, residuals):
 
 @njit(cache=True)
 def grow_columns(design, z, root, start, fewest):
-    """Points that the columns explain: drop the worst, or add the best, until the next one is a blunder."""
+    """Grow the set of points that the columns explain: drop the worst or add the best until the next is an outlier.
+
+    Inputs
+    ------
+    design, z, root : as above
+    start : (n,) bool, points to begin with
+    fewest : int, number of points that always remain
+
+    Outputs
+    -------
+    (n,) bool
+    """
     n, p = design.shape
     chosen, inverse, residuals, lever = start.copy(), np.empty((p, p)), z.copy(), np.zeros(n)
     for _ in range(2 * n):
@@ -109,26 +130,27 @@ def grow_columns(design, z, root, start, fewest):
 
 @njit(cache=True)
 def fit_two_planes(u, v, z, root):
-    """Part the points by a line so that a plane through each part explains them best.
+    """Divide the points by a line so that a plane through each part explains them best.
 
-    Before the line the plane is z = 0, or one fitted there, whichever is better: z = 0 has left blunders out, but may
-    be tilted into the second plane. Points in a row along the line say nothing of the tilt across it.
+    On the near side the plane is z = 0, or one fitted there, whichever is better: z = 0 is free of outliers, but may be
+    tilted into the second plane. Points in a row along the line do not determine the tilt across it.
 
-    Returns
+    Inputs
+    ------
+    u, v, z : (n,) float64 [m]
+    root : (n,) float64 [1/m]
+
+    Outputs
     -------
-    truncated sum of squares of both planes, that of the points that are no blunders, points beyond the line (n,),
-    direction (2,) across the line to them, coefficients (3,) of the second plane, less the first, on 1, along the line,
-    across it; nan where its tilt across is not known
+    score, least : float64, sum of squares of both planes in units of sigma, truncated, and of points within the limit
+    far : (n,) bool, points beyond the line
+    way : (2,) float64, direction across the line towards them [-]
+    plane : (3,) float64, coefficients of the second plane less the first, on 1 [m], along the line and across it [-];
+        nan where the tilt across is not determined
     """
     n = z.shape[0]
-    score, worth, least, far, way, plane = (
-        np.inf,
-        np.inf,
-        np.inf,
-        np.zeros(n, dtype=np.bool_),
-        np.zeros(2),
-        np.zeros(3),
-    )
+    score, worth, least = np.inf, np.inf, np.inf
+    far, way, plane = np.zeros(n, dtype=np.bool_), np.zeros(2), np.zeros(3)
     across, along, moved = np.empty(n), np.empty(n), np.empty(n, dtype=np.bool_)
     first, second, zero = np.zeros(3), np.zeros(3), np.zeros(3)
     for direction in range(_DIRECTIONS):
@@ -152,8 +174,8 @@ def fit_two_planes(u, v, z, root):
             size = 3 if count > 3 and spread > _FLATTEST**2 * count else 2
             if not (_solve(there, size, second) and _solve(here, 3, first)):
                 continue
-            rival, within = _leave(along, across, z, root, moved, zero, second)
-            other, inner = _leave(along, across, z, root, moved, first, second)
+            rival, within = _unexplained(along, across, z, root, moved, zero, second)
+            other, inner = _unexplained(along, across, z, root, moved, first, second)
             base = zero
             if other < rival:
                 rival, within, base = other, inner, first
@@ -167,7 +189,7 @@ def fit_two_planes(u, v, z, root):
 
 @njit(cache=True)
 def _add(sums, sign, along, across, z, root):
-    """Normal equations (3, 4) of a plane on 1, along, across, with or without one more point."""
+    """Add a point to the normal equations (3, 4) of a plane on 1, along, across; remove it if `sign` is -1."""
     weight = sign * root**2
     row = (1.0, along, across, z)
     for a in range(3):
@@ -177,7 +199,7 @@ def _add(sums, sign, along, across, z, root):
 
 @njit(cache=True)
 def _solve(sums, size, out):
-    """Coefficients of a plane, the leading two or all three; False if the points do not determine them."""
+    """Solve for the leading two or all three coefficients; return False if the points do not determine them."""
     work = sums.copy()
     for a in range(size):
         if not work[a, a] > 1e-10 * sums[a, a]:
@@ -196,8 +218,8 @@ def _solve(sums, size, out):
 
 
 @njit(cache=True)
-def _leave(along, across, z, root, beyond, first, second):
-    """Truncated sum of squares that two planes leave, and that of the points that are no blunders."""
+def _unexplained(along, across, z, root, beyond, first, second):
+    """Return the truncated sum of squares that two planes leave, and that of the points within the limit."""
     out, within = 0.0, 0.0
     for i in range(z.shape[0]):
         plane = second if beyond[i] else first

@@ -1,31 +1,30 @@
-"""Numba kernels that start the search for a face: its compact part, and the planes through three of its points.
-
-Arrays are as in `_kernels_planes`.
-"""
+"""Numba kernels that start the search for a face: its compact part, and the planes through three of its points."""
 
 import math
 
 import numpy as np
 from numba import njit
 
+from survey.faces._kernels.planes import cross, dot
+
 __all__ = ["STARTS", "beside_the_rest", "cost", "search_triples", "smallest"]
 
 STARTS = 6  # planes of least truncated squares that are kept
 
 _CRITICAL = 3.29  # two-sided normal quantile of Baarda's α₀ = 0.1 %
-_ALL_TRIPLES = 26  # up to so many points all triples are tried; beyond, a fixed draw of _DRAWS
-_DRAWS = 3000
+_ALL_TRIPLES = 26  # number of points up to which all triples are tried: 2,600
+_DRAWS = 3000  # fixed draw of triples beyond that
 _EROSION = 0.03  # how far behind a face its eroded edges and its mortar lie [m]
-_IN_FRONT = _CRITICAL**2  # how much more a blunder less than that in front counts, in squares of sigma
-_FARTHEST = 2.5  # distance from the middle of a face, over that of its third quartile, beyond which no point is its own
-_ALONE = 0.7  # distance from the nearest other point, over that limit, that such a point has at least
-_BALANCED = 0.4  # mean of directions, below which points lie all around
+_IN_FRONT = _CRITICAL**2  # additional cost of an outlier less than that in front [squares of sigma]
+_FARTHEST = 2.5  # distance from the middle over that of the third quartile, beyond which a point may be beside the face
+_ALONE = 0.7  # least distance of such a point from its nearest neighbour, over that limit
+_BALANCED = 0.4  # length of the mean direction below which points lie all around
 _ALIKE = 2.0  # largest over smallest distance of corners from the middle of their face
 
 
 @njit(cache=True)
 def smallest(values, size):
-    """The `size`-th smallest value (Hoare 1961)."""
+    """Return the `size`-th smallest value (Hoare 1961)."""
     heap = values.copy()
     low, high, k = 0, heap.shape[0] - 1, size - 1
     while low < high:
@@ -47,10 +46,10 @@ def smallest(values, size):
 
 @njit(cache=True)
 def cost(test, root, side):
-    """What a point counts, in squares of sigma; `side` is 1 if the normal looks to the observer, -1 if away from him.
+    """Return the cost of a point in squares of sigma; `side` is 1 if the normal points to the observer, otherwise -1.
 
-    No blunder counts more than the limit, but one that lies a little in front of the face counts twice: there edges
-    erode and mortar recedes, so such points are a sign that the plane is tilted into what lies behind.
+    The cost of an outlier is truncated at the limit, but doubles a little in front of the face: edges erode and mortar
+    recedes behind it, so points in front are a sign that the plane is tilted into what lies behind.
     """
     if test * test <= _CRITICAL**2:
         return test * test
@@ -60,7 +59,7 @@ def cost(test, root, side):
 
 @njit(cache=True)
 def _triple(number, n, i, j, k):
-    """The triple after (i, j, k): the next of all, or a drawn one, the same for every face of n points."""
+    """Return the triple after (i, j, k): the next of all, or a drawn one, the same for every face of n points."""
     if n <= _ALL_TRIPLES:
         k += 1
         if k == n:
@@ -79,20 +78,20 @@ def _triple(number, n, i, j, k):
 
 @njit(cache=True)
 def _normal_of(local, i, j, k, normal):
-    """Twice the area of a triangle, and its unit normal."""
-    ax, ay, az = local[0, i], local[1, i], local[2, i]
-    bx, by, bz = local[0, j] - ax, local[1, j] - ay, local[2, j] - az
-    cx, cy, cz = local[0, k] - ax, local[1, k] - ay, local[2, k] - az
-    nx, ny, nz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
-    area = math.sqrt(nx * nx + ny * ny + nz * nz)
+    """Return twice the area of a triangle; write its unit normal."""
+    x, y, z = local[0, i], local[1, i], local[2, i]
+    u = (local[0, j] - x, local[1, j] - y, local[2, j] - z)
+    v = (local[0, k] - x, local[1, k] - y, local[2, k] - z)
+    n = cross(u, v)
+    area = math.sqrt(dot(n, n))
     if area > 0.0:
-        normal[0], normal[1], normal[2] = nx / area, ny / area, nz / area
+        normal[0], normal[1], normal[2] = n[0] / area, n[1] / area, n[2] / area
     return area
 
 
 @njit(cache=True)
 def _keep(truncated, distances, scores, best):
-    """Sort a plane in among the best, and out those with the same points within the limit."""
+    """Insert a plane among the best and drop a worse one with the same points within the limit."""
     n, last = distances.shape[0], STARTS
     for rank in range(1, 1 + STARTS):
         same = True
@@ -112,12 +111,23 @@ def _keep(truncated, distances, scores, best):
 
 
 @njit(cache=True)
-def search_triples(local, root, size, known, view):
-    """Distances from planes through three points (1 + STARTS, n), inf where there are fewer.
+def search_triples(points, size, known, view):
+    """Search the planes through three points.
 
-    First the plane of least median distance, then, with a known precision, those of least truncated squares, each with
-    a different set of points within the limit, best first.
+    Inputs
+    ------
+    points : Points
+    size : int, rank of the distance that counts as the median
+    known : bool, whether the precision of the points is known
+    view : (4,) float64, direction to the observer and least cosine between it and the normal; zeros if unknown
+
+    Outputs
+    -------
+    (1 + STARTS, n) float64, distances from the planes in units of sigma, inf where there are fewer: first from the
+    plane of least median distance, then, with a known precision, from those of least truncated squares, each with a
+    different set of points within the limit, best first
     """
+    local, root = points
     n = root.shape[0]
     count = n * (n - 1) * (n - 2) // 6 if n <= _ALL_TRIPLES else _DRAWS
     normal, distances, scores = np.empty(3), np.empty(n), np.empty(1 + STARTS)
@@ -129,15 +139,15 @@ def search_triples(local, root, size, known, view):
         for number in range(count):
             i, j, k = _triple(number, n, i, j, k)
             area = _normal_of(local, i, j, k, normal)
-            if sweep == 0 or area <= 1e-3 * largest:  # thin triangles say nothing of the tilt
+            if sweep == 0 or area <= 1e-3 * largest:  # thin triangles do not determine the tilt
                 largest = max(largest, area)
                 continue
             nx, ny, nz = normal[0], normal[1], normal[2]
-            along = nx * view[0] + ny * view[1] + nz * view[2]
+            along = dot(normal, view)
             if abs(along) < view[3]:
                 continue
             side = 0.0 if along == 0.0 else math.copysign(1.0, along)
-            height = nx * local[0, i] + ny * local[1, i] + nz * local[2, i]
+            height = dot(normal, local[:, i])
             near, truncated = 0, 0.0
             for m in range(n):
                 d = root[m] * (nx * local[0, m] + ny * local[1, m] + nz * local[2, m] - height)
@@ -154,10 +164,10 @@ def search_triples(local, root, size, known, view):
 
 @njit(cache=True)
 def beside_the_rest(local):
-    """Indices of the points of a compact face: those far beside are no part of it, wherever its plane may pass them.
+    """Return the indices of the points that form a compact face, without those far beside it.
 
-    So far out they would outvote all others. Four or more that lie all around, alike in distance, are corners of a face
-    that is measured in its middle.
+    Points so far out would outvote all others wherever they happen to lie near the prolonged plane. Four or more that
+    lie all around, at similar distances, are kept: they are the corners of a face that was measured in its middle.
     """
     n = local.shape[1]
     everything = np.arange(n)
@@ -166,9 +176,7 @@ def beside_the_rest(local):
     centre = _spatial_median(local)
     away, balance = np.empty(n), np.zeros(3)
     for i in range(n):
-        away[i] = math.sqrt(
-            (local[0, i] - centre[0]) ** 2 + (local[1, i] - centre[1]) ** 2 + (local[2, i] - centre[2]) ** 2
-        )
+        away[i] = math.sqrt(_squared_distance(local[:, i], centre))
     limit, count = _FARTHEST * smallest(away, n - n // 4), 0
     nearest, farthest = np.inf, 0.0
     beside = np.zeros(n, dtype=np.bool_)
@@ -179,7 +187,7 @@ def beside_the_rest(local):
             nearest, farthest = min(nearest, away[i]), max(farthest, away[i])
             for k in range(3):
                 balance[k] += (local[k, i] - centre[k]) / away[i]
-    balanced = balance[0] ** 2 + balance[1] ** 2 + balance[2] ** 2 < (_BALANCED * count) ** 2
+    balanced = dot(balance, balance) < (_BALANCED * count) ** 2
     alike = farthest <= _ALIKE * nearest and farthest <= 2.0 * _ALIKE * limit
     if count == 0 or (count > 3 and balanced and alike):
         return everything
@@ -193,18 +201,23 @@ def beside_the_rest(local):
 
 @njit(cache=True)
 def _nearest_of(local, i, away, limit):
-    """Distance of a point from the nearest that is not far away."""
+    """Return the distance of a point from the nearest one within the limit."""
     least = np.inf
     for j in range(local.shape[1]):
         if away[j] <= limit:
-            x, y, z = local[0, i] - local[0, j], local[1, i] - local[1, j], local[2, i] - local[2, j]
-            least = min(least, x * x + y * y + z * z)
+            least = min(least, _squared_distance(local[:, i], local[:, j]))
     return math.sqrt(least)
 
 
 @njit(cache=True)
+def _squared_distance(p, q):
+    d = (p[0] - q[0], p[1] - q[1], p[2] - q[2])
+    return dot(d, d)
+
+
+@njit(cache=True)
 def _spatial_median(local):
-    """Place of least sum of distances, nearly (Weiszfeld 1937)."""
+    """Approximate the point of least sum of distances (Weiszfeld 1937)."""
     n = local.shape[1]
     centre = np.zeros(3)
     for k in range(3):
@@ -213,12 +226,7 @@ def _spatial_median(local):
     for _ in range(15):
         x, y, z, total = 0.0, 0.0, 0.0, 0.0
         for i in range(n):
-            square = (
-                (local[0, i] - centre[0]) ** 2
-                + (local[1, i] - centre[1]) ** 2
-                + (local[2, i] - centre[2]) ** 2
-            )
-            weight = 1.0 / max(math.sqrt(square), 1e-9)
+            weight = 1.0 / max(math.sqrt(_squared_distance(local[:, i], centre)), 1e-9)
             total += weight
             x, y, z = x + weight * local[0, i], y + weight * local[1, i], z + weight * local[2, i]
         centre[0], centre[1], centre[2] = x / total, y / total, z / total

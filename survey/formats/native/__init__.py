@@ -1,1 +1,4 @@
-"""The native survey format (`.moma`): reader and writer."""
+"""The native survey format (`.moma`): reader and writer.
+
+Public: `open_moma`, `read_moma`, `read_head`, `with_header` (reader); `write_moma` (writer).
+"""

@@ -1,4 +1,4 @@
-"""Going through one line of the native format, word by word."""
+"""Parser of one line of the native format, word by word."""
 
 import re
 from re import Pattern
@@ -16,7 +16,7 @@ _COURSES = re.compile(r"\s*(\d{1,6})(?:\s*-\s*(\d{1,6}))?(?=\s|$)", re.ASCII)
 
 
 class Cursor:
-    """A place in a line. A word that begins with ``#`` begins a comment, unless text is asked for.
+    """A position in a line. A word that begins with ``#`` begins a comment, except in text.
 
     Attributes
     ----------
@@ -31,12 +31,12 @@ class Cursor:
         return SurveyError(what, where=self.where, remedy=remedy)
 
     def peek(self) -> str:
-        """Next word as it stands; empty at the end of the line."""
+        """Return the next word without consuming it; empty at the end of the line."""
         found = _WORD.match(self._line, self._at)
         return "" if found is None or found[1].startswith("#") else found[1]
 
     def word(self) -> str:
-        """Next word as it stands, which is then behind us."""
+        """Consume the next word; empty at the end of the line."""
         found = _WORD.match(self._line, self._at)
         if found is None or found[1].startswith("#"):
             return ""
@@ -44,20 +44,20 @@ class Cursor:
         return found[1]
 
     def keyword(self, word: str) -> bool:
-        """Whether the next word is this one; then it is behind us."""
+        """Consume the next word if it is this one; return whether it was."""
         if self.peek() != word:
             return False
         self.word()
         return True
 
     def copy(self) -> "Cursor":
-        """Make another one at the same place."""
+        """Return a cursor at the same position."""
         other = Cursor(self._line, self.where)
         other._at = self._at
         return other
 
     def key(self) -> str:
-        """Next word, even if it begins with ``#`` or a quotation mark."""
+        """Consume the next word, even if it begins with ``#`` or a quotation mark."""
         words = self._line[self._at :].split(maxsplit=1)
         if not words:
             return ""
@@ -65,22 +65,22 @@ class Cursor:
         return words[0]
 
     def matching(self, pattern: Pattern[str], what: str, remedy: str) -> str:
-        """Next word, which must be of a pattern."""
+        """Consume the next word, which must match a pattern."""
         word = self.word()
         if pattern.fullmatch(word) is None:
             raise self.fail(f"{what} {shown(word)} is not a {what}", remedy)
         return word
 
     def code(self, what: str = "code") -> str:
-        """Next word, which must be the name of a stone."""
+        """Consume the name of a stone."""
         return self.matching(CODE, what, NAME_REMEDY)
 
     def kind(self) -> str:
-        """Next word, which must be the name of a kind of stone."""
+        """Consume the name of a kind of stone."""
         return self.matching(KIND, "kind", "use lower-case letters, e.g. header")
 
     def name(self, what: str) -> str:
-        """Next word, or several in quotes."""
+        """Consume a name: one word, or several in quotes."""
         word = self.peek()
         if word.startswith('"') and len(word) > 1:
             self.word()
@@ -91,21 +91,21 @@ class Cursor:
         return self.code(what)
 
     def number(self, what: str) -> float:
-        """Next word, which must be a number."""
+        """Consume a number."""
         word = self.word()
         if not word:
             raise self.fail(f"{what} is missing", "write a number")
         return parse_number(word, what, self.where)
 
     def length(self, what: str) -> float:
-        """Next word, which must be a number greater than 0."""
+        """Consume a number greater than 0."""
         word = self.word()
         if not word:
             raise self.fail(f"{what} is missing", "write a number greater than 0")
         return parse_length(word, what, self.where)
 
     def row(self, what: str, axes: str = "xyz") -> tuple[float, ...]:
-        """Next words, which must be coordinates."""
+        """Consume coordinates, one for each axis."""
         values: list[float] = []
         for axis in axes:
             if self.peek() in ("", "at", "sigma", "site"):
@@ -115,11 +115,11 @@ class Cursor:
         return tuple(values)
 
     def course(self) -> int:
-        """Next word, which must be the number of a course."""
+        """Consume the number of a course."""
         return parse_course(self.word(), self.where)
 
     def courses(self) -> tuple[int, int]:
-        """Next words, which must be a course or first - last."""
+        """Consume a course, or first - last."""
         found = _COURSES.match(self._line, self._at)
         if found is None:
             raise self.fail(f"courses {shown(self.peek())}", "write: course 3, or: course 3-5")
@@ -130,17 +130,17 @@ class Cursor:
         return first, last
 
     def sigma(self, what: str) -> float | None:
-        """``sigma S``, if that comes next."""
+        """Consume ``sigma S`` if it comes next."""
         return self.length(f"{what} sigma") if self.keyword("sigma") else None
 
     def source(self, what: str) -> str:
-        """``source TEXT``, which must come next."""
+        """Consume ``source TEXT``, which must come next."""
         if not self.keyword("source"):
             raise self.fail(f"the {what} has no source", f"write: {what} … source TEXT")
         return self.text("source")
 
     def text(self, what: str) -> str:
-        """All that is left of the line."""
+        """Consume the rest of the line."""
         text = self._line[self._at :].strip().replace("\t", " ")
         self._at = len(self._line)
         if not text or not text.isprintable():
@@ -148,6 +148,11 @@ class Cursor:
         return text
 
     def end(self, remedy: str) -> None:
-        """Nothing but a comment may be left of the line."""
+        """Check that nothing but a comment is left of the line."""
         if word := self.peek():
             raise self.fail(f"unexpected {shown(word)}", remedy)
+
+    def check_first(self, value: object, word: str) -> None:
+        """Check that a value which may be stated once is not yet known."""
+        if value is not None:
+            raise self.fail(f"a second {word!r}", f"keep one {word!r} line")

@@ -1,4 +1,4 @@
-"""The head of the native survey format: what a survey says of all its stones together."""
+"""The head of the native survey format: data shared by all stones of a survey."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -26,7 +26,7 @@ _FEWEST_MARKS = 4  # a homography has eight unknowns
 
 
 class _Numbered(Protocol):
-    """What knows the line that it was read from."""
+    """An entry with the line that it was read from."""
 
     @property
     def line(self) -> int: ...
@@ -40,12 +40,12 @@ class _Mark:
 
 
 class HeadReader:
-    """The lines of a head that have been read.
+    """Reader of a head, line by line.
 
     Attributes
     ----------
-    sigma : standard deviation of a coordinate that does not say its own [m]; None if not said
-    takers : what reads a line, by its first word
+    sigma : standard deviation of a coordinate without one of its own [m]; None if not stated
+    takers : methods that read a line, by its first word
     """
 
     def __init__(self) -> None:
@@ -58,7 +58,7 @@ class HeadReader:
         self._rules: list[DepthRule] = []
         self._canons: dict[str, Canon] = {}
         self._extrusion: Extrusion | None = None
-        self._places: dict[str, str] = {}  # of what is checked once all is known
+        self._places: dict[str, str] = {}  # of entries that are checked once all lines are read
         self.takers: dict[str, Callable[[Cursor, int], None]] = {
             "name": self._take_name,
             "observer": self._take_observer,
@@ -77,13 +77,13 @@ class HeadReader:
 
         Parameters
         ----------
-        name : of the survey, if the head does not say it
+        name : of the survey, if the head states none
         path : of the survey
 
         Raises
         ------
         SurveyError
-            at the line that names what does not exist, or that lacks something
+            at the line that refers to a missing entry, or that is incomplete
         """
         return SurveyHead(
             name=self._name or name,
@@ -99,7 +99,7 @@ class HeadReader:
     # --- lines ---
 
     def _take_name(self, cursor: Cursor, line: int) -> None:
-        _once(self._name, "name", cursor)
+        cursor.check_first(self._name, "name")
         self._name = cursor.text("name")
 
     def _take_observer(self, cursor: Cursor, line: int) -> None:
@@ -115,7 +115,7 @@ class HeadReader:
         self._stations[station.name] = station
 
     def _take_sigma(self, cursor: Cursor, line: int) -> None:
-        _once(self.sigma, "sigma", cursor)
+        cursor.check_first(self.sigma, "sigma")
         self.sigma = cursor.length("sigma")
         cursor.end("write: sigma 0.003")
 
@@ -130,7 +130,7 @@ class HeadReader:
         site = np.array(cursor.row("site"))
         site_sigma = cursor.sigma("site")
         cursor.end(remedy)
-        # 0 stands for that of the head, which may still follow
+        # 0 stands for the sigma of the head, which may still follow
         self._control[name] = ControlPoint(
             name, measured, measured_sigma or 0.0, site, site_sigma or 0.0, line
         )
@@ -185,10 +185,10 @@ class HeadReader:
         self._canons[kind] = Canon(kind, length, height, sigma, cursor.source("canon"), line)
 
     def _take_extrusion(self, cursor: Cursor, line: int) -> None:
-        _once(self._extrusion, "extrude", cursor)
+        cursor.check_first(self._extrusion, "extrude")
         self._extrusion = read_extrusion(cursor)
 
-    # --- what can be said once all lines are read ---
+    # --- checks once all lines are read ---
 
     def _control_point(self, point: ControlPoint) -> ControlPoint:
         where = self._places[f"control {point.name}"]
@@ -227,7 +227,7 @@ def read_extrusion(cursor: Cursor) -> Extrusion:
     """Read ``[along DX DY DZ] [tail T]``."""
     remedy = "write: extrude [along DX DY DZ] [tail T]"
     if not cursor.peek():
-        raise cursor.fail("extrude says nothing", remedy)
+        raise cursor.fail("extrude has no values", remedy)
     direction = np.array(cursor.row("along")) if cursor.keyword("along") else None
     if direction is not None and not direction.any():
         raise cursor.fail("the direction has no length", remedy)
@@ -241,17 +241,12 @@ def read_extrusion(cursor: Cursor) -> Extrusion:
 
 
 def _overlap(one: DepthRule, other: DepthRule) -> bool:
-    """Whether two rules would hold for the same stones, neither being more particular."""
+    """Return whether two equally specific rules would hold for the same stone."""
     if (one.kind, one.zone) != (other.kind, other.zone):
         return False
     if one.courses is None or other.courses is None:
         return one.courses is other.courses
     return one.courses[0] <= other.courses[1] and other.courses[0] <= one.courses[1]
-
-
-def _once(value: object, word: str, cursor: Cursor) -> None:
-    if value is not None:
-        raise cursor.fail(f"a second {word!r}", f"keep one {word!r} line")
 
 
 def _new(name: str, known: Mapping[str, _Numbered], what: str, cursor: Cursor) -> None:
@@ -260,6 +255,6 @@ def _new(name: str, known: Mapping[str, _Numbered], what: str, cursor: Cursor) -
 
 
 def missing(what: str, name: str, known: Iterable[str], where: str) -> SurveyError:
-    """Make the error of a name that the head does not have."""
+    """Make the error of a name that is missing in the head."""
     names = ", ".join(known) or "none"
     return SurveyError(f"no {what} {name}", where=where, remedy=f"{what}s of this survey: {names}")

@@ -7,7 +7,7 @@ of a line or after a blank begins a comment, except in TEXT; blank lines are fre
     header  = "name" TEXT
             | "observer" X Y Z                              (* where the surveyor stood *)
             | "station" NAME X Y Z
-            | "sigma" S                                     (* of one coordinate that does not say its own *)
+            | "sigma" S                                     (* of one coordinate without its own *)
             | "control" NAME X Y Z [ "sigma" S ] "site" X Y Z [ "sigma" S ]
             | "photo" NAME [ "sigma" PIXELS ] [ "station" NAME ]
             | "mark" PHOTO U V "at" X Y Z [ "sigma" S ]     (* four or more per photo *)
@@ -47,12 +47,12 @@ __all__ = ["open_moma", "read_head", "read_moma", "with_header", "write_moma"]
 
 
 def open_moma(path: Path, options: ReadingOptions | None = None) -> SurveyStream:
-    """Begin to read a native survey file; its stones come one by one.
+    """Open a native survey file, whose stones are then read one by one.
 
     Parameters
     ----------
     path : the file
-    options : a head of another file is refused, because a native survey has its own; the rest is not needed
+    options : a head of another file is refused, because a native survey has its own; the rest is not used
 
     Raises
     ------
@@ -86,8 +86,8 @@ def read_moma(path: Path) -> Survey:
 def read_head(path: Path) -> SurveyHead:
     """Read a header file: a native survey without stones, for formats that have no head of their own.
 
-    Its name is empty if the file does not say one. The sigma of the file is that of its control points and marks;
-    `with_header` takes it for the stones too.
+    Its name is empty if the file states none. The sigma of the file is that of its control points and marks;
+    `with_header` also takes it for the stones.
 
     Raises
     ------
@@ -98,7 +98,7 @@ def read_head(path: Path) -> SurveyHead:
 
 
 def with_header(options: ReadingOptions, path: Path) -> ReadingOptions:
-    """Take the head of a header file, and its sigma if it says one, into the options."""
+    """Return the options with the head of a header file, and with its sigma if it states one."""
     head, sigma = _header_file(path)
     return replace(options, head=head, sigma=options.sigma if sigma is None else sigma)
 
@@ -114,7 +114,7 @@ def _header_file(path: Path) -> tuple[SurveyHead, float | None]:
 def _read_head(
     lines: TextLines, numbered: Iterator[tuple[int, str]]
 ) -> tuple[HeadReader, tuple[int, str] | None]:
-    """Read up to the first stone; returns also its first line, None if there is none."""
+    """Read up to the first stone; return the head and that line, None if there is no stone."""
     reader, begun = HeadReader(), False
     for number, line in numbered:
         cursor = Cursor(line, f"{lines.path}:{number}")
@@ -125,7 +125,7 @@ def _read_head(
             if line.split("#", 1)[0].split() != MAGIC.split():
                 raise cursor.fail(
                     "this is not a MOMA survey",
-                    f"the first line must be '{MAGIC}'; of another format say which (--format csv, pnezd, …)",
+                    f"the first line must be '{MAGIC}'; name any other format (--format csv, pnezd, …)",
                 )
             begun = True
         elif word == "stone":
@@ -140,7 +140,7 @@ def _read_head(
 
 
 class _Stones:
-    """The stones of a file, and those that failed."""
+    """Reader of the stones of a file."""
 
     def __init__(
         self, lines: TextLines, numbered: Iterator[tuple[int, str]], head: SurveyHead, sigma: float | None
@@ -148,12 +148,12 @@ class _Stones:
         self._path, self._end, self._numbered = lines.path, lines.end, numbered
         self._head, self._sigma = head, sigma
         self._lines_of: dict[str, int] = {}
-        self._begin = 0  # line on which the stone, or what is not one, begins
-        self._error: SurveyError | None = None  # why what is being passed over is wrong
+        self._begin = 0  # first line of the stone, or of lines outside any stone
+        self._error: SurveyError | None = None  # reason to skip lines up to the next stone
         self._code: str | None = None
 
     def records(self, first: tuple[int, str]) -> Iterator[BlockRecord | Reject]:
-        """Go through the lines, from the first stone."""
+        """Iterate over the stones; `first` is the line that begins the first one."""
         stone = self._open(*first)
         for number, line in self._numbered:
             if stone is not None and stone.take_place(line):
@@ -195,7 +195,7 @@ class _Stones:
             return None
 
     def _take(self, stone: StoneReader | None, word: str, cursor: Cursor, number: int) -> BlockRecord | None:
-        """Read a line of a stone; returns the stone once it is complete."""
+        """Read a line of a stone; return the stone once it is complete."""
         try:
             if stone is None:
                 self._begin, self._code = number, None

@@ -14,23 +14,23 @@ from survey.records.survey import BlockRecord, Extrusion, SurveyHead
 __all__ = ["STONE_WORDS", "StoneReader"]
 
 STONE_WORDS = ("vertex", "point", "photo", "pixel", "station", "extrude", "sigma", "depth", "note", "end")
-"""What a line of a stone can begin with."""
+"""Words that begin a line of a stone."""
 
 _FEWEST_CORNERS = 3
 _PLACE = re.compile(
     r"[ \t]*(vertex|point)[ \t]+([-+.0-9eE]+)[ \t]+([-+.0-9eE]+)[ \t]+([-+.0-9eE]+)[ \t]*"
-).fullmatch  # what is a number to `float` and made of these characters is a number here
+).fullmatch  # a number to `float` made of these characters is one here too
 
 
 class StoneReader:
-    """A stone that is being read.
+    """Reader of a stone, line by line.
 
     Parameters
     ----------
-    cursor : in its first line, behind ``stone``
+    cursor : in its first line, after ``stone``
     line : number of that line
     head : of the survey
-    sigma : of the survey, for coordinates that do not say their own [m]; None if it has none
+    sigma : of the survey, for coordinates without one of their own [m]; None if it has none
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class StoneReader:
         cursor.end("write: stone CODE KIND [course N] [zone NAME]")
         self._line, self._head, self._head_sigma = line, head, sigma
         self._places: dict[str, list[tuple[float, ...]]] = {"vertex": [], "point": []}
-        self._sigmas: dict[tuple[str, int], float] = {}  # of places that say their own
+        self._sigmas: dict[tuple[str, int], float] = {}  # of places with their own
         self._pixels: list[tuple[float, ...]] = []
         self._sigma: float | None = None
         self._depth: tuple[float, float | None, str] | None = None
@@ -55,7 +55,7 @@ class StoneReader:
         self._extrusion: Extrusion | None = None
 
     def take_place(self, line: str) -> bool:
-        """Read a line of a vertex or point if it is a plain one: the short way for most of a file."""
+        """Read a line of a vertex or point if it is a plain one: the fast path for most of a file."""
         found = _PLACE(line)
         if found is None:
             return False
@@ -70,34 +70,34 @@ class StoneReader:
         return True
 
     def take(self, word: str, cursor: Cursor) -> None:
-        """Read one line, from behind its first word, which is one of a stone but not ``end``."""
+        """Read one line after its first word, which is one of `STONE_WORDS` other than ``end``."""
         match word:
             case "vertex" | "point":
                 self._take_place(word, cursor)
             case "sigma":
-                _first(self._sigma, word, cursor)
+                cursor.check_first(self._sigma, word)
                 self._sigma = cursor.length("sigma")
                 cursor.end("write: sigma 0.003")
             case "depth":
-                _first(self._depth, word, cursor)
+                cursor.check_first(self._depth, word)
                 self._depth = cursor.length("depth"), cursor.sigma("depth"), cursor.source("depth")
             case "note":
                 self._take_note(cursor)
             case "photo":
-                _first(self._photograph, word, cursor)
+                cursor.check_first(self._photograph, word)
                 self._photograph = self._known("photo", [one.name for one in self._head.photographs], cursor)
             case "pixel":
                 self._pixels.append(cursor.row("pixel", "uv"))
                 cursor.end("write: pixel U V")
             case "station":
-                _first(self._station, word, cursor)
+                cursor.check_first(self._station, word)
                 self._station = self._known("station", [one.name for one in self._head.stations], cursor)
             case _:
-                _first(self._extrusion, word, cursor)
+                cursor.check_first(self._extrusion, word)
                 self._extrusion = read_extrusion(cursor)
 
     def finish(self, cursor: Cursor, line: int) -> BlockRecord:
-        """Put the stone together; the cursor is behind its ``end``."""
+        """Put the stone together; the cursor is after its ``end``."""
         cursor.end("put 'end' on a line of its own")
         self._check_corners(cursor)
         sigma = self._sigma or self._head_sigma
@@ -170,11 +170,6 @@ class StoneReader:
             return None
         order = [(word, k) for word in ("point", "vertex") for k in range(len(self._places[word]))]
         return np.array([self._sigmas.get(one, common) for one in order])
-
-
-def _first(value: object, word: str, cursor: Cursor) -> None:
-    if value is not None:
-        raise cursor.fail(f"a second {word!r}", f"keep one {word!r} line")
 
 
 def _array(rows: list[tuple[float, ...]], columns: int) -> Array:

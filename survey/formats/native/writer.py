@@ -1,4 +1,4 @@
-"""Writing the native survey format, as `survey.formats.native.reader` reads it."""
+"""Writer of the native survey format, the inverse of `survey.formats.native.reader`."""
 
 from collections import Counter
 from collections.abc import Iterable
@@ -23,13 +23,13 @@ MAGIC = "moma-survey 1"
 
 
 def write_moma(survey: Survey, path: Path) -> None:
-    """Write a survey in the native format; what is read back is equal to the last bit.
+    """Write a survey in the native format; it is read back equal to the last bit.
 
-    The numbers that an instrument gave to points are left out: the format has no place for them.
+    Point numbers of an instrument are left out: the format has no place for them.
 
     Parameters
     ----------
-    survey : what to write, with one stone or more
+    survey : with one stone or more
     path : the file; it is replaced
 
     Raises
@@ -135,7 +135,7 @@ def _row(values: Iterable[float]) -> str:
 
 
 def _number(value: float) -> str:
-    """Shortest of: four decimals when they say it all, else every digit."""
+    """Write four decimals if they are exact, otherwise every digit."""
     if not abs(value) <= FARTHEST:
         raise SurveyError(f"{value} cannot be written", remedy="coordinates are in metres, and finite")
     fixed = f"{value:.4f}"
@@ -143,7 +143,7 @@ def _number(value: float) -> str:
 
 
 def _text(text: str) -> str:
-    """Text to the end of a line."""
+    """Check text that runs to the end of a line."""
     if not text or not text.isprintable() or text != text.strip():
         raise SurveyError(f"{text[:60]!r} cannot be written", remedy="keep names and notes to one line")
     return text

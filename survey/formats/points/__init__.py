@@ -1,1 +1,4 @@
-"""Point lists: CSV, PNEZD and PENZD."""
+"""Point lists: CSV, PNEZD and PENZD.
+
+Public: `open_csv`, `read_csv` (csv); `open_pnezd`, `open_penzd` (pnezd); `CodeTemplate` (code_template).
+"""

@@ -1,8 +1,8 @@
-"""How the codes that surveyors key into an instrument are made up: a template of fields.
+"""Templates of the codes that surveyors key into an instrument.
 
 A template is text with fields in braces, e.g. ``{block}:{role}`` or ``{block} {kind} {course} {role}``; the text
-between them stands for itself, a blank for one or more. A description is taken apart in one way or not at all: a
-template by which one description could mean two things is refused.
+between them stands for itself, a blank for one or more. A description has one reading or none: an ambiguous template
+is refused.
 """
 
 import re
@@ -13,9 +13,9 @@ from moma.errors import UsageError
 __all__ = ["STATION", "CodeFields", "CodeTemplate"]
 
 STATION = "station"
-"""The role of a place where the instrument stood."""
+"""The role of a position of the instrument."""
 
-_FIELDS = {  # what a field can be, and the characters in it
+_FIELDS = {  # pattern of each field, and of its characters
     "block": (r"[^\W_][\w.+/:-]{0,63}", r"[\w.+/:-]"),
     "zone": (r"[^\W_][\w.+/:-]{0,63}", r"[\w.+/:-]"),
     "kind": (r"[A-Za-z][A-Za-z0-9_-]{0,31}", r"[A-Za-z0-9_-]"),
@@ -29,7 +29,7 @@ _REMEDY = "write e.g. {block}:{role} or {block} {kind} {course} {role}"
 
 @dataclass(frozen=True)
 class CodeFields:
-    """What one description says.
+    """The fields of one description.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class CodeFields:
 
 
 class CodeTemplate:
-    """A template, ready to take descriptions apart.
+    """A parsed template.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class CodeTemplate:
     Raises
     ------
     UsageError
-        if it has no block, a field that there is not, or could be read in two ways
+        if it has no block, has an unknown field, or is ambiguous
     """
 
     def __init__(self, text: str) -> None:
@@ -72,18 +72,18 @@ class CodeTemplate:
         self._match = re.compile(pattern).fullmatch
 
     def parse(self, description: str) -> CodeFields | None:
-        """Take a description apart; None if it is not of this template."""
+        """Split a description into its fields; None if it does not fit the template."""
         found = self._match(description)
         if found is None:
             return None
-        said = found.groupdict()
-        kind, course = said.get("kind"), said.get("course")
+        fields = found.groupdict()
+        kind, course = fields.get("kind"), fields.get("course")
         return CodeFields(
-            block=said["block"],
+            block=fields["block"],
             kind=None if kind is None else kind.lower(),
             course=None if course is None else int(course),
-            zone=said.get("zone"),
-            role=_ROLES[said.get("role", "v")[0].lower()],
+            zone=fields.get("zone"),
+            role=_ROLES[fields.get("role", "v")[0].lower()],
         )
 
     def _check_fields(self) -> None:
@@ -101,7 +101,7 @@ class CodeTemplate:
     def _check_separation(self, literals: list[str]) -> None:
         """Check that every field has a known end.
 
-        A field ends where the text behind it has a character that the field cannot have; from the right likewise.
+        A field ends where the text after it has a character that the field cannot have; from the right likewise.
         If the fields can be peeled off from both ends in this way until one is left, there is one reading.
         """
         names, between = list(self.fields), list(literals)
@@ -113,7 +113,7 @@ class CodeTemplate:
             else:
                 first, second = names[0], names[1]
                 raise UsageError(
-                    f"code template {self.text!r} can be read in two ways: {between[0]!r} does not tell "
+                    f"code template {self.text!r} can be read in two ways: {between[0]!r} does not separate "
                     f"{{{first}}} from {{{second}}}",
                     remedy="separate them by a character that neither of them has, such as a blank",
                 )

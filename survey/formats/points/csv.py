@@ -1,15 +1,14 @@
-"""Surveys as a table: one measured point per line, as spreadsheets and point exports give them.
+"""Tables of points: one measured point per line, as spreadsheets and point exports write them.
 
-The first line names the columns, in any order: ``block,kind,course,role,x,y,z`` and, if wanted, ``sigma``,
+The first line names the columns, in any order: ``block,kind,course,role,x,y,z`` and, optionally, ``sigma``,
 ``depth``, ``depth_sigma``, ``depth_source``, ``zone`` and ``station``. They are separated by commas, semicolons or
 tabs; decimals have a point or, where columns are not separated by commas, a comma. ``role`` is ``vertex`` or
 ``v`` for a corner of the face, in order around it, ``point`` or ``p`` for any other point on it. Lengths are
 metres; empty fields mean "not known". The lines of a block may lie anywhere. A line that begins with ``#`` is a
-comment; rows of nothing but separators are passed over, and columns without a name at the right are empty.
+comment; rows of nothing but separators are skipped, and columns without a name at the right are empty.
 """
 
 import csv
-from collections.abc import Iterator
 from operator import itemgetter
 from pathlib import Path
 
@@ -24,10 +23,10 @@ from survey.records.survey import Survey, SurveyHead, SurveyStream
 __all__ = ["NEEDED", "OPTIONAL", "open_csv", "read_csv"]
 
 NEEDED = ("block", "kind", "course", "role", "x", "y", "z")
-"""Columns that every table has."""
+"""Required columns."""
 
 OPTIONAL = ("sigma", "depth", "depth_sigma", "depth_source", "zone", "station")
-"""Columns that it may have besides."""
+"""Optional columns."""
 
 _IS_VERTEX = {"vertex": True, "v": True, "point": False, "p": False}
 _DELIMITERS = (",", ";", "\t")
@@ -36,16 +35,16 @@ _LONGEST_NAME = 64
 
 
 def open_csv(path: Path, options: ReadingOptions | None = None) -> SurveyStream:
-    """Read a table of points, and hand its stones out one by one.
+    """Read a table of points and return its stones one by one.
 
     Parameters
     ----------
     path : the file
-    options : sigma where a line does not say it; the head of another file
+    options : sigma of lines without one; the head of another file
 
     Returns
     -------
-    SurveyStream : without a head of another file, corners run counter-clockwise seen from outside
+    SurveyStream : without the head of another file, corners must run counter-clockwise seen from outside
 
     Raises
     ------
@@ -55,7 +54,7 @@ def open_csv(path: Path, options: ReadingOptions | None = None) -> SurveyStream:
     options = options or ReadingOptions()
     lines = TextLines(Path(path))
     head = options.head_for(Path(path))
-    rows = _without_comments(lines)
+    rows = lines.rows()
     number, names = next(rows, (1, ""))
     reader = _RowReader(lines, (number, names), head, PointTable(lines.path, options.sigma))
     for number, line in rows:
@@ -71,7 +70,7 @@ def read_csv(path: Path, default_sigma: float = 0.003) -> Survey:
     Parameters
     ----------
     path : the file
-    default_sigma : standard deviation of a coordinate whose line does not say it [m]
+    default_sigma : standard deviation of a coordinate whose line states none [m]
 
     Raises
     ------
@@ -81,19 +80,11 @@ def read_csv(path: Path, default_sigma: float = 0.003) -> Survey:
     return whole(open_csv(path, ReadingOptions(sigma=default_sigma)), Path(path))
 
 
-def _without_comments(lines: TextLines) -> Iterator[tuple[int, str]]:
-    """Lines that say something: spreadsheets end tables in rows of nothing but separators."""
-    for number, line in lines:
-        text = line.strip(" \t,;")
-        if text and not text.startswith("#"):
-            yield number, line
-
-
 class _RowReader:
-    """What reads the lines of a table into its stones."""
+    """Reader of the lines of a table."""
 
     def __init__(self, lines: TextLines, names: tuple[int, str], head: SurveyHead, table: PointTable) -> None:
-        self._path, self._head, self.table = lines.path, head, table
+        self._path, self._head, self.table, self._fail = lines.path, head, table, lines.fail
         number, line = names
         self._delimiter = _delimiter(line)
         where = f"{lines.path}:{number}"
@@ -105,7 +96,7 @@ class _RowReader:
         self._optional = [(name, self._at[name]) for name in OPTIONAL[1:] if name in self._at]
         self._sigma_at = self._at.get("sigma")
         self._decimals = Decimals(lines.path, commas=self._delimiter != ",")
-        self._said: dict[str, tuple[str, str]] = {}  # kind and course of each block, as written
+        self._kinds: dict[str, tuple[str, str]] = {}  # kind and course of each block, as written
 
     def take(self, line: str, number: int) -> None:
         """Read one line."""
@@ -123,7 +114,7 @@ class _RowReader:
             self.table.refuse(code, error, number)
 
     def _code(self, values: list[str]) -> str | None:
-        """The block that a line, however wrong, is of; None if that cannot be known."""
+        """Return the block of a line, even of a wrong one; None if it cannot be known."""
         code = values[self._block_at].strip() if self._block_at < len(values) else ""
         return code if code in self.table.stones or CODE.fullmatch(code) else None
 
@@ -142,7 +133,7 @@ class _RowReader:
             sigma = self._decimals.length(text, "sigma", number)
         if stone is None:
             stone = self._new_stone(code, kind, course, number)
-        elif self._said[code] != (kind, course):
+        elif self._kinds[code] != (kind, course):
             raise self._fail(
                 number,
                 f"kind or course of block {code} differs from line {stone.line}",
@@ -150,7 +141,7 @@ class _RowReader:
             )
         for name, at in self._optional:
             if values[at]:
-                self._say(stone, name, values[at], number)
+                self._set(stone, name, values[at], number)
         self.table.stones[code] = stone
         stone.add_place(is_vertex, place, sigma, "")
         stone.add_line(number)
@@ -161,13 +152,13 @@ class _RowReader:
                 raise self._fail(
                     number, f"{name} {shown(text)} is not a {name} name", "write e.g. W01-01, header"
                 )
-        self._said[code] = kind, course
+        self._kinds[code] = kind, course
         return TableStone(
             code, kind, parse_course(course, f"{self._path}:{number}") if course else None, number
         )
 
-    def _say(self, stone: TableStone, name: str, text: str, number: int) -> None:
-        """Take what holds for a block as a whole from one of its lines."""
+    def _set(self, stone: TableStone, name: str, text: str, number: int) -> None:
+        """Set a value of the whole block from one of its lines."""
         value: float | str = text
         if name in ("depth", "depth_sigma"):
             value = self._decimals.length(text, name, number)
@@ -192,12 +183,9 @@ class _RowReader:
             ) from error
         return [value.strip() for value in row]
 
-    def _fail(self, number: int, what: str, remedy: str) -> SurveyError:
-        return SurveyError(what, where=f"{self._path}:{number}", remedy=remedy)
-
 
 def _delimiter(line: str) -> str:
-    """What separates the names of the columns."""
+    """Return the separator of the column names."""
     return max(_DELIMITERS, key=line.count)
 
 

@@ -7,22 +7,22 @@ from survey.formats.fields import FARTHEST, parse_length, parse_number, shown
 
 __all__ = ["Decimals"]
 
-_PLAIN = re.compile(r"[-+.0-9eE]+").fullmatch  # what is a number to `float` and made of these is one here
+_PLAIN = re.compile(r"[-+.0-9eE]+").fullmatch  # a number to `float` made of these characters is one here too
 
 
 class Decimals:
-    """How a table writes its numbers: with the mark of the first one that has any.
+    """The decimal mark of a table: that of the first number that has one.
 
     Parameters
     ----------
     path : of the table, for errors
-    commas : whether there can be decimal commas, because columns are separated by something else
+    commas : whether decimal commas are possible, because other characters separate the columns
     """
 
     def __init__(self, path: str, commas: bool) -> None:
         self._path, self._commas = path, commas
         self._mark: str | None = None
-        self._line = 0  # the first one with that mark
+        self._line = 0  # first line with that mark
         self._lengths: dict[str, float] = {}
 
     def place(self, texts: tuple[str, str, str], names: str, line: int) -> tuple[float, float, float]:
@@ -71,7 +71,7 @@ class Decimals:
         return known
 
     def _plain(self, texts: tuple[str, str, str]) -> tuple[float, float, float] | None:
-        """The short way for most of a table; None where something asks for a closer look."""
+        """Read plain numbers, the fast path for most of a table; None for numbers that need a full check."""
         joined = "".join(texts)
         if self._mark == ",":
             if "." in joined:

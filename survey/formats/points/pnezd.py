@@ -1,13 +1,12 @@
 """Point lists as total stations export them: number, coordinates, and a description that carries a code.
 
 ``PNEZD`` is point, northing, easting, elevation, description; ``PENZD`` has the easting first. x is the easting, y the
-northing, z the elevation, in metres. Fields are separated by commas, semicolons, tabs or blanks; what is behind the
-fourth separator is the description, whatever it holds. Decimals have a point or, where fields are not separated by
-commas, a comma. A first line without digits names the columns and is passed over. A line that begins with ``#`` is
-a comment. What the description means is said by a code template (`survey.formats.points.code_template`).
+northing, z the elevation, in metres. Fields are separated by commas, semicolons, tabs or blanks; everything after the
+fourth separator is the description. Decimals have a point or, where fields are not separated by commas, a comma. A
+first line without digits names the columns and is skipped. A line that begins with ``#`` is a comment. The
+description is parsed by a code template (`survey.formats.points.code_template`).
 """
 
-from collections.abc import Iterator
 from dataclasses import replace
 from itertools import chain, islice
 from pathlib import Path
@@ -33,7 +32,7 @@ _NOTHING = float("nan")
 
 
 def open_pnezd(path: Path, options: ReadingOptions | None = None) -> SurveyStream:
-    """Read a list of point, northing, easting, elevation, description; hand its stones out one by one.
+    """Read a list of point, northing, easting, elevation, description; return its stones one by one.
 
     Parameters
     ----------
@@ -42,27 +41,27 @@ def open_pnezd(path: Path, options: ReadingOptions | None = None) -> SurveyStrea
 
     Returns
     -------
-    SurveyStream : its head has the stations of the list too
+    SurveyStream : its head also has the stations of the list
 
     Raises
     ------
     SurveyError
         naming file and line, if the list as a whole is wrong
     UsageError
-        if the code template is
+        if the code template is wrong
     """
     return _open(Path(path), options or ReadingOptions(), "yxz")
 
 
 def open_penzd(path: Path, options: ReadingOptions | None = None) -> SurveyStream:
-    """Read a list of point, easting, northing, elevation, description; else as `open_pnezd`."""
+    """Read a list of point, easting, northing, elevation, description, otherwise as `open_pnezd`."""
     return _open(Path(path), options or ReadingOptions(), "xyz")
 
 
 def _open(path: Path, options: ReadingOptions, axes: str) -> SurveyStream:
     template = CodeTemplate(options.codes or _CODES)
     lines = TextLines(path)
-    rows = _rows(lines)
+    rows = lines.rows()
     ahead = list(islice(rows, _LOOK_AHEAD))
     if ahead and not any(one.isdigit() for one in ahead[0][1]):
         del ahead[0]
@@ -76,15 +75,8 @@ def _open(path: Path, options: ReadingOptions, axes: str) -> SurveyStream:
     return SurveyStream(head, reader.table.records())
 
 
-def _rows(lines: TextLines) -> Iterator[tuple[int, str]]:
-    for number, line in lines:
-        text = line.strip(" \t,;")
-        if text and not text.startswith("#"):
-            yield number, line
-
-
 class _ListReader:
-    """What reads the lines of a list into its stones and stations."""
+    """Reader of the lines of a list."""
 
     def __init__(
         self,
@@ -94,7 +86,8 @@ class _ListReader:
         template: CodeTemplate,
         options: ReadingOptions,
     ) -> None:
-        self._path, self._template, self._kind = lines.path, template, options.kind
+        self._path, self._fail = lines.path, lines.fail
+        self._template, self._kind = template, options.kind
         self.table = PointTable(lines.path, options.sigma)
         self._description, self._code = "", template.parse("")
         self._axes = axes
@@ -116,7 +109,7 @@ class _ListReader:
                     number, f"{len(parts)} fields, not 5", "write point, two coordinates, elevation, code"
                 )
             name, a, b, c, description = parts
-            if description != self._description:  # neighbours mostly have the same
+            if description != self._description:  # adjacent lines mostly have the same
                 self._description, self._code = description, self._template.parse(description)
             code = self._code
             if code is None:
@@ -157,7 +150,7 @@ class _ListReader:
         stone.add_line(number)
 
     def _likely_block(self, line: str) -> str | None:
-        """The stone that a line with a field too many or too few is of; None if that cannot be known."""
+        """Return the stone of a line with a field too many or too few; None if it cannot be known."""
         rest: list[str] = [line]
         while len(rest := rest[-1].split(self._separator, 1)) == 2:
             code = self._template.parse(rest[1].strip())
@@ -172,7 +165,7 @@ class _ListReader:
             raise self._fail(number, f"point {name} a second time", f"the first is on line {before}")
 
     def _find_separator(self, ahead: list[tuple[int, str]]) -> str | None:
-        """What separates the fields of the first line in which there are coordinates."""
+        """Return the separator of the fields in the first line that has coordinates."""
         for number, line in ahead:
             for self._separator in _SEPARATORS:
                 parts = self._split(line)
@@ -190,9 +183,6 @@ class _ListReader:
         if self._separator is None:
             return [one.strip() for one in line.split(None, 4)]
         return [one.strip() for one in line.split(self._separator, 4)]
-
-    def _fail(self, number: int, what: str, remedy: str) -> SurveyError:
-        return SurveyError(what, where=f"{self._path}:{number}", remedy=remedy)
 
 
 def _has_coordinates(parts: list[str], decimals: Decimals, number: int) -> bool:

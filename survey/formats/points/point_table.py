@@ -1,4 +1,4 @@
-"""The stones of a table of points, gathered line by line, wherever their lines lie."""
+"""Collection of the stones of a table of points, whose lines may come in any order."""
 
 import math
 from array import array
@@ -14,19 +14,19 @@ from survey.records.survey import BlockRecord, Reject, SurveyHead
 
 __all__ = ["PointTable", "TableStone", "check_station"]
 
-_FEWEST_CORNERS = 3
-_HOPELESS = 1000
+_FEWEST_CORNERS = 3  # of a face
+_HOPELESS = 1000  # wrong lines without any stone after which the file is refused
 
 
 @dataclass(slots=True)
 class TableStone:
-    """The lines of one stone that have been read.
+    """One stone while its lines are read.
 
     Attributes
     ----------
     code, kind, course, zone, station : as in BlockRecord
     line : the first of its lines
-    error : why it cannot be a stone; None so far
+    error : the first error in its lines; None if there is none
     depth, depth_sigma, depth_source : as in BlockRecord
     """
 
@@ -49,7 +49,7 @@ class TableStone:
     runs: list[int] = field(default_factory=list)
 
     def add_line(self, line: int) -> None:
-        """Note that a line belongs to the stone; first and next of every run are kept."""
+        """Record a line of the stone; the first and the next line of every run are kept."""
         if self.runs and self.runs[-1] == line:
             self.runs[-1] = line + 1
         else:
@@ -69,17 +69,17 @@ class TableStone:
                 self.point_names.append(name)
 
     def spans(self) -> tuple[range, ...]:
-        """Lines of the file that it was read from."""
+        """Return the lines of the file that it was read from."""
         return tuple(range(*self.runs[i : i + 2]) for i in range(0, len(self.runs), 2))
 
 
 class PointTable:
-    """The stones of a table, and the lines that belong to none.
+    """The stones of a table, and the wrong lines that belong to none.
 
     Parameters
     ----------
     path : of the table, for errors
-    sigma : standard deviation of a coordinate whose line does not say it [m]
+    sigma : standard deviation of a coordinate whose line states none [m]
 
     Attributes
     ----------
@@ -93,16 +93,16 @@ class PointTable:
 
     @property
     def is_empty(self) -> bool:
-        """Whether no line has been read."""
+        """True if no line has been read."""
         return not (self.stones or self._astray)
 
     def refuse(self, code: str | None, error: SurveyError, line: int) -> None:
-        """Note a line that is wrong: it spoils its stone, if it is known which that is.
+        """Record a wrong line, which spoils its stone if that is known.
 
         Raises
         ------
         SurveyError
-            the first of these errors, if a thousand lines have been read and none says which stone it is of
+            the first of these errors, if a thousand lines have been read and none names its stone
         """
         if code is not None:
             stone = self.stones.setdefault(code, TableStone(code, "", None, line))
@@ -114,10 +114,10 @@ class PointTable:
             raise self._astray[0][1]
 
     def records(self) -> Iterator[BlockRecord | Reject]:
-        """Go through the stones, and what is none, in the order of the lines that they begin on; once."""
+        """Iterate, once, over stones and stray lines in the order of their first lines."""
         astray, at = self._astray, 0
         for code in list(self.stones):
-            stone = self.stones.pop(code)  # each leaves as it is handed out: memory need not hold both
+            stone = self.stones.pop(code)  # popped, so that memory holds each stone only once
             while at < len(astray) and astray[at][0] < stone.line:
                 yield _reject(*astray[at])
                 at += 1
@@ -162,7 +162,7 @@ class PointTable:
         )
 
     def _precision(self, stone: TableStone) -> tuple[float, Array | None]:
-        """Of the stone, and of its points if they differ."""
+        """Return the precision of the stone, and of its points if they differ."""
         sigmas = np.array([*stone.point_sigmas, *stone.vertex_sigmas])
         sigmas[np.isnan(sigmas)] = self._sigma
         if (sigmas == sigmas[0]).all():
@@ -184,7 +184,7 @@ def check_station(name: str, head: SurveyHead, where: str) -> None:
     Raises
     ------
     SurveyError
-        if not
+        if it has none
     """
     names = [one.name for one in head.stations]
     if name not in names:

@@ -1,1 +1,4 @@
-"""Closed solids: OBJ, PLY, STL and MSH."""
+"""Closed solids: OBJ, PLY, STL and MSH.
+
+Public: `open_solids` (reader); `closed_bodies`, `RawBody`, `ClosedBody` (bodies).
+"""

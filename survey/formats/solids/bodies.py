@@ -1,8 +1,7 @@
-"""From the polygons of a file of solids to closed stones with planar faces.
+"""Closed stones with planar faces, from the polygons of a file of solids.
 
-Nothing is repaired: corners are the same only where their coordinates are. What is decided is what the polygons leave
-open and their neighbours settle: which of them make one body, which side of each is outside, and how a polygon that is
-not plane is folded.
+Nothing is repaired: corners are the same only where their coordinates are. Three things are inferred from neighbouring
+polygons: which of them make one body, which side of each is outside, and how a polygon that is not plane is folded.
 """
 
 from collections.abc import Iterator, Sequence
@@ -12,22 +11,23 @@ import numpy as np
 
 from moma.errors import GeometryError, SurveyError
 from survey.arrays import Array
+from survey.formats.fields import FARTHEST
 from survey.formats.solids.body_groups import body_groups, signed_volume
 from survey.formats.solids.flat_faces import merge_flat, rounding
 from survey.geometry.folds import fold, warp
 from survey.geometry.solids import Solid
 from survey.geometry.watertight import check_watertight
 
-__all__ = ["ClosedBody", "RawBody", "closed_bodies"]
+__all__ = ["ClosedBody", "RawBody", "check_coordinates", "closed_bodies", "compact"]
 
 Polygon = tuple[int, ...]
 
-_COARSEST = 1e-3  # metres: a third of what a point is measured to
+_COARSEST = 1e-3  # a third of the precision of a measured point [m]
 
 
 @dataclass(frozen=True)
 class RawBody:
-    """What a file gives under one name.
+    """The polygons of a file under one name.
 
     Attributes
     ----------
@@ -35,9 +35,9 @@ class RawBody:
     vertices : (nv, 3) [m]
     polygons : vertex indices of each
     line : of the file, on which it begins; 0 in a binary file
-    end : the line behind it
-    resolution : of the file's numbers: distances that it cannot tell from nothing [m]
-    error : why it cannot be read; None if it can
+    end : the line after it
+    resolution : rounding of the file's numbers [m]
+    error : the first error in its lines; None if there is none
     """
 
     name: str
@@ -51,13 +51,13 @@ class RawBody:
 
 @dataclass(frozen=True)
 class ClosedBody:
-    """A closed stone, and what was settled of its faces.
+    """A closed stone, and the changes made to its faces.
 
     Attributes
     ----------
     solid : under the name of all bodies of the file's object
-    folded : how many polygons that are not plane were cut along folds
-    doubled : how many faces of the file's object were there twice
+    folded : number of polygons that are not plane and were cut along folds
+    doubled : number of duplicate faces of the file's object
     """
 
     solid: Solid
@@ -70,13 +70,13 @@ def closed_bodies(raw: RawBody, flat: float = 0.0) -> Iterator[ClosedBody | Geom
 
     Parameters
     ----------
-    raw : its vertices finite, its indices valid
-    flat : a polygon whose corners lie no farther from its mean plane is taken for plane [m]; at least what rounding to
-        a few digits does to one
+    raw : with finite vertices and valid indices
+    flat : distance of corners from their mean plane within which a polygon counts as plane [m]; rounding to a few
+        digits is always allowed for
 
     Returns
     -------
-    For each body the solid, or why it is not one
+    For each body the solid, or the error
     """
     try:
         vertices, polygons = _welded(raw)
@@ -100,7 +100,7 @@ def closed_bodies(raw: RawBody, flat: float = 0.0) -> Iterator[ClosedBody | Geom
 
 
 def _welded(raw: RawBody) -> tuple[Array, list[Polygon]]:
-    """Corners with the same coordinates become one; a face that is there twice counts once."""
+    """Merge corners with the same coordinates and duplicate faces."""
     if not raw.polygons:
         raise GeometryError("it has no faces", remedy="export closed surfaces")
     if raw.resolution > _COARSEST:
@@ -116,7 +116,7 @@ def _welded(raw: RawBody) -> tuple[Array, list[Polygon]]:
         renumbered = tuple(new[i] for i in polygon)
         if len(set(renumbered)) < max(len(renumbered), 3):
             raise GeometryError(
-                "a face has less than three corners, or one of them twice",
+                "a face has fewer than three corners, or one of them twice",
                 remedy="export it without such faces",
             )
         start = renumbered.index(min(renumbered))
@@ -125,7 +125,7 @@ def _welded(raw: RawBody) -> tuple[Array, list[Polygon]]:
 
 
 def _closed(raw: RawBody, vertices: Array, polygons: list[Polygon], flat: float) -> ClosedBody:
-    """The solid with faces as large as planes allow, if it is closed."""
+    """Make the solid with the largest possible plane faces, and check that it is closed."""
     pieces: list[Polygon] = []
     folded = 0
     for polygon in polygons:
@@ -137,20 +137,39 @@ def _closed(raw: RawBody, vertices: Array, polygons: list[Polygon], flat: float)
             pieces += fold(vertices, polygon, tolerance)
             folded += 1
     used = np.unique(np.concatenate([np.array(one) for one in pieces]))
-    merged = _compact(raw.name, vertices, merge_flat(vertices, pieces, used, flat + raw.resolution))
-    with np.errstate(all="ignore"):  # a body without volume is found, and not warned of
+    merged = _solid(raw.name, vertices, merge_flat(vertices, pieces, used, flat + raw.resolution))
+    with np.errstate(all="ignore"):  # a body without volume is an error below, not a warning
         try:
             check_watertight(merged)
-        except (
-            GeometryError
-        ):  # an outline that cannot be cut into ears; the polygons as they came can say more
-            merged = _compact(raw.name, vertices, pieces)
+        except GeometryError:  # perhaps an outline that cannot be cut into ears: try the original polygons
+            merged = _solid(raw.name, vertices, pieces)
             check_watertight(merged)
     return ClosedBody(merged, folded)
 
 
-def _compact(name: str, vertices: Array, polygons: Sequence[Polygon]) -> Solid:
-    """The solid with the corners that it uses."""
+def _solid(name: str, vertices: Array, polygons: Sequence[Polygon]) -> Solid:
+    used, renumbered = compact(polygons)
+    return Solid(name, vertices[used], tuple(renumbered))
+
+
+def compact(polygons: Sequence[Polygon]) -> tuple[list[int], list[Polygon]]:
+    """Return the vertices that polygons use, in order, and the polygons renumbered to these."""
     used = sorted({i for polygon in polygons for i in polygon})
     new = {old: k for k, old in enumerate(used)}
-    return Solid(name, vertices[used], tuple(tuple(new[i] for i in polygon) for polygon in polygons))
+    return used, [tuple(new[i] for i in polygon) for polygon in polygons]
+
+
+def check_coordinates(points: Array, what: str, where: str) -> None:
+    """Check that points (n, 3) are finite and within reach of a site [m].
+
+    Raises
+    ------
+    SurveyError
+        if they are not
+    """
+    if not (np.abs(points) <= FARTHEST).all():
+        raise SurveyError(
+            f"a {what} is not finite, or beyond {FARTHEST:g} m",
+            where=where,
+            remedy="coordinates are in metres",
+        )

@@ -1,9 +1,9 @@
-"""Which polygons of a file make one body.
+"""Grouping of the polygons of a file into bodies.
 
 Faces that share an edge belong together. Where stones touch along an edge, four faces or more share it, and the
-bodies are told apart by their insides: each takes up an angle about the edge, which runs from a face of one sense of
-direction to the next one of the other. This needs to know which side of every face is outside, so that the faces of
-such files must agree on it; elsewhere neighbours settle it.
+bodies are distinguished by their interiors: each takes up an angle about the edge, which runs from a face of one
+direction to the next one of the other. The outer side of every face must be known for this, so the faces of such files
+must agree on it; elsewhere it follows from the neighbours.
 """
 
 import math
@@ -21,7 +21,7 @@ __all__ = ["body_groups", "signed_volume"]
 Polygon = tuple[int, ...]
 Edge = tuple[int, int]
 
-_SAME_DIRECTION = 1e-6  # radians: no stone has so sharp an edge; faces of two stones lie on one another
+_SAME_DIRECTION = 1e-6  # angle below which faces of two stones coincide; no edge is so sharp [rad]
 _FULL = 2.0 * math.pi
 
 
@@ -36,7 +36,7 @@ def body_groups(vertices: Array, polygons: list[Polygon]) -> list[list[Polygon]]
     Raises
     ------
     GeometryError
-        if there are edges with one face, or edges of which it cannot be told which faces belong together
+        if there are edges with one face, or edges whose faces cannot be paired
     """
     owners: dict[Edge, list[int]] = defaultdict(list)
     for k, polygon in enumerate(polygons):
@@ -61,7 +61,7 @@ def body_groups(vertices: Array, polygons: list[Polygon]) -> list[list[Polygon]]
 
 
 def signed_volume(vertices: Array, polygons: list[Polygon]) -> float:
-    """Volume of closed bodies, negative if they are inside out: the sum over their faces, cut into fans [m³]."""
+    """Compute the volume of closed bodies, negative if they are inside out [m³]."""
     fans = [(one[0], one[k], one[k + 1]) for one in polygons for k in range(1, len(one) - 1)]
     a, b, c = (vertices[list(ids)] - vertices[polygons[0][0]] for ids in zip(*fans, strict=True))
     return float((a * np.cross(b, c)).sum()) / 6.0
@@ -74,7 +74,7 @@ def _edges(polygon: Polygon) -> Iterator[Edge]:
 def _grow(
     seed: int, polygons: list[Polygon], mates: dict[tuple[Edge, int], int], turned: dict[int, Polygon]
 ) -> list[int]:
-    """Go from face to face, turning each as its neighbour."""
+    """Collect the faces of a body from neighbour to neighbour, turning each like its neighbour."""
     members = [seed]
     for k in members:
         for a, b in _edges(turned[k]):
@@ -89,7 +89,7 @@ def _grow(
 def _mates_by_angle(
     vertices: Array, polygons: list[Polygon], owners: dict[Edge, list[int]]
 ) -> dict[tuple[Edge, int], int]:
-    """The other face of the same body at each edge of each face."""
+    """Find the other face of the same body at each edge of each face."""
     mates: dict[tuple[Edge, int], int] = {}
     for edge, faces in owners.items():
         forward = [k for k in faces if edge in set(_edges(polygons[k]))]
@@ -111,7 +111,7 @@ def _mates_by_angle(
 def _pairs(
     vertices: Array, edge: Edge, forward: list[Polygon], backward: list[Polygon]
 ) -> list[tuple[int, int]]:
-    """Go from each face through its inside to the next face of the other direction."""
+    """Pair each face with the next one of the other direction, through the interior."""
     axis = vertices[edge[1]] - vertices[edge[0]]
     frame = np.linalg.svd(axis[None, :])[2][1:]
     if np.linalg.det([*frame, axis]) < 0.0:
@@ -120,7 +120,7 @@ def _pairs(
     stops = [_angle(vertices, one, -axis, frame) for one in backward]
     pairs = []
     for i, start in enumerate(starts):
-        # a face seen from outside has its inside behind: by decreasing angle about its own direction
+        # the interior lies behind a face seen from outside: decreasing angle about its own direction
         turns = [(start - stop - _SAME_DIRECTION) % _FULL for stop in stops]
         pairs.append((i, min(range(len(stops)), key=turns.__getitem__)))
     if max(Counter(j for _, j in pairs).values()) > 1:
@@ -131,7 +131,7 @@ def _pairs(
 
 
 def _angle(vertices: Array, polygon: Polygon, direction: Array, frame: Array) -> float:
-    """Angle about the edge at which a face leaves it, which runs along the edge in this direction."""
+    """Return the angle about the edge at which a face leaves it, for its direction along the edge."""
     normal = area_vector(vertices[list(polygon)])
     u, v = frame @ np.cross(normal, direction)
     return math.atan2(float(v), float(u))

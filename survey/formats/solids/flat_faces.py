@@ -1,7 +1,7 @@
-"""Planar faces of a body: how flat polygons are, and which triangles lie in one plane.
+"""Planar faces of a body, merged from triangles.
 
-Meshes have planes cut into triangles, which say nothing of the stone; its faces are the planes. Triangles that share
-edges and lie in the plane of the largest of them become one polygon where their common boundary is one loop.
+In a mesh the planes of a stone are cut into triangles that are an artefact; its faces are the planes. Triangles that
+share edges and lie in the plane of the largest of them become one polygon where their common boundary is one loop.
 """
 
 from collections import defaultdict
@@ -16,13 +16,15 @@ __all__ = ["merge_flat", "rounding"]
 
 Polygon = tuple[int, ...]
 
-_BULGE = 1e-4  # of a polygon's size: what rounding to a few digits does to a plane one
-_SAME_PLANE = 1e-5  # of a body's size
-_SAME_SIDE = 0.9  # cosine between normals, which are poor in thin triangles: heights decide
+_BULGE = 1e-4  # warp of a plane polygon rounded to a few digits, over its size
+_SAME_PLANE = 1e-5  # distance from a common plane, over the size of the body
+_SAME_SIDE = (
+    0.9  # cosine between normals, a coarse test: those of thin triangles are poor, and heights decide
+)
 
 
 def rounding(corners: Array, resolution: float) -> float:
-    """By how much rounding to a few digits may lift a corner of a plane polygon out of its plane [m].
+    """Return how far rounding to a few digits can lift a corner of a plane polygon out of its plane [m].
 
     Parameters
     ----------
@@ -41,7 +43,7 @@ def merge_flat(
     ----------
     vertices : (nv, 3) [m]
     polygons : of a closed body, all counter-clockwise seen from outside
-    used : the vertices that they use
+    used : indices of their vertices
     resolution : of the coordinates [m]
     """
     triangles = np.array([one for one in polygons if len(one) == 3], dtype=np.intp).reshape(-1, 3)
@@ -60,7 +62,7 @@ def merge_flat(
 
 
 def _regions(vertices: Array, triangles: NDArray[np.intp], tolerance: float) -> list[list[int]]:
-    """Triangles that lie in one plane and share edges, the largest first."""
+    """Group triangles that lie in one plane and share edges, the largest first."""
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
     areas = np.linalg.norm(normals, axis=1)
@@ -89,7 +91,7 @@ def _edges(polygon: Sequence[int]) -> list[tuple[int, int]]:
 
 
 def _outline(triangles: list[list[int]]) -> Polygon | None:
-    """The one loop around a region; None if there are several, or it touches itself."""
+    """Return the loop around a region; None if there are several, or it touches itself."""
     inside = {edge for one in triangles for edge in _edges(one)}
     after = {p: q for p, q in inside if (q, p) not in inside}
     if len(after) != sum((q, p) not in inside for p, q in inside):
@@ -109,7 +111,7 @@ def _without_straight_corners(
     for polygon in (*merged, *kept):
         for i in polygon:
             faces_at[i] += 1
-    turns: dict[int, int] = defaultdict(int)  # in how many merged faces a corner turns, or is not merged
+    turns: dict[int, int] = defaultdict(int)  # number of faces that need the corner
     for polygon in kept:
         for i in polygon:
             turns[i] += 1
@@ -121,7 +123,7 @@ def _without_straight_corners(
 
 
 def _corners(vertices: Array, polygon: Polygon, faces_at: dict[int, int], tolerance: float) -> list[int]:
-    """Corners at which a polygon turns, or more than two faces meet."""
+    """Return the corners at which a polygon turns, or more than two faces meet."""
     n = len(polygon)
     fixed = [k for k in range(n) if faces_at[polygon[k]] != 2]
     if not fixed:

@@ -10,7 +10,7 @@ import numpy as np
 
 from moma.errors import SurveyError
 from survey.formats.fields import parse_number, shown
-from survey.formats.solids.bodies import RawBody
+from survey.formats.solids.bodies import RawBody, compact
 from survey.formats.text_lines import TextLines
 
 __all__ = ["obj_bodies"]
@@ -29,7 +29,7 @@ class _Object:
 
 
 def obj_bodies(path: Path) -> Iterator[RawBody]:
-    """Go through the objects of a file; where it has none, through its groups.
+    """Iterate over the objects of a file; where it has none, over its groups.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def obj_bodies(path: Path) -> Iterator[RawBody]:
 
 
 class _ObjReader:
-    """The vertices that have been read; objects may share them."""
+    """Reader of vertices and faces; objects may share vertices."""
 
     def __init__(self, path: str) -> None:
         self._path = path
@@ -107,16 +107,15 @@ class _ObjReader:
         return tuple(corners)
 
     def body(self, current: _Object, end: int) -> RawBody:
-        """The polygons of an object with the vertices that they use."""
-        used = sorted({i for polygon in current.polygons for i in polygon})
-        new = {old: k for k, old in enumerate(used)}
+        """Make the body of an object, with the vertices that it uses."""
+        used, polygons = compact(current.polygons)
         error = current.error
         if self._wrong and error is None:
             error = next((self._wrong[i] for i in used if i in self._wrong), None)
         return RawBody(
             current.name,
             np.array([self._places[3 * i : 3 * i + 3] for i in used]).reshape(-1, 3),
-            [tuple(new[i] for i in polygon) for polygon in current.polygons],
+            polygons,
             current.line,
             end,
             error=error,

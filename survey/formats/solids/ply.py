@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from moma.errors import SurveyError
-from survey.formats.fields import FARTHEST, parse_number, shown
-from survey.formats.solids.bodies import RawBody
+from survey.formats.fields import parse_number, shown, unreadable
+from survey.formats.solids.bodies import RawBody, check_coordinates
 from survey.formats.text_lines import TextLines
 
 __all__ = ["ply_bodies"]
 
-_TYPES = {  # by name: how struct calls them
+_TYPES = {  # by name: the code of `struct`
     **dict.fromkeys(("char", "int8"), "b"),
     **dict.fromkeys(("uchar", "uint8"), "B"),
     **dict.fromkeys(("short", "int16"), "h"),
@@ -27,7 +27,7 @@ _TYPES = {  # by name: how struct calls them
 _INTEGERS = "bBhHiI"
 _LISTS = ("vertex_indices", "vertex_index")
 _SINGLE = 2.0**-23  # relative resolution of single precision
-_LONGEST_HEADER = 1 << 16
+_LONGEST_HEADER = 1 << 16  # bytes
 _REMEDY = "export the PLY again"
 
 Row = dict[str, tuple[float, ...]]
@@ -55,7 +55,7 @@ def ply_bodies(path: Path) -> Iterator[RawBody]:
     Raises
     ------
     SurveyError
-        if the file is no PLY, or is not whole
+        if the file is not a PLY, or is cut short
     """
     start = _read(path, _LONGEST_HEADER)
     if not start.startswith((b"ply\n", b"ply\r\n")):
@@ -77,13 +77,11 @@ def _read(path: Path, size: int) -> bytes:
         with path.open("rb") as handle:
             return handle.read(size)
     except OSError as error:
-        raise SurveyError(
-            f"cannot be read: {error.strerror or error}", where=str(path), remedy="give an existing file"
-        ) from error
+        raise unreadable(path, error) from error
 
 
 def _header(lines: list[str], path: str) -> tuple[str | None, list[_Element]]:
-    """Byte order, None for text, and what comes in what order."""
+    """Return the byte order, None for text, and the elements in order."""
     orders = {"ascii": None, "binary_little_endian": "<", "binary_big_endian": ">"}
     order: str | None = ""
     elements: list[_Element] = []
@@ -141,7 +139,7 @@ class _TextRows:
         return tuple(parse_number(word, "number", where) for word in some)
 
     def check_end(self) -> None:
-        """Nothing may follow."""
+        """Check that no row follows."""
         number, _ = next(self._rows, (0, ""))
         if number:
             raise self._lines.fail(number, "more rows than the header has", _REMEDY)
@@ -170,7 +168,7 @@ class _BinaryRows:
         return out
 
     def check_end(self) -> None:
-        """Nothing may follow."""
+        """Check that no row follows."""
         if self._data[self._at :].strip():
             raise SurveyError("more rows than the header has", where=self._path, remedy=_REMEDY)
 
@@ -200,14 +198,9 @@ def _body(
                 polygons.append(tuple(int(one) for one in row[lists[0]]))
     rows.check_end()
     vertices = np.array(places, dtype=np.float64).reshape(-1, 3)
-    if not (np.abs(vertices) <= FARTHEST).all():
-        raise SurveyError(
-            f"a corner is not finite, or beyond {FARTHEST:g} m",
-            where=where,
-            remedy="coordinates are in metres",
-        )
+    check_coordinates(vertices, "corner", where)
     if any(not 0 <= index < len(vertices) for polygon in polygons for index in polygon):
-        raise SurveyError("a face with a corner that there is not", where=where, remedy=_REMEDY)
+        raise SurveyError("a face refers to a vertex that does not exist", where=where, remedy=_REMEDY)
     line = 1 if end else 0
     scale = float(np.abs(vertices).max(initial=0.0))
     return RawBody(path.stem, vertices, polygons, line, end, resolution * scale)

@@ -1,12 +1,11 @@
-"""Closed solids that other programs made: OBJ, PLY, STL and gmsh MSH, one stone per object.
+"""Closed solids from other programs: OBJ, PLY, STL and Gmsh MSH, one stone per object.
 
 An object is an ``o`` (or ``g``) of OBJ, a ``solid`` of STL, a volume of MSH, the whole of a PLY. Where one has several
-bodies, each is a stone: NAME-1, NAME-2, … The name is taken apart by the code template,
-{block}:{kind} by default; if it does not fit, it is the code itself, blanks replaced by "_".
+bodies, each is a stone: NAME-1, NAME-2, … The name is parsed by the code template, {block}:{kind} by default; if it
+does not fit, it is the code itself, blanks replaced by "_".
 
-Coordinates stay as they are in the file unless snapping is asked for: then faces of neighbours that match but for a
-tolerance are brought into common planes (`survey.joints.snapping.snapping`), for which all stones of the file must be
-there at once.
+Coordinates stay as they are in the file unless snapping is asked for: then faces of neighbours that match within a
+tolerance are brought into common planes (`survey.joints.snapping.snapping`), which needs all stones at once.
 """
 
 import re
@@ -34,7 +33,7 @@ from survey.records.survey import Reject, SolidRecord, SurveyStream
 __all__ = ["open_solids"]
 
 _CODES = "{block}:{kind}"
-_MOST_CHANGE = 0.1  # of its volume that snapping may take from a stone
+_MOST_CHANGE = 0.1  # largest relative change of a stone's volume by snapping
 _BODIES: Mapping[str, Callable[[Path], Iterator[RawBody]]] = {
     ".obj": obj_bodies,
     ".ply": ply_bodies,
@@ -44,12 +43,12 @@ _BODIES: Mapping[str, Callable[[Path], Iterator[RawBody]]] = {
 
 
 def open_solids(path: Path, options: ReadingOptions | None = None) -> SurveyStream:
-    """Begin to read a file of closed solids; its stones come one by one.
+    """Open a file of closed solids, whose stones are then read one by one.
 
     Parameters
     ----------
-    path : the file; its ending says what it is
-    options : the code template of names; kind of stones whose names do not say it; the unit; the tolerance of snapping;
+    path : the file; its ending names the format
+    options : the code template of names; kind of stones whose names have none; the unit; the tolerance of snapping;
         the head of another file
 
     Raises
@@ -57,20 +56,20 @@ def open_solids(path: Path, options: ReadingOptions | None = None) -> SurveyStre
     SurveyError
         naming the file, and the line if it is text, if it is wrong as a whole
     UsageError
-        if the ending is not known, or the code template has what a solid does not
+        if the ending is not known, or the code template has a field that solids do not have
     """
     options, path = options or ReadingOptions(), Path(path)
     template = CodeTemplate(options.codes or _CODES)
     for field in ("role", "zone"):
         if field in template.fields:
             raise UsageError(
-                f"code template {template.text!r} has a {field}, which solids have not",
+                f"code template {template.text!r} has a {field}, which solids do not have",
                 remedy="write e.g. {block}:{kind}",
             )
     bodies = _BODIES.get(path.suffix.lower())
     if bodies is None:
         raise UsageError(
-            f"ending {path.suffix!r} is none of solids",
+            f"ending {path.suffix!r} is not that of a format of solids",
             where=str(path),
             remedy=f"endings: {', '.join(_BODIES)}",
         )
@@ -88,7 +87,7 @@ def open_solids(path: Path, options: ReadingOptions | None = None) -> SurveyStre
 def _snapped(
     found: list[SolidRecord | Reject], tolerance: float, path: str
 ) -> tuple[list[SolidRecord | Reject], Snapping]:
-    """The same stones with the planes of their faces in common."""
+    """Bring matching faces of the stones into common planes."""
     records = [one for one in found if isinstance(one, SolidRecord)]
     given = [Solid(one.code, one.vertices, one.faces) for one in records]
     solids, snapping = snap(given, tolerance)
@@ -97,9 +96,9 @@ def _snapped(
 
 
 def _moved(record: SolidRecord, solid: Solid, snapping: Snapping, path: str) -> SolidRecord | Reject:
-    """The stone as it is now, if it is one still."""
+    """Return the moved stone if it is still a valid solid."""
     try:
-        with np.errstate(all="ignore"):  # a body without volume is found, and not warned of
+        with np.errstate(all="ignore"):  # a body without volume is an error below, not a warning
             check_watertight(solid)
             _check_volume(record, solid)
     except GeometryError as error:
@@ -121,14 +120,14 @@ def _check_volume(record: SolidRecord, solid: Solid) -> None:
 
 
 class _Solids:
-    """The solids of a file, and those that are none."""
+    """Reader of the solids of a file."""
 
     def __init__(self, path: Path, template: CodeTemplate, options: ReadingOptions) -> None:
         self._path, self._template, self._options = path, template, options
         self._known: set[str] = set()
 
     def records(self, first: RawBody, others: Iterator[RawBody]) -> Iterator[SolidRecord | Reject]:
-        """Go through the bodies of a file."""
+        """Iterate over the bodies of a file."""
         yield from self._stones(first)
         for raw in others:
             yield from self._stones(raw)
@@ -169,7 +168,7 @@ class _Solids:
 
 
 def _remarks(body: ClosedBody) -> tuple[str, ...]:
-    """What was settled of its faces."""
+    """Describe the changes made to the faces."""
     out = []
     if body.doubled:
         out.append(f"{body.doubled} faces were there twice")

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from moma.errors import SurveyError
-from survey.formats.fields import FARTHEST, parse_number, shown
-from survey.formats.solids.bodies import RawBody
+from survey.formats.fields import parse_number, shown, unreadable
+from survey.formats.solids.bodies import RawBody, check_coordinates
 from survey.formats.text_lines import TextLines
 
 __all__ = ["stl_bodies"]
@@ -24,7 +24,7 @@ _ORDER: Mapping[str, tuple[str, ...]] = {  # the line that must follow
 
 
 def stl_bodies(path: Path) -> Iterator[RawBody]:
-    """Go through the solids of a file; a binary file is one.
+    """Iterate over the solids of a file; a binary file is one.
 
     Raises
     ------
@@ -39,7 +39,7 @@ def stl_bodies(path: Path) -> Iterator[RawBody]:
 
 
 def _read_binary(path: Path) -> RawBody | None:
-    """The triangles of a binary file; None if its length is not that of one."""
+    """Read the triangles of a binary file; None if its length is not that of one."""
     from trimesh.exchange.stl import HeaderError, load_stl_binary
 
     try:
@@ -48,17 +48,9 @@ def _read_binary(path: Path) -> RawBody | None:
     except HeaderError:
         return None
     except OSError as error:
-        reason = error.strerror or error
-        raise SurveyError(
-            f"cannot be read: {reason}", where=str(path), remedy="give an existing file"
-        ) from error
+        raise unreadable(path, error) from error
     vertices = np.asarray(loaded.get("vertices", np.empty((0, 3))), dtype=np.float64).reshape(-1, 3)
-    if not (np.abs(vertices) <= FARTHEST).all():
-        raise SurveyError(
-            f"a corner is not finite, or beyond {FARTHEST:g} m",
-            where=str(path),
-            remedy="coordinates are in metres",
-        )
+    check_coordinates(vertices, "corner", str(path))
     triangles = [tuple(one) for one in np.arange(len(vertices)).reshape(-1, 3).tolist()]
     return RawBody(
         path.stem, vertices, triangles, resolution=_SINGLE * float(np.abs(vertices).max(initial=0.0))

@@ -1,4 +1,4 @@
-"""Assemblies as other programs write them: solids whose coordinates are rounded to a millimetre, and their truth.
+"""Assemblies as exported by other programs: solids with coordinates rounded to a millimetre, and their truth.
 
 A dome of hexagonal stones, whose joints are planes through its centre; and piers of angled stones, which are not
 convex. Rounding turns faces of more than three corners out of their plane and neighbours out of touch.
@@ -20,17 +20,17 @@ __all__ = ["RoundedAssembly", "angled_pier", "hexagonal_dome", "rounded"]
 
 
 _GOLDEN = math.pi * (3.0 - math.sqrt(5.0))  # turn from point to point of a spiral that fills a sphere evenly
-_NEAR = 14  # points among which the neighbours of one on the sphere are
-_SAME = 1e-9  # distance of corners that are one but for rounding [m]
+_NEAR = 14  # nearest points that include all neighbours of one on the sphere
+_SAME = 1e-9  # distance of identical corners, due to rounding [m]
 
 
 @dataclass(frozen=True)
 class RoundedAssembly:
-    """A synthetic assembly: no such one exists.
+    """A synthetic assembly.
 
     Attributes
     ----------
-    name : says what it is
+    name : a description
     solids : with coordinates rounded to a millimetre; not all need be convex
     truth : the same before rounding, in the same order
     parts : convex parts of the true solids; those of one stone bear its code
@@ -47,7 +47,7 @@ class RoundedAssembly:
 
 
 def rounded(solids: Sequence[Solid], decimals: int = 3) -> tuple[Solid, ...]:
-    """The same solids with coordinates as a file gives them."""
+    """Round the coordinates of solids to the decimals of a file."""
     return tuple(Solid(one.code, np.round(one.vertices, decimals) + 0.0, one.faces) for one in solids)
 
 
@@ -56,7 +56,7 @@ def hexagonal_dome(stones: int = 90, radius: float = 3.0, thickness: float = 0.3
 
     Parameters
     ----------
-    stones : how many
+    stones : their number
     radius, thickness : of the intrados, touched by every stone's lower face, and of the shell [m]
 
     Returns
@@ -107,7 +107,7 @@ def angled_pier(courses: int = 6, wing: float = 2.2, height: float = 0.3) -> Rou
 
 
 def _course(course: int, wing: float, depth: float = 0.4) -> dict[str, list[Array]]:
-    """By code, the outline of each stone on the ground, and those of its convex parts if it is not convex."""
+    """Return by code the outline of each stone on the ground, and those of its convex parts if it is not convex."""
     a, b = (1.0, 0.7) if course % 2 else (0.7, 1.0)
     out = {
         f"L{course:02d}": [
@@ -128,7 +128,7 @@ def _course(course: int, wing: float, depth: float = 0.4) -> dict[str, list[Arra
 
 
 def _upright(code: str, outline: Array, low: float, high: float) -> Solid:
-    """A prism on a counter-clockwise outline, turned about the vertical so that no coordinate is round."""
+    """Make a prism on a counter-clockwise outline, turned about the vertical so that no coordinate is round."""
     angle = 0.37
     turn = np.array([(math.cos(angle), math.sin(angle)), (-math.sin(angle), math.cos(angle))])
     flat = np.asarray(outline, dtype=float) @ turn + [3.1234567, 7.6543217]
@@ -137,7 +137,7 @@ def _upright(code: str, outline: Array, low: float, high: float) -> Solid:
 
 
 def _cell(code: str, planes: Array, inside: Array) -> Solid:
-    """The convex solid within half-spaces n·x + d ≤ 0 (n, 4), with one polygon for each that bounds it."""
+    """Make the convex solid within half-spaces n·x + d ≤ 0 (n, 4), with one polygon for each that bounds it."""
     points = HalfspaceIntersection(planes, inside).intersections
     keep: list[Array] = []
     for point in points:

@@ -1,4 +1,4 @@
-"""A wall of two facings and a core that nobody sees, with headers that reach into it and stones that go through."""
+"""A wall of two facings and a hidden core, with headers that reach into it and through stones."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,22 +20,20 @@ BACK = "inside"
 """Name of the station from which the second facing was seen."""
 
 _DEPTHS = {"header": 0.45, "stretcher": 0.26}  # of the stones of a facing [m]
-_EVERY, _COURSES, _LENGTH = (
-    2.4,
-    3,
-    0.40,
-)  # one stone goes through every so many metres and courses, so long [m]
+_EVERY = 2.4  # distance of through stones along a course [m]
+_COURSES = 3  # courses from one row of through stones to the next
+_LENGTH = 0.40  # of a through stone along the wall [m]
 
 
 @dataclass(frozen=True)
 class TwoFacings:
-    """A synthetic wall of two facings, and what is true of its core.
+    """A synthetic wall of two facings, and the truth about its core.
 
     Attributes
     ----------
-    building : all stones; those that go through were surveyed in the first facing, with the depth of the wall
-    first, second : codes of the stones of each facing, the stones that go through left out
-    through : codes of the stones that go through
+    building : all stones; through stones were surveyed in the first facing, with the depth of the wall
+    first, second : codes of the stones of each facing, without through stones
+    through : codes of the through stones
     thickness : from face to face [m]
     storeys : first and last course of each storey
     core_volumes : volume of the core in each storey, between the stones [m³]
@@ -66,11 +64,11 @@ def two_facings(
     courses : of both facings, whose beds are at the same heights
     seed : of Python's own generator, whose stream is the same everywhere
     thickness : from face to face; more than 0.95, so that headers of both sides do not meet [m]
-    storeys : into which the courses are divided; a record's zone names its facing and storey
+    storeys : number of storeys; a record's zone names its facing and storey
 
     Returns
     -------
-    TwoFacings. Codes are F<course>-<number> in the first facing, B… in the second, T… for those that go through
+    TwoFacings. Codes are F<course>-<number> in the first facing, B… in the second, T… for through stones
     """
     rng = Random(seed)
     heights = bed_heights(rng, courses)
@@ -113,7 +111,7 @@ def two_facings(
 
 
 def _through(heights: Sequence[float], ends: tuple[float, float]) -> list[list[Piece]]:
-    """By course, the stones that go through: one above the other in every third course, set off in turn."""
+    """Place through stones by course: one above the other in every third course, offset in turn."""
     out: list[list[Piece]] = [[] for _ in heights[1:]]
     for course in range(1, len(out), _COURSES):
         middle = 0.5 * (heights[course] + heights[course + 1])
@@ -125,13 +123,13 @@ def _through(heights: Sequence[float], ends: tuple[float, float]) -> list[list[P
 
 
 def _mirrored(piece: Piece) -> Piece:
-    """A stone with upright ends, seen from the other side."""
+    """Mirror a stone with upright ends, as seen from the other side."""
     left, right = (-line.point[0] for line in (piece.right, piece.left))
     return Piece(piece.kind, upright(left, piece.left.point[1]), upright(right, piece.left.point[1]))
 
 
 def _draft(plan: PlannedStone, frame: WallFrame, zone: str, through: float | None, rng: Random) -> Draft:
-    """A stone of a facing; one that goes through has its two faces in those of the wall."""
+    """Draft a stone of a facing; a through stone has its two faces in those of the wall."""
     stone = (
         flat_stone(plan, through, frame)
         if through is not None
@@ -142,7 +140,7 @@ def _draft(plan: PlannedStone, frame: WallFrame, zone: str, through: float | Non
 
 
 def _core(solids: Sequence[Solid], frame: WallFrame, span: tuple[int, int], thickness: float) -> float:
-    """Volume between the hidden sides of the two facings over some courses [m³].
+    """Compute the volume between the hidden sides of the two facings over some courses [m³].
 
     Behind each stone, from its hidden side to the middle of the wall, lies a prism square to the wall: its
     section times the length at the section's centroid, since both ends are planes.
@@ -161,7 +159,7 @@ def _core(solids: Sequence[Solid], frame: WallFrame, span: tuple[int, int], thic
 
 
 def _mean_over(polygon: np.ndarray, values: np.ndarray) -> float:
-    """Mean over a plane polygon of what is linear on it and known at its corners."""
+    """Average over a plane polygon a linear function that is known at its corners."""
     areas, means = [], []
     normal = area_vector(polygon)
     for k in range(1, len(polygon) - 1):

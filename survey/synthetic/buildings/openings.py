@@ -38,8 +38,8 @@ class Opening:
     jambs : its courses from first to last; the arch springs from the last
     arch : courses that the arch spans, from first to last
     radials : joints of the arch from left to right, both ends included
-    upright_ends : whether the arch ends at upright lines, else at its skewbacks
-    reach : farthest from the axis that the arch lies [m]
+    upright_ends : whether the arch ends at upright lines instead of skewbacks
+    reach : largest distance of the arch from the axis [m]
     springing, back : heights at which it begins and ends [m]
     """
 
@@ -53,7 +53,7 @@ class Opening:
     back: float
 
     def edges(self, course: int, height: float) -> tuple[Line, Line, str] | None:
-        """Where a course ends at the opening, left and right, and the kind that stands there; None: it runs through."""
+        """Return the lines where a course ends at the opening, and the kind of stone there; None if it runs through."""
         if self.jambs[0] <= course <= self.jambs[1]:
             return upright(-self.half, height), upright(self.half, height), "jamb"
         if not self.arch[0] <= course <= self.arch[1]:
@@ -63,11 +63,11 @@ class Opening:
         return self.radials[0], self.radials[-1], "springer"
 
     def beside(self, course: int) -> tuple[float, float]:
-        """Lengths of the stones at the left and right edge of a course [m]."""
+        """Return the lengths of the stones at the left and right edge of a course [m]."""
         return _JAMBS if course % 2 else _JAMBS[::-1]
 
     def voussoirs(self) -> list[PlannedStone]:
-        """The stones of the arch, from left to right."""
+        """Outline the stones of the arch, from left to right."""
         stones = []
         keystone = (len(self.radials)) // 2
         for rank, (left, right) in enumerate(pairwise(self.radials), start=1):
@@ -77,7 +77,7 @@ class Opening:
         return stones
 
     def _outer(self, radial: Line) -> tuple[float, float]:
-        """Outer end of a joint of the arch."""
+        """Return the outer end of a joint of the arch."""
         if self.upright_ends:
             side = math.copysign(self.reach, radial.point[0])
             s, t = (
@@ -131,7 +131,7 @@ def _segment(half: float, rise: float, springing: float) -> list[Line]:
 
 
 def _semicircle(half: float, reach: float, springing: float, beds: Sequence[float]) -> list[Line]:
-    """Joints through the ends of the beds on the right, then between the corners of the arch's back."""
+    """Lay out joints through the ends of the beds, and between the corners of the arch's back."""
     sides = [math.pi / 2.0 - math.atan2(bed - springing, reach) for bed in beds]
     corner = sides[-1]
     count = round(2.0 * corner * half / _INTRADOS) // 2 * 2 + 1
@@ -140,6 +140,6 @@ def _semicircle(half: float, reach: float, springing: float, beds: Sequence[floa
 
 
 def _radial(angle: float, radius: float, centre: float) -> Line:
-    """Joint at an angle from upright, positive to the right; its point is on the intrados."""
+    """Return the joint at an angle from upright, positive to the right, with its point on the intrados."""
     direction = (math.sin(angle), math.cos(angle))
     return Line((radius * direction[0], centre + radius * direction[1]), direction)

@@ -1,4 +1,4 @@
-"""Two walls that meet at a corner, bonded by quoins that show both their sides."""
+"""Two walls that meet at a corner, bonded by quoins with two visible sides."""
 
 import math
 from dataclasses import replace
@@ -27,8 +27,8 @@ _AZIMUTH = math.radians(11.0)  # of the first wall against the x axis
 def corner(courses: int = 8, length: float = 3.0, seed: int = 1) -> Building:
     """Build two walls that meet at a right angle, and measure their outer faces.
 
-    Quoins lie with their long side in either wall in turn. They are surveyed with the face that they show in the
-    first wall, and with the depth that can be seen in the second.
+    Quoins lie with their long side in either wall in turn. They are surveyed by their face in the first wall, with the
+    depth that is visible in the second.
 
     Parameters
     ----------

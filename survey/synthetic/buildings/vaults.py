@@ -17,7 +17,7 @@ __all__ = ["barrel_vault", "semicircular_arch"]
 
 _FOOT = np.array([14.2, 31.75, 5.6])  # of the axis in the site [m]
 _AZIMUTH = math.radians(23.0)  # of a vault's span, of an arch's face against the x axis
-_JITTER = 0.06  # by which head joints of a vault in bond are off the regular bond [m]
+_JITTER = 0.06  # largest deviation of head joints from a regular bond [m]
 
 
 def barrel_vault(
@@ -33,7 +33,7 @@ def barrel_vault(
     """Build a semicircular barrel vault and measure its intrados from below.
 
     The stones are wedges between planes through the axis; their faces are chords of the intrados, plane and of four
-    sides. What is measured is the face and the thickness: sides of neighbours open like wedges.
+    sides. The face and the thickness are measured: sides of neighbours open like wedges.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def _kind(number: int, count: int) -> str:
 
 
 def _heads(course: int, rings: int, length: float, bonded: bool, rng: Random) -> list[float]:
-    """Head joints of a course along the axis, ends included [m]."""
+    """Return the head joints of a course along the axis, ends included [m]."""
     if not bonded:
         return [k * length for k in range(rings + 1)]
     first = 0.5 if course % 2 else 1.0
@@ -126,7 +126,7 @@ def _rectangle(code: str, kind: str, course: int, half: float, ends: tuple[float
 
 
 def _wedge(plan: PlannedStone, frame: WallFrame, apothem: float, thickness: float) -> TrueStone:
-    """A stone whose sides lie on planes through the axis, `apothem` in front of its face."""
+    """Make a stone whose sides lie on planes through the axis, `apothem` in front of its face."""
     front = frame.place(plan.corners)
     wider = plan.corners * [(apothem + thickness) / apothem, 1.0]
     solid = prism(plan.code, front, frame.place(wider, -thickness))

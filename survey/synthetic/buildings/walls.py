@@ -28,17 +28,17 @@ DEPTHS = {
 _COURSE = (0.26, 0.34)  # heights of courses [m]
 _STONE = 0.51 * 0.30  # mean face of a stone [m²]
 _SLENDER = 2.2  # length over height of a wall
-_APART = 0.95  # of stones that span two courses, and from the ends of their run [m]
+_APART = 0.95  # distance of stones that span two courses, and from the ends of their run [m]
 
 
 @dataclass(frozen=True)
 class Course:
-    """What was laid in a course.
+    """The stones of a course.
 
     Attributes
     ----------
     pieces : from left to right
-    tall : which of them reach through the next course too
+    tall : indices of those that reach through the next course too
     """
 
     pieces: tuple[Piece, ...]
@@ -52,7 +52,7 @@ def wall(
 
     Parameters
     ----------
-    stones : about how many
+    stones : their approximate number
     seed : of Python's own generator, whose stream is the same everywhere
     arch : of an opening in its middle; needs about 60 stones
     sag : by which beds sag over 10 m, along a parabola [m]; not together with an arch
@@ -92,7 +92,7 @@ def wall(
 
 
 def bed_heights(rng: Random, courses: int) -> list[float]:
-    """Heights of the beds, from the ground to the top [m]."""
+    """Draw the heights of the beds, from the ground to the top [m]."""
     heights = [0.0]
     for _ in range(courses):
         heights.append(heights[-1] + rng.uniform(*_COURSE))
@@ -111,12 +111,12 @@ def plan_courses(
 
     Parameters
     ----------
-    rng : source of chance
+    rng : random numbers
     heights : of the beds [m]
     ends : of the wall [m]
     opening : to be left open
     snecked : share of the stones that are two courses high [-]
-    through : by course, stones that are already in their place; none if shorter than the course's number
+    through : by course, stones that are already in place; courses beyond its length have none
     """
     courses: list[Course] = []
     below: list[float] = []
@@ -145,7 +145,7 @@ def plan_courses(
 def _runs(
     blocked: Sequence[Piece], opening: Opening | None, number: int, middle: float, ends: tuple[float, float]
 ) -> list[tuple[Line, Line]]:
-    """Stretches of a course that are to be filled, between what is already there."""
+    """Return the stretches of a course to be filled, between stones already in place."""
     gaps = [(piece.left, piece.right) for piece in blocked]
     edges = opening.edges(number, middle) if opening is not None else None
     if edges is not None:
@@ -169,7 +169,7 @@ def _fill_beside(
     middle: float,
     below: Sequence[float],
 ) -> list[Piece]:
-    """Fill a run; beside an opening stands a stone of its own kind."""
+    """Fill a run, with a stone of a special kind beside an opening."""
     edges = opening.edges(number, middle) if opening is not None else None
     if opening is None or edges is None or edges[2] == "stretcher":
         return fill_run(rng, start, stop, middle, below)
@@ -194,7 +194,7 @@ def _clear(place: float, outward: int, below: Sequence[float]) -> float:
 def _forbidden(
     ends: tuple[float, float], opening: Opening | None, blocked: Sequence[Piece], middle: float
 ) -> list[tuple[float, float]]:
-    """Where no stone may be two courses high: near ends, near such stones, near the opening."""
+    """Return the stretches without stones two courses high: near ends, such stones and the opening."""
     out = [(ends[0], ends[0]), (ends[1], ends[1])]
     out += [(piece.left.at(middle), piece.right.at(middle)) for piece in blocked]
     if opening is not None:
@@ -223,7 +223,7 @@ def _tall(
 def _outlines(
     courses: Sequence[Course], heights: Sequence[float], sag: float
 ) -> list[tuple[PlannedStone, tuple[int, ...]]]:
-    """Outlines of all stones of the courses, once the beds are known."""
+    """Outline all stones of the courses, once the beds are known."""
     beds = _beds(courses, heights, sag)
     return [
         planned(
@@ -239,7 +239,7 @@ def _outlines(
 
 
 def _beds(courses: Sequence[Course], heights: Sequence[float], sag: float) -> list[Bed]:
-    """The beds: level, or bent at the head joints of the stones that end below them."""
+    """Lay out the beds: level, or bent at the head joints of the stones that end below them."""
     if not sag:
         return [Bed(height) for height in heights]
     beds = [_bent(courses[0].pieces, heights[0], sag)]
@@ -252,7 +252,7 @@ def _beds(courses: Sequence[Course], heights: Sequence[float], sag: float) -> li
 
 
 def _bent(below: Sequence[Piece], height: float, sag: float) -> Bed:
-    """The bed on some stones, at each of their head joints on a parabola that falls by `sag` over 5 m."""
+    """Lay out the bed on some stones: at their head joints it is on a parabola that falls by `sag` over 5 m."""
     corners = set()
     for piece in below:
         for line in (piece.left, piece.right):

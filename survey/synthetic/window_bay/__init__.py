@@ -1,1 +1,4 @@
-"""The sample survey of a wall with a window."""
+"""The sample survey of a wall with a window.
+
+Public: `make_sample`, `write_sample`, `truth_of` (sample); `plan_window` (window).
+"""

@@ -1,4 +1,4 @@
-"""The whole sample: plan, stones, measurement, and the two files that say it."""
+"""The whole sample: plan, stones, measurement, and its two files."""
 
 import json
 from dataclasses import dataclass, replace
@@ -17,7 +17,7 @@ from survey.synthetic.window_bay.window import plan_window
 __all__ = ["SEED", "Sample", "make_sample", "truth_of", "write_sample"]
 
 SEED = 2000
-BLUNDERS = 12
+BLUNDERS = 12  # points with a gross error
 SOURCE = "synthetic value, chosen for this sample"
 OWN_SOURCE = "synthetic value, as if measured at the open end of the panel"
 OWN_DEPTH_SIGMA = 0.01
@@ -34,13 +34,13 @@ DEPTHS = {
 
 @dataclass(frozen=True)
 class Sample:
-    """A survey, with everything that is true of it.
+    """A survey with its truth.
 
     Attributes
     ----------
-    survey : what the file says
+    survey : contents of the file
     frame : the wall's frame in the site
-    stones, measured : the true stones, and how each was measured, in the same order
+    stones, measured : the true stones and their measurements, in the same order
     """
 
     survey: Survey
@@ -77,7 +77,7 @@ def make_sample(seed: int = SEED) -> Sample:
 
 
 def _with_own_depth(measured: Measured, stone: TrueStone) -> Measured:
-    """A header at the open end of the panel: its whole depth can be seen there, and measured."""
+    """Add the depth of a header at the open end of the panel, where it is visible and measured."""
     return replace(
         measured,
         record=replace(
@@ -87,7 +87,7 @@ def _with_own_depth(measured: Measured, stone: TrueStone) -> Measured:
 
 
 def truth_of(sample: Sample) -> dict[str, object]:
-    """Say the truth in plain lists, rounded far below any tolerance: the file is the same everywhere."""
+    """Return the truth in plain lists, rounded far below any tolerance, so that the file is the same everywhere."""
     return {
         "about": "true geometry of window.moma; indices count from 0 in the order of the file",
         "seed": SEED,
@@ -98,7 +98,7 @@ def truth_of(sample: Sample) -> dict[str, object]:
 
 
 def write_sample(directory: Path) -> tuple[Path, Path]:
-    """Write window.moma and truth.json into a folder, made if need be; return their paths."""
+    """Write window.moma and truth.json into a folder, created if necessary; return their paths."""
     directory.mkdir(parents=True, exist_ok=True)
     sample = make_sample()
     survey, truth = directory / "window.moma", directory / "truth.json"
@@ -108,7 +108,7 @@ def write_sample(directory: Path) -> tuple[Path, Path]:
 
 
 def _dumped(truth: dict[str, object]) -> str:
-    """JSON with one line for each entry and for each stone."""
+    """Write JSON with one line for each entry and for each stone."""
     lines = [f'"{key}": {json.dumps(value)}' for key, value in truth.items() if key != "stones"]
     stones = ",\n".join(json.dumps(stone) for stone in cast(list[object], truth["stones"]))
     return "{\n" + ",\n".join([*lines, f'"stones": [\n{stones}\n]']) + "\n}\n"

@@ -2,8 +2,7 @@
 
 Courses 1–2 carry the sill (3), the jambs (4–7) frame the opening, the arch spans courses 8–9 between the
 skewbacks of the springers, courses 10–12 load it. The arch's joints are radial, its intrados is a chord
-polygon,
-its extrados is the bed line of course 10, so that every stone is a quadrilateral.
+polygon, its extrados is the bed line of course 10, so that every stone is a quadrilateral.
 """
 
 import math
@@ -18,20 +17,21 @@ from survey.synthetic.bond import Line, PlannedStone, crossing, fill, level, upr
 __all__ = ["plan_window"]
 
 LEFT, RIGHT = -2.35, 2.45  # ends of the panel [m]; s = 0 is the axis of the window
-HEIGHT = 3.90
+HEIGHT = 3.90  # of the panel [m]
 COURSES = 12
 SILL_COURSE, JAMB_COURSES, ARCH_COURSES = 3, (4, 5, 6, 7), (8, 9)
-HALF_OPENING = 0.60
-SILL_BEARING = 0.20
-RISE = 0.20  # of the intrados above its springing
+HALF_OPENING = 0.60  # half the width of the window [m]
+SILL_BEARING = 0.20  # length of the sill beyond the opening [m]
+RISE = 0.20  # of the intrados above its springing [m]
 VOUSSOIRS = 7
-JAMB_LENGTHS = (0.42, 0.62)  # short and long in turn, so that the jambs bond with the wall
-CLEARANCE, CLEARANCE_OVER_ARCH = 0.09, 0.05  # between head joints of neighbouring courses [m]
+JAMB_LENGTHS = (0.42, 0.62)  # short and long in turn, so that the jambs bond with the wall [m]
+CLEARANCE = 0.09  # between head joints of neighbouring courses [m]
+CLEARANCE_OVER_ARCH = 0.05  # the same above the arch, whose joints are closer [m]
 
 
 @dataclass(frozen=True)
 class _Piece:
-    """One stone of a course: what it is, and where it ends on the right."""
+    """One stone of a course: its kind, and its right end."""
 
     kind: str
     end: Line
@@ -60,7 +60,7 @@ def _bed_heights(rng: Random) -> list[float]:
 
 
 def _radials(springing: float) -> list[Line]:
-    """Radial joints of the arch from left to right, the two springings included."""
+    """Lay out the radial joints of the arch from left to right, the two springings included."""
     radius = (HALF_OPENING**2 + RISE**2) / (2.0 * RISE)
     half_angle = math.asin(HALF_OPENING / radius)
     centre = (0.0, springing + RISE - radius)
@@ -75,7 +75,7 @@ def _radials(springing: float) -> list[Line]:
 def _runs(
     rng: Random, course: int, low: float, high: float, radials: list[Line], below: list[float]
 ) -> list[tuple[Line, list[_Piece]]]:
-    """Unbroken runs of stones of one course: the line each begins at, and its stones."""
+    """Fill the unbroken runs of stones of one course; return the line that each begins at, and its stones."""
     middle = 0.5 * (low + high)
     left, right = upright(LEFT, middle), upright(RIGHT, middle)
     if course in JAMB_COURSES:
@@ -140,7 +140,7 @@ def _course_stones(
 
 
 def _is_free(line: Line, ends: tuple[float, ...]) -> bool:
-    """Whether a line is an end of the panel or a reveal of the opening: only those are exactly upright."""
+    """Return whether a line is an end of the panel or a reveal of the opening; only those are exactly upright."""
     return line.direction == (0.0, 1.0) and line.point[0] in ends
 
 

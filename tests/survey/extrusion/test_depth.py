@@ -1,4 +1,4 @@
-"""How deep a stone is: which evidence counts, whatever the order in which it is written."""
+"""Depth of a stone by the best evidence, in whatever order the rules are written."""
 
 from itertools import permutations
 

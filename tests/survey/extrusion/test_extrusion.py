@@ -14,6 +14,7 @@ from moma.errors import GeometryError
 from survey.extrusion.depth import Depth
 from survey.extrusion.extrusion import extrude
 from survey.faces.faces import outline_face
+from survey.geometry.solids import volume_of
 from survey.geometry.watertight import check_watertight
 from survey.records.survey import BlockRecord, Extrusion
 
@@ -34,22 +35,15 @@ def deep(value=0.5, sigma=0.02):
     return Depth(value, sigma, "guess", "kind", 3)
 
 
-def volume(solid):
-    """By the divergence theorem, over fans of triangles."""
-    p = solid.vertices - solid.vertices[0]
-    fans = [(f[0], f[k], f[k + 1]) for f in solid.faces for k in range(1, len(f) - 1)]
-    return sum(float(np.dot(p[a], np.cross(p[b], p[c]))) for a, b, c in fans) / 6.0
-
-
 def behind(block):
-    """Hidden corner behind each measured corner, in the order of CORNERS."""
+    """Return the hidden corner behind each measured corner, in the order of CORNERS."""
     order = np.argsort(block.face.corner_of)
     return block.solid.vertices[4:][order], block.vertex_sigma[:4][order], block.vertex_sigma[4:][order]
 
 
 def test_square_to_the_face_the_volume_is_area_times_depth():
     block = extrude(face_of(), deep())
-    assert volume(block.solid) == pytest.approx(AREA * 0.5)
+    assert volume_of(block.solid) == pytest.approx(AREA * 0.5)
     np.testing.assert_allclose(behind(block)[0], CORNERS + np.array([0.0, 0.5, 0.0]), atol=1e-12)
     check_watertight(block.solid, convex=True)
 
@@ -60,7 +54,7 @@ def test_along_a_direction_the_depth_is_measured_along_it(angle, size):
     towards = np.array([sin(radians(angle)), cos(radians(angle)), 0.0])
     block = extrude(face_of(), deep(), Extrusion(size * towards))
     np.testing.assert_allclose(behind(block)[0], CORNERS + 0.5 * towards, atol=1e-12)
-    assert volume(block.solid) == pytest.approx(AREA * 0.5 * cos(radians(angle)))
+    assert volume_of(block.solid) == pytest.approx(AREA * 0.5 * cos(radians(angle)))
     check_watertight(block.solid, convex=True)
 
 
@@ -71,7 +65,7 @@ def test_a_tapered_stone_is_a_frustum(tail, depth, angle):
     towards = np.array([0.0, cos(radians(angle)), sin(radians(angle))])
     block = extrude(face_of(), deep(depth), Extrusion(towards, tail))
     high = depth * cos(radians(angle))
-    assert volume(block.solid) == pytest.approx(high * AREA * (1.0 + tail + tail**2) / 3.0, rel=1e-9)
+    assert volume_of(block.solid) == pytest.approx(high * AREA * (1.0 + tail + tail**2) / 3.0, rel=1e-9)
     hidden = behind(block)[0]
     np.testing.assert_allclose(hidden.mean(axis=0), CORNERS.mean(axis=0) + depth * towards, atol=1e-12)
     np.testing.assert_allclose(hidden[1] - hidden[0], [tail * LENGTH, 0.0, 0.0], atol=1e-12)
@@ -81,7 +75,7 @@ def test_an_l_shaped_face_tapers_as_a_whole():
     flat = np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]], dtype=float)
     corners = np.column_stack([flat[:, 0], np.zeros(6), flat[:, 1]])
     block = extrude(face_of(corners), deep(0.9), Extrusion(tail=0.5))
-    assert volume(block.solid) == pytest.approx(0.9 * 3.0 * (1.0 + 0.5 + 0.25) / 3.0)
+    assert volume_of(block.solid) == pytest.approx(0.9 * 3.0 * (1.0 + 0.5 + 0.25) / 3.0)
     check_watertight(block.solid)
 
 
@@ -186,7 +180,7 @@ def test_far_from_the_origin_nothing_is_lost():
 
 
 def twin_of(block):
-    """What the kernel computes, in matrices."""
+    """Compute the result of the kernel in matrices."""
     face, fit, tail, count = block.face, block.face.fit, block.extrusion.tail, len(block.face.outline)
     hidden, direction = block.solid.vertices[count:], block.extrusion.direction
     into = -fit.normal if direction is None else direction / np.linalg.norm(direction)

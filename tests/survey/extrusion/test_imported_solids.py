@@ -1,4 +1,4 @@
-"""Solids of other programs: which side is the face, and how deep the stone is behind it."""
+"""Imported solids: their visible side, and the depth of the stone behind it."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ def box(x, y, z):
 
 
 def prism(outline, depth):
-    """Of a polygon (x, z), counter-clockwise seen from -y, at y = 0, to y = depth."""
+    """Make the prism of a polygon (x, z), counter-clockwise seen from -y, at y = 0, to y = depth."""
     front = [(x, 0.0, z) for x, z in outline]
     n = len(front)
     sides = [(i, i + n, (i + 1) % n + n, (i + 1) % n) for i in range(n)]

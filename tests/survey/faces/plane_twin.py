@@ -1,4 +1,4 @@
-"""The plane of a face without its blunders, as `survey.faces.planes` finds it, in slow and readable numpy."""
+"""The robust plane of a face as `survey.faces.planes` finds it, in slow and readable numpy."""
 
 import math
 from dataclasses import dataclass
@@ -13,6 +13,16 @@ LIMIT = 3.29
 EROSION = 0.03
 GRAZING = 0.17
 TILT = math.radians(10.0)
+
+# Reference case P01, "TLS plane, exact checkerboard set" (closed form): x in {-3,-1,1,3},
+# y in {-1.5,-.5,.5,1.5}, z = ±0.01 alternating, i + j odd → +
+CHECKERBOARD = np.array(
+    [
+        (x, y, 0.01 if (i + j) % 2 else -0.01)
+        for i, x in enumerate((-3.0, -1.0, 1.0, 3.0))
+        for j, y in enumerate((-1.5, -0.5, 0.5, 1.5))
+    ]
+)
 
 
 @dataclass(frozen=True)
@@ -49,7 +59,7 @@ def largest_sum(redundancy: int) -> float:
 
 
 def accepted_points(points: Array, sigma: Array, known: bool, observer: Array | None) -> Bools:
-    """What `fit_plane` does not reject, (n,)."""
+    """Return the points that `fit_plane` accepts, (n,)."""
     kept = compact(points)
     part = plane_of(points - points[0], 1.0 / sigma, kept)
     wide = part is not None and part.singular[1] > max(0.15 * part.singular[0], 3.0 / TILT if known else 0.0)

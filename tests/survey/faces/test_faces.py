@@ -7,6 +7,7 @@ from moma.errors import GeometryError, SurveyError
 from survey.extrusion.depth import depth_for
 from survey.extrusion.extrusion import extrude
 from survey.faces.faces import outline_face
+from survey.geometry.solids import volume_of
 from survey.geometry.watertight import check_watertight
 from survey.records.survey import BlockRecord, DepthRule
 
@@ -113,12 +114,7 @@ def test_any_simple_outline_extrudes_to_a_watertight_solid_of_area_times_depth(
     block = extrude(face, depth_for(record(SQUARE), RULES))
     check_watertight(block.solid)
     area = 0.5 * abs(flat[:, 0] @ np.roll(flat[:, 1], -1) - flat[:, 1] @ np.roll(flat[:, 0], -1))
-    vertices, volume = block.solid.vertices - block.solid.vertices.mean(axis=0), 0.0
-    for polygon in (vertices[list(f)] for f in block.solid.faces):
-        volume += (
-            sum(polygon[0] @ np.cross(polygon[k], polygon[k + 1]) for k in range(1, len(polygon) - 1)) / 6
-        )
-    assert volume == pytest.approx(area * 0.5, rel=1e-9)
+    assert volume_of(block.solid) == pytest.approx(area * 0.5, rel=1e-9)
 
 
 def test_a_solid_with_a_hole_or_inside_out_is_refused_by_name() -> None:

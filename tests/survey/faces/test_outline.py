@@ -1,4 +1,4 @@
-"""The outline of a face: what it measures, which order goes around, which corners are one."""
+"""The outline of a face: its measures, the order of its corners, and corners measured twice."""
 
 import math
 from itertools import permutations
@@ -185,7 +185,7 @@ def test_what_is_no_polygon_is_refused_with_its_numbers(flat, words):
 
 
 def crosses(points, i, j):
-    """By the side of each segment on which the ends of the other lie."""
+    """Return whether two segments cross, by the sides on which the ends of each lie."""
 
     def side(a, b, c):
         return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

@@ -1,4 +1,4 @@
-"""Verdicts on the shapes of simulated faces: how often they are right, and how often an alarm is false."""
+"""Verdicts on the shapes of simulated faces: rates of right ones and of false alarms."""
 
 import time
 from collections import Counter

@@ -1,4 +1,4 @@
-"""Whatever is done to a file, it is read correctly or refused with a place: no crash, no hang, nothing by halves."""
+"""A damaged file is read correctly or refused with a place: no crash, no hang, no partial result."""
 
 import random
 import re
@@ -140,7 +140,7 @@ def mutated(example: Example, seed: int) -> bytes:
 
 
 def read_or_locate(path: Path, format: str, data: bytes) -> bool:
-    """Go through a file; whether all of it was accepted."""
+    """Read a file; return whether all of it was accepted."""
     path.write_bytes(data)
     whole, stones = True, 0
     try:
@@ -171,7 +171,7 @@ def check_place(error: MomaError, path: Path) -> None:
 
 
 def check_block(one: BlockRecord, data: bytes, format: str) -> None:
-    """It is sound, and no line of its own was left out."""
+    """Check that a block is sound, and that none of its lines was left out."""
     measured = np.vstack([one.points, one.vertices])
     assert np.isfinite(measured).all()
     assert np.abs(measured).max(initial=0.0) <= 1e8
@@ -192,7 +192,7 @@ def check_block(one: BlockRecord, data: bytes, format: str) -> None:
 
 
 def naive(lines: list[str], word: str) -> list[list[float]]:
-    """Coordinates of a native stone, read with no questions asked."""
+    """Read the coordinates of a native stone without any check."""
     rows = [line.split() for line in lines]
     return [[float(text) for text in row[1:4]] for row in rows if row and row[0] == word]
 

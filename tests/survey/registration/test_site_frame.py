@@ -286,7 +286,7 @@ def test_four_inconsistent_points_name_the_suspicious_ones() -> None:
 def test_precision_that_was_overstated_is_refused_as_a_contradiction() -> None:
     rng = np.random.default_rng(2)
     points = control(WALL + rng.normal(0, 0.03, WALL.shape), transformed(WALL))
-    with pytest.raises(SurveyError, match="times less precise than was said"):
+    with pytest.raises(SurveyError, match="times less precise than stated"):
         fit_similarity(points)
 
 

@@ -1,9 +1,10 @@
-"""Stone faces as they might be measured, and what is exactly true of them."""
+"""Simulated stone faces, and their exact truth."""
 
 from dataclasses import dataclass
 
 import mpmath
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 # rows of 9 R and 3 R for rotations R by integer quaternions: rational, so whatever they turn is known exactly
 NINTHS = np.array([[1, -8, 4], [4, 4, 7], [-8, 1, 4]])
@@ -11,16 +12,8 @@ THIRDS = np.array([[2, -1, 2], [2, 2, -1], [-1, 2, 2]])
 
 
 def turned(rng):
-    """Random rotation (3, 3), uniform."""
-    q = rng.normal(size=4)
-    w, x, y, z = q / np.linalg.norm(q)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    """Draw a uniform random rotation (3, 3)."""
+    return Rotation.from_quat(np.roll(rng.normal(size=4), -1)).as_matrix()
 
 
 @dataclass
@@ -37,7 +30,7 @@ class TrueFace:
 
 
 def face(rng, inner=10, length=0.6, height=0.3, turn=None, place=(0.0, 0.0, 0.0)):
-    """A rectangular face with `inner` points on it and then its four corners."""
+    """Draw a rectangular face with `inner` points on it and then its four corners."""
     turn = turned(rng) if turn is None else turn
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * [length / 2, height / 2]
     some = rng.uniform(-0.5, 0.5, (inner, 2)) * [length, height]
@@ -47,7 +40,7 @@ def face(rng, inner=10, length=0.6, height=0.3, turn=None, place=(0.0, 0.0, 0.0)
 
 @dataclass
 class PrecisePlane:
-    """What `precise_plane` found; multiprecision numbers, in arrays of objects."""
+    """Result of `precise_plane`; multiprecision numbers, in arrays of objects."""
 
     normal: np.ndarray
     offset: mpmath.mpf
@@ -60,7 +53,7 @@ class PrecisePlane:
 
 
 def precise_plane(points, sigmas, accepted, digits=50):
-    """Total least squares by the definition, in so many digits: the eigenvectors of Σ w (p - c)(p - c)ᵀ.
+    """Compute total least squares by the definition, in many digits: the eigenvectors of Σ w (p - c)(p - c)ᵀ.
 
     `tilt_variance` is that of the normal's error, the (3, 3) matrix Σ e eᵀ / λ over the two directions e in the plane.
     """

@@ -1,4 +1,4 @@
-"""Courses that slope and sag, and stones that are not what their kind means, found again from noisy measurements.
+"""Sloping and sagging courses, and stones that contradict their kind, recovered from noisy measurements.
 
 Walls with known deformations are measured point by point with noise of 2 mm; their stones' beds lie 3 mm high or low
 besides, as masons laid them. Every number is then found by the whole chain: plane, outline, depth, bed line. Predicted

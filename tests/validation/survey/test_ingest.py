@@ -1,4 +1,4 @@
-"""`moma ingest` of surveys with wrong stones: nothing by halves, nothing lost.
+"""`moma ingest` of surveys with wrong stones: no partial result, no data lost.
 
 By default a file is taken whole or not at all, and the database stays as it was, byte for byte. With `--keep-going` the
 good stones are taken, and what is left over is itself a survey: corrected, it is taken in too, and the database then
@@ -78,7 +78,7 @@ def survey(path, format, spoil=None, stones=range(COUNT)):
 
 @pytest.fixture
 def header(tmp_path):
-    """For point lists, which say nothing of depths."""
+    """Write a header file for point lists, which have no depths."""
     path = tmp_path / "header.moma"
     path.write_text("\n".join(HEADS["moma"]) + "\n", encoding="utf-8")
     return path
@@ -101,7 +101,7 @@ def ingest(database, path, format, *more, header=None):
 
 
 def stored(database):
-    """What the database says of every stone, by code."""
+    """Return the data of every stone in the database, by code."""
     done = CliRunner().invoke(app, ["query", "header", "--db", f"sqlite:///{database}", "--format", "json"])
     assert done.exit_code == 0, done.output
     return {row["code"]: row for row in json.loads(done.stdout)}

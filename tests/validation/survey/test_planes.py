@@ -16,6 +16,7 @@ import pytest
 from scipy import stats
 
 from survey.faces.planes import fit_plane
+from tests.survey.faces.plane_twin import CHECKERBOARD
 from tests.validation.survey.stone_faces import NINTHS, THIRDS, face, precise_plane, turned
 
 FACES = 2000
@@ -32,35 +33,12 @@ PLACES = [
 # --- P01 and exact data ---
 
 
-def checkerboard():
-    """Case P01: x in {-3,-1,1,3}, y in {-1.5,-.5,.5,1.5}, z = ±0.01 alternating."""
-    xy = [
-        (x, y, (i + j) % 2)
-        for i, x in enumerate((-3, -1, 1, 3))
-        for j, y in enumerate((-1.5, -0.5, 0.5, 1.5))
-    ]
-    return np.array([(x, y, 0.01 if odd else -0.01) for x, y, odd in xy])
-
-
-def test_checkerboard_of_case_p01():
-    fit = fit_plane(checkerboard(), None, observer=(0, 0, 9))
-    np.testing.assert_allclose(fit.normal, [0, 0, 1], atol=1e-12)
-    np.testing.assert_allclose(fit.centroid, 0, atol=1e-12)
-    np.testing.assert_allclose(fit.singular_values, [np.sqrt(80), np.sqrt(20), 0.04], rtol=1e-12)
-    assert fit.rms == pytest.approx(0.01, rel=1e-12)
-    assert fit.sigma0 == pytest.approx(0.01 * np.sqrt(16 / 13), rel=1e-12)  # 0.011094004
-    tilts_and_height = fit.sigma0 / np.array(
-        [np.sqrt(80), np.sqrt(20), 4]
-    )  # 0.00124035, 0.00248069, 0.0027735
-    np.testing.assert_allclose(np.sqrt(np.diag(fit.covariance)), tilts_and_height, rtol=1e-12)
-
-
 @pytest.mark.parametrize("place", PLACES)
 def test_checkerboard_turned_and_moved_keeps_its_angle(place):
     rng = np.random.default_rng(3)
     for _ in range(20):
         turn = turned(rng)
-        fit = fit_plane(checkerboard() @ turn.T + place, None, observer=turn[:, 2] * 9 + place)
+        fit = fit_plane(CHECKERBOARD @ turn.T + place, None, observer=turn[:, 2] * 9 + place)
         # the coordinates themselves are rounded to 1e-16 of 7e6 m: 1e-9 m over 3 m; P01 asks for 1e-7
         assert np.linalg.norm(np.cross(fit.normal, turn[:, 2])) < 1e-9
         assert fit.normal @ turn[:, 2] > 0
@@ -162,6 +140,9 @@ def test_planes_have_the_digits_of_a_50_digit_computation(place, weighting):
         close(fit.centroid, true.centroid, 1e-12 * away)
         close(fit.offset, sign * true.offset, 1e-12 * away)
         close(fit.residuals, sign * true.heights, 1e-12 * length)
+        mean_weight = float(np.mean(1 / sigmas[accepted] ** 2))
+        expected = true.singular.astype(float) / np.sqrt(mean_weight)
+        np.testing.assert_allclose(fit.singular_values, expected, rtol=1e-12)
         np.testing.assert_allclose(
             fit.rms, float(sum(true.heights[accepted] ** 2) / len(accepted)) ** 0.5, rtol=1e-12
         )
@@ -184,7 +165,7 @@ def simulated(rng, sigmas, place=(0.0, 0.0, 0.0), inner=10):
 
 
 def heights_off(true, fit, places):
-    """How far the fitted plane is from the true one at places on the true one, along the fitted normal."""
+    """Return the distance of the fitted plane from places on the true one, along the fitted normal."""
     return (fit.centroid - places) @ fit.normal
 
 

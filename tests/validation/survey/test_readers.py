@@ -1,4 +1,4 @@
-"""Files as other programs write them, or as they come from a site: each is read right, or refused at a line.
+"""Files of other programs and from sites: each is read correctly, or refused at a line.
 
 Written after exports of Excel (German and French settings), Trimble Business Center (PNEZD), Leica Infinity and LisCAD
 (blank-separated lists), Blender, Rhino and MeshLab (OBJ); solids are written here by gmsh and trimesh themselves.
@@ -38,7 +38,7 @@ def the_stone(stones, code="W01-01", kind="header", course=1):
 
 
 def located(error, path, line):
-    """Whether an error says where it is: the file and the line."""
+    """Return whether an error names the file and the line."""
     assert isinstance(error, MomaError)
     assert error.where is not None
     assert error.where.startswith(f"{path}:{line}"), f"{error.where}, not line {line}"
@@ -442,7 +442,7 @@ def whole_survey(format):
 
 
 def spoiled(rng, line):
-    """One line as accidents leave it."""
+    """Damage one line as accidents do."""
     cut = int(rng.integers(len(line) + 1))
     odd = [
         "\t",

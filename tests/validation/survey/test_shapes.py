@@ -1,4 +1,4 @@
-"""Faces that are no planes: how often they are recognised, with what numbers, and how often planes are wronged.
+"""Faces that are not plane: rate of recognition, accuracy of the numbers, and rate of false alarms on planes.
 
 A sphere or cylinder of radius R stands h = l²/8R proud of its chord l; its principal curvatures are 1/R. A bevel is a
 second plane beyond an edge, at a known angle. Bounds are shares of some hundred simulated faces of 0.6 × 0.3 m with

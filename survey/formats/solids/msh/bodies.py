@@ -1,4 +1,4 @@
-"""gmsh MSH: the boundary of each volume."""
+"""Boundary of each volume of a Gmsh mesh."""
 
 from collections import defaultdict
 from collections.abc import Iterator
@@ -6,10 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from moma.errors import SurveyError
 from survey.arrays import Ints
-from survey.formats.fields import FARTHEST
-from survey.formats.solids.bodies import RawBody
+from survey.formats.solids.bodies import RawBody, check_coordinates, compact
 from survey.formats.solids.msh.sections import MshFile
 
 __all__ = ["msh_bodies"]
@@ -18,7 +16,7 @@ _TETRA = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
 _HEXA = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
 _WEDGE = ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5))
 _PYRAMID = ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4))
-_FACES = {  # of gmsh's types of the first and second order, their corners counter-clockwise seen from outside
+_FACES = {  # of Gmsh's types of the first and second order, their corners counter-clockwise seen from outside
     **dict.fromkeys((4, 11), _TETRA),
     **dict.fromkeys((5, 12, 17), _HEXA),
     **dict.fromkeys((6, 13, 18), _WEDGE),
@@ -29,7 +27,7 @@ Cells = list[tuple[int, Ints]]
 
 
 def msh_bodies(path: Path) -> Iterator[RawBody]:
-    """Go through the volumes of a mesh: physical ones, and the others by their entity.
+    """Iterate over the volumes of a mesh: physical ones, and the others by their entity.
 
     Raises
     ------
@@ -37,21 +35,14 @@ def msh_bodies(path: Path) -> Iterator[RawBody]:
         if the file cannot be read as a mesh
     """
     mesh = MshFile(path)
-    if not (np.abs(mesh.points) <= FARTHEST).all():
-        raise SurveyError(
-            f"a node is not finite, or beyond {FARTHEST:g} m",
-            where=str(path),
-            remedy="coordinates are in metres",
-        )
+    check_coordinates(mesh.points, "node", str(path))
     for name, blocks in _volumes(mesh).items():
-        boundary = _boundary(blocks)
-        used = sorted({i for polygon in boundary for i in polygon})
-        new = {old: k for k, old in enumerate(used)}
-        yield RawBody(name, mesh.points[used], [tuple(new[i] for i in polygon) for polygon in boundary])
+        used, polygons = compact(_boundary(blocks))
+        yield RawBody(name, mesh.points[used], polygons)
 
 
 def _volumes(mesh: MshFile) -> dict[str, Cells]:
-    """The elements of each volume, by type."""
+    """Collect the elements of each volume, by type."""
     volumes: dict[str, Cells] = defaultdict(list)
     for one in mesh.elements:
         if one.type not in _FACES:
@@ -64,7 +55,7 @@ def _volumes(mesh: MshFile) -> dict[str, Cells]:
 
 
 def _boundary(blocks: Cells) -> list[tuple[int, ...]]:
-    """Faces that belong to one element only, as triangles, which merge to the planes of the stone."""
+    """Return the faces that belong to one element only, as triangles; they merge to the planes of the stone later."""
     once: dict[frozenset[int], tuple[int, ...] | None] = {}
     for kind, cells in blocks:
         for cell in cells.tolist():

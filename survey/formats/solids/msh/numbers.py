@@ -1,4 +1,4 @@
-"""The numbers of a gmsh MSH file, section by section, whether text or binary."""
+"""Numbers of a Gmsh MSH file, section by section, from text or binary."""
 
 import re
 
@@ -15,7 +15,7 @@ _REMEDY = "export MSH 2.2 or 4.1"
 
 
 class MshNumbers:
-    """The numbers of a file, one after the other.
+    """Reader of the numbers of a file in sequence.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ class MshNumbers:
 
     Attributes
     ----------
-    binary : whether the file is
+    binary : whether the file is binary
     version : "2.2" or "4.1"
     """
 
@@ -54,12 +54,12 @@ class MshNumbers:
         self.end("MeshFormat")
 
     def fail(self, what: str, remedy: str = _REMEDY) -> SurveyError:
-        """Make an error; of a text file with the line that has been reached."""
+        """Make an error; of a text file with the current line."""
         line = self._data.count(b"\n", 0, min(self._at, len(self._data))) + 1
         return SurveyError(what, where=self._path if self.binary else f"{self._path}:{line}", remedy=remedy)
 
     def section(self) -> str | None:
-        """Name of the section that comes next; None at the end of the file."""
+        """Return the name of the next section; None at the end of the file."""
         while self._at < len(self._data):
             line = self._line().strip()
             if line.startswith(b"$"):
@@ -72,7 +72,7 @@ class MshNumbers:
         return None
 
     def text(self, name: str) -> list[str]:
-        """All lines of a section, up to its end."""
+        """Return all lines of a section, up to its end."""
         stop = self._data.find(b"$End" + name.encode("latin-1"), self._at)
         if stop < 0:
             raise self.fail(f"section {shown(name)} has no end")
@@ -83,9 +83,9 @@ class MshNumbers:
         return [line for line in text.splitlines() if line.strip()]
 
     def end(self, name: str) -> None:
-        """The section must end here."""
+        """Check that the section ends here."""
         if self._word < len(self._words):
-            raise self.fail(f"section {name} has more numbers than it says")
+            raise self.fail(f"section {name} has more numbers than it states")
         self._words, self._word = [], 0
         while self._at < len(self._data):
             line = self._line().strip()
@@ -96,7 +96,7 @@ class MshNumbers:
         raise self.fail(f"section {shown(name)} does not end where it should")
 
     def plausible(self, count: int) -> int:
-        """A count of what takes a byte each at least."""
+        """Check a count of things that take a byte each at least."""
         if not 0 <= count <= len(self._data):
             raise self.fail(f"a count of {count}")
         return count
@@ -138,7 +138,7 @@ class MshNumbers:
         return records["tag"].astype(np.int64), records["place"].astype(np.float64)
 
     def element_head(self) -> tuple[int, int, int]:
-        """Type, how many follow, and how many tags each has, of elements of format 2.2."""
+        """Read the type, the number and the number of tags of a block of elements of format 2.2."""
         if self.binary:
             kind, count, tags = self.integers(3).tolist()
             return kind, count, tags
@@ -151,7 +151,7 @@ class MshNumbers:
         return line
 
     def _split(self, name: str) -> None:
-        """Take the words of a section of a text file."""
+        """Split a section of a text file into words."""
         stop = self._data.find(b"$End" + name.encode(), self._at)
         if stop < 0:
             raise self.fail(f"section {name} has no end")
@@ -171,7 +171,7 @@ class MshNumbers:
             return np.frombuffer(self._bytes(count * int(kind[1])), dtype=self._order + kind)
         words = self._words[self._word : self._word + count]
         if len(words) < count:
-            raise self.fail("the section has less numbers than it says")
+            raise self.fail("the section has fewer numbers than it states")
         self._word += count
         try:
             return np.array([float(one) if kind == "f8" else int(one) for one in words], dtype=kind)

@@ -1,7 +1,7 @@
-"""The sections of a gmsh MSH file, 2.2 and 4.1, text and binary, that say what its volumes are made of.
+"""Sections of a Gmsh MSH file, 2.2 and 4.1, text and binary, that describe its volumes.
 
-Every count is held against what is there before memory is asked for, and every node that an element names must exist:
-general mesh readers trust the file, and return what happens to be in memory where it is wrong.
+Every count is checked against the size of the file before memory is allocated, and every node of an element must exist:
+general mesh readers trust the file, and return uninitialised memory where it is wrong.
 """
 
 import re
@@ -10,50 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
-from moma.errors import SurveyError
 from survey.arrays import Array, Ints
-from survey.formats.fields import shown
+from survey.formats.fields import shown, unreadable
 from survey.formats.solids.msh.numbers import MshNumbers
 
 __all__ = ["Elements", "MshFile"]
 
-_NODES = dict(  # of each type of element
-    enumerate(
-        (
-            2,
-            3,
-            4,
-            4,
-            8,
-            6,
-            5,
-            3,
-            6,
-            9,
-            10,
-            27,
-            18,
-            14,
-            1,
-            8,
-            20,
-            15,
-            13,
-            9,
-            10,
-            12,
-            15,
-            15,
-            21,
-            4,
-            5,
-            6,
-            20,
-            35,
-        ),
-        start=1,
-    )
-)
+_COUNTS = "2 3 4 4 8 6 5 3 6 9 10 27 18 14 1 8 20 15 13 9 10 12 15 15 21 4 5 6 20 35"
+_NODES = dict(enumerate(map(int, _COUNTS.split()), start=1))  # number of nodes of each type of element
 _NAME = re.compile(r'\s*(\d+)\s+(-?\d+)\s+"(.*)"\s*', re.ASCII)
 
 
@@ -63,7 +27,7 @@ class Elements:
 
     Attributes
     ----------
-    type : gmsh's number of it
+    type : Gmsh's number of the type
     nodes : (n, k) rows of `MshFile.points`
     entity : (n,) number of the entity
     physical : (n,) number of the physical group, 0 if it is in none
@@ -77,7 +41,7 @@ class Elements:
 
 @dataclass
 class MshFile:
-    """What a file says of its volumes.
+    """The volumes of a file.
 
     Attributes
     ----------
@@ -94,18 +58,14 @@ class MshFile:
     _order: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     _physical: dict[tuple[int, int], int] = field(
         default_factory=dict
-    )  # of entities, by dimension and number
+    )  # by dimension and number of the entity
 
     def __post_init__(self) -> None:
         """Read the file."""
         try:
             data = self.path.read_bytes()
         except OSError as error:
-            raise SurveyError(
-                f"cannot be read: {error.strerror or error}",
-                where=str(self.path),
-                remedy="give an existing file",
-            ) from error
+            raise unreadable(self.path, error) from error
         self._numbers = MshNumbers(data, str(self.path))
         while (name := self._numbers.section()) is not None:
             match name, self._numbers.version:
@@ -181,7 +141,7 @@ class MshFile:
             group = self._physical.get((dimension, entity), 0)
             self._add(kind, rows[:, 1:], np.full(count, entity), np.full(count, group))
         if sum(len(one.nodes) for one in self.elements) != total:
-            raise numbers.fail(f"other than the {total} elements that it says")
+            raise numbers.fail(f"other than the {total} elements that it states")
 
     def _read_elements_2(self) -> None:
         numbers = self._numbers
@@ -191,7 +151,7 @@ class MshFile:
             kind, count, tags = numbers.element_head()
             width = (1 if numbers.binary else 0) + tags + self._node_count(kind)
             if tags < 2 or not 0 < count <= total - read:
-                raise numbers.fail("elements without the number of their entity, or more than it says")
+                raise numbers.fail("elements without the number of their entity, or more than it states")
             block = numbers.integers(count * width).reshape(count, width)
             rows.setdefault((kind, tags), []).append(block[:, 1:] if numbers.binary else block)
             read += count
@@ -210,6 +170,6 @@ class MshFile:
         places = np.searchsorted(self._tags, tags)
         places = np.minimum(places, len(self._tags) - 1)
         if tags.size and not (len(self._tags) and (self._tags[places] == tags).all()):
-            raise self._numbers.fail("an element of a node that there is not")
+            raise self._numbers.fail("an element refers to a node that does not exist")
         nodes = self._order[places] if tags.size else tags
         self.elements.append(Elements(kind, nodes, entity, physical))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from survey.arrays import Array, Bools
-from survey.faces._kernels.planes import leverages, weighted_plane
+from survey.faces._kernels.planes import Points, leverages, weighted_plane
 from survey.faces._kernels.robust_fit import fit_face
 from survey.faces._kernels.shapes import fit_columns, fit_two_planes, grow_columns, truncated_sum
 from survey.faces._kernels.triples import beside_the_rest, search_triples, smallest
@@ -38,8 +38,8 @@ def test_weighted_plane_is_that_of_the_singular_value_decomposition() -> None:
         root, accepted = 1.0 / rng.uniform(0.001, 0.01, count), rng.random(count) < 0.8
         accepted[:3] = True
         frame, work = np.empty((5, 3)), np.empty((3, count))
-        local = np.ascontiguousarray(points.T)
-        total = weighted_plane(local, root, accepted, frame, work)
+        local = Points(np.ascontiguousarray(points.T), root)
+        total = weighted_plane(local, accepted, frame, work)
         twin = plane_of(points, root, accepted)
         assert twin is not None
         assert total == pytest.approx(twin.weight, rel=1e-14)
@@ -47,7 +47,7 @@ def test_weighted_plane_is_that_of_the_singular_value_decomposition() -> None:
         np.testing.assert_allclose(frame[4], twin.singular, rtol=1e-12)
         assert np.abs(np.sum(frame[1:4] * twin.vectors, axis=1)) == pytest.approx(1.0, abs=1e-13)
         residuals, lever = np.empty(count), np.empty(count)
-        leverages(local, root, frame, total, residuals, lever)
+        leverages(local, frame, total, residuals, lever)
         np.testing.assert_allclose(np.abs(residuals), np.abs(twin.distances(points)), atol=1e-14)
         np.testing.assert_allclose(lever, twin.leverages(points, root), rtol=1e-9)
 
@@ -81,7 +81,7 @@ def test_triples_of_least_median_and_least_truncated_squares() -> None:
         points = contaminated(rng, count, count // 4, "gross")
         points -= points[0]
         root, size = np.full(count, 1.0 / SIGMA), count // 2 + 2
-        found = search_triples(np.ascontiguousarray(points.T), root, size, True, np.zeros(4))
+        found = search_triples(Points(np.ascontiguousarray(points.T), root), size, True, np.zeros(4))
         _, distances = triple_planes(points, root, np.zeros(3), 0.0)
         distances = np.abs(distances)
         medians = np.sort(distances, axis=1)[:, size - 1]

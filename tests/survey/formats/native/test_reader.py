@@ -147,7 +147,7 @@ def test_what_is_written_is_read_back_to_the_last_bit(tmp_path: Path, survey: Su
         (HEAD + "canon header 0.3 0.3 source x\n", 3, "no sigma"),
         (HEAD + "canon header 0.3 sigma 0.3 source x\n", 3, "height"),
         (HEAD + "canon header 1 1 sigma 1 source x\ncanon header 1 1 sigma 1 source x\n", 4, "line 3"),
-        (HEAD + "extrude\n", 3, "says nothing"),
+        (HEAD + "extrude\n", 3, "has no values"),
         (HEAD + "extrude along 0 0 0\n", 3, "no length"),
         (HEAD + "extrude tail 1.1\n", 3, "larger than the face"),
         (HEAD + "extrude tail 0.9 along 0 0 1\n", 3, "unexpected 'along'"),

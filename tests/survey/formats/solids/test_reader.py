@@ -34,7 +34,7 @@ def solids(path: Path, data: bytes | str, options: ReadingOptions | None = None)
 
 
 def volume(one: SolidRecord) -> float:
-    """Of the polyhedron, by the divergence theorem over its triangles."""
+    """Compute the volume of a polyhedron by the divergence theorem over its triangles."""
     a, b, c = np.moveaxis(one.vertices[triangulate(Solid(one.code, one.vertices, one.faces))], 1, 0)
     return float((a * np.cross(b, c)).sum()) / 6.0
 
@@ -262,7 +262,7 @@ def test_touching_faces_that_do_not_agree_on_outside_are_refused(tmp_path: Path)
 
 
 def elements_of(gmsh: Any, volume: int) -> np.ndarray:
-    """Where the nodes of each element are, (elements, nodes, 3), as gmsh says."""
+    """Return the nodes of each element, (elements, nodes, 3), as Gmsh reads them."""
     tags, places, _ = gmsh.model.mesh.getNodes()
     place = dict(zip(tags.tolist(), places.reshape(-1, 3), strict=True))
     (_,), (elements,), (nodes,) = gmsh.model.mesh.getElements(3, volume)
@@ -272,7 +272,7 @@ def elements_of(gmsh: Any, volume: int) -> np.ndarray:
 @pytest.mark.parametrize("version", ["2.2", "4.1"])
 @pytest.mark.parametrize("binary", [False, True])
 def test_a_mesh_is_read_as_another_program_reads_it(tmp_path: Path, version: str, binary: bool) -> None:
-    """Against gmsh itself: tetrahedra and prisms of the first and second order."""
+    """Against Gmsh itself: tetrahedra and prisms of the first and second order."""
     gmsh = pytest.importorskip("gmsh")
     path = tmp_path / "g.msh"
     gmsh.initialize(interruptible=False)

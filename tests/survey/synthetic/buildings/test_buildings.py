@@ -1,4 +1,4 @@
-"""The generated buildings are what they say: solids without gaps, joints known otherwise, faces as measured."""
+"""Generated buildings: solids without gaps, joints found independently, faces as measured."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The committed sample: a program's output, a wall that can stand, and every step against its truth."""
+"""The committed sample: reproducible output, a wall that can stand, and every step against its truth."""
 
 from pathlib import Path
 from typing import Any
