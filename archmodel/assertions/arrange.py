@@ -1,4 +1,4 @@
-"""Declaring structures with their members, and relations of entities.
+"""Declaration of structures with their members, and of relations between entities.
 
 As in ``archmodel.assertions.declare``, what is declared again as it is changes nothing.
 """
@@ -33,7 +33,7 @@ def declare_structure(
     number: int | None = None,
     side: str | None = None,
 ) -> Outcome:
-    """A part of the building, within another one perhaps; its members are declared by `declare_members`."""
+    """Declare a part of the building, within another one perhaps; its members are declared by `declare_members`."""
     cls = structure_kind_named(kind)
     if side is not None:
         checked_choice("side", side, ("outer", "inner"))
@@ -55,7 +55,7 @@ def declare_structure(
 def declare_members(
     session: Session, entry: Entry, code: str, entities: Sequence[int], *, ordered: bool = False
 ) -> Outcome:
-    """Entities, by their numbers, are members of a structure; those of which it was declared already stay.
+    """Declare entities, by their numbers, members of a structure; earlier declarations stay.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def declare_members(
 def declare_relation(
     session: Session, entry: Entry, kind: str, of: Sequence[int], to: Sequence[int]
 ) -> Outcome:
-    """Each of some entities, by their numbers, is in a relation to each of others.
+    """Declare a relation of each of some entities, by their numbers, to each of others.
 
     A relation that was computed from the geometry stays beside the declared one.
 
@@ -99,7 +99,7 @@ def declare_relation(
 
 
 def _refuse_circle(code: str, above: Structure | None) -> None:
-    """A structure cannot be a part of itself, however many levels up."""
+    """Refuse a structure that would be a part of itself, at any level."""
     while above is not None:
         if above.code == code:
             raise UsageError(f"{code} would be a part of itself", remedy="give it another parent")

@@ -1,4 +1,4 @@
-"""Correcting what an entity is: it has the new values, and corrections keep both.
+"""Correction of entities: the new values hold, and the correction keeps both.
 
 Kind, code, course, zone and the attributes of its kind are corrected by `correct`. Depth is no plain attribute,
 since the solid follows from it: `replace_measurement` takes the solid that was made anew.
@@ -73,7 +73,7 @@ def correct(session: Session, entry: Entry, code: str, values: Mapping[str, obje
 
 
 def replace_measurement(session: Session, entry: Entry, stone: StoneRecord, place: str) -> Outcome:
-    """Give an entity the solid, depth and what follows from them of a record, in place of those it has.
+    """Replace an entity's solid, depth and what follows from them with those of a record.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def replace_measurement(session: Session, entry: Entry, stone: StoneRecord, plac
 
 
 def _row(session: Session, code: str) -> Mapping[str, Any]:
-    """The entity's columns; not an object, whose class may be about to change."""
+    """Return the entity's columns; not an object, whose class may be about to change."""
     session.flush()
     table = table_of(Entity)
     row = None
@@ -118,7 +118,7 @@ def _kind(value: object) -> str:
 
 
 def _checked(name: str, value: object, own: Mapping[str, OwnAttribute], code: str) -> object:
-    """A value as its column has it."""
+    """Check a value against its column."""
     if name == "kind":
         return _kind(value)
     if name in own:
@@ -140,7 +140,7 @@ def _checked(name: str, value: object, own: Mapping[str, OwnAttribute], code: st
 
 
 def _own_value(attribute: OwnAttribute, value: object) -> object:
-    """The value of an attribute of a kind: whole where its column is, a number if it has a unit, else a text."""
+    """Check a value of a kind's attribute: an integer for an integer column, a number with a unit, or a text."""
     if value is None:
         return None
     if attribute.unit is None:
@@ -154,12 +154,12 @@ def _own_value(attribute: OwnAttribute, value: object) -> object:
 
 
 def _value(row: Mapping[str, Any], name: str) -> object:
-    """What an entity has now: in a column, or among the attributes of its registered kind."""
+    """Return the present value: from a column, or from the attributes of its registered kind."""
     return row[name] if name in row else (row["own"] or {}).get(name)
 
 
 def _lost(row: Mapping[str, Any], own: Mapping[str, OwnAttribute]) -> set[str]:
-    """Attributes of the kind before that have a value and that the kind after has not."""
+    """List attributes of the old kind that have a value and that the new kind lacks."""
     before = own_attributes(kind_named(row["kind"]))
     return {name for name in before if name not in own and _value(row, name) is not None}
 

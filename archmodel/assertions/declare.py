@@ -1,4 +1,4 @@
-"""Declaring materials, phases and documents; structures and relations are declared by ``archmodel.assertions.arrange``.
+"""Declaration of materials, phases and documents; for structures and relations see ``archmodel.assertions.arrange``.
 
 What is declared again as it is changes nothing; what is declared otherwise supersedes what was held; what is left
 out (None) stays as it was.
@@ -77,7 +77,7 @@ def declare_material(
     description: str | None = None,
     properties: Mapping[str, PropertyValue] | None = None,
 ) -> Outcome:
-    """A stone or a mortar under one name, with its properties; properties that are not named stay as they are."""
+    """Declare a stone or a mortar under one name, with its properties; properties not named stay as they are."""
     values = {"description": checked_text("description", description)}
     outcome = declare_named(session, entry, Material, {"name": checked_label("name", name)}, values)
     for key, given in (properties or {}).items():
@@ -88,7 +88,7 @@ def declare_material(
 def declare_property(
     session: Session, entry: Entry, material: str, name: str, given: PropertyValue
 ) -> Outcome:
-    """One property of a material that was declared.
+    """Declare one property of a declared material.
 
     Raises
     ------
@@ -136,7 +136,7 @@ def declare_phase(
     ends: int | None = None,
     description: str | None = None,
 ) -> Outcome:
-    """A time of building or repair; years at the earliest and at the latest."""
+    """Declare a time of building or repair; years at the earliest and at the latest."""
     held = held_or_none(session, Phase, name)
     if held is not None:
         begins = held.begins if begins is None else begins
@@ -157,7 +157,7 @@ def declare_document(
     author: str | None = None,
     dated: str | None = None,
 ) -> Outcome:
-    """A document, drawing or photograph, by reference: `place` is where it can be found."""
+    """Declare a document, drawing or photograph, by reference: `place` is where it can be found."""
     values = {
         "type": checked_choice("type of document", type, DOCUMENT_TYPES),
         "title": checked_text("title", title),
@@ -176,7 +176,7 @@ def declare_named(
     values: Mapping[str, object],
     made: type[Structure] | None = None,
 ) -> Outcome:
-    """A row under a name: new, as it is, or with new contents."""
+    """Declare a row under a name: new, unchanged, or with new contents."""
     (name,) = key.values()
     held = held_or_none(session, cls, name)  # type: ignore[type-var]
     if held is not None:

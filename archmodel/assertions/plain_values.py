@@ -17,7 +17,7 @@ Values = dict[str, object]
 
 
 def statement_values(statement: Statement) -> Values:
-    """What a statement says, without what is not known; the session must be open.
+    """Return the known values of a statement; the session must be open.
 
     Returns
     -------
@@ -38,7 +38,7 @@ def statement_values(statement: Statement) -> Values:
 
 
 def entry_values(entry: Entry) -> Values:
-    """An act of recording: number, action, author, source, when."""
+    """Describe an act of recording: number, action, author, source, time."""
     return {
         "entry": entry.id,
         "action": entry.action,

@@ -1,4 +1,4 @@
-"""Registering a kind of a user's own in a database."""
+"""Registration of a user's own kind of stone in a database."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -36,7 +36,7 @@ def register_kind(
     canon: str | None = None,
     attributes: Mapping[str, tuple[str | None, str]] | None = None,
 ) -> Outcome:
-    """Make a kind known to this database; it is a class of the hierarchy from now on.
+    """Register a kind in this database; it is a class of the hierarchy from now on.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def register_kind(
 def _check_attributes(
     given: Mapping[str, tuple[str | None, str]], inherited: Mapping[str, OwnAttribute]
 ) -> None:
-    """An attribute has a name of its own, so that a query can ask for it."""
+    """Refuse an attribute without a name of its own, for which a query could not ask."""
     # what the classes call their own members (own, entry, metadata, …) would be written over
     built_in = [name for cls in kinds().values() if cls.__users__ is None for name in dir(cls)]
     taken = {*ATTRIBUTES, *built_in, *inherited, *KEYWORDS, *FUNCTIONS, *STRUCTURE_FUNCTIONS}
@@ -112,7 +112,7 @@ def _check_attributes(
 
 
 def _check_canon(canon: str) -> None:
-    """Proportions are of the stone itself: runs, other stones and structures may be gone when they are asked for."""
+    """Refuse proportions that depend on runs, other stones or structures, which may be gone later."""
     for node in _nodes(parse(canon)):
         if isinstance(node, Call):
             raise complaint(node.function, "canonical proportions cannot ask functions", "compare attributes")
@@ -121,7 +121,7 @@ def _check_canon(canon: str) -> None:
 
 
 def _nodes(node: object) -> Iterator[object]:
-    """A node of an expression and all that is in it."""
+    """Iterate over a node of an expression and all nodes in it."""
     yield node
     if is_dataclass(node) and not isinstance(node, Token):
         for part in fields(node):

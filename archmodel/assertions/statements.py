@@ -1,4 +1,4 @@
-"""Saying something of entities and structures: material, phase, marks, observations, depth, documents, notes.
+"""Statements about entities and structures: material, phase, marks, observations, depth, documents, notes.
 
 One thing said of many subjects is one statement about each. Of what a subject can have but one (`SINGLE`), a new
 statement supersedes the one before; the others add up. What is said already, word for word, is not said again.
@@ -57,7 +57,7 @@ SINGLE: tuple[type[Statement], ...] = (MadeOf, OfPhase, DepthEvidence)
 
 @dataclass(frozen=True)
 class Remark:
-    """What can be said with every statement.
+    """Details that every statement can have.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ PLAIN = Remark()
 def say_made_of(
     session: Session, entry: Entry, about: Subjects, material: str, remark: Remark = PLAIN
 ) -> Outcome:
-    """They are of a material, which must have been declared."""
+    """State their material, which must have been declared."""
     number = held_named(session, Material, material).id
     return _say(session, entry, MadeOf, about, {"material_id": number}, remark)
 
@@ -86,7 +86,7 @@ def say_made_of(
 def say_of_phase(
     session: Session, entry: Entry, about: Subjects, phase: str, remark: Remark = PLAIN
 ) -> Outcome:
-    """They were built, or put where they are, in a phase, which must have been declared."""
+    """State the phase in which they were built or put in place; it must have been declared."""
     number = held_named(session, Phase, phase).id
     return _say(session, entry, OfPhase, about, {"phase_id": number}, remark)
 
@@ -99,7 +99,7 @@ def say_mason_mark(
     place: str | None = None,
     remark: Remark = PLAIN,
 ) -> Outcome:
-    """They bear a mason's mark; `sign` is the same for the same mark, `place` is where on the stone, in words."""
+    """State a mason's mark; `sign` is the same for the same mark, `place` is where on the stone, in words."""
     values = {"sign": checked_label("sign", sign), "place": checked_text("place", place)}
     return _say(session, entry, MasonMark, about, values, remark)
 
@@ -115,7 +115,7 @@ def say_observation(
     at: Sequence[float] | None = None,
     remark: Remark = PLAIN,
 ) -> Outcome:
-    """Something was seen on them.
+    """State an observation made on them.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def say_depth(
     sigma: float | None = None,
     remark: Remark = PLAIN,
 ) -> Outcome:
-    """They are so deep [m], with this standard deviation [m].
+    """State their depth [m], with its standard deviation [m].
 
     This is the statement alone; ``pipelines.record.depth`` makes the solid follow it.
     """
@@ -156,14 +156,14 @@ def say_depth(
 
 
 def say_reference(session: Session, entry: Entry, about: Subjects, remark: Remark) -> Outcome:
-    """A document or photograph, named in the remark, treats or shows them."""
+    """State a document or photograph, named in the remark, that treats or shows them."""
     if remark.document is None:
         raise UsageError("a reference names no document", remedy="give the code of a document")
     return _say(session, entry, Reference, about, {}, remark)
 
 
 def say_note(session: Session, entry: Entry, about: Subjects, key: str, remark: Remark) -> Outcome:
-    """A word, the text of the remark, under a key such as "edge"."""
+    """State a note, the text of the remark, under a key such as "edge"."""
     if remark.text is None:
         raise UsageError(f"the note {key[:40]!r} says nothing", remedy="give its text")
     return _say(session, entry, Note, about, {"key": checked_label("key", key)}, remark)
@@ -177,7 +177,7 @@ def _say(
     values: Mapping[str, object],
     remark: Remark,
 ) -> Outcome:
-    """One statement about each subject that does not have it already."""
+    """Store one statement about each subject that lacks it."""
     full = {**values, **_remark_row(session, remark)}
     outcome = NOTHING
     for owner, numbers in (("entity_id", about.entities), ("structure_id", about.structures)):

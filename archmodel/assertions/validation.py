@@ -1,4 +1,4 @@
-"""Checks of the values that knowledge is made of: texts, numbers, years, names from a list."""
+"""Checks of texts, numbers, years and choices in assertions."""
 
 import difflib
 import math
@@ -23,7 +23,7 @@ MAX_WHOLE = 2**31 - 1
 
 
 def checked_text(name: str, value: str | None) -> str | None:
-    """A text in words, of several lines perhaps, without outer space; None stays None."""
+    """Check a text in words, of several lines perhaps, and strip outer space; None stays None."""
     if value is None:
         return None
     text = value.strip()
@@ -37,7 +37,7 @@ def checked_text(name: str, value: str | None) -> str | None:
 
 
 def checked_label(name: str, value: str) -> str:
-    """A code or a name: one line, at most 200 characters."""
+    """Check a code or a name: one line, at most 200 characters."""
     if not value.strip() or value != value.strip() or not value.isprintable() or len(value) > 200:
         remedy = "write up to 200 characters in one line, without blanks at the ends"
         raise UsageError(f"{name} {value[:40]!a} is not a name", remedy=remedy)
@@ -53,7 +53,7 @@ def checked_number(
     at_least: float | None = None,
     below: float | None = None,
 ) -> float | None:
-    """A finite number within bounds; None stays None."""
+    """Check a finite number within bounds; None stays None."""
     if value is None:
         return None
     number = isinstance(value, int | float) and not isinstance(value, bool)
@@ -72,7 +72,7 @@ def checked_number(
 
 
 def checked_whole(name: str, value: int | None, lowest: int, highest: int = MAX_WHOLE) -> int | None:
-    """A whole number within bounds, both included; None stays None."""
+    """Check an integer within bounds, both included; None stays None."""
     if value is None:
         return None
     whole = isinstance(value, int) and not isinstance(value, bool)
@@ -83,7 +83,7 @@ def checked_whole(name: str, value: int | None, lowest: int, highest: int = MAX_
 
 
 def checked_years(begins: int | None, ends: int | None) -> None:
-    """Years in order; negative ones are before our era."""
+    """Check that years are in order; negative ones are before the common era."""
     for name, year in (("begins", begins), ("ends", ends)):
         checked_whole(name, year, -1_000_000, 9999)
     if begins is not None and ends is not None and begins > ends:
@@ -91,7 +91,7 @@ def checked_years(begins: int | None, ends: int | None) -> None:
 
 
 def checked_choice(name: str, value: str, known: Iterable[str]) -> str:
-    """One of the known names."""
+    """Check that a value is one of the known names."""
     names = list(known)
     if value in names:
         return value

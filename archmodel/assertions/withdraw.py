@@ -1,4 +1,4 @@
-"""Withdrawing what was said of entities and structures, found by what it says."""
+"""Withdrawal of statements about entities and structures, found by their content."""
 
 from collections.abc import Mapping, Sequence
 
@@ -52,7 +52,7 @@ def withdraw_statements(
 
 
 def withdraw_members(session: Session, entry: Entry, about: Subjects) -> Outcome:
-    """The entities are members of the structures no longer; memberships that were computed stay."""
+    """Withdraw declared memberships of entities in structures; computed ones stay."""
     outcome, held = NOTHING, []
     for batch in batches(about.entities):
         statement = select(Membership).where(
@@ -106,7 +106,7 @@ def _ended(
     before: Outcome,
     thing: str,
 ) -> Outcome:
-    """End what is held; what was held once is withdrawn already; what never was is a mistake."""
+    """End rows that are held; rows withdrawn already stay, and rows that never were are an error."""
     if not held and not before.unchanged:
         raise UsageError(f"there is no such {thing} to withdraw", remedy="look at it by: moma show CODE")
     for batch in batches(held):

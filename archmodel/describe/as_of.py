@@ -1,4 +1,4 @@
-"""Rows as they were at an earlier entry: those that were revised, and entities that were corrected."""
+"""Rows as they were at an earlier entry: revised rows, and entities that were corrected."""
 
 from typing import Any, TypeVar
 
@@ -16,7 +16,7 @@ T = TypeVar("T", Material, Phase, Document, Structure)
 
 
 def version_at(session: Session, row: T, at: int | None) -> T:
-    """The row as it was when the entry `at` had just been made; now, if that is None.
+    """Return the row as it was when the entry `at` had just been made; as it is now if that is None.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def version_at(session: Session, row: T, at: int | None) -> T:
 
 
 def entity_at(session: Session, number: int, at: int | None) -> dict[str, Any] | None:
-    """The columns of an entity as they were, corrections since then undone; None if it was not there yet."""
+    """Return the columns of an entity before later corrections; None if it was not there yet."""
     table = table_of(Entity)
     row = dict(session.execute(select(table).where(table.c.id == number)).mappings().one())
     if at is None:
@@ -53,7 +53,7 @@ def entity_at(session: Session, number: int, at: int | None) -> dict[str, Any] |
 
 
 def structures_named(session: Session, code: str) -> list[Structure]:
-    """Structures that have or had a code, latest first; those that only keep what a revised one was before are not."""
+    """List structures that have or had a code, latest first, without rows that only keep an earlier revision."""
     rows = session.scalars(select(Structure).where(Structure.code == code)).all()
     kept = {one.supersedes_id for one in rows}
     found = [one for one in rows if one.id not in kept]

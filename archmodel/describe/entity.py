@@ -1,4 +1,4 @@
-"""All that is known of one entity or structure, now or at an earlier entry."""
+"""Description of one entity or structure, now or at an earlier entry."""
 
 import math
 from typing import Any
@@ -35,7 +35,7 @@ Values = dict[str, Any]
 
 
 def describe(session: Session, code: str, at: int | None = None) -> dict[str, object]:
-    """Everything about the stone or structure of this code, in plain values that JSON can say.
+    """Describe the stone or structure of a code in plain values that JSON can hold.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def _structure(session: Session, held: Structure, at: int | None) -> Values:
 
 
 def _own(cls: type[Entity], row: Values) -> Values:
-    """The attributes of its kind that are known, each with its unit (None for a text) and definition."""
+    """Return the known attributes of its kind, each with its unit (None for a text) and definition."""
     kept = row["own"] or {}
     values = {name: row[name] if name in row else kept.get(name) for name in own_attributes(cls)}
     return {
@@ -159,7 +159,7 @@ def _measurement(session: Session, number: int, at: int | None) -> Measurement |
 
 
 def _results(session: Session, number: int, at: int | None) -> list[EntityResult]:
-    """What runs computed, latest first."""
+    """List the results of runs, latest first."""
     statement = (
         select(EntityResult)
         .join(EntityResult.run)
@@ -171,7 +171,7 @@ def _results(session: Session, number: int, at: int | None) -> list[EntityResult
 
 
 def _membership(session: Session, one: Membership, at: int | None) -> Values:
-    """A structure that it is a member of, and what that is a part of."""
+    """Describe membership in a structure, and the structures that contain it."""
     structure = version_at(session, one.structure, at)
     return {
         "code": structure.code,
@@ -199,7 +199,7 @@ def _corrections(session: Session, number: int, at: int | None) -> list[Values]:
 
 
 def _survey(measured: Measurement) -> dict[str, object]:
-    """Where the measurement comes from."""
+    """Describe the survey of a measurement."""
     survey = measured.survey
     return {
         "name": survey.name,
@@ -211,7 +211,7 @@ def _survey(measured: Measurement) -> dict[str, object]:
 
 
 def _measured(measurement: Measurement) -> dict[str, object]:
-    """The measurement and the plane fitted to it, with standard deviations from the covariance."""
+    """Describe the measurement and its plane, with standard deviations from the covariance."""
     deviations = [math.sqrt(max(variance, 0.0)) for variance in measurement.covariance.diagonal().tolist()]
     return {
         "vertices": len(measurement.vertices),
@@ -236,12 +236,12 @@ def _measured(measurement: Measurement) -> dict[str, object]:
 
 
 def _names(measurement: Measurement) -> list[str | int]:
-    """The points left out: by the names that the instrument gave them, else by their numbers from 1."""
+    """Name the outliers: as the instrument named the points, otherwise by their numbers from 1."""
     return [measurement.names[i] if measurement.names else i + 1 for i in measurement.rejected]
 
 
 def _result(result: EntityResult) -> dict[str, object]:
-    """What one run computed for the stone."""
+    """Describe the result of one run for the stone."""
     return {
         "run": result.run.id,
         "scene": result.run.scene,
@@ -258,5 +258,5 @@ def _result(result: EntityResult) -> dict[str, object]:
 
 
 def _definition(cls: type[Structure]) -> str:
-    """The one sentence that defines a kind of structure."""
+    """Return the one sentence that defines a kind of structure."""
     return (cls.__doc__ or "").strip().split("\n", 1)[0]

@@ -1,4 +1,4 @@
-"""Everything that was ever said of an entity or a structure, in the order in which it was recorded.
+"""History of an entity or a structure: all statements in the order of recording.
 
 What is held now, what was held once and what replaced it: nothing is overwritten, so all of it can be read back,
 and so can the whole description as it was when any entry had just been made (`known_at`).
@@ -30,7 +30,7 @@ Values = dict[str, object]
 
 @dataclass(frozen=True)
 class Event:
-    """One thing that was said, or said no longer.
+    """One statement, or the end of one.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Event:
 
 
 def history(session: Session, code: str) -> tuple[Event, ...]:
-    """Everything ever said of the stone or structure of this code, oldest first.
+    """Return all events of the stone or structure of a code, oldest first.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def history(session: Session, code: str) -> tuple[Event, ...]:
 
 
 def known_at(session: Session, code: str, entry: int) -> dict[str, object]:
-    """The description of a stone or structure as it was when an entry had just been made.
+    """Describe a stone or structure as it was when an entry had just been made.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def _event(entry: Entry, event: str, what: str, says: Values, before: Values | N
 
 
 def _of_entity(session: Session, number: int) -> Iterator[Event]:
-    """Its record, measurements, corrections, structures, relations and runs."""
+    """Collect its record, measurements, corrections, structures, relations and runs."""
     entity = session.get_one(Entity, number)
     first = entity_at(session, number, entity.entry_id) or {}
     told = {name: first[name] for name in ("code", "kind", "course", "zone", "depth")}
@@ -131,7 +131,7 @@ def _of_entity(session: Session, number: int) -> Iterator[Event]:
 
 
 def _relations(session: Session, number: int) -> Iterator[Event]:
-    """Its relations, as seen from it."""
+    """Collect its relations, as seen from it."""
     statement = (
         select(Relation)
         .where(or_(Relation.subject_id == number, Relation.object_id == number))
@@ -150,7 +150,7 @@ def _relations(session: Session, number: int) -> Iterator[Event]:
 
 
 def _of_structure(session: Session, held: Structure) -> Iterator[Event]:
-    """The versions of a structure, its members, what is said of it, and its end."""
+    """Collect the versions of a structure, its members, the statements about it, and its end."""
     versions = [held]
     while versions[0].supersedes_id is not None:
         versions.insert(0, session.get_one(Structure, versions[0].supersedes_id))
@@ -201,7 +201,7 @@ def _chain(
     told: Callable[[Any], Values],
     about: Callable[[Any], Hashable],
 ) -> Iterator[Event]:
-    """Rows without ``supersedes_id``: one that began with the entry that ended another about the same replaces it."""
+    """Chain rows without ``supersedes_id``: one that began with the entry that ended another replaces it."""
     ended: dict[tuple[Hashable, int], Recorded] = {
         (about(one), one.superseded_id): one for one in rows if one.superseded_id is not None
     }

@@ -1,4 +1,4 @@
-"""What is said of an entity or a structure, by itself and through the structures that it belongs to."""
+"""Knowledge of an entity or a structure: its own, and that of the structures to which it belongs."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ _LISTS: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class Owner:
-    """A structure whose statements hold for something within it.
+    """Structure whose statements hold for everything within it.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class Owner:
 
 
 def memberships(session: Session, entity: int, at: int | None) -> list[Membership]:
-    """What an entity is a member of."""
+    """Select the memberships of an entity."""
     statement = (
         select(Membership)
         .where(Membership.entity_id == entity, held_at(Membership, at))
@@ -56,7 +56,7 @@ def memberships(session: Session, entity: int, at: int | None) -> list[Membershi
 
 
 def owners_of(session: Session, members: Iterable[Membership], at: int | None) -> list[Owner]:
-    """The structures that a stone belongs to, nearest first, each once."""
+    """List the structures to which a stone belongs, nearest first, each once."""
     owners: dict[int, Owner] = {}
     for membership in members:
         _ascend(session, membership.structure_id, 1, at, owners)
@@ -64,7 +64,7 @@ def owners_of(session: Session, members: Iterable[Membership], at: int | None) -
 
 
 def owners_of_structure(session: Session, parent: int | None, at: int | None) -> list[Owner]:
-    """The structures that a structure is a part of, nearest first."""
+    """List the structures of which a structure is a part, nearest first."""
     owners: dict[int, Owner] = {}
     _ascend(session, parent, 1, at, owners)
     return list(owners.values())
@@ -73,7 +73,7 @@ def owners_of_structure(session: Session, parent: int | None, at: int | None) ->
 def _ascend(
     session: Session, number: int | None, distance: int, at: int | None, owners: dict[int, Owner]
 ) -> None:
-    """Add a structure and what it is a part of; what is there at no greater distance stays."""
+    """Add a structure and the structures that contain it; entries at no greater distance stay."""
     while number is not None and (number not in owners or owners[number].distance > distance):
         structure = version_at(session, session.get_one(Structure, number), at)
         owners[number] = Owner(structure, number, distance)
@@ -81,13 +81,13 @@ def _ascend(
 
 
 def knowledge(session: Session, column: str, number: int, owners: Sequence[Owner], at: int | None) -> Values:
-    """Material, phase, marks, observations, … of one entity or structure.
+    """Describe material, phase, marks, observations and so on of one entity or structure.
 
     Parameters
     ----------
     column : "entity_id" or "structure_id"
     number : its own
-    owners : the structures that it belongs to; what is said of those says so (`said_of`)
+    owners : the structures that it belongs to; what is said of those says so (`phase_or_material_of`)
     at : number of the entry at which it is asked for; None: now
     """
     own = _statements(session, column, [number], at)
@@ -121,11 +121,11 @@ def _statements(session: Session, column: str, numbers: Sequence[int], at: int |
 
 
 def _told(statement: Statement, far: Mapping[int, Owner]) -> Values:
-    """A statement with its provenance, and the structure that it is about, if that is another one."""
+    """Describe a statement with its provenance, and its structure if that is another one."""
     values = statement_values(statement)
     owner = far.get(_of(statement))
     if owner is not None:
-        values["said_of"] = owner.structure.code
+        values["phase_or_material_of"] = owner.structure.code
     return values | entry_values(statement.entry)
 
 
@@ -136,7 +136,7 @@ def _nearest(
     far: Mapping[int, Owner],
     at: int | None,
 ) -> Values | None:
-    """What is said nearest: of itself, else of the nearest structure."""
+    """Return the nearest statements: its own, or those of the nearest structure."""
     said: Any = next((one for _, one in ranked if isinstance(one, cls)), None)
     if said is None:
         return None

@@ -1,4 +1,4 @@
-"""How one entity stands to others: its relations from both sides, and its joints in the latest run."""
+"""Relations of one entity from both sides, and its joints in the latest run."""
 
 from sqlalchemy import or_, select
 from sqlalchemy.orm import Session, joinedload
@@ -13,7 +13,7 @@ Values = dict[str, object]
 
 
 def relations(session: Session, entity: int, at: int | None) -> dict[str, list[Values]]:
-    """Relations of an entity by kind as seen from it: what it rests on, what it supports, what is beside it, …
+    """List the relations of an entity by kind as seen from it: rests on, supports, beside, …
 
     Returns
     -------
@@ -47,7 +47,7 @@ def relations(session: Session, entity: int, at: int | None) -> dict[str, list[V
 
 
 def joints(session: Session, entity: int, run: int) -> list[Values]:
-    """What a run computed for the joints of an entity; forces in N, pressures in Pa, lengths in m."""
+    """List the results of a run for the joints of an entity; forces in N, pressures in Pa, lengths in m."""
     statement = (
         select(JointResult)
         .where(

@@ -1,4 +1,4 @@
-"""What is known of simulation runs: all of them in a list, one in full, two beside each other."""
+"""Descriptions of simulation runs: a list of all, one in full, and a comparison of two."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -24,7 +24,7 @@ _SHOWN = 12
 
 
 def list_runs(session: Session) -> list[dict[str, object]]:
-    """All runs, oldest first: run, scene, stored_at, outcome, stones, contacts, the error measures, wall [s]."""
+    """List all runs, oldest first: run, scene, stored_at, outcome, stones, contacts, the error measures, wall [s]."""
     stones = select(func.count()).where(EntityResult.run_id == Run.id).correlate(Run).scalar_subquery()
     statement = select(Run, stones).options(joinedload(Run.entry)).order_by(Run.id)
     return [
@@ -43,7 +43,7 @@ def list_runs(session: Session) -> list[dict[str, object]]:
 
 
 def describe_run(session: Session, number: int, count: int = 5) -> dict[str, Any]:
-    """One run in full, in plain values that JSON can say.
+    """Describe one run in full, in plain values that JSON can hold.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def describe_run(session: Session, number: int, count: int = 5) -> dict[str, Any
 
 
 def compare_runs(session: Session, number: int, against: int, count: int = 10) -> dict[str, Any]:
-    """What is different in run `number` from run `against`.
+    """Compare run `number` with run `against`.
 
     Returns
     -------
@@ -127,7 +127,7 @@ def compare_runs(session: Session, number: int, against: int, count: int = 10) -
 
 
 def _run(session: Session, number: int) -> Run:
-    """The run of this number; an error that names the latest if there is none."""
+    """Return the run of a number; an error that names the latest if there is none."""
     found = None
     if 0 < number <= _LARGEST:
         found = session.get(Run, number, options=[joinedload(Run.entry)])
@@ -144,7 +144,7 @@ def _run(session: Session, number: int) -> Run:
 
 
 def _stresses(session: Session, run: int, count: int) -> list[dict[str, object]]:
-    """The stones with the largest Von Mises stress [Pa]."""
+    """List the stones with the largest Von Mises stress [Pa]."""
     # the largest first, all else of them then: what is sorted should be short
     largest = (
         select(EntityResult.entity_id)
@@ -164,7 +164,7 @@ def _stresses(session: Session, run: int, count: int) -> list[dict[str, object]]
 
 
 def _simplification(session: Session, run: int) -> dict[str, object] | None:
-    """What the solids of the stones were made of."""
+    """Describe the simplification of the stones' solids."""
     of_run = Simplification.run_id == run
     farthest = session.execute(
         select(Entity.code, Simplification.displacement_max, Simplification.mode)
@@ -192,7 +192,7 @@ def _simplification(session: Session, run: int) -> dict[str, object] | None:
 def _joints(
     session: Session, run: int, worst: InstrumentedAttribute[Any], above: float, count: int
 ) -> list[dict[str, object]]:
-    """The joints that have the largest of one value, of those above a bound."""
+    """List the joints with the largest of one value, among those above a bound."""
     chosen = (
         select(JointResult.number)
         .where(JointResult.run_id == run, worst > above)
@@ -229,7 +229,7 @@ _JOINT_VALUES = (
 
 
 def _flat(settings: Mapping[str, Any], prefix: str = "") -> dict[str, object]:
-    """Nested settings as {"time.step": …}."""
+    """Flatten nested settings to {"time.step": …}."""
     flat: dict[str, object] = {}
     for name, value in settings.items():
         inner = _flat(value, f"{prefix}{name}.") if isinstance(value, Mapping) else {f"{prefix}{name}": value}
@@ -238,14 +238,14 @@ def _flat(settings: Mapping[str, Any], prefix: str = "") -> dict[str, object]:
 
 
 def _alone(session: Session, run: int, other: int) -> int:
-    """How many stones are in one run and not in the other."""
+    """Count the stones that are in one run and not in the other."""
     there = select(EntityResult.entity_id).where(EntityResult.run_id == other)
     alone = select(func.count()).where(EntityResult.run_id == run, EntityResult.entity_id.not_in(there))
     return int(session.scalar(alone) or 0)
 
 
 def _changes(session: Session, run: int, other: int, value: str, count: int) -> list[dict[str, object]]:
-    """The stones whose value changed most, largest change first."""
+    """List the stones whose value changed most, largest change first."""
     mine, theirs = aliased(EntityResult), aliased(EntityResult)
     now, then = getattr(mine, value), getattr(theirs, value)
     statement = (

@@ -1,4 +1,4 @@
-"""What a database can hold, as a tree: kinds with their attributes, structures, relations."""
+"""Schema of a database as a tree: kinds with their attributes, structures, relations."""
 
 from collections.abc import Sequence
 
@@ -22,7 +22,7 @@ RELATION_DEFINITIONS = {
 
 
 def schema(session: Session | None = None, kind: str | None = None) -> dict[str, object]:
-    """The hierarchy in values that JSON can say.
+    """Describe the hierarchy in values that JSON can hold.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def schema(session: Session | None = None, kind: str | None = None) -> dict[str,
 
 
 def _branch(cls: type[Entity], known: frozenset[type[Entity]], whole: bool = False) -> dict[str, object]:
-    """A kind and its subkinds; with what it inherits, if it is the `whole` tree."""
+    """Describe a kind and its subkinds; with inherited attributes if it is the `whole` tree."""
     own: Sequence[type[Entity]] = [one for one in reversed(cls.__mro__) if issubclass(one, Entity)]
     declared = [one for base in (own if whole else own[-1:]) for one in base.__dict__.get("__own__", ())]
     canon = canon_of(cls) if whole or "__canon__" in cls.__dict__ else None

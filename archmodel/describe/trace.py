@@ -1,4 +1,4 @@
-"""From what was computed of a stone back to the points that were measured."""
+"""Trace from a result of a stone back to the points that were measured."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -20,7 +20,7 @@ _TOO_LARGE = 2**31
 
 @dataclass(frozen=True)
 class Trace:
-    """What a result of one stone rests on, step by step.
+    """Evidence behind a result of one stone, step by step.
 
     Attributes
     ----------
@@ -45,12 +45,12 @@ class Trace:
 
     @property
     def is_outdated(self) -> bool:
-        """Whether the stone has been measured again, or its depth corrected, since the run read it."""
+        """True if the stone has been measured again, or its depth corrected, since the run read it."""
         return self.measurement is not None and self.measurement.superseded_id is not None
 
 
 def trace(session: Session, code: str, run: int | None = None) -> Trace:
-    """Go back from a result of the stone to its measurement.
+    """Trace a result of the stone back to its measurement.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def trace(session: Session, code: str, run: int | None = None) -> Trace:
 
 
 def _measurement(entity: Entity, run: Run) -> Select[Any]:
-    """What was held to be measured when the run read the stone."""
+    """Return the measurement that held when the run read the stone."""
     known = run.entry_id if run.as_of_id is None else run.as_of_id
     return (
         select(Measurement)
@@ -98,7 +98,7 @@ def _measurement(entity: Entity, run: Run) -> Select[Any]:
 
 
 def _not_run(session: Session, entity: Entity, run: int | None) -> UsageError:
-    """The error for a stone without the result that was asked for."""
+    """Make the error for a stone without the requested result."""
     runs = session.scalars(
         select(EntityResult.run_id)
         .where(EntityResult.entity_id == entity.id)

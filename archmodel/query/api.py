@@ -1,4 +1,4 @@
-"""Asking the database: which entities, with which attributes, and all that is known of one."""
+"""Queries of the database: entities by kind and condition, their attributes and their faces."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -8,7 +8,6 @@ from sqlalchemy import ColumnElement, select
 from sqlalchemy.orm import Session, object_session
 
 from archmodel.arrays import Array
-from archmodel.describe.entity import describe
 from archmodel.query.attributes import ATTRIBUTES, Attribute, attributes_of
 from archmodel.query.compile import column_named, condition, condition_in
 from archmodel.query.grammar import attributes_in, parse
@@ -24,7 +23,6 @@ __all__ = [
     "asked_columns",
     "attributes",
     "condition",
-    "describe",
     "find",
     "find_faces",
     "find_rows",
@@ -42,7 +40,7 @@ BATCH = 500
 
 @dataclass(frozen=True)
 class Face:
-    """The face of an entity that was found.
+    """Face of an entity that a query found.
 
     Attributes
     ----------
@@ -57,7 +55,7 @@ class Face:
 
 
 def attributes(session: Session | None = None, kind: str | None = None) -> tuple[Attribute, ...]:
-    """What can be asked, in the order in which it is shown.
+    """List the attributes that queries can ask for, in the order of display.
 
     Parameters
     ----------
@@ -71,7 +69,7 @@ def attributes(session: Session | None = None, kind: str | None = None) -> tuple
 
 
 def find(session: Session, kind: str, where: Sequence[str] = (), run: int | None = None) -> list[Entity]:
-    """The entities of a kind and its subkinds that satisfy all expressions, in the order of the survey.
+    """Return the entities of a kind and its subkinds that satisfy all expressions, in the order of the survey.
 
     Parameters
     ----------
@@ -100,7 +98,7 @@ def find_rows(
     run: int | None = None,
     columns: Sequence[str] | None = None,
 ) -> list[dict[str, object]]:
-    """As `find`, but attributes by name instead of entities: the fast way to a table.
+    """Return attributes of entities by name, as rows; the fast way to a table. Arguments as of `find`.
 
     Parameters
     ----------
@@ -118,7 +116,7 @@ def find_faces(
     run: int | None = None,
     columns: Sequence[str] = ("code",),
 ) -> list[Face]:
-    """As `find_rows`, with the face of each entity."""
+    """Return rows as `find_rows` does, with the face of each entity."""
 
     def chosen(scope: Scope) -> list[ColumnElement[Any]]:
         measurement = scope.measurement()
@@ -129,7 +127,7 @@ def find_faces(
 
 
 def asked_columns(where: Sequence[str], session: Session | None = None, kind: str = "entity") -> list[str]:
-    """The attributes that expressions name, but for those of other entities: ``depth``, ``von_mises_max@12``."""
+    """List the attributes that expressions name, without those of other entities: ``depth``, ``von_mises_max@12``."""
     known = attributes_of(session, kind_named(kind))
     expressions = [where] if isinstance(where, str) else where
     named = [token.text.lower() for one in expressions for token in attributes_in(parse(one))]
@@ -137,12 +135,12 @@ def asked_columns(where: Sequence[str], session: Session | None = None, kind: st
 
 
 def row_of(entity: Entity) -> dict[str, object]:
-    """Every attribute of an entity by name; None where it is not known. The entity's session must be open."""
+    """Return every attribute of an entity by name; None where it is not known. The entity's session must be open."""
     return rows_of([entity])[0]
 
 
 def rows_of(entities: Iterable[Entity]) -> list[dict[str, object]]:
-    """As `row_of`, for many entities of one session, in their order."""
+    """Return every attribute of many entities of one session, in their order, as `row_of` does."""
     wanted = list(entities)
     names = list(ATTRIBUTES)
     found: dict[object, dict[str, object]] = {}
@@ -163,7 +161,7 @@ def rows_of(entities: Iterable[Entity]) -> list[dict[str, object]]:
 def _asked(
     session: Session, where: Sequence[str], run: int | None
 ) -> tuple[Scope, list[ColumnElement[bool]]]:
-    """The scope of a query and its conditions; every kind in the database must be one that we know."""
+    """Return the scope of a query and its conditions; refuse kinds that this program does not know."""
     expressions = [where] if isinstance(where, str) else where
     if len(expressions) > MAX_EXPRESSIONS:
         remedy = "join some of them by and"
@@ -178,7 +176,7 @@ def _asked(
 
 
 def _columns(scope: Scope, names: Sequence[str]) -> list[ColumnElement[Any]]:
-    """The attributes of these names, as columns without them: a name may be the user's."""
+    """Return the columns of attributes under labels of our own: a name may be the user's."""
     return [column_named(scope, name).label(f"column_{number}") for number, name in enumerate(names)]
 
 
@@ -189,7 +187,7 @@ def _select(
     run: int | None,
     chosen: Callable[[Scope], list[ColumnElement[Any]]],
 ) -> Iterable[Sequence[Any]]:
-    """The chosen columns of the entities of a kind that satisfy all expressions, in the order of the survey."""
+    """Select columns of the entities of a kind that satisfy all expressions, in the order of the survey."""
     scope, conditions = _asked(session, where, run)
     columns = chosen(scope)
     statement = scope.joined(select(*columns)).where(*_of_kind(scope, kind), *conditions)
@@ -197,7 +195,7 @@ def _select(
 
 
 def _of_kind(scope: Scope, kind: str) -> list[ColumnElement[bool]]:
-    """That an entity is of a kind or one of its subkinds; nothing where every entity is."""
+    """Return the conditions that restrict entities to a kind and its subkinds; none where every entity is one."""
     cls = kind_named(kind)
     if cls is Entity:
         return []

@@ -1,4 +1,4 @@
-"""What can be asked of every entity, and where in the tables it is found."""
+"""Attributes that queries can ask for, and their places in the tables."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ __all__ = ["ATTRIBUTES", "Attribute", "attributes_of", "kinds_of", "own_attribut
 
 @dataclass(frozen=True)
 class Attribute:
-    """One thing that can be asked of an entity.
+    """One attribute of an entity.
 
     Attributes
     ----------
@@ -58,12 +58,12 @@ class Attribute:
 
     @property
     def is_number(self) -> bool:
-        """Whether it is a number, and not a text."""
+        """True for a number, False for a text."""
         return self.unit is not None
 
     @property
     def type_name(self) -> str:
-        """Its unit; of what has none, whether it is a text or true or false."""
+        """The unit; without one, whether the attribute is a text or true or false."""
         return self.unit or ("true/false" if self.is_truth else "text")
 
 
@@ -224,7 +224,7 @@ ATTRIBUTES: Mapping[str, Attribute] = {
 
 
 def attributes_of(session: Session | None = None, kind: type[Entity] | None = None) -> dict[str, Attribute]:
-    """The attributes of every entity, and those that some kinds have of their own.
+    """Return the attributes of every entity, and those that some kinds have of their own.
 
     Parameters
     ----------
@@ -238,7 +238,7 @@ def attributes_of(session: Session | None = None, kind: type[Entity] | None = No
 
 
 def kinds_of(session: Session | None = None) -> dict[str, type[Entity]]:
-    """The kinds that can be in a database: those built in, and those that it registers itself."""
+    """Return the kinds that a database can hold: those built in, and those that it registers itself."""
     user = None if session is None else session.get_bind().dialect
     return {
         name: cls
@@ -250,7 +250,7 @@ def kinds_of(session: Session | None = None) -> dict[str, type[Entity]]:
 def own_attributes_of(
     session: Session | None = None, kind: type[Entity] | None = None
 ) -> dict[str, Attribute]:
-    """The attributes that some kinds have of their own, by name; null for entities of other kinds."""
+    """Return the attributes that some kinds have of their own, by name; null for entities of other kinds."""
     known = kinds_of(session).values()
     found: dict[str, Attribute] = {}
     for cls in known:
@@ -261,7 +261,7 @@ def own_attributes_of(
 
 
 def _own(own: OwnAttribute) -> Attribute:
-    """An attribute of a kind: in a column, or, of a registered kind, in the entity's JSON."""
+    """Make the attribute of a kind: in a column or, for a registered kind, in the entity's JSON."""
 
     def value(scope: Scope, run: int | None) -> ColumnElement[Any]:
         if own.name in Entity.__table__.c:

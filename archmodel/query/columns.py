@@ -1,4 +1,4 @@
-"""Where the attributes of entities are found: in columns of joined tables, or by a search for each entity."""
+"""Sources of attributes: columns of joined tables, or a search for each entity."""
 
 from collections.abc import Callable
 from typing import Any
@@ -36,37 +36,37 @@ DOCUMENTING = ("made_of", "of_phase", "mason_mark", "observation", "depth", "ref
 
 
 def of_entity(name: str) -> Value:
-    """A column of the entity."""
+    """Return a source in a column of the entity."""
     return lambda scope, run: scope.entity.c[name]
 
 
 def of_measurement(name: str) -> Value:
-    """A column of its measurement."""
+    """Return a source in a column of the entity's measurement."""
     return lambda scope, run: scope.measurement().c[name]
 
 
 def of_result(name: str) -> Value:
-    """A column of its result in a run."""
+    """Return a source in a column of the entity's result in a run."""
     return lambda scope, run: scope.result(run).c[name]
 
 
 def of_simplification(name: str) -> Value:
-    """A column of the solid that stood for it in a run."""
+    """Return a source in a column of the solid that stood for the entity in a run."""
     return lambda scope, run: scope.simplification(run).c[name]
 
 
 def of_values(name: str) -> Value:
-    """A named number of its result in a run."""
+    """Return a source in a named number of the entity's result in a run."""
     return lambda scope, run: scope.result(run).c["values"][name].as_float()
 
 
 def of_material(name: str) -> Value:
-    """A property of its material."""
+    """Return a source in a property of the entity's material."""
     return lambda scope, run: scope.material_property(name).c.value
 
 
 def rows(table: type[Any], column: str, *, now: bool = True) -> Value:
-    """How many rows of a table name the entity in this column."""
+    """Count the rows of a table that name the entity in a column."""
 
     def value(scope: Scope, run: int | None) -> ColumnElement[int]:
         rows = scope.context.alias(table)
@@ -77,7 +77,7 @@ def rows(table: type[Any], column: str, *, now: bool = True) -> Value:
 
 
 def of_relations(what: Callable[[FromClause], ColumnElement[Any]], *sides: str, kind: str) -> Value:
-    """Something of all relations of a kind in which the entity stands on one of the sides."""
+    """Aggregate over all relations of a kind in which the entity stands on one of the sides."""
 
     def value(scope: Scope, run: int | None) -> ColumnElement[Any]:
         parts: list[ColumnElement[Any]] = []
@@ -96,12 +96,12 @@ def of_relations(what: Callable[[FromClause], ColumnElement[Any]], *sides: str, 
 
 
 def count(rows: FromClause) -> ColumnElement[int]:
-    """How many rows."""
+    """Return the SQL count of rows."""
     return func.count(rows.c.id)
 
 
 def of_marks(what: Callable[[FromClause], ColumnElement[Any]]) -> Value:
-    """Something of the mason marks that the entity itself bears."""
+    """Aggregate over the mason marks that the entity itself bears."""
 
     def value(scope: Scope, run: int | None) -> ColumnElement[Any]:
         said = scope.context.alias(Statement)
@@ -114,11 +114,11 @@ def of_marks(what: Callable[[FromClause], ColumnElement[Any]]) -> Value:
 
 
 def of_observations(what: Callable[[FromClause], ColumnElement[Any]]) -> Value:
-    """Something of all observations that hold for it."""
+    """Aggregate over all observations that hold for the entity."""
 
     def value(scope: Scope, run: int | None) -> ColumnElement[Any]:
         said, seen = observations_of(
-            scope.context.alias, scope.entity, scope.context.said_of_structures("observation")
+            scope.context.alias, scope.entity, scope.context.statements_of_structures("observation")
         )
         return select(what(said)).where(seen).correlate(scope.entity).scalar_subquery()
 
@@ -126,13 +126,13 @@ def of_observations(what: Callable[[FromClause], ColumnElement[Any]]) -> Value:
 
 
 def documents(scope: Scope, run: int | None) -> ColumnElement[int]:
-    """How many documents the statements that hold for it name."""
+    """Count the documents that the statements about the entity name."""
     said = scope.context.alias(Statement)
     told = statements_of(
         scope.context.alias,
         scope.entity,
         said,
-        scope.context.said_of_structures(*DOCUMENTING),
+        scope.context.statements_of_structures(*DOCUMENTING),
         *DOCUMENTING,
     )
     count = select(func.count(distinct(said.c.document_id))).where(told)
@@ -140,7 +140,7 @@ def documents(scope: Scope, run: int | None) -> ColumnElement[int]:
 
 
 def structures(scope: Scope, run: int | None) -> ColumnElement[int]:
-    """How many structures it is a member of."""
+    """Count the structures of which the entity is a member."""
     rows, structure = scope.context.alias(Membership), scope.context.alias(Structure)
     count = (
         select(func.count())

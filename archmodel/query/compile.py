@@ -1,4 +1,4 @@
-"""From query expressions to SQL conditions; see ``docs/query.md`` for the language.
+"""Compilation of query expressions to SQL conditions; see ``docs/query.md`` for the language.
 
 What the user wrote reaches the database as bound parameters only; the names that become SQL are those of
 ``attributes``, ``functions`` and the tables.
@@ -15,7 +15,7 @@ from sqlalchemy.orm import Session
 from archmodel.query.attributes import ATTRIBUTES, Attribute, attributes_of
 from archmodel.query.functions.registry import FUNCTIONS, STRUCTURE_FUNCTIONS, Function
 from archmodel.query.grammar import All, AnyOf, Call, Comparison, IsNull, Like, Membership, Node, Not, parse
-from archmodel.query.names import meant, run_numbered
+from archmodel.query.names import meant, run_with_number
 from archmodel.query.scope import Context, Scope, StructureScope
 from archmodel.query.tokens import Token, complaint
 from archmodel.tables.entities import Entity, kind_named, kind_of
@@ -59,7 +59,7 @@ STRUCTURE_ATTRIBUTES: Mapping[str, Attribute] = {
 
 
 def condition(session: Session, expression: str, run: int | None = None) -> ColumnElement[bool]:
-    """The condition of one expression, for a select of entities: ``select(Header).where(condition(…))``.
+    """Return the condition of one expression, for a select of entities: ``select(Header).where(condition(…))``.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def condition(session: Session, expression: str, run: int | None = None) -> Colu
 
 
 def column_named(scope: Scope, name: str) -> ColumnElement[Any]:
-    """Where an attribute is found: ``depth``, ``von_mises_max@12``.
+    """Return the column of an attribute: ``depth``, ``von_mises_max@12``.
 
     Raises
     ------
@@ -93,7 +93,7 @@ def column_named(scope: Scope, name: str) -> ColumnElement[Any]:
 
 
 def condition_in(scope: Where, node: Node) -> ColumnElement[bool]:
-    """The condition of a node, for a select that has the joins of the scope; as deep as the grammar allows."""
+    """Return the condition of a node, for a select with the joins of the scope; as deep as the grammar allows."""
     match node:
         case All(operands):
             return and_(*(condition_in(scope, operand) for operand in operands))
@@ -125,7 +125,7 @@ def condition_in(scope: Where, node: Node) -> ColumnElement[bool]:
 
 
 def _call(scope: Where, call: Call) -> ColumnElement[bool]:
-    """The condition of a function."""
+    """Return the condition of a function."""
     name = call.function.text.lower()
     known: Mapping[str, Function] = FUNCTIONS if isinstance(scope, Scope) else STRUCTURE_FUNCTIONS
     if (function := known.get(name)) is None:
@@ -140,7 +140,7 @@ def _call(scope: Where, call: Call) -> ColumnElement[bool]:
 
 
 def _attributes(scope: Where) -> Mapping[str, Attribute]:
-    """What can be asked here."""
+    """Return the attributes that can be asked for here."""
     if isinstance(scope, StructureScope):
         return STRUCTURE_ATTRIBUTES
     session = scope.context.session
@@ -149,14 +149,14 @@ def _attributes(scope: Where) -> Mapping[str, Attribute]:
 
 
 def _found(scope: Where, name: str) -> Attribute | None:
-    """The attribute of this name; the database is asked only for what is not built in."""
+    """Return the attribute of a name; the database is asked only for what is not built in."""
     if isinstance(scope, Scope) and name in ATTRIBUTES:
         return ATTRIBUTES[name]
     return _attributes(scope).get(name)
 
 
 def _column(scope: Where, token: Token) -> tuple[Attribute, ColumnElement[Any]]:
-    """The attribute that a token names, and where it is found: ``depth``, ``von_mises_max@12``."""
+    """Return the attribute that a token names, and its column: ``depth``, ``von_mises_max@12``."""
     name, at, number = token.text.partition("@")
     if (attribute := _found(scope, name.lower())) is None:
         known = _attributes(scope)
@@ -167,12 +167,12 @@ def _column(scope: Where, token: Token) -> tuple[Attribute, ColumnElement[Any]]:
     if at and not attribute.of_run:
         what = f"{attribute.name} does not depend on a run"
         raise complaint(token, what, f"write {attribute.name} without @{number[:20]}")
-    run = run_numbered(scope.context, token, number) if at else None
+    run = run_with_number(scope.context, token, number) if at else None
     return attribute, attribute.value(scope, run)  # type: ignore[arg-type]
 
 
 def _operand(scope: Where, attribute: Attribute, value: Token) -> Any:
-    """The right side of a comparison: a constant, or another attribute of the same kind (depth > length)."""
+    """Return the right side of a comparison: a constant, or another attribute of the same kind (depth > length)."""
     if value.role == "word" and (attribute.is_number or (attribute.of_run and "@" in value.text)):
         name = value.text.partition("@")[0].lower()
         other = _found(scope, name)
@@ -189,7 +189,7 @@ def _operand(scope: Where, attribute: Attribute, value: Token) -> Any:
 
 
 def _constant(scope: Where, attribute: Attribute, value: Token) -> Any:
-    """The value as the attribute's type has it."""
+    """Convert a value to the attribute's type."""
     if attribute.is_number:
         return _number(attribute, value)
     if attribute.is_truth:
@@ -212,7 +212,7 @@ def _type_of(attribute: Attribute) -> str:
 
 
 def _truth(attribute: Attribute, value: Token) -> ColumnElement[Any]:
-    """True or false, in upper or lower case."""
+    """Parse true or false, in upper or lower case."""
     if value.text.lower() not in _TRUTHS:
         what = f"{attribute.name} is true or false, {value.text[:40]!r} is not"
         raise complaint(value, what, f"write {attribute.name} = true or {attribute.name} = false")
@@ -223,7 +223,7 @@ _TRUTHS = {"true": True, "false": False}
 
 
 def _number(attribute: Attribute, value: Token) -> ColumnElement[Any]:
-    """A number with its type: PostgreSQL would round it to that of the column, or not use the index."""
+    """Return a number with its type: PostgreSQL would round it to that of the column, or not use the index."""
     number = float(value.text) if value.role == "number" else math.nan
     if not math.isfinite(number):
         remedy = "write a number without quotes, e.g. 0.4 or 2e5"

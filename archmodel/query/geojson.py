@@ -27,12 +27,12 @@ DECIMALS = 6
 
 
 def feature_collection(faces: Iterable[Face]) -> dict[str, object]:
-    """One feature for each face, with the attributes as its properties; no geometry where none was measured."""
+    """Make one feature for each face, with its attributes as properties; no geometry where none was measured."""
     return {"type": "FeatureCollection", "features": [_feature(face) for face in faces]}
 
 
 def flattened(faces: Sequence[Face]) -> list[Face]:
-    """The same faces with outlines (nv, 2) in the plane of the wall [m]: u along it, v upwards.
+    """Return the faces with outlines (nv, 2) in the plane of the wall [m]: u along it, v upwards.
 
     For a wall without slope, v is the height z. Level faces (a paving) have u = x, v = y if they look up.
 
@@ -65,7 +65,7 @@ def flattened(faces: Sequence[Face]) -> list[Face]:
 
 
 def _axes(normal: Array) -> Array:
-    """(2, 3) directions u and v in the plane, so that u × v is the normal."""
+    """Return directions u and v (2, 3) in the plane, so that u × v is the normal."""
     along = np.array([-normal[1], normal[0], 0.0])
     if float(np.linalg.norm(along)) < LEVEL:
         along = np.array([math.copysign(1.0, normal[2]), 0.0, 0.0])

@@ -1,4 +1,4 @@
-"""The grammar of query expressions: from text to a small tree, with limits; no database here.
+"""Grammar of query expressions: from text to a small tree, with limits; no database here.
 
 ::
 
@@ -56,7 +56,7 @@ _JOINING = "join tests by and, or; put a text with blanks in quotes"
 
 @dataclass(frozen=True)
 class Comparison:
-    """attribute operator value."""
+    """Node: attribute operator value."""
 
     attribute: Token
     operator: str
@@ -65,7 +65,7 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Membership:
-    """attribute in (values)."""
+    """Node: attribute in (values)."""
 
     attribute: Token
     values: tuple[Token, ...]
@@ -73,7 +73,7 @@ class Membership:
 
 @dataclass(frozen=True)
 class Like:
-    """attribute like pattern."""
+    """Node: attribute like pattern."""
 
     attribute: Token
     pattern: Token
@@ -81,7 +81,7 @@ class Like:
 
 @dataclass(frozen=True)
 class Call:
-    """function(arguments)."""
+    """Node: function(arguments)."""
 
     function: Token
     arguments: "tuple[Token | Node, ...]"
@@ -89,28 +89,28 @@ class Call:
 
 @dataclass(frozen=True)
 class IsNull:
-    """attribute is null, or function(…) is null: it is neither true nor false."""
+    """Node: attribute is null, or function(…) is null, neither true nor false."""
 
     operand: Token | Call
 
 
 @dataclass(frozen=True)
 class Not:
-    """The opposite; unknown stays unknown."""
+    """Node: the opposite; unknown stays unknown."""
 
     operand: "Node"
 
 
 @dataclass(frozen=True)
 class All:
-    """Every operand, joined by and."""
+    """Node: every operand, joined by and."""
 
     operands: "tuple[Node, ...]"
 
 
 @dataclass(frozen=True)
 class AnyOf:
-    """At least one operand, joined by or."""
+    """Node: at least one operand, joined by or."""
 
     operands: "tuple[Node, ...]"
 
@@ -119,7 +119,7 @@ Node = Comparison | Membership | Like | Call | IsNull | Not | All | AnyOf
 
 
 def parse(text: str) -> Node:
-    """The tree of an expression.
+    """Parse an expression into its tree.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def parse(text: str) -> Node:
 
 
 def attributes_in(node: Node) -> Iterator[Token]:
-    """The tokens that are, or may be, attributes of what the expression speaks of; not those within functions."""
+    """List the tokens that are, or may be, attributes of the expression's own entities; not those within functions."""
     match node:
         case All(operands) | AnyOf(operands):
             for operand in operands:
@@ -146,7 +146,7 @@ def attributes_in(node: Node) -> Iterator[Token]:
 
 
 class _Parser:
-    """Recursive descent over the tokens; `depth` counts parentheses, nots and functions, `calls` functions."""
+    """Recursive-descent parser over the tokens; `depth` counts parentheses, nots and functions, `calls` functions."""
 
     def __init__(self, tokens: list[Token]) -> None:
         self.tokens = tokens
@@ -163,7 +163,7 @@ class _Parser:
         return token
 
     def taken(self, role: str, text: str) -> bool:
-        """Take the token if it is this one."""
+        """Take the next token if it is this one."""
         if (self.token.role, self.token.text) != (role, text):
             return False
         self.index += 1
@@ -218,7 +218,7 @@ class _Parser:
         return Not(node) if negated else node
 
     def call(self, function: Token, depth: int) -> Call:
-        """The arguments; the parenthesis has been taken."""
+        """Parse the arguments; the parenthesis has been taken."""
         self.calls += 1
         if self.calls > MAX_CALLS:
             what = f"functions are nested more than {MAX_CALLS} deep"
@@ -233,14 +233,14 @@ class _Parser:
         return Call(function, tuple(arguments))
 
     def argument(self, depth: int) -> Token | Node:
-        """A value if nothing but the next argument or the end follows it, else an expression."""
+        """Parse a value if the next argument or the end follows it, otherwise an expression."""
         if self.token.role in VALUES and self.following in ((",", "sign"), (")", "sign"), ("", "end")):
             return self.take()
         return self.expression(depth + 1)
 
     @property
     def following(self) -> tuple[str, str]:
-        """Text and role of the token after this one."""
+        """Return text and role of the token after this one."""
         token = self.tokens[min(self.index + 1, len(self.tokens) - 1)]
         return token.text, token.role
 

@@ -1,4 +1,4 @@
-"""What is said of an entity: by statements about it, else about the structures that it is a member of.
+"""Statements that hold for an entity: its own, or inherited from the structures of which it is a member.
 
 Statements about a structure hold for its members and for the members of its parts, unless the entity, or a structure
 nearer to it, has a statement of its own.
@@ -27,12 +27,12 @@ from archmodel.tables.structures import Structure
 
 __all__ = [
     "Alias",
-    "entities_told",
+    "entities_with_statement",
     "held",
     "observations_of",
-    "said_of",
-    "said_of_structures",
+    "phase_or_material_of",
     "statements_of",
+    "statements_of_structures",
 ]
 
 MAX_LEVELS = 40
@@ -45,12 +45,12 @@ _SUBJECT = {"of_phase": "phase_id", "made_of": "material_id"}
 
 
 def held(rows: FromClause) -> ColumnElement[bool]:
-    """Only what is held to be true now."""
+    """Keep the rows that are held to be true now."""
     return rows.c.superseded_id.is_(None)
 
 
-def said_of_structures(alias: Alias, *kinds: str) -> CTE:
-    """Held statements of some kinds about structures, for each structure and all parts of it.
+def statements_of_structures(alias: Alias, *kinds: str) -> CTE:
+    """Select held statements of some kinds about structures, for each structure and all parts of it.
 
     Returns
     -------
@@ -72,13 +72,15 @@ def said_of_structures(alias: Alias, *kinds: str) -> CTE:
     )
 
 
-def said_of(alias: Alias, entity: FromClause, kind: str, of_structures: CTE) -> ColumnElement[int]:
-    """Number of the phase or the material that an entity is held to be of; the latest statement decides.
+def phase_or_material_of(
+    alias: Alias, entity: FromClause, kind: str, of_structures: CTE
+) -> ColumnElement[int]:
+    """Return the number of the phase or material of an entity; the latest statement decides.
 
     Parameters
     ----------
     kind : of statement: of_phase or made_of
-    of_structures : `said_of_structures` of that kind
+    of_structures : `statements_of_structures` of that kind
     """
     own, inherited, member = alias(Statement), alias(Statement), alias(Membership)
     subject = _SUBJECT[kind]
@@ -105,11 +107,11 @@ def said_of(alias: Alias, entity: FromClause, kind: str, of_structures: CTE) -> 
 def statements_of(
     alias: Alias, entity: FromClause, said: FromClause, of_structures: CTE, *kinds: str
 ) -> ColumnElement[bool]:
-    """The condition that a statement `said` is one of the entity, or of a structure that it is a member of.
+    """Return the condition that a statement `said` is one of the entity, or of a structure of which it is a member.
 
     Parameters
     ----------
-    of_structures : `said_of_structures` of these kinds
+    of_structures : `statements_of_structures` of these kinds
     """
     own, member = alias(Statement), alias(Membership)
     by_itself = select(own.c.id).where(own.c.entity_id == entity.c.id, own.c.kind.in_(kinds), held(own))
@@ -122,18 +124,18 @@ def statements_of(
     return said.c.id.in_(union_all(by_itself.correlate(entity), by_structure.correlate(entity)))
 
 
-def entities_told(
+def entities_with_statement(
     alias: Alias,
     of_structures: CTE,
     wanted: Callable[[FromClause], list[ColumnElement[bool]]],
     *kinds: str,
     own_type_first: bool = False,
 ) -> CompoundSelect[int]:
-    """Numbers of all entities for which a statement holds: one search, however many entities there are.
+    """Select the numbers of all entities for which a statement holds, in one search.
 
     Parameters
     ----------
-    of_structures : `said_of_structures` of these kinds
+    of_structures : `statements_of_structures` of these kinds
     wanted : what is asked of the statement
     own_type_first : a statement about a structure gives way to one of the same type about the entity
     """
@@ -156,7 +158,7 @@ def entities_told(
 def observations_of(
     alias: Alias, entity: FromClause, of_structures: CTE
 ) -> tuple[FromClause, ColumnElement[bool]]:
-    """Observations that hold for an entity: its own, and those of its structures of types that it has none of.
+    """Select the observations that hold for an entity: its own, and those of its structures of types that it lacks.
 
     Returns
     -------
@@ -175,7 +177,7 @@ def observations_of(
 def _of_same_type(
     alias: Alias, entity_id: ColumnElement[int], said: FromClause, around: FromClause
 ) -> ColumnElement[bool]:
-    """Whether there is an observation about the entity itself that is of the type of `said`."""
+    """Test for an observation about the entity itself of the type of `said`."""
     own = alias(Statement)
     same = select(own.c.id).where(
         own.c.entity_id == entity_id, own.c.kind == "observation", own.c.type == said.c.type, held(own)

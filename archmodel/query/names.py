@@ -1,4 +1,4 @@
-"""Names in an expression that only the database knows: stones, structures, marks, documents, runs."""
+"""Names in expressions that only the database knows: stones, structures, marks, documents, runs."""
 
 import difflib
 from collections.abc import Iterable, Sequence
@@ -19,7 +19,7 @@ __all__ = [
     "mark_named",
     "meant",
     "refuse_unknown_run",
-    "run_numbered",
+    "run_with_number",
     "stone_named",
     "structure_named",
 ]
@@ -29,7 +29,7 @@ MAX_SHOWN = 12
 
 
 def meant(written: str, known: Iterable[str], what: str) -> str:
-    """What the user may have meant: the nearest names, else the first of all."""
+    """Suggest names: the nearest ones, or the first of all if none is near."""
     names = list(known)
     lower = {name.lower(): name for name in names}
     near = difflib.get_close_matches(written[:40].lower(), lower, n=3, cutoff=0.5)
@@ -40,7 +40,7 @@ def meant(written: str, known: Iterable[str], what: str) -> str:
 
 
 def stone_named(context: Context, code: Token) -> Row[int, float | None, float | None, float | None]:
-    """Number and centroid (x, y, z) of a stone."""
+    """Return number and centroid (x, y, z) of a stone."""
 
     def look() -> Row[int, float | None, float | None, float | None]:
         stone = select(Entity.id, Entity.x, Entity.y, Entity.z).where(Entity.code == code.text)
@@ -55,7 +55,7 @@ def stone_named(context: Context, code: Token) -> Row[int, float | None, float |
 
 
 def structure_named(context: Context, code: Token) -> int:
-    """Number of a structure that is held now."""
+    """Return the number of a structure that is held now."""
 
     def look() -> int:
         structure = select(Structure.id).where(Structure.code == code.text, Structure.superseded_id.is_(None))
@@ -70,7 +70,7 @@ def structure_named(context: Context, code: Token) -> int:
 
 
 def mark_named(context: Context, sign: Token) -> str:
-    """The sign, if a mason mark of this name is held."""
+    """Return the sign of a mason mark that is held; an error if there is none."""
     known = select(MasonMark.sign).where(MasonMark.superseded_id.is_(None), MasonMark.sign.is_not(None))
     signs = context.once("marks", lambda: sorted(set(context.session.scalars(known))))
     if sign.text not in signs:
@@ -80,7 +80,7 @@ def mark_named(context: Context, sign: Token) -> str:
 
 
 def document_named(context: Context, code: Token) -> int:
-    """Number of a document that is held now."""
+    """Return the number of a document that is held now."""
     known = select(Document.code, Document.id).where(Document.superseded_id.is_(None)).order_by(Document.code)
     documents: dict[str, int] = context.once(
         "documents", lambda: {row.code: row.id for row in context.session.execute(known)}
@@ -91,8 +91,8 @@ def document_named(context: Context, code: Token) -> int:
     return documents[code.text]
 
 
-def run_numbered(context: Context, token: Token, number: str) -> int:
-    """The number, if there is a run of this number.
+def run_with_number(context: Context, token: Token, number: str) -> int:
+    """Return the number of a run; an error if there is none.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def run_numbered(context: Context, token: Token, number: str) -> int:
 
 
 def refuse_unknown_run(context: Context) -> None:
-    """Check that the run whose results are meant, if one is named, is in the database."""
+    """Refuse a run that is not in the database, if one is named."""
     runs = _runs(context) if context.run is not None else ()
     if context.run is not None and context.run not in runs:
         what = "there is no such run in the database"
@@ -120,7 +120,7 @@ def refuse_unknown_run(context: Context) -> None:
 
 
 def _runs(context: Context) -> list[int]:
-    """Numbers of all runs."""
+    """Select the numbers of all runs."""
     runs: list[int] = context.once(
         "runs", lambda: list(context.session.scalars(select(Run.id).order_by(Run.id)))
     )
@@ -128,7 +128,7 @@ def _runs(context: Context) -> list[int]:
 
 
 def _known_runs(runs: Sequence[int]) -> str:
-    """The latest runs, for an error."""
+    """List the latest runs, for an error."""
     if not runs:
         return "there are no runs yet (moma run SCENE)"
     return f"the runs are {'…, ' if len(runs) > MAX_SHOWN else ''}{', '.join(map(str, runs[-MAX_SHOWN:]))}"

@@ -1,4 +1,4 @@
-"""Where the names of a query are found: a table of entities, and tables joined to it only as they are asked for."""
+"""Scope of a query: a table of entities, and tables joined to it only when an expression needs them."""
 
 from collections import Counter
 from collections.abc import Callable, Hashable
@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 from sqlalchemy import CTE, ColumnElement, FromClause, Select, and_, func, select
 from sqlalchemy.orm import Session
 
-from archmodel.query.inherited import held, said_of, said_of_structures
+from archmodel.query.inherited import held, phase_or_material_of, statements_of_structures
 from archmodel.query.tokens import Token, complaint
 from archmodel.tables.base import Base
 from archmodel.tables.entities import Entity
@@ -31,7 +31,7 @@ _ALIASES: dict[tuple[type[Base], int], list[FromClause]] = {}
 
 @dataclass
 class Context:
-    """What the parts of one query share.
+    """State that the parts of one query share.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Context:
     _shared: dict[Hashable, Any] = field(default_factory=dict, init=False)
 
     def alias(self, cls: type[Base]) -> FromClause:
-        """An alias of the table of a class that this query does not have yet.
+        """Return an alias of a table that this query does not have yet.
 
         Queries share their aliases with later ones, since to make one takes longer than most queries do.
         """
@@ -61,26 +61,26 @@ class Context:
         return pool[number]
 
     def count_function(self, token: Token) -> None:
-        """Refuse one function too many."""
+        """Count a function, and refuse one too many."""
         self._functions += 1
         if self._functions > MAX_FUNCTIONS:
             raise complaint(token, f"more than {MAX_FUNCTIONS} functions", "ask in several queries")
 
     def once(self, key: Hashable, make: Callable[[], Any]) -> Any:
-        """What is looked up, or put together, at most once in a query."""
+        """Return a value that is looked up, or put together, at most once in a query."""
         if key not in self._shared:
             self._shared[key] = make()
         return self._shared[key]
 
-    def said_of_structures(self, *kinds: str) -> CTE:
-        """Statements of some kinds about structures, for every structure that is a part of theirs."""
-        cte: CTE = self.once(("structures", kinds), lambda: said_of_structures(self.alias, *kinds))
+    def statements_of_structures(self, *kinds: str) -> CTE:
+        """Return statements of some kinds about structures, for every structure that is a part of theirs."""
+        cte: CTE = self.once(("structures", kinds), lambda: statements_of_structures(self.alias, *kinds))
         return cte
 
 
 @dataclass
 class Scope:
-    """The entities that an expression speaks of.
+    """Entities that an expression is about.
 
     Every join finds at most one row for each entity, so that it adds no rows.
 
@@ -96,34 +96,34 @@ class Scope:
 
     @classmethod
     def elsewhere(cls, context: Context) -> "Scope":
-        """Other entities than those that are spoken of."""
+        """Return the scope of other entities than those of this expression."""
         return cls(context, context.alias(Entity))
 
     @property
     def is_bare(self) -> bool:
-        """Whether nothing was joined."""
+        """True if nothing was joined."""
         return not self._joins
 
     def joined(self, statement: S) -> S:
-        """The select on entities with the joins that were asked for."""
+        """Return the select on entities with the joins that were needed."""
         source = self.entity
         for target, condition in self._joins.values():
             source = source.outerjoin(target, condition)
         return statement.select_from(source)
 
     def measurement(self) -> FromClause:
-        """The measurement that is held now."""
+        """Join the measurement that is held now."""
         return self._join(
             "measurement", Measurement, lambda rows: and_(rows.c.entity_id == self.entity.c.id, held(rows))
         )
 
     def survey(self) -> FromClause:
-        """The survey of that measurement."""
+        """Join the survey of that measurement."""
         number = self.measurement().c.survey_id
         return self._join("survey", Survey, lambda rows: rows.c.id == number)
 
     def result(self, run: int | None = None) -> FromClause:
-        """What a run computed: that of this number, or of the query, or the latest that holds the entity."""
+        """Join the result of a run: of this number, of the query, or the latest that holds the entity."""
         number = self.context.run if run is None else run
         wanted = self._latest_run() if number is None else number
         return self._join(
@@ -133,12 +133,12 @@ class Scope:
         )
 
     def run(self, run: int | None = None) -> FromClause:
-        """The run of that result."""
+        """Join the run of that result."""
         result = self.result(run)
         return self._join(("run", id(result)), Run, lambda rows: rows.c.id == result.c.run_id)
 
     def simplification(self, run: int | None = None) -> FromClause:
-        """The solid that stood for the entity in that run."""
+        """Join the solid that stood for the entity in that run."""
         result = self.result(run)
         return self._join(
             ("simplification", id(result)),
@@ -147,21 +147,21 @@ class Scope:
         )
 
     def phase(self) -> FromClause:
-        """The phase that it is held to be of."""
-        number = said_of(
-            self.context.alias, self.entity, "of_phase", self.context.said_of_structures("of_phase")
+        """Join the phase of the entity."""
+        number = phase_or_material_of(
+            self.context.alias, self.entity, "of_phase", self.context.statements_of_structures("of_phase")
         )
         return self._join("phase", Phase, lambda rows: rows.c.id == number)
 
     def material(self) -> FromClause:
-        """The material that it is held to be of."""
-        number = said_of(
-            self.context.alias, self.entity, "made_of", self.context.said_of_structures("made_of")
+        """Join the material of the entity."""
+        number = phase_or_material_of(
+            self.context.alias, self.entity, "made_of", self.context.statements_of_structures("made_of")
         )
         return self._join("material", Material, lambda rows: rows.c.id == number)
 
     def material_property(self, name: str) -> FromClause:
-        """A property of that material."""
+        """Join a property of that material."""
         number = self.material().c.id
         return self._join(
             ("property", name),
@@ -170,7 +170,7 @@ class Scope:
         )
 
     def _latest_run(self) -> ColumnElement[int]:
-        """Number of the latest run that holds the entity: one step in the primary key."""
+        """Return the number of the latest run that holds the entity: one step in the primary key."""
         result = self.context.alias(EntityResult)
         latest = select(func.max(result.c.run_id)).where(result.c.entity_id == self.entity.c.id)
         return latest.correlate(self.entity).scalar_subquery()
@@ -178,7 +178,7 @@ class Scope:
     def _join(
         self, key: Hashable, cls: type[Base], condition: Callable[[FromClause], ColumnElement[bool]]
     ) -> FromClause:
-        """The alias that is joined under this key, joined now if it was not."""
+        """Return the alias joined under this key, and join it if it is not joined yet."""
         if key not in self._joins:
             rows = self.context.alias(cls)
             self._joins[key] = rows, condition(rows)
@@ -187,7 +187,7 @@ class Scope:
 
 @dataclass
 class StructureScope:
-    """The structures that an expression within ``member_of(…)`` speaks of.
+    """Structures that an expression within ``member_of(…)`` is about.
 
     Attributes
     ----------

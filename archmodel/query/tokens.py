@@ -1,4 +1,4 @@
-"""Query expressions in pieces, and errors that point at a piece."""
+"""Tokens of query expressions, and errors that point at a token."""
 
 import re
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ _TOKEN = re.compile(
 
 @dataclass(frozen=True)
 class Token:
-    """A piece of the expression.
+    """Token of an expression.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class Token:
 
 
 def complaint(token: Token, what: str, remedy: str | None = None) -> QueryError:
-    """The error that points at a token."""
+    """Make an error that points at a token."""
     shown = token.source if len(token.source) <= 60 else token.source[:57] + "..."
     # The expression is the user's: whatever cannot be printed is escaped, so that the error is one line.
     where = ascii(shown) if not shown.isprintable() else f'"{shown}"'
@@ -48,7 +48,7 @@ def complaint(token: Token, what: str, remedy: str | None = None) -> QueryError:
 
 
 def tokenise(text: str) -> list[Token]:
-    """The expression in pieces, with an end after the last."""
+    """Split an expression into tokens, with an end token after the last."""
     if len(text) > MAX_LENGTH:
         token = Token("end", "", MAX_LENGTH, text)
         raise complaint(
@@ -74,7 +74,7 @@ def tokenise(text: str) -> list[Token]:
 
 
 def _token(role: str, piece: str, position: int, source: str) -> Token:
-    """A piece with its true role."""
+    """Return a token with its true role."""
     if role == "quoted":
         piece = piece[1:-1].replace(piece[0] * 2, piece[0])
     elif role == "word" and piece.lower() in KEYWORDS:
@@ -85,5 +85,5 @@ def _token(role: str, piece: str, position: int, source: str) -> Token:
 
 
 def named(token: Token) -> str:
-    """How an error speaks of a token."""
+    """Name a token in an error."""
     return "the end" if token.role == "end" else repr(token.text[:40])

@@ -1,4 +1,4 @@
-"""Voussoirs in their rows: rings of arches from the joints between stones, as plain values.
+"""Rings of arches from the joints between voussoirs, as plain values.
 
 Voussoirs that touch make up an arch if their faces look one way, along its axis. Seen along that axis, a joint
 between two stones of one ring is crossed by the ring (its normal runs along the arch), one between two rings is
@@ -31,7 +31,7 @@ _FEWEST = 3  # stones of an arch, with its springers
 
 @dataclass(frozen=True)
 class ArchStone:
-    """A stone in its place in an arch.
+    """Stone in its place in an arch.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class ArchStone:
 
 @dataclass(frozen=True)
 class Arch:
-    """A row, or rings of rows, of voussoirs.
+    """Row, or rings of rows, of voussoirs.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Arch:
 
 @dataclass(frozen=True, eq=False)
 class ArchJoint:
-    """Two stones that touch.
+    """Joint of two stones in contact.
 
     Attributes
     ----------
@@ -74,16 +74,16 @@ class ArchJoint:
     normal: Array
 
     def other(self, stone: int) -> int:
-        """The stone on the other side."""
+        """Return the stone on the other side."""
         return self.second if stone == self.first else self.first
 
     def towards(self, stone: int) -> Array:
-        """The normal that points to one of the stones."""
+        """Return the normal that points to one of the stones."""
         return self.normal if stone == self.first else -self.normal
 
 
 def arches_among(stones: StoneColumns, feet: Sequence[bool], joints: Iterable[ArchJoint]) -> list[Arch]:
-    """The arches that voussoirs make up, by the smallest number of their stones.
+    """Return the arches that voussoirs form, by the smallest number of their stones.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def arches_among(stones: StoneColumns, feet: Sequence[bool], joints: Iterable[Ar
 
 
 def _groups(members: Sequence[int], touching: Mapping[int, Sequence[ArchJoint]]) -> Iterator[list[int]]:
-    """Stones that hang together, each group and all of them in the order of their numbers."""
+    """Return connected groups of stones, each group and all of them in the order of their numbers."""
     left = set(members)
     for start in members:
         if start not in left:
@@ -121,7 +121,7 @@ def _groups(members: Sequence[int], touching: Mapping[int, Sequence[ArchJoint]])
 def _arch(
     group: Sequence[int], touching: Mapping[int, Sequence[ArchJoint]], stones: StoneColumns
 ) -> Arch | None:
-    """The arch of stones that hang together; None if they make none: one stone, or a web of a vault."""
+    """Return the arch of connected stones; None if they form none: one stone, or a web of a vault."""
     mean = stones.normals[list(group)].mean(axis=0)
     if not float(np.linalg.norm(mean)) >= _ONE_WAY:
         return None
@@ -149,7 +149,7 @@ def _arch(
 
 
 class _View:
-    """What one sees who looks at an arch along its axis: the places of its stones and of those they touch."""
+    """View along the axis of an arch: the places of its stones and of those that they touch."""
 
     def __init__(
         self,
@@ -170,27 +170,27 @@ class _View:
         self._flat = dict(zip(seen, flat, strict=True))
 
     def project(self, vectors: Array) -> Array:
-        """Components (…, 2) to the right and up."""
+        """Return components (…, 2) to the right and up."""
         out: Array = vectors @ self._axes
         return out
 
     def places(self, stones: Iterable[int]) -> Array:
-        """Centroids (m, 2) of some stones, to the right and up [m]."""
+        """Return centroids (m, 2) of some stones, to the right and up [m]."""
         return np.array([self._flat[i] for i in stones])
 
     def right(self, stone: int) -> float:
-        """How far to the right a stone lies [m]."""
+        """Return the distance of a stone to the right [m]."""
         return float(self._flat[stone][0])
 
     def up(self, stone: int) -> float:
-        """How high a stone lies [m]."""
+        """Return the height of a stone [m]."""
         return float(self._flat[stone][1])
 
 
 def _within_rings(
     group: Sequence[int], joints: Sequence[ArchJoint], view: _View
 ) -> tuple[list[ArchJoint], Array]:
-    """The joints that the rings cross, and the centre about which they turn."""
+    """Return the joints that the rings cross, and the centre about which they turn."""
     degrees = Counter(i for joint in joints for i in (joint.first, joint.second))
     if max(degrees.values(), default=0) <= 2 and len(joints) < len(group):
         return list(joints), np.zeros(2)  # one row, however its centre lies
@@ -207,7 +207,7 @@ def _within_rings(
 
 
 def _centre(middle: Array, normal: Array) -> Array:
-    """The place (2,) to which most joints point: joints within rings meet there, those between rings nowhere.
+    """Return the place (2,) to which most joints point: joints within rings meet there, those between rings nowhere.
 
     Parameters
     ----------
@@ -232,14 +232,14 @@ def _centre(middle: Array, normal: Array) -> Array:
 
 
 def _off(centre: Array, middle: Array, normal: Array) -> Array:
-    """Sine of the angle (m,) by which the face of each joint points past a place."""
+    """Return the sine of the angle (m,) by which the face of each joint points past a place."""
     ray = middle - centre
     out: Array = np.abs((normal * ray).sum(axis=1)) / np.maximum(np.linalg.norm(ray, axis=1), 1e-12)
     return out
 
 
 def _row_of(ring: Sequence[int], crossed: Mapping[int, Sequence[ArchJoint]], view: _View) -> list[int] | None:
-    """The stones of a ring in their row, from left to right; None if they branch.
+    """Order the stones of a ring from left to right; None if they branch.
 
     A ring that is closed begins with its lowest stone.
     """
@@ -263,7 +263,7 @@ def _placed(
     stones: StoneColumns,
     view: _View,
 ) -> Iterator[ArchStone]:
-    """The stones of a ring and its springers, from left to right."""
+    """Place the stones of a ring and its springers, from left to right."""
     feet: tuple[set[int], set[int]] = (set(), set())
     for end in {row[0], row[-1]}:
         for foot in (joint.other(end) for joint in crossed[end]):
@@ -279,7 +279,7 @@ def _placed(
 
 
 def _angle(stone: int, place: Mapping[int, int], joints: Sequence[ArchJoint], view: _View) -> float | None:
-    """Angle between the joints of a stone with those before and after it in its row [rad]; None without these."""
+    """Return the angle between the joints of a stone with its neighbours in the row [rad]; None without these."""
     sides = [np.zeros(3), np.zeros(3)]
     for joint in joints:
         apart = place.get(joint.other(stone), place[stone]) - place[stone]

@@ -20,7 +20,7 @@ __all__ = ["arch_parts", "find_arches"]
 
 
 def find_arches(session: Session) -> list[Arch]:
-    """The arches that the relations of the voussoirs make, by the smallest number of their stones."""
+    """Find the arches that the relations of the voussoirs form, by the smallest number of their stones."""
     stones = stone_columns(session, Entity.kind.in_(_names(Voussoir)))
     if len(stones) == 0:
         return []
@@ -38,7 +38,7 @@ def _names(cls: type[Entity]) -> list[str]:
 
 
 def _touching_voussoirs(session: Session) -> Iterable[Any]:
-    """Subject, object and normal of the joints between voussoirs."""
+    """Select subject, object and normal of the joints between voussoirs."""
     subject, other = aliased(Entity), aliased(Entity)
     names = _names(Voussoir)
     return session.execute(
@@ -57,7 +57,7 @@ def _touching_voussoirs(session: Session) -> Iterable[Any]:
 
 
 def arch_parts(session: Session, arches: Sequence[Arch]) -> list[Part]:
-    """The arches as structures; one that shares most of its stones with an arch of the database keeps its code."""
+    """Return the arches as structures; one that shares most of its stones with a stored arch keeps its code."""
     number = {stone.entity: i for i, arch in enumerate(arches) for stone in arch.stones}
     votes: Counter[tuple[int, str]] = Counter()
     known = (

@@ -1,4 +1,4 @@
-"""From stones that touch to relations: what rests on what, what is beside, behind, bonded with what.
+"""Classification of contacts as relations: rests on, beside, behind, bonded with.
 
 Plain values in and out: which pairs touch where and in which direction (as a search of their solids finds it), what
 kinds the stones are and which way their faces look. The definitions are in ``docs/relations.md``.
@@ -26,7 +26,7 @@ _RESTS_ON, _BESIDE, _BONDED, _ACROSS = (
 
 @dataclass(frozen=True)
 class RelationSettings:
-    """What counts as touching, and as what; kept in the entry of the relations that were found with it.
+    """Tolerances of contact and of its classification; kept in the entry of the relations found with them.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class RelationSettings:
 
 @dataclass(frozen=True)
 class StonesOf:
-    """Stones as their relations need them.
+    """Attributes of stones that classification needs.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class StonesOf:
 
 @dataclass(frozen=True)
 class Contacts:
-    """Where stones touch.
+    """Contacts between stones.
 
     Attributes
     ----------
@@ -118,7 +118,7 @@ class FoundRelations:
 def relations_between(
     contacts: Contacts, stones: StonesOf, settings: RelationSettings | None = None
 ) -> FoundRelations:
-    """What follows from the contacts of stones.
+    """Classify the contacts of stones.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def relations_between(
 
 @dataclass(frozen=True)
 class _Faces:
-    """How the faces of the two stones of each contact look.
+    """Directions of the two faces of each contact.
 
     Attributes
     ----------
@@ -189,13 +189,13 @@ class _Faces:
 
 
 def _is_one_of(names: Sequence[str], *classes: type) -> Bools:
-    """Which stones are of a kind or its subkinds."""
+    """Return a mask of the stones that are of a kind or its subkinds."""
     wanted = {kind_of(cls) for cls in kinds().values() if issubclass(cls, classes)}
     return np.fromiter((name in wanted for name in names), dtype=np.bool_, count=len(names))
 
 
 def _rests(contacts: Contacts, stones: StonesOf, settings: RelationSettings) -> Bools:
-    """Contacts by which one stone rests on the other."""
+    """Return the contacts by which one stone rests on the other."""
     first, second = contacts.pairs[:, 0], contacts.pairs[:, 1]
     arch = _is_one_of(stones.kinds, Voussoir, RibSegment)
     rise = contacts.normal[:, 2]
@@ -215,7 +215,7 @@ def _contradicted(
     count: int,
     settings: RelationSettings,
 ) -> Bools:
-    """Contacts that would let a stone rest on itself through others: the least steep of each circle.
+    """Return the contacts that would let a stone rest on itself through others: the least steep of each circle.
 
     Beds are not given up: stones that truly lie on one another in a ring stay so.
     """
@@ -236,7 +236,7 @@ def _contradicted(
 
 
 def _merged(contacts: Contacts, parts: Sequence[tuple[int, Bools, Ints, Ints, Array]]) -> FoundRelations:
-    """One relation of a kind for each pair, with the area of all contacts that make it."""
+    """Merge relations to one of a kind for each pair, with the area of all its contacts."""
     rows = np.concatenate([np.flatnonzero(mask) for _, mask, _, _, _ in parts])
     kind = np.concatenate([np.full(int(mask.sum()), number) for number, mask, _, _, _ in parts])
     subject = np.concatenate([one[mask] for _, mask, one, _, _ in parts])

@@ -21,7 +21,7 @@ _SAME = 1e-9  # values that differ by less, in m or rad, are one value computed 
 
 
 def arch_values(arches: Sequence[Arch]) -> dict[int, dict[str, float | None]]:
-    """Ring, rank and angle of the stones of arches, by entity; a springer of two arches has its place in the first."""
+    """Return ring, rank and angle of the stones of arches, by entity; a springer of two belongs to the first."""
     values: dict[int, dict[str, float | None]] = {}
     for arch in arches:
         for stone in arch.stones:
@@ -31,7 +31,7 @@ def arch_values(arches: Sequence[Arch]) -> dict[int, dict[str, float | None]]:
 
 
 def tail_lengths(session: Session, headers: Collection[int] | None = None) -> dict[int, float]:
-    """How far headers reach behind the deepest stretcher beside them, by entity [m]; 0 where they do not.
+    """Return the reach of headers behind the deepest stretcher beside them, by entity [m]; 0 at least.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def _names(cls: type[Entity]) -> list[str]:
 
 
 def give_values(session: Session, values: Mapping[int, Mapping[str, float | None]], act: Act) -> int:
-    """Give entities computed values of attributes; how many values changed.
+    """Write computed values of attributes to entities; return how many values changed.
 
     What was not known is filled in. What was computed otherwise before is corrected, so that the former value is
     kept. What somebody declared, be it that it is not known, stays as it is.
@@ -116,7 +116,7 @@ def _differs(before: float | None, after: float | None) -> bool:
 
 
 def _declared(session: Session, names: Sequence[str]) -> set[tuple[int, str]]:
-    """Attributes of entities that somebody gave a value."""
+    """Return the attributes of entities that somebody stated."""
     rows = session.execute(
         select(Correction.entity_id, Correction.attribute)
         .join(Entry, Entry.id == Correction.entry_id)

@@ -1,4 +1,4 @@
-"""Walking along relations: what a stone carries and is carried by, its load path, its neighbours, the courses.
+"""Walks along relations: loads above and below a stone, its neighbours, the courses.
 
 Each question is a statement or two, whatever the size of the building, and can be asked of what was known at an
 earlier entry (`as_of`). A relation that is both computed and declared counts once.
@@ -36,7 +36,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Neighbour:
-    """A stone in relation to the one that was asked for.
+    """Stone in relation to the given one.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Neighbour:
 
 @dataclass(frozen=True)
 class CourseStones:
-    """A course with its stones.
+    """Course with its stones.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class CourseStones:
 
 @dataclass(frozen=True)
 class NearStone:
-    """A stone near another.
+    """Stone near the given one.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ class NearStone:
 
 
 def carries(session: Session, code: str, as_of: int | None = None) -> tuple[Neighbour, ...]:
-    """The stones that rest directly on this one.
+    """List the stones that rest directly on this one.
 
     Raises
     ------
@@ -98,12 +98,12 @@ def carries(session: Session, code: str, as_of: int | None = None) -> tuple[Neig
 
 
 def carried_by(session: Session, code: str, as_of: int | None = None) -> tuple[Neighbour, ...]:
-    """The stones on which this one rests directly."""
+    """List the stones on which this one rests directly."""
     return tuple(one for one in neighbours(session, code, as_of) if one.relation == "rests_on")
 
 
 def neighbours(session: Session, code: str, as_of: int | None = None) -> tuple[Neighbour, ...]:
-    """Every stone in any relation to this one, by relation and code.
+    """List every stone in any relation to this one, by relation and code.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def neighbours(session: Session, code: str, as_of: int | None = None) -> tuple[N
 def courses_in_order(
     session: Session, zone: str | None = None, as_of: int | None = None
 ) -> tuple[CourseStones, ...]:
-    """The courses by zone and number, each with its stones from left to right.
+    """List the courses by zone and number, each with its stones from left to right.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def courses_in_order(
 
 
 def stones_near(session: Session, code: str, distance: float) -> tuple[NearStone, ...]:
-    """The stones whose centroids are at most so far from that of one, nearest first.
+    """List the stones with centroids within a distance of that of one, nearest first.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ __all__ = ["LoadPath", "LoadPathStone", "load_path", "place_of"]
 
 @dataclass(frozen=True, slots=True)  # slots: paths of 10,000 stones are usual, and each is made anew
 class LoadPathStone:
-    """A stone on a load path.
+    """Stone on a load path.
 
     Attributes
     ----------
@@ -56,17 +56,17 @@ class LoadPath:
 
     @property
     def levels(self) -> int:
-        """How many joints lead to the farthest stone."""
+        """Number of joints to the farthest stone."""
         return max((stone.level for stone in self.stones), default=0)
 
     @property
     def last(self) -> tuple[LoadPathStone, ...]:
-        """The stones where the path ends: on the way down, those that stand on the ground."""
+        """Stones where the path ends: on the way down, those that stand on the ground."""
         return tuple(stone for stone in self.stones if stone.last)
 
 
 def load_path(session: Session, code: str, *, up: bool = False, as_of: int | None = None) -> LoadPath:
-    """All stones on which one rests, directly or through others; or, upwards, all that rest on it.
+    """Return the load path of a stone down to the ground or, upwards, of all stones that rest on it.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def load_path(session: Session, code: str, *, up: bool = False, as_of: int | Non
 def _reached(
     me: int, up: bool, as_of: int | None
 ) -> tuple[CTE, ColumnElement[bool], ColumnElement[int], ColumnElement[int]]:
-    """The stones on the path, the condition of its steps, and where a step starts and ends; UNION ends circles."""
+    """Select the stones on the path, the condition of its steps, and start and end of a step; UNION ends circles."""
     columns = table_of(Relation).c
     start, end = (columns.object_id, columns.subject_id) if up else (columns.subject_id, columns.object_id)
     ended = columns.superseded_id
@@ -126,7 +126,7 @@ def _reached(
 
 
 def _levels(me: int, steps: Mapping[int, Sequence[int]]) -> dict[int, int]:
-    """Most steps to every stone that can be reached, so that each comes after all through which the load comes.
+    """Count the most steps to every stone on the path, so that each comes after all through which its load comes.
 
     Where stones bear one another in a circle, the one that the fewest steps lead to is taken to be the first.
     """
@@ -163,7 +163,7 @@ def _fewest_steps(me: int, steps: Mapping[int, Sequence[int]]) -> dict[int, int]
 
 
 def place_of(session: Session, code: str) -> Row[int, float | None, float | None, float | None]:
-    """Number and centroid of a stone."""
+    """Return number and centroid of a stone."""
     row = None
     if code.isprintable():
         row = session.execute(

@@ -1,4 +1,4 @@
-"""Computed relations into the database: the same stay, new ones come, those no longer found are superseded."""
+"""Storage of computed relations: unchanged ones stay, new ones enter, those no longer found are superseded."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, fields
@@ -27,7 +27,7 @@ _NUMBERS = ("area", "gap", "x", "y", "z", "nx", "ny", "nz")
 
 
 class Act:
-    """An act of recording that is made when the first row needs it: what changes nothing leaves no entry."""
+    """Act of recording that is made when the first row needs it, so that no change leaves no entry."""
 
     def __init__(
         self, session: Session, source: str, settings: Mapping[str, object], action: str = "geometry"
@@ -49,7 +49,7 @@ class Act:
 
 
 def held_settings(session: Session) -> RelationSettings:
-    """The tolerances with which the relations of this database were computed last; the usual ones if they were not.
+    """Return the tolerances of the last computed relations; the defaults if there are none.
 
     Relations that are computed later, of stones that come or change, are so to the same measure.
     """
@@ -63,7 +63,7 @@ def held_settings(session: Session) -> RelationSettings:
 
 @dataclass(frozen=True)
 class Changes:
-    """What became of rows of one table.
+    """Counts of changed rows of one table.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class Changes:
 def store_relations(
     session: Session, ids: Ints, found: FoundRelations, act: Act, only: Collection[int] | None = None
 ) -> dict[str, Changes]:
-    """Make the computed relations of the database those that were found.
+    """Replace the computed relations of the database with those that were found.
 
     A declared relation is left as it is, and no computed one comes beside it.
 
@@ -170,7 +170,7 @@ def _select(session: Session, condition: ColumnElement[bool]) -> list[Any]:
 
 
 def _concerning(only: Collection[int] | None) -> Iterator[ColumnElement[bool]]:
-    """Conditions that together hold for the relations of some entities."""
+    """Return conditions that together hold for the relations of some entities."""
     if only is None:
         yield table_of(Relation).c.id.is_not(None)
         return
@@ -181,7 +181,7 @@ def _concerning(only: Collection[int] | None) -> Iterator[ColumnElement[bool]]:
 
 
 def _keys(kind: Ints, subject: Ints, other: Ints) -> Ints:
-    """One number for kind, subject and object, each entity's below 2³⁰."""
+    """Return one number for kind, subject and object; each entity's number is below 2³⁰."""
     return (kind << 60) | (subject << 30) | other
 
 

@@ -1,4 +1,4 @@
-"""Zones and courses as structures: what the survey says of each stone, and the stones' order along the wall."""
+"""Zones and courses as structures, from the survey and from the order of stones along the wall."""
 
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Sequence
@@ -24,7 +24,7 @@ _LONG = 3.0  # a course so many times as long as wide is a wall, else it runs ar
 
 @dataclass(frozen=True)
 class Part:
-    """A structure with its members, as it follows from the survey or from the geometry.
+    """Structure with its members, from the survey or from the geometry.
 
     Attributes
     ----------
@@ -44,12 +44,12 @@ class Part:
 
 
 def course_code(zone: str | None, course: int) -> str:
-    """Code of the structure that a course is."""
+    """Return the code of the structure of a course."""
     return f"course {course}" if zone is None else f"{zone}/course {course}"
 
 
 def parts_of_survey(stones: StoneColumns) -> list[Part]:
-    """The zones and courses of some stones; members of a zone are the stones that belong to none of its courses.
+    """Return the zones and courses of some stones; members of a zone are its stones without a course.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def parts_of_survey(stones: StoneColumns) -> list[Part]:
 
 
 def whole_courses(session: Session, entities: Collection[int]) -> StoneColumns:
-    """All stones of the zones and courses that some entities belong to, or belonged to until now."""
+    """Return all stones of the zones and courses to which some entities belong, or belonged until now."""
     places: set[tuple[str | None, int | None]] = set()
     zone = aliased(Structure)
     held = (
@@ -112,7 +112,7 @@ def whole_courses(session: Session, entities: Collection[int]) -> StoneColumns:
 
 
 def along_the_wall(centres: Array, normals: Array) -> Ints:
-    """Order of the stones of a course, from left to right as one sees them who stands before the wall.
+    """Order the stones of a course from left to right as seen from in front of the wall.
 
     Stones that look all ways lie around a tower: they are ordered to the right, counter-clockwise from above,
     from the first after the widest gap. Two facings of one wall are ordered along it together.
@@ -141,7 +141,7 @@ def along_the_wall(centres: Array, normals: Array) -> Ints:
 
 
 def _around(flat: Array) -> Array:
-    """Angles of places about their mean, counted from behind the widest gap between them."""
+    """Return the angles of places about their mean, counted from behind the widest gap between them."""
     angle = np.arctan2(flat[:, 1], flat[:, 0])
     ordered = np.sort(angle)
     gaps = np.diff(ordered, append=ordered[0] + 2.0 * np.pi)
@@ -158,7 +158,7 @@ def store_parts(
     kinds: Iterable[str],
     among: Iterable[int] | None = None,
 ) -> tuple[Changes, Changes]:
-    """Make the computed structures and memberships of some kinds those that were found.
+    """Replace the computed structures and memberships of some kinds with those that were found.
 
     Structures that are held under a code are taken as they are; what was declared is left alone.
 
@@ -203,7 +203,7 @@ def _row(entity: int, structure: int, rank: int | None, entry: int) -> dict[str,
 
 
 def _structures(session: Session, parts: Sequence[Part], act: Act) -> tuple[dict[str, int], Changes]:
-    """Numbers of the structures by code; those that are not there are made."""
+    """Return the numbers of the structures by code; make those that are missing."""
     numbers: dict[str, int] = {}
     for batch in batches({code for part in parts for code in (part.code, part.parent) if code is not None}):
         held = select(Structure.code, Structure.id).where(
@@ -227,7 +227,7 @@ def _structures(session: Session, parts: Sequence[Part], act: Act) -> tuple[dict
 def _held(
     session: Session, kinds: tuple[str, ...], among: set[int] | None
 ) -> tuple[dict[tuple[int, int], tuple[int, int | None]], set[tuple[int, int]]]:
-    """Number and rank of the computed memberships that are held, by entity and structure; and the declared ones."""
+    """Return number and rank of the held computed memberships by entity and structure, and the declared ones."""
     held: dict[tuple[int, int], tuple[int, int | None]] = {}
     declared: set[tuple[int, int]] = set()
     statement = (

@@ -114,7 +114,7 @@ def show(
 
     from archmodel.database.session import open_database
     from archmodel.describe import history as past
-    from archmodel.query.api import describe
+    from archmodel.describe.entity import describe
     from moma.cli.text.entities import entity_lines, history_lines
     from moma.cli.text.formats import as_json
 

@@ -1,4 +1,4 @@
-"""Functions of query expressions that ask what is said of a stone, and whether it is as its kind should be."""
+"""Query functions on knowledge: marks, observations, documents, corrections, kinds and canonical proportions."""
 
 from sqlalchemy import FromClause, case, exists, null
 
@@ -6,7 +6,7 @@ from archmodel.query.attributes import attributes_of, kinds_of
 from archmodel.query.columns import DOCUMENTING
 from archmodel.query.functions.usages import Ask, Condition, tokens
 from archmodel.query.grammar import Call, parse
-from archmodel.query.inherited import entities_told, held
+from archmodel.query.inherited import entities_with_statement, held
 from archmodel.query.names import document_named, mark_named, meant
 from archmodel.query.scope import Scope
 from archmodel.query.tokens import Token, complaint
@@ -20,7 +20,7 @@ MAX_SEVERITY = 4
 
 
 def has_mark(scope: Scope, call: Call, ask: Ask) -> Condition:
-    """Mason marks. One that is said of a structure is somewhere on it, on no stone in particular."""
+    """Test for mason marks. A mark of a structure is somewhere on it, on no stone in particular."""
     said = scope.context.alias(Statement)
     conditions: list[Condition] = [
         held(said),
@@ -32,7 +32,7 @@ def has_mark(scope: Scope, call: Call, ask: Ask) -> Condition:
 
 
 def observed(scope: Scope, call: Call, ask: Ask) -> Condition:
-    """Observations of the stone, and of its structures if it has none of their type."""
+    """Test for observations of the stone, and of its structures if it has none of their type."""
     values = tokens(call, 0, 1, 2)
     wanted = {}
     if values:
@@ -47,8 +47,10 @@ def observed(scope: Scope, call: Call, ask: Ask) -> Condition:
         return of_type if least is None else [*of_type, said.c.severity >= least]
 
     context = scope.context
-    of_structures = context.said_of_structures("observation")
-    told = entities_told(context.alias, of_structures, conditions, "observation", own_type_first=True)
+    of_structures = context.statements_of_structures("observation")
+    told = entities_with_statement(
+        context.alias, of_structures, conditions, "observation", own_type_first=True
+    )
     return scope.entity.c.id.in_(told)
 
 
@@ -60,19 +62,21 @@ def _severity(token: Token) -> int:
 
 
 def documented(scope: Scope, call: Call, ask: Ask) -> Condition:
-    """Documents that any statement about the stone, or its structures, names."""
+    """Test for documents that any statement about the stone, or its structures, names."""
     numbers = [document_named(scope.context, code) for code in tokens(call, 0, 1)]
 
     def conditions(said: FromClause) -> list[Condition]:
         return [said.c.document_id > 0, *(said.c.document_id == number for number in numbers)]
 
     context = scope.context
-    of_structures = context.said_of_structures(*DOCUMENTING)
-    return scope.entity.c.id.in_(entities_told(context.alias, of_structures, conditions, *DOCUMENTING))
+    of_structures = context.statements_of_structures(*DOCUMENTING)
+    return scope.entity.c.id.in_(
+        entities_with_statement(context.alias, of_structures, conditions, *DOCUMENTING)
+    )
 
 
 def corrected(scope: Scope, call: Call, ask: Ask) -> Condition:
-    """Corrections of its attributes."""
+    """Test for corrections of its attributes."""
     rows = scope.context.alias(Correction)
     conditions: list[Condition] = [rows.c.entity_id == scope.entity.c.id]
     for token in tokens(call, 0, 1):
@@ -86,12 +90,12 @@ def corrected(scope: Scope, call: Call, ask: Ask) -> Condition:
 
 
 def _any_row(scope: Scope, *conditions: Condition) -> Condition:
-    """Whether there is a row that satisfies the conditions, for each entity."""
+    """Test for a row that satisfies the conditions, for each entity."""
     return exists().where(*conditions).correlate(scope.entity)
 
 
 def is_a(scope: Scope, call: Call, ask: Ask) -> Condition:
-    """Its kind, or one that its kind is a case of."""
+    """Test for a kind, or one of its subkinds."""
     (name,) = tokens(call, 1)
     try:
         cls = kind_named(name.text)
@@ -101,7 +105,7 @@ def is_a(scope: Scope, call: Call, ask: Ask) -> Condition:
 
 
 def canonical(scope: Scope, call: Call, ask: Ask) -> Condition:
-    """The proportions that theory asks of its kind, in the very language of queries."""
+    """Test for the proportions that theory asks of its kind, stated in the query language itself."""
     tokens(call, 0)
     with_canon: dict[str, list[str]] = {}
     for kind, cls in kinds_of(scope.context.session).items():

@@ -1,4 +1,4 @@
-"""The functions of query expressions by name."""
+"""Registry of query functions by name."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ Sql = Callable[[Any, Call, Ask], Condition]
 
 @dataclass(frozen=True)
 class Function:
-    """A function of expressions that is true or false of an entity, or of a structure.
+    """Function of query expressions that is true or false of an entity, or of a structure.
 
     Attributes
     ----------

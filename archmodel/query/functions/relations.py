@@ -1,4 +1,4 @@
-"""Functions of query expressions that ask how a stone stands to others, and of which structures it is a member."""
+"""Query functions on relations between stones and membership in structures."""
 
 from collections.abc import Callable
 from typing import Any
@@ -20,7 +20,7 @@ Wanted = Callable[[ColumnElement[int]], Condition]
 
 
 def related(name: str, subject: str, other: str) -> Callable[[Scope, Call, Ask], Condition]:
-    """A stored relation, asked of the entity on the side `subject` about the one on the side `other`."""
+    """Test for a stored relation of the entity on the side `subject` to the one on the side `other`."""
     sides = ((subject, other), (other, subject)) if name in SYMMETRIC else ((subject, other),)
 
     def sql(scope: Scope, call: Call, ask: Ask) -> Condition:
@@ -39,7 +39,7 @@ def related(name: str, subject: str, other: str) -> Callable[[Scope, Call, Ask],
 
 
 def _others(context: Context, argument: Token | Node | None, ask: Ask) -> Wanted | None:
-    """The condition on the number of the other entity; None: any will do.
+    """Return the condition on the number of the other entity; None: any will do.
 
     A nested expression is a table of its own before the statement, which is made once and not for every entity;
     selects within selects would be too deep for SQLite's parser.
@@ -56,7 +56,7 @@ def _others(context: Context, argument: Token | Node | None, ask: Ask) -> Wanted
 
 
 def load_path(step_from: str, step_to: str) -> Callable[[Scope, Call, Ask], Condition]:
-    """Along rests_on from the entities that are meant, over `step_from` to `step_to`, as often as it goes."""
+    """Test for a place on the load path from the given entities, along `step_from` → `step_to`, as often as it goes."""
 
     def sql(scope: Scope, call: Call, ask: Ask) -> Condition:
         wanted = _others(scope.context, only(call, needed=True), ask)
@@ -79,7 +79,7 @@ def load_path(step_from: str, step_to: str) -> Callable[[Scope, Call, Ask], Cond
 
 
 def member_of(scope: Scope, call: Call, ask: Ask) -> Condition:
-    """Membership in a structure, or in a part of it."""
+    """Test for membership in a structure, or in a part of it."""
     rows = scope.context.alias(Membership)
     argument = only(call)
     if argument is None:
@@ -93,7 +93,7 @@ def member_of(scope: Scope, call: Call, ask: Ask) -> Condition:
 
 
 def _with_parts(context: Context, argument: Token | Node, ask: Ask) -> FromClause:
-    """Numbers of the structures that are meant, and of their parts."""
+    """Return the numbers of the given structures and of their parts."""
     whole, part = context.alias(Structure), context.alias(Structure)
     if isinstance(argument, Token):
         meant_here: Condition = whole.c.id == structure_named(context, argument)
@@ -106,7 +106,7 @@ def _with_parts(context: Context, argument: Token | Node, ask: Ask) -> FromClaus
 
 
 def part_of(scope: StructureScope, call: Call, ask: Ask) -> Condition:
-    """Being a structure, or a part of it."""
+    """Test for being a structure, or a part of it."""
     argument = only(call)
     if argument is None:
         return scope.structure.c.parent_id.is_not(None)

@@ -1,4 +1,4 @@
-"""Functions of query expressions that ask where a stone is."""
+"""Query functions on places."""
 
 from sqlalchemy import Double, and_, literal
 
@@ -12,7 +12,7 @@ __all__ = ["within", "within_box"]
 
 
 def within(scope: Scope, call: Call, ask: Ask) -> Condition:
-    """Centroids near a stone, or near a place."""
+    """Test for a centroid near a stone, or near a place."""
     values = tokens(call, 2, 4)
     radius = metres(values[-1])
     if radius < 0.0:
@@ -27,7 +27,7 @@ def within(scope: Scope, call: Call, ask: Ask) -> Condition:
 
 
 def _ball(scope: Scope, centre: tuple[float, ...], radius: float) -> Condition:
-    """Centroids at most `radius` from the centre; the box around it comes first, for the index."""
+    """Test for a centroid at most `radius` from the centre; the box around it comes first, for the index."""
     columns = [scope.entity.c[axis] for axis in "xyz"]
     offsets = [column - literal(value, Double) for column, value in zip(columns, centre, strict=True)]
     square = sum((offset * offset for offset in offsets[1:]), offsets[0] * offsets[0])
@@ -37,7 +37,7 @@ def _ball(scope: Scope, centre: tuple[float, ...], radius: float) -> Condition:
 
 
 def within_box(scope: Scope, call: Call, ask: Ask) -> Condition:
-    """Centroids in a box along the axes."""
+    """Test for a centroid in a box along the axes."""
     numbers = list(map(metres, tokens(call, 6)))
     low, high = numbers[:3], numbers[3:]
     if any(a > b for a, b in zip(low, high, strict=True)):

@@ -1,4 +1,4 @@
-"""How each function of query expressions is written, and what it says; and what its arguments can be."""
+"""Usage of query functions: syntax, meaning, and checks of their arguments."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -86,14 +86,14 @@ STRUCTURE_USAGES: Mapping[str, Usages] = {
 
 
 def _refusal(call: Call) -> QueryError:
-    """The error for arguments that a function does not take."""
+    """Make the error for arguments that a function does not take."""
     name = call.function.text.lower()
     ways = " or ".join(usage for usage, _ in (USAGES.get(name) or STRUCTURE_USAGES[name]))
     return complaint(call.function, f"{name} cannot take these arguments", f"write {ways}")
 
 
 def tokens(call: Call, *lengths: int) -> tuple[Token, ...]:
-    """The arguments, which must be values, as many as one of the lengths says."""
+    """Return the arguments, which must be values, as many as one of the lengths allows."""
     values = tuple(one for one in call.arguments if isinstance(one, Token))
     if len(values) != len(call.arguments) or len(values) not in lengths:
         raise _refusal(call)
@@ -101,14 +101,14 @@ def tokens(call: Call, *lengths: int) -> tuple[Token, ...]:
 
 
 def only(call: Call, *, needed: bool = False) -> Token | Node | None:
-    """The one argument; None if there is none, and none is needed."""
+    """Return the one argument; None if there is none, and none is needed."""
     if len(call.arguments) > 1 or (needed and not call.arguments):
         raise _refusal(call)
     return call.arguments[0] if call.arguments else None
 
 
 def metres(token: Token) -> float:
-    """A coordinate or a distance."""
+    """Parse a coordinate or a distance [m]."""
     number = float(token.text) if token.role == "number" else math.nan
     if not abs(number) <= MAX_METRES:
         remedy = f"write metres without quotes, e.g. 1.5, up to {MAX_METRES:g}"

@@ -80,7 +80,7 @@ def _said(one: Values) -> str:
     own = {
         name: value
         for name, value in one.items()
-        if name not in (*_PROVENANCE, "text", "document", "locator", "observed_on", "said_of")
+        if name not in (*_PROVENANCE, "text", "document", "locator", "observed_on", "phase_or_material_of")
     }
     parts = [_values(own), _cited(one)]
     return f"{', '.join(part for part in parts if part)} [{_by(one)}]"
@@ -96,7 +96,7 @@ def _cited(one: Values) -> str:
         one.get("text"),
         f"{where} {one['locator']}" if where and "locator" in one else where,
         f"seen {one['observed_on']}" if "observed_on" in one else None,
-        f"said of {one['said_of']}" if "said_of" in one else None,
+        f"said of {one['phase_or_material_of']}" if "phase_or_material_of" in one else None,
     ]
     return ", ".join(part for part in parts if part)
 

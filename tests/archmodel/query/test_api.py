@@ -3,7 +3,8 @@ import json
 import pytest
 
 from archmodel.database.session import Database
-from archmodel.query.api import attributes, describe, find, find_rows, row_of, rows_of
+from archmodel.describe.entity import describe
+from archmodel.query.api import attributes, find, find_rows, row_of, rows_of
 from archmodel.query.attributes import ATTRIBUTES
 from archmodel.store.runs import store_run
 from archmodel.tables.entities import Header, Keystone, Voussoir

@@ -267,7 +267,7 @@ def test_an_unexpected_error_is_one_line_and_whole_with_v(database, monkeypatch)
     def broken(*_):
         raise ZeroDivisionError("by hand")
 
-    monkeypatch.setattr("archmodel.query.api.describe", broken)
+    monkeypatch.setattr("archmodel.describe.entity.describe", broken)
     message = fails(1, "show", "V4", "--db", database)
     assert "unexpected ZeroDivisionError: by hand" in message
     assert isinstance(invoke("show", "V4", "--db", database, "-v").exception, ZeroDivisionError)

@@ -95,7 +95,7 @@ def test_a_file_is_recorded_with_who_says_so(url: str, write: Write) -> None:
         assert (entry.author, entry.source, (entry.id,)) == ("A", "by eye", file.entries)
         told = describe(session, "W01-01")["knowledge"]
         assert told["material"]["name"] == "tuff"  # type: ignore[index]
-        assert told["material"]["said_of"] == "WALL"  # type: ignore[index]
+        assert told["material"]["phase_or_material_of"] == "WALL"  # type: ignore[index]
         (seen,) = session.scalars(select(Observation))
         assert str(seen.observed_on) == "2024-05-14"
         assert [one.code for one in find(session, "entity", ["member_of(WALL)"])] == [

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from archmodel.database.session import open_database
-from archmodel.query.api import describe, find_rows
+from archmodel.describe.entity import describe
+from archmodel.query.api import find_rows
 from archmodel.store.run_record import STONE_VALUES
 from mechanics.results.result import Outcome
 from mechanics.scene.scene import Fidelity
