@@ -1,26 +1,23 @@
 """From the database to a scene: selected stones → simplified solids → closed joints → blocks."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from sqlalchemy.orm import Session
 
 from mechanics.scene.scene import Block, Fidelity, Part, Scene
-from mechanics.stones.meshing.elements import Element
-from mechanics.stones.meshing.meshers.choice import Mesher
 from pipelines.arrays import Array
 from pipelines.ingest.records import surveyed_block
 from pipelines.run.fidelity import Modelled, Wishes, modelled, neighbours
 from pipelines.run.local_frame import entry_about, local_origin, stone_about
 from pipelines.run.remarks import remarks
 from pipelines.scene.file import SceneFile
+from pipelines.scene.keys import typed_values
 from pipelines.scene.laws import law_rules
 from pipelines.scene.loads import build_loads, thrown
 from pipelines.scene.selection import STRESS, Groups, StoneModel, select_groups, select_stones
-from pipelines.scene.settings import MeshSettings
-from pipelines.scene.table_keys import STRESS_PICTURES
+from pipelines.scene.settings import STRESS_PICTURES, MeshSettings
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.solids import Solid
 from survey.geometry.stone_parts import stone_parts
@@ -132,9 +129,8 @@ def _meshes(scene: SceneFile, groups: Groups) -> dict[str, MeshSettings]:
     """The meshes of the stones that an entry of [[meshes]] names; of two, the later counts."""
     meshes: dict[str, MeshSettings] = {}
     for entry in scene.meshes:
-        given = {key: value for key, value in entry.values.items() if value is not None and key != "stones"}
-        kinds: dict[str, Callable[[str], Any]] = {"element": Element, "mesher": Mesher}
-        own = {key: kinds[key](value) if key in kinds else value for key, value in given.items()}
+        given = {key: value for key, value in entry.values.items() if value is not None}
+        own = typed_values(MeshSettings, given)
         if "size" in own:
             own["ring_size"] = own["size"]  # what is said of a stone holds in a ring too
         meshes |= dict.fromkeys(groups[entry.path][0], replace(scene.mesh, **own))

@@ -179,9 +179,7 @@ def settings_of(scene: SceneFile, built: Scene) -> dict[str, Any]:
         "joints": _values(scene.joints),
         "contact": {
             "law": {"type": type(contact.law).__name__, **_values(contact.law)},
-            "alert_distance": contact.alert_distance,
-            "points": contact.points,
-            "placement": str(contact.placement),
+            **{name: value for name, value in _values(contact).items() if name not in ("law", "rules")},
         },
         "time": _values(built.time),
         "solver": _values(built.solver),

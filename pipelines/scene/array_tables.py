@@ -8,11 +8,13 @@ from typing import Any
 from mechanics.scene.loads.accelerogram import Accelerogram
 from mechanics.scene.loads.tables import read_history
 from mechanics.scene.loads.time_series import History
-from pipelines.scene.array_keys import HISTORY_FILE
 from pipelines.toml.lines import Path
 from pipelines.toml.schema import Document, Key, Kind, check_table
 
 __all__ = ["Entry", "describe", "file_beside", "read_entries"]
+
+# alternative to time and value in the inline table of a history
+_FILE = Key("file", Kind.TEXT, "Text file with a column of times and one of values, or three.", default=None)
 
 
 @dataclass(frozen=True)
@@ -125,7 +127,7 @@ def _history(document: Document, path: Path, value: Any, key: Key) -> History:
     vector = key.kind is Kind.VECTOR_HISTORY
     title = f"{key.name} = {{ … }}"
     if "file" in value:
-        checked = check_table(document, path, value, [HISTORY_FILE], title)
+        checked = check_table(document, path, value, [_FILE], title)
         parts = ("x", "y", "z") if vector else (key.name,)
         columns = ", ".join(["time [s]", *(f"{part} [{key.unit}]" for part in parts)])
         return read_history(file_beside(document, str(checked["file"])), columns)

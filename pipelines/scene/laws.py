@@ -1,4 +1,4 @@
-"""The laws of particular joints, from [[laws]] of a scene file to rules between groups of stones."""
+"""Laws of particular joints: from [[laws]] of a scene file to rules between groups of stones."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,14 +10,14 @@ from mechanics.scene.laws.law import Law
 from mechanics.scene.laws.lennard_jones import LennardJones
 from mechanics.scene.laws.mortar import MortarJoint
 from mechanics.scene.scene import LawRule
-from pipelines.scene.array_keys import LAW_KEYS, LAW_TYPES
 from pipelines.scene.array_tables import Entry, read_entries
-from pipelines.toml.schema import Document, nearest
+from pipelines.scene.keys import build, keys_of
+from pipelines.toml.schema import Document, Key, Kind, nearest
 
-__all__ = ["BONDS", "JointLaw", "law_rules", "read_laws"]
+__all__ = ["BONDS", "LAW_KEYS", "LAW_TYPES", "JointLaw", "law_rules", "read_laws"]
 
-# types of laws that are mortar
 BONDS = ("mortar", "cohesive_zone")
+"""Types of laws that are mortar."""
 
 _CLASSES: Mapping[str, type[Law]] = {
     "dry": DryJoint,
@@ -25,6 +25,28 @@ _CLASSES: Mapping[str, type[Law]] = {
     "cohesive_zone": CohesiveZone,
     "lennard_jones": LennardJones,
 }
+
+LAW_TYPES: Mapping[str, tuple[Key, ...]] = {
+    # the default of friction is that of [contact] alone
+    name: keys_of(law, "friction")
+    for name, law in _CLASSES.items()
+}
+
+LAW_KEYS = (
+    Key(
+        "materials",
+        Kind.TEXTS,
+        "Two names of materials: the law holds between their stones.",
+        default=(),
+    ),
+    Key(
+        "between",
+        Kind.GROUPS,
+        "Two lists of codes or expressions: the law holds between the stones of the one and those of the other.",
+        default=(),
+    ),
+)
+"""Keys of every law."""
 
 
 @dataclass(frozen=True)
@@ -56,9 +78,8 @@ def _law(document: Document, entry: Entry, materials: Sequence[str]) -> JointLaw
         if name not in materials:
             what = f"unknown material {name!r}"
             document.fail(what, *entry.path, "materials", remedy=nearest(name, materials))
-    parameters = {key.name: entry.values[key.name] for key in LAW_TYPES[entry.type]}
     with document.at(*entry.path):
-        return JointLaw(entry, _CLASSES[entry.type](**parameters))
+        return JointLaw(entry, build(_CLASSES[entry.type], entry.values))
 
 
 def law_rules(

@@ -26,7 +26,7 @@ from pipelines.results.vtk import contact_grid, write_frames
 from pipelines.results.vtu import CELL_TYPES
 from pipelines.run.stone_values import stone_results, stress_statistics
 from pipelines.run.summary import as_json, summarise
-from pipelines.scene.table_keys import PICTURES
+from pipelines.scene.settings import PICTURES
 from tests.pipelines.results_by_hand import (
     BOX_FACES,
     LIMESTONE,

@@ -17,13 +17,11 @@ from moma.errors import SceneError
 from pipelines.ingest.ingest import ingest
 from pipelines.run.assemble import assemble
 from pipelines.run.check import check_scene
-from pipelines.scene.array_keys import LAW_KEYS, LAW_TYPES, LOAD_TYPES, THROW_KEYS
 from pipelines.scene.file import parse_scene
 from pipelines.scene.laws import law_rules
-from pipelines.scene.stone_keys import MESH_KEYS
 from pipelines.toml.lines import key_lines
 from tests.paths import ROOT
-from tests.pipelines.scene.test_file import default_text, message_of
+from tests.pipelines.scene.test_file import message_of
 
 STONE = "[materials.stone]\ndensity = 2000\nyoung = 1e10\npoisson = 0.2\n"
 MORTAR = '[[laws]]\ntype = "mortar"\nfriction = 0.5\ntension = 1e5\nshear = 2e5\n'
@@ -282,23 +280,6 @@ def test_tables_of_an_array_have_their_own_lines():
         ("a", "1", "c", "1", "z"): 11,
     }
     assert {path: lines[path] for path in expected} == expected
-
-
-def test_every_key_of_the_arrays_is_documented_with_its_unit_and_default():
-    documented = (ROOT / "docs/scene.md").read_text(encoding="utf-8")
-    for array, common, types in (
-        ("meshes", MESH_KEYS, {}),
-        ("laws", LAW_KEYS, LAW_TYPES),
-        ("loads", (), LOAD_TYPES),
-        ("throw", THROW_KEYS, {}),
-    ):
-        section = documented.split(f"## `[[{array}]]`")[1].split("\n## ")[0]
-        parts = re.split(r'\n### `type = "(\w+)"`', section)
-        assert parts[1::2] == list(types)
-        for text, keys in zip(parts[::2], (common, *types.values()), strict=True):
-            rows = [line.strip("| ").split("|") for line in text.splitlines() if line.startswith("| `")]
-            found = [tuple(cell.strip() for cell in row) for row in rows]
-            assert found == [(f"`{key.name}`", key.unit, default_text(key), key.doc) for key in keys]
 
 
 def test_the_examples_of_the_documentation_are_valid():
