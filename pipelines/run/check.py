@@ -14,6 +14,7 @@ from moma.errors import GeometryError, MeshError
 from pipelines.draw.closing_pictures import draw_closing
 from pipelines.draw.elevations.closing_shapes import ClosingShapes, closing_shapes
 from pipelines.results.folder import check_replaceable, replacing
+from pipelines.results.summary import as_json
 from pipelines.run.assemble import Assembly, assemble_stones, wishes_of
 from pipelines.run.check_report import (
     CheckReport,
@@ -28,7 +29,6 @@ from pipelines.run.closing_check import (
     simplification_report,
 )
 from pipelines.run.fidelity import Modelled, modelled
-from pipelines.run.summary import as_json
 from pipelines.scene.array_tables import describe
 from pipelines.scene.file import SceneFile, read_scene
 from pipelines.scene.selection import Groups, StoneModel, select_groups, select_stones

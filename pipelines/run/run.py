@@ -3,7 +3,7 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -20,11 +20,11 @@ from pipelines.draw.pictures import draw_pictures, missing
 from pipelines.reports.run import write_report
 from pipelines.results.folder import check_replaceable, replacing
 from pipelines.results.joints_csv import write_joints
+from pipelines.results.stone_values import stone_results
+from pipelines.results.summary import as_json, summarise
 from pipelines.results.vtk import write_frames
 from pipelines.run.assemble import Assembly, assemble_stones
 from pipelines.run.record import run_record
-from pipelines.run.stone_values import stone_results
-from pipelines.run.summary import as_json, summarise
 from pipelines.scene.file import SceneFile, read_scene
 from pipelines.scene.selection import select_groups, select_stones
 from pipelines.tuning.expected_errors import ProfileReport, profile_report
@@ -141,7 +141,8 @@ def write_results(
         except MissingLibraryError as error:
             warnings.append(f"no pictures: {error}")
     progress(Progress("write", 2, 3, "report.html"))
-    summary = summarise(result, version=version("moma-masonry"), seconds=seconds, profile=profile)
+    reached = None if profile is None else asdict(profile)
+    summary = summarise(result, version=version("moma-masonry"), seconds=seconds, profile=reached)
     write_report(folder / "report.html", result, summary, stones, warnings)
     (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
     summary["origin"] = assembly.origin.tolist()

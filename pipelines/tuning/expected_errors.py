@@ -11,10 +11,11 @@ from typing import Any
 
 from mechanics.results.result import Outcome, Result
 from mechanics.scene.scene import Fidelity
+from pipelines.results.quantities import QUANTITIES, Quantities, quantities
 from pipelines.scene.file import SceneFile
 from pipelines.tuning.measured_errors import COLLAPSE, ERRORS
-from pipelines.tuning.profiles import profile_named, settings_of_profile
-from pipelines.tuning.quantities import QUANTITIES, Quantities, quantities
+from pipelines.tuning.overlay import overlay_record
+from pipelines.tuning.profiles import profile_named
 
 __all__ = [
     "BOUNDS",
@@ -54,7 +55,7 @@ class Expected:
 
     Attributes
     ----------
-    value : as `pipelines.tuning.quantities.differences` has it [-]
+    value : as `pipelines.results.quantities.differences` has it [-]
     of : the quantity in words
     bound : whether the error may well be less
     """
@@ -90,7 +91,7 @@ def profile_report(name: str | None, scene: SceneFile, result: Result) -> Profil
     return ProfileReport(
         name,
         profile.about,
-        settings_of_profile(profile, scene.time),
+        overlay_record(profile.overlay(scene.time)),
         expected_errors(name, found, loops(result), rigid=rigid),
     )
 

@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any
 
 from mechanics.scene.scene import Fidelity, Method, Placement, TimeSettings
 from mechanics.stones.meshing.elements import Element
@@ -13,7 +12,7 @@ from pipelines.scene.selection import StoneModel
 from pipelines.toml.schema import nearest
 from pipelines.tuning.overlay import Overlay, overlaid, typical_width
 
-__all__ = ["PROFILES", "Profile", "profile_named", "settings_of_profile", "with_profile"]
+__all__ = ["PROFILES", "Profile", "profile_named", "with_profile"]
 
 
 @dataclass(frozen=True)
@@ -132,13 +131,3 @@ def with_profile(scene: SceneFile, name: str | None, models: Iterable[StoneModel
     if name is None:
         return scene
     return overlaid(scene, profile_named(name).overlay(scene.time), typical_width(models))
-
-
-def settings_of_profile(profile: Profile, time: TimeSettings) -> dict[str, Any]:
-    """What a profile sets in a scene with these settings of time, by the names of `Overlay`; texts and numbers."""
-    values = vars(profile.overlay(time))
-    return {
-        key: value if isinstance(value, int | float) else str(value)
-        for key, value in values.items()
-        if value is not None
-    }

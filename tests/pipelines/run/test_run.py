@@ -14,10 +14,10 @@ from mechanics.scene.scene import Fidelity
 from moma.errors import MissingLibraryError, SceneError, UsageError
 from pipelines.ingest.ingest import ingest
 from pipelines.ingest.records import surveyed_block
+from pipelines.results.stone_values import stone_results
 from pipelines.run import run as run_module
 from pipelines.run.assemble import assemble
 from pipelines.run.run import run_scene, write_results
-from pipelines.run.stone_values import stone_results
 from pipelines.scene.file import parse_scene
 from pipelines.scene.selection import select_stones
 from tests.paths import ROOT

@@ -8,9 +8,9 @@ import pytest
 from mechanics.scene.scene import Fidelity
 from pipelines.draw.offscreen.surfaces import wall_surface
 from pipelines.draw.pictures import missing
+from pipelines.results.stone_values import stone_results, stress_statistics
+from pipelines.results.summary import summarise
 from pipelines.results.vtk import body_cells, body_grid
-from pipelines.run.stone_values import stone_results, stress_statistics
-from pipelines.run.summary import summarise
 from tests.pipelines.results_by_hand import deformable_body, result_of, rigid_body
 
 FORCES = ((0.0, 0.0, 3000.0), (0.0, 600.0, 800.0))

@@ -13,12 +13,12 @@ from mechanics.simulate import simulate
 from mechanics.stones.meshing.elements import Element
 from moma.cli.options import ProfileName
 from moma.errors import UsageError
+from pipelines.results.quantities import QUANTITIES, Quantities, StoneQuantities
 from pipelines.scene.file import parse_scene
 from pipelines.tuning.expected_errors import BOUNDS, TYPICAL, expected_errors, loops
 from pipelines.tuning.measured_errors import COLLAPSE, ERRORS
 from pipelines.tuning.overlay import Overlay, overlaid, overlaid_scene
 from pipelines.tuning.profiles import PROFILES, profile_named, with_profile
-from pipelines.tuning.quantities import QUANTITIES, Quantities, StoneQuantities
 from tests.paths import ROOT
 
 PAGE = (ROOT / "docs/runs.md").read_text(encoding="utf-8")

@@ -4,10 +4,10 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+from pipelines.results.quantities import QUANTITIES, differences
+from pipelines.tradeoff.grid import Setting
+from pipelines.tradeoff.store import Measured, Status
 from pipelines.tuning.overlay import Overlay
-from pipelines.tuning.quantities import QUANTITIES, differences
-from pipelines.tuning.tradeoff.grid import Setting
-from pipelines.tuning.tradeoff.store import Measured, Status
 
 __all__ = [
     "Judged",

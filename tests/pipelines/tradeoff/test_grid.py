@@ -11,10 +11,8 @@ from mechanics.scene.scene import Block, Fidelity, Method, Placement
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
 from pipelines.scene.file import parse_scene
-from pipelines.tuning.overlay import Overlay, overlaid
-from pipelines.tuning.tradeoff.grid import grid, setting_name
-from pipelines.tuning.tradeoff.toml import scene_lines
-from pipelines.tuning.tradeoff.worker import overlay_from, overlay_record
+from pipelines.tradeoff.grid import grid, setting_name
+from pipelines.tuning.overlay import Overlay, overlaid, overlay_from, overlay_record, scene_lines
 from tests.pipelines.results_by_hand import BOX_FACES, box
 
 STONE = Material("limestone", 2350.0, 12e9, 0.2)

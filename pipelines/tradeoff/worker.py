@@ -1,5 +1,5 @@
 """One run of a study of speed against accuracy, in a process of its own: ``python -m
-pipelines.tuning.tradeoff.worker``.
+pipelines.tradeoff.worker``.
 
 So its CPU time and its memory are its own, and it can be stopped. The job comes as one line of JSON on the standard
 input, which stays open for as long as the parent lives; the answer is one line of JSON on the standard output.
@@ -13,33 +13,25 @@ import signal
 import sys
 import threading
 import time
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 from archmodel.database.session import open_database
 from mechanics.results.result import Result
-from mechanics.scene.scene import Fidelity, Method, Placement
 from mechanics.simulate import simulate
-from mechanics.stones.meshing.elements import Element
 from moma.errors import MomaError
+from pipelines.results.quantities import quantities
 from pipelines.run.assemble import assemble
 from pipelines.scene.file import SceneFile, parse_scene
-from pipelines.tuning.overlay import Overlay, overlaid
-from pipelines.tuning.quantities import quantities
+from pipelines.tuning.overlay import overlaid, overlay_from
 
-__all__ = ["FAILED", "SHORT", "Job", "overlay_from", "overlay_record"]
+__all__ = ["FAILED", "SHORT", "Job"]
 
 FAILED = 3
 """Exit code of a run that failed in a way that MOMA foresees; the reason is on the standard output."""
 
 SHORT = 5.0
 """Work of fewer seconds of CPU time is done twice, since the first time has compiled kernels to read from the disk."""
-_KINDS: dict[str, Any] = {
-    "fidelity": Fidelity,
-    "element": Element,
-    "placement": Placement,
-    "method": Method,
-}
 
 
 @dataclass(frozen=True)
@@ -59,23 +51,6 @@ class Job:
     url: str
     overlay: dict[str, Any]
     width: float
-
-
-def overlay_record(overlay: Overlay) -> dict[str, Any]:
-    """What an overlay sets, in plain texts and numbers."""
-    given = {one.name: getattr(overlay, one.name) for one in fields(overlay)}
-    return {
-        name: str(value) if name in _KINDS else value for name, value in given.items() if value is not None
-    }
-
-
-def overlay_from(record: dict[str, Any]) -> Overlay:
-    """The overlay that `overlay_record` has written."""
-    return Overlay(**{name: _KINDS.get(name, _as_it_is)(value) for name, value in record.items()})
-
-
-def _as_it_is(value: Any) -> Any:
-    return value
 
 
 def _measured(job: Job) -> dict[str, Any]:

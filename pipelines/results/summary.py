@@ -11,15 +11,14 @@ import numpy as np
 from mechanics.results.contact_result import JointResult
 from mechanics.results.result import Result
 from mechanics.scene.scene import Fidelity
-from pipelines.run.stone_values import stress_statistics
-from pipelines.tuning.expected_errors import ProfileReport
-from pipelines.tuning.quantities import quantities
+from pipelines.results.quantities import quantities
+from pipelines.results.stone_values import stress_statistics
 
 __all__ = ["as_json", "summarise"]
 
 
 def summarise(
-    result: Result, *, version: str, seconds: Mapping[str, float], profile: ProfileReport | None = None
+    result: Result, *, version: str, seconds: Mapping[str, float], profile: Mapping[str, Any] | None = None
 ) -> dict[str, Any]:
     """The contents of summary.json, in SI units.
 
@@ -28,7 +27,7 @@ def summarise(
     result : of the simulation
     version : of MOMA
     seconds : wall time by stage, of the simulation and of what went before and after it [s]
-    profile : at which it ran
+    profile : the report of the profile at which it ran
 
     Numbers that are not finite become None: JSON has no word for them.
     """
@@ -59,7 +58,7 @@ def summarise(
         "displacement": {"max": displacement},
         "settlement": {"max": float(result.history.settlement[-1])},
         "reaction": {"total_vertical": result.reaction, "weight": result.weight},
-        "profile": None if profile is None else asdict(profile),
+        "profile": profile,
         "version": version,
     }
     return {key: _finite(value) for key, value in summary.items()}

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.tuning.tradeoff.grid import Setting
-from pipelines.tuning.tradeoff.store import Measured, Status
-from pipelines.tuning.tradeoff.worker import SHORT
+from pipelines.tradeoff.grid import Setting
+from pipelines.tradeoff.store import Measured, Status
+from pipelines.tradeoff.worker import SHORT
 
 __all__ = ["Choice", "Forecast", "left_out", "next_run"]
 
@@ -183,5 +183,5 @@ def _patience(expected: float | None, budget: float) -> float:
 
 
 def _twice(seconds: float) -> float:
-    """Short work is done twice, see `pipelines.tuning.tradeoff.worker`."""
+    """Short work is done twice, see `pipelines.tradeoff.worker`."""
     return 2.0 * seconds if seconds < SHORT else seconds

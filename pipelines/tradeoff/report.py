@@ -10,15 +10,14 @@ from importlib.metadata import version
 from typing import Any
 
 from mechanics.scene.scene import Fidelity
-from pipelines.run.summary import as_json
-from pipelines.tuning.quantities import QUANTITIES
-from pipelines.tuning.tradeoff.forecast import Forecast, left_out
-from pipelines.tuning.tradeoff.pareto import Judged, Reference, cheapest, counted, front, judge
-from pipelines.tuning.tradeoff.plot import Panel, Point, trade_png
-from pipelines.tuning.tradeoff.scheduler import Limits
-from pipelines.tuning.tradeoff.store import INDEX, Measured, Status, Store
-from pipelines.tuning.tradeoff.toml import scene_lines
-from pipelines.tuning.tradeoff.worker import overlay_record
+from pipelines.results.quantities import QUANTITIES
+from pipelines.results.summary import as_json
+from pipelines.tradeoff.forecast import Forecast, left_out
+from pipelines.tradeoff.pareto import Judged, Reference, cheapest, counted, front, judge
+from pipelines.tradeoff.plot import Panel, Point, trade_png
+from pipelines.tradeoff.scheduler import Limits
+from pipelines.tradeoff.store import INDEX, Measured, Status, Store
+from pipelines.tuning.overlay import overlay_record, scene_lines
 
 __all__ = ["MAIN", "Goal", "study_png", "study_record", "write_study"]
 

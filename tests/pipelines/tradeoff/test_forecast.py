@@ -7,10 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mechanics.stones.meshing.elements import Element
+from pipelines.tradeoff.forecast import Forecast, left_out, next_run
+from pipelines.tradeoff.grid import Setting
+from pipelines.tradeoff.store import Measured, Status
 from pipelines.tuning.overlay import Overlay
-from pipelines.tuning.tradeoff.forecast import Forecast, left_out, next_run
-from pipelines.tuning.tradeoff.grid import Setting
-from pipelines.tuning.tradeoff.store import Measured, Status
 
 GIB = 2**30
 

@@ -15,12 +15,11 @@ from typing import Any
 import numpy as np
 
 from moma.errors import UsageError
+from pipelines.results.quantities import Quantities, quantities_from
+from pipelines.results.summary import as_json
 from pipelines.run.assemble import Assembly
-from pipelines.run.summary import as_json
 from pipelines.scene.file import SceneFile
-from pipelines.tuning.overlay import Overlay
-from pipelines.tuning.quantities import Quantities, quantities_from
-from pipelines.tuning.tradeoff.worker import overlay_from, overlay_record
+from pipelines.tuning.overlay import Overlay, overlay_from, overlay_record
 
 __all__ = ["INDEX", "Measured", "Status", "Store", "study_key"]
 

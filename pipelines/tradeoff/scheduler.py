@@ -14,12 +14,13 @@ from types import TracebackType
 from typing import IO, Any, Self
 
 from mechanics.dynamics.progress import Listener, Progress
-from pipelines.tuning.quantities import quantities_from
-from pipelines.tuning.tradeoff.forecast import Choice, Forecast, next_run
-from pipelines.tuning.tradeoff.grid import Setting
-from pipelines.tuning.tradeoff.pareto import models_of_interest
-from pipelines.tuning.tradeoff.store import Measured, Status, Store
-from pipelines.tuning.tradeoff.worker import FAILED, Job, overlay_record
+from pipelines.results.quantities import quantities_from
+from pipelines.tradeoff.forecast import Choice, Forecast, next_run
+from pipelines.tradeoff.grid import Setting
+from pipelines.tradeoff.pareto import models_of_interest
+from pipelines.tradeoff.store import Measured, Status, Store
+from pipelines.tradeoff.worker import FAILED, Job
+from pipelines.tuning.overlay import overlay_record
 
 __all__ = ["Limits", "carry_out"]
 
@@ -150,7 +151,7 @@ class _Runs:
         # closed by _Run.close; files, since pipes that nobody reads would make it wait
         answer, complaint = tempfile.TemporaryFile(), tempfile.TemporaryFile()  # noqa: SIM115
         process = subprocess.Popen(
-            [sys.executable, "-m", "pipelines.tuning.tradeoff.worker"],
+            [sys.executable, "-m", "pipelines.tradeoff.worker"],
             stdin=subprocess.PIPE,
             stdout=answer,
             stderr=complaint,
@@ -193,7 +194,7 @@ class _Runs:
         return over
 
     def _environment(self) -> dict[str, str]:
-        root = str(Path(__file__).resolve().parents[3])
+        root = str(Path(__file__).resolve().parents[2])
         path = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
         return os.environ | dict.fromkeys(_THREADS, str(self._limits.threads)) | {"PYTHONPATH": path}
 

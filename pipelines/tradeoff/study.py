@@ -9,16 +9,16 @@ from archmodel.database.session import open_database
 from mechanics.dynamics.progress import Listener, silent
 from mechanics.scene.scene import Fidelity
 from moma.errors import UsageError
+from pipelines.results.quantities import QUANTITIES
 from pipelines.run.assemble import assemble
 from pipelines.scene.file import read_scene
 from pipelines.toml.schema import nearest
+from pipelines.tradeoff.grid import grid
+from pipelines.tradeoff.report import Goal, study_record, write_study
+from pipelines.tradeoff.scheduler import Limits, carry_out
+from pipelines.tradeoff.store import Store, study_key
+from pipelines.tradeoff.worker import Job
 from pipelines.tuning.overlay import typical_width
-from pipelines.tuning.quantities import QUANTITIES
-from pipelines.tuning.tradeoff.grid import grid
-from pipelines.tuning.tradeoff.report import Goal, study_record, write_study
-from pipelines.tuning.tradeoff.scheduler import Limits, carry_out
-from pipelines.tuning.tradeoff.store import Store, study_key
-from pipelines.tuning.tradeoff.worker import Job
 
 __all__ = ["Asked", "TradeReport", "run_trade"]
 

@@ -15,7 +15,7 @@ import numpy as np
 from mechanics.results.result import BodyResult, Result
 from mechanics.scene.scene import Fidelity
 from pipelines.arrays import Array
-from pipelines.run.stone_values import stress_statistics
+from pipelines.results.stone_values import stress_statistics
 
 __all__ = ["QUANTITIES", "Quantities", "StoneQuantities", "differences", "quantities", "quantities_from"]
 
