@@ -135,7 +135,7 @@ def _kept(name: str, scene: Scene, overlay: Overlay, records: Path | None) -> tu
 def _write(rows: Sequence[Row], loads: Mapping[str, float]) -> None:
     """The module of the numbers, with three digits."""
     lines = [
-        '"""What `python -m benchmarks.profiles --write` has measured on the reference scenes; not written by hand."""',
+        '"""Errors on the reference scenes, written by `python -m benchmarks.profiles --write`, not by hand."""',
         "",
         "from collections.abc import Mapping",
         "",

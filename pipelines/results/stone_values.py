@@ -1,4 +1,4 @@
-"""Numbers of a result, by stone and over the scene: what tables, database and reports show."""
+"""Values of a result by stone and over the scene, for tables, database and reports."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ class StressStatistics:
 
 
 def stress_statistics(result: Result) -> StressStatistics | None:
-    """Statistics of the Von Mises stress; None if no stone deforms."""
+    """Compute statistics of the Von Mises stress; None if no stone deforms."""
     stressed = [
         (body.von_mises, body.node_volume)
         for body in result.bodies
@@ -49,7 +49,7 @@ def stress_statistics(result: Result) -> StressStatistics | None:
 
 
 def stone_results(result: Result) -> tuple[StoneResult, ...]:
-    """What goes back to the database, one per stone, in the scene's order."""
+    """Return the results for the database, one per stone, in the order of the scene."""
     force = np.linalg.norm(result.contacts.force, axis=1)
     largest = _largest(result.contacts.bodies, force, len(result.bodies))
     of_joints = _joint_values(result.joints, len(result.bodies))
@@ -68,7 +68,7 @@ def stone_results(result: Result) -> tuple[StoneResult, ...]:
 
 
 def _values(body: BodyResult, of_joints: Mapping[str, float]) -> dict[str, float]:
-    """The named values of a stone, those that are known; archmodel.run_records.STONE_VALUES says what they are."""
+    """Return the known values of a stone by name; archmodel.store.run_record.STONE_VALUES explains them."""
     values: dict[str, float | None] = {"volume": body.volume, "mass": body.mass, **of_joints}
     if body.values is not None:
         values |= _stresses(body.values)
@@ -91,7 +91,7 @@ def _stresses(stress: StressValues) -> dict[str, float | None]:
 
 
 def _joint_values(joints: JointResult, count: int) -> dict[str, Array]:
-    """(nb,) the worst of the joints of each stone; NaN where it has none of which there is something to say."""
+    """Return the worst value (nb,) over the joints of each stone; NaN where none is known."""
     return {
         f"joint_{name}": _largest(joints.bodies, getattr(joints, attribute), count)
         for name, attribute in (
@@ -105,7 +105,7 @@ def _joint_values(joints: JointResult, count: int) -> dict[str, Array]:
 
 
 def _largest(bodies: Ints, values: Array, count: int) -> Array:
-    """Largest of the values (n,) of the pairs of bodies (n, 2) that each body (count,) is in; NaN without one."""
+    """Return the largest value (n,) over the pairs of bodies (n, 2) that each body (count,) is in; NaN without one."""
     largest = np.full(count, -np.inf)
     known = np.isfinite(values)
     for side in (0, 1):

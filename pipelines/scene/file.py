@@ -36,12 +36,11 @@ class SceneFile:
     document : file and lines, for error messages
     text : the file, as it is kept with the run
     name : title
-    joints : what becomes of joints
     gravity : (3,) acceleration [m/s²]
     mesh : finite elements of deformable stones that no entry of `meshes` names
-    meshes : groups of stones that are meshed otherwise
+    meshes : finite elements of particular groups of stones
     laws : of particular joints; the general law is in `contact`
-    loads, throws : what acts besides gravity, and what begins in motion
+    loads, throws : actions besides gravity, and initial motions
     """
 
     document: Document
@@ -68,13 +67,27 @@ def read_scene(path: str | Path) -> SceneFile:
 
     Raises
     ------
-    SceneError : with file and line, at the first thing that is wrong
+    SceneError : with file and line, at the first mistake
+
+    >>> scene = read_scene("data/samples/window/window.toml")
+    >>> scene.name, scene.bodies.fixed, scene.materials[0].material.density
+    ('Window bay', ('course = 1',), 2350.0)
     """
     return parse_scene(read_text(path, SceneError, missing="no such scene file"), str(path))
 
 
 def parse_scene(text: str, path: str) -> SceneFile:
-    """Check the text of a scene file; `path` is for the messages."""
+    """Check the text of a scene file; `path` is for the messages.
+
+    >>> scene = parse_scene('''
+    ... [materials.limestone]
+    ... density = 2350.0
+    ... young = 12e9
+    ... poisson = 0.2
+    ... ''', "tower.toml")
+    >>> scene.name, scene.contact.law.friction, scene.time.step
+    ('tower', 0.6, 0.001)
+    """
     given = parse_toml(text, path, SceneError, "see docs/scene.md for a scene to start from")
     document = Document(path, key_lines(text))
     tables = _checked_tables(document, given)

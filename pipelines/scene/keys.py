@@ -82,7 +82,7 @@ def build(owner: type[Settings], values: Mapping[str, Any]) -> Settings:
 
 
 def _declared(owner: type[Any]) -> Mapping[str, tuple[Any, MechanicsSetting | SurveySetting]]:
-    """Type, None left out, and declaration of every setting of a dataclass."""
+    """Return type, without None, and declaration of every setting of a dataclass."""
     return {
         name: (_without_none(hint.__origin__), one)
         for name, hint in get_type_hints(owner, include_extras=True).items()

@@ -51,14 +51,14 @@ LAW_KEYS = (
 
 @dataclass(frozen=True)
 class JointLaw:
-    """A law and the table that it was made from; it names two materials, two groups of stones, or neither."""
+    """A law and its table, which names two materials, two groups of stones, or neither."""
 
     entry: Entry
     law: Law
 
 
 def read_laws(document: Document, given: Mapping[str, Any]) -> tuple[JointLaw, ...]:
-    """Check and make all laws; the stones between which they hold are still expressions."""
+    """Check and build all laws; the stones between which they hold are still expressions."""
     materials = tuple(given.get("materials", {}))
     return tuple(
         _law(document, entry, materials)
@@ -88,7 +88,7 @@ def law_rules(
     groups: Mapping[tuple[str, ...], Sequence[frozenset[str]]],
     materials: Mapping[str, str],
 ) -> tuple[LawRule, ...]:
-    """Rules between groups of codes; `materials` is the name of the material of each stone, by code."""
+    """Return the rules between groups of codes; `materials` maps the code of each stone to its material."""
     rules = []
     for one in laws:
         path, named = one.entry.path, one.entry.values["materials"]

@@ -140,7 +140,7 @@ THROW_KEYS = (
 
 
 def read_loads(document: Document, given: Mapping[str, Any]) -> tuple[Entry, ...]:
-    """Check all loads, and read their records; their stones are still expressions."""
+    """Check all loads and read their records; their stones are still expressions."""
     entries = read_entries(document, given, "loads", LOAD_TYPES)
     for entry in entries:
         if entry.type == "tilt" and (entry.values["rate"] is None) == (entry.values["angle"] is None):
@@ -158,7 +158,7 @@ def read_throws(document: Document, given: Mapping[str, Any]) -> tuple[Entry, ..
 
 
 def build_loads(document: Document, entries: Iterable[Entry], groups: Groups, blocks: Blocks) -> Loads:
-    """The loads on the blocks, given by code; `groups` are the codes that each entry names.
+    """Return the loads on the blocks, given by code; `groups` are the codes that each entry names.
 
     Raises
     ------
@@ -186,7 +186,7 @@ def build_loads(document: Document, entries: Iterable[Entry], groups: Groups, bl
 def thrown(
     document: Document, entries: Iterable[Entry], groups: Groups, blocks: Blocks
 ) -> dict[str, tuple[float, ...]]:
-    """Initial velocity (6,) [m/s, rad/s] of every stone that begins in motion, by code."""
+    """Return the initial velocity (6,) [m/s, rad/s] of every stone that begins in motion, by code."""
     found: dict[str, tuple[float, ...]] = {}
     for entry in entries:
         velocity = (*entry.values["velocity"], *(float(np.radians(one)) for one in entry.values["spin"]))
@@ -201,7 +201,7 @@ def thrown(
 
 
 def _with_records(document: Document, entry: Entry) -> Entry:
-    """The entry with its records in the place of their file names."""
+    """Return the entry with records in place of their file names."""
     values = dict(entry.values)
     if not any(values[axis] for axis in "xyz"):
         document.fail("a ground motion without a record", *entry.path, remedy="give at least one of x, y, z")
@@ -250,7 +250,7 @@ def _force(document: Document, entry: Entry, codes: Codes, blocks: Blocks) -> St
 def _check_supports(
     document: Document, entry: Entry, groups: Sequence[Codes], blocks: Blocks, taken: dict[str, str]
 ) -> None:
-    """Only fixed stones can be moved, and each by one load only; `taken` says by which."""
+    """Refuse to move stones that are not fixed, or are moved by another load; `taken` maps codes to loads."""
     for (key, _), codes in zip(entry.groups, groups, strict=True):
         for code in sorted(codes):
             if blocks[code].fidelity is not Fidelity.FIXED:

@@ -59,7 +59,7 @@ def _rows(keys: Iterable[Key]) -> Iterator[str]:
 
 
 def _default(value: object) -> str:
-    """A default as TOML writes it; None, which has a meaning of its own, is left blank."""
+    """Return a default in TOML; None, which has a meaning of its own, is left blank."""
     if value is REQUIRED:
         return "required"
     return "" if value is None else f"`{_toml(value)}`"

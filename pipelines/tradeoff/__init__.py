@@ -1,1 +1,5 @@
-"""Speed against accuracy, measured on a scene (`moma trade`)."""
+"""Studies of speed against accuracy on a scene (`moma trade`).
+
+Public: `run_trade`, `Asked`, `TradeReport` (study); `grid`, `Setting` (grid); `front`, `judge` (pareto); `Store`
+(store).
+"""

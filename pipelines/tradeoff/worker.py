@@ -1,8 +1,7 @@
-"""One run of a study of speed against accuracy, in a process of its own: ``python -m
-pipelines.tradeoff.worker``.
+"""One run of a tradeoff study in a process of its own: ``python -m pipelines.tradeoff.worker``.
 
-So its CPU time and its memory are its own, and it can be stopped. The job comes as one line of JSON on the standard
-input, which stays open for as long as the parent lives; the answer is one line of JSON on the standard output.
+A separate process has its own CPU time and memory, and can be stopped. The job is one line of JSON on the standard
+input, which stays open as long as the parent lives; the answer is one line of JSON on the standard output.
 """
 
 import ctypes
@@ -28,21 +27,21 @@ from pipelines.tuning.overlay import overlaid, overlay_from
 __all__ = ["FAILED", "SHORT", "Job"]
 
 FAILED = 3
-"""Exit code of a run that failed in a way that MOMA foresees; the reason is on the standard output."""
+"""Exit code of a run that failed with a MomaError; the reason is on the standard output."""
 
 SHORT = 5.0
-"""Work of fewer seconds of CPU time is done twice, since the first time has compiled kernels to read from the disk."""
+"""CPU time below which work is done twice, since the first time includes loading compiled kernels [s]."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """What one run needs to know.
+    """Input of one run.
 
     Attributes
     ----------
     text, path : of the scene file; the path is for messages and for files beside it
     url : of the database
-    overlay : what replaces settings of the scene, see `overlay_record`
+    overlay : settings that replace those of the scene, see `overlay_record`
     width : typical smallest width of the stones [m]
     """
 
@@ -54,7 +53,7 @@ class Job:
 
 
 def _measured(job: Job) -> dict[str, Any]:
-    """Run the scene, twice if that is short, and say what it took and what came out."""
+    """Run the scene, twice if that is short, and return its cost and results."""
     program = _peak_memory()
     scene = overlaid(parse_scene(job.text, job.path), overlay_from(job.overlay), job.width)
     for _ in range(2):
@@ -85,15 +84,15 @@ def _simulated(scene: SceneFile, url: str) -> Result:
 
 
 def _peak_memory() -> int:
-    """The most that this process has had at once [bytes]."""
+    """Return the peak memory of this process [bytes]."""
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak if sys.platform == "darwin" else 1024 * peak
 
 
 def _end_with_parent(parent: int) -> None:
-    """End this process as soon as its parent has ended, however that came about."""
+    """End this process as soon as its parent has ended, for whatever reason."""
     if sys.platform.startswith("linux"):
-        # the kernel does it at once, even amid a long kernel of numba, which the thread below would wait for
+        # the operating system does so at once, even within a long numba kernel, for which the thread below would wait
         ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
         if os.getppid() != parent:
             os._exit(1)
@@ -101,15 +100,14 @@ def _end_with_parent(parent: int) -> None:
 
 
 def _await_end() -> None:
-    while os.read(
-        0, 1024
-    ):  # the parent says nothing more; it ends when the parent's end of the pipe is closed
+    # the parent sends nothing more, so reading ends when its end of the pipe is closed
+    while os.read(0, 1024):
         pass
     os._exit(1)
 
 
 def _main() -> int:
-    # unbuffered, since the rest is for the watch
+    # unbuffered, since the rest is read by the watching thread
     with open(sys.stdin.fileno(), "rb", buffering=0, closefd=False) as channel:
         asked = json.loads(channel.readline())
     _end_with_parent(asked.pop("parent"))

@@ -1,4 +1,4 @@
-"""What `python -m benchmarks.profiles --write` has measured on the reference scenes; not written by hand."""
+"""Errors on the reference scenes, written by `python -m benchmarks.profiles --write`, not by hand."""
 
 from collections.abc import Mapping
 

@@ -1,4 +1,4 @@
-"""What two runs of a scene are compared by, on results whose numbers are known."""
+"""Quantities by which two runs of a scene are compared, on results whose numbers are known."""
 
 import json
 import math

@@ -1,6 +1,6 @@
-"""A wall on a national grid is computed about a point amid its stones: the same wall, to the nanometre.
+"""Walls on a national grid, computed about a local origin: the same wall, to the nanometre.
 
-Coordinates are first rounded to 2⁻²⁰ m, so that moving them by whole metres is exact in 64 bits.
+Coordinates are first rounded to 2⁻²⁰ m, so that shifting them by whole metres is exact in 64 bits.
 """
 
 import csv
@@ -14,10 +14,9 @@ from archmodel.database.session import open_database
 from archmodel.query.api import find
 from archmodel.store.stones import load_stones
 from pipelines.ingest.ingest import ingest
-from pipelines.run.assemble import assemble
 from pipelines.run.local_frame import local_origin, stone_about
 from pipelines.run.run import run_scene
-from pipelines.scene.file import parse_scene
+from tests.pipelines.scenes import assembled
 
 GRID = np.array([652_345.0, 6_862_789.0, 1_040.0])
 ORIGIN = np.array([652_000.0, 6_863_000.0, 1_000.0])  # the nearest multiple of 1 km
@@ -100,11 +99,6 @@ def text_for(shift, more=LOADS):
     return SCENE + more.format(x=x, y=y, z=z)
 
 
-def assembled(url, text):
-    with open_database(url) as database, database.session(read_only=True) as session:
-        return assemble(parse_scene(text, "scene.toml"), session)
-
-
 @pytest.mark.parametrize("joints", ["", '[joints]\nmode = "as-surveyed"\n'])
 def test_a_far_scene_is_the_near_one_about_its_own_origin(walls, joints):
     near = assembled(walls[0], text_for(np.zeros(3)) + joints)
@@ -133,7 +127,7 @@ def test_points_of_loads_and_pivots_move_along(walls):
     np.testing.assert_allclose(turn.pivot, [0.5, 0.1, 0.4])
 
 
-def test_a_run_far_away_is_the_run_nearby_and_tells_places_on_the_site(walls, tmp_path):
+def test_a_run_far_away_is_the_run_nearby_in_site_coordinates(walls, tmp_path):
     done = {}
     for name, url, shift in zip(("near", "far"), walls, (np.zeros(3), GRID), strict=True):
         (tmp_path / f"{name}.toml").write_text(text_for(shift, LOADS.split('[[loads]]\ntype = "motion"')[0]))
@@ -183,7 +177,7 @@ def test_near_scenes_stay_where_they_are_and_far_ones_have_a_round_origin(far_st
     assert stone_about(ten[0], np.zeros(3)) is ten[0]
 
 
-def test_a_stone_about_an_origin_has_lost_nothing(far_stones):
+def test_shifting_a_stone_loses_nothing(far_stones):
     for stone in far_stones:
         about = stone_about(stone, ORIGIN)
         for name in ("vertices", "points", "outline", "solid_vertices", "centroid"):

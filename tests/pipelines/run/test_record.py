@@ -1,4 +1,4 @@
-"""What a run leaves in the database is what the simulation gave back: a small wall, near the origin and far from it."""
+"""Stored runs against the result of the simulation: a small wall, near the origin and far from it."""
 
 import numpy as np
 import pytest
@@ -62,7 +62,7 @@ def survey(shift):
 
 @pytest.fixture(params=["near", "far"])
 def ran(request, new_url, tmp_path, monkeypatch):
-    """The URL, what the simulation gave back, the assembly it was of, and the number of the stored run."""
+    """Yield a session, the result of the simulation, its assembly, and the number of the stored run."""
     (tmp_path / "wall.moma").write_text(survey(np.zeros(3) if request.param == "near" else FAR))
     (tmp_path / "scene.toml").write_text(SCENE)
     url, given = new_url(), []
@@ -198,7 +198,7 @@ def tetrahedra(vertices, faces):
 
 
 def check_sums_over_joints(joints, points):
-    """What a joint bears is the sum over its points, turned to its first stone."""
+    """The force of a joint is the sum over its points, taken on its first stone."""
     for joint in joints:
         own = [point for point in points if point.joint == joint.number]
         assert own
@@ -213,7 +213,7 @@ def check_sums_over_joints(joints, points):
 
 
 def check_solids(session, number, assembly, codes):
-    """Joints of 10 mm were closed: corners on them moved by half of that, others by nothing."""
+    """Joints of 10 mm were closed: corners on them moved by half of that, others not at all."""
     solids = session.scalars(select(Simplification).where(Simplification.run_id == number)).all()
     blocks = {block.code: block for block in assembly.scene.blocks}
     assert {codes[one.entity_id] for one in solids} == set(FACES)

@@ -19,17 +19,14 @@ from pipelines.scene.tables import TABLES
 from pipelines.toml.lines import key_lines
 from survey.joints.settings import JointSettings
 from tests.paths import ROOT
+from tests.pipelines.scenes import fails_at_line
 
 SAMPLE = ROOT / "data/samples/window/window.toml"
 STONE = "[materials.stone]\ndensity = 2000\nyoung = 1e10\npoisson = 0.2\n"
 
 
-def message_of(text):
-    with pytest.raises(SceneError) as caught:
-        parse_scene(text, "scene.toml")
-    assert caught.value.exit_code == 2
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
+def parsed(text):
+    return parse_scene(text, "scene.toml")
 
 
 def test_the_smallest_scene_has_a_material_and_defaults_for_the_rest():
@@ -105,9 +102,7 @@ def test_the_sample_scene_is_valid():
     ],
 )
 def test_a_mistake_is_named_with_its_line(text, line, said):
-    message = message_of(text + STONE) if "not TOML" not in said else message_of(text)
-    assert message.startswith(f"scene.toml:{line}: ")
-    assert said in message
+    fails_at_line(line, said, parsed, text if "not TOML" in said else text + STONE)
 
 
 @pytest.mark.parametrize(
@@ -137,9 +132,7 @@ def test_a_mistake_is_named_with_its_line(text, line, said):
     ],
 )
 def test_a_mistake_in_the_materials_is_named_with_its_line(text, line, said):
-    message = message_of(text)
-    assert message.startswith(f"scene.toml:{line}: ")
-    assert said in message
+    fails_at_line(line, said, parsed, text)
 
 
 def test_a_missing_file_is_named(tmp_path):
@@ -188,7 +181,7 @@ def test_key_lines_agree_with_where_the_keys_were_written(keys, blank):
 
 
 def _paths(tables, above=()):
-    """Paths of all keys, but of those inside inline tables, which stand on their table's line."""
+    """Yield paths of all keys except those inside inline tables, which are on the line of their table."""
     for name, value in tables.items():
         path = (*above, name)
         yield path

@@ -1,4 +1,4 @@
-"""The front, the reference and the recommendation of a study, against what they are by definition."""
+"""Front, reference and recommendation of a study, against their definitions."""
 
 import math
 from dataclasses import replace

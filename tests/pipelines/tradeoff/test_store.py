@@ -1,4 +1,4 @@
-"""What a study keeps: written whole or not at all, read back the same, and of this scene only."""
+"""Stored runs of a study: written whole or not at all, read back the same, and of this scene only."""
 
 import json
 from dataclasses import replace
