@@ -8,10 +8,22 @@ import numpy as np
 from archmodel.store.run_record import StoneResult
 from mechanics.results.contact_result import JointResult
 from mechanics.results.result import BodyResult, Result
-from mechanics.results.stress_values import StressValues, volume_quantile
+from mechanics.results.stress_values import volume_quantile
 from pipelines.arrays import Array, Ints
 
 __all__ = ["StressStatistics", "stone_results", "stress_statistics"]
+
+_STRESSES = (
+    "von_mises_p99",
+    "principal_tension",
+    "principal_compression",
+    "mean_pressure",
+    "tension_zone",
+    "overstressed_zone",
+    "utilisation",
+    "utilisation_tension",
+    "utilisation_compression",
+)
 
 
 @dataclass(frozen=True)
@@ -71,23 +83,9 @@ def _values(body: BodyResult, of_joints: Mapping[str, float]) -> dict[str, float
     """Return the known values of a stone by name; archmodel.store.run_record.STONE_VALUES explains them."""
     values: dict[str, float | None] = {"volume": body.volume, "mass": body.mass, **of_joints}
     if body.values is not None:
-        values |= _stresses(body.values)
+        values |= {name: getattr(body.values, name) for name in _STRESSES}
+        values["stress_error"] = body.values.error
     return {name: value for name, value in values.items() if value is not None and np.isfinite(value)}
-
-
-def _stresses(stress: StressValues) -> dict[str, float | None]:
-    return {
-        "von_mises_p99": stress.von_mises_p99,
-        "principal_tension": stress.principal_tension,
-        "principal_compression": stress.principal_compression,
-        "mean_pressure": stress.mean_pressure,
-        "tension_zone": stress.tension_zone,
-        "overstressed_zone": stress.overstressed_zone,
-        "utilisation": stress.utilisation,
-        "utilisation_tension": stress.utilisation_tension,
-        "utilisation_compression": stress.utilisation_compression,
-        "stress_error": stress.error,
-    }
 
 
 def _joint_values(joints: JointResult, count: int) -> dict[str, Array]:

@@ -4,7 +4,7 @@ import math
 import platform
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, is_dataclass
+from dataclasses import asdict, fields, is_dataclass
 from functools import cache
 from importlib.metadata import version
 from typing import Any
@@ -87,41 +87,21 @@ def run_record(
 def joint_arrays(joints: JointResult, origin: Array, widths: Array) -> JointArrays:
     """Return the joints in the frame of the site, given the scene's `origin` (3,) and surveyed `widths` (nj,) [m]."""
     normal, shear = normal_and_shear(joints)
-    return JointArrays(
-        stones=joints.bodies,
-        centroid=joints.centroid + origin,
-        normal=joints.frame[:, 0],
-        area=joints.area,
-        parted=joints.parted,
-        force_normal=normal,
-        force_shear=shear,
-        pressure_mean=joints.pressure_mean,
-        pressure_max=joints.pressure_max,
-        kern=joints.kern,
-        friction_use=joints.friction_use,
-        slipping=joints.slipping,
-        open=joints.open,
-        gap=joints.gap,
-        opening=joints.opening,
-        sliding=joints.sliding,
-        width=widths,
-    )
+    own = {
+        "stones": joints.bodies,
+        "centroid": joints.centroid + origin,
+        "normal": joints.frame[:, 0],
+        "force_normal": normal,
+        "force_shear": shear,
+        "width": widths,
+    }
+    return JointArrays(**_shared(JointArrays, joints) | own)
 
 
 def contact_arrays(contacts: ContactResult, origin: Array) -> ContactArrays:
     """Return the contact points in the frame of the site, given the scene's `origin` (3,) [m]."""
-    return ContactArrays(
-        stones=contacts.bodies,
-        joint=contacts.joint,
-        point=contacts.point + origin,
-        normal=contacts.normal,
-        force=contacts.force,
-        area=contacts.area,
-        gap=contacts.gap,
-        opening=contacts.opening,
-        slide=contacts.slide,
-        status=contacts.status,
-    )
+    own = {"stones": contacts.bodies, "point": contacts.point + origin}
+    return ContactArrays(**_shared(ContactArrays, contacts) | own)
 
 
 def surveyed_widths(joints: JointResult, codes: Sequence[str], closing: ClosingReport) -> Array:
@@ -195,10 +175,15 @@ def versions() -> Mapping[str, str]:
 
 def _errors(errors: Errors) -> ErrorMeasures:
     """Return the error measures; None where one could not be computed."""
-    measured = {name: getattr(errors, name) for name in ErrorMeasures.__dataclass_fields__}
+    measured = _shared(ErrorMeasures, errors)
     return ErrorMeasures(
         **{name: value if math.isfinite(value) else None for name, value in measured.items()}
     )
+
+
+def _shared(record: type[Any], source: object) -> dict[str, Any]:
+    """Return the fields of a record that the source has under the same name."""
+    return {one.name: getattr(source, one.name) for one in fields(record) if hasattr(source, one.name)}
 
 
 def _values(settings: object) -> dict[str, Any]:

@@ -33,12 +33,7 @@ LAW_TYPES: Mapping[str, tuple[Key, ...]] = {
 }
 
 LAW_KEYS = (
-    Key(
-        "materials",
-        Kind.TEXTS,
-        "Two names of materials: the law holds between their stones.",
-        default=(),
-    ),
+    Key("materials", Kind.TEXTS, "Two names of materials: the law holds between their stones.", default=()),
     Key(
         "between",
         Kind.GROUPS,

@@ -9,15 +9,7 @@ from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.meshers.choice import Mesher
 from mechanics.stones.settings import Setting
 
-__all__ = [
-    "PICTURES",
-    "STRESS_PICTURES",
-    "Fidelities",
-    "MaterialRule",
-    "MeshSettings",
-    "Output",
-    "Selection",
-]
+__all__ = ["PICTURES", "STRESS_PICTURES", "Fidelities", "MaterialRule", "MeshSettings", "Output", "Selection"]
 
 _COARSER = 2.0
 """Edges of the ring over those of the stones for whose sake it deforms: docs/accuracy.md, section 13."""

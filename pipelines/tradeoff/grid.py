@@ -1,6 +1,7 @@
 """Settings that a tradeoff study tries on a scene, chosen by the outputs that the scene requests."""
 
 import math
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -22,6 +23,19 @@ _CELLS = {
     Element.HEX20: (1, 2, 3, 4),
 }
 """Cells across the typical smallest width of a stone, by element. Hex27 has more nodes than hex20 to the same order."""
+
+_WORDS = {
+    "fidelity": "{}",
+    "element": "{}",
+    "cells": "{:g} cells",
+    "points": "{} points",
+    "placement": "points by {}",
+    "step": "h {:g} s",
+    "theta": "θ {:g}",
+    "method": "{}",
+    "tolerance": "η {:.0e}",
+}
+"""Changes of an overlay in words."""
 
 _RIGID = Overlay(fidelity=Fidelity.RIGID)
 _PLAIN = (Overlay(), _RIGID)
@@ -91,27 +105,14 @@ def grid(
 
 
 def setting_name(overlay: Overlay) -> str:
-    """Return the changes of an overlay in words."""
-    words = []
-    if overlay.fidelity is not None:
-        words.append(str(overlay.fidelity))
-    if overlay.element is not None:
-        words.append(str(overlay.element))
-    if overlay.cells is not None:
-        words.append(f"{overlay.cells:g} cell{'s' if overlay.cells != 1 else ''}")
-    if overlay.points is not None:
-        words.append(f"{overlay.points} points")
-    if overlay.placement is not None:
-        words.append(f"points by {overlay.placement}")
-    if overlay.step is not None:
-        words.append(f"h {overlay.step:g} s")
-    if overlay.theta is not None:
-        words.append(f"θ {overlay.theta:g}")
-    if overlay.method is not None:
-        words.append(f"{overlay.method}")
-    if overlay.tolerance is not None:
-        words.append(f"η {overlay.tolerance:.0e}")
-    return ", ".join(words) or "as written"
+    """Return the changes of an overlay in words.
+
+    >>> setting_name(Overlay(element=Element.TET10, cells=2.0, tolerance=1e-4))
+    'tet10, 2 cells, η 1e-04'
+    """
+    values = ((text, getattr(overlay, name)) for name, text in _WORDS.items())
+    words = ", ".join(text.format(value) for text, value in values if value is not None)
+    return re.sub(r"(?<![.\d])1 cells", "1 cell", words) or "as written"
 
 
 def _models(scene: SceneFile, moving: Sequence[Block], width: float, stress: bool) -> list[Setting]:

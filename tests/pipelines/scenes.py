@@ -1,15 +1,17 @@
-"""Scenes in tests: their assembly from a database, and the line of the error in a wrong one."""
+"""Scenes in tests: surveys of a few stones, assembly from a database, and the line of the error in a wrong scene."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
+import numpy as np
 import pytest
 
 from archmodel.database.session import open_database
 from moma.errors import SceneError
+from pipelines.arrays import Array
 from pipelines.run.assemble import Assembly, assemble
 from pipelines.scene.file import parse_scene
 
-__all__ = ["assembled", "fails_at_line"]
+__all__ = ["assembled", "fails_at_line", "survey_text"]
 
 
 def assembled(url: str, text: str) -> Assembly:
@@ -27,3 +29,20 @@ def fails_at_line(line: int, words: str, build: Callable[[str], object], text: s
     assert words in message
     assert "\n" not in message
     assert caught.value.exit_code == 2
+
+
+def survey_text(stones: Mapping[str, tuple[int, Array, Array]], shift: Array) -> str:
+    """Write a survey of headers: by code the course, the corners (4, 3) and points (n, 3) of the face, shifted [m]."""
+    observer = (shift + np.array([0.5, -9.0, 1.0])).tolist()
+    lines = [
+        "moma-survey 1",
+        f"observer {' '.join(map(repr, observer))}",
+        "sigma 0.002",
+        "depth * 0.4 sigma 0.02 source thickness",
+    ]
+    for code, (course, corners, points) in stones.items():
+        lines.append(f"stone {code} header course {course}")
+        for word, places in (("vertex", corners), ("point", points)):
+            lines += [f"{word} {' '.join(map(repr, place))}" for place in (places + shift).tolist()]
+        lines.append("end")
+    return "\n".join(lines) + "\n"

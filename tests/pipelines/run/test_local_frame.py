@@ -16,7 +16,7 @@ from archmodel.store.stones import load_stones
 from pipelines.ingest.ingest import ingest
 from pipelines.run.local_frame import local_origin, stone_about
 from pipelines.run.run import run_scene
-from tests.pipelines.scenes import assembled
+from tests.pipelines.scenes import assembled, survey_text
 
 GRID = np.array([652_345.0, 6_862_789.0, 1_040.0])
 ORIGIN = np.array([652_000.0, 6_863_000.0, 1_000.0])  # the nearest multiple of 1 km
@@ -51,36 +51,16 @@ pivot = [{x}, {y}, {z}]
 """
 
 
-def block(name, course, x, z, length):
-    rng = np.random.default_rng(sum(map(ord, name)))
+def stone(code, course, x, z, length):
+    rng = np.random.default_rng(sum(map(ord, code)))
     corners = np.array([(x, 0, z), (x + length, 0, z), (x + length, 0, z + 0.29), (x, 0, z + 0.29)])
     points = np.column_stack([rng.uniform(x, x + length, 5), np.zeros(5), rng.uniform(z, z + 0.29, 5)])
-    return (
-        name,
-        course,
-        [
-            np.round((part + rng.normal(0.0, 0.002, part.shape)) * 2.0**20) / 2.0**20
-            for part in (corners, points)
-        ],
-    )
+    noisy = (part + rng.normal(0.0, 0.002, part.shape) for part in (corners, points))
+    return course, *(np.round(part * 2.0**20) / 2.0**20 for part in noisy)
 
 
-STONES = [block("LEFT", 1, 0.0, 0.0, 0.5), block("RIGHT", 1, 0.51, 0.0, 0.5), block("TOP", 2, 0.2, 0.3, 0.6)]
-
-
-def survey(shift):
-    lines = [
-        "moma-survey 1",
-        f"observer {' '.join(map(repr, (shift + np.array([0.5, -9.0, 1.0])).tolist()))}",
-        "sigma 0.002",
-    ]
-    lines.append("depth * 0.4 sigma 0.02 source thickness")
-    for name, course, parts in STONES:
-        lines.append(f"stone {name} header course {course}")
-        for word, part in zip(("vertex", "point"), parts, strict=True):
-            lines += [f"{word} {' '.join(map(repr, row))}" for row in (part + shift).tolist()]
-        lines.append("end")
-    return "\n".join(lines) + "\n"
+FACES = {"LEFT": (1, 0.0, 0.0, 0.5), "RIGHT": (1, 0.51, 0.0, 0.5), "TOP": (2, 0.2, 0.3, 0.6)}
+STONES = {code: stone(code, *face) for code, face in FACES.items()}
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +68,7 @@ def walls(tmp_path_factory):
     """URLs of the databases of the wall near the origin and far from it."""
     folder, urls = tmp_path_factory.mktemp("walls"), []
     for name, shift in (("near", np.zeros(3)), ("far", GRID)):
-        (folder / f"{name}.moma").write_text(survey(shift))
+        (folder / f"{name}.moma").write_text(survey_text(STONES, shift))
         urls.append(f"sqlite:///{folder / name}.db")
         ingest([folder / f"{name}.moma"], urls[-1])
     return urls
