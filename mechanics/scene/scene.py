@@ -12,13 +12,15 @@ from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.meshers.choice import Mesher
 from mechanics.stones.settings import Setting, check_settings
-from mechanics.stones.validation import check_corners, finite, refuse_unless, sane
+from mechanics.stones.validation import check_corners, finite, refuse_unless
 from moma.errors import SceneError
 
 __all__ = [
     "Block",
     "ContactSettings",
+    "ContactSize",
     "Fidelity",
+    "Growth",
     "LawRule",
     "Method",
     "Part",
@@ -27,6 +29,22 @@ __all__ = [
     "SolverSettings",
     "Start",
     "TimeSettings",
+]
+
+
+ContactSize = Annotated[
+    float | None,
+    Setting(
+        "Target edge length at faces that touch other stones; if not given, or larger, `size`.", "m", above=0
+    ),
+]
+Growth = Annotated[
+    float,
+    Setting(
+        "Increase of edge length per unit of distance from these faces, until it reaches `size`.",
+        "-",
+        above=0,
+    ),
 ]
 
 
@@ -57,14 +75,13 @@ class Block:
     faces : vertex indices of each planar face, counter-clockwise seen from outside
     material : density and elasticity
     fidelity : fixed, rigid or deformable
-    mesh_size : target edge length of the finite elements [m]; only for deformable blocks
+    mesh_size : only for deformable blocks
     element : kind of its finite elements; hexahedra suit blocks whose corners each join three faces
     velocity : (6,) initial translation [m/s] and rotation [rad/s] velocity; not for fixed blocks
     parts : convex parts that fill a non-convex stone without overlap; empty if it is convex
-    radius : of a ball, whose surface is the sphere about the mean of its corners; corners and faces are for pictures
-        (mechanics.balls makes them) [m]. None: a polyhedron
-    contact_size : target edge length at the faces that touch other blocks where the scene begins; None: as inside [m]
-    growth : by how much edges get longer per metre away from these faces, up to the mesh size [-]
+    radius : the surface of a ball is the sphere about the mean of its corners; corners and faces are for pictures
+        (mechanics.balls makes them). None: a polyhedron
+    contact_size : of the faces that touch other blocks where the scene begins
     mesher : of its tetrahedra
     stress : whether the stress of a deformable block is wanted; if not, it is not computed
     """
@@ -74,36 +91,25 @@ class Block:
     faces: tuple[tuple[int, ...], ...]
     material: Material
     fidelity: Fidelity = Fidelity.RIGID
-    mesh_size: float | None = None
+    mesh_size: Annotated[
+        float | None, Setting("Target edge length of the finite elements.", "m", above=0)
+    ] = None
     element: Element = Element.TET4
     velocity: tuple[float, ...] = (0.0,) * 6
     parts: tuple[Part, ...] = ()
-    radius: float | None = None
-    contact_size: float | None = None
-    growth: float = 0.5
+    radius: Annotated[float | None, Setting("Radius of a ball.", "m", above=0)] = None
+    contact_size: ContactSize = None
+    growth: Growth = 0.5
     mesher: Mesher = Mesher.AUTO
     stress: bool = True
 
     def __post_init__(self) -> None:
-        where, metres = f"stone {self.code}", "give metres greater than 0"
+        where = f"stone {self.code}"
         check_corners(where, self.vertices)
         for part in self.parts:
             check_corners(where, part.vertices)
-        refuse_unless(
-            where,
-            (
-                ("velocity", self.velocity, finite(self.velocity, 6), "give six numbers"),
-                ("mesh_size", self.mesh_size, self.mesh_size is None or sane(self.mesh_size), metres),
-                (
-                    "contact_size",
-                    self.contact_size,
-                    self.contact_size is None or sane(self.contact_size),
-                    metres,
-                ),
-                ("growth", self.growth, sane(self.growth), "give a number greater than 0"),
-                ("radius", self.radius, self.radius is None or sane(self.radius), metres),
-            ),
-        )
+        refuse_unless(where, [("velocity", self.velocity, finite(self.velocity, 6), "give six numbers")])
+        check_settings(where, self)
 
 
 class Placement(StrEnum):

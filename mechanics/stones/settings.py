@@ -66,21 +66,20 @@ def check_settings(where: str, settings: object) -> None:
     owner: Any = type(settings)
     for name, setting in declared(owner).items():
         value = getattr(settings, name)
-        if setting.choices:
-            right = value in setting.choices
-        else:
-            right = value is None or not _bounds(setting) or _within(value, setting)
-        if not right:
+        if not (value in setting.choices if setting.choices else value is None or _within(value, setting)):
             raise SceneError(f"{name} = {value!r}", where=where, remedy=_remedy(setting))
 
 
-def _within(number: float, setting: Setting) -> bool:
+def _within(value: Any, setting: Setting) -> bool:
+    _, _, above, at_least, below, at_most, _, infinite = setting
+    if above is at_least is below is at_most is None:
+        return True  # a flag, an enumeration, a text
     return (
-        abs(number) <= (inf if setting.infinite else LARGEST)
-        and (setting.above is None or number - setting.above >= SMALLEST)
-        and (setting.at_least is None or number >= setting.at_least)
-        and (setting.below is None or number < setting.below)
-        and (setting.at_most is None or number <= setting.at_most)
+        abs(value) <= (inf if infinite else LARGEST)
+        and (above is None or value - above >= SMALLEST)
+        and (at_least is None or value >= at_least)
+        and (below is None or value < below)
+        and (at_most is None or value <= at_most)
     )
 
 
@@ -93,7 +92,7 @@ def _remedy(setting: Setting) -> str:
 
 
 def _bounds(setting: Setting) -> list[str]:
-    """Bounds in words."""
+    """Return the bounds in words."""
     if setting.at_least is not None and setting.at_most is not None:
         return [f"from {setting.at_least:g} to {setting.at_most:g}"]
     words = (

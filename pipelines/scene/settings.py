@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from mechanics.scene.scene import Block, Fidelity
+from mechanics.scene.scene import Block, ContactSize, Fidelity, Growth
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.meshers.choice import Mesher
@@ -90,22 +90,8 @@ class MeshSettings:
             "Element type: tetrahedra (tet…) or hexahedra (hex…), of the first (tet4, hex8) or second order."
         ),
     ] = Block.element
-    contact_size: Annotated[
-        float | None,
-        Setting(
-            "Target edge length at faces that touch other stones; if not given, or larger, `size`.",
-            "m",
-            above=0,
-        ),
-    ] = None
-    growth: Annotated[
-        float,
-        Setting(
-            "Increase of edge length per unit of distance from these faces, until it reaches `size`.",
-            "-",
-            above=0,
-        ),
-    ] = Block.growth
+    contact_size: ContactSize = None
+    growth: Growth = Block.growth
     mesher: Annotated[
         Mesher,
         Setting(

@@ -16,7 +16,6 @@ from moma.errors import SceneError
 from pipelines.run.check import check_scene
 from pipelines.scene.file import parse_scene
 from pipelines.scene.laws import law_rules
-from pipelines.toml.lines import key_lines
 from tests.paths import ROOT
 from tests.pipelines.scenes import assembled, fails_at_line
 
@@ -248,21 +247,6 @@ def test_records_are_read_filtered_and_corrected_as_asked(tmp_path):
             parse_scene(f"{head}{wrong}\n{STONE}", path)
         assert str(caught.value).startswith(f"{path}:5: ")
         assert said in str(caught.value)
-
-
-def test_tables_of_an_array_have_their_own_lines():
-    text = "[[a]]\nx = 1\n[[a]]\n\nx = 2\n[a.b]\ny = 1\n[[a.c]]\nz = 1\n[[a.c]]\nz = 2\n"
-    lines = key_lines(text)
-    expected = {
-        ("a", "0"): 1,
-        ("a", "0", "x"): 2,
-        ("a", "1"): 3,
-        ("a", "1", "x"): 5,
-        ("a", "1", "b", "y"): 7,
-        ("a", "1", "c", "0", "z"): 9,
-        ("a", "1", "c", "1", "z"): 11,
-    }
-    assert {path: lines[path] for path in expected} == expected
 
 
 def test_the_examples_of_the_documentation_are_valid():

@@ -1,7 +1,6 @@
 """Scene files: every mistake is named with its line, its value and a remedy, before anything runs."""
 
 import re
-import tomllib
 from dataclasses import fields
 
 import pytest
@@ -11,12 +10,10 @@ from hypothesis import strategies as st
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import ContactSettings, SolverSettings, Start, TimeSettings
 from mechanics.stones.meshing.elements import Element
-from moma.errors import MomaError, SceneError, UsageError
-from pipelines.record.file import parse_record
+from moma.errors import MomaError, SceneError
 from pipelines.scene.file import parse_scene, read_scene
 from pipelines.scene.settings import Fidelities, MeshSettings, Output, Selection
 from pipelines.scene.tables import TABLES
-from pipelines.toml.lines import key_lines
 from survey.joints.settings import JointSettings
 from tests.paths import ROOT
 from tests.pipelines.scenes import fails_at_line
@@ -156,39 +153,6 @@ def test_no_text_makes_the_reader_fail_in_another_way(text):
     assert re.match(r"scene\.toml:\d+: ", message)
 
 
-@given(
-    st.dictionaries(
-        st.sampled_from(["a", "b-1", "c_2", '"d.e"', "'f'", "g.h"]),
-        st.sampled_from(
-            ["1", '"# no comment"', "[1,\n 2, # two\n 3]", '"""\n[x]\ny = 1\n"""', "{ p = 1 }", "'='"]
-        ),
-        max_size=6,
-    ),
-    st.integers(0, 3),
-)
-def test_key_lines_agree_with_where_the_keys_were_written(keys, blank):
-    lines = ["# head", *[""] * blank, "[table]"]
-    written = {}
-    for key, value in keys.items():
-        written[key] = len("\n".join(lines).split("\n")) + 1
-        lines.append(f"{key} = {value} # end")
-    text = "\n".join(lines)
-    found = key_lines(text)
-    assert set(_paths(tomllib.loads(text))) == set(found)
-    for key, line in written.items():
-        path = tuple(part.strip("\"'") for part in ([key] if key[0] in "\"'" else key.split(".")))
-        assert found[("table", *path)] == line
-
-
-def _paths(tables, above=()):
-    """Yield paths of all keys except those inside inline tables, which are on the line of their table."""
-    for name, value in tables.items():
-        path = (*above, name)
-        yield path
-        if isinstance(value, dict) and "p" not in value:
-            yield from _paths(value, path)
-
-
 @pytest.mark.parametrize(
     ("table", "owners"),
     [
@@ -209,19 +173,3 @@ def test_every_setting_has_a_key_with_its_default(table, owners):
     assert keys == {name: value for name, value in settings.items() if name not in ("law", "rules")} | (
         {"default": "auto"} if table == "bodies" else {}
     )
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (
-            "[scene]\nname = " + "[" * 3000 + "]" * 3000,
-            r"wild\.toml:2: not TOML: lists or tables are nested too",
-        ),
-        ("[scene]\nx = 1\ny = " + "1" * 5000, r"wild\.toml:3: not TOML: a number has thousands of digits"),
-    ],
-)
-def test_toml_that_breaks_its_reader_is_an_error_with_a_line(text, message):
-    for parse in (parse_scene, parse_record):
-        with pytest.raises(UsageError, match=message):
-            parse(text, "wild.toml")
