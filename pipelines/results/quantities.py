@@ -41,9 +41,7 @@ QUANTITIES: Mapping[str, str] = {
 """Quantities and their meanings. The last five have a true value of zero: they are errors themselves."""
 
 _OWN_ERRORS = ("natural_map", "penetration", "balance", "reaction", "energy")
-_NO_MOVEMENT = (
-    1e-6  # least displacement over the size of a stone [-]; overlaps of rigid stones at rest are smaller
-)
+_NO_MOVEMENT = 1e-6  # of the size of a stone [-]; overlaps of rigid stones at rest are smaller
 
 
 @dataclass(frozen=True)
