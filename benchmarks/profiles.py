@@ -19,10 +19,10 @@ from benchmarks.profile_scenes import HELD_OUT, REFERENCE
 from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
 from mechanics.scene.scene import Fidelity, Scene
 from mechanics.simulate import simulate
+from pipelines.results.quantities import Quantities, differences, quantities, quantities_from
 from pipelines.tuning.expected_errors import BOUNDS, TYPICAL, expected_errors, loops, measure
 from pipelines.tuning.overlay import Overlay, overlaid_scene
 from pipelines.tuning.profiles import PROFILES
-from pipelines.tuning.quantities import Quantities, differences, quantities, quantities_from
 
 __all__ = ["FINEST", "main", "measured_rows", "ratios", "run"]
 
@@ -135,7 +135,7 @@ def _kept(name: str, scene: Scene, overlay: Overlay, records: Path | None) -> tu
 def _write(rows: Sequence[Row], loads: Mapping[str, float]) -> None:
     """The module of the numbers, with three digits."""
     lines = [
-        '"""What `python -m benchmarks.profiles --write` has measured on the reference scenes; not written by hand."""',
+        '"""Errors on the reference scenes, written by `python -m benchmarks.profiles --write`, not by hand."""',
         "",
         "from collections.abc import Mapping",
         "",
@@ -152,8 +152,8 @@ def _write(rows: Sequence[Row], loads: Mapping[str, float]) -> None:
         lines.append("    },")
     lines += [
         "}",
-        '"""By profile and quantity: the ratio of the error to its measure (pipelines.profile_report), and the least',
-        'and the largest error of the reference scenes."""',
+        '"""By profile and quantity: the ratio of the error to its measure (pipelines.tuning.expected_errors), and',
+        'the least and the largest error of the reference scenes."""',
         "",
         "COLLAPSE: Mapping[str, float] = {",
         *(f'    "{profile}": {_digits(value)},' for profile, value in loads.items()),

@@ -18,8 +18,8 @@ from mechanics.scene.scene import Block, Fidelity, Scene, SolverSettings, Start,
 from mechanics.simulate import simulate
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
+from pipelines.results.quantities import Quantities, differences, quantities
 from pipelines.run.fidelity import Wishes, modelled, neighbours
-from pipelines.tuning.quantities import Quantities, differences, quantities
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.formats.reading import open_survey
 from survey.geometry.solids import Solid

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import Annotated
 
 from mechanics.arrays import Array
 from mechanics.scene.laws.dry_joint import DryJoint
@@ -10,13 +11,16 @@ from mechanics.scene.loads.load import Loads
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.meshers.choice import Mesher
-from mechanics.stones.validation import check_corners, finite, refuse_unless, sane
+from mechanics.stones.settings import Setting, check_settings
+from mechanics.stones.validation import check_corners, finite, refuse_unless
 from moma.errors import SceneError
 
 __all__ = [
     "Block",
     "ContactSettings",
+    "ContactSize",
     "Fidelity",
+    "Growth",
     "LawRule",
     "Method",
     "Part",
@@ -28,8 +32,20 @@ __all__ = [
 ]
 
 
-# numbers of contact points that two faces can have
-_POINTS = (1, 3, 4, 8)
+ContactSize = Annotated[
+    float | None,
+    Setting(
+        "Target edge length at faces that touch other stones; if not given, or larger, `size`.", "m", above=0
+    ),
+]
+Growth = Annotated[
+    float,
+    Setting(
+        "Increase of edge length per unit of distance from these faces, until it reaches `size`.",
+        "-",
+        above=0,
+    ),
+]
 
 
 class Fidelity(StrEnum):
@@ -59,14 +75,13 @@ class Block:
     faces : vertex indices of each planar face, counter-clockwise seen from outside
     material : density and elasticity
     fidelity : fixed, rigid or deformable
-    mesh_size : target edge length of the finite elements [m]; only for deformable blocks
+    mesh_size : only for deformable blocks
     element : kind of its finite elements; hexahedra suit blocks whose corners each join three faces
     velocity : (6,) initial translation [m/s] and rotation [rad/s] velocity; not for fixed blocks
     parts : convex parts that fill a non-convex stone without overlap; empty if it is convex
-    radius : of a ball, whose surface is the sphere about the mean of its corners; corners and faces are for pictures
-        (mechanics.balls makes them) [m]. None: a polyhedron
-    contact_size : target edge length at the faces that touch other blocks where the scene begins; None: as inside [m]
-    growth : by how much edges get longer per metre away from these faces, up to the mesh size [-]
+    radius : the surface of a ball is the sphere about the mean of its corners; corners and faces are for pictures
+        (mechanics.balls makes them). None: a polyhedron
+    contact_size : of the faces that touch other blocks where the scene begins
     mesher : of its tetrahedra
     stress : whether the stress of a deformable block is wanted; if not, it is not computed
     """
@@ -76,36 +91,25 @@ class Block:
     faces: tuple[tuple[int, ...], ...]
     material: Material
     fidelity: Fidelity = Fidelity.RIGID
-    mesh_size: float | None = None
+    mesh_size: Annotated[
+        float | None, Setting("Target edge length of the finite elements.", "m", above=0)
+    ] = None
     element: Element = Element.TET4
     velocity: tuple[float, ...] = (0.0,) * 6
     parts: tuple[Part, ...] = ()
-    radius: float | None = None
-    contact_size: float | None = None
-    growth: float = 0.5
+    radius: Annotated[float | None, Setting("Radius of a ball.", "m", above=0)] = None
+    contact_size: ContactSize = None
+    growth: Growth = 0.5
     mesher: Mesher = Mesher.AUTO
     stress: bool = True
 
     def __post_init__(self) -> None:
-        where, metres = f"stone {self.code}", "give metres greater than 0"
+        where = f"stone {self.code}"
         check_corners(where, self.vertices)
         for part in self.parts:
             check_corners(where, part.vertices)
-        refuse_unless(
-            where,
-            (
-                ("velocity", self.velocity, finite(self.velocity, 6), "give six numbers"),
-                ("mesh_size", self.mesh_size, self.mesh_size is None or sane(self.mesh_size), metres),
-                (
-                    "contact_size",
-                    self.contact_size,
-                    self.contact_size is None or sane(self.contact_size),
-                    metres,
-                ),
-                ("growth", self.growth, sane(self.growth), "give a number greater than 0"),
-                ("radius", self.radius, self.radius is None or sane(self.radius), metres),
-            ),
-        )
+        refuse_unless(where, [("velocity", self.velocity, finite(self.velocity, 6), "give six numbers")])
+        check_settings(where, self)
 
 
 class Placement(StrEnum):
@@ -132,26 +136,31 @@ class ContactSettings:
     ----------
     law : where no rule says otherwise
     rules : laws of particular joints; of two that name the same pair, the later holds
-    alert_distance : gap below which a contact is watched, relative to the smaller block's size [-]
-    points : contact points of two rigid faces: 1, 3, 4 or 8, at most
-    placement : *corners*: at the true edge of the common face, so that a stone rocks about its very edge; *inertia*:
-        inside it, where they carry its area and its second moments exactly, as a uniform pressure does
+    placement : at the *corners* a stone rocks about its very edge; by *inertia* the points carry the area and the
+        second moments of the common face exactly, as a uniform pressure does
     """
 
     law: Law = field(default_factory=DryJoint)
     rules: tuple[LawRule, ...] = ()
-    alert_distance: float = 0.05
-    points: int = 4
-    placement: Placement = Placement.CORNERS
+    alert_distance: Annotated[
+        float,
+        Setting(
+            "Gap below which a contact is watched, relative to the smaller stone's size.",
+            "-",
+            above=0,
+            at_most=1,
+        ),
+    ] = 0.05
+    points: Annotated[int, Setting("Contact points of two flat faces, at most.", choices=(1, 3, 4, 8))] = 4
+    placement: Annotated[
+        Placement,
+        Setting(
+            "corners: at the true edge of the common face; inertia: inside it, where they carry its second moments."
+        ),
+    ] = Placement.CORNERS
 
     def __post_init__(self) -> None:
-        refuse_unless(
-            "contact",
-            (
-                ("points", self.points, self.points in _POINTS, "give 1, 3, 4 or 8"),
-                ("alert_distance", self.alert_distance, sane(self.alert_distance), "give more than 0"),
-            ),
-        )
+        check_settings("contact", self)
 
 
 class Start(StrEnum):
@@ -167,55 +176,61 @@ class TimeSettings:
 
     Attributes
     ----------
-    step : time step h [s]
-    theta : integration parameter θ, 1/2 ≤ θ ≤ 1; 1 damps most and finds a static equilibrium
-    duration : longest simulated time [s]
-    relaxation : kinetic damping: all velocities are set to zero each time the kinetic energy has passed a peak;
-        leads to a static equilibrium soonest, but the way there is no longer the true motion
-    start : *rest*: all stones without stress, loads come at once; *equilibrium*: in the static equilibrium under the
-        loads of the first instant, found at once where there is one
-    lumped_mass : mass of deformable stones on the diagonal, instead of the consistent one
-    stop_at_equilibrium : stop as soon as every block is at rest and in balance, or the scene has collapsed
-    balance_tolerance : unbalanced force of a block over its weight below which it is in balance [-]
-    collapse_displacement : a block that moved by more than this fraction of its smallest dimension
-        while still moving counts as collapsed [-]
-    sleep : unbalanced force over weight up to which a stone may sleep once it has come to rest; 0: none sleeps. Not in
-        relaxations, and not in scenes with deformable stones [-]
+    theta : 1 finds a static equilibrium
+    relaxation : leads to a static equilibrium soonest, but the way there is no longer the true motion
+    start : at *rest* all stones are free of stress; the *equilibrium* is found at once where there is one
+    sleep : has no effect in relaxations and in scenes with deformable stones
     """
 
-    step: float = 1e-3
-    theta: float = 1.0
-    duration: float = 1.0
-    relaxation: bool = False
-    start: Start = Start.REST
-    lumped_mass: bool = False
-    stop_at_equilibrium: bool = True
-    balance_tolerance: float = 1e-4
-    collapse_displacement: float = 0.5
-    sleep: float = 0.0
+    step: Annotated[float, Setting("Time step h.", "s", above=0)] = 1e-3
+    theta: Annotated[float, Setting("θ of the scheme; 1 damps most.", "-", at_least=0.5, at_most=1)] = 1.0
+    duration: Annotated[float, Setting("Longest simulated time.", "s", above=0)] = 1.0
+    relaxation: Annotated[
+        bool,
+        Setting("Kinetic damping: all velocities become zero when the kinetic energy has passed a peak."),
+    ] = False
+    start: Annotated[
+        Start,
+        Setting(
+            "rest: all loads come at once; equilibrium: the stones already bear the loads of the first instant."
+        ),
+    ] = Start.REST
+    lumped_mass: Annotated[
+        bool, Setting("Mass of deformable stones at their nodes alone, not along the shape functions.")
+    ] = False
+    stop_at_equilibrium: Annotated[
+        bool, Setting("Stop once every stone is at rest and in balance, or one has collapsed.")
+    ] = True
+    balance_tolerance: Annotated[
+        float,
+        Setting(
+            "Unbalanced force of a stone over its weight below which it is in balance.",
+            "-",
+            above=0,
+            infinite=True,
+        ),
+    ] = 1e-4
+    collapse_displacement: Annotated[
+        float,
+        Setting(
+            "A stone that moved by more than this fraction of its smallest side and still moves has collapsed.",
+            "-",
+            above=0,
+            infinite=True,
+        ),
+    ] = 0.5
+    sleep: Annotated[
+        float,
+        Setting(
+            "Unbalanced force of a stone over its weight up to which it may sleep once it rests; 0: none sleeps.",
+            "-",
+            at_least=0,
+            at_most=0.1,
+        ),
+    ] = 0.0
 
     def __post_init__(self) -> None:
-        refuse_unless(
-            "time",
-            (
-                ("step", self.step, sane(self.step), "give seconds greater than 0"),
-                ("theta", self.theta, 0.5 <= self.theta <= 1, "give from 0.5 to 1"),
-                ("duration", self.duration, sane(self.duration), "give seconds greater than 0"),
-                (
-                    "balance_tolerance",
-                    self.balance_tolerance,
-                    self.balance_tolerance > 0,
-                    "give a number greater than 0",
-                ),
-                (
-                    "collapse_displacement",
-                    self.collapse_displacement,
-                    self.collapse_displacement > 0,
-                    "give a number greater than 0",
-                ),
-                ("sleep", self.sleep, 0 <= self.sleep < 1, "give from 0 up to 1"),
-            ),
-        )
+        check_settings("time", self)
 
 
 class Method(StrEnum):
@@ -232,41 +247,47 @@ class Method(StrEnum):
 
 @dataclass(frozen=True)
 class SolverSettings:
-    """Solver of the contact problem of each step.
+    """Solver of the contact problem of each step; docs/theory.md §3 states where each method is strong.
 
     Attributes
     ----------
-    method : auto chooses; nsgs (Gauss–Seidel), admm (alternating directions), apgd (accelerated projected gradients),
-        interior-point, newton, cone (cone programmes: the reference). docs/theory.md §3 says which suits what
-    tolerance : natural map η (unit-free) at which a step counts as solved [-]
-    velocity_tolerance : largest velocity by which a contact may still break its law, over the largest velocity that
-        the contacts have to stop [-]
-    max_iterations : sweeps or iterations after which a step is left as it is and reported as not converged
-    threads : that sweep rigid scenes of many contacts, or factorise deformable ones, at most; sweeps give the same to
-        the last bit. More than one pays on idle cores only: where others use them, each waits for the slowest
+    threads : also those that factorise deformable scenes. More than one pays on idle cores only: where others use
+        them, each waits for the slowest
     """
 
-    method: Method = Method.AUTO
-    tolerance: float = 1e-6
-    velocity_tolerance: float = 1e-5
-    max_iterations: int = 2000
-    threads: int = 1
+    method: Annotated[
+        Method,
+        Setting(
+            "auto chooses; nsgs: Gauss–Seidel; admm: alternating directions; apgd: accelerated gradients; "
+            "interior-point; newton; cone: cone programmes, the reference."
+        ),
+    ] = Method.AUTO
+    tolerance: Annotated[
+        float, Setting("Natural map η at which a step is solved.", "-", above=0, below=1)
+    ] = 1e-6
+    velocity_tolerance: Annotated[
+        float,
+        Setting(
+            "Largest velocity by which a contact may break its law, over the largest that contacts have to stop.",
+            "-",
+            above=0,
+            infinite=True,
+        ),
+    ] = 1e-5
+    max_iterations: Annotated[
+        int,
+        Setting("Iterations after which a step is left as it is, and reported as not converged.", at_least=1),
+    ] = 2000
+    threads: Annotated[
+        int,
+        Setting(
+            "Threads that sweep rigid scenes of many contacts; the results are the same to the last bit.",
+            at_least=1,
+        ),
+    ] = 1
 
     def __post_init__(self) -> None:
-        refuse_unless(
-            "solver",
-            (
-                ("tolerance", self.tolerance, 0 < self.tolerance < 1, "give a number between 0 and 1"),
-                (
-                    "velocity_tolerance",
-                    self.velocity_tolerance,
-                    self.velocity_tolerance > 0,
-                    "give a number greater than 0",
-                ),
-                ("max_iterations", self.max_iterations, self.max_iterations >= 1, "give 1 or more"),
-                ("threads", self.threads, self.threads >= 1, "give 1 or more"),
-            ),
-        )
+        check_settings("solver", self)
 
 
 @dataclass(frozen=True)

@@ -2,11 +2,13 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 
 from mechanics.arrays import Array
-from mechanics.stones.validation import LARGEST, sane
+from mechanics.stones.settings import Setting, check_settings
+from mechanics.stones.validation import LARGEST
 from moma.errors import SceneError
 
 __all__ = ["Material", "Orthotropy", "fourth_order"]
@@ -16,6 +18,7 @@ __all__ = ["Material", "Orthotropy", "fourth_order"]
 _FIRST, _SECOND = (0, 1, 2, 0, 1, 2), (0, 1, 2, 1, 2, 0)
 # by this much a product of axes may differ from 0 or 1
 _ORTHONORMAL = 1e-6
+Triple = tuple[float, float, float]
 _WORLD_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -23,18 +26,21 @@ _WORLD_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 class Orthotropy:
     """Elasticity with three planes of symmetry, as of bedded stone or of homogenised masonry.
 
-    Attributes
-    ----------
-    young : E₁, E₂, E₃ along the axes [Pa]
-    shear : shear moduli G₁₂, G₂₃, G₃₁ [Pa]
-    poisson : ν₁₂, ν₂₃, ν₃₁ [-]; ν_ij is minus the strain along j over that along i under a stress along i
-    axes : unit vectors of the three axes in the scene's initial state, right angles between them [-]
+    ν_ij is minus the strain along j over that along i under a stress along i. The axes are unit vectors.
     """
 
-    young: tuple[float, float, float]
-    shear: tuple[float, float, float]
-    poisson: tuple[float, float, float]
-    axes: tuple[tuple[float, float, float], ...] = _WORLD_AXES
+    young: Annotated[Triple, Setting("Young's moduli E₁, E₂, E₃ along three axes.", "Pa", above=0)]
+    shear: Annotated[Triple, Setting("Shear moduli G₁₂, G₂₃, G₃₁.", "Pa", above=0)]
+    poisson: Annotated[
+        Triple, Setting("Ratios ν₁₂, ν₂₃, ν₃₁; ν_ij: contraction along j under a stress along i.", "-")
+    ]
+    axes: Annotated[
+        tuple[Triple, ...],
+        Setting(
+            "The three axes, at right angles, in the initial state of the scene. Their lengths do not matter.",
+            "-",
+        ),
+    ] = _WORLD_AXES
 
 
 @dataclass(frozen=True)
@@ -44,44 +50,43 @@ class Material:
     Attributes
     ----------
     name : as in the scene
-    density : ρ [kg/m³]
-    young : Young's modulus E [Pa]; not used by rigid blocks
-    poisson : Poisson's ratio ν [-], 0 ≤ ν < 0.5; linear elements are too stiff above about 0.4, take quadratic ones
-    mass_damping, stiffness_damping : α [1/s] and β [s] of Rayleigh's damping V = α M + β K
-    tensile_strength, compressive_strength : both positive [Pa]; None: not known
+    poisson : linear elements are too stiff above about 0.4; quadratic ones are not
+    tensile_strength, compressive_strength : None if not known
     orthotropy : replaces young and poisson; None: isotropic
     """
 
     name: str
-    density: float
-    young: float
-    poisson: float
-    mass_damping: float = 0.0
-    stiffness_damping: float = 0.0
-    tensile_strength: float | None = None
-    compressive_strength: float | None = None
+    density: Annotated[float, Setting("Density ρ.", "kg/m³", above=0)]
+    young: Annotated[float, Setting("Young's modulus E; only deformable stones use it.", "Pa", above=0)]
+    poisson: Annotated[float, Setting("Poisson's ratio ν.", "-", at_least=0, below=0.5)]
+    mass_damping: Annotated[
+        float,
+        Setting(
+            "α of Rayleigh's damping V = α M + β K of deformable stones; it also slows their motion as a whole.",
+            "1/s",
+            at_least=0,
+        ),
+    ] = 0.0
+    stiffness_damping: Annotated[
+        float, Setting("β of Rayleigh's damping; it slows their deformation alone.", "s", at_least=0)
+    ] = 0.0
+    tensile_strength: Annotated[
+        float | None,
+        Setting("Tensile strength; without it, no utilisation in tension.", "Pa", above=0, infinite=True),
+    ] = None
+    compressive_strength: Annotated[
+        float | None,
+        Setting(
+            "Compressive strength, positive; without it, no utilisation in compression.",
+            "Pa",
+            above=0,
+            infinite=True,
+        ),
+    ] = None
     orthotropy: Orthotropy | None = None
 
     def __post_init__(self) -> None:
-        for quantity, ok, remedy in (
-            ("density", sane(self.density), "give kg/m³ greater than 0"),
-            ("young", sane(self.young), "give pascals greater than 0"),
-            ("poisson", 0 <= self.poisson < 0.5, "give a ratio from 0 up to, but not including, 0.5"),
-            ("mass_damping", 0 <= self.mass_damping <= LARGEST, "give 1/s, 0 or greater"),
-            ("stiffness_damping", 0 <= self.stiffness_damping <= LARGEST, "give seconds, 0 or greater"),
-            ("tensile_strength", _unknown_or_positive(self.tensile_strength), "give pascals greater than 0"),
-            (
-                "compressive_strength",
-                _unknown_or_positive(self.compressive_strength),
-                "give pascals greater than 0",
-            ),
-        ):
-            if not ok:
-                raise SceneError(
-                    f"{quantity} = {getattr(self, quantity)!r}",
-                    where=f"material {self.name!r}",
-                    remedy=remedy,
-                )
+        check_settings(f"material {self.name!r}", self)
         if self.orthotropy is not None:
             _check_orthotropy(self.orthotropy, f"material {self.name!r}")
 
@@ -95,10 +100,6 @@ class Material:
             stiffness = _turned(own, np.array(self.orthotropy.axes, dtype=float))
         stiffness.flags.writeable = False
         return stiffness
-
-
-def _unknown_or_positive(strength: float | None) -> bool:
-    return strength is None or strength > 0
 
 
 def _isotropic(young: float, poisson: float) -> Array:

@@ -67,3 +67,5 @@ _COMMANDS = (
 )
 for _command in _COMMANDS:
     app.command(_command.__name__.strip("_").replace("_", "-"))(_command)
+# another name of trade, which reads as commerce to some
+app.command("tradeoff", hidden=True)(trade)

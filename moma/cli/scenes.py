@@ -107,7 +107,7 @@ def trade(
     """Run a scene at many settings: what does each cost, and how far is it from the finest?"""
     from moma.cli.text.formats import as_json
     from moma.cli.text.tradeoff import trade_lines
-    from pipelines.tuning.tradeoff.study import Asked, run_trade
+    from pipelines.tradeoff.study import Asked, run_trade
 
     asked = Asked(60.0 * budget, jobs, error, of)
     folder = out or Path("out") / f"{scene.stem}-trade"

@@ -1,1 +1,5 @@
-"""Checking and running scenes (`moma check`, `moma run`)."""
+"""Checking and running scenes (`moma check`, `moma run`).
+
+Public: `run_scene`, `RunReport` (run); `check_scene` (check); `CheckReport` (check_report); `assemble`, `Assembly`
+(assemble); `modelled`, `Wishes` (fidelity).
+"""

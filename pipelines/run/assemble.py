@@ -1,26 +1,23 @@
 """From the database to a scene: selected stones → simplified solids → closed joints → blocks."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from sqlalchemy.orm import Session
 
 from mechanics.scene.scene import Block, Fidelity, Part, Scene
-from mechanics.stones.meshing.elements import Element
-from mechanics.stones.meshing.meshers.choice import Mesher
 from pipelines.arrays import Array
 from pipelines.ingest.records import surveyed_block
 from pipelines.run.fidelity import Modelled, Wishes, modelled, neighbours
 from pipelines.run.local_frame import entry_about, local_origin, stone_about
 from pipelines.run.remarks import remarks
 from pipelines.scene.file import SceneFile
+from pipelines.scene.keys import typed_values
 from pipelines.scene.laws import law_rules
 from pipelines.scene.loads import build_loads, thrown
 from pipelines.scene.selection import STRESS, Groups, StoneModel, select_groups, select_stones
-from pipelines.scene.settings import MeshSettings
-from pipelines.scene.table_keys import STRESS_PICTURES
+from pipelines.scene.settings import STRESS_PICTURES, MeshSettings
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.solids import Solid
 from survey.geometry.stone_parts import stone_parts
@@ -37,14 +34,14 @@ class Assembly:
 
     Attributes
     ----------
-    scene : for `mechanics.simulate`, with places counted from `origin`
+    scene : for `mechanics.simulate`, with positions relative to `origin`
     models : the stones as surveyed, in the order of the scene's blocks
-    modelled : by code, how each is modelled, and why
+    modelled : by code, the model of each stone and its reason
     simplified : the stones before their joints were closed
-    closing : what became of their joints
+    closing : report on their joints
     towards : (3,) mean normal of the faces, from the wall to the observer [-]
     origin : (3,) of the scene, in the frame of the site [m]
-    remarks : what the scene says that has no effect, and how far its stresses reach
+    remarks : keys of the scene without effect, and limits of its stresses
     """
 
     scene: Scene
@@ -63,14 +60,14 @@ def assemble(scene: SceneFile, session: Session) -> Assembly:
     Raises
     ------
     SceneError : a key names no stone, a stone has no material, or a load does not suit its stones
-    GeometryError : a stone is degenerate, or not convex and cannot be cut into convex parts
+    GeometryError : a stone is degenerate, or not convex and cannot be divided into convex parts
     """
     models = select_stones(scene, session)
     return assemble_stones(scene, models, select_groups(scene, session, models))
 
 
 def assemble_stones(scene: SceneFile, models: tuple[StoneModel, ...], groups: Groups) -> Assembly:
-    """As `assemble`, of stones that have been selected; the database is not needed."""
+    """Build the scene, as `assemble`, from stones already selected, without the database."""
     origin = local_origin([model.record for model in models])
     stones = [surveyed_block(stone_about(model.record, origin)) for model in models]
     closed = close_joints(stones, scene.joints)
@@ -94,7 +91,7 @@ def assemble_stones(scene: SceneFile, models: tuple[StoneModel, ...], groups: Gr
 
 
 def wishes_of(scene: SceneFile, models: Sequence[StoneModel], groups: Groups) -> Wishes:
-    """What the scene says of how its stones are modelled."""
+    """Return what the scene asks of the models of its stones."""
     asked = scene.output.pictures or ()
     pushed = (groups[entry.path][0] for entry in scene.loads if entry.type == "force")
     return Wishes(
@@ -108,7 +105,7 @@ def wishes_of(scene: SceneFile, models: Sequence[StoneModel], groups: Groups) ->
 
 
 def _scene(scene: SceneFile, blocks: Sequence[Block], groups: Groups, origin: Array) -> Scene:
-    """The scene of the blocks, with the laws and loads that the file gives them."""
+    """Return the scene of the blocks, with the laws and loads of the file."""
     document, by_code = scene.document, {block.code: block for block in blocks}
     materials = {block.code: block.material.name for block in blocks}
     loads = [entry_about(entry, origin) for entry in scene.loads]
@@ -129,14 +126,13 @@ def _scene(scene: SceneFile, blocks: Sequence[Block], groups: Groups, origin: Ar
 
 
 def _meshes(scene: SceneFile, groups: Groups) -> dict[str, MeshSettings]:
-    """The meshes of the stones that an entry of [[meshes]] names; of two, the later counts."""
+    """Return the meshes of the stones that [[meshes]] name; of two for the same stone, the later holds."""
     meshes: dict[str, MeshSettings] = {}
     for entry in scene.meshes:
-        given = {key: value for key, value in entry.values.items() if value is not None and key != "stones"}
-        kinds: dict[str, Callable[[str], Any]] = {"element": Element, "mesher": Mesher}
-        own = {key: kinds[key](value) if key in kinds else value for key, value in given.items()}
+        given = {key: value for key, value in entry.values.items() if value is not None}
+        own = typed_values(MeshSettings, given)
         if "size" in own:
-            own["ring_size"] = own["size"]  # what is said of a stone holds in a ring too
+            own["ring_size"] = own["size"]  # the size given for a stone holds in a ring too
         meshes |= dict.fromkeys(groups[entry.path][0], replace(scene.mesh, **own))
     return meshes
 
@@ -159,13 +155,13 @@ def _block(model: StoneModel, chosen: Modelled, solid: Solid, mesh: MeshSettings
 
 
 def _parts(solid: Solid) -> tuple[Part, ...]:
-    """Convex parts of a stone that is not convex."""
+    """Return the convex parts of a stone that is not convex."""
     parts = stone_parts(solid)
     return tuple(Part(one.vertices, one.faces) for one in parts) if len(parts) > 1 else ()
 
 
 def _facing(stones: Sequence[SurveyedBlock]) -> Array:
-    """(3,) mean normal of the faces, weighted by area."""
+    """Return the mean normal (3,) of the faces, weighted by area."""
     total = np.zeros(3)
     for stone in stones:
         total += stone.face.measures.area * stone.face.fit.normal

@@ -1,4 +1,4 @@
-"""Is a scene sound, and what will it cost: everything that can be known before it runs."""
+"""Soundness and cost of a scene, as far as they can be known before it runs."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -14,6 +14,7 @@ from moma.errors import GeometryError, MeshError
 from pipelines.draw.closing_pictures import draw_closing
 from pipelines.draw.elevations.closing_shapes import ClosingShapes, closing_shapes
 from pipelines.results.folder import check_replaceable, replacing
+from pipelines.results.summary import as_json
 from pipelines.run.assemble import Assembly, assemble_stones, wishes_of
 from pipelines.run.check_report import (
     CheckReport,
@@ -28,7 +29,6 @@ from pipelines.run.closing_check import (
     simplification_report,
 )
 from pipelines.run.fidelity import Modelled, modelled
-from pipelines.run.summary import as_json
 from pipelines.scene.array_tables import describe
 from pipelines.scene.file import SceneFile, read_scene
 from pipelines.scene.selection import Groups, StoneModel, select_groups, select_stones
@@ -40,8 +40,8 @@ from survey.joints.settings import JointMode
 __all__ = ["check_scene"]
 
 _INDEX = "check.json"
-_DEEP = 0.005  # metres: less than that is noise of a survey, which the contacts take up
-_NAMED = 6  # stones or pairs of stones that one problem is told of
+_DEEP = 0.005  # overlap [m]; less is survey noise, which the contacts absorb
+_NAMED = 6  # most stones, or pairs of stones, that one problem names
 
 
 def check_scene(
@@ -49,20 +49,20 @@ def check_scene(
 ) -> CheckReport:
     """Check a scene file against a database, without running anything.
 
-    What is wrong with the file itself is raised; what is wrong with the stones is in the report.
+    Mistakes in the file are raised; problems with the stones are in the report.
 
     Parameters
     ----------
     path : of the scene file
     url : of the database
     pictures : folder for pictures of the stones and their joints, and for the report as ``check.json``; None: none
-    profile : name of the profile whose settings go before the scene's; None: the scene as it is written
+    profile : name of the profile whose settings take precedence over the scene's; None: the scene as written
 
     Raises
     ------
     SceneError : the file is wrong, or an expression names no stone
     DatabaseError : the database cannot be read
-    UsageError : the folder holds something else, or there is no such profile
+    UsageError : the folder holds other files, or there is no such profile
     """
     if pictures is not None:
         check_replaceable(pictures, _INDEX)
@@ -88,7 +88,7 @@ def check_scene(
 
 
 def _with_pictures(report: CheckReport, assembly: Assembly, folder: Path) -> CheckReport:
-    """The report with its pictures, which lie in the folder, all of them or none."""
+    """Draw the pictures into the folder, all of them or none; return the report that lists them."""
     with replacing(folder, _INDEX) as fresh:
         files, warnings = draw_closing(fresh, _shapes(report.scene, assembly))
         report = replace(report, files=(*files, _INDEX), warnings=(*report.warnings, *warnings))
@@ -101,7 +101,7 @@ def _hypotheses(assembly: Assembly) -> frozenset[str]:
 
 
 def _shapes(scene: str, assembly: Assembly) -> ClosingShapes:
-    """What the pictures show, about the local origin of the scene."""
+    """Return the content of the pictures, about the local origin of the scene."""
     records = [model.record for model in assembly.models]
     return closing_shapes(
         scene,
@@ -124,7 +124,7 @@ def _report(
     needs: Plan | None,
     problems: tuple[str, ...],
 ) -> CheckReport:
-    """What is known: of stones that could not be assembled, or of a scene that could not be meshed, less."""
+    """Return the report; it says less where stones could not be assembled, or the scene not be meshed."""
     kinds = Counter(model.record.kind for model in models)
     chosen = _modelled(scene, models, groups) if assembly is None else assembly.modelled
     bodies = Counter(str(one.fidelity) for one in chosen.values())
@@ -155,7 +155,7 @@ def _report(
 
 
 def _modelled(scene: SceneFile, models: Sequence[StoneModel], groups: Groups) -> Mapping[str, Modelled]:
-    """How stones are modelled of which no joint is known."""
+    """Return the models of stones whose joints are unknown."""
     return modelled([one.record.code for one in models], {}, wishes_of(scene, models, groups))
 
 
@@ -194,7 +194,7 @@ def _unsound_solids(scene: Scene) -> list[str]:
 
 
 def _unclosed(assembly: Assembly) -> list[str]:
-    """Stones of which every joint was to be closed and stays open."""
+    """Report stones whose joints all stay open although they were to be closed."""
     if assembly.closing.mode is JointMode.AS_SURVEYED:
         return []
     held = {block.code for block in assembly.scene.blocks if block.fidelity is Fidelity.FIXED}
@@ -215,7 +215,7 @@ def _unclosed(assembly: Assembly) -> list[str]:
 
 
 def _alone(assembly: Assembly) -> list[str]:
-    """Stones that nothing throws or holds, and that face no other across a joint."""
+    """Report stones, neither thrown nor fixed, that face no other across a joint."""
     if assembly.closing.mode is JointMode.AS_SURVEYED or len(assembly.models) == 1:
         return []
     alone = set(assembly.closing.alone)
@@ -233,7 +233,7 @@ def _alone(assembly: Assembly) -> list[str]:
 
 
 def _overlapping(assembly: Assembly) -> list[str]:
-    """Stones that begin deep within each other, and would be driven apart."""
+    """Report stones that initially overlap deeply and would be driven apart."""
     deep = [one for one in assembly.closing.overlaps if one.depth > _DEEP]
     return [
         f"{' and '.join(one.stones)} lie {one.depth * 1e3:.0f} mm in each other; measure them again, or exclude one"
@@ -262,7 +262,7 @@ def _cost(needs: Plan, scene: Scene) -> Cost:
 
 
 def _unsupported(needs: Plan) -> list[str]:
-    """Stones that nothing can hold; mostly a selection or a joint is not what was meant."""
+    """Report stones that nothing can support; usually a selection or a joint is not as intended."""
     if not needs.bodies[Fidelity.FIXED]:
         return ['no stone is fixed, so nothing holds the others; give [bodies] fixed, e.g. ["course = 1"]']
     if not needs.loose:

@@ -1,4 +1,4 @@
-"""What `moma check` says of a scene."""
+"""Report of `moma check` on a scene."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class MaterialUse:
-    """A material and how many stones are of it."""
+    """A material and the number of its stones."""
 
     name: str
     density: float
@@ -28,7 +28,7 @@ class MaterialUse:
 
 @dataclass(frozen=True)
 class StoneModelling:
-    """How one stone is modelled, why, and whether its stress is computed."""
+    """Model of one stone, its reason, and whether its stress is computed."""
 
     code: str
     fidelity: str
@@ -38,7 +38,7 @@ class StoneModelling:
 
 @dataclass(frozen=True)
 class MeshUse:
-    """Finite elements of one kind and target edge length [m], and how many stones are of them."""
+    """Finite elements of one type and target edge length [m], and the number of stones that have them."""
 
     element: str
     size: float
@@ -47,13 +47,13 @@ class MeshUse:
 
 @dataclass(frozen=True)
 class MeshQualityReport:
-    """How the deformable stones were meshed.
+    """Meshes of the deformable stones.
 
     Attributes
     ----------
     nodes, cells : of all meshes
     distinct : meshes that had to be made; stones of one shape share theirs
-    how : how many stones got their mesh from which mesher
+    how : number of stones by mesher
     smallest_angle : between two sides of a cell [degrees], in the stone `sharpest`
     smallest_jacobian : of a cell, scaled [-], in the stone `worst`
     retried : stones at which a mesher failed before another succeeded, with the reasons
@@ -72,7 +72,7 @@ class MeshQualityReport:
 
 @dataclass(frozen=True)
 class Cost:
-    """What a run will need.
+    """Expected cost of a run.
 
     Attributes
     ----------
@@ -100,15 +100,15 @@ class Cost:
 
 @dataclass(frozen=True)
 class CheckReport:
-    """The plan of a scene; it is sound if there are no problems. Laws and loads are told in words.
+    """Plan of a scene, which is sound if there are no problems. Laws and loads are described in words.
 
     Attributes
     ----------
-    ring : stones that deform for the sake of another one's stress
-    stones : how each stone is modelled, and why; where joints could not be closed, as if there were none
-    simplification, joints : what became of the stones and of their joints; None if they could not be made
+    ring : number of stones that deform for the stress of others
+    stones : model of each stone, and its reason; where joints could not be closed, as if there were none
+    simplification, joints : changes of the stones and of their joints; None if they could not be made
     files : pictures that were drawn
-    warnings : what has no effect, how far stresses reach, and what could not be drawn
+    warnings : keys without effect, limits of the stresses, and pictures that could not be drawn
     """
 
     scene: str

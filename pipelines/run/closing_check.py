@@ -1,4 +1,4 @@
-"""What `moma check` tells of simplified stones and closed joints, as plain values; places are those of the site."""
+"""Report of `moma check` on simplified stones and closed joints, in plain values and site coordinates."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -21,19 +21,19 @@ __all__ = [
 ]
 
 
-_DEEP = 0.005  # metres: stones that were measured farther into each other want looking at
+_DEEP = 0.005  # measured overlap of two stones [m]; deeper ones should be looked at
 
 
 @dataclass(frozen=True)
 class OutsideStone:
-    """A stone that simplifying changed by more than the survey may be wrong.
+    """A stone that simplification changed by more than the uncertainty of the survey.
 
     Attributes
     ----------
     code : of the stone
     displacement : largest of a corner [m]
-    tolerance : by which the survey may be wrong [m]
-    reason : what was done, in words
+    tolerance : uncertainty of the survey [m]
+    reason : the simplification, in words
     """
 
     code: str
@@ -44,15 +44,15 @@ class OutsideStone:
 
 @dataclass(frozen=True)
 class SimplificationReport:
-    """What simplifying the stones changed.
+    """Changes by simplification of the stones.
 
     Attributes
     ----------
-    shapes : how many stones of each shape
+    shapes : number of stones by shape
     least_blocky : code of the stone that was farthest from a hexahedron
     blockiness : of that stone [-]
     max_displacement : largest of a corner [m], of `worst_stone`
-    outside : stones outside of the survey's tolerance, the farthest first
+    outside : stones outside the tolerance of the survey, the farthest first
     general : stones that stay general polyhedra, and why
     displacement : largest of a corner of each stone [m]
     """
@@ -77,7 +77,7 @@ class GapPlace:
     width : mean [m]
     area : over which they face each other [m²]
     place : (x, y, z) [m]
-    reason : why it was not closed
+    reason : why the joint was not closed
     """
 
     stones: tuple[str, str]
@@ -89,13 +89,13 @@ class GapPlace:
 
 @dataclass(frozen=True)
 class OverlapPlace:
-    """Two stones that lie in each other.
+    """Two stones that overlap.
 
     Attributes
     ----------
     stones : codes of the two
-    volume : that both take [m³]
-    depth : by which one would have to move to be free [m]
+    volume : of the overlap [m³]
+    depth : distance by which one stone would have to move to be free [m]
     place : (x, y, z) [m]
     """
 
@@ -107,22 +107,22 @@ class OverlapPlace:
 
 @dataclass(frozen=True)
 class JointsReport:
-    """What became of the joints.
+    """Joints after closing.
 
     Attributes
     ----------
     mode : close, mortar or as-surveyed
-    count : joints that are closed
-    planes : on so many contact planes
-    mean_width : how wide joints were surveyed on average, open ones too, by area [m]
-    area : of all of them [m²]
-    left_open : how many joints stay open, by reason
+    count : number of closed joints
+    planes : number of their contact planes
+    mean_width : mean surveyed width, weighted by area, of all joints, open ones included [m]
+    area : of the closed joints [m²]
+    left_open : number of joints that stay open, by reason
     max_displacement : largest movement of a corner [m], of `worst_stone`
     max_volume_change : largest relative change of a volume [-]
     alone : stones without any joint
     displacement : largest movement of a corner of each stone [m]
-    measured_overlaps : closed joints of stones that were measured into each other, as gaps of negative width
-    gaps, overlaps : what remains, the largest first
+    measured_overlaps : closed joints of stones whose measurements overlap, as gaps of negative width
+    gaps, overlaps : those that remain, the largest first
     """
 
     mode: str
@@ -142,7 +142,7 @@ class JointsReport:
 
 
 def simplification_report(stones: Sequence[BlockyStone]) -> SimplificationReport | None:
-    """What simplifying changed; None without stones."""
+    """Summarise the changes by simplification; None without stones."""
     if not stones:
         return None
     moved = {one.code: float(one.report.displacement.max(initial=0.0)) for one in stones}
@@ -169,7 +169,10 @@ def simplification_report(stones: Sequence[BlockyStone]) -> SimplificationReport
 def joints_report(
     closing: ClosingReport, origin: Array, hypotheses: frozenset[str] = frozenset()
 ) -> JointsReport:
-    """What became of the joints, whose places are counted from `origin` (3,) [m]; nobody saw the `hypotheses`."""
+    """Summarise the joints, whose positions are relative to `origin` (3,) [m].
+
+    Overlaps of the stones in `hypotheses`, which were not measured, are left out.
+    """
     closed = [one for one in closing.joints if not one.left_open]
     areas = np.array([one.area for one in closing.joints])
     moved = {code: float(one.max(initial=0.0)) for code, one in closing.displacement.items()}

@@ -1,7 +1,7 @@
-"""How each stone of a scene is modelled, and why: as simple as what is asked of the run allows.
+"""Model of each stone of a scene, and its reason: as simple as the requested outputs allow.
 
-The lists of [bodies] go first. With `default = "auto"` a stone deforms where an output needs its stress, and so do
-those within a few joints of it, which a rigid neighbour would hold too stiffly; all others are rigid.
+The lists of [bodies] take precedence. With `default = "auto"` a stone deforms where an output needs its stress, and
+so do those within a few joints of it, as rigid neighbours would restrain it too stiffly; all others are rigid.
 """
 
 from collections import deque
@@ -18,16 +18,16 @@ Neighbours = Mapping[str, Iterable[str]]
 
 @dataclass(frozen=True)
 class Wishes:
-    """What a scene says of its stones.
+    """Requests of a scene that bear on the models of its stones.
 
     Attributes
     ----------
-    named : by code, what a list of [bodies] says of it
-    default : of all others; None: what the outputs need
-    stress : codes of the stones whose stress is asked for; None: nothing is said of it
-    pictures : names of the pictures of stress that are asked for
-    pushed : codes of the stones on which forces act; they can act on rigid stones only
-    ring : stones within so many joints of one whose stress is asked for deform too
+    named : by code, the model that a list of [bodies] gives
+    default : of all others; None: as the outputs need
+    stress : codes of the stones whose stress is requested; None: not given
+    pictures : names of the pictures of stress that are requested
+    pushed : codes of the stones on which forces act; forces can act on rigid stones only
+    ring : number of joints from a stone whose stress is requested within which stones deform too
     """
 
     named: Mapping[str, Fidelity]
@@ -40,12 +40,12 @@ class Wishes:
 
 @dataclass(frozen=True)
 class Modelled:
-    """How one stone is modelled.
+    """Model of one stone.
 
     Attributes
     ----------
     fidelity : fixed, rigid or deformable
-    reason : why
+    reason : in words
     ring : joints to the nearest stone for whose stress it deforms; 0: not for that of another
     stress : whether its stress is computed
     """
@@ -57,13 +57,13 @@ class Modelled:
 
 
 def modelled(codes: Sequence[str], neighbours: Neighbours, wishes: Wishes) -> dict[str, Modelled]:
-    """The model of each stone.
+    """Choose the model of each stone.
 
     Parameters
     ----------
     codes : of all stones of the scene
-    neighbours : by code, the stones with which one has a joint; each of two names the other
-    wishes : what the scene says
+    neighbours : by code, the stones with which it shares a joint; symmetric
+    wishes : requests of the scene
     """
     chosen: dict[str, Modelled] = {}
     for code in codes:
@@ -82,7 +82,7 @@ def modelled(codes: Sequence[str], neighbours: Neighbours, wishes: Wishes) -> di
 
 
 def neighbours(joints: Iterable[Joint]) -> dict[str, set[str]]:
-    """By code, the stones that face a stone across a joint; those without one are left out."""
+    """Return, by code, the stones that face it across a joint; stones without joints are left out."""
     found: dict[str, set[str]] = {}
     for joint in joints:
         first, second = joint.stones
@@ -99,7 +99,7 @@ def _listed(fidelity: Fidelity) -> Modelled:
 
 
 def _needed(code: str, wishes: Wishes) -> str | None:
-    """Why the stress of a stone is needed; None if it is not."""
+    """Return the reason for which the stress of a stone is needed; None if it is not."""
     if wishes.stress is not None:
         return "stress asked for by [output] stress" if code in wishes.stress else None
     if wishes.pictures and code not in wishes.pushed:
@@ -116,7 +116,7 @@ def _stressed(code: str, model: Modelled, wishes: Wishes) -> bool:
 def _others(
     codes: Sequence[str], chosen: Mapping[str, Modelled], neighbours: Neighbours, wishes: Wishes
 ) -> dict[str, Modelled]:
-    """The stones whose stress is not needed: deformable within the ring, else rigid."""
+    """Model stones whose stress is not needed: deformable within the ring, rigid outside it."""
     held = {code for code, model in chosen.items() if model.fidelity is Fidelity.FIXED}
     region = [
         code for code in codes if code in (wishes.stress or ()) and _stressed(code, chosen[code], wishes)
@@ -140,9 +140,9 @@ def _others(
 def _within(
     region: Sequence[str], neighbours: Neighbours, reach: int, held: Set[str]
 ) -> dict[str, tuple[int, str]]:
-    """Stones within so many joints of a region: how many, and from which stone of it, the first of several.
+    """Return stones within `reach` joints of a region: the distance and the nearest stone, the first of several.
 
-    What is held takes no load from one side of it to another, so the way does not go through it.
+    Fixed stones transmit no load from one side to another, so paths do not pass through them.
     """
     near = {code: (0, code) for code in region}
     waiting = deque(region)

@@ -1,7 +1,7 @@
-"""A scene far from the origin of the site's frame is computed about a point amid its stones.
+"""Local origin of a scene that lies far from the origin of the site's frame.
 
-National grids have coordinates of 10⁶ m, of which float64 keeps a nanometre: too coarse for faces that are to
-meet. Measurements lose nothing by it; so they are moved before anything is computed of them.
+National grids have coordinates of 10⁶ m, which float64 resolves to a nanometre: too coarse for faces that are to
+meet. Measurements lose nothing by a shift, so they are shifted before anything is computed from them.
 """
 
 from collections.abc import Sequence
@@ -17,15 +17,15 @@ __all__ = ["entry_about", "local_origin", "stone_about"]
 
 
 _FAR = 10_000.0
-"""Coordinates up to this are exact enough as they are [m]."""
+"""Largest coordinates that are exact enough without a shift [m]."""
 _GRID = 1_000.0
-"""Origins are multiples of this, so that one sees what was taken off [m]."""
+"""Origins are multiples of this, so that the shift is easy to read [m]."""
 _PLACES = ("point", "pivot")
-"""Values of a scene's entries that are places in the frame of the site."""
+"""Values of a scene's entries that are points in the frame of the site."""
 
 
 def local_origin(stones: Sequence[StoneRecord]) -> Array:
-    """The point (3,) of the site's frame that a scene of these stones has as its origin [m]."""
+    """Return the point (3,) of the site's frame that is the origin of a scene of these stones [m]."""
     if not stones:
         return np.zeros(3)
     centres = np.array([stone.centroid for stone in stones])
@@ -36,7 +36,7 @@ def local_origin(stones: Sequence[StoneRecord]) -> Array:
 
 
 def stone_about(stone: StoneRecord, origin: Array) -> StoneRecord:
-    """The stone with all its coordinates counted from `origin`."""
+    """Return the stone with all its coordinates relative to `origin`."""
     if not origin.any():
         return stone
     centroid = stone.centroid - origin
@@ -52,7 +52,7 @@ def stone_about(stone: StoneRecord, origin: Array) -> StoneRecord:
 
 
 def entry_about(entry: Entry, origin: Array) -> Entry:
-    """The entry of a scene file with its places counted from `origin`."""
+    """Return the entry of a scene file with its points relative to `origin`."""
     places = {name: entry.values[name] for name in _PLACES if entry.values.get(name) is not None}
     if not origin.any() or not places:
         return entry

@@ -1,10 +1,10 @@
-"""From what a simulation gives back to the record of the run that the database keeps, in the frame of the site."""
+"""Database record of a run, in the frame of the site, from the result of its simulation."""
 
 import math
 import platform
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, is_dataclass
+from dataclasses import asdict, fields, is_dataclass
 from functools import cache
 from importlib.metadata import version
 from typing import Any
@@ -51,13 +51,13 @@ def run_record(
     summary: Mapping[str, Any],
     as_of: int | None,
 ) -> RunRecord:
-    """All that is kept of a run.
+    """Return the record of a run.
 
     Parameters
     ----------
     result : of the simulation
     stones : its results by stone
-    scene, assembly : what was simulated, as its author wrote it and as it was built
+    scene, assembly : the scene as its author wrote it and as it was built
     summary : the contents of summary.json
     as_of : the last entry in the database when the stones were read
     """
@@ -85,53 +85,33 @@ def run_record(
 
 
 def joint_arrays(joints: JointResult, origin: Array, widths: Array) -> JointArrays:
-    """The joints in the frame of the site; places are counted from `origin` (3,), `widths` (nj,) as surveyed [m]."""
+    """Return the joints in the frame of the site, given the scene's `origin` (3,) and surveyed `widths` (nj,) [m]."""
     normal, shear = normal_and_shear(joints)
-    return JointArrays(
-        stones=joints.bodies,
-        centroid=joints.centroid + origin,
-        normal=joints.frame[:, 0],
-        area=joints.area,
-        parted=joints.parted,
-        force_normal=normal,
-        force_shear=shear,
-        pressure_mean=joints.pressure_mean,
-        pressure_max=joints.pressure_max,
-        kern=joints.kern,
-        friction_use=joints.friction_use,
-        slipping=joints.slipping,
-        open=joints.open,
-        gap=joints.gap,
-        opening=joints.opening,
-        sliding=joints.sliding,
-        width=widths,
-    )
+    own = {
+        "stones": joints.bodies,
+        "centroid": joints.centroid + origin,
+        "normal": joints.frame[:, 0],
+        "force_normal": normal,
+        "force_shear": shear,
+        "width": widths,
+    }
+    return JointArrays(**_shared(JointArrays, joints) | own)
 
 
 def contact_arrays(contacts: ContactResult, origin: Array) -> ContactArrays:
-    """The contact points, as `joint_arrays`."""
-    return ContactArrays(
-        stones=contacts.bodies,
-        joint=contacts.joint,
-        point=contacts.point + origin,
-        normal=contacts.normal,
-        force=contacts.force,
-        area=contacts.area,
-        gap=contacts.gap,
-        opening=contacts.opening,
-        slide=contacts.slide,
-        status=contacts.status,
-    )
+    """Return the contact points in the frame of the site, given the scene's `origin` (3,) [m]."""
+    own = {"stones": contacts.bodies, "point": contacts.point + origin}
+    return ContactArrays(**_shared(ContactArrays, contacts) | own)
 
 
 def surveyed_widths(joints: JointResult, codes: Sequence[str], closing: ClosingReport) -> Array:
-    """How wide each joint of a run (nj,) was surveyed [m]; NaN where two stones touch that were not found to face.
+    """Return the surveyed width of each joint of a run (nj,) [m]; NaN where the stones were not found to face.
 
     Parameters
     ----------
     joints : of the run
     codes : of its stones, in the order of their numbers
-    closing : what was found of the joints before it. Of several joints of two stones, the one that lies most alike
+    closing : joints before the run. Of several joints of two stones, the one of most similar orientation counts
     """
     known: dict[frozenset[str], list[Joint]] = defaultdict(list)
     for one in closing.joints:
@@ -141,13 +121,13 @@ def surveyed_widths(joints: JointResult, codes: Sequence[str], closing: ClosingR
         found = known.get(frozenset(codes[stone] for stone in stones))
         if found:
             alike = max(found, key=lambda one: abs(float(one.normal @ frame[0])))
-            # stones that were measured into each other say nothing of the mortar between them
+            # overlapping measurements give no thickness of mortar
             widths[number] = alike.width if alike.width >= 0.0 else np.nan
     return widths
 
 
 def simplifications(assembly: Assembly) -> tuple[SimplificationRecord, ...]:
-    """The solids that stood for the stones, compared with those of the survey."""
+    """Return the solids that represented the stones, compared with those of the survey."""
     mode, records = str(assembly.closing.mode), []
     for model, simple, block in zip(assembly.models, assembly.simplified, assembly.scene.blocks, strict=True):
         surveyed, vertices = model.record.solid_vertices - assembly.origin, block.vertices
@@ -172,16 +152,14 @@ def simplifications(assembly: Assembly) -> tuple[SimplificationRecord, ...]:
 
 
 def settings_of(scene: SceneFile, built: Scene) -> dict[str, Any]:
-    """Time, solver, contact and joints as they were used, defaults filled in; laws of single joints are in the text."""
+    """Return time, solver, contact and joints as used, with defaults; laws of single joints are in the text."""
     contact = built.contact
     return {
         "gravity": list(built.gravity),
         "joints": _values(scene.joints),
         "contact": {
             "law": {"type": type(contact.law).__name__, **_values(contact.law)},
-            "alert_distance": contact.alert_distance,
-            "points": contact.points,
-            "placement": str(contact.placement),
+            **{name: value for name, value in _values(contact).items() if name not in ("law", "rules")},
         },
         "time": _values(built.time),
         "solver": _values(built.solver),
@@ -190,21 +168,26 @@ def settings_of(scene: SceneFile, built: Scene) -> dict[str, Any]:
 
 @cache
 def versions() -> Mapping[str, str]:
-    """Of MOMA, of Python and of the libraries that the numbers come from."""
+    """Return the versions of MOMA, of Python and of the numerical libraries."""
     libraries = {name: version(name) for name in _LIBRARIES}
     return {"moma": version("moma-masonry"), "python": platform.python_version(), **libraries}
 
 
 def _errors(errors: Errors) -> ErrorMeasures:
-    """The error measures; None where one could not be measured."""
-    measured = {name: getattr(errors, name) for name in ErrorMeasures.__dataclass_fields__}
+    """Return the error measures; None where one could not be computed."""
+    measured = _shared(ErrorMeasures, errors)
     return ErrorMeasures(
         **{name: value if math.isfinite(value) else None for name, value in measured.items()}
     )
 
 
+def _shared(record: type[Any], source: object) -> dict[str, Any]:
+    """Return the fields of a record that the source has under the same name."""
+    return {one.name: getattr(source, one.name) for one in fields(record) if hasattr(source, one.name)}
+
+
 def _values(settings: object) -> dict[str, Any]:
-    """Fields of a settings value, choices as texts."""
+    """Return the fields of a settings value, enumerations as texts."""
     if not is_dataclass(settings) or isinstance(settings, type):
         return {}
     return {

@@ -1,4 +1,4 @@
-"""What the author of a scene should know of it: what it says without effect, and how far to trust its stresses."""
+"""Remarks for the author of a scene: keys without effect, and limits of its stresses."""
 
 from collections.abc import Iterator, Mapping
 
@@ -13,13 +13,13 @@ _STRESS = 'ask for their stress by stress in [output], or give default = "deform
 
 
 def remarks(scene: SceneFile, groups: Groups, modelled: Mapping[str, Modelled]) -> tuple[str, ...]:
-    """What has no effect, with its place and what would give it one; and whether stresses are beside rigid stones.
+    """Return the keys without effect, with place and remedy, and a caution where stresses are beside rigid stones.
 
     Parameters
     ----------
     scene : as its author wrote it
     groups : which stones its tables name
-    modelled : by code, how each stone is modelled
+    modelled : by code, the model of each stone
     """
     soft = {code for code, one in modelled.items() if one.fidelity is Fidelity.DEFORMABLE}
     return (

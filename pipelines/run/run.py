@@ -3,7 +3,7 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -20,11 +20,11 @@ from pipelines.draw.pictures import draw_pictures, missing
 from pipelines.reports.run import write_report
 from pipelines.results.folder import check_replaceable, replacing
 from pipelines.results.joints_csv import write_joints
+from pipelines.results.stone_values import stone_results
+from pipelines.results.summary import as_json, summarise
 from pipelines.results.vtk import write_frames
 from pipelines.run.assemble import Assembly, assemble_stones
 from pipelines.run.record import run_record
-from pipelines.run.stone_values import stone_results
-from pipelines.run.summary import as_json, summarise
 from pipelines.scene.file import SceneFile, read_scene
 from pipelines.scene.selection import select_groups, select_stones
 from pipelines.tuning.expected_errors import ProfileReport, profile_report
@@ -32,18 +32,18 @@ from pipelines.tuning.profiles import with_profile
 
 __all__ = ["RunReport", "run_scene", "write_results"]
 
-_USUAL = ("von_mises", "displacement")  # pictures where a scene asks for none in particular
+_USUAL = ("von_mises", "displacement")  # pictures of a scene that does not name any
 
 
 @dataclass(frozen=True)
 class RunReport:
-    """What a run left behind.
+    """Results of a run.
 
     Attributes
     ----------
-    folder : where the results lie
-    summary : the contents of summary.json
-    warnings : what went less well than asked
+    folder : of the result files
+    summary : contents of summary.json
+    warnings : requests that were not fully met
     run : number of the run in the database
     """
 
@@ -67,12 +67,12 @@ def run_scene(
     path : scene file
     url : of the database
     folder : of the results; earlier results there are replaced when the new ones are complete
-    progress : told of every stage
-    profile : name of the profile whose settings go before the scene's; None: the scene as it is written
+    progress : called at every stage
+    profile : name of the profile whose settings take precedence over the scene's; None: the scene as written
 
     Raises
     ------
-    UsageError : the folder holds other things, or there is no such profile
+    UsageError : the folder holds other files, or there is no such profile
     SceneError, GeometryError, MeshError, SolverError : see `assemble` and `mechanics.simulate`
     DatabaseError : the database cannot be read, or not written at the end; the folder is complete then
     """
@@ -111,12 +111,12 @@ def write_results(
     progress: Listener = silent,
     profile: ProfileReport | None = None,
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Write all files of a run into an empty folder; the summary, and what could not be done.
+    """Write all files of a run into an empty folder; return the summary and the warnings.
 
-    Pictures that cannot be drawn on this machine are a warning; everything else is written.
+    Pictures that cannot be drawn on this machine cause a warning; everything else is written.
     """
     warnings = list(assembly.remarks)
-    # a relaxed equilibrium counts by its end alone, whose steps are all solved
+    # of a relaxation only the final equilibrium counts, whose steps are all solved
     relaxed = result.outcome is Outcome.EQUILIBRIUM and result.scene.time.relaxation
     if result.errors.unconverged_steps and not relaxed:
         warnings.append(
@@ -141,7 +141,8 @@ def write_results(
         except MissingLibraryError as error:
             warnings.append(f"no pictures: {error}")
     progress(Progress("write", 2, 3, "report.html"))
-    summary = summarise(result, version=version("moma-masonry"), seconds=seconds, profile=profile)
+    reached = None if profile is None else asdict(profile)
+    summary = summarise(result, version=version("moma-masonry"), seconds=seconds, profile=reached)
     write_report(folder / "report.html", result, summary, stones, warnings)
     (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
     summary["origin"] = assembly.origin.tolist()
@@ -153,7 +154,7 @@ def write_results(
 
 
 def _pictures(scene: SceneFile, result: Result) -> tuple[tuple[str, ...], list[str]]:
-    """The pictures to draw, and what to say of those that were asked for but would show nothing."""
+    """Return the pictures to draw, and a warning for each requested one that would show nothing."""
     asked = _USUAL if scene.output.pictures is None else scene.output.pictures
     reasons = {name: missing(result, name) for name in asked}
     omitted = [f"no picture {name}: {reason}" for name, reason in reasons.items() if reason is not None]

@@ -1,4 +1,4 @@
-"""Tables of which a scene file may hold many: each checked by its type, with its histories read."""
+"""Arrays of tables of a scene file: each table checked by its type, with its time series read."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -8,11 +8,13 @@ from typing import Any
 from mechanics.scene.loads.accelerogram import Accelerogram
 from mechanics.scene.loads.tables import read_history
 from mechanics.scene.loads.time_series import History
-from pipelines.scene.array_keys import HISTORY_FILE
 from pipelines.toml.lines import Path
 from pipelines.toml.schema import Document, Key, Kind, check_table
 
 __all__ = ["Entry", "describe", "file_beside", "read_entries"]
+
+# alternative to time and value in the inline table of a time series
+_FILE = Key("file", Kind.TEXT, "Text file with a column of times and one of values, or three.", default=None)
 
 
 @dataclass(frozen=True)
@@ -21,9 +23,9 @@ class Entry:
 
     Attributes
     ----------
-    path : where it stands, for messages: ("loads", "0")
-    type : one of those the array knows
-    values : of all its keys but `type`, defaults filled in, histories read
+    path : its position, for messages: ("loads", "0")
+    type : one of those of the array
+    values : of all its keys except `type`, defaults filled in, time series read
     groups : key, and codes or expressions, of each group of stones that it names
     """
 
@@ -40,7 +42,7 @@ def read_entries(
     types: Mapping[str, tuple[Key, ...]],
     common: tuple[Key, ...] = (),
 ) -> tuple[Entry, ...]:
-    """All tables [[name]]; where there is but one type, it is not written."""
+    """Check all tables [[name]]; an array of a single type has no key `type`."""
     tables = given.get(name, [])
     if not isinstance(tables, list) or not all(isinstance(one, dict) for one in tables):
         document.fail(f"{name!r} is not a list of tables", name, remedy=f"write [[{name}]] above each")
@@ -50,7 +52,7 @@ def read_entries(
 
 
 def describe(entry: Entry, groups: Mapping[Path, Sequence[frozenset[str]]]) -> str:
-    """An entry in words: its type, its stones, and the values that it gives."""
+    """Return an entry in words: its type, its stones, and the values that it gives."""
     stones = " and ".join(f"{len(codes)} stones" for codes in groups[entry.path])
     values = ", ".join(
         f"{name} {_shown(value)}"
@@ -61,7 +63,7 @@ def describe(entry: Entry, groups: Mapping[Path, Sequence[frozenset[str]]]) -> s
 
 
 def _shown(value: Any) -> str:
-    """A value in a few words."""
+    """Return a value in a few words."""
     match value:
         case tuple() | list():
             return f"({', '.join(map(_shown, value))})"
@@ -79,7 +81,7 @@ def _shown(value: Any) -> str:
 
 
 def file_beside(document: Document, name: str) -> FilePath:
-    """A file that a scene names; its path is relative to the scene file."""
+    """Return the path of a file that a scene names, relative to the scene file."""
     return FilePath(document.path).parent / name
 
 
@@ -93,7 +95,7 @@ def _entry(
     title, given = f"[[{path[0]}]]", dict(table)
     kind = next(iter(types))
     if len(types) > 1:
-        which = Key("type", Kind.TEXT, "What it is.", choices=tuple(types))
+        which = Key("type", Kind.TEXT, "Type.", choices=tuple(types))
         kind = str(
             check_table(document, path, {k: v for k, v in table.items() if k == "type"}, [which], title)[
                 "type"
@@ -119,13 +121,13 @@ def _groups(keys: Iterable[Key], values: Mapping[str, Any]) -> Iterable[tuple[st
 
 
 def _history(document: Document, path: Path, value: Any, key: Key) -> History:
-    """A history from a constant, from { time, value }, or from { file }."""
+    """Return the time series of a constant, of { time, value }, or of { file }."""
     if not isinstance(value, dict):
         return History.constant(value)
     vector = key.kind is Kind.VECTOR_HISTORY
     title = f"{key.name} = {{ … }}"
     if "file" in value:
-        checked = check_table(document, path, value, [HISTORY_FILE], title)
+        checked = check_table(document, path, value, [_FILE], title)
         parts = ("x", "y", "z") if vector else (key.name,)
         columns = ", ".join(["time [s]", *(f"{part} [{key.unit}]" for part in parts)])
         return read_history(file_beside(document, str(checked["file"])), columns)

@@ -4,33 +4,22 @@ Nothing runs and no database is read here; stones are still expressions. docs/sc
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mechanics.scene.laws.dry_joint import DryJoint
-from mechanics.scene.scene import (
-    ContactSettings,
-    Fidelity,
-    Method,
-    Placement,
-    SolverSettings,
-    Start,
-    TimeSettings,
-)
+from mechanics.scene.scene import ContactSettings, SolverSettings, TimeSettings
 from mechanics.stones.materials import Material, Orthotropy
-from mechanics.stones.meshing.elements import Element
-from mechanics.stones.meshing.meshers.choice import Mesher
 from moma.errors import SceneError
-from pipelines.scene.array_keys import ARRAYS
 from pipelines.scene.array_tables import Entry, read_entries
+from pipelines.scene.keys import build, typed_values
 from pipelines.scene.laws import BONDS, JointLaw, read_laws
 from pipelines.scene.loads import read_loads, read_throws
-from pipelines.scene.settings import Fidelities, MaterialRule, MeshSettings, Output, Selection
-from pipelines.scene.stone_keys import MATERIAL_KEYS, MESH_KEYS, ORTHOTROPY_KEYS
-from pipelines.scene.table_keys import AUTO, PICTURES, TABLES
+from pipelines.scene.settings import PICTURES, Fidelities, MaterialRule, MeshSettings, Output, Selection
+from pipelines.scene.tables import ARRAYS, AUTO, MATERIAL_KEYS, MESH_KEYS, ORTHOTROPY_KEYS, TABLES
 from pipelines.toml.lines import key_lines, parse_toml, read_text
 from pipelines.toml.schema import Document, check_table, nearest
 from survey.joints.settings import JointMode, JointSettings
@@ -47,12 +36,11 @@ class SceneFile:
     document : file and lines, for error messages
     text : the file, as it is kept with the run
     name : title
-    joints : what becomes of joints
     gravity : (3,) acceleration [m/s²]
     mesh : finite elements of deformable stones that no entry of `meshes` names
-    meshes : groups of stones that are meshed otherwise
+    meshes : finite elements of particular groups of stones
     laws : of particular joints; the general law is in `contact`
-    loads, throws : what acts besides gravity, and what begins in motion
+    loads, throws : actions besides gravity, and initial motions
     """
 
     document: Document
@@ -79,13 +67,27 @@ def read_scene(path: str | Path) -> SceneFile:
 
     Raises
     ------
-    SceneError : with file and line, at the first thing that is wrong
+    SceneError : with file and line, at the first mistake
+
+    >>> scene = read_scene("data/samples/window/window.toml")
+    >>> scene.name, scene.bodies.fixed, scene.materials[0].material.density
+    ('Window bay', ('course = 1',), 2350.0)
     """
     return parse_scene(read_text(path, SceneError, missing="no such scene file"), str(path))
 
 
 def parse_scene(text: str, path: str) -> SceneFile:
-    """Check the text of a scene file; `path` is for the messages."""
+    """Check the text of a scene file; `path` is for the messages.
+
+    >>> scene = parse_scene('''
+    ... [materials.limestone]
+    ... density = 2350.0
+    ... young = 12e9
+    ... poisson = 0.2
+    ... ''', "tower.toml")
+    >>> scene.name, scene.contact.law.friction, scene.time.step
+    ('tower', 0.6, 0.001)
+    """
     given = parse_toml(text, path, SceneError, "see docs/scene.md for a scene to start from")
     document = Document(path, key_lines(text))
     tables = _checked_tables(document, given)
@@ -94,29 +96,26 @@ def parse_scene(text: str, path: str) -> SceneFile:
         document=document,
         text=text,
         name=tables["scene"]["name"] or Path(path).stem,
-        selection=Selection(**tables["select"]),
+        selection=build(Selection, tables["select"]),
         materials=_materials(document, given),
-        bodies=_fidelities(**tables["bodies"]),
-        joints=_joints(document, laws, **tables["joints"]),
-        contact=_contact(document, **tables["contact"]),
+        bodies=_fidelities(tables["bodies"]),
+        joints=_joints(document, laws, tables["joints"]),
+        contact=_contact(document, tables["contact"]),
         gravity=_gravity(document, **tables["gravity"]),
-        mesh=_mesh(**tables["mesh"]),
+        mesh=build(MeshSettings, tables["mesh"]),
         meshes=read_entries(document, given, "meshes", {"mesh": MESH_KEYS}),
         time=_time(document, tables["time"]),
-        solver=SolverSettings(**tables["solver"] | {"method": Method(tables["solver"]["method"])}),
-        output=_output(document, **tables["output"]),
+        solver=build(SolverSettings, tables["solver"]),
+        output=_output(document, tables["output"]),
         laws=laws,
         loads=read_loads(document, given),
         throws=read_throws(document, given),
     )
 
 
-def _fidelities(*, default: str, **lists: Any) -> Fidelities:
-    return Fidelities(default=None if default == AUTO else Fidelity(default), **lists)
-
-
-def _mesh(*, element: str, mesher: str, **sizes: Any) -> MeshSettings:
-    return MeshSettings(element=Element(element), mesher=Mesher(mesher), **sizes)
+def _fidelities(values: dict[str, Any]) -> Fidelities:
+    default = None if values["default"] == AUTO else values["default"]
+    return build(Fidelities, values | {"default": default})
 
 
 def _checked_tables(document: Document, given: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
@@ -144,11 +143,10 @@ def _materials(document: Document, given: Mapping[str, Any]) -> tuple[MaterialRu
             )
         plain = {key: value for key, value in content.items() if key != "orthotropy"}
         values: dict[str, Any] = check_table(document, ("materials", name), plain, MATERIAL_KEYS)
-        stones = values.pop("stones")
-        if "orthotropy" in content:
-            values["orthotropy"] = _orthotropy(document, name, content["orthotropy"])
+        own = _orthotropy(document, name, content["orthotropy"]) if "orthotropy" in content else None
         with document.at("materials", name, "orthotropy"):
-            rules.append(MaterialRule(Material(name, **values), stones))
+            material = Material(name, **typed_values(Material, values), orthotropy=own)
+            rules.append(MaterialRule(material, values["stones"]))
     general = [rule.material.name for rule in rules if not rule.stones]
     if len(general) > 1:
         document.fail(
@@ -165,39 +163,31 @@ def _orthotropy(document: Document, material: str, content: Any) -> Orthotropy:
     if not isinstance(content, dict):
         document.fail("'orthotropy' is not a table", *path, remedy=f"write [{'.'.join(path)}]")
     values: dict[str, Any] = check_table(document, path, content, ORTHOTROPY_KEYS)
-    axes = values.pop("axes")
-    if axes is None:
-        return Orthotropy(**values)
-    lengths = np.linalg.norm(np.array(axes), axis=1)
+    axes = np.array(values.pop("axes"))
+    lengths = np.linalg.norm(axes, axis=1)
     if len(axes) != 3 or not lengths.all():
         document.fail(
             "axes are not three directions", *path, "axes", remedy="give for example [[1, 0, 0], …]"
         )
-    return Orthotropy(**values, axes=tuple(map(tuple, (np.array(axes) / lengths[:, None]).tolist())))
+    return Orthotropy(**values, axes=tuple(map(tuple, (axes / lengths[:, None]).tolist())))
 
 
-def _joints(document: Document, laws: Sequence[JointLaw], mode: str, **settings: float) -> JointSettings:
-    if mode == JointMode.MORTAR and not any(one.entry.type in BONDS for one in laws):
+def _joints(document: Document, laws: Sequence[JointLaw], values: Mapping[str, Any]) -> JointSettings:
+    settings = build(JointSettings, values)
+    if settings.mode is JointMode.MORTAR and not any(one.entry.type in BONDS for one in laws):
         document.fail(
             'mode = "mortar", but no law says how mortar bonds',
             "joints",
             "mode",
             remedy='add [[laws]] of type "mortar" or "cohesive_zone"',
         )
-    return JointSettings(mode=JointMode(mode), **settings)
+    return settings
 
 
-def _contact(
-    document: Document,
-    friction: float,
-    dynamic_friction: float | None,
-    restitution: float,
-    placement: str,
-    **settings: Any,
-) -> ContactSettings:
+def _contact(document: Document, values: Mapping[str, Any]) -> ContactSettings:
     with document.at("contact", "dynamic_friction"):
-        law = DryJoint(friction, dynamic_friction, restitution)
-    return ContactSettings(law, placement=Placement(placement), **settings)
+        law = build(DryJoint, values)
+    return replace(build(ContactSettings, values), law=law)
 
 
 def _gravity(
@@ -218,13 +208,11 @@ def _time(document: Document, values: dict[str, Any]) -> TimeSettings:
             "duration",
             remedy="give at least one step",
         )
-    return TimeSettings(**values | {"start": Start(values["start"])})
+    return build(TimeSettings, values)
 
 
-def _output(
-    document: Document, frame_every: int, stress: tuple[str, ...] | None, pictures: tuple[str, ...] | None
-) -> Output:
-    for name in pictures or ():
+def _output(document: Document, values: Mapping[str, Any]) -> Output:
+    for name in values["pictures"] or ():
         if name not in PICTURES:
             document.fail(f"unknown picture {name!r}", "output", "pictures", remedy=nearest(name, PICTURES))
-    return Output(frame_every, stress, pictures)
+    return build(Output, values)

@@ -1,4 +1,4 @@
-"""The laws of particular joints, from [[laws]] of a scene file to rules between groups of stones."""
+"""Laws of particular joints: from [[laws]] of a scene file to rules between groups of stones."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,14 +10,14 @@ from mechanics.scene.laws.law import Law
 from mechanics.scene.laws.lennard_jones import LennardJones
 from mechanics.scene.laws.mortar import MortarJoint
 from mechanics.scene.scene import LawRule
-from pipelines.scene.array_keys import LAW_KEYS, LAW_TYPES
 from pipelines.scene.array_tables import Entry, read_entries
-from pipelines.toml.schema import Document, nearest
+from pipelines.scene.keys import build, keys_of
+from pipelines.toml.schema import Document, Key, Kind, nearest
 
-__all__ = ["BONDS", "JointLaw", "law_rules", "read_laws"]
+__all__ = ["BONDS", "LAW_KEYS", "LAW_TYPES", "JointLaw", "law_rules", "read_laws"]
 
-# types of laws that are mortar
 BONDS = ("mortar", "cohesive_zone")
+"""Types of laws that are mortar."""
 
 _CLASSES: Mapping[str, type[Law]] = {
     "dry": DryJoint,
@@ -26,17 +26,34 @@ _CLASSES: Mapping[str, type[Law]] = {
     "lennard_jones": LennardJones,
 }
 
+LAW_TYPES: Mapping[str, tuple[Key, ...]] = {
+    # the default of friction is that of [contact] alone
+    name: keys_of(law, "friction")
+    for name, law in _CLASSES.items()
+}
+
+LAW_KEYS = (
+    Key("materials", Kind.TEXTS, "Two names of materials: the law holds between their stones.", default=()),
+    Key(
+        "between",
+        Kind.GROUPS,
+        "Two lists of codes or expressions: the law holds between the stones of the one and those of the other.",
+        default=(),
+    ),
+)
+"""Keys of every law."""
+
 
 @dataclass(frozen=True)
 class JointLaw:
-    """A law and the table that it was made from; it names two materials, two groups of stones, or neither."""
+    """A law and its table, which names two materials, two groups of stones, or neither."""
 
     entry: Entry
     law: Law
 
 
 def read_laws(document: Document, given: Mapping[str, Any]) -> tuple[JointLaw, ...]:
-    """Check and make all laws; the stones between which they hold are still expressions."""
+    """Check and build all laws; the stones between which they hold are still expressions."""
     materials = tuple(given.get("materials", {}))
     return tuple(
         _law(document, entry, materials)
@@ -56,9 +73,8 @@ def _law(document: Document, entry: Entry, materials: Sequence[str]) -> JointLaw
         if name not in materials:
             what = f"unknown material {name!r}"
             document.fail(what, *entry.path, "materials", remedy=nearest(name, materials))
-    parameters = {key.name: entry.values[key.name] for key in LAW_TYPES[entry.type]}
     with document.at(*entry.path):
-        return JointLaw(entry, _CLASSES[entry.type](**parameters))
+        return JointLaw(entry, build(_CLASSES[entry.type], entry.values))
 
 
 def law_rules(
@@ -67,7 +83,7 @@ def law_rules(
     groups: Mapping[tuple[str, ...], Sequence[frozenset[str]]],
     materials: Mapping[str, str],
 ) -> tuple[LawRule, ...]:
-    """Rules between groups of codes; `materials` is the name of the material of each stone, by code."""
+    """Return the rules between groups of codes; `materials` maps the code of each stone to its material."""
     rules = []
     for one in laws:
         path, named = one.entry.path, one.entry.values["materials"]

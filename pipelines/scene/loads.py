@@ -1,4 +1,4 @@
-"""What acts on the stones of a scene, from [[loads]] and [[throw]] of a scene file to the loads of the mechanics."""
+"""Loads and initial motions: from [[loads]] and [[throw]] of a scene file to the loads of the mechanics."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
@@ -11,24 +11,115 @@ from mechanics.scene.loads.gravity import GravityRamp, TiltingTable
 from mechanics.scene.loads.ground_motion import Component, GroundMotion
 from mechanics.scene.loads.load import Force, GravityChange, Loads, Motion
 from mechanics.scene.loads.motions import ImposedMotion, settlement, spreading
-from mechanics.scene.loads.record_files import read_accelerogram
+from mechanics.scene.loads.record_files import UNITS, read_accelerogram
 from mechanics.scene.loads.record_processing import band_pass, without_drift
 from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import Block, Fidelity
 from mechanics.stones.polyhedra import mass_properties
-from pipelines.scene.array_keys import LOAD_TYPES, THROW_KEYS
 from pipelines.scene.array_tables import Entry, file_beside, read_entries
-from pipelines.toml.schema import Document
+from pipelines.scene.keys import keys_of
+from pipelines.toml.schema import Document, Key, Kind
 
-__all__ = ["build_loads", "read_loads", "read_throws", "thrown"]
+__all__ = ["LOAD_TYPES", "THROW_KEYS", "build_loads", "read_loads", "read_throws", "thrown"]
 
 Codes = frozenset[str]
 Groups = Mapping[tuple[str, ...], Sequence[Codes]]
 Blocks = Mapping[str, Block]
 
+_STONES = Key("stones", Kind.STONES, "Codes or expressions of the stones on which it acts.")
+_SUPPORTS = Key("stones", Kind.STONES, "Codes or expressions of the fixed stones that move.")
+_START = Key("start", Kind.NUMBER, "Start time.", "s", 0.0, at_least=0)
+_DURATION = Key("duration", Kind.NUMBER, "Duration.", "s", above=0)
+
+LOAD_TYPES: Mapping[str, tuple[Key, ...]] = {
+    "gravity_ramp": keys_of(GravityRamp),
+    "tilt": (
+        Key("axis", Kind.VECTOR, "Axis about which the table turns, right-handed.", "-"),
+        Key("rate", Kind.NUMBER, "Constant rate; or give `angle`.", "°/s", None, above=0),
+        Key("limit", Kind.NUMBER, "Angle at which a constant rate ends.", "°", 90.0, above=0),
+        Key("start", Kind.NUMBER, "Start time of a constant rate.", "s", 0.0, at_least=0),
+        Key("angle", Kind.HISTORY, "Angle with time; or give `rate`.", "°", None),
+    ),
+    "force": (
+        _STONES,
+        Key("force", Kind.VECTOR_HISTORY, "Force on each of them, constant or with time.", "N"),
+        Key(
+            "point",
+            Kind.VECTOR,
+            "Point of application on a single stone, which carries it along; if not given, the centre of mass.",
+            "m",
+            None,
+        ),
+        *keys_of(StoneForce),
+    ),
+    "settlement": (
+        _SUPPORTS,
+        Key("displacement", Kind.VECTOR, "Displacement at the end.", "m"),
+        _DURATION,
+        _START,
+    ),
+    "spreading": (
+        Key(
+            "first",
+            Kind.STONES,
+            "Codes or expressions of the fixed stones that move back by half of `distance`.",
+        ),
+        Key("second", Kind.STONES, "Codes or expressions of those that move forward by the other half."),
+        Key("direction", Kind.VECTOR, "Direction of the second ones; its length does not matter.", "-"),
+        Key("distance", Kind.NUMBER, "Distance by which the groups part.", "m"),
+        _DURATION,
+        _START,
+    ),
+    "motion": (
+        _SUPPORTS,
+        Key("velocity", Kind.VECTOR_HISTORY, "Velocity, constant or with time.", "m/s", (0.0, 0.0, 0.0)),
+        Key("spin", Kind.HISTORY, "Angular velocity, constant or with time; needs `pivot`.", "°/s", 0.0),
+        *keys_of(ImposedMotion),
+        Key("pivot", Kind.VECTOR, "A point of that axis at the start.", "m", None),
+    ),
+    "ground_motion": (
+        _SUPPORTS,
+        Key(
+            "x",
+            Kind.TEXT,
+            "File of the record along x: PEER's .AT2, or a table of time and acceleration.",
+            default=None,
+        ),
+        Key("y", Kind.TEXT, "File of the record along y.", default=None),
+        Key("z", Kind.TEXT, "File of the record along z.", default=None),
+        Key("unit", Kind.TEXT, "Unit of the acceleration in tables.", default=None, choices=tuple(UNITS)),
+        Key("azimuth", Kind.NUMBER, "Angle by which x and y are first turned about z.", "°", 0.0),
+        *keys_of(GroundMotion),
+        Key("low", Kind.NUMBER, "Lower corner of a Butterworth filter, if any.", "Hz", None, above=0),
+        Key("high", Kind.NUMBER, "Upper corner of a Butterworth filter, if any.", "Hz", None, above=0),
+        Key(
+            "order",
+            Kind.INTEGER,
+            "Order of the filter, applied both ways.",
+            default=4,
+            at_least=1,
+            at_most=10,
+        ),
+        Key(
+            "baseline",
+            Kind.INTEGER,
+            "Degree of the polynomial that is subtracted from the displacement, at least 2; 0: none.",
+            default=0,
+            at_least=0,
+            at_most=12,
+        ),
+    ),
+}
+
+THROW_KEYS = (
+    Key("stones", Kind.STONES, "Codes or expressions of the stones that begin in motion."),
+    Key("velocity", Kind.VECTOR, "Velocity of the centre of mass.", "m/s", (0.0, 0.0, 0.0)),
+    Key("spin", Kind.VECTOR, "Angular velocity about the axes x, y, z.", "°/s", (0.0, 0.0, 0.0)),
+)
+
 
 def read_loads(document: Document, given: Mapping[str, Any]) -> tuple[Entry, ...]:
-    """Check all loads, and read their records; their stones are still expressions."""
+    """Check all loads and read their records; their stones are still expressions."""
     entries = read_entries(document, given, "loads", LOAD_TYPES)
     for entry in entries:
         if entry.type == "tilt" and (entry.values["rate"] is None) == (entry.values["angle"] is None):
@@ -46,7 +137,7 @@ def read_throws(document: Document, given: Mapping[str, Any]) -> tuple[Entry, ..
 
 
 def build_loads(document: Document, entries: Iterable[Entry], groups: Groups, blocks: Blocks) -> Loads:
-    """The loads on the blocks, given by code; `groups` are the codes that each entry names.
+    """Return the loads on the blocks, given by code; `groups` are the codes that each entry names.
 
     Raises
     ------
@@ -74,7 +165,7 @@ def build_loads(document: Document, entries: Iterable[Entry], groups: Groups, bl
 def thrown(
     document: Document, entries: Iterable[Entry], groups: Groups, blocks: Blocks
 ) -> dict[str, tuple[float, ...]]:
-    """Initial velocity (6,) [m/s, rad/s] of every stone that begins in motion, by code."""
+    """Return the initial velocity (6,) [m/s, rad/s] of every stone that begins in motion, by code."""
     found: dict[str, tuple[float, ...]] = {}
     for entry in entries:
         velocity = (*entry.values["velocity"], *(float(np.radians(one)) for one in entry.values["spin"]))
@@ -89,7 +180,7 @@ def thrown(
 
 
 def _with_records(document: Document, entry: Entry) -> Entry:
-    """The entry with its records in the place of their file names."""
+    """Return the entry with records in place of their file names."""
     values = dict(entry.values)
     if not any(values[axis] for axis in "xyz"):
         document.fail("a ground motion without a record", *entry.path, remedy="give at least one of x, y, z")
@@ -138,7 +229,7 @@ def _force(document: Document, entry: Entry, codes: Codes, blocks: Blocks) -> St
 def _check_supports(
     document: Document, entry: Entry, groups: Sequence[Codes], blocks: Blocks, taken: dict[str, str]
 ) -> None:
-    """Only fixed stones can be moved, and each by one load only; `taken` says by which."""
+    """Refuse to move stones that are not fixed, or are moved by another load; `taken` maps codes to loads."""
     for (key, _), codes in zip(entry.groups, groups, strict=True):
         for code in sorted(codes):
             if blocks[code].fidelity is not Fidelity.FIXED:

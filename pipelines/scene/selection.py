@@ -1,4 +1,4 @@
-"""Which stones a scene means, and how each is modelled: its expressions, asked of the database."""
+"""Stones of a scene: its expressions evaluated in the database."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -20,9 +20,8 @@ __all__ = ["STRESS", "Groups", "StoneModel", "select_groups", "select_stones"]
 
 _CODE = re.compile(r"[\w.:/+-]+")  # a text without blanks or comparison is meant as a code
 
-
 STRESS = ("output", "stress")
-"""Where a scene names the stones whose stress is wanted."""
+"""Key that names the stones whose stress is wanted."""
 
 # the codes of each group of stones that a table of an array names, by the table's path; and those of STRESS
 Groups = Mapping[Path, tuple[frozenset[str], ...]]
@@ -30,7 +29,7 @@ Groups = Mapping[Path, tuple[frozenset[str], ...]]
 
 @dataclass(frozen=True)
 class StoneModel:
-    """One stone of a scene: as surveyed, of what, and what a list of [bodies] makes it; None: no list names it."""
+    """One stone of a scene: its record, its material, and its model if a list of [bodies] names it."""
 
     record: StoneRecord
     material: Material
@@ -38,13 +37,11 @@ class StoneModel:
 
 
 def select_stones(scene: SceneFile, session: Session) -> tuple[StoneModel, ...]:
-    """The stones of a scene, in the order of the survey.
+    """Select the stones of a scene, in the order of the survey.
 
     Raises
     ------
-    SceneError
-        at the key whose expression cannot be understood or names no stone, or where a stone would have no
-        material, or two
+    SceneError : at the key whose expression is invalid or names no stone, or where a stone has no material, or two
     """
     records = _selected(scene, session)
     materials = _materials(scene, session, records)
@@ -55,11 +52,11 @@ def select_stones(scene: SceneFile, session: Session) -> tuple[StoneModel, ...]:
 
 
 def select_groups(scene: SceneFile, session: Session, models: Sequence[StoneModel]) -> Groups:
-    """Which of the selected stones the meshes, laws, loads and throws of a scene name, and its output of stress.
+    """Return the selected stones that the meshes, laws, loads and throws of a scene name, and its output of stress.
 
     Raises
     ------
-    SceneError : at the key whose expression cannot be understood or names no stone
+    SceneError : at the key whose expression is invalid or names no stone
     """
     records = {model.record.code: model.record for model in models}
     entries = (*scene.meshes, *(one.entry for one in scene.laws), *scene.loads, *scene.throws)
@@ -75,7 +72,7 @@ def select_groups(scene: SceneFile, session: Session, models: Sequence[StoneMode
 
 
 def _selected(scene: SceneFile, session: Session) -> dict[str, StoneRecord]:
-    """Stones by code: of the kind, satisfying all of `where`, less those excluded."""
+    """Return stones by code: of the kind, satisfying all of `where`, except those excluded."""
     selection, document = scene.selection, scene.document
     try:
         entities = find(session, selection.kind, selection.where)
@@ -98,7 +95,7 @@ def _selected(scene: SceneFile, session: Session) -> dict[str, StoneRecord]:
 
 
 def _materials(scene: SceneFile, session: Session, records: Mapping[str, StoneRecord]) -> dict[str, Material]:
-    """Material of every stone: that of the one rule that names it, else the general one."""
+    """Return the material of every stone: that of the one rule that names it, or the general one."""
     general: Material | None = None
     found: dict[str, Material] = {}
     for rule in scene.materials:
@@ -126,7 +123,7 @@ def _materials(scene: SceneFile, session: Session, records: Mapping[str, StoneRe
 def _fidelities(
     scene: SceneFile, session: Session, records: Mapping[str, StoneRecord]
 ) -> dict[str, Fidelity]:
-    """Fidelity of the stones that a list names."""
+    """Return the fidelity of the stones that a list names."""
     lists = {
         Fidelity.RIGID: scene.bodies.rigid,
         Fidelity.DEFORMABLE: scene.bodies.deformable,
@@ -141,14 +138,14 @@ def _fidelities(
         scene.document.fail(
             f"stone {min(both)} is both rigid and deformable", "bodies", "deformable", remedy="name it in one"
         )
-    # FIXED comes last: it goes before the others
+    # FIXED comes last and so takes precedence over the others
     return {code: fidelity for fidelity, codes in named.items() for code in codes}
 
 
 def _named(
     scene: SceneFile, session: Session, records: Mapping[str, object], key: Path, items: Sequence[str]
 ) -> set[str]:
-    """Codes of the selected stones, the keys of `records`, that any of the items, codes or expressions, names."""
+    """Return the codes, keys of `records`, that any of the items, codes or expressions, names."""
     codes: set[str] = set()
     for item in items:
         if item in records:
@@ -173,7 +170,7 @@ def _named(
 
 
 def _matching(scene: SceneFile, session: Session, item: str) -> set[str]:
-    """Codes of the stones that satisfy an expression and the selection, so that no others are read."""
+    """Return the codes of stones that satisfy an expression and the selection, so that no others are read."""
     selection = scene.selection
     where = [*selection.where[: MAX_EXPRESSIONS - 1], item]
     rows = find_rows(session, selection.kind, where, columns=("code",))

@@ -1,25 +1,43 @@
-"""Values of the tables of a scene file that no other package has a type for."""
+"""Settings of a scene file that no other package has a type for."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
-from mechanics.scene.scene import Block, Fidelity
+from mechanics.scene.scene import Block, ContactSize, Fidelity, Growth
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.meshers.choice import Mesher
+from mechanics.stones.settings import Setting
 
-__all__ = ["Fidelities", "MaterialRule", "MeshSettings", "Output", "Selection"]
+__all__ = ["PICTURES", "STRESS_PICTURES", "Fidelities", "MaterialRule", "MeshSettings", "Output", "Selection"]
 
 _COARSER = 2.0
 """Edges of the ring over those of the stones for whose sake it deforms: docs/accuracy.md, section 13."""
 
+Texts = tuple[str, ...]
+
+STRESS_PICTURES = ("von_mises", "principal_tension", "principal_compression", "utilisation", "error")
+"""Pictures that show nothing of rigid stones."""
+
+PICTURES = (
+    "von_mises",
+    "displacement",
+    "principal_tension",
+    "principal_compression",
+    "utilisation",
+    "error",
+    "pressure",
+    "resultants",
+)
+
 
 @dataclass(frozen=True)
 class Selection:
-    """Which stones take part: of this kind, satisfying all of `where`, named by none of `exclude`."""
+    """Stones that take part: of this kind, satisfying all of `where`, named by none of `exclude`."""
 
-    kind: str
-    where: tuple[str, ...]
-    exclude: tuple[str, ...]
+    kind: Annotated[str, Setting("Kind of the stones; its subkinds belong to it.")] = "entity"
+    where: Annotated[Texts, Setting("Expressions that every stone must satisfy.")] = ()
+    exclude: Annotated[Texts, Setting("Codes or expressions; stones named by any of them are left out.")] = ()
 
 
 @dataclass(frozen=True)
@@ -27,50 +45,71 @@ class MaterialRule:
     """A material and the expressions of its stones; no expressions: all stones that no other rule names."""
 
     material: Material
-    stones: tuple[str, ...]
+    stones: Annotated[
+        Texts,
+        Setting(
+            "Expressions; stones that satisfy any of them are of this material. "
+            "One material may leave this out: it is that of all other stones."
+        ),
+    ] = ()
 
 
 @dataclass(frozen=True)
 class Fidelities:
-    """How stones are modelled: `fixed` goes before the other lists.
+    """Models of the stones: `fixed` takes precedence over the other lists.
 
     Attributes
     ----------
-    default : of stones in no list; None: as their outputs need it
-    rigid, deformable, fixed : codes or expressions
-    ring : without a default, stones within so many joints of one whose stress is asked for deform too
+    default : None, which is "auto" in the file: as their outputs need it
     """
 
-    default: Fidelity | None
-    rigid: tuple[str, ...]
-    deformable: tuple[str, ...]
-    fixed: tuple[str, ...]
-    ring: int
+    default: Annotated[
+        Fidelity | None,
+        Setting("Model of stones that no list below names; auto: rigid unless an output needs their stress."),
+    ] = None
+    rigid: Annotated[Texts, Setting("Codes or expressions of stones that move but do not deform.")] = ()
+    deformable: Annotated[Texts, Setting("Codes or expressions of stones with finite elements.")] = ()
+    fixed: Annotated[Texts, Setting("Codes or expressions of stones that never move: the supports.")] = ()
+    ring: Annotated[
+        int,
+        Setting(
+            "With auto, stones within this many joints of one named by `stress` in `[output]` deform too.",
+            at_least=0,
+        ),
+    ] = 3
 
 
 @dataclass(frozen=True)
 class MeshSettings:
-    """Finite elements of deformable stones.
+    """Finite elements of deformable stones."""
 
-    Attributes
-    ----------
-    size : target edge length [m]
-    element : kind
-    contact_size : target edge length at faces that touch other stones; None: as everywhere [m]
-    growth : by how much edges get longer per metre away from these faces [-]
-    mesher : of tetrahedra
-    ring_size : target edge length of stones that deform for the stress of others; None: twice `size` [m]
-    """
-
-    size: float
-    element: Element
-    contact_size: float | None = None
-    growth: float = Block.growth
-    mesher: Mesher = Block.mesher
-    ring_size: float | None = None
+    size: Annotated[float, Setting("Target edge length of the finite elements.", "m", above=0)] = 0.2
+    element: Annotated[
+        Element,
+        Setting(
+            "Element type: tetrahedra (tet…) or hexahedra (hex…), of the first (tet4, hex8) or second order."
+        ),
+    ] = Block.element
+    contact_size: ContactSize = None
+    growth: Growth = Block.growth
+    mesher: Annotated[
+        Mesher,
+        Setting(
+            "Mesher of tetrahedra: auto: delaunay for convex stones, gmsh for others; gmsh: first; delaunay: alone."
+        ),
+    ] = Block.mesher
+    ring_size: Annotated[
+        float | None,
+        Setting(
+            "Target edge length of stones that deform for the stress of others (`ring` in `[bodies]`); "
+            "if not given, twice `size`.",
+            "m",
+            above=0,
+        ),
+    ] = None
 
     def size_of(self, ring: int) -> float:
-        """Target edge length of a stone that is so many joints from those whose stress is wanted [m]."""
+        """Return the target edge length of a stone that is `ring` joints from those whose stress is wanted [m]."""
         if ring == 0:
             return self.size
         return _COARSER * self.size if self.ring_size is None else self.ring_size
@@ -78,15 +117,22 @@ class MeshSettings:
 
 @dataclass(frozen=True)
 class Output:
-    """What to keep.
+    """Results to keep."""
 
-    Attributes
-    ----------
-    frame_every : a frame every so many steps; 0: first and last
-    stress : codes or expressions of the stones whose stress is wanted; None: of all that deform
-    pictures : their names; None: the usual
-    """
-
-    frame_every: int
-    stress: tuple[str, ...] | None
-    pictures: tuple[str, ...] | None
+    frame_every: Annotated[
+        int,
+        Setting(
+            "Number of steps between frames of motion, stresses and contacts; 0: first and last frame only.",
+            at_least=0,
+        ),
+    ] = 0
+    stress: Annotated[
+        Texts | None,
+        Setting("Codes or expressions of the stones whose stress is wanted; if not given, all that deform."),
+    ] = None
+    pictures: Annotated[
+        Texts | None,
+        Setting(
+            "Pictures to draw, see below; if not given, displacement, and von_mises where a stone deforms."
+        ),
+    ] = None

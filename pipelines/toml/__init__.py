@@ -1,1 +1,4 @@
-"""Validated TOML with line numbers in errors."""
+"""Validated TOML with line numbers in errors.
+
+Public: `Key`, `Kind`, `Document`, `check_table`, `nearest` (schema); `read_text`, `parse_toml`, `key_lines` (lines).
+"""

@@ -1,4 +1,4 @@
-"""What a TOML text says, and on which line each key stands, which the standard reader does not tell."""
+"""TOML text: its contents, and the line of each key, which the standard reader does not report."""
 
 import re
 import tomllib
@@ -27,10 +27,10 @@ _TOKEN = re.compile(
 
 
 def key_lines(text: str) -> dict[Path, int]:
-    """Line numbers, from 1, of the tables and keys of a valid TOML text.
+    """Return the line numbers, from 1, of the tables and keys of a valid TOML text.
 
     Tables of an array are numbered: the keys under the second ``[[loads]]`` begin with ("loads", "1"). A key inside
-    an inline table stands on the line of that table's key, so `line_of` falls back on it.
+    an inline table is on the line of the key of that table, so `line_of` falls back on it.
     """
     lines: dict[Path, int] = {}
     table: Path = ()
@@ -51,7 +51,7 @@ def key_lines(text: str) -> dict[Path, int]:
 
 
 def _numbered(header: Path, counts: Mapping[Path, int]) -> Path:
-    """The path of a header, with the number of the last table after each array above it."""
+    """Return the path of a header, with the number of the last table after each array above it."""
     path: Path = ()
     for name in header[:-1]:
         path = (*path, name)
@@ -61,7 +61,7 @@ def _numbered(header: Path, counts: Mapping[Path, int]) -> Path:
 
 
 def line_of(lines: Mapping[Path, int], path: Path) -> int:
-    """Line of a key, or of the nearest table or key that holds it; 1 if there is none."""
+    """Return the line of a key, or of the nearest table or key that contains it; 1 if there is none."""
     while path:
         if path in lines:
             return lines[path]
@@ -70,7 +70,7 @@ def line_of(lines: Mapping[Path, int], path: Path) -> int:
 
 
 def _statements(text: str) -> Iterator[tuple[int, list[str]]]:
-    """(first line, tokens) of each header or assignment, comments and outer space left out."""
+    """Yield (first line, tokens) of each header or assignment, without comments and outer space."""
     line, first, depth = 1, 1, 0
     tokens: list[str] = []
     for match in _TOKEN.finditer(text + "\n"):
@@ -88,7 +88,7 @@ def _statements(text: str) -> Iterator[tuple[int, list[str]]]:
 
 
 def _dotted(key: str) -> Path:
-    """Path of a dotted, perhaps quoted, key: ``a."b.c"`` is (a, b.c)."""
+    """Return the path of a dotted, perhaps quoted, key: ``a."b.c"`` is (a, b.c)."""
     value: object = tomllib.loads(f"{key} = 0")
     path: list[str] = []
     while isinstance(value, dict):
@@ -100,11 +100,11 @@ def _dotted(key: str) -> Path:
 def read_text(
     path: str | FilePath, error: type[UsageError], *, missing: str = "no such file", encoding: str = "utf-8"
 ) -> str:
-    """The text of a file that a user wrote.
+    """Read the text of a file that a user wrote.
 
     Parameters
     ----------
-    error, missing : of the complaint, and its words where there is no such file
+    error, missing : class of the error, and its text where there is no such file
 
     Raises
     ------
@@ -122,11 +122,11 @@ def read_text(
 
 
 def parse_toml(text: str, path: str, error: type[UsageError], remedy: str) -> dict[str, Any]:
-    """The contents of a TOML text.
+    """Parse a TOML text.
 
     Parameters
     ----------
-    path, error, remedy : of the complaint, if it is none
+    path, error, remedy : place, class and remedy of the error if it is not TOML
 
     Raises
     ------
@@ -147,6 +147,6 @@ def parse_toml(text: str, path: str, error: type[UsageError], remedy: str) -> di
 
 
 def _fullest_line(text: str, characters: str) -> int:
-    """The line with most of these characters."""
+    """Return the number of the line with most of these characters."""
     lines = text.splitlines()
     return 1 + max(range(len(lines)), key=lambda number: sum(map(lines[number].count, characters)))

@@ -1,4 +1,4 @@
-"""What a TOML table may hold, and its check: what is unknown, missing or wrong, by name and line."""
+"""Keys of TOML tables, and their check: unknown, missing and wrong values are reported by name and line."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -21,12 +21,12 @@ class _Required(Enum):
 
 REQUIRED = _Required.REQUIRED
 
-# TOML's whole numbers have no end, floating-point numbers have
+# whole numbers of TOML are unbounded; from here on they are not taken for floating-point ones
 _HUGE = 10**300
 
 
 class Kind(Enum):
-    """What the value of a key is; the value says it in the words of an error message."""
+    """Type of the value of a key, in the words of an error message."""
 
     NUMBER = "a number"
     INTEGER = "a whole number"
@@ -52,11 +52,11 @@ class Key:
     ----------
     name : as written in the file
     kind : type of its value
-    doc : what it means, one sentence
+    doc : meaning, one sentence
     unit : of the value; "-" for a ratio
     default : used when the key is absent; REQUIRED if it must be given; None if absence has its own meaning
     above, at_least, below, at_most : bounds of a number
-    choices : the texts or numbers allowed; any if empty
+    choices : texts or numbers allowed; any if empty
     """
 
     name: str
@@ -73,7 +73,7 @@ class Key:
 
 @dataclass(frozen=True)
 class Document:
-    """A TOML text that was read, so that errors can name file and line.
+    """Path and line numbers of a TOML text, so that errors can name them.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class Document:
     lines: Mapping[Path, int] = field(default_factory=dict)
 
     def where(self, *path: str) -> str:
-        """``file:line`` of a key."""
+        """Return ``file:line`` of a key."""
         return f"{self.path}:{line_of(self.lines, path)}"
 
     def fail(self, what: str, *path: str, remedy: str | None = None) -> NoReturn:
@@ -94,7 +94,7 @@ class Document:
 
     @contextmanager
     def at(self, *path: str) -> Iterator[None]:
-        """Let a SceneError of what is made in a with-block name the key that it was made from, if it names none."""
+        """Make a SceneError raised in the with-block name this key, unless it names a place in the file."""
         try:
             yield
         except SceneError as error:
@@ -106,9 +106,24 @@ class Document:
 def check_table(
     document: Document, table: Path, given: Mapping[str, object], keys: Iterable[Key], title: str = ""
 ) -> dict[str, object]:
-    """Values of all keys of one table, defaults filled in; raises SceneError at the first that is wrong.
+    """Return the values of all keys of one table, with defaults filled in.
 
-    `title` is what messages call the table; else its header.
+    Parameters
+    ----------
+    table : its path
+    given : its contents
+    title : name of the table in messages; by default its header
+
+    Raises
+    ------
+    SceneError : at the first key that is unknown, missing or wrong
+
+    >>> friction = Key("friction", Kind.NUMBER, "Coulomb's coefficient μ.", "-", 0.6, at_least=0)
+    >>> check_table(Document("scene.toml"), ("contact",), {"friction": 1}, [friction])
+    {'friction': 1.0}
+    >>> check_table(Document("scene.toml"), ("contact",), {"frictoin": 1}, [friction])
+    Traceback (most recent call last):
+    moma.errors.SceneError: scene.toml:1: unknown key 'frictoin' in [contact]; did you mean 'friction'?
     """
     known = {key.name: key for key in keys}
     title = title or f"[{'.'.join(table)}]"
@@ -127,7 +142,7 @@ def check_table(
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """The remedy for an unknown name: the nearest known ones, or all of them."""
+    """Return the remedy for an unknown name: the nearest known ones, or all of them."""
     names = sorted(known)
     close = get_close_matches(name, names, n=2, cutoff=0.6)
     if close:
@@ -156,7 +171,7 @@ def _checked(document: Document, path: Path, value: object, key: Key) -> object:
 
 
 def _typed(value: object, kind: Kind) -> object | None:
-    """The value as the type of its kind, or None if it is another one."""
+    """Return the value as the type of its kind, or None if it is of another."""
     match kind:
         case Kind.NUMBER:
             return float(value) if _is_number(value) else None  # type: ignore[arg-type]
@@ -190,13 +205,13 @@ def _typed(value: object, kind: Kind) -> object | None:
 
 
 def _list_of(value: object, typed: Callable[[object], object | None]) -> tuple[object, ...] | None:
-    """All entries of a list as `typed` gives them, or None if it gives None for any."""
+    """Return all entries of a list as `typed` gives them, or None if it gives None for any."""
     entries = [typed(one) for one in value] if isinstance(value, list) else [None]
     return None if any(one is None for one in entries) else tuple(entries)
 
 
 def _numbers(typed: object) -> Iterator[int | float]:
-    """All numbers in a value, its bounds being those of each."""
+    """Yield all numbers in a value; its bounds are those of each."""
     if isinstance(typed, tuple):
         for one in typed:
             yield from _numbers(one)
@@ -221,7 +236,7 @@ def _within(number: float, key: Key) -> bool:
 
 
 def _expected(key: Key) -> str:
-    """What to write, in words: type, unit and bounds."""
+    """Return the expected value in words: type, unit and bounds."""
     if key.choices:
         return " or ".join(f'"{one}"' if isinstance(one, str) else str(one) for one in key.choices)
     bounds = [

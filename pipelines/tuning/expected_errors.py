@@ -1,7 +1,7 @@
-"""What error a run at a profile is expected to have: numbers measured on reference scenes, and the run's own estimates.
+"""Expected errors of a run at a profile, from measurements on reference scenes and the run's own estimates.
 
-The estimates are those by which errors of different scenes become alike (docs/accuracy.md §12): of elastic stones the
-error of their stress after Zienkiewicz and Zhu; of rigid ones the part of the joints that statics leaves free.
+The estimates scale errors of different scenes to each other (docs/accuracy.md §12): for elastic stones the error of
+their stress after Zienkiewicz and Zhu; for rigid ones the fraction of joints that statics leaves undetermined.
 """
 
 import math
@@ -11,10 +11,11 @@ from typing import Any
 
 from mechanics.results.result import Outcome, Result
 from mechanics.scene.scene import Fidelity
+from pipelines.results.quantities import QUANTITIES, Quantities, quantities
 from pipelines.scene.file import SceneFile
 from pipelines.tuning.measured_errors import COLLAPSE, ERRORS
-from pipelines.tuning.profiles import profile_named, settings_of_profile
-from pipelines.tuning.quantities import QUANTITIES, Quantities, quantities
+from pipelines.tuning.overlay import overlay_record
+from pipelines.tuning.profiles import profile_named
 
 __all__ = [
     "BOUNDS",
@@ -28,7 +29,7 @@ __all__ = [
 ]
 
 TYPICAL = ("stone_von_mises_p99",)
-"""Where errors are much alike from structure to structure: a typical error is told."""
+"""Quantities whose errors hardly vary between structures: a typical error is given."""
 
 BOUNDS = (
     "stone_von_mises_mean",
@@ -40,23 +41,22 @@ BOUNDS = (
     "stone_displacement",
     "settlement",
 )
-"""Others, where errors may cancel or forces are free: the largest is told that the reference scenes let expect."""
+"""Quantities whose errors may cancel, or whose forces are undetermined: an upper bound is given."""
 
 _MOVEMENTS = ("displacement", "stone_displacement", "settlement")
 _FORCES = ("joint_forces", "support_reactions")
-# what solver and balance leave, where statics decides all
-_LEAST = 1e-4
+_LEAST = 1e-4  # expected relative error from solver and balance alone, where statics determines all [-]
 
 
 @dataclass(frozen=True)
 class Expected:
-    """A relative error that is to be expected, and of what.
+    """An expected relative error of one quantity.
 
     Attributes
     ----------
-    value : as `pipelines.tuning.quantities.differences` has it [-]
+    value : as `pipelines.results.quantities.differences` defines it [-]
     of : the quantity in words
-    bound : whether the error may well be less
+    bound : the error may well be less
     """
 
     value: float
@@ -66,13 +66,13 @@ class Expected:
 
 @dataclass(frozen=True)
 class ProfileReport:
-    """A profile, and what it gave.
+    """A profile and the errors to expect at it.
 
     Attributes
     ----------
     name, about : of the profile
-    settings : that it has set
-    expected : by quantity; empty if the scene has not come to rest, for which nothing was measured
+    settings : those of the profile
+    expected : by quantity; empty if the scene has not come to rest, for which no measurements exist
     """
 
     name: str
@@ -82,7 +82,7 @@ class ProfileReport:
 
 
 def profile_report(name: str | None, scene: SceneFile, result: Result) -> ProfileReport | None:
-    """What a run at a profile is told of it; None without one."""
+    """Return the report on the profile of a run; None without one."""
     if name is None:
         return None
     profile, found = profile_named(name), quantities(result)
@@ -90,20 +90,20 @@ def profile_report(name: str | None, scene: SceneFile, result: Result) -> Profil
     return ProfileReport(
         name,
         profile.about,
-        settings_of_profile(profile, scene.time),
+        overlay_record(profile.overlay(scene.time)),
         expected_errors(name, found, loops(result), rigid=rigid),
     )
 
 
 def expected_errors(name: str, found: Quantities, free: float, *, rigid: bool) -> dict[str, Expected]:
-    """The errors to expect of a run at a profile.
+    """Return the errors to expect of a run at a profile.
 
     Parameters
     ----------
     name : of the profile
-    found : what the run gave
-    free : part of its joints that statics leaves free, as `loops` has it
-    rigid : whether some of its stones are
+    found : quantities of the run
+    free : fraction of its joints that statics leaves undetermined, see `loops`
+    rigid : some of its stones are rigid
     """
     if found.outcome != Outcome.EQUILIBRIUM:
         return {}
@@ -118,13 +118,13 @@ def expected_errors(name: str, found: Quantities, free: float, *, rigid: bool) -
 
 
 def _expected(name: str, quantity: str, stress_error: float | None, free: float, rigid: bool) -> float | None:
-    """One expected error; None if there is nothing by which to tell it."""
+    """Return one expected error; None without an estimate to scale it by."""
     if stress_error is None and (not rigid or quantity not in (*_FORCES, *_MOVEMENTS)):
         return None
-    # elastic stones of fast have the mesh of balanced
+    # elastic stones in fast have the mesh of balanced
     elastic = ERRORS["balanced" if name == "fast" else name]
     if quantity in _FORCES:
-        # a reaction is a force in a joint: where it is more exact, that is the structure's merit
+        # a reaction is a force in a joint; where it was more accurate, that is due to the structure
         ratio = max((ERRORS["fast"] if rigid else elastic)[one][0] for one in _FORCES)
         return ratio * measure(quantity, None if rigid else stress_error, free)
     if quantity in _MOVEMENTS:
@@ -133,30 +133,30 @@ def _expected(name: str, quantity: str, stress_error: float | None, free: float,
     value = elastic[quantity][0] * measure(quantity, stress_error, free)
     if not rigid:
         return value
-    # the forces on them are as wrong as rigid neighbours leave them
+    # the forces on them carry the error of rigid neighbours
     forces = _expected(name, "joint_forces", stress_error, free, rigid)
     return value if forces is None else math.hypot(value, forces)
 
 
 def measure(quantity: str, stress_error: float | None, free: float) -> float:
-    """That to which the error of a quantity is in proportion, from scene to scene [-].
+    """Return the measure to which the error of a quantity is proportional from scene to scene [-].
 
     Parameters
     ----------
     quantity : of TYPICAL or BOUNDS
-    stress_error : of elastic stones, as Zienkiewicz and Zhu estimate it; None of rigid ones
-    free : part of the joints that statics leaves free: no error of a model changes the forces in the others
+    stress_error : of elastic stones, as Zienkiewicz and Zhu estimate it; None for rigid ones
+    free : fraction of joints that statics leaves undetermined: model errors do not change the forces in the others
     """
     if stress_error is None:
-        # of forces of which a part is arbitrary, the root mean square goes with the root of that part
+        # where a fraction of the forces is arbitrary, the root mean square grows with the root of that fraction
         return 1.0 if quantity in _MOVEMENTS else math.sqrt(free)
     return stress_error * (free if quantity in _FORCES else 1.0)
 
 
 def loops(result: Result) -> float:
-    """The part of the pressed joints that could be cut without any stone losing its last tie to the ground [-].
+    """Return the fraction of pressed joints that could be cut without disconnecting a stone from the ground [-].
 
-    A column has none; an arch one in as many as it has joints.
+    It is zero for a column, and one over the number of joints for an arch.
     """
     fixed = [body.fidelity is Fidelity.FIXED for body in result.bodies]
     pairs = {

@@ -1,4 +1,4 @@
-"""What `python -m benchmarks.profiles --write` has measured on the reference scenes; not written by hand."""
+"""Errors on the reference scenes, written by `python -m benchmarks.profiles --write`, not by hand."""
 
 from collections.abc import Mapping
 
@@ -35,8 +35,8 @@ ERRORS: Mapping[str, Mapping[str, tuple[float, float, float]]] = {
         "settlement": (0.12, 0.00026, 0.00673),
     },
 }
-"""By profile and quantity: the ratio of the error to its measure (pipelines.profile_report), and the least
-and the largest error of the reference scenes."""
+"""By profile and quantity: the ratio of the error to its measure (pipelines.tuning.expected_errors), and
+the least and the largest error of the reference scenes."""
 
 COLLAPSE: Mapping[str, float] = {
     "fast": 0.0129,

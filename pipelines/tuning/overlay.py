@@ -1,4 +1,4 @@
-"""One scene at other settings: what a profile, or a point of a study of speed against accuracy, changes of it."""
+"""One scene at other settings: the changes that a profile, or a point of a tradeoff study, makes to it."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -13,22 +13,44 @@ from pipelines.arrays import Array
 from pipelines.scene.file import SceneFile
 from pipelines.scene.selection import StoneModel
 
-__all__ = ["Overlay", "overlaid", "overlaid_scene", "typical_width"]
+__all__ = [
+    "Overlay",
+    "overlaid",
+    "overlaid_scene",
+    "overlay_from",
+    "overlay_record",
+    "scene_lines",
+    "typical_width",
+]
+
+_ENUMS: Mapping[str, Any] = {
+    "fidelity": Fidelity,
+    "element": Element,
+    "placement": Placement,
+    "method": Method,
+}
+
+# settings that replace those of the same name in a table of the scene
+_TABLES: Mapping[str, tuple[str, ...]] = {
+    "contact": ("points", "placement"),
+    "time": ("step", "theta"),
+    "solver": ("method", "tolerance", "velocity_tolerance", "max_iterations"),
+}
 
 
 @dataclass(frozen=True)
 class Overlay:
-    """Settings that replace those of a scene; None leaves what the scene says.
+    """Settings that replace those of a scene; None keeps the scene's own.
 
-    Selection, materials, laws, loads and supports are the scene's own. Lists of stones in [bodies] go before
-    `fidelity`, as they go before its `default`.
+    Selection, materials, laws, loads and supports are the scene's own. Lists of stones in [bodies] take precedence
+    over `fidelity`, as they do over its `default`.
 
     Attributes
     ----------
     fidelity : of stones that no list names
-    element : kind of finite elements
-    cells : their number along the typical (median) smallest width of the stones; stands for the size of the mesh, and
-        for `contact_size` [-]
+    element : type of finite element
+    cells : their number along the typical (median) smallest width of the stones; replaces the size of the mesh, and
+        `contact_size` [-]
     points, placement : contact points of two flat faces
     step, theta : of the time integration [s], [-]
     method, tolerance, velocity_tolerance, max_iterations : of the solver
@@ -48,12 +70,12 @@ class Overlay:
 
 
 def overlaid(scene: SceneFile, overlay: Overlay, width: float) -> SceneFile:
-    """The scene at the settings of the overlay; entries of [[meshes]] keep their own.
+    """Return the scene at the settings of the overlay; entries of [[meshes]] keep their own.
 
     Parameters
     ----------
     scene : as its author wrote it
-    overlay : what replaces its settings
+    overlay : replaces its settings
     width : typical smallest width of its stones, to which `cells` refers [m]
     """
     # a scene's grading belongs to its own size
@@ -62,34 +84,69 @@ def overlaid(scene: SceneFile, overlay: Overlay, width: float) -> SceneFile:
         if overlay.cells is None
         else {"size": width / overlay.cells, "contact_size": None, "ring_size": None}
     )
-    contact, time, solver = _settings(overlay)
     return replace(
         scene,
         bodies=replace(scene.bodies, **_given({"default": overlay.fidelity})),
         mesh=replace(scene.mesh, **_given({"element": overlay.element}), **sizes),
-        contact=replace(scene.contact, **contact),
-        time=replace(scene.time, **time),
-        solver=replace(scene.solver, **solver),
+        **_replaced(scene, overlay),
     )
 
 
 def overlaid_scene(scene: Scene, overlay: Overlay, listed: frozenset[str] = frozenset()) -> Scene:
-    """As `overlaid`, of a scene that has been assembled; `listed` are the codes of blocks that keep their fidelity."""
+    """Return an assembled scene at the settings of the overlay; the blocks `listed` by code keep their fidelity."""
     size = None
     if overlay.cells is not None:
         size = _median_width((one.vertices, one.faces) for one in scene.blocks) / overlay.cells
-    contact, time, solver = _settings(overlay)
     return replace(
         scene,
         blocks=tuple(_block(one, overlay, size, one.code in listed) for one in scene.blocks),
-        contact=replace(scene.contact, **contact),
-        time=replace(scene.time, **time),
-        solver=replace(scene.solver, **solver),
+        **_replaced(scene, overlay),
+    )
+
+
+def overlay_record(overlay: Overlay) -> dict[str, Any]:
+    """Return the settings of an overlay in plain texts and numbers."""
+    return {name: str(value) if name in _ENUMS else value for name, value in _given(vars(overlay)).items()}
+
+
+def overlay_from(record: Mapping[str, Any]) -> Overlay:
+    """Read back what `overlay_record` returned."""
+    return Overlay(
+        **{name: _ENUMS[name](value) if name in _ENUMS else value for name, value in record.items()}
+    )
+
+
+def scene_lines(overlay: Overlay, width: float) -> str:
+    """Return the TOML that turns a scene into the overlaid one; "" if that changes nothing.
+
+    Parameters
+    ----------
+    overlay : the setting
+    width : typical smallest width of the stones, to which its cells refer [m]
+
+    >>> print(scene_lines(Overlay(element=Element.TET10, cells=2.0, tolerance=1e-4), width=0.3))
+    [mesh]
+    element = "tet10"
+    size = 0.15
+    <BLANKLINE>
+    [solver]
+    tolerance = 0.0001
+    """
+    size = None if overlay.cells is None else width / overlay.cells
+    tables = {
+        "bodies": _given({"default": overlay.fidelity}),
+        "mesh": _given({"element": overlay.element, "size": size}),
+        **_settings(overlay),
+    }
+    return "\n\n".join(
+        "\n".join([f"[{table}]", *(f"{key} = {_toml(value)}" for key, value in keys.items())])
+        for table, keys in tables.items()
+        if keys
     )
 
 
 def typical_width(models: Iterable[StoneModel]) -> float:
-    """Median of the smallest widths of surveyed stones [m]."""
+    """Return the median of the smallest widths of surveyed stones [m]."""
     return _median_width((one.record.solid_vertices, one.record.solid_faces) for one in models)
 
 
@@ -106,15 +163,24 @@ def _block(block: Block, overlay: Overlay, size: float | None, listed: bool) -> 
     return replace(block, fidelity=fidelity, **_given({"element": overlay.element}), **mesh)
 
 
-def _settings(overlay: Overlay) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
-    """Of contact, time and solver, those that the overlay gives."""
-    solver = ("method", "tolerance", "velocity_tolerance", "max_iterations")
-    contact, time, own = (
-        _given({name: getattr(overlay, name) for name in names})
-        for names in (("points", "placement"), ("step", "theta"), solver)
-    )
-    return contact, time, own
+def _replaced(scene: SceneFile | Scene, overlay: Overlay) -> dict[str, Any]:
+    """Return contact, time and solver of a scene with what the overlay gives."""
+    return {table: replace(getattr(scene, table), **given) for table, given in _settings(overlay).items()}
+
+
+def _settings(overlay: Overlay) -> dict[str, dict[str, Any]]:
+    """Return what the overlay gives of contact, time and solver."""
+    return {
+        table: _given({name: getattr(overlay, name) for name in names}) for table, names in _TABLES.items()
+    }
 
 
 def _given(values: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in values.items() if value is not None}
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, str):
+        return f'"{value}"'
+    # repr has the point or exponent that TOML requires in a number that is not whole
+    return repr(value) if isinstance(value, int) else repr(float(f"{value:.6g}"))

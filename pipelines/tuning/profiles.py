@@ -1,9 +1,8 @@
-"""Profiles: named sets of settings, from a quick look to careful stresses, as `moma run --profile` applies them."""
+"""Profiles: named sets of settings, from a quick look to accurate stresses, for `moma run --profile`."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any
 
 from mechanics.scene.scene import Fidelity, Method, Placement, TimeSettings
 from mechanics.stones.meshing.elements import Element
@@ -13,7 +12,7 @@ from pipelines.scene.selection import StoneModel
 from pipelines.toml.schema import nearest
 from pipelines.tuning.overlay import Overlay, overlaid, typical_width
 
-__all__ = ["PROFILES", "Profile", "profile_named", "settings_of_profile", "with_profile"]
+__all__ = ["PROFILES", "Profile", "profile_named", "with_profile"]
 
 
 @dataclass(frozen=True)
@@ -23,9 +22,9 @@ class Profile:
     Attributes
     ----------
     name : on the command line
-    about : what it is for
+    about : its purpose
     rest : settings of scenes that seek an equilibrium or a collapse: θ = 1, or relaxation
-    step, theta : in their place where the scene wants the motion itself: θ < 1 without relaxation [s], [-]
+    step, theta : replace those of `rest` where the scene follows the motion itself: θ < 1 without relaxation [s], [-]
     """
 
     name: str
@@ -35,7 +34,7 @@ class Profile:
     theta: float
 
     def overlay(self, time: TimeSettings) -> Overlay:
-        """What it changes of a scene with these settings of time."""
+        """Return the changes to a scene with these settings of time."""
         if time.relaxation or time.theta == 1.0:
             return self.rest
         return replace(self.rest, step=self.step, theta=self.theta)
@@ -54,7 +53,7 @@ _FAST = Profile(
         theta=1.0,
         method=Method.AUTO,
         tolerance=1e-5,
-        # with less, rigid stones in steps so long are not in balance to 10⁻⁴, and never come to rest
+        # with a looser one, rigid stones in steps of this length miss a balance of 10⁻⁴ and never come to rest
         velocity_tolerance=1e-5,
         max_iterations=2000,
     ),
@@ -103,7 +102,7 @@ PROFILES: Mapping[str, Profile] = MappingProxyType({one.name: one for one in (_F
 
 
 def profile_named(name: str) -> Profile:
-    """The profile of this name.
+    """Return the profile of this name.
 
     Raises
     ------
@@ -115,15 +114,15 @@ def profile_named(name: str) -> Profile:
 
 
 def with_profile(scene: SceneFile, name: str | None, models: Iterable[StoneModel]) -> SceneFile:
-    """The scene with the settings of a profile, which go before its own; without a name, as it is.
+    """Return the scene with the settings of a profile in place of its own; without a name, unchanged.
 
-    Its lists of [bodies], its [[meshes]] and all that says what is asked for stay.
+    Its lists of [bodies], its [[meshes]] and everything that defines the task are kept.
 
     Parameters
     ----------
     scene : as its author wrote it
     name : of the profile
-    models : the stones of the scene, whose typical smallest width sets the size of the mesh
+    models : stones of the scene, whose typical smallest width sets the mesh size
 
     Raises
     ------
@@ -132,13 +131,3 @@ def with_profile(scene: SceneFile, name: str | None, models: Iterable[StoneModel
     if name is None:
         return scene
     return overlaid(scene, profile_named(name).overlay(scene.time), typical_width(models))
-
-
-def settings_of_profile(profile: Profile, time: TimeSettings) -> dict[str, Any]:
-    """What a profile sets in a scene with these settings of time, by the names of `Overlay`; texts and numbers."""
-    values = vars(profile.overlay(time))
-    return {
-        key: value if isinstance(value, int | float) else str(value)
-        for key, value in values.items()
-        if value is not None
-    }

@@ -1,9 +1,21 @@
-"""What counts as a joint between two surveyed stones, and what becomes of it."""
+"""Settings of joints between surveyed stones: what counts as a joint, and what becomes of it."""
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Annotated, NamedTuple
 
-__all__ = ["JointMode", "JointSettings"]
+__all__ = ["JointMode", "JointSettings", "Setting"]
+
+
+class Setting(NamedTuple):
+    """Annotation of a field: its meaning in one sentence, its unit, and the bounds that a scene file may give it."""
+
+    doc: str
+    unit: str = ""
+    above: float | None = None
+    at_least: float | None = None
+    below: float | None = None
+    at_most: float | None = None
 
 
 class JointMode(StrEnum):
@@ -21,21 +33,32 @@ class JointMode(StrEnum):
 
 @dataclass(frozen=True)
 class JointSettings:
-    """What counts as a joint, what becomes of it, and how far closing it may move a stone.
+    """Definition of a joint, its treatment, and how far closing it may move a stone."""
 
-    Attributes
-    ----------
-    mode : what becomes of joints
-    max_width : faces farther apart do not touch [m]
-    max_angle : faces that open wider do not face each other [degrees]
-    min_overlap : narrowest strip in which two faces must face each other [m]
-    straightness : largest distance of a sound corner from its side of a joint that is taken as one plane [m]
-    max_displacement : largest distance by which a corner may move [m]
-    """
-
-    mode: JointMode = JointMode.CLOSE
-    max_width: float = 0.05
-    max_angle: float = 20.0
-    min_overlap: float = 0.01
-    straightness: float = 0.02
-    max_displacement: float = 0.08
+    mode: Annotated[
+        JointMode,
+        Setting(
+            "close: neighbours share contact planes; mortar: so too, with the width kept as the mortar's thickness; "
+            "as-surveyed: stones keep their measured sides."
+        ),
+    ] = JointMode.CLOSE
+    max_width: Annotated[float, Setting("Faces farther apart do not make a joint.", "m", above=0)] = 0.05
+    max_angle: Annotated[
+        float, Setting("Faces that open wider do not make a joint.", "°", above=0, below=45)
+    ] = 20.0
+    min_overlap: Annotated[
+        float, Setting("Narrowest strip in which two faces must face each other.", "m", at_least=0)
+    ] = 0.01
+    straightness: Annotated[
+        float,
+        Setting(
+            "Largest distance of a sound corner from its joint that still counts as plane; "
+            "a bed that is less straight is bent.",
+            "m",
+            above=0,
+            at_most=0.1,
+        ),
+    ] = 0.02
+    max_displacement: Annotated[
+        float, Setting("Largest distance by which closing may move a corner.", "m", above=0)
+    ] = 0.08

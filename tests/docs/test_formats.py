@@ -9,8 +9,8 @@ from typer.testing import CliRunner
 
 from moma.cli import app
 from pipelines.results.joints_csv import JOINT_COLUMNS
+from pipelines.results.summary import summarise
 from pipelines.results.vtk import body_cells, body_grid, contact_grid, joint_grid
-from pipelines.run.summary import summarise
 from survey.formats.native import reader as moma_ascii
 from survey.formats.native.header import HeadReader
 from survey.formats.native.stone import STONE_WORDS

@@ -19,7 +19,7 @@ EXAMPLES = re.findall(r"```python\n((?:(?!```).)*)```\n\n```text\n(.*?)```", PAG
 
 @pytest.fixture(scope="module")
 def names(tmp_path_factory):
-    """What the examples find: the imports of the page, and a session on the sample after the run of the page."""
+    """Return the names of the examples: the imports of the page, and a session on the sample after its run."""
     folder = tmp_path_factory.mktemp("runs")
     (scene,) = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
     (folder / "scene.toml").write_text(scene, encoding="utf-8")

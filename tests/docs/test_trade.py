@@ -14,12 +14,12 @@ from typer.testing import CliRunner
 
 from moma.cli import app
 from moma.cli.text.tradeoff import trade_lines
-from pipelines.tuning.quantities import QUANTITIES
-from pipelines.tuning.tradeoff import study as trade_module
-from pipelines.tuning.tradeoff.grid import grid
-from pipelines.tuning.tradeoff.pareto import front
-from pipelines.tuning.tradeoff.report import study_png
-from pipelines.tuning.tradeoff.study import TradeReport
+from pipelines.results.quantities import QUANTITIES
+from pipelines.tradeoff import study as trade_module
+from pipelines.tradeoff.grid import grid
+from pipelines.tradeoff.pareto import front
+from pipelines.tradeoff.report import study_png
+from pipelines.tradeoff.study import TradeReport
 from tests.docs.test_docs import ROOT, SCENE, blocks, commands, place
 
 __all__ = ["place"]

@@ -1,15 +1,16 @@
 """Mortar that softens as it opens or slides: a cohesive zone (after Jean, Acary & Monerie 2001)."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from mechanics.arrays import Array
 from mechanics.scene.laws.bonds import BROKEN, bonded, with_bonds
-from mechanics.scene.laws.dry_joint import DryJoint, at_limit, slid
+from mechanics.scene.laws.dry_joint import DryJoint, Friction, at_limit, slid
 from mechanics.scene.laws.law import BOND, OPENING, REST, SLIDING, SLIP, Approach, Terms
 from mechanics.scene.laws.mortar import held_tension
-from mechanics.scene.laws.parameters import require_positive
+from mechanics.stones.settings import Setting, check_settings
 
 __all__ = ["CohesiveZone"]
 
@@ -28,29 +29,16 @@ class CohesiveZone:
     The pull of a step is that of the opening in its middle, at the velocity before. An opening smaller than what the
     full pull moves in one step cannot be resolved: there the pull stays full until the bond has closed. The pull in
     proportion begins that far before closed, and so its steps h²W·(pull/opening) stay below 1/θ, where they are stable.
-
-    Attributes
-    ----------
-    friction : μ [-]
-    tension, shear : σ_N and σ_T; tension is cut at σ_T/μ, the apex of the cone [Pa]
-    energy_tension, energy_shear : G_I and G_II [J/m²]
     """
 
-    friction: float
-    tension: float
-    shear: float
-    energy_tension: float
-    energy_shear: float
+    friction: Friction
+    tension: Annotated[float, Setting("Tensile strength σ_N; no more than σ_T/μ is held.", "Pa", above=0)]
+    shear: Annotated[float, Setting("Shear strength without pressure, σ_T.", "Pa", above=0)]
+    energy_tension: Annotated[float, Setting("Energy G_I that opening costs.", "J/m²", above=0)]
+    energy_shear: Annotated[float, Setting("Energy G_II that sliding costs.", "J/m²", above=0)]
 
     def __post_init__(self) -> None:
-        require_positive(
-            "cohesive zone",
-            tension=self.tension,
-            shear=self.shear,
-            energy_tension=self.energy_tension,
-            energy_shear=self.energy_shear,
-        )
-        _ = self._dry  # checks the friction
+        check_settings("cohesive zone", self)
 
     @property
     def reach(self) -> float:

@@ -1,14 +1,22 @@
 """Stone on stone: Signorini with gap or with Newton's restitution, Coulomb with static and dynamic friction."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from mechanics.arrays import Array, Bools
 from mechanics.scene.laws.law import REST, SLIDING, Approach, Terms
-from mechanics.scene.laws.parameters import require_at_least_zero, require_between
+from mechanics.stones.settings import Setting, check_settings
+from moma.errors import SceneError
 
-__all__ = ["DryJoint", "at_limit", "gap_bias", "slid"]
+__all__ = ["DryJoint", "DynamicFriction", "Friction", "at_limit", "gap_bias", "slid"]
+
+Friction = Annotated[float, Setting("Coulomb's coefficient μ.", "-", at_least=0)]
+DynamicFriction = Annotated[
+    float | None,
+    Setting("μ of a contact that slid in the last step; `friction` if not given.", "-", at_least=0),
+]
 
 
 # an impulse lies on its cone, to rounding
@@ -45,25 +53,23 @@ def slid(contacts: Approach, terms: Terms, impulse: Array, velocity: Array) -> B
 
 @dataclass(frozen=True)
 class DryJoint:
-    """Unilateral contact without cohesion.
+    """Unilateral contact without cohesion. Without restitution a stone lands inelastically, in time with the gap."""
 
-    Attributes
-    ----------
-    friction : Coulomb's μ while sticking [-]
-    dynamic_friction : μ of a contact that slid in the last step; None: the same [-]
-    restitution : Newton's e, 0 ≤ e ≤ 1; 0 lands inelastically, in time with the gap [-]
-    """
-
-    friction: float = 0.6
-    dynamic_friction: float | None = None
-    restitution: float = 0.0
+    friction: Friction = 0.6
+    dynamic_friction: DynamicFriction = None
+    restitution: Annotated[
+        float,
+        Setting("Newton's ratio e of the velocities after and before an impact.", "-", at_least=0, at_most=1),
+    ] = 0.0
 
     def __post_init__(self) -> None:
-        require_at_least_zero("dry joint", friction=self.friction)
-        if self.dynamic_friction is not None:
-            remedy = f"give from 0 up to the static friction, {self.friction:g}"
-            require_between("dry joint", 0, self.friction, remedy, dynamic_friction=self.dynamic_friction)
-        require_between("dry joint", 0, 1, "give a ratio from 0 to 1", restitution=self.restitution)
+        check_settings("dry joint", self)
+        if self.dynamic_friction is not None and self.dynamic_friction > self.friction:
+            raise SceneError(
+                f"dynamic_friction = {self.dynamic_friction!r}",
+                where="dry joint",
+                remedy=f"give from 0 up to the static friction, {self.friction:g}",
+            )
 
     @property
     def reach(self) -> float:

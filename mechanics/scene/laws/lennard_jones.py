@@ -1,13 +1,14 @@
 """Attraction at a short distance: the non-smooth Lennard-Jones law (Renouf, Dubois & Alart 2006)."""
 
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
 from mechanics.arrays import Array
-from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.laws.dry_joint import DryJoint, Friction
 from mechanics.scene.laws.law import Approach, Terms
-from mechanics.scene.laws.parameters import require_positive
+from mechanics.stones.settings import Setting, check_settings
 
 __all__ = ["LennardJones"]
 
@@ -19,21 +20,14 @@ class LennardJones:
     r̃_N = r_N + hγ: where the contact is open, r̃_N = 0 says that the full pull acts; where it is closed, r̃_N is the
     pressure, and Coulomb's cone ‖r_T‖ ≤ μ r̃_N stands on it. In the step that crosses d_w, the pull acts for the part of
     the path that lies within, so the work of an escape is γ d_w, but for what the velocity changes in that step.
-
-    Attributes
-    ----------
-    friction : μ [-]
-    force : γ of each contact point [N]
-    distance : d_w [m]
     """
 
-    friction: float
-    force: float
-    distance: float
+    friction: Friction
+    force: Annotated[float, Setting("Pull γ of each contact point.", "N", above=0)]
+    distance: Annotated[float, Setting("Gap d_w within which it acts.", "m", above=0)]
 
     def __post_init__(self) -> None:
-        require_positive("Lennard-Jones law", force=self.force, distance=self.distance)
-        _ = self._dry  # checks the friction
+        check_settings("Lennard-Jones law", self)
 
     @property
     def reach(self) -> float:

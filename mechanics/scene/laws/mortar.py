@@ -1,14 +1,15 @@
 """Mortar that breaks at once: cohesion as a shift of the normal impulse (Acary et al. 1999)."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from mechanics.arrays import Array
 from mechanics.scene.laws.bonds import BROKEN, bonded, with_bonds
-from mechanics.scene.laws.dry_joint import DryJoint, at_limit, slid
+from mechanics.scene.laws.dry_joint import DryJoint, DynamicFriction, Friction, at_limit, slid
 from mechanics.scene.laws.law import BOND, REST, SLIDING, SLIP, Approach, Terms
-from mechanics.scene.laws.parameters import require_at_least_zero
+from mechanics.stones.settings import Setting, check_settings
 
 __all__ = ["MortarJoint", "held_tension"]
 
@@ -29,24 +30,18 @@ class MortarJoint:
     """A bond r_N ≥ -h c_n A, ‖r_T‖ ≤ h c_t A + μ r_N that breaks once and for all, then a dry joint.
 
     With r̃_N = r_N + h c_n A these are r̃_N ≥ 0 and ‖r_T‖ ≤ μ r̃_N + h A (c_t - μ c_n). A is the tributary area of the
-    contact point. The bond breaks when it opens at its tensile limit or slides at its shear limit.
-
-    Attributes
-    ----------
-    friction : μ, of the bond and of the broken joint [-]
-    tension : c_n; where it exceeds c_t/μ, the apex of the cone, the joint holds c_t/μ [Pa]
-    shear : c_t, shear strength without pressure [Pa]
-    dynamic_friction : μ of a broken joint that slid in the last step; None: the same [-]
+    contact point. The bond breaks when it opens at its tensile limit or slides at its shear limit. μ is
+    that of the bond and of the broken joint; the apex of the cone lies at a tension of c_t/μ.
     """
 
-    friction: float
-    tension: float
-    shear: float
-    dynamic_friction: float | None = None
+    friction: Friction
+    tension: Annotated[float, Setting("Tensile strength c_n; no more than c_t/μ is held.", "Pa", at_least=0)]
+    shear: Annotated[float, Setting("Shear strength without pressure, c_t.", "Pa", at_least=0)]
+    dynamic_friction: DynamicFriction = None
 
     def __post_init__(self) -> None:
-        require_at_least_zero("mortar joint", tension=self.tension, shear=self.shear)
-        _ = self._dry  # checks the friction
+        check_settings("mortar joint", self)
+        _ = self._dry  # checks the dynamic friction
 
     @property
     def reach(self) -> float:

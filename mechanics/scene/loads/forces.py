@@ -1,11 +1,13 @@
 """Forces on stones."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from mechanics.arrays import Array
 from mechanics.scene.loads.time_series import History
+from mechanics.stones.settings import Setting
 from mechanics.stones.validation import finite, refuse_unless
 from moma.errors import SceneError
 
@@ -21,13 +23,13 @@ class StoneForce:
     stones : codes
     force : (3,) with time [N]
     arm : (3,) from the centre of mass to where it acts, in the axes of the start [m]
-    follows : the force turns with the stone; else it keeps its direction in the world
+    follows : without it, the force keeps its direction in the world
     """
 
     stones: frozenset[str]
     force: History
     arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    follows: bool = False
+    follows: Annotated[bool, Setting("The force turns with the stone.")] = False
 
     def __post_init__(self) -> None:
         if self.force.components != 3:

@@ -1,12 +1,14 @@
 """Changes of gravity: a ramp, and a tilting table."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mechanics.arrays import Array
 from mechanics.scene.loads.time_series import History
+from mechanics.stones.settings import Setting, check_settings
 from moma.errors import SceneError
 
 __all__ = ["GravityRamp", "TiltingTable"]
@@ -14,20 +16,12 @@ __all__ = ["GravityRamp", "TiltingTable"]
 
 @dataclass(frozen=True)
 class GravityRamp:
-    """Gravity grows from nothing, linearly, so that a structure takes up its weight without a shock.
+    """Gravity grows from nothing, linearly, so that a structure takes up its weight without a shock."""
 
-    Attributes
-    ----------
-    duration : time until it is whole [s]
-    """
-
-    duration: float
+    duration: Annotated[float, Setting("Time until gravity is whole.", "s", above=0)]
 
     def __post_init__(self) -> None:
-        if not 0 < self.duration < np.inf:
-            raise SceneError(
-                f"duration = {self.duration!r}", where="gravity ramp", remedy="give seconds greater than 0"
-            )
+        check_settings("gravity ramp", self)
 
     @property
     def until(self) -> float:

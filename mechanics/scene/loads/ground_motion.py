@@ -2,12 +2,14 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 
 from mechanics.scene.loads.accelerogram import Accelerogram
 from mechanics.scene.loads.load import Pose
 from mechanics.scene.loads.time_series import History
+from mechanics.stones.settings import Setting
 from moma.errors import SceneError
 
 __all__ = ["Component", "GroundMotion"]
@@ -38,14 +40,13 @@ class GroundMotion:
     ----------
     stones : codes
     components : up to three, in different directions
-    scale : factor on the records [-]
-    start : time of their first sample; the ground rests before [s]
+    start : time of the first sample; the ground rests before
     """
 
     stones: frozenset[str]
     components: tuple[Component, ...]
-    scale: float = 1.0
-    start: float = 0.0
+    scale: Annotated[float, Setting("Factor on the records.", "-")] = 1.0
+    start: Annotated[float, Setting("Start time.", "s", at_least=0)] = 0.0
 
     def __post_init__(self) -> None:
         directions = np.array([one.direction for one in self.components], dtype=float).reshape(-1, 3)

@@ -2,12 +2,14 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mechanics.scene.loads.load import Pose
 from mechanics.scene.loads.time_series import History
+from mechanics.stones.settings import Setting
 from mechanics.stones.validation import finite
 from moma.errors import SceneError
 
@@ -36,14 +38,14 @@ class ImposedMotion:
     stones : codes
     velocity : (3,) with time [m/s]
     spin : turning velocity about `axis` with time [rad/s]
-    axis : (3,) right-handed; its length does not matter
+    axis : (3,); its length does not matter
     pivot : (3,) a point of the axis at the start; it moves with `velocity` [m]
     """
 
     stones: frozenset[str]
     velocity: History = field(default_factory=_still)
     spin: History = field(default_factory=_no_spin)
-    axis: Vector = (0.0, 0.0, 1.0)
+    axis: Annotated[Vector, Setting("Axis of the spin, right-handed.", "-")] = (0.0, 0.0, 1.0)
     pivot: Vector = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from moma.cli.text.formats import as_table
 
 if TYPE_CHECKING:
-    from pipelines.tuning.tradeoff.study import TradeReport
+    from pipelines.tradeoff.study import TradeReport
 
 __all__ = ["trade_lines"]
 

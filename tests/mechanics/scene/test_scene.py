@@ -23,7 +23,7 @@ def test_codes_used_twice_are_named():
 
 @pytest.mark.parametrize("size", [None, 0.0, -1.0])
 def test_a_deformable_stone_needs_a_mesh_size(size):
-    with pytest.raises(SceneError, match=r"stone A1: mesh_size.*metres greater than 0"):
+    with pytest.raises(SceneError, match=r"stone A1: mesh_size.* greater than 0"):
         build_model(scene(brick("A1", (0, 0, 0), (1, 1, 1), Fidelity.DEFORMABLE, mesh_size=size)))
 
 

@@ -16,10 +16,10 @@ from typer.testing import CliRunner
 from mechanics.stones.meshing.elements import Element
 from moma.cli import app
 from pipelines.ingest.ingest import ingest
+from pipelines.results.quantities import QUANTITIES
+from pipelines.tradeoff import study as trade_module
+from pipelines.tradeoff.grid import Setting, grid
 from pipelines.tuning.overlay import Overlay
-from pipelines.tuning.quantities import QUANTITIES
-from pipelines.tuning.tradeoff import study as trade_module
-from pipelines.tuning.tradeoff.grid import Setting, grid
 from tests.paths import ROOT
 
 SCENE = """
@@ -189,6 +189,14 @@ def test_a_folder_with_other_things_is_left_alone(place, tmp_path):
     assert [one.name for one in tmp_path.iterdir()] == ["letter.txt"]
 
 
+def test_tradeoff_is_another_name_that_help_does_not_list(place):
+    arguments = (str(place / "none.toml"), "--out", str(place / "none"))
+    results = [CliRunner().invoke(app, [name, *arguments]) for name in ("trade", "tradeoff")]
+    assert [one.exit_code for one in results] == [2, 2]
+    assert results[0].output == results[1].output
+    assert "tradeoff" not in CliRunner().invoke(app, ["--help"]).output
+
+
 def test_a_scene_that_is_not_there_is_wrong_use(place):
     assert invoke(place / "none.toml", "--db", f"sqlite:///{place / 'window.db'}").exit_code == 2
 
@@ -204,7 +212,7 @@ def children(pid):
             words = (entry / "cmdline").read_bytes()
         except OSError:
             continue
-        if parent == pid and b"pipelines.tuning.tradeoff.worker" in words:
+        if parent == pid and b"pipelines.tradeoff.worker" in words:
             found.append(int(entry.name))
     return found
 

@@ -7,8 +7,8 @@ import pytest
 
 from mechanics.stones.materials import Material
 from pipelines.results.joints_csv import JOINT_COLUMNS, write_joints
-from pipelines.run.stone_values import stone_results
-from pipelines.run.summary import summarise
+from pipelines.results.stone_values import stone_results
+from pipelines.results.summary import summarise
 from tests.pipelines.results_by_hand import deformable_body, result_of, rigid_body
 
 STRONG = Material("marble", 2000.0, 1e10, 0.2, tensile_strength=1e6, compressive_strength=8e6)

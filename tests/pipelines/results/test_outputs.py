@@ -22,11 +22,11 @@ from pipelines.draw.offscreen.result import colouring
 from pipelines.draw.offscreen.surfaces import load_surface, save_surface, wall_surface
 from pipelines.draw.pictures import draw_pictures, missing, package_of
 from pipelines.reports.run import write_report
+from pipelines.results.stone_values import stone_results, stress_statistics
+from pipelines.results.summary import as_json, summarise
 from pipelines.results.vtk import contact_grid, write_frames
 from pipelines.results.vtu import CELL_TYPES
-from pipelines.run.stone_values import stone_results, stress_statistics
-from pipelines.run.summary import as_json, summarise
-from pipelines.scene.table_keys import PICTURES
+from pipelines.scene.settings import PICTURES
 from tests.pipelines.results_by_hand import (
     BOX_FACES,
     LIMESTONE,

@@ -1,4 +1,4 @@
-"""`moma check`: what it tells of simplified stones, joints and meshes, and the folder of its pictures."""
+"""`moma check`: its report on simplified stones, joints and meshes, and the folder of its pictures."""
 
 import json
 from dataclasses import asdict
@@ -8,16 +8,13 @@ import pytest
 
 from moma.cli.text.checks import check_lines, duration
 from moma.errors import UsageError
-from pipelines.ingest.ingest import ingest
 from pipelines.run.check import check_scene
 from pipelines.run.closing_check import joints_report, simplification_report
 from survey.joints.report import ClosingReport, Gap, Joint, Overlap
 from survey.joints.settings import JointMode
 from survey.simplify.simplify import simplify
 from survey.synthetic.buildings.walls import wall
-from tests.paths import ROOT
 
-SURVEY = ROOT / "data/samples/window/window.moma"
 PLACE, UP = np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.0, 1.0])
 SCENE = """
 [scene]
@@ -32,13 +29,6 @@ poisson = 0.2
 default = "rigid"
 fixed = ["course = 1"]
 """
-
-
-@pytest.fixture(scope="module")
-def url(tmp_path_factory):
-    place = f"sqlite:///{tmp_path_factory.mktemp('check') / 'window.db'}"
-    ingest([SURVEY], place)
-    return place
 
 
 @pytest.fixture
@@ -67,7 +57,7 @@ REPORT = ClosingReport(
 )
 
 
-def test_joints_are_counted_and_what_remains_has_its_place_on_the_site():
+def test_joints_are_counted_and_remaining_gaps_and_overlaps_have_site_coordinates():
     told = joints_report(REPORT, np.array([100.0, 200.0, 0.0]))
     assert (told.mode, told.count, told.planes, told.left_open) == ("close", 2, 1, {"too wide": 1})
     assert told.mean_width == pytest.approx((0.3 * 10 + 0.1 * 20 + 0.1 * 40) / 0.5 * 1e-3)
@@ -81,7 +71,7 @@ def test_joints_are_counted_and_what_remains_has_its_place_on_the_site():
     assert (empty.count, empty.mean_width, empty.worst_stone) == (0, 0.0, None)
 
 
-def test_simplified_stones_are_told_by_shape_and_by_what_the_survey_bears_out():
+def test_simplified_stones_are_reported_by_shape_and_against_the_tolerance_of_the_survey():
     stones = [simplify(one) for one in wall(30, 3).blocks()]
     told = simplification_report(stones)
     assert told is not None
@@ -93,7 +83,7 @@ def test_simplified_stones_are_told_by_shape_and_by_what_the_survey_bears_out():
     assert simplification_report([]) is None
 
 
-def test_a_scene_is_told_with_its_stones_and_joints(scene, url):
+def test_the_report_has_the_stones_and_joints_of_the_scene(scene, url):
     report = check_scene(scene, url)
     assert report.problems == ()
     assert report.simplification is not None
@@ -110,7 +100,7 @@ def test_a_scene_is_told_with_its_stones_and_joints(scene, url):
     assert report.mesh_quality is None
 
 
-def test_meshes_are_told_with_their_quality(scene, url):
+def test_the_report_has_the_quality_of_the_meshes(scene, url):
     scene.write_text(SCENE.replace('"rigid"', '"deformable"') + "[mesh]\nsize = 0.4\n")
     quality = check_scene(scene, url).mesh_quality
     assert quality is not None
@@ -164,5 +154,5 @@ def test_pictures_and_the_report_lie_in_a_folder_of_their_own(scene, url, tmp_pa
         (7300.0, "2 h"),
     ],
 )
-def test_times_are_told_in_the_unit_in_which_one_thinks_of_them(seconds, told):
+def test_times_are_given_in_a_convenient_unit(seconds, told):
     assert duration(seconds) == told

@@ -1,4 +1,4 @@
-"""How each stone is modelled: what lists, outputs and the ring say, on any graph of neighbours."""
+"""Model of each stone by lists, outputs and the ring, on any graph of neighbours."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ ROW = {one: {*CODES[max(n - 1, 0) : n], *CODES[n + 1 : n + 2]} for n, one in enu
 
 
 def said(wishes):
-    """What each stone of the row is, in one letter, and reasons by code."""
+    """Return the model of each stone of the row as one letter, and the reasons by code."""
     found = modelled(CODES, ROW, wishes)
     letters = "".join(str(found[one].fidelity)[0] for one in CODES)
     return letters, {code: one.reason for code, one in found.items()}
@@ -83,7 +83,7 @@ def test_a_joint_makes_two_stones_neighbours_closed_or_not():
 
 @st.composite
 def scenes(draw):
-    """Neighbours of up to ten stones, and what is said of them."""
+    """Return neighbours of up to ten stones, and requests about them."""
     pairs = draw(st.sets(st.tuples(st.sampled_from(CODES), st.sampled_from(CODES)), max_size=25))
     graph: dict[str, set[str]] = {}
     for one, other in pairs:
@@ -97,7 +97,7 @@ def scenes(draw):
 
 @given(scenes())
 def test_the_ring_is_all_that_is_so_many_joints_away(scene):
-    """Against distances by powers of the matrix of neighbours, fixed stones taken out of it."""
+    """Compare with distances from powers of the adjacency matrix without fixed stones."""
     graph, wishes = scene
     near = np.array([[other in graph.get(one, ()) for other in CODES] for one in CODES])
     open_ = np.array([wishes.named.get(code) is not FIXED for code in CODES])

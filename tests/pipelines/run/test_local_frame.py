@@ -1,6 +1,6 @@
-"""A wall on a national grid is computed about a point amid its stones: the same wall, to the nanometre.
+"""Walls on a national grid, computed about a local origin: the same wall, to the nanometre.
 
-Coordinates are first rounded to 2⁻²⁰ m, so that moving them by whole metres is exact in 64 bits.
+Coordinates are first rounded to 2⁻²⁰ m, so that shifting them by whole metres is exact in 64 bits.
 """
 
 import csv
@@ -14,10 +14,9 @@ from archmodel.database.session import open_database
 from archmodel.query.api import find
 from archmodel.store.stones import load_stones
 from pipelines.ingest.ingest import ingest
-from pipelines.run.assemble import assemble
 from pipelines.run.local_frame import local_origin, stone_about
 from pipelines.run.run import run_scene
-from pipelines.scene.file import parse_scene
+from tests.pipelines.scenes import assembled, survey_text
 
 GRID = np.array([652_345.0, 6_862_789.0, 1_040.0])
 ORIGIN = np.array([652_000.0, 6_863_000.0, 1_000.0])  # the nearest multiple of 1 km
@@ -52,36 +51,16 @@ pivot = [{x}, {y}, {z}]
 """
 
 
-def block(name, course, x, z, length):
-    rng = np.random.default_rng(sum(map(ord, name)))
+def stone(code, course, x, z, length):
+    rng = np.random.default_rng(sum(map(ord, code)))
     corners = np.array([(x, 0, z), (x + length, 0, z), (x + length, 0, z + 0.29), (x, 0, z + 0.29)])
     points = np.column_stack([rng.uniform(x, x + length, 5), np.zeros(5), rng.uniform(z, z + 0.29, 5)])
-    return (
-        name,
-        course,
-        [
-            np.round((part + rng.normal(0.0, 0.002, part.shape)) * 2.0**20) / 2.0**20
-            for part in (corners, points)
-        ],
-    )
+    noisy = (part + rng.normal(0.0, 0.002, part.shape) for part in (corners, points))
+    return course, *(np.round(part * 2.0**20) / 2.0**20 for part in noisy)
 
 
-STONES = [block("LEFT", 1, 0.0, 0.0, 0.5), block("RIGHT", 1, 0.51, 0.0, 0.5), block("TOP", 2, 0.2, 0.3, 0.6)]
-
-
-def survey(shift):
-    lines = [
-        "moma-survey 1",
-        f"observer {' '.join(map(repr, (shift + np.array([0.5, -9.0, 1.0])).tolist()))}",
-        "sigma 0.002",
-    ]
-    lines.append("depth * 0.4 sigma 0.02 source thickness")
-    for name, course, parts in STONES:
-        lines.append(f"stone {name} header course {course}")
-        for word, part in zip(("vertex", "point"), parts, strict=True):
-            lines += [f"{word} {' '.join(map(repr, row))}" for row in (part + shift).tolist()]
-        lines.append("end")
-    return "\n".join(lines) + "\n"
+FACES = {"LEFT": (1, 0.0, 0.0, 0.5), "RIGHT": (1, 0.51, 0.0, 0.5), "TOP": (2, 0.2, 0.3, 0.6)}
+STONES = {code: stone(code, *face) for code, face in FACES.items()}
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +68,7 @@ def walls(tmp_path_factory):
     """URLs of the databases of the wall near the origin and far from it."""
     folder, urls = tmp_path_factory.mktemp("walls"), []
     for name, shift in (("near", np.zeros(3)), ("far", GRID)):
-        (folder / f"{name}.moma").write_text(survey(shift))
+        (folder / f"{name}.moma").write_text(survey_text(STONES, shift))
         urls.append(f"sqlite:///{folder / name}.db")
         ingest([folder / f"{name}.moma"], urls[-1])
     return urls
@@ -98,11 +77,6 @@ def walls(tmp_path_factory):
 def text_for(shift, more=LOADS):
     x, y, z = (shift + np.array([0.5, 0.1, 0.4])).tolist()
     return SCENE + more.format(x=x, y=y, z=z)
-
-
-def assembled(url, text):
-    with open_database(url) as database, database.session(read_only=True) as session:
-        return assemble(parse_scene(text, "scene.toml"), session)
 
 
 @pytest.mark.parametrize("joints", ["", '[joints]\nmode = "as-surveyed"\n'])
@@ -133,7 +107,7 @@ def test_points_of_loads_and_pivots_move_along(walls):
     np.testing.assert_allclose(turn.pivot, [0.5, 0.1, 0.4])
 
 
-def test_a_run_far_away_is_the_run_nearby_and_tells_places_on_the_site(walls, tmp_path):
+def test_a_run_far_away_is_the_run_nearby_in_site_coordinates(walls, tmp_path):
     done = {}
     for name, url, shift in zip(("near", "far"), walls, (np.zeros(3), GRID), strict=True):
         (tmp_path / f"{name}.toml").write_text(text_for(shift, LOADS.split('[[loads]]\ntype = "motion"')[0]))
@@ -183,7 +157,7 @@ def test_near_scenes_stay_where_they_are_and_far_ones_have_a_round_origin(far_st
     assert stone_about(ten[0], np.zeros(3)) is ten[0]
 
 
-def test_a_stone_about_an_origin_has_lost_nothing(far_stones):
+def test_shifting_a_stone_loses_nothing(far_stones):
     for stone in far_stones:
         about = stone_about(stone, ORIGIN)
         for name in ("vertices", "points", "outline", "solid_vertices", "centroid"):

@@ -1,4 +1,4 @@
-"""A scene models no more than it requires: what is read, what deforms, what is computed, and how it is told."""
+"""Scenes model no more than their outputs require: stones read, deformed and computed, and the report on it."""
 
 import json
 
@@ -7,7 +7,6 @@ import pytest
 from sqlalchemy import event
 from typer.testing import CliRunner
 
-from archmodel.database.session import open_database
 from archmodel.tables.entities import Entity
 from archmodel.tables.surveys import Measurement
 from mechanics.scene.scene import Fidelity
@@ -15,12 +14,10 @@ from mechanics.simulate import simulate
 from moma.cli import app
 from moma.cli.text.checks import check_lines
 from moma.errors import SceneError
-from pipelines.ingest.ingest import ingest
 from pipelines.run.assemble import assemble
 from pipelines.run.check import check_scene
 from pipelines.scene.file import parse_scene
 from pipelines.scene.selection import select_groups, select_stones
-from tests.pipelines.run.test_run import SURVEY
 
 LOW = """
 [scene]
@@ -40,21 +37,7 @@ REGION = LOW.replace("[mesh]", "ring = 1\n[mesh]") + '[output]\nstress = ["W03-0
 BESIDE_RIGID = "are rigid and spread forces otherwise"
 
 
-@pytest.fixture(scope="module")
-def url(tmp_path_factory):
-    """The sample in a database that tests only read."""
-    url = f"sqlite:///{tmp_path_factory.mktemp('db') / 'window.db'}"
-    ingest([SURVEY], url)
-    return url
-
-
-@pytest.fixture
-def session(url):
-    with open_database(url, create=False) as database, database.session(read_only=True) as session:
-        yield session
-
-
-def told(url, folder, text):
+def report_on(url, folder, text):
     path = folder / "scene.toml"
     path.write_text(text, encoding="utf-8")
     return check_scene(path, url)
@@ -153,7 +136,7 @@ def test_contacts_between_fixed_stones_are_not_computed(session):
 
 
 def test_check_says_how_each_stone_is_modelled_and_why(url, tmp_path):
-    report = told(url, tmp_path, REGION)
+    report = report_on(url, tmp_path, REGION)
     assert report.bodies["deformable"] == report.ring + 1
     stones = {one.code: one for one in report.stones}
     assert stones["W03-04"].stress
@@ -221,7 +204,7 @@ def test_the_command_explains(url, tmp_path):
         ),
     ],
 )  # fmt: skip
-def test_what_has_no_effect_is_told_with_its_line(session, text, line, said):
+def test_keys_without_effect_are_named_with_their_line(session, text, line, said):
     remarks = assemble(parse_scene(text, "scene.toml"), session).remarks
     idle = [one for one in remarks if BESIDE_RIGID not in one]
     if said is None:

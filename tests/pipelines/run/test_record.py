@@ -1,4 +1,4 @@
-"""What a run leaves in the database is what the simulation gave back: a small wall, near the origin and far from it."""
+"""Stored runs against the result of the simulation: a small wall, near the origin and far from it."""
 
 import numpy as np
 import pytest
@@ -15,6 +15,7 @@ from pipelines.run import run as run_module
 from pipelines.run.assemble import assemble
 from pipelines.run.run import run_scene
 from pipelines.scene.file import read_scene
+from tests.pipelines.scenes import survey_text
 
 FAR = np.array([652_345.0, 6_862_789.0, 1_040.0])
 
@@ -42,28 +43,19 @@ pictures = []
 FACES = {"LEFT": (1, 0.0, 0.0, 0.5), "RIGHT": (1, 0.51, 0.0, 0.5), "TOP": (2, 0.2, 0.3, 0.6)}
 
 
-def survey(shift):
-    lines = [
-        "moma-survey 1",
-        "observer " + " ".join(map(str, np.add(shift, [0.5, -9.0, 1.0]))),
-        "sigma 0.002",
-    ]
-    lines.append("depth * 0.4 sigma 0.02 source thickness")
-    for code, (course, x, z, length) in FACES.items():
-        rng = np.random.default_rng(course)
-        corners = np.array([(x, 0, z), (x + length, 0, z), (x + length, 0, z + 0.29), (x, 0, z + 0.29)])
-        inside = np.column_stack([rng.uniform(x, x + length, 6), np.zeros(6), rng.uniform(z, z + 0.29, 6)])
-        lines.append(f"stone {code} header course {course}")
-        for word, places in (("vertex", corners), ("point", inside)):
-            lines += [f"{word} {' '.join(map(repr, place))}" for place in (places + shift).tolist()]
-        lines.append("end")
-    return "\n".join(lines) + "\n"
+def stone(course, x, z, length):
+    rng = np.random.default_rng(course)
+    corners = np.array([(x, 0, z), (x + length, 0, z), (x + length, 0, z + 0.29), (x, 0, z + 0.29)])
+    inside = np.column_stack([rng.uniform(x, x + length, 6), np.zeros(6), rng.uniform(z, z + 0.29, 6)])
+    return course, corners, inside
 
 
 @pytest.fixture(params=["near", "far"])
 def ran(request, new_url, tmp_path, monkeypatch):
-    """The URL, what the simulation gave back, the assembly it was of, and the number of the stored run."""
-    (tmp_path / "wall.moma").write_text(survey(np.zeros(3) if request.param == "near" else FAR))
+    """Yield a session, the result of the simulation, its assembly, and the number of the stored run."""
+    stones = {code: stone(*face) for code, face in FACES.items()}
+    shift = np.zeros(3) if request.param == "near" else FAR
+    (tmp_path / "wall.moma").write_text(survey_text(stones, shift))
     (tmp_path / "scene.toml").write_text(SCENE)
     url, given = new_url(), []
     ingest([tmp_path / "wall.moma"], url)
@@ -198,7 +190,7 @@ def tetrahedra(vertices, faces):
 
 
 def check_sums_over_joints(joints, points):
-    """What a joint bears is the sum over its points, turned to its first stone."""
+    """The force of a joint is the sum over its points, taken on its first stone."""
     for joint in joints:
         own = [point for point in points if point.joint == joint.number]
         assert own
@@ -213,7 +205,7 @@ def check_sums_over_joints(joints, points):
 
 
 def check_solids(session, number, assembly, codes):
-    """Joints of 10 mm were closed: corners on them moved by half of that, others by nothing."""
+    """Joints of 10 mm were closed: corners on them moved by half of that, others not at all."""
     solids = session.scalars(select(Simplification).where(Simplification.run_id == number)).all()
     blocks = {block.code: block for block in assembly.scene.blocks}
     assert {codes[one.entity_id] for one in solids} == set(FACES)

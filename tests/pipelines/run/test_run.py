@@ -12,19 +12,16 @@ from archmodel.query.api import find_rows
 from archmodel.store.run_record import STONE_VALUES
 from mechanics.results.result import Outcome
 from mechanics.scene.scene import Fidelity
-from moma.errors import MissingLibraryError, SceneError, UsageError
-from pipelines.ingest.ingest import ingest
+from moma.errors import MissingLibraryError, UsageError
 from pipelines.ingest.records import surveyed_block
+from pipelines.results.stone_values import stone_results
 from pipelines.run import run as run_module
 from pipelines.run.assemble import assemble
 from pipelines.run.run import run_scene, write_results
-from pipelines.run.stone_values import stone_results
 from pipelines.scene.file import parse_scene
 from pipelines.scene.selection import select_stones
-from tests.paths import ROOT
 from tests.pipelines.results_by_hand import result_of, rigid_body
-
-SURVEY = ROOT / "data/samples/window/window.moma"
+from tests.pipelines.scenes import fails_at_line
 
 LOW = """
 [scene]
@@ -44,20 +41,6 @@ size = 0.3
 [time]
 step = 0.005
 """
-
-
-@pytest.fixture(scope="module")
-def url(tmp_path_factory):
-    """The sample in a database that tests only read."""
-    url = f"sqlite:///{tmp_path_factory.mktemp('db') / 'window.db'}"
-    ingest([SURVEY], url)
-    return url
-
-
-@pytest.fixture
-def session(url):
-    with open_database(url, create=False) as database, database.session(read_only=True) as session:
-        yield session
 
 
 def selected(text, session):
@@ -113,10 +96,7 @@ def test_every_stone_has_the_material_of_its_rule(session):
 )
 def test_a_selection_that_fails_is_named_with_its_line(session, written, instead, line, said):
     assert written in LOW
-    with pytest.raises(SceneError) as caught:
-        selected(LOW.replace(written, instead, 1), session)
-    assert str(caught.value).startswith(f"scene.toml:{line}: ")
-    assert said in str(caught.value)
+    fails_at_line(line, said, lambda text: selected(text, session), LOW.replace(written, instead, 1))
 
 
 def test_a_stone_from_the_database_is_the_stone_that_was_surveyed(session):
@@ -147,12 +127,10 @@ def test_closed_stones_touch_and_open_ones_do_not(session):
     assert by_code["W02-01"].mesh_size is None
 
 
-def test_a_run_writes_its_folder_and_keeps_its_results(tmp_path):
-    url = f"sqlite:///{tmp_path / 'own.db'}"
-    ingest([SURVEY], url)
+def test_a_run_writes_its_folder_and_keeps_its_results(own_url, tmp_path):
     (tmp_path / "low.toml").write_text(LOW, encoding="utf-8")
     heard = []
-    done = run_scene(tmp_path / "low.toml", url, tmp_path / "out", heard.append)
+    done = run_scene(tmp_path / "low.toml", own_url, tmp_path / "out", heard.append)
     assert {report.stage for report in heard} == {"mesh", "step", "write"}
     summary = json.loads((tmp_path / "out/summary.json").read_text(encoding="utf-8"))
     assert summary == done.summary
@@ -163,7 +141,7 @@ def test_a_run_writes_its_folder_and_keeps_its_results(tmp_path):
     assert {"report.html", "results.pvd", "joints.csv", "von_mises.png", "scene.toml"} <= set(
         summary["files"]
     )
-    with open_database(url, create=False) as database, database.session(read_only=True) as session:
+    with open_database(own_url, create=False) as database, database.session(read_only=True) as session:
         rows = find_rows(session, "entity", ["von_mises_max > 0"])
         worst = find_rows(session, "entity", ["stress_error > 0 and principal_compression < 0"])
         bearing = find_rows(session, "entity", ["joint_pressure > 1000", "joint_kern < 3"])
@@ -179,32 +157,30 @@ def test_a_run_writes_its_folder_and_keeps_its_results(tmp_path):
     assert run["scene"] == "Two courses"
     assert rows[0]["von_mises_max"] == pytest.approx(summary["von_mises"]["max"])
     # once more, in the place of the first
-    again = run_scene(tmp_path / "low.toml", url, tmp_path / "out")
+    again = run_scene(tmp_path / "low.toml", own_url, tmp_path / "out")
     assert again.run > done.run
     assert again.summary["von_mises"] == done.summary["von_mises"]
 
 
-def test_a_picture_that_shows_nothing_is_a_warning(tmp_path):
-    url = f"sqlite:///{tmp_path / 'own.db'}"
-    ingest([SURVEY], url)
+def test_a_picture_that_shows_nothing_is_a_warning(own_url, tmp_path):
     text = LOW.replace('deformable = ["W02-02"]\n', "") + '[output]\npictures = ["error", "resultants"]\n'
     (tmp_path / "low.toml").write_text(text, encoding="utf-8")
-    done = run_scene(tmp_path / "low.toml", url, tmp_path / "out")
+    done = run_scene(tmp_path / "low.toml", own_url, tmp_path / "out")
     idle, omitted = done.warnings
     assert "[mesh] has no effect: no stone deforms" in idle
     assert omitted == "no picture error: no stone deforms"
     assert [name for name in done.summary["files"] if name.endswith(".png")] == ["resultants.png"]
 
 
-def test_without_pictures_the_rest_is_written_and_a_warning_says_what_to_install(tmp_path, monkeypatch):
+def test_without_pictures_the_rest_is_written_and_a_warning_says_what_to_install(
+    own_url, tmp_path, monkeypatch
+):
     def no_pictures(*_):
         raise MissingLibraryError("libGL.so.1: not there", remedy="apt-get install libgl1")
 
     monkeypatch.setattr(run_module, "draw_pictures", no_pictures)
-    url = f"sqlite:///{tmp_path / 'own.db'}"
-    ingest([SURVEY], url)
     (tmp_path / "low.toml").write_text(LOW.replace('deformable = ["W02-02"]\n', ""), encoding="utf-8")
-    done = run_scene(tmp_path / "low.toml", url, tmp_path / "out")
+    done = run_scene(tmp_path / "low.toml", own_url, tmp_path / "out")
     assert done.warnings[1:] == ("no pictures: libGL.so.1: not there; apt-get install libgl1",)
     assert "apt-get install libgl1" in (tmp_path / "out/report.html").read_text(encoding="utf-8")
     assert (tmp_path / "out/results.pvd").exists()
@@ -217,12 +193,10 @@ def test_a_place_that_is_taken_is_refused_before_anything_runs(tmp_path, url, mo
         run_scene(tmp_path / "low.toml", url, tmp_path)
 
 
-def test_a_static_start_is_told_and_a_warning_where_there_is_none(tmp_path):
-    url = f"sqlite:///{tmp_path / 'own.db'}"
-    ingest([SURVEY], url)
+def test_a_static_start_is_told_and_a_warning_where_there_is_none(own_url, tmp_path):
     text = LOW + 'start = "equilibrium"\n[output]\npictures = []\n'
     (tmp_path / "low.toml").write_text(text, encoding="utf-8")
-    done = run_scene(tmp_path / "low.toml", url, tmp_path / "out")
+    done = run_scene(tmp_path / "low.toml", own_url, tmp_path / "out")
     assert done.summary["static"]["found"]
     assert done.warnings == ()
     assert "Began in static equilibrium" in (tmp_path / "out/report.html").read_text(encoding="utf-8")
@@ -232,7 +206,7 @@ def test_a_static_start_is_told_and_a_warning_where_there_is_none(tmp_path):
         + "[joints]\nmode = 'as-surveyed'\n"
     )
     (tmp_path / "falling.toml").write_text(falling.replace('["W02-02"]', '["W03-02"]'), encoding="utf-8")
-    done = run_scene(tmp_path / "falling.toml", url, tmp_path / "out2")
+    done = run_scene(tmp_path / "falling.toml", own_url, tmp_path / "out2")
     assert not done.summary["static"]["found"]
     assert any("no static equilibrium was found" in one for one in done.warnings)
 

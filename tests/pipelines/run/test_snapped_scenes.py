@@ -4,15 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from archmodel.database.session import open_database
 from mechanics.stones.polyhedra import mass_properties
 from pipelines.ingest.ingest import ingest
 from pipelines.ingest.kind_rules import kind_rules
 from pipelines.ingest.reading_options import reading_options
-from pipelines.run.assemble import assemble
 from pipelines.run.run import run_scene
-from pipelines.scene.file import parse_scene
 from survey.geometry.solids import Solid
+from tests.pipelines.scenes import assembled
 from tests.survey.joints.assemblies import dome, groin, obj
 
 SCENE = """
@@ -50,8 +48,7 @@ def taken_in(folder: Path, solids: list[Solid], support: str) -> str:
 
 def test_a_dome_rounded_to_a_millimetre_stands_and_moves_by_nothing(tmp_path: Path) -> None:
     url = taken_in(tmp_path, dome(2, 8), "z < 0.6")
-    with open_database(url) as database, database.session(read_only=True) as session:
-        blocks = assemble(parse_scene(SCENE, "vault.toml"), session).scene.blocks
+    blocks = assembled(url, SCENE).scene.blocks
     assert all(len(block.parts) == 2 for block in blocks)
     summary = run_scene(tmp_path / "vault.toml", url, tmp_path / "out").summary
     assert summary["bodies"] == {"rigid": 8, "deformable": 0, "fixed": 8}
@@ -69,8 +66,7 @@ def test_groin_stones_rest_on_each_other_with_both_arms(tmp_path: Path) -> None:
     """Beds slant by at most 0.3 rad, so that friction holds the stones; the upper course is 3 of 6."""
     stones = groin(2, (0.02, 0.3))
     url = taken_in(tmp_path, stones, "code like '%0'")
-    with open_database(url) as database, database.session(read_only=True) as session:
-        blocks = assemble(parse_scene(SCENE, "vault.toml"), session).scene.blocks
+    blocks = assembled(url, SCENE).scene.blocks
     assert {block.code: len(block.parts) for block in blocks} == {
         **dict.fromkeys(("G0", "G1"), 2),
         **dict.fromkeys(("A0", "A1", "B0", "B1"), 0),

@@ -1,18 +1,16 @@
-"""Scenes of stones that came as closed solids: as they are where joints stay open, led to each other where not."""
+"""Scenes of imported solids: unchanged where joints stay open, fitted to each other where they are closed."""
 
 from math import pi, sin
 
 import numpy as np
 import pytest
 
-from archmodel.database.session import open_database
 from mechanics.stones.polyhedra import mass_properties
 from pipelines.ingest.ingest import ingest
-from pipelines.run.assemble import assemble
 from pipelines.run.check import check_scene
 from pipelines.run.run import run_scene
-from pipelines.scene.file import parse_scene
 from survey.joints.settings import JointMode
+from tests.pipelines.scenes import assembled
 
 SCENE = """
 [scene]
@@ -43,7 +41,7 @@ def loft(name, front, back):
 
 
 def rectangle(x, z, length, height, y=0.0, tail=1.0):
-    """Counter-clockwise seen from -y; a tail shrinks it about its middle line, upon its bed."""
+    """Return corners counter-clockwise seen from -y; a tail shrinks it about its centre line, above its bed."""
     a, b = 0.5 * length * (1 - tail), tail * height
     return [(x + a, y, z), (x + length - a, y, z), (x + length - a, y, z + b), (x + a, y, z + b)]
 
@@ -66,7 +64,7 @@ PRISM = 0.5 * 1.5 * 3**0.5 * 0.2**2
 
 @pytest.fixture
 def scene_of(tmp_path):
-    """The assembly of a scene of solids."""
+    """Return a function that assembles a scene of solids."""
 
     def build(objects, text):
         path = tmp_path / "stones.obj"
@@ -74,8 +72,7 @@ def scene_of(tmp_path):
         url = f"sqlite:///{tmp_path / 'stones.db'}"
         if not (tmp_path / "stones.db").exists():
             ingest([path], url, "solids")
-        with open_database(url) as database, database.session(read_only=True) as session:
-            return assemble(parse_scene(text, "scene.toml"), session)
+        return assembled(url, text)
 
     build.url = f"sqlite:///{tmp_path / 'stones.db'}"
     return build

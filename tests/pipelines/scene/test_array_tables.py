@@ -1,11 +1,10 @@
-"""Laws, loads and throws in scene files: what they make, and every mistake with its line."""
+"""Laws, loads and throws in scene files: the objects they make, and the line of every mistake."""
 
 import re
 
 import numpy as np
 import pytest
 
-from archmodel.database.session import open_database
 from mechanics.scene.laws.cohesive_zone import CohesiveZone
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.lennard_jones import LennardJones
@@ -14,20 +13,18 @@ from mechanics.scene.scene import Block, Fidelity, Placement
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.polyhedra import mass_properties
 from moma.errors import SceneError
-from pipelines.ingest.ingest import ingest
-from pipelines.run.assemble import assemble
 from pipelines.run.check import check_scene
-from pipelines.scene.array_keys import LAW_KEYS, LAW_TYPES, LOAD_TYPES, THROW_KEYS
 from pipelines.scene.file import parse_scene
 from pipelines.scene.laws import law_rules
-from pipelines.scene.stone_keys import MESH_KEYS
-from pipelines.toml.lines import key_lines
 from tests.paths import ROOT
-from tests.pipelines.scene.test_file import default_text, message_of
+from tests.pipelines.scenes import assembled, fails_at_line
 
 STONE = "[materials.stone]\ndensity = 2000\nyoung = 1e10\npoisson = 0.2\n"
 MORTAR = '[[laws]]\ntype = "mortar"\nfriction = 0.5\ntension = 1e5\nshear = 2e5\n'
 SETTLEMENT = '[[loads]]\ntype = "settlement"\nstones = ["S1"]\ndisplacement = [0, 0, -0.02]\nduration = 5\n'
+
+FORCE = "[[loads]]\ntype = 'force'\nstones = ['S']\n"
+MOTION = "[[loads]]\ntype = 'motion'\nstones = ['S']\npivot = [0, 0, 0]\n"
 
 
 def parsed(text):
@@ -163,21 +160,6 @@ def test_the_general_law_and_the_contact_points_are_those_of_the_contact_table()
         ),
         ("[[throw]]\nvelocity = [1, 0, 0]\n", 1, "[[throw]] has no 'stones'"),
         ("[[throw]]\nstones = ['S']\nvelocity = [1, 0]\n", 3, "not a list of three numbers"),
-    ],
-)
-def test_a_mistake_is_named_with_its_line(text, line, said):
-    message = message_of(text + STONE)
-    assert message.startswith(f"scene.toml:{line}: ")
-    assert said in message
-
-
-FORCE = "[[loads]]\ntype = 'force'\nstones = ['S']\n"
-MOTION = "[[loads]]\ntype = 'motion'\nstones = ['S']\npivot = [0, 0, 0]\n"
-
-
-@pytest.mark.parametrize(
-    ("written", "line", "said"),
-    [
         (FORCE + "force = 3\n", 4, "force = 3 is not a list of three numbers or a table { time"),
         (
             FORCE + "force = { time = [0, 1] }\n",
@@ -214,10 +196,8 @@ MOTION = "[[loads]]\ntype = 'motion'\nstones = ['S']\npivot = [0, 0, 0]\n"
         (MOTION + "spin = { file = 'a.csv', time = [1] }\n", 5, "unknown key 'time' in spin = { … }"),
     ],
 )
-def test_a_mistake_in_a_history_is_named_with_its_line(written, line, said):
-    message = message_of(written + STONE)
-    assert message.startswith(f"scene.toml:{line}: ")
-    assert said in message
+def test_a_mistake_is_named_with_its_line(text, line, said):
+    fails_at_line(line, said, parsed, text)
 
 
 def test_histories_are_constants_tables_or_files_beside_the_scene(tmp_path):
@@ -269,38 +249,6 @@ def test_records_are_read_filtered_and_corrected_as_asked(tmp_path):
         assert said in str(caught.value)
 
 
-def test_tables_of_an_array_have_their_own_lines():
-    text = "[[a]]\nx = 1\n[[a]]\n\nx = 2\n[a.b]\ny = 1\n[[a.c]]\nz = 1\n[[a.c]]\nz = 2\n"
-    lines = key_lines(text)
-    expected = {
-        ("a", "0"): 1,
-        ("a", "0", "x"): 2,
-        ("a", "1"): 3,
-        ("a", "1", "x"): 5,
-        ("a", "1", "b", "y"): 7,
-        ("a", "1", "c", "0", "z"): 9,
-        ("a", "1", "c", "1", "z"): 11,
-    }
-    assert {path: lines[path] for path in expected} == expected
-
-
-def test_every_key_of_the_arrays_is_documented_with_its_unit_and_default():
-    documented = (ROOT / "docs/scene.md").read_text(encoding="utf-8")
-    for array, common, types in (
-        ("meshes", MESH_KEYS, {}),
-        ("laws", LAW_KEYS, LAW_TYPES),
-        ("loads", (), LOAD_TYPES),
-        ("throw", THROW_KEYS, {}),
-    ):
-        section = documented.split(f"## `[[{array}]]`")[1].split("\n## ")[0]
-        parts = re.split(r'\n### `type = "(\w+)"`', section)
-        assert parts[1::2] == list(types)
-        for text, keys in zip(parts[::2], (common, *types.values()), strict=True):
-            rows = [line.strip("| ").split("|") for line in text.splitlines() if line.startswith("| `")]
-            found = [tuple(cell.strip() for cell in row) for row in rows]
-            assert found == [(f"`{key.name}`", key.unit, default_text(key), key.doc) for key in keys]
-
-
 def test_the_examples_of_the_documentation_are_valid():
     documented = (ROOT / "docs/scene.md").read_text(encoding="utf-8")
     examples = re.findall(r"^```toml\n(.*?)^```$", documented, re.MULTILINE | re.DOTALL)
@@ -329,21 +277,9 @@ fixed = ["course = 1"]
 """
 
 
-@pytest.fixture(scope="module")
-def url(tmp_path_factory):
-    """The sample in a database that tests only read."""
-    url = f"sqlite:///{tmp_path_factory.mktemp('db') / 'window.db'}"
-    ingest([ROOT / "data/samples/window/window.moma"], url)
-    return url
-
-
 @pytest.fixture
 def build(url):
-    def assembled(text):
-        with open_database(url, create=False) as database, database.session(read_only=True) as session:
-            return assemble(parse_scene(LOW + text, "scene.toml"), session).scene
-
-    return assembled
+    return lambda text: assembled(url, LOW + text).scene
 
 
 def test_laws_and_loads_find_their_stones(build):
@@ -444,11 +380,8 @@ def test_the_ground_shakes_along_its_azimuth(build, tmp_path):
         (MORTAR + "between = ['course = 1', 'W02-99']\n", 18, "between: 'W02-99' is not the code"),
     ],
 )
-def test_what_does_not_suit_its_stones_is_named_with_its_line(build, text, line, said):
-    with pytest.raises(SceneError) as caught:
-        build(text)
-    assert str(caught.value).startswith(f"scene.toml:{line}: ")
-    assert said in str(caught.value)
+def test_a_load_or_law_that_does_not_suit_its_stones_is_named_with_its_line(build, text, line, said):
+    fails_at_line(line, said, build, text)
 
 
 def test_groups_of_stones_have_meshes_of_their_own_and_the_later_counts(build):
@@ -487,7 +420,7 @@ def test_a_mesh_of_no_stone_is_named_with_its_line(build):
         build("[[meshes]]\nstones = ['W02-99']\nsize = 0.1\n")
 
 
-def test_check_tells_the_meshes(url, tmp_path):
+def test_check_reports_the_meshes(url, tmp_path):
     path = tmp_path / "scene.toml"
     path.write_text(
         LOW + "deformable = ['W02-01', 'W02-02', 'W02-03']\n[mesh]\nsize = 0.4\n"
@@ -497,7 +430,7 @@ def test_check_tells_the_meshes(url, tmp_path):
     assert uses == {(str(Block.element), 0.4, 2), ("hex8", 0.4, 1)}
 
 
-def test_check_tells_laws_and_loads(url, tmp_path):
+def test_check_reports_laws_and_loads(url, tmp_path):
     (tmp_path / "a.csv").write_text("0 0\n1 2\n2 0\n")
     path = tmp_path / "scene.toml"
     path.write_text(

@@ -1,4 +1,4 @@
-"""Profiles: what they set, what they leave, what error they tell; and the page that says so."""
+"""Profiles: settings that they change and keep, expected errors, and the page that documents them."""
 
 import re
 from dataclasses import replace
@@ -13,12 +13,12 @@ from mechanics.simulate import simulate
 from mechanics.stones.meshing.elements import Element
 from moma.cli.options import ProfileName
 from moma.errors import UsageError
+from pipelines.results.quantities import QUANTITIES, Quantities, StoneQuantities
 from pipelines.scene.file import parse_scene
 from pipelines.tuning.expected_errors import BOUNDS, TYPICAL, expected_errors, loops
 from pipelines.tuning.measured_errors import COLLAPSE, ERRORS
 from pipelines.tuning.overlay import Overlay, overlaid, overlaid_scene
 from pipelines.tuning.profiles import PROFILES, profile_named, with_profile
-from pipelines.tuning.quantities import QUANTITIES, Quantities, StoneQuantities
 from tests.paths import ROOT
 
 PAGE = (ROOT / "docs/runs.md").read_text(encoding="utf-8")
@@ -60,7 +60,7 @@ def at(name, scene, width=0.4):
     return overlaid(scene, PROFILES[name].overlay(scene.time), width)
 
 
-def test_settings_of_a_profile_go_before_those_of_the_scene():
+def test_settings_of_a_profile_take_precedence_over_those_of_the_scene():
     scene, found = parsed(), at("accurate", parsed())
     assert found.bodies.default is Fidelity.DEFORMABLE
     assert (found.mesh.size, found.mesh.contact_size, found.mesh.element) == (0.2, None, Element.TET10)
@@ -69,7 +69,7 @@ def test_settings_of_a_profile_go_before_those_of_the_scene():
     assert at("fast", scene).bodies.default is Fidelity.RIGID
 
 
-def test_all_that_says_what_is_asked_for_stays():
+def test_the_definition_of_the_task_stays():
     scene, found = parsed(), at("fast", parsed())
     assert found.bodies == replace(scene.bodies, default=Fidelity.RIGID)  # its lists
     assert found.meshes == scene.meshes
@@ -92,7 +92,7 @@ def test_a_scene_that_asks_for_the_motion_keeps_it():
     assert at("accurate", relaxed).time.theta == 1.0
 
 
-def test_without_a_name_a_scene_stays_as_it_is_and_a_wrong_name_is_told():
+def test_without_a_name_a_scene_stays_as_it_is_and_a_wrong_name_is_refused():
     scene = parsed()
     assert with_profile(scene, None, []) is scene
     with pytest.raises(UsageError, match="balanced"):
@@ -155,15 +155,15 @@ def found(outcome="equilibrium", stress=(0.1, 0.1)):
     return Quantities(outcome, 1.0, *values, stones, {}, {}, 1e-5, 1e-5, {})
 
 
-def told(name, run, free):
-    """What is expected of a run in which stones without stress are rigid."""
+def expected(name, run, free):
+    """Return the expected errors of a run in which stones without stress are rigid."""
     rigid = any(one.stress_error is None for one in run.stones.values())
     return expected_errors(name, run, free, rigid=rigid)
 
 
 def test_what_is_expected_goes_with_the_estimates_of_the_run():
     for name in ("balanced", "accurate"):
-        coarse, fine = (told(name, found(stress=(one, one)), 0.2) for one in (0.1, 0.05))
+        coarse, fine = (expected(name, found(stress=(one, one)), 0.2) for one in (0.1, 0.05))
         for quantity in (*TYPICAL, *BOUNDS):
             assert coarse[quantity].value == pytest.approx(2.0 * fine[quantity].value)
             assert coarse[quantity].of == QUANTITIES[quantity]
@@ -171,39 +171,39 @@ def test_what_is_expected_goes_with_the_estimates_of_the_run():
 
 
 def test_where_statics_decides_forces_hold_to_the_tolerance_and_rigid_stones_do_not_move():
-    said = told("fast", found(stress=(None, None)), 0.0)
+    said = expected("fast", found(stress=(None, None)), 0.0)
     assert said["joint_forces"].value == 1e-4
     assert said["displacement"].value == pytest.approx(1.0, abs=0.01)
     assert "stone_von_mises_mean" not in said
-    assert told("fast", found(stress=(None, None)), 0.5)["joint_forces"].value > 0.1
+    assert expected("fast", found(stress=(None, None)), 0.5)["joint_forces"].value > 0.1
     assert said["support_reactions"].value == said["joint_forces"].value  # these are forces in joints too
 
 
 def test_stones_that_a_list_lets_deform_are_as_good_in_fast_as_in_balanced():
-    fast, balanced = (told(name, found(), 0.3) for name in ("fast", "balanced"))
+    fast, balanced = (expected(name, found(), 0.3) for name in ("fast", "balanced"))
     assert {**fast, "collapse": None} == {**balanced, "collapse": None}
 
 
-def test_stones_that_deform_without_stress_are_told_of_like_others():
-    """Those of a ring deform for the sake of their neighbour's stress alone."""
+def test_stones_that_deform_without_stress_count_like_others():
+    """Stones of a ring deform only for the stress of their neighbours."""
     run = found(stress=(0.1, None))
-    assert expected_errors("balanced", run, 0.3, rigid=False) == told("balanced", found(), 0.3)
+    assert expected_errors("balanced", run, 0.3, rigid=False) == expected("balanced", found(), 0.3)
     nothing = expected_errors("balanced", found(stress=(None, None)), 0.3, rigid=False)
     assert list(nothing) == ["collapse"]  # no estimate, no claim
 
 
 def test_rigid_neighbours_spoil_the_stress():
-    alone = told("balanced", found(), 0.3)
-    mixed = told("balanced", found(stress=(0.1, None)), 0.3)
+    alone = expected("balanced", found(), 0.3)
+    mixed = expected("balanced", found(stress=(0.1, None)), 0.3)
     forces = mixed["joint_forces"].value
-    assert forces == told("fast", found(stress=(None, None)), 0.3)["joint_forces"].value
+    assert forces == expected("fast", found(stress=(None, None)), 0.3)["joint_forces"].value
     whole = np.hypot(alone["stone_von_mises_mean"].value, forces)
     assert mixed["stone_von_mises_mean"].value == pytest.approx(whole)
 
 
 @pytest.mark.parametrize("outcome", ["moving", "collapsed"])
 def test_nothing_is_claimed_of_what_was_not_measured(outcome):
-    assert told("balanced", found(outcome), 0.3) == {}
+    assert expected("balanced", found(outcome), 0.3) == {}
 
 
 def test_the_numbers_were_measured_at_all_profiles():

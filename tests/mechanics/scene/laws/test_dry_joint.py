@@ -92,7 +92,7 @@ def test_a_falling_block_bounces_with_newtons_ratio(ratio):
         ({"friction": float("nan")}, "friction = nan"),
         ({"friction": float("inf")}, "friction = inf"),
         ({"dynamic_friction": 0.7}, "dynamic_friction = 0.7; give from 0 up to the static friction, 0.6"),
-        ({"restitution": 1.1}, "restitution = 1.1; give a ratio from 0 to 1"),
+        ({"restitution": 1.1}, "restitution = 1.1; give a number from 0 to 1"),
     ],
 )
 def test_impossible_parameters_are_refused_by_name(changed, said):

@@ -19,7 +19,7 @@ def test_a_ramp_takes_gravity_to_its_whole():
     ramp = GravityRamp(2.0)
     for time, part in ((-1.0, 0.0), (0.0, 0.0), (0.5, 0.25), (2.0, 1.0), (9.0, 1.0)):
         np.testing.assert_allclose(ramp(time, DOWN), part * DOWN)
-    with pytest.raises(SceneError, match=r"duration = 0\.0; give seconds greater than 0"):
+    with pytest.raises(SceneError, match=r"duration = 0\.0; give a number greater than 0 \[s\]"):
         GravityRamp(0.0)
 
 

@@ -1,8 +1,7 @@
-"""One run of a study of speed against accuracy, in a process of its own: ``python -m
-pipelines.tuning.tradeoff.worker``.
+"""One run of a tradeoff study in a process of its own: ``python -m pipelines.tradeoff.worker``.
 
-So its CPU time and its memory are its own, and it can be stopped. The job comes as one line of JSON on the standard
-input, which stays open for as long as the parent lives; the answer is one line of JSON on the standard output.
+A separate process has its own CPU time and memory, and can be stopped. The job is one line of JSON on the standard
+input, which stays open as long as the parent lives; the answer is one line of JSON on the standard output.
 """
 
 import ctypes
@@ -13,44 +12,36 @@ import signal
 import sys
 import threading
 import time
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 from archmodel.database.session import open_database
 from mechanics.results.result import Result
-from mechanics.scene.scene import Fidelity, Method, Placement
 from mechanics.simulate import simulate
-from mechanics.stones.meshing.elements import Element
 from moma.errors import MomaError
+from pipelines.results.quantities import quantities
 from pipelines.run.assemble import assemble
 from pipelines.scene.file import SceneFile, parse_scene
-from pipelines.tuning.overlay import Overlay, overlaid
-from pipelines.tuning.quantities import quantities
+from pipelines.tuning.overlay import overlaid, overlay_from
 
-__all__ = ["FAILED", "SHORT", "Job", "overlay_from", "overlay_record"]
+__all__ = ["FAILED", "SHORT", "Job"]
 
 FAILED = 3
-"""Exit code of a run that failed in a way that MOMA foresees; the reason is on the standard output."""
+"""Exit code of a run that failed with a MomaError; the reason is on the standard output."""
 
 SHORT = 5.0
-"""Work of fewer seconds of CPU time is done twice, since the first time has compiled kernels to read from the disk."""
-_KINDS: dict[str, Any] = {
-    "fidelity": Fidelity,
-    "element": Element,
-    "placement": Placement,
-    "method": Method,
-}
+"""CPU time below which work is done twice, since the first time includes loading compiled kernels [s]."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """What one run needs to know.
+    """Input of one run.
 
     Attributes
     ----------
     text, path : of the scene file; the path is for messages and for files beside it
     url : of the database
-    overlay : what replaces settings of the scene, see `overlay_record`
+    overlay : settings that replace those of the scene, see `overlay_record`
     width : typical smallest width of the stones [m]
     """
 
@@ -61,25 +52,8 @@ class Job:
     width: float
 
 
-def overlay_record(overlay: Overlay) -> dict[str, Any]:
-    """What an overlay sets, in plain texts and numbers."""
-    given = {one.name: getattr(overlay, one.name) for one in fields(overlay)}
-    return {
-        name: str(value) if name in _KINDS else value for name, value in given.items() if value is not None
-    }
-
-
-def overlay_from(record: dict[str, Any]) -> Overlay:
-    """The overlay that `overlay_record` has written."""
-    return Overlay(**{name: _KINDS.get(name, _as_it_is)(value) for name, value in record.items()})
-
-
-def _as_it_is(value: Any) -> Any:
-    return value
-
-
 def _measured(job: Job) -> dict[str, Any]:
-    """Run the scene, twice if that is short, and say what it took and what came out."""
+    """Run the scene, twice if that is short, and return its cost and results."""
     program = _peak_memory()
     scene = overlaid(parse_scene(job.text, job.path), overlay_from(job.overlay), job.width)
     for _ in range(2):
@@ -110,15 +84,15 @@ def _simulated(scene: SceneFile, url: str) -> Result:
 
 
 def _peak_memory() -> int:
-    """The most that this process has had at once [bytes]."""
+    """Return the peak memory of this process [bytes]."""
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak if sys.platform == "darwin" else 1024 * peak
 
 
 def _end_with_parent(parent: int) -> None:
-    """End this process as soon as its parent has ended, however that came about."""
+    """End this process as soon as its parent has ended, for whatever reason."""
     if sys.platform.startswith("linux"):
-        # the kernel does it at once, even amid a long kernel of numba, which the thread below would wait for
+        # the operating system does so at once, even within a long numba kernel, for which the thread below would wait
         ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
         if os.getppid() != parent:
             os._exit(1)
@@ -126,15 +100,14 @@ def _end_with_parent(parent: int) -> None:
 
 
 def _await_end() -> None:
-    while os.read(
-        0, 1024
-    ):  # the parent says nothing more; it ends when the parent's end of the pipe is closed
+    # the parent sends nothing more, so reading ends when its end of the pipe is closed
+    while os.read(0, 1024):
         pass
     os._exit(1)
 
 
 def _main() -> int:
-    # unbuffered, since the rest is for the watch
+    # unbuffered, since the rest is read by the watching thread
     with open(sys.stdin.fileno(), "rb", buffering=0, closefd=False) as channel:
         asked = json.loads(channel.readline())
     _end_with_parent(asked.pop("parent"))

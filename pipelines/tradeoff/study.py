@@ -1,4 +1,4 @@
-"""Speed against accuracy, measured on the user's own scene: runs at many settings, judged by the finest of them."""
+"""Tradeoff study: the user's own scene at many settings, each compared with the finest of them."""
 
 import os
 from dataclasses import dataclass
@@ -9,33 +9,33 @@ from archmodel.database.session import open_database
 from mechanics.dynamics.progress import Listener, silent
 from mechanics.scene.scene import Fidelity
 from moma.errors import UsageError
+from pipelines.results.quantities import QUANTITIES
 from pipelines.run.assemble import assemble
 from pipelines.scene.file import read_scene
 from pipelines.toml.schema import nearest
+from pipelines.tradeoff.grid import grid
+from pipelines.tradeoff.report import Goal, study_record, write_study
+from pipelines.tradeoff.scheduler import Limits, carry_out
+from pipelines.tradeoff.store import Store, study_key
+from pipelines.tradeoff.worker import Job
 from pipelines.tuning.overlay import typical_width
-from pipelines.tuning.quantities import QUANTITIES
-from pipelines.tuning.tradeoff.grid import grid
-from pipelines.tuning.tradeoff.report import Goal, study_record, write_study
-from pipelines.tuning.tradeoff.scheduler import Limits, carry_out
-from pipelines.tuning.tradeoff.store import Store, study_key
-from pipelines.tuning.tradeoff.worker import Job
 
 __all__ = ["Asked", "TradeReport", "run_trade"]
 
-_STRESS = "von_mises"  # names with this in them are of stresses
-_MEMORY_SHARE = 0.8  # of the machine's, that runs may take together
+_STRESS = "von_mises"  # names of quantities with this in them are stresses
+_MEMORY_SHARE = 0.8  # share of the memory of the machine that runs may take together [-]
 
 
 @dataclass(frozen=True)
 class Asked:
-    """What a study is to find out.
+    """Request of a study.
 
     Attributes
     ----------
     budget : time of all runs [s]
     jobs : runs at a time
     error : below which a setting is recommended [-]
-    quantity : of which; None: von_mises_p99 if a stone deforms, else support_reactions
+    quantity : of this error; None: von_mises_p99 if a stone deforms, support_reactions if none does
     """
 
     budget: float = 600.0
@@ -58,12 +58,12 @@ class Asked:
 
 @dataclass(frozen=True)
 class TradeReport:
-    """What a study found.
+    """Result of a study.
 
     Attributes
     ----------
-    folder : where it lies
-    record : the contents of trade.json
+    folder : of the study
+    record : contents of trade.json
     """
 
     folder: Path
@@ -73,19 +73,19 @@ class TradeReport:
 def run_trade(
     path: str | Path, url: str, folder: str | Path, asked: Asked, progress: Listener = silent
 ) -> TradeReport:
-    """Run a scene at many settings and say what each costs and how far it is from the finest.
+    """Run a scene at many settings; measure the cost of each and its difference from the finest.
 
     Parameters
     ----------
     path : scene file
     url : of the database
-    folder : of the study; runs that it has already are not done again
-    asked : how long it may take, and what is to be recommended
-    progress : told of every run
+    folder : of the study; runs that it holds already are not repeated
+    asked : budget, and criterion of the recommendation
+    progress : called at every run
 
     Raises
     ------
-    UsageError : the folder holds other things
+    UsageError : the folder holds other files
     SceneError, GeometryError, DatabaseError : see `pipelines.run.assemble`
     """
     scene = read_scene(path)
@@ -108,5 +108,5 @@ def run_trade(
 
 
 def _memory() -> int:
-    """Memory of this machine [bytes]."""
+    """Return the memory of this machine [bytes]."""
     return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")

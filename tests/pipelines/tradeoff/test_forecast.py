@@ -1,4 +1,4 @@
-"""What a study runs next, in a world in which the time of each run is known beforehand."""
+"""Choice of the next run of a study, in a world where the time of each run is known beforehand."""
 
 from dataclasses import dataclass
 
@@ -7,10 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mechanics.stones.meshing.elements import Element
+from pipelines.tradeoff.forecast import Forecast, left_out, next_run
+from pipelines.tradeoff.grid import Setting
+from pipelines.tradeoff.store import Measured, Status
 from pipelines.tuning.overlay import Overlay
-from pipelines.tuning.tradeoff.forecast import Forecast, left_out, next_run
-from pipelines.tuning.tradeoff.grid import Setting
-from pipelines.tuning.tradeoff.store import Measured, Status
 
 GIB = 2**30
 
@@ -35,7 +35,7 @@ SETTINGS = [*LADDER, *(variant(one, f"{one.name} loose") for one in LADDER)]
 
 @dataclass
 class World:
-    """Runs take a constant, and a power of their unknowns that nobody was told."""
+    """Runs take a constant plus a power of their unknowns, which the forecast does not know."""
 
     rate: float
     power: float
@@ -63,7 +63,7 @@ class World:
 
 
 def carried_out(world, budget, ended=None, memory=16.0 * GIB):
-    """All that is run within a budget: in their order."""
+    """Return the runs within a budget, in their order."""
     ended = dict(ended or {})
     settings = {one.name: one for one in SETTINGS}
     order = []

@@ -1,4 +1,4 @@
-"""The front, the reference and the recommendation of a study, against what they are by definition."""
+"""Front, reference and recommendation of a study, against their definitions."""
 
 import math
 from dataclasses import replace
@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mechanics.stones.meshing.elements import Element
+from pipelines.results.quantities import QUANTITIES, Quantities, StoneQuantities
+from pipelines.tradeoff.grid import Setting
+from pipelines.tradeoff.pareto import Judged, Reference, cheapest, front, judge, models_of_interest
+from pipelines.tradeoff.store import Measured, Status
 from pipelines.tuning.overlay import Overlay
-from pipelines.tuning.quantities import QUANTITIES, Quantities, StoneQuantities
-from pipelines.tuning.tradeoff.grid import Setting
-from pipelines.tuning.tradeoff.pareto import Judged, Reference, cheapest, front, judge, models_of_interest
-from pipelines.tuning.tradeoff.store import Measured, Status
 
 costs = st.floats(1e-3, 1e4)
 errors = st.floats(0.0, 10.0)

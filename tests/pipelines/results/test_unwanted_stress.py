@@ -1,4 +1,4 @@
-"""A stone that deforms, but whose stress was not wanted, counts for nothing wherever stresses are told or drawn."""
+"""Stones that deform without a stress request are left out wherever stresses are reported or drawn."""
 
 from dataclasses import replace
 
@@ -8,9 +8,9 @@ import pytest
 from mechanics.scene.scene import Fidelity
 from pipelines.draw.offscreen.surfaces import wall_surface
 from pipelines.draw.pictures import missing
+from pipelines.results.stone_values import stone_results, stress_statistics
+from pipelines.results.summary import summarise
 from pipelines.results.vtk import body_cells, body_grid
-from pipelines.run.stone_values import stone_results, stress_statistics
-from pipelines.run.summary import summarise
 from tests.pipelines.results_by_hand import deformable_body, result_of, rigid_body
 
 FORCES = ((0.0, 0.0, 3000.0), (0.0, 600.0, 800.0))
@@ -33,7 +33,7 @@ def stones():
     )
 
 
-def test_numbers_are_those_of_the_stones_that_were_asked_for(stones):
+def test_numbers_are_those_of_the_requested_stones(stones):
     without = result_of(stones[:3], pairs=((1, 0), (2, 1)), forces=FORCES)
     beside = result_of(stones, pairs=((1, 0), (2, 1)), forces=FORCES)
     assert stress_statistics(beside) == stress_statistics(without)
@@ -59,7 +59,7 @@ def test_files_and_pictures_have_its_mesh_and_no_stress(stones):
     assert missing(beside, "von_mises") is None
 
 
-def test_a_picture_of_stress_that_nobody_asked_for_has_a_reason(stones):
+def test_a_missing_picture_of_stress_has_a_reason(stones):
     alone = result_of([stones[0], stones[3]], pairs=((1, 0),), forces=FORCES[:1])
     assert missing(alone, "von_mises") == "no stress was asked for"
     assert missing(alone, "displacement") is None

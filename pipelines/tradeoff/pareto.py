@@ -1,13 +1,13 @@
-"""What a study of speed against accuracy says: errors against the finest run, the front, and what to choose."""
+"""Evaluation of a tradeoff study: errors against the finest run, Pareto front, and recommendation."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+from pipelines.results.quantities import QUANTITIES, differences
+from pipelines.tradeoff.grid import Setting
+from pipelines.tradeoff.store import Measured, Status
 from pipelines.tuning.overlay import Overlay
-from pipelines.tuning.quantities import QUANTITIES, differences
-from pipelines.tuning.tradeoff.grid import Setting
-from pipelines.tuning.tradeoff.store import Measured, Status
 
 __all__ = [
     "Judged",
@@ -21,19 +21,19 @@ __all__ = [
 ]
 
 _OWN = ("natural_map", "penetration", "balance", "reaction", "energy")
-_COARSER = 1.2  # ratio of sizes from which on two meshes tell something of each other
+_COARSER = 1.2  # least ratio of sizes at which one mesh gives an error estimate of another [-]
 
 
 @dataclass(frozen=True)
 class Reference:
-    """What the others are measured against: the finest run that could be afforded, not the truth.
+    """Reference of the errors: the finest run within the budget, not the truth.
 
     Attributes
     ----------
     name : of its setting
-    errors : of each of QUANTITIES, estimated; None where there is nothing to estimate it by [-]
-    partner : the run by whose difference that is estimated; "" without one
-    ratio : how much finer it is than its partner [-]
+    errors : estimated error of each of QUANTITIES; None where no estimate is possible [-]
+    partner : the run whose difference gives the estimate; "" without one
+    ratio : size of the partner over that of the reference [-]
     stress_error : of its stress as Zienkiewicz & Zhu (1987) estimate it; None if no stone deforms [-]
     """
 
@@ -46,11 +46,11 @@ class Reference:
 
 @dataclass(frozen=True)
 class Judged:
-    """One run that is done.
+    """One finished run with its errors.
 
     Attributes
     ----------
-    run : what was measured
+    run : its measurements
     errors : of each of QUANTITIES against the reference; those of the reference itself are estimated [-]
     """
 
@@ -60,13 +60,13 @@ class Judged:
 
 @dataclass(frozen=True)
 class Recommendation:
-    """The cheapest setting whose error is below what was asked.
+    """The cheapest setting whose error is below the requested one.
 
     Attributes
     ----------
     name : of the setting
-    error : its error, that of the reference included [-]
-    holds : whether that is below what was asked; if not, it is the smallest that there is
+    error : its error, including that of the reference [-]
+    holds : the error is below the requested one; if not, it is the smallest available
     """
 
     name: str
@@ -77,14 +77,14 @@ class Recommendation:
 def judge(
     settings: Mapping[str, Setting], runs: Mapping[str, Measured]
 ) -> tuple[Reference | None, tuple[Judged, ...]]:
-    """The reference, and all runs that are done with their errors; None if there are none.
+    """Return the reference, None without finished runs, and all finished runs with their errors.
 
-    The reference is the run with the finest elements, by the distance of their nodes and their order: estimates of the
-    error of a stress are blind to what a mesh of one cell cannot show. Of runs with equal meshes, and where no stone
-    deforms, it is that with the smallest time step, then the smallest tolerance, then the most contact points. Its own
-    error is estimated as if errors fell with the first power of the size of cells or steps, which is slower than
-    those of smooth fields fall, and about what corners and edges of contacts allow: the difference to the next coarser
-    run of its kind over (ratio of the sizes - 1).
+    The reference is the run with the finest elements, by the distance of their nodes and their order: error estimates
+    of a stress cannot see what a mesh of one cell does not resolve. Of runs with equal meshes, and where no stone
+    deforms, it is the one with the smallest time step, then the smallest tolerance, then the most contact points. Its
+    own error is estimated on the assumption that errors fall with the first power of the cell or step size, which is
+    slower than for smooth fields and about what corners and edges of contacts allow: the difference from the next
+    coarser run of its kind over (ratio of the sizes - 1).
     """
     done = [run for run in runs.values() if run.status is Status.DONE and run.quantities is not None]
     if not done:
@@ -102,9 +102,10 @@ def judge(
 
 
 def front(points: Iterable[tuple[float, float]]) -> tuple[int, ...]:
-    """Which of the points (cost, error) no other beats in one of the two without being worse in the other.
+    """Return the indices of the points (cost, error) on the Pareto front, by rising cost; of equal points the first.
 
-    In the order of cost; of equal points the first.
+    >>> front([(1.0, 0.3), (2.0, 0.4), (3.0, 0.1)])
+    (0, 2)
     """
     listed = list(points)
     order = sorted(range(len(listed)), key=lambda one: (*listed[one], one))
@@ -118,9 +119,9 @@ def front(points: Iterable[tuple[float, float]]) -> tuple[int, ...]:
 def cheapest(
     judged: Sequence[Judged], reference: Reference, quantity: str, error: float
 ) -> Recommendation | None:
-    """The cheapest run that is surely below an error of a quantity; None if none has it.
+    """Return the cheapest run that is surely below an error of a quantity; None if its error is unknown in all runs.
 
-    A run that differs by e from a reference that is itself wrong by no more than e_r is wrong by no more than e + e_r.
+    A run that differs by e from a reference whose error is at most e_r has an error of at most e + e_r.
     """
     known = [(one, bound) for one in judged if (bound := _bound(one, reference, quantity)) is not None]
     if not known:
@@ -136,7 +137,7 @@ def cheapest(
 def models_of_interest(
     settings: Mapping[str, Setting], runs: Mapping[str, Measured], quantity: str
 ) -> frozenset[str]:
-    """The scene as it is written, if its error is known, and the models on the front of a quantity."""
+    """Return the scene as written, if its error is known, and the models on the front of a quantity."""
     _, judged = judge(settings, runs)
     known = [
         (one.run, error)
@@ -149,12 +150,12 @@ def models_of_interest(
 
 
 def counted(one: Judged, quantity: str) -> float | None:
-    """The error of a run; None if it is not known, or if the scene ends otherwise than in the reference [-]."""
+    """Return the error of a run [-]; None if it is unknown, or if the outcome differs from that of the reference."""
     return None if one.errors["outcome"] else one.errors[quantity]
 
 
 def _bound(one: Judged, reference: Reference, quantity: str) -> float | None:
-    """Error of a run with that of the reference; None if it cannot be told, or the scene ends otherwise."""
+    """Return the error of a run plus that of the reference; None if it is unknown, or the outcome differs."""
     error, own = counted(one, quantity), reference.errors[quantity]
     if error is None or own is None:
         return None
@@ -162,7 +163,7 @@ def _bound(one: Judged, reference: Reference, quantity: str) -> float | None:
 
 
 def _fineness(setting: Setting, run: Measured) -> tuple[float, ...]:
-    """Smaller is finer."""
+    """Return a sort key that is smaller for finer runs."""
     stressed = run.quantities is not None and run.quantities.stress_error is not None
     return (
         setting.coarseness if stressed else math.inf,
@@ -175,7 +176,7 @@ def _fineness(setting: Setting, run: Measured) -> tuple[float, ...]:
 
 
 def _reference(settings: Mapping[str, Setting], finest: Measured, others: Sequence[Measured]) -> Reference:
-    """The finest run, with its error estimated by the finest of the others that is coarser in mesh or step."""
+    """Return the finest run, its error estimated from the finest of the others that is coarser in mesh or step."""
     found = _partner(settings, finest, others)
     assert finest.quantities is not None
     if found is None:
@@ -192,7 +193,7 @@ def _reference(settings: Mapping[str, Setting], finest: Measured, others: Sequen
 def _partner(
     settings: Mapping[str, Setting], finest: Measured, others: Sequence[Measured]
 ) -> tuple[Measured, float] | None:
-    """A run to estimate the error of the finest by, and how much coarser it is; None if all have its mesh and step."""
+    """Return a run for the error estimate of the finest, and how much coarser it is; None if none is coarser."""
     fine = settings[finest.name]
     alike = [one for one in others if settings[one.name].element is fine.element]
     meshes = [one for one in others if settings[one.name].element not in (None, fine.element)]
@@ -208,7 +209,7 @@ def _partner(
 def _coarser(
     settings: Mapping[str, Setting], fine: Setting, runs: Sequence[Measured], size: str
 ) -> tuple[Measured, float] | None:
-    """The first of the runs that is coarser in the size of its cells or steps, and by how much."""
+    """Return the first of the runs that is coarser in cell or step size, and by how much."""
     for one in runs:
         ratio = getattr(settings[one.name], size) / getattr(fine, size)
         if ratio > _COARSER:

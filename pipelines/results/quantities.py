@@ -1,7 +1,7 @@
-"""What users of a run care about, in numbers that two runs of one scene can be compared by, rigid or not, on any mesh.
+"""Quantities of interest of a run, by which two runs of one scene can be compared, rigid or not, on any mesh.
 
-Nothing here is said of nodes: meshes differ. Stresses and displacements are those of a stone as a whole, forces those
-of a joint or a support as a whole, since forces at single points of a hyperstatic structure are not unique.
+None of them refers to nodes, since meshes differ. Stresses and displacements are those of a whole stone, forces those
+of a whole joint or support, since forces at single points of a hyperstatic structure are not unique.
 """
 
 import math
@@ -15,7 +15,7 @@ import numpy as np
 from mechanics.results.result import BodyResult, Result
 from mechanics.scene.scene import Fidelity
 from pipelines.arrays import Array
-from pipelines.run.stone_values import stress_statistics
+from pipelines.results.stone_values import stress_statistics
 
 __all__ = ["QUANTITIES", "Quantities", "StoneQuantities", "differences", "quantities", "quantities_from"]
 
@@ -38,10 +38,10 @@ QUANTITIES: Mapping[str, str] = {
     "reaction": "vertical reaction of all supports against the weight",
     "energy": "energy that no term of the balance explains",
 }
-"""What runs are compared by, and what it is. The last five have a true value of zero: they are errors themselves."""
+"""Quantities and their meanings. The last five have a true value of zero: they are errors themselves."""
 
 _OWN_ERRORS = ("natural_map", "penetration", "balance", "reaction", "energy")
-_NO_MOVEMENT = 1e-6  # of a stone's size: the overlaps of rigid stones at rest are less, and no displacement
+_NO_MOVEMENT = 1e-6  # of the size of a stone [-]; overlaps of rigid stones at rest are smaller
 
 
 @dataclass(frozen=True)
@@ -50,8 +50,8 @@ class StoneQuantities:
 
     Attributes
     ----------
-    volume : [m³]
-    displacement : (3,) mean over its volume; of a rigid stone, over its corners [m]
+    volume : of the stone [m³]
+    displacement : (3,) mean over its volume; for a rigid stone, over its corners [m]
     von_mises_max, von_mises_p99, von_mises_mean : None if rigid [Pa]
     stress_error : relative error of its stress as Zienkiewicz & Zhu (1987) estimate it; None if rigid [-]
     """
@@ -66,19 +66,19 @@ class StoneQuantities:
 
 @dataclass(frozen=True)
 class Quantities:
-    """What users of a run care about.
+    """Quantities of interest of a run.
 
     Attributes
     ----------
-    outcome : how the run ended
+    outcome : of the run
     size : of a typical stone: cube root of the median volume [m]
     von_mises_max, von_mises_p99, von_mises_mean : over all deformable stones; None if none deforms [Pa]
     stones : by code, those that are not fixed
-    support_reactions : of each fixed stone on what it bears, against gravity [N]
+    support_reactions : of each fixed stone on the stones that it supports, against gravity [N]
     joint_forces : (3,) resultant on the first of two stones, by their codes as "first|second" in alphabetical order [N]
     displacement : largest of all points [m]
-    settlement : how far the stone that sank most has sunk [m]
-    errors : those of mechanics.result.Errors that are measured against zero; None where it is not known [-]
+    settlement : of the stone that sank most [m]
+    errors : those of mechanics.results.result.Errors that are measured against zero; None where unknown [-]
     """
 
     outcome: str
@@ -95,7 +95,7 @@ class Quantities:
 
     @property
     def stress_error(self) -> float | None:
-        """Estimated error of the stress of all stones, each weighed by its volume and squared stress [-]."""
+        """Estimated error of the stress of all stones, weighted by volume and squared stress [-]."""
         known = [
             (one.stress_error, one.volume * one.von_mises_mean**2)
             for one in self.stones.values()
@@ -107,12 +107,12 @@ class Quantities:
         return math.sqrt(sum(error**2 * weight for error, weight in known) / total)
 
     def as_record(self) -> dict[str, Any]:
-        """In plain numbers and texts, for JSON; `quantities_from` reads it."""
+        """Return plain numbers and texts, for JSON; `quantities_from` reads them."""
         return asdict(self)
 
 
 def quantities(result: Result) -> Quantities:
-    """What users of a run care about, of its result."""
+    """Compute the quantities of interest of a result."""
     stress = stress_statistics(result)
     moving = [body for body in result.bodies if body.fidelity is not Fidelity.FIXED]
     forces = _joint_forces(result)
@@ -132,7 +132,7 @@ def quantities(result: Result) -> Quantities:
 
 
 def quantities_from(record: Mapping[str, Any]) -> Quantities:
-    """The quantities that `Quantities.as_record` has written."""
+    """Read the quantities that `Quantities.as_record` returned."""
     stones = {
         code: StoneQuantities(**one | {"displacement": tuple(one["displacement"])})
         for code, one in record["stones"].items()
@@ -142,12 +142,13 @@ def quantities_from(record: Mapping[str, Any]) -> Quantities:
 
 
 def differences(found: Quantities, reference: Quantities) -> dict[str, float | None]:
-    """Relative error of each of QUANTITIES; None where one of the two cannot give it.
+    """Compute the relative error of each of QUANTITIES; None where one of the two runs does not give it.
 
-    With the values a of a run and b of the reference: |a - b| / |b| of single numbers; Σ|a - b| / Σ|b| of the
-    reactions; of joints √(Σ‖a - b‖² / Σ‖b‖²), and of stones so too, weighed by volume. The last five are the
-    run's own errors, whatever those of the reference. Of stresses, stones count that deform in both runs; the p99 of
-    all is known only if those are the same stones. Movements of less than 10⁻⁶ of a stone's size count as that.
+    With the values a of a run and b of the reference: |a - b| / |b| for single numbers; Σ|a - b| / Σ|b| for the
+    reactions; √(Σ‖a - b‖² / Σ‖b‖²) for joints, and likewise for stones, weighted by volume. The last five are the
+    run's own errors, whatever those of the reference. Stresses are compared over the stones that deform in both runs;
+    the p99 of all is known only if those are the same stones. Reference movements below 10⁻⁶ of a stone's size count
+    as that.
     """
     both = [(found.stones[code], one) for code, one in reference.stones.items() if code in found.stones]
     stressed = [(a, b) for a, b in both if a.von_mises_max is not None and b.von_mises_max is not None]
@@ -184,14 +185,14 @@ def _stone(body: BodyResult) -> StoneQuantities:
 
 
 def _support_reactions(result: Result) -> dict[str, float]:
-    """Of each fixed stone on what it bears, against gravity (along z without) [N]."""
+    """Compute the force of each fixed stone on those that it supports, against gravity, or along z without it [N]."""
     gravity = np.array(result.scene.gravity)
     size = float(np.linalg.norm(gravity))
     up = -gravity / size if size > 0.0 else np.array([0.0, 0.0, 1.0])
     lift = result.contacts.force @ up
     count = len(result.bodies)
     first, second = result.contacts.bodies.reshape(-1, 2).T
-    # the force is that on the first, so the second bears it up
+    # the force acts on the first, which the second supports
     total = np.bincount(second, lift, count) - np.bincount(first, lift, count)
     return {
         body.code: float(total[number])
@@ -201,7 +202,7 @@ def _support_reactions(result: Result) -> dict[str, float]:
 
 
 def _joint_forces(result: Result) -> dict[tuple[str, str], Array]:
-    """Resultant of the contacts between each two stones, on that whose code comes first [N]."""
+    """Compute the resultant of the contacts between each two stones, on the one whose code comes first [N]."""
     codes = [body.code for body in result.bodies]
     total: dict[tuple[str, str], Array] = defaultdict(lambda: np.zeros(3))
     for (first, second), force in zip(result.contacts.bodies.tolist(), result.contacts.force, strict=True):
@@ -237,7 +238,7 @@ def _largest(stones: Iterable[StoneQuantities]) -> float | None:
 
 
 def _mean(stones: Iterable[StoneQuantities]) -> float | None:
-    """Mean stress of some stones, weighed by their volumes."""
+    """Return the mean stress of stones, weighted by volume."""
     known = [(_number(one.von_mises_mean), one.volume) for one in stones]
     volume = sum(one for _, one in known)
     return sum(mean * one for mean, one in known) / volume if volume > 0.0 else None
@@ -246,7 +247,7 @@ def _mean(stones: Iterable[StoneQuantities]) -> float | None:
 def _field_apart(
     pairs: list[tuple[StoneQuantities, StoneQuantities]], name: str, least: float = 0.0
 ) -> float | None:
-    """Difference of a value of each stone over the value, both in the root mean square over the volume."""
+    """Return the difference of a value of each stone over the value, both as root mean squares over the volume."""
     if not pairs:
         return None
     found, true = (
@@ -269,7 +270,7 @@ def _reactions_apart(found: Mapping[str, float], reference: Mapping[str, float])
 def _forces_apart(
     found: Mapping[str, tuple[float, ...]], reference: Mapping[str, tuple[float, ...]]
 ) -> float | None:
-    """Two stones that touch in one of the runs alone press on each other with nothing in the other."""
+    """Return the relative difference of joint forces; in a run where two stones do not touch, their force is zero."""
     none = (0.0, 0.0, 0.0)
     true = {pair: np.array(reference.get(pair, none)) for pair in {*found, *reference}}
     scale = sum(float(one @ one) for one in true.values())

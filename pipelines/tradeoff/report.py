@@ -1,4 +1,4 @@
-"""What a study of speed against accuracy leaves behind: trade.json, trade.csv, trade.png."""
+"""Result files of a tradeoff study: trade.json, trade.csv, trade.png."""
 
 import csv
 import io
@@ -10,15 +10,14 @@ from importlib.metadata import version
 from typing import Any
 
 from mechanics.scene.scene import Fidelity
-from pipelines.run.summary import as_json
-from pipelines.tuning.quantities import QUANTITIES
-from pipelines.tuning.tradeoff.forecast import Forecast, left_out
-from pipelines.tuning.tradeoff.pareto import Judged, Reference, cheapest, counted, front, judge
-from pipelines.tuning.tradeoff.plot import Panel, Point, trade_png
-from pipelines.tuning.tradeoff.scheduler import Limits
-from pipelines.tuning.tradeoff.store import INDEX, Measured, Status, Store
-from pipelines.tuning.tradeoff.toml import scene_lines
-from pipelines.tuning.tradeoff.worker import overlay_record
+from pipelines.results.quantities import QUANTITIES
+from pipelines.results.summary import as_json
+from pipelines.tradeoff.forecast import Forecast, left_out
+from pipelines.tradeoff.pareto import Judged, Reference, cheapest, counted, front, judge
+from pipelines.tradeoff.plot import Panel, Point, trade_png
+from pipelines.tradeoff.scheduler import Limits
+from pipelines.tradeoff.store import INDEX, Measured, Status, Store
+from pipelines.tuning.overlay import overlay_record, scene_lines
 
 __all__ = ["MAIN", "Goal", "study_png", "study_record", "write_study"]
 
@@ -30,14 +29,14 @@ MAIN = (
     "joint_forces",
     "displacement",
 )
-"""The quantities that table and plot show, where they are known."""
+"""Quantities that table and plot show where they are known."""
 
 _COSTS = ("cpu", "wall", "memory", "nodes", "contacts", "steps", "unconverged_steps", "solver")
 
 
 @dataclass(frozen=True)
 class Goal:
-    """What a study is after.
+    """Goal of a study.
 
     Attributes
     ----------
@@ -54,7 +53,7 @@ class Goal:
 
 
 def study_record(goal: Goal, forecast: Forecast, left: float, limits: Limits) -> dict[str, Any]:
-    """The contents of trade.json: every setting with what it costs, its errors, or why there is no result."""
+    """Return the contents of trade.json: every setting with its cost and errors, or the reason for having no result."""
     reference, judged = judge(forecast.settings, forecast.ended)
     quantity = goal.quantity
     points = [(one.run.cpu, error) for one in judged if (error := counted(one, quantity)) is not None]
@@ -129,7 +128,7 @@ def _recommended(
 
 
 def _as_csv(rows: Sequence[Mapping[str, Any]]) -> str:
-    """One line for each setting; nothing where a value is not known."""
+    """Return one line for each setting, with empty fields for unknown values."""
     plain = [name for name in rows[0] if name not in ("overlay", "errors")]
     out = io.StringIO()
     writer = csv.DictWriter(
@@ -142,13 +141,13 @@ def _as_csv(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def study_png(record: Mapping[str, Any]) -> bytes:
-    """The picture of a study, of the contents of its trade.json."""
+    """Draw the picture of a study from the contents of its trade.json."""
     title = f"{record['scene']}: error against the finest affordable run ({record['reference']['name']})"
     return trade_png(title, _panels(record), record["asked_error"])
 
 
 def _panels(record: Mapping[str, Any]) -> list[Panel]:
-    """One panel for each main quantity that at least two runs have, that which is asked for first."""
+    """Return a panel for each main quantity that at least two runs have, the requested one first."""
     done = [row for row in record["rows"] if row["status"] == Status.DONE and not row["errors"]["outcome"]]
     reference, panels = record["reference"], []
     for quantity in dict.fromkeys([record["quantity"], *MAIN]):
@@ -171,7 +170,7 @@ def _panels(record: Mapping[str, Any]) -> list[Panel]:
 
 
 def _kind(row: Mapping[str, Any]) -> str:
-    """By what the points of a plot are coloured."""
+    """Return the kind by which a point of the plot is coloured."""
     overlay = row["overlay"]
     if overlay.get("fidelity") == Fidelity.RIGID:
         return str(Fidelity.RIGID)

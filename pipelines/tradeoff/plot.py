@@ -1,4 +1,4 @@
-"""Error against CPU time, with the front of what is worth its time."""
+"""Plot of error against CPU time, with the Pareto front."""
 
 import io
 import logging
@@ -20,13 +20,13 @@ _COLOURS = {
 _OTHER = "#8e6c8a"
 _FRONT, _BAND = "#555555", "#dddddd"
 _LEAST = 1e-7  # a logarithmic axis has no zero
-_HIDDEN = 0.1  # of the error of the reference: what is smaller is drawn here
+_HIDDEN = 0.1  # share of the error of the reference at which smaller errors are drawn [-]
 _COLUMNS = 3
 
 
 @dataclass(frozen=True)
 class Point:
-    """One run: its setting, by what it is coloured, CPU time [s] and error [-]."""
+    """One run: its setting, the kind that gives its colour, CPU time [s] and error [-]."""
 
     setting: str
     kind: str
@@ -40,11 +40,11 @@ class Panel:
 
     Attributes
     ----------
-    title : what it is
+    title : of the panel
     points : the runs
     front : numbers of the points on it
-    reference : the setting that all are measured against, whose error is estimated
-    reference_error : below it, errors cannot be told apart [-]
+    reference : setting of the reference run, whose error is estimated
+    reference_error : errors below it cannot be distinguished [-]
     recommended : setting to mark; None: none
     """
 
@@ -57,8 +57,8 @@ class Panel:
 
 
 def trade_png(title: str, panels: Sequence[Panel], asked: float) -> bytes:
-    """A picture with a panel for each quantity; `asked` is the error below which settings are recommended [-]."""
-    # matplotlib tells on stderr that it builds its font cache, once per machine
+    """Draw a panel for each quantity; `asked` is the error below which settings are recommended [-]."""
+    # matplotlib reports on stderr, once per machine, that it builds its font cache
     logging.getLogger("matplotlib.font_manager").setLevel(logging.ERROR)
     from matplotlib.figure import Figure
 
@@ -86,7 +86,7 @@ def _draw(axes: Any, panel: Panel, asked: float) -> None:
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.set_minor_locator(NullLocator())
         axis.set_major_formatter(StrMethodFormatter("{x:g}"))
-    # far below the error of the reference nothing can be told apart: there the axis ends
+    # errors far below that of the reference cannot be distinguished, so the axis ends there
     least = max(_LEAST, _HIDDEN * (panel.reference_error or 0.0))
 
     def seen(error: float) -> float:

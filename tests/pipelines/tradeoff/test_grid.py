@@ -1,4 +1,4 @@
-"""Which settings a study tries, by what the scene asks for; and that their lines make of a scene what they mean."""
+"""Settings that a study tries, by the outputs of the scene; and their lines of TOML against the overlay."""
 
 import tomllib
 from dataclasses import replace
@@ -11,10 +11,8 @@ from mechanics.scene.scene import Block, Fidelity, Method, Placement
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
 from pipelines.scene.file import parse_scene
-from pipelines.tuning.overlay import Overlay, overlaid
-from pipelines.tuning.tradeoff.grid import grid, setting_name
-from pipelines.tuning.tradeoff.toml import scene_lines
-from pipelines.tuning.tradeoff.worker import overlay_from, overlay_record
+from pipelines.tradeoff.grid import grid, setting_name
+from pipelines.tuning.overlay import Overlay, overlaid, overlay_from, overlay_record, scene_lines
 from tests.pipelines.results_by_hand import BOX_FACES, box
 
 STONE = Material("limestone", 2350.0, 12e9, 0.2)
@@ -59,7 +57,7 @@ def test_a_scene_of_rigid_stones_is_tried_with_rigid_stones_only():
     assert {"3 points", "8 points", "points by inertia"} <= set(found)
 
 
-def test_who_asks_for_a_stress_gets_stones_that_deform():
+def test_a_requested_stress_makes_stones_deform():
     found = tried(REST, blocks(Fidelity.RIGID), stress=True)
     ladder = [one for name, one in found.items() if "cell" in name]
     assert {one.overlay.fidelity for one in ladder} == {Fidelity.DEFORMABLE}
@@ -105,7 +103,7 @@ def test_a_region_that_deforms_is_tried_within_a_wall_that_does_too():
 
 
 @given(overlays)
-def test_names_tell_settings_apart_and_records_read_back(overlay):
+def test_names_distinguish_settings_and_records_read_back(overlay):
     assert overlay_from(overlay_record(overlay)) == overlay
     assert (setting_name(overlay) == "as written") == (
         replace(overlay, velocity_tolerance=None, max_iterations=None) == Overlay()

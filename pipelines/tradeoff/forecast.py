@@ -1,4 +1,4 @@
-"""How long a run will take and how much memory, by those that have ended; and which run comes next."""
+"""Forecast of time and memory of runs from those that have ended, and choice of the next run."""
 
 import math
 from collections.abc import Collection, Mapping
@@ -6,25 +6,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.tuning.tradeoff.grid import Setting
-from pipelines.tuning.tradeoff.store import Measured, Status
-from pipelines.tuning.tradeoff.worker import SHORT
+from pipelines.tradeoff.grid import Setting
+from pipelines.tradeoff.store import Measured, Status
+from pipelines.tradeoff.worker import SHORT
 
 __all__ = ["Choice", "Forecast", "left_out", "next_run"]
 
-_USUAL_POWER = 1.5
-_POWERS = (1.0, 2.5)  # of the unknowns, by which time grows; sparse factors of walls and of solid masonry
-_MEMORY_POWER = 1.3
-_START = 3.0  # seconds: a process begins, and reads what it needs; until it has been measured
-_MODELS_SHARE = 0.7  # of the budget for models of the stones, before their variants take what is left
-_PATIENCE = 2.0  # a run is stopped that takes so many times as long as expected,
-_LEAST_SHARE = 1.0 / 6.0  # but not before so much of the budget is spent on it
-_UNKNOWN_SHARE = 1.0 / 3.0  # the same of a run of which nothing is known
+_USUAL_POWER = 1.5  # of the unknowns, by which time grows, until it has been measured
+_POWERS = (1.0, 2.5)  # bounds of the measured power: sparse factors of walls and of solid masonry
+_MEMORY_POWER = 1.3  # of the unknowns, by which memory grows
+_START = 3.0  # start of a process and reading of its input, until it has been measured [s]
+_MODELS_SHARE = 0.7  # share of the budget for models of the stones, before their variants
+_PATIENCE = 2.0  # a run is stopped when it takes this many times as long as expected,
+_LEAST_SHARE = 1.0 / 6.0  # but not before this share of the budget is spent on it
+_UNKNOWN_SHARE = 1.0 / 3.0  # share of the budget for a run without a forecast
 
 
 @dataclass(frozen=True)
 class Forecast:
-    """What runs that have ended say of those to come.
+    """Expected cost of runs, from those that have ended.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class Forecast:
     ended: Mapping[str, Measured]
 
     def seconds(self, setting: Setting) -> float | None:
-        """Expected time from the start of the process to its end [s]; None: nothing is known, or of what it varies."""
+        """Return the expected time of the process from start to end [s]; None if there is no run to infer it from."""
         start = self._start()
         if setting.varied is not None:
             base = self.ended.get(setting.varied)
@@ -51,25 +51,24 @@ class Forecast:
         return start + _twice(grown * setting.effort / known.effort * max(near.wall, 1e-3))
 
     def memory(self, setting: Setting) -> float | None:
-        """Expected memory of the process [bytes]."""
+        """Return the expected memory of the process [bytes]; None if there is no run to infer it from."""
         near = self.ended.get(setting.varied) if setting.varied is not None else self._nearest(setting)
         if near is None or near.memory == 0:
             return None
         grown: float = (setting.unknowns / self.settings[near.name].unknowns) ** _MEMORY_POWER
-        least = min(
-            run.memory for run in self.ended.values() if run.memory
-        )  # compiled kernels, whatever the mesh
+        # compiled kernels, whatever the mesh
+        least = min(run.memory for run in self.ended.values() if run.memory)
         return least + grown * (near.memory - least)
 
     def _start(self) -> float:
-        """What a process takes besides its work [s]."""
+        """Return the time of a process besides its work [s]."""
         spent = [one.elapsed - _twice(one.wall) for one in self.ended.values() if one.status is Status.DONE]
         return max(float(np.median(spent)), 0.5) if spent else _START
 
     def _nearest(self, setting: Setting) -> Measured | None:
-        """The model of the same element, or else of any, whose number of unknowns is nearest.
+        """Return the run with the nearest number of unknowns, of the same element type if there is one.
 
-        One that was stopped says something of the same element with more unknowns only.
+        A stopped run only bounds the time of the same element type with more unknowns.
         """
         alike, others = [], []
         for one in self.ended.values():
@@ -89,7 +88,7 @@ class Forecast:
         return abs(math.log(setting.unknowns / self.settings[run.name].unknowns))
 
     def _power(self) -> float:
-        """By which time grows with the unknowns, of elements of one kind with the other."""
+        """Return the power of the unknowns by which time grows, from pairs of runs with one element type."""
         slopes = []
         for one in self.ended.values():
             for other in self.ended.values():
@@ -105,12 +104,12 @@ class Forecast:
 
 @dataclass(frozen=True)
 class Choice:
-    """The run that comes next.
+    """The next run.
 
     Attributes
     ----------
-    setting : of it
-    limit : when it is stopped, from its start [s]
+    setting : of the run
+    limit : time after which it is stopped [s]
     """
 
     setting: Setting
@@ -125,18 +124,18 @@ def next_run(
     budget: float,
     memory: float,
 ) -> Choice | None:
-    """The cheapest run that fits: of models first, until their share of the budget is spent, then of variants.
+    """Choose the cheapest run that fits: models first, until their share of the budget is spent, then variants.
 
     Parameters
     ----------
     forecast : of this study
-    begun : names of runs that are not to be begun again
+    begun : names of runs that are not to be started again
     worth : names of models whose variants are of interest
-    left : time that is left of the budget [s]
-    budget : [s]
+    left : remaining time of the budget [s]
+    budget : of the study [s]
     memory : that a run may take [bytes]
 
-    What the variants leave of the budget goes to the models again, that the reference may be as fine as can be had.
+    Time that the variants leave goes to the models again, so that the reference is as fine as possible.
     """
     waiting = [one for one in forecast.settings.values() if one.name not in begun]
     models = [one for one in waiting if one.varied is None]
@@ -150,7 +149,7 @@ def next_run(
 
 
 def left_out(forecast: Forecast, setting: Setting, left: float, memory: float) -> str:
-    """Why a setting was not run."""
+    """Return the reason for which a setting was not run."""
     base = forecast.ended.get(setting.varied or "")
     if setting.varied is not None and (base is None or base.status is not Status.DONE):
         return f"a variant of {setting.varied!r}, of which there is no result"
@@ -183,5 +182,5 @@ def _patience(expected: float | None, budget: float) -> float:
 
 
 def _twice(seconds: float) -> float:
-    """Short work is done twice, see `pipelines.tuning.tradeoff.worker`."""
+    """Return the time of work that is done twice if it is short, see `pipelines.tradeoff.worker`."""
     return 2.0 * seconds if seconds < SHORT else seconds

@@ -1,4 +1,4 @@
-"""The runs of a study of speed against accuracy: processes that are begun, awaited, stopped, and never left behind."""
+"""Runs of a tradeoff study: processes that are started, awaited, stopped, and never left behind."""
 
 import json
 import os
@@ -14,30 +14,31 @@ from types import TracebackType
 from typing import IO, Any, Self
 
 from mechanics.dynamics.progress import Listener, Progress
-from pipelines.tuning.quantities import quantities_from
-from pipelines.tuning.tradeoff.forecast import Choice, Forecast, next_run
-from pipelines.tuning.tradeoff.grid import Setting
-from pipelines.tuning.tradeoff.pareto import models_of_interest
-from pipelines.tuning.tradeoff.store import Measured, Status, Store
-from pipelines.tuning.tradeoff.worker import FAILED, Job, overlay_record
+from pipelines.results.quantities import quantities_from
+from pipelines.tradeoff.forecast import Choice, Forecast, next_run
+from pipelines.tradeoff.grid import Setting
+from pipelines.tradeoff.pareto import models_of_interest
+from pipelines.tradeoff.store import Measured, Status, Store
+from pipelines.tradeoff.worker import FAILED, Job
+from pipelines.tuning.overlay import overlay_record
 
 __all__ = ["Limits", "carry_out"]
 
-_PAUSE = 0.02  # seconds between two looks at the processes
+_PAUSE = 0.02  # interval between polls of the processes [s]
 _THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a study may take.
+    """Limits of a study.
 
     Attributes
     ----------
-    budget : time of all runs, those of earlier calls included [s]
+    budget : time of all runs, including those of earlier calls [s]
     jobs : runs at a time
     memory : of one run [bytes]
-    quantity : that the study is after; variants of models that are on its front are run
-    threads : of one run, as its scene says
+    quantity : of the goal; variants of models on its front are run
+    threads : of one run, from the scene
     """
 
     budget: float
@@ -50,12 +51,12 @@ class Limits:
 def carry_out(
     job: Job, settings: Sequence[Setting], store: Store, limits: Limits, progress: Listener
 ) -> tuple[Forecast, float]:
-    """Run what fits into the budget and has not been run; what is known then, and the time that is left of it [s].
+    """Run what fits into the budget and has not been run; return the forecast and the remaining time [s].
 
     Every run is kept in the store as soon as it has ended. Whatever ends this function ends its runs.
     """
     by_name = {one.name: one for one in settings}
-    # a name may have come to mean another setting, as that of a profile
+    # the meaning of a name may have changed, as that of a profile
     ended = {
         name: run
         for name, run in store.load().items()
@@ -73,7 +74,7 @@ def carry_out(
             for run in runs.collect():
                 store.keep(run)
                 ended[run.name] = run
-                progress(Progress("trade", len(ended), len(by_name), _told(run)))
+                progress(Progress("trade", len(ended), len(by_name), _described(run)))
             time.sleep(_PAUSE)
 
 
@@ -84,7 +85,7 @@ def _next(
     left: float,
     limits: Limits,
 ) -> Choice | None:
-    # what was stopped is tried again when there is more time than there was then
+    # a stopped run is tried again with a larger budget
     over = {
         name for name, run in ended.items() if run.status is not Status.STOPPED or run.budget >= limits.budget
     }
@@ -93,13 +94,13 @@ def _next(
     return next_run(forecast, {*over, *runs.names}, worth, left, limits.budget, memory)
 
 
-def _told(run: Measured) -> str:
+def _described(run: Measured) -> str:
     return f"{run.name}: {f'{run.cpu:.1f} s' if run.status is Status.DONE else run.status}"
 
 
 @dataclass
 class _Run:
-    """A process at work."""
+    """A running process."""
 
     choice: Choice
     process: "subprocess.Popen[bytes]"
@@ -108,7 +109,7 @@ class _Run:
     begun: float
 
     def stop(self) -> None:
-        """End it at once if it has not ended, and close all that was open for it."""
+        """Kill the process if it still runs, and close its files."""
         self.process.kill()
         self.process.wait()
         if self.process.stdin is not None:
@@ -118,11 +119,11 @@ class _Run:
 
 
 class _Runs:
-    """Processes at work; to be used as a context, at whose end none is left.
+    """Running processes; a context manager that leaves none behind.
 
     Parameters
     ----------
-    job : what they share; each gets its overlay
+    job : common to all; each gets its own overlay
     limits : of the study
     """
 
@@ -142,20 +143,20 @@ class _Runs:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the settings that are being run."""
+        """Names of the settings that are being run."""
         return tuple(run.choice.setting.name for run in self._runs)
 
     def begin(self, choice: Choice) -> None:
         """Start a process."""
-        # closed by _Run.close; files, since pipes that nobody reads would make it wait
+        # files, closed by _Run.stop, since unread pipes would block the process
         answer, complaint = tempfile.TemporaryFile(), tempfile.TemporaryFile()  # noqa: SIM115
         process = subprocess.Popen(
-            [sys.executable, "-m", "pipelines.tuning.tradeoff.worker"],
+            [sys.executable, "-m", "pipelines.tradeoff.worker"],
             stdin=subprocess.PIPE,
             stdout=answer,
             stderr=complaint,
             env=self._environment(),
-            start_new_session=True,  # Ctrl-C is told to us alone, and we end it
+            start_new_session=True,  # Ctrl-C reaches this process alone, which ends the others
         )
         self._runs.append(_Run(choice, process, answer, complaint, time.monotonic()))
         asked = asdict(self._job) | {
@@ -167,10 +168,10 @@ class _Runs:
             process.stdin.write(json.dumps(asked).encode() + b"\n")
             process.stdin.flush()
         except BrokenPipeError:
-            return  # it ended already; its exit code will say so
+            return  # it has ended already; its exit code will show that
 
     def collect(self) -> list[Measured]:
-        """Those that have ended since, or that have to be stopped now."""
+        """Return the runs that have ended, or exceeded their limit and are stopped."""
         over = []
         for run in tuple(self._runs):
             elapsed = time.monotonic() - run.begun
@@ -193,16 +194,16 @@ class _Runs:
         return over
 
     def _environment(self) -> dict[str, str]:
-        root = str(Path(__file__).resolve().parents[3])
+        root = str(Path(__file__).resolve().parents[2])
         path = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
         return os.environ | dict.fromkeys(_THREADS, str(self._limits.threads)) | {"PYTHONPATH": path}
 
 
 def _ending(run: _Run) -> dict[str, Any]:
-    """How a process ended by itself, and what it said."""
-    code, said, complaint = run.process.returncode, _text(run.answer), _text(run.complaint)
+    """Return the status and the answer of a process that has ended by itself."""
+    code, complaint = run.process.returncode, _text(run.complaint)
     try:
-        answer: dict[str, Any] = json.loads(said)
+        answer: dict[str, Any] = json.loads(_text(run.answer))
     except ValueError:
         answer = {}
     if code == 0 and "quantities" in answer:

@@ -1,4 +1,4 @@
-"""What two runs of a scene are compared by, on results whose numbers are known."""
+"""Quantities by which two runs of a scene are compared, on results whose numbers are known."""
 
 import json
 import math
@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from mechanics.results.result import Outcome
 from mechanics.scene.scene import Fidelity
-from pipelines.tuning.quantities import QUANTITIES, Quantities, differences, quantities, quantities_from
+from pipelines.results.quantities import QUANTITIES, Quantities, differences, quantities, quantities_from
 from tests.pipelines.results_by_hand import deformable_body, result_of, rigid_body
 
 WEIGHT = 1000.0

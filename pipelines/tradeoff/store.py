@@ -1,4 +1,4 @@
-"""What a study of speed against accuracy has measured so far, one file for each run, so that it can go on later."""
+"""Measurements of a tradeoff study, one file for each run, so that it can be continued."""
 
 import hashlib
 import json
@@ -15,12 +15,11 @@ from typing import Any
 import numpy as np
 
 from moma.errors import UsageError
+from pipelines.results.quantities import Quantities, quantities_from
+from pipelines.results.summary import as_json
 from pipelines.run.assemble import Assembly
-from pipelines.run.summary import as_json
 from pipelines.scene.file import SceneFile
-from pipelines.tuning.overlay import Overlay
-from pipelines.tuning.quantities import Quantities, quantities_from
-from pipelines.tuning.tradeoff.worker import overlay_from, overlay_record
+from pipelines.tuning.overlay import Overlay, overlay_from, overlay_record
 
 __all__ = ["INDEX", "Measured", "Status", "Store", "study_key"]
 
@@ -29,7 +28,7 @@ _RUNS = "runs"
 
 
 class Status(StrEnum):
-    """What became of a run."""
+    """Status of a run."""
 
     DONE = "done"
     FAILED = "failed"
@@ -39,22 +38,22 @@ class Status(StrEnum):
 
 @dataclass(frozen=True)
 class Measured:
-    """One run that has ended.
+    """Measurements of one run that has ended.
 
     Attributes
     ----------
     name, overlay : its setting
-    status : what became of it
-    elapsed : from its start to its end, with the start of the process [s]
+    status : of the run
+    elapsed : from start to end, including the start of the process [s]
     budget : of the study in which it ended [s]
     reason : why it failed or was stopped
-    cpu, wall : of the work alone: closing joints, simulating [s]
-    memory, program_memory : the most that its process had at once, and what it had before it began [bytes]
+    cpu, wall : time of the work alone: closing joints, simulating [s]
+    memory, program_memory : peak of its process, and that before the work began [bytes]
     nodes : of all finite elements
     contacts, steps, unconverged_steps : of the run
-    solver : which method found the solutions
+    solver : method that found the solutions
     stages : wall time by stage [s]
-    quantities : what came out; None unless it is done
+    quantities : results; None unless it is done
     """
 
     name: str
@@ -82,19 +81,19 @@ class Store:
 
     Attributes
     ----------
-    folder : where it is
-    key : of scene, stones and version, see `study_key`; results of others in the folder are left alone
+    folder : of the study
+    key : of scene, stones and version, see `study_key`; results with other keys in the folder are left alone
     """
 
     folder: Path
     key: str
 
     def prepare(self) -> None:
-        """Make the folder.
+        """Create the folder.
 
         Raises
         ------
-        UsageError : there is something else, or it cannot be written
+        UsageError : the place holds something else, or cannot be written
         """
         where, remedy = str(self.folder), "name another folder"
         if self.folder.is_symlink() or (self.folder.exists() and not self.folder.is_dir()):
@@ -107,7 +106,7 @@ class Store:
             raise UsageError(f"cannot be written: {error.strerror}", where=where, remedy=remedy) from error
 
     def load(self) -> dict[str, Measured]:
-        """All runs of this study that have ended, by the name of their setting."""
+        """Return all runs of this study that have ended, by the name of their setting."""
         found = {}
         for file in sorted((self.folder / _RUNS).glob("*.json")):
             try:
@@ -116,7 +115,7 @@ class Store:
                     one = _measured(record)
                     found[one.name] = one
             except (OSError, ValueError, LookupError, TypeError):
-                continue  # no result of ours: it is measured again
+                continue  # not a result of a study: the run is repeated
         return found
 
     def keep(self, run: Measured) -> None:
@@ -131,11 +130,11 @@ class Store:
         self.write(f"{_RUNS}/{name}.json", as_json(record).encode("utf-8"))
 
     def write(self, name: str, content: bytes) -> None:
-        """A file of the folder; it appears whole or not at all.
+        """Write a file of the folder; it appears whole or not at all.
 
         Raises
         ------
-        UsageError : there is no room, or no right to
+        UsageError : the disk is full, or permission is missing
         """
         target = self.folder / name
         try:
@@ -165,7 +164,7 @@ def _measured(record: dict[str, Any]) -> Measured:
 
 
 def study_key(scene: SceneFile, assembly: Assembly) -> str:
-    """A number that changes with the scene file, with the stones and loads that it stands for, and with the version."""
+    """Return a digest of the scene file, of the stones and loads that it stands for, and of the version."""
     digest = hashlib.sha256()
     for part in (version("moma-masonry"), scene.text, assembly.scene):
         _feed(part, digest)
@@ -174,7 +173,7 @@ def study_key(scene: SceneFile, assembly: Assembly) -> str:
 
 @singledispatch
 def _feed(value: object, digest: Any) -> None:
-    """Add a value, with all that it is made of, to the digest."""
+    """Add a value, with everything that it contains, to the digest."""
     if is_dataclass(value):
         for one in fields(value):
             _feed(one.name, digest)

@@ -1,4 +1,4 @@
-"""What a study keeps: written whole or not at all, read back the same, and of this scene only."""
+"""Stored runs of a study: written whole or not at all, read back the same, and of this scene only."""
 
 import json
 from dataclasses import replace
@@ -11,10 +11,10 @@ from mechanics.scene.loads.gravity import TiltingTable
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.scene import Fidelity, Method, Scene
 from moma.errors import UsageError
+from pipelines.tradeoff.store import Measured, Status, Store, study_key
 from pipelines.tuning.overlay import Overlay
-from pipelines.tuning.tradeoff.store import Measured, Status, Store, study_key
-from tests.pipelines.tuning.tradeoff.test_grid import blocks
-from tests.pipelines.tuning.tradeoff.test_pareto import quantities_of
+from tests.pipelines.tradeoff.test_grid import blocks
+from tests.pipelines.tradeoff.test_pareto import quantities_of
 
 DONE = Measured(
     name="rigid",

@@ -1,6 +1,7 @@
-"""Which settings a study of speed against accuracy tries on a scene: chosen by what the scene asks for."""
+"""Settings that a tradeoff study tries on a scene, chosen by the outputs that the scene requests."""
 
 import math
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -23,32 +24,44 @@ _CELLS = {
 }
 """Cells across the typical smallest width of a stone, by element. Hex27 has more nodes than hex20 to the same order."""
 
+_WORDS = {
+    "fidelity": "{}",
+    "element": "{}",
+    "cells": "{:g} cells",
+    "points": "{} points",
+    "placement": "points by {}",
+    "step": "h {:g} s",
+    "theta": "θ {:g}",
+    "method": "{}",
+    "tolerance": "η {:.0e}",
+}
+"""Changes of an overlay in words."""
+
 _RIGID = Overlay(fidelity=Fidelity.RIGID)
 _PLAIN = (Overlay(), _RIGID)
-_LINEAR = (
-    4.0  # times as long as elements of the second order: with them contacts take more iterations to find
-)
-_LOOSER, _TIGHTER = 100.0, 0.01
-_PROFILE = "profile"  # the first word of their names
-_LOOSEST = 1e-2  # of a tolerance: beyond it, contacts do not obey their laws at all
+_LINEAR = 4.0  # time of linear over quadratic elements of as many unknowns: contacts need more iterations [-]
+_LOOSER = 100.0  # factor on tolerances of looser variants [-]
+_TIGHTER = 0.01  # factor on tolerances of tighter variants [-]
+_LOOSEST = 1e-2  # largest tolerance; beyond it, contacts no longer obey their laws [-]
+_PROFILE = "profile"  # first word of the names of profiles
 
 
 @dataclass(frozen=True)
 class Setting:
-    """One point of the study.
+    """One setting of the study.
 
     Attributes
     ----------
-    name : what it changes of the scene, in words
-    overlay : the same for `pipelines.tuning.overlay`
+    name : the changes to the scene, in words
+    overlay : the same as a value
     unknowns : expected number of velocities, to order settings by their cost
     element, edge : of the finite elements, None without; and their target edge length [m]
-    coarseness : expected error of their stress, but for a factor: a power of the distance of nodes over the typical
+    coarseness : expected error of their stress up to a factor: a power of the distance of nodes over the typical
         smallest width of the stones; infinite without finite elements [-]
     step, tolerance, points : of the run, changed or not [s], [-], [-]
-    varied : the setting of which this one changes one thing more; None of those that change the model of the stones
-    effort : expected time over that of `varied`; of models, over that of one with as many unknowns that are velocities
-        of rigid stones or of finite elements of the second order [-]
+    varied : the setting from which this variant differs in one further thing; None for models of the stones
+    effort : expected time over that of `varied`; for models, over that of rigid stones or quadratic elements with as
+        many unknowns [-]
     """
 
     name: str
@@ -67,18 +80,18 @@ class Setting:
 def grid(
     scene: SceneFile, blocks: Sequence[Block], width: float, stress: bool = False
 ) -> tuple[Setting, ...]:
-    """The settings to try: models of the stones, cheapest first, then variants of these in one more thing.
+    """Return the settings to try: models of the stones, cheapest first, then variants in one further setting.
 
     Parameters
     ----------
     scene : as its author wrote it
-    blocks : of the scene so written
+    blocks : of the scene as written
     width : typical smallest width of the stones, to which cells refer [m]
-    stress : whether the study is after a stress, so that stones must deform
+    stress : the study is about a stress, so that stones must deform
 
     Where a stone deforms, or has to, it is tried rigid and with finite elements of several kinds and sizes, hexahedra
     only if they suit the stones. Of rigid stones, other contact points are tried; of all, other tolerances and methods
-    of the solver. Time steps are varied where motion is followed, not where a place of rest is sought by relaxation.
+    of the solver. Time steps are varied where motion is followed, not where equilibrium is sought by relaxation.
     """
     moving = [block for block in blocks if block.fidelity is not Fidelity.FIXED]
     models = _models(scene, moving, width, stress)
@@ -92,31 +105,18 @@ def grid(
 
 
 def setting_name(overlay: Overlay) -> str:
-    """What an overlay changes, in words."""
-    words = []
-    if overlay.fidelity is not None:
-        words.append(str(overlay.fidelity))
-    if overlay.element is not None:
-        words.append(str(overlay.element))
-    if overlay.cells is not None:
-        words.append(f"{overlay.cells:g} cell{'s' if overlay.cells != 1 else ''}")
-    if overlay.points is not None:
-        words.append(f"{overlay.points} points")
-    if overlay.placement is not None:
-        words.append(f"points by {overlay.placement}")
-    if overlay.step is not None:
-        words.append(f"h {overlay.step:g} s")
-    if overlay.theta is not None:
-        words.append(f"θ {overlay.theta:g}")
-    if overlay.method is not None:
-        words.append(f"{overlay.method}")
-    if overlay.tolerance is not None:
-        words.append(f"η {overlay.tolerance:.0e}")
-    return ", ".join(words) or "as written"
+    """Return the changes of an overlay in words.
+
+    >>> setting_name(Overlay(element=Element.TET10, cells=2.0, tolerance=1e-4))
+    'tet10, 2 cells, η 1e-04'
+    """
+    values = ((text, getattr(overlay, name)) for name, text in _WORDS.items())
+    words = ", ".join(text.format(value) for text, value in values if value is not None)
+    return re.sub(r"(?<![.\d])1 cells", "1 cell", words) or "as written"
 
 
 def _models(scene: SceneFile, moving: Sequence[Block], width: float, stress: bool) -> list[Setting]:
-    """How stones can be modelled, by rising numbers of unknowns."""
+    """Return the models of the stones, by increasing cost."""
     soft = [block for block in moving if block.fidelity is Fidelity.DEFORMABLE]
     found = [_model(scene, Overlay(), moving, soft, width)]
     if soft and not scene.bodies.deformable:
@@ -139,17 +139,17 @@ def _models(scene: SceneFile, moving: Sequence[Block], width: float, stress: boo
 def _profiles(
     scene: SceneFile, moving: Sequence[Block], soft: Sequence[Block], width: float
 ) -> Iterator[Setting]:
-    """The named profiles; where no stone deforms, without those in which all do."""
+    """Yield the named profiles; where no stone deforms, without those in which all do."""
     for profile in PROFILES.values():
         overlay = profile.overlay(scene.time)
         if overlay.fidelity is Fidelity.DEFORMABLE and not soft:
-            continue  # the scene asks for no stress
+            continue  # the scene requests no stress
         deformed = {None: soft, Fidelity.RIGID: (), Fidelity.DEFORMABLE: moving}[overlay.fidelity]
         yield replace(_model(scene, overlay, moving, deformed, width), name=f"{_PROFILE} {profile.name}")
 
 
 def _of_solver(scene: SceneFile, model: Setting) -> Iterator[Setting]:
-    """Other tolerances, and other methods of the scene as it is written and of rigid stones."""
+    """Yield other tolerances, and other methods for the scene as written and for rigid stones."""
     plain, solver = model.overlay in _PLAIN, scene.solver
     for factor, effort in ((_LOOSER, 1.0), (_TIGHTER, 2.0)) if plain else ((_LOOSER, 1.0),):
         overlay = replace(
@@ -164,7 +164,7 @@ def _of_solver(scene: SceneFile, model: Setting) -> Iterator[Setting]:
 
 
 def _of_time(scene: SceneFile, model: Setting) -> Iterator[Setting]:
-    """Other time steps, and another damping of the scheme, where there is motion to follow."""
+    """Yield other time steps, and other damping of the scheme, where motion is followed."""
     time = scene.time
     if model.overlay not in _PLAIN or time.relaxation:
         return
@@ -177,7 +177,7 @@ def _of_time(scene: SceneFile, model: Setting) -> Iterator[Setting]:
 
 
 def _of_points(scene: SceneFile, model: Setting) -> Iterator[Setting]:
-    """Other contact points of flat faces, of rigid stones."""
+    """Yield other contact points of flat faces, for rigid stones."""
     for points in (3, 4, 8):
         if points != scene.contact.points:
             yield _variant(model, replace(model.overlay, points=points), points / scene.contact.points)
@@ -193,7 +193,7 @@ def _other(tolerance: float, factor: float) -> float:
 def _model(
     scene: SceneFile, overlay: Overlay, moving: Sequence[Block], soft: Sequence[Block], width: float
 ) -> Setting:
-    """A setting in which these stones of those that move have finite elements."""
+    """Return a setting in which the stones `soft`, of those that move, have finite elements."""
     element = overlay.element or scene.mesh.element
     edge = scene.mesh.size if overlay.cells is None else width / overlay.cells
     return Setting(
@@ -224,7 +224,7 @@ def _variant(model: Setting, overlay: Overlay, effort: float) -> Setting:
 
 
 def _unknowns(block: Block, element: Element, edge: float) -> float:
-    """About as many velocities as the block's nodes have if it were a box with a grid in it."""
+    """Estimate the number of nodal velocities of a block, as of a box filled with a grid."""
     cells = np.maximum(1.0, np.round(np.ptp(block.vertices, axis=0) / edge))
     corners = float(np.prod(cells + 1.0))
     if element is Element.HEX20:
@@ -235,7 +235,7 @@ def _unknowns(block: Block, element: Element, edge: float) -> float:
 
 
 def _suits_hexahedra(block: Block) -> bool:
-    """Convex, and each of its corners joins three faces."""
+    """Return whether a block is convex and each of its corners joins three faces."""
     joined = np.bincount(
         np.concatenate([np.array(face) for face in block.faces]), minlength=len(block.vertices)
     )

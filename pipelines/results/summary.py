@@ -1,4 +1,4 @@
-"""summary.json: the run in a few numbers, for people and for programs."""
+"""summary.json: key figures of a run, for people and for programs."""
 
 import json
 import math
@@ -11,26 +11,25 @@ import numpy as np
 from mechanics.results.contact_result import JointResult
 from mechanics.results.result import Result
 from mechanics.scene.scene import Fidelity
-from pipelines.run.stone_values import stress_statistics
-from pipelines.tuning.expected_errors import ProfileReport
-from pipelines.tuning.quantities import quantities
+from pipelines.results.quantities import quantities
+from pipelines.results.stone_values import stress_statistics
 
 __all__ = ["as_json", "summarise"]
 
 
 def summarise(
-    result: Result, *, version: str, seconds: Mapping[str, float], profile: ProfileReport | None = None
+    result: Result, *, version: str, seconds: Mapping[str, float], profile: Mapping[str, Any] | None = None
 ) -> dict[str, Any]:
-    """The contents of summary.json, in SI units.
+    """Return the contents of summary.json, in SI units.
 
     Parameters
     ----------
     result : of the simulation
     version : of MOMA
     seconds : wall time by stage, of the simulation and of what went before and after it [s]
-    profile : at which it ran
+    profile : the report of the profile at which it ran
 
-    Numbers that are not finite become None: JSON has no word for them.
+    Numbers that are not finite become None, as JSON cannot express them.
     """
     stress = stress_statistics(result)
     displacement = max(float(np.linalg.norm(body.displacement, axis=1).max()) for body in result.bodies)
@@ -59,19 +58,25 @@ def summarise(
         "displacement": {"max": displacement},
         "settlement": {"max": float(result.history.settlement[-1])},
         "reaction": {"total_vertical": result.reaction, "weight": result.weight},
-        "profile": None if profile is None else asdict(profile),
+        "profile": profile,
         "version": version,
     }
     return {key: _finite(value) for key, value in summary.items()}
 
 
 def as_json(value: Mapping[str, Any] | list[Any]) -> str:
-    """JSON text with a final newline; refuses numbers that JSON cannot say."""
+    """Return JSON text with a final newline; numbers that JSON cannot express are refused.
+
+    >>> print(as_json({"steps": 3}), end="")
+    {
+      "steps": 3
+    }
+    """
     return json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def _stress(result: Result) -> dict[str, Any] | None:
-    """The worst of all deformable stones, each value with its stone; None if none deforms."""
+    """Return the extreme values over all deformable stones, each with its stone; None if none deforms."""
     values = [(body.code, body.values) for body in result.bodies if body.values is not None]
     if not values:
         return None

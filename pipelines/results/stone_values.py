@@ -1,4 +1,4 @@
-"""Numbers of a result, by stone and over the scene: what tables, database and reports show."""
+"""Values of a result by stone and over the scene, for tables, database and reports."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,10 +8,22 @@ import numpy as np
 from archmodel.store.run_record import StoneResult
 from mechanics.results.contact_result import JointResult
 from mechanics.results.result import BodyResult, Result
-from mechanics.results.stress_values import StressValues, volume_quantile
+from mechanics.results.stress_values import volume_quantile
 from pipelines.arrays import Array, Ints
 
 __all__ = ["StressStatistics", "stone_results", "stress_statistics"]
+
+_STRESSES = (
+    "von_mises_p99",
+    "principal_tension",
+    "principal_compression",
+    "mean_pressure",
+    "tension_zone",
+    "overstressed_zone",
+    "utilisation",
+    "utilisation_tension",
+    "utilisation_compression",
+)
 
 
 @dataclass(frozen=True)
@@ -31,7 +43,7 @@ class StressStatistics:
 
 
 def stress_statistics(result: Result) -> StressStatistics | None:
-    """Statistics of the Von Mises stress; None if no stone deforms."""
+    """Compute statistics of the Von Mises stress; None if no stone deforms."""
     stressed = [
         (body.von_mises, body.node_volume)
         for body in result.bodies
@@ -49,7 +61,7 @@ def stress_statistics(result: Result) -> StressStatistics | None:
 
 
 def stone_results(result: Result) -> tuple[StoneResult, ...]:
-    """What goes back to the database, one per stone, in the scene's order."""
+    """Return the results for the database, one per stone, in the order of the scene."""
     force = np.linalg.norm(result.contacts.force, axis=1)
     largest = _largest(result.contacts.bodies, force, len(result.bodies))
     of_joints = _joint_values(result.joints, len(result.bodies))
@@ -68,30 +80,16 @@ def stone_results(result: Result) -> tuple[StoneResult, ...]:
 
 
 def _values(body: BodyResult, of_joints: Mapping[str, float]) -> dict[str, float]:
-    """The named values of a stone, those that are known; archmodel.run_records.STONE_VALUES says what they are."""
+    """Return the known values of a stone by name; archmodel.store.run_record.STONE_VALUES explains them."""
     values: dict[str, float | None] = {"volume": body.volume, "mass": body.mass, **of_joints}
     if body.values is not None:
-        values |= _stresses(body.values)
+        values |= {name: getattr(body.values, name) for name in _STRESSES}
+        values["stress_error"] = body.values.error
     return {name: value for name, value in values.items() if value is not None and np.isfinite(value)}
 
 
-def _stresses(stress: StressValues) -> dict[str, float | None]:
-    return {
-        "von_mises_p99": stress.von_mises_p99,
-        "principal_tension": stress.principal_tension,
-        "principal_compression": stress.principal_compression,
-        "mean_pressure": stress.mean_pressure,
-        "tension_zone": stress.tension_zone,
-        "overstressed_zone": stress.overstressed_zone,
-        "utilisation": stress.utilisation,
-        "utilisation_tension": stress.utilisation_tension,
-        "utilisation_compression": stress.utilisation_compression,
-        "stress_error": stress.error,
-    }
-
-
 def _joint_values(joints: JointResult, count: int) -> dict[str, Array]:
-    """(nb,) the worst of the joints of each stone; NaN where it has none of which there is something to say."""
+    """Return the worst value (nb,) over the joints of each stone; NaN where none is known."""
     return {
         f"joint_{name}": _largest(joints.bodies, getattr(joints, attribute), count)
         for name, attribute in (
@@ -105,7 +103,7 @@ def _joint_values(joints: JointResult, count: int) -> dict[str, Array]:
 
 
 def _largest(bodies: Ints, values: Array, count: int) -> Array:
-    """Largest of the values (n,) of the pairs of bodies (n, 2) that each body (count,) is in; NaN without one."""
+    """Return the largest value (n,) over the pairs of bodies (n, 2) that each body (count,) is in; NaN without one."""
     largest = np.full(count, -np.inf)
     known = np.isfinite(values)
     for side in (0, 1):

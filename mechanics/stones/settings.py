@@ -1,0 +1,104 @@
+"""Settings declared once: meaning, unit and bounds beside the type and the default of a dataclass field."""
+
+from collections.abc import Mapping
+from functools import cache
+from math import inf
+from typing import Any, NamedTuple, get_type_hints
+
+from mechanics.stones.validation import LARGEST, SMALLEST
+from moma.errors import SceneError
+
+__all__ = ["Setting", "check_settings", "declared"]
+
+
+class Setting(NamedTuple):
+    """Annotation of a field: ``friction: Annotated[float, Setting("Coulomb's coefficient μ.", "-", at_least=0)]``.
+
+    Attributes
+    ----------
+    doc : meaning, one sentence; the reference of the scene file shows it
+    unit : of the value; "-" for a ratio
+    above, at_least, below, at_most : bounds of a number
+    choices : the numbers allowed; any if empty
+    infinite : infinity is a value, which asks for nothing
+    """
+
+    doc: str
+    unit: str = ""
+    above: float | None = None
+    at_least: float | None = None
+    below: float | None = None
+    at_most: float | None = None
+    choices: tuple[int, ...] = ()
+    infinite: bool = False
+
+
+@cache
+def declared(owner: type) -> Mapping[str, Setting]:
+    """Return the settings that a dataclass declares, by field."""
+    hints = get_type_hints(owner, include_extras=True)
+    return {
+        name: one
+        for name, hint in hints.items()
+        for one in getattr(hint, "__metadata__", ())
+        if isinstance(one, Setting)
+    }
+
+
+def check_settings(where: str, settings: object) -> None:
+    """Refuse the first number outside its declared bounds; None, where a field allows it, is always within them.
+
+    Raises
+    ------
+    SceneError : naming the place, the setting, its value and a remedy
+
+    >>> from dataclasses import dataclass
+    >>> from typing import Annotated
+    >>> @dataclass
+    ... class Step:
+    ...     length: Annotated[float, Setting("Time step h.", "s", above=0)] = 1e-3
+    >>> declared(Step)["length"].unit
+    's'
+    >>> check_settings("time", Step(-1.0))
+    Traceback (most recent call last):
+    moma.errors.SceneError: time: length = -1.0; give a number greater than 0 [s]
+    """
+    owner: Any = type(settings)
+    for name, setting in declared(owner).items():
+        value = getattr(settings, name)
+        if not (value in setting.choices if setting.choices else value is None or _within(value, setting)):
+            raise SceneError(f"{name} = {value!r}", where=where, remedy=_remedy(setting))
+
+
+def _within(value: Any, setting: Setting) -> bool:
+    _, _, above, at_least, below, at_most, _, infinite = setting
+    if above is at_least is below is at_most is None:
+        return True  # a flag, an enumeration, a text
+    return (
+        abs(value) <= (inf if infinite else LARGEST)
+        and (above is None or value - above >= SMALLEST)
+        and (at_least is None or value >= at_least)
+        and (below is None or value < below)
+        and (at_most is None or value <= at_most)
+    )
+
+
+def _remedy(setting: Setting) -> str:
+    if setting.choices:
+        *others, last = map(str, setting.choices)
+        return f"give {', '.join(others)} or {last}"
+    unit = f" [{setting.unit}]" if setting.unit not in ("", "-") else ""
+    return f"give a number {' and '.join(_bounds(setting))}{unit}"
+
+
+def _bounds(setting: Setting) -> list[str]:
+    """Return the bounds in words."""
+    if setting.at_least is not None and setting.at_most is not None:
+        return [f"from {setting.at_least:g} to {setting.at_most:g}"]
+    words = (
+        (setting.above, "greater than {:g}"),
+        (setting.at_least, "of {:g} or more"),
+        (setting.below, "less than {:g}"),
+        (setting.at_most, "of at most {:g}"),
+    )
+    return [text.format(bound) for bound, text in words if bound is not None]

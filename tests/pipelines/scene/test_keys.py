@@ -1,0 +1,60 @@
+"""Keys of a scene file derived from settings dataclasses."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Annotated
+
+import pytest
+
+from mechanics.stones.settings import Setting, check_settings
+from moma.errors import SceneError
+from pipelines.scene.keys import build, keys_of
+from pipelines.toml.schema import REQUIRED, Document, Kind, check_table
+
+
+class Colour(StrEnum):
+    RED = "red"
+    GREEN = "green"
+
+
+@dataclass(frozen=True)
+class Paint:
+    weight: Annotated[float, Setting("Weight.", "kg", above=0, at_most=5)]
+    coats: Annotated[int, Setting("Coats.", choices=(1, 3))] = 3
+    colour: Annotated[Colour, Setting("Colour.")] = Colour.RED
+    second: Annotated[Colour | None, Setting("Second colour.")] = None
+    names: Annotated[tuple[str, ...], Setting("Names.")] = ()
+    own: int = 7
+
+
+def test_fields_with_a_declaration_become_keys():
+    keys = {key.name: key for key in keys_of(Paint, "names")}
+    assert list(keys) == ["weight", "coats", "colour", "second", "names"]
+    weight = keys["weight"]
+    assert (weight.kind, weight.doc, weight.unit) == (Kind.NUMBER, "Weight.", "kg")
+    assert (weight.default, weight.above, weight.at_most) == (REQUIRED, 0, 5)
+    assert (keys["coats"].default, keys["coats"].choices) == (3, (1, 3))
+    assert (keys["colour"].default, keys["colour"].choices) == ("red", ("red", "green"))
+    assert (keys["second"].kind, keys["second"].default) == (Kind.TEXT, None)
+    assert keys["names"].default is REQUIRED
+
+
+def test_a_checked_table_makes_the_dataclass():
+    given = {"weight": 2, "colour": "green", "names": ["a"]}
+    values = check_table(Document("paint.toml"), ("paint",), given, keys_of(Paint))
+    assert build(Paint, values | {"other": 1}) == Paint(2.0, 3, Colour.GREEN, None, ("a",))
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"weight": 0.0}, "paint: weight = 0.0; give a number greater than 0 and of at most 5 [kg]"),
+        ({"weight": 5.1}, "weight = 5.1"),
+        ({"weight": float("nan")}, "weight = nan"),
+        ({"coats": 2}, "coats = 2; give 1 or 3"),
+    ],
+)
+def test_the_dataclass_is_held_to_the_same_bounds(changed, message):
+    with pytest.raises(SceneError) as caught:
+        check_settings("paint", Paint(**{"weight": 1.0} | changed))
+    assert message in str(caught.value)

@@ -1,0 +1,48 @@
+"""Scenes in tests: surveys of a few stones, assembly from a database, and the line of the error in a wrong scene."""
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+import pytest
+
+from archmodel.database.session import open_database
+from moma.errors import SceneError
+from pipelines.arrays import Array
+from pipelines.run.assemble import Assembly, assemble
+from pipelines.scene.file import parse_scene
+
+__all__ = ["assembled", "fails_at_line", "survey_text"]
+
+
+def assembled(url: str, text: str) -> Assembly:
+    """Assemble a scene from the stones of a database."""
+    with open_database(url, create=False) as database, database.session(read_only=True) as session:
+        return assemble(parse_scene(text, "scene.toml"), session)
+
+
+def fails_at_line(line: int, words: str, build: Callable[[str], object], text: str) -> None:
+    """Check that what is built of a text fails in one line, which names the line of the scene, with exit code 2."""
+    with pytest.raises(SceneError) as caught:
+        build(text)
+    message = str(caught.value)
+    assert message.startswith(f"scene.toml:{line}: ")
+    assert words in message
+    assert "\n" not in message
+    assert caught.value.exit_code == 2
+
+
+def survey_text(stones: Mapping[str, tuple[int, Array, Array]], shift: Array) -> str:
+    """Write a survey of headers: by code the course, the corners (4, 3) and points (n, 3) of the face, shifted [m]."""
+    observer = (shift + np.array([0.5, -9.0, 1.0])).tolist()
+    lines = [
+        "moma-survey 1",
+        f"observer {' '.join(map(repr, observer))}",
+        "sigma 0.002",
+        "depth * 0.4 sigma 0.02 source thickness",
+    ]
+    for code, (course, corners, points) in stones.items():
+        lines.append(f"stone {code} header course {course}")
+        for word, places in (("vertex", corners), ("point", points)):
+            lines += [f"{word} {' '.join(map(repr, place))}" for place in (places + shift).tolist()]
+        lines.append("end")
+    return "\n".join(lines) + "\n"
