@@ -7,11 +7,13 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from mechanics.arrays import Array
+from mechanics.dynamics.clock import Clock
 from mechanics.dynamics.observers.energy import EnergyBalance, kinetic_energy
 from mechanics.dynamics.observers.equilibrium import imbalance, settlement, speed, support_reaction
 from mechanics.dynamics.progress import Progress
-from mechanics.dynamics.simulation import Clock, Simulation, Step
+from mechanics.dynamics.simulation import Simulation
 from mechanics.dynamics.static_start import static_start
+from mechanics.dynamics.step import Step
 from mechanics.dynamics.stopping import LASTING, Watch
 from mechanics.model.model import Model, build_model
 from mechanics.results.postprocess import Observer
@@ -89,10 +91,7 @@ class _Log:
         """Account for one step, and return the imbalance of each body (nb,)."""
         model, solution = self._model, step.solution
         self.energy(step)
-        overlap = float(np.max(-step.active.gap, initial=0.0))
-        resting = 0
-        if step.borne is not None:
-            overlap, resting = max(overlap, float(-step.borne.gap.min(initial=0.0))), len(step.borne.contacts)
+        overlap = float(np.max(-step.gap, initial=0.0))
         self.penetration = max(self.penetration, overlap)
         self.unconverged += not solution.converged
         if solution.why:
@@ -108,7 +107,7 @@ class _Log:
                 float(balance.max()),
                 solution.natural_map,
                 solution.iterations,
-                len(step.active.contacts) + resting,
+                len(step.gap),
                 overlap,
                 float(settlement(model, self._start, step.after)[~model.fixed].max(initial=0.0)),
             )

@@ -7,7 +7,7 @@ import numpy as np
 
 from mechanics.dynamics.observers.equilibrium import displacement, imbalance
 from mechanics.dynamics.progress import Progress
-from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import Model
 from mechanics.results.result import StaticStart
 from mechanics.scene.scene import TimeSettings
@@ -47,7 +47,7 @@ def static_start(
         solver = InteriorPoint(
             _FURTHER * max(asked.tolerance, _ROUNDING), _FASTEST * asked.velocity_tolerance
         )
-    search = Simulation(still, start, Clock(), solver, elastic_scale=True)
+    search = Simulation(still, start, solver=solver, elastic_scale=True)
     limit = model.scene.time.balance_tolerance
     iterations, count, balance, eta, found = 0, 0, np.inf, np.inf, False
     while count < _STEPS and not found:
@@ -77,7 +77,7 @@ def _still(model: Model, step: float) -> Model:
 
 def _set_down(model: Model, search: Simulation) -> Simulation:
     """Some steps of the run's own length: a small error of velocity has left gaps between rigid stones over 1 s."""
-    last = Simulation(_still(model, model.scene.time.step), search.start, Clock())
+    last = Simulation(_still(model, model.scene.time.step), search.start)
     last.take_over(search)
     for _ in range(_SETTLING):
         last.step()

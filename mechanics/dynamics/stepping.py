@@ -7,10 +7,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mechanics.arrays import Array, Ints
-from mechanics.contact.contacts import Contacts
 from mechanics.delassus.assembly import world_impulse
-from mechanics.delassus.mixed import MixedDelassus
-from mechanics.delassus.rigid import RigidDelassus
+from mechanics.dynamics.contact_search import Detection
 from mechanics.model._kernels import deform, rigid_part
 from mechanics.model.deformable import Compliance
 from mechanics.model.model import Model
@@ -152,23 +150,17 @@ def _loads(model: Model, state: State, gravity: Array) -> Array:
 
 
 def kicked(
-    model: Model,
-    free: Kick,
-    rotation: Array,
-    contacts: Contacts,
-    operator: RigidDelassus | MixedDelassus,
-    impulse: Array,
-    compliance: Sequence[Compliance],
+    model: Model, free: Kick, found: Detection, impulse: Array, compliance: Sequence[Compliance]
 ) -> Kick:
-    """v_{i+1} = v_free + ŵ H r; `rotation` (nb, 3, 3) is that for which the operator was made."""
-    velocity = free.velocity + operator.rigid_change(impulse)
+    """Return v_{i+1} = v_free + ŵ H r, with ŵ and H of the configuration in which the contacts were found."""
+    velocity = free.velocity + found.operator.rigid_change(impulse)
     node_velocity = free.node_velocity
     if compliance:
-        world = world_impulse(contacts, impulse)
-        nodal = contacts.weights.T @ np.stack([world, -world], axis=1).reshape(-1, 3)
+        world = world_impulse(found.contacts, impulse)
+        nodal = found.contacts.weights.T @ np.stack([world, -world], axis=1).reshape(-1, 3)
         node_velocity = node_velocity.copy()
         for group, own in zip(model.elastic_stones.groups, compliance, strict=True):
-            turn = rotation[group.bodies]
+            turn = found.configuration.rotation[group.bodies]
             node_velocity[group.nodes] += own.respond(nodal[group.nodes] @ turn) @ turn.transpose(0, 2, 1)
     return Kick(velocity, node_velocity, free.load)
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from mechanics.arrays import Array, Bools, Ints
 from mechanics.contact.contacts import Contacts, material_points
-from mechanics.dynamics.simulation import Step
+from mechanics.dynamics.step import Step
 from mechanics.model.model import Model
 from mechanics.results.contact_result import ContactResult, JointResult
 from mechanics.results.interfaces import Faces, find_interfaces, placed_faces

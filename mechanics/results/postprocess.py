@@ -7,7 +7,7 @@ import numpy as np
 
 from mechanics.arrays import Array
 from mechanics.contact.contacts import material_points
-from mechanics.dynamics.simulation import Step
+from mechanics.dynamics.step import Step
 from mechanics.model.deformable import Deformable
 from mechanics.model.model import Model
 from mechanics.results.contact_result import ContactResult, JointResult

@@ -8,7 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from mechanics.arrays import Bools, Ints
-from mechanics.dynamics.simulation import detector
+from mechanics.dynamics.contact_search import detector
 from mechanics.model.model import Model, build_model
 from mechanics.results.forecast.workload import Amounts, amounts
 from mechanics.scene.scene import Fidelity, Scene

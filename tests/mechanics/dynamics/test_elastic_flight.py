@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from mechanics.dynamics.observers.energy import elastic_energy, kinetic_energy
-from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.dynamics.simulation import Simulation
 from mechanics.dynamics.stepping import predict
 from mechanics.model._kernels import deform, rigid_part
 from mechanics.model.model import build_model
@@ -263,7 +263,7 @@ def test_rigid_stones_fly_as_if_alone():
 def test_momentum_is_kept_through_kicks_too():
     """200 steps of 1 ms with elastic forces and centrifugal ones: they push no stone as a whole."""
     model, start = build(step=1e-3, theta=0.5)
-    simulation = Simulation(model, start, Clock())
+    simulation = Simulation(model, start)
     simulation.state = before = shaken(model, start, 9, strain=1e-4)
     for _ in range(200):
         after = simulation.step().after

@@ -8,7 +8,7 @@ import pytest
 
 from mechanics.dynamics.observers.energy import EnergyBalance, elastic_energy, kinetic_energy
 from mechanics.dynamics.observers.equilibrium import displacement, imbalance, speed, support_reaction
-from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
 from mechanics.results.result import Outcome
 from mechanics.scene.scene import Fidelity, SolverSettings
@@ -23,7 +23,7 @@ G = 9.81
 def run(one, steps):
     """The steps of a scene, and its model."""
     model, start = build_model(one)
-    simulation = Simulation(model, start, Clock())
+    simulation = Simulation(model, start)
     return model, start, [simulation.step() for _ in range(steps)]
 
 
