@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 
 from mechanics.dynamics.observers.equilibrium import displacement, imbalance
+from mechanics.dynamics.outcome import StaticStart
 from mechanics.dynamics.progress import Progress
 from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import Model
-from mechanics.results.result import StaticStart
 from mechanics.scene.scene import TimeSettings
 from mechanics.scene.state import State
 from mechanics.solvers.choice import Solver

@@ -4,9 +4,9 @@ import numpy as np
 
 from mechanics.arrays import Array
 from mechanics.dynamics.observers.equilibrium import displacement, seen_from_supports, speed
+from mechanics.dynamics.outcome import Outcome
 from mechanics.model.model import Model
 from mechanics.problem.problem import ContactSolution
-from mechanics.results.result import Outcome
 from mechanics.scene.state import State
 
 __all__ = ["LASTING", "Watch"]

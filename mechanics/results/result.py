@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import StrEnum
 
 from mechanics.arrays import Array, Ints
+from mechanics.dynamics.outcome import Outcome, StaticStart
 from mechanics.results.contact_result import ContactResult, JointResult
 from mechanics.results.stress_values import StressValues
 from mechanics.scene.scene import Fidelity, Scene
@@ -20,14 +20,6 @@ __all__ = [
     "Result",
     "StaticStart",
 ]
-
-
-class Outcome(StrEnum):
-    """How a run ended."""
-
-    EQUILIBRIUM = "equilibrium"
-    MOVING = "moving"
-    COLLAPSED = "collapsed"
 
 
 @dataclass(frozen=True)
@@ -160,25 +152,6 @@ class Energies:
     external: float
     contact: float
     scheme: float
-
-
-@dataclass(frozen=True)
-class StaticStart:
-    """How the static equilibrium was sought.
-
-    Attributes
-    ----------
-    found : whether there is one; else the run begins with all stones at rest and without stress
-    steps, iterations : of the search, and of its solver
-    natural_map : η of the last step, r and u measured against the elastic part of W [-]
-    balance : unbalanced force of a body over its weight, largest over the bodies [-]
-    """
-
-    found: bool
-    steps: int
-    iterations: int
-    natural_map: float
-    balance: float
 
 
 @dataclass(frozen=True)
