@@ -1,4 +1,4 @@
-"""How a run begins and ends; light, so that results and reports can load it alone."""
+"""Start and end of a run; a light module, so that results and reports load quickly."""
 
 from dataclasses import dataclass
 from enum import StrEnum

@@ -1,4 +1,4 @@
-"""Energy balance of the θ-scheme: what no term explains was made by the program.
+"""Energy balance of the θ-scheme; energy that no term explains is an error of the program.
 
 With v_θ = θ v_{i+1} + (1-θ) v_i, the scheme gives exactly
 
@@ -22,12 +22,12 @@ __all__ = ["EnergyBalance", "elastic_energy", "kinetic_energy"]
 
 
 def kinetic_energy(model: Model, state: State) -> float:
-    """½ vᵀ M v of all bodies that can move [J]."""
+    """Return ½ vᵀ M v of all bodies that can move [J]."""
     return 0.5 * _mass_norm(model, state.rotation, state.velocity, state.node_velocity)
 
 
 def elastic_energy(model: Model, state: State) -> float:
-    """½ dᵀ K d of all deformable bodies [J]."""
+    """Return ½ dᵀ K d of all deformable bodies [J]."""
     return sum(
         stone.elastic_energy(state.node[model.nodes_of(b)], state.centre[b], state.rotation[b])
         for b, stone in enumerate(model.stones)
@@ -59,7 +59,7 @@ def _contact_work(model: Model, step: Step, theta: float) -> tuple[float, float]
 
 
 def _elastic_dissipation(model: Model, step: Step, theta: float, duration: float) -> float:
-    """(θ - ½) ‖Δq‖²_K + h v_θᵀ V v_θ of all deformable bodies [J]."""
+    """Return (θ - ½) ‖Δq‖²_K + h v_θᵀ V v_θ of all deformable bodies [J]."""
     total = 0.0
     for group in model.elastic_stones.groups:
         stone, count = group.stone, len(group.bodies)
@@ -76,7 +76,7 @@ def _elastic_dissipation(model: Model, step: Step, theta: float, duration: float
 
 
 def _in_axes(group: ElasticGroup, state: State, nodal: Array, origin: Array | None = None) -> Array:
-    """Nodal vectors (k, n, 3) of equal stones in their own axes."""
+    """Return nodal vectors (k, n, 3) of equal stones in their own axes."""
     own = nodal[group.nodes]
     if origin is not None:
         own = own - origin[group.bodies, None]
@@ -85,14 +85,14 @@ def _in_axes(group: ElasticGroup, state: State, nodal: Array, origin: Array | No
 
 
 class EnergyBalance:
-    """Adds up the terms of the balance over a run.
+    """Terms of the energy balance, summed over a run.
 
     Attributes
     ----------
     external, contact, scheme : work of loads and driven bodies, work of the contacts, dissipation of scheme, damping
         and relaxation, so far [J]
     unexplained : ΔE - external - contact + scheme, so far [J]
-    reference : the largest energy that was in play so far, at least 10⁻⁹ of weight times smallest width [J]
+    reference : largest energy in any term so far, at least 10⁻⁹ of weight times smallest width [J]
     """
 
     def __init__(self, model: Model, state: State) -> None:
@@ -124,7 +124,7 @@ class EnergyBalance:
         self.reference = max(self.reference, energy, abs(self.external), abs(self.contact), self.scheme)
 
     def _load_work(self, step: Step, theta: float) -> float:
-        """h P·v_θ: loads at the kick, on velocities before and after it."""
+        """Return h P·v_θ: loads at the kick times the mean of the velocities before and after it [J]."""
         model = self._model
         moving, h = model.inertia.moving, model.scene.time.step
         mean = theta * step.kick.velocity + (1 - theta) * step.predicted.velocity
