@@ -18,8 +18,7 @@ from mechanics.dynamics.observers.equilibrium import imbalance
 from mechanics.dynamics.simulation import Simulation
 from mechanics.dynamics.stopping import Watch
 from mechanics.model.model import build_model
-from mechanics.results.forecast.plan import plan
-from mechanics.results.forecast.workload import Amounts
+from mechanics.results.forecast.plan import Amounts, plan
 from moma.errors import SolverError
 
 __all__ = ["main"]
