@@ -1,4 +1,4 @@
-"""The scene: everything that a simulation needs, and nothing that changes while it runs."""
+"""Scene: all input of a simulation, constant during a run."""
 
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -33,7 +33,7 @@ _POINTS = (1, 3, 4, 8)
 
 
 class Fidelity(StrEnum):
-    """How a block is modelled."""
+    """Mechanical model of a block."""
 
     FIXED = "fixed"
     RIGID = "rigid"
@@ -63,12 +63,12 @@ class Block:
     element : kind of its finite elements; hexahedra suit blocks whose corners each join three faces
     velocity : (6,) initial translation [m/s] and rotation [rad/s] velocity; not for fixed blocks
     parts : convex parts that fill a non-convex stone without overlap; empty if it is convex
-    radius : of a ball, whose surface is the sphere about the mean of its corners; corners and faces are for pictures
-        (mechanics.balls makes them) [m]. None: a polyhedron
-    contact_size : target edge length at the faces that touch other blocks where the scene begins; None: as inside [m]
-    growth : by how much edges get longer per metre away from these faces, up to the mesh size [-]
+    radius : of a ball, whose surface is the sphere about the mean of its corners; corners and faces serve pictures only
+        (`mechanics.model.balls.ball`) [m]. None: a polyhedron
+    contact_size : target edge length at the faces that touch other blocks at the start; None: as inside [m]
+    growth : growth of the edge length per metre of distance from these faces, up to the mesh size [-]
     mesher : of its tetrahedra
-    stress : whether the stress of a deformable block is wanted; if not, it is not computed
+    stress : compute the stress of a deformable block
     """
 
     code: str
@@ -109,7 +109,7 @@ class Block:
 
 
 class Placement(StrEnum):
-    """Where the contact points of two flat faces lie."""
+    """Placement of the contact points of two flat faces."""
 
     CORNERS = "corners"
     INERTIA = "inertia"
@@ -117,7 +117,7 @@ class Placement(StrEnum):
 
 @dataclass(frozen=True)
 class LawRule:
-    """The law between two groups of stones, given by their codes; it goes before the scene's general law."""
+    """Law between two groups of stones, given by their codes; it precedes the scene's general law."""
 
     first: frozenset[str]
     second: frozenset[str]
@@ -130,12 +130,12 @@ class ContactSettings:
 
     Attributes
     ----------
-    law : where no rule says otherwise
-    rules : laws of particular joints; of two that name the same pair, the later holds
+    law : of all joints without a rule
+    rules : laws of particular joints; of two for the same pair, the later holds
     alert_distance : gap below which a contact is watched, relative to the smaller block's size [-]
-    points : contact points of two rigid faces: 1, 3, 4 or 8, at most
-    placement : *corners*: at the true edge of the common face, so that a stone rocks about its very edge; *inertia*:
-        inside it, where they carry its area and its second moments exactly, as a uniform pressure does
+    points : largest number of contact points of two rigid faces: 1, 3, 4 or 8
+    placement : *corners*: on the edge of the common face, so that a stone rocks about its true edge; *inertia*: inside
+        it, where they reproduce its area and second moments exactly, as a uniform pressure does
     """
 
     law: Law = field(default_factory=DryJoint)
@@ -168,19 +168,19 @@ class TimeSettings:
     Attributes
     ----------
     step : time step h [s]
-    theta : integration parameter θ, 1/2 ≤ θ ≤ 1; 1 damps most and finds a static equilibrium
+    theta : integration parameter θ, 1/2 ≤ θ ≤ 1; 1 damps most and leads to a static equilibrium
     duration : longest simulated time [s]
-    relaxation : kinetic damping: all velocities are set to zero each time the kinetic energy has passed a peak;
-        leads to a static equilibrium soonest, but the way there is no longer the true motion
-    start : *rest*: all stones without stress, loads come at once; *equilibrium*: in the static equilibrium under the
-        loads of the first instant, found at once where there is one
+    relaxation : kinetic damping: all velocities are set to zero each time the kinetic energy has passed a peak; the
+        fastest way to a static equilibrium, but not the true motion
+    start : *rest*: all stones without stress, loads applied at once; *equilibrium*: the static equilibrium under the
+        loads of the first instant, solved for directly, where there is one
     lumped_mass : mass of deformable stones on the diagonal, instead of the consistent one
     stop_at_equilibrium : stop as soon as every block is at rest and in balance, or the scene has collapsed
-    balance_tolerance : unbalanced force of a block over its weight below which it is in balance [-]
-    collapse_displacement : a block that moved by more than this fraction of its smallest dimension
-        while still moving counts as collapsed [-]
-    sleep : unbalanced force over weight up to which a stone may sleep once it has come to rest; 0: none sleeps. Not in
-        relaxations, and not in scenes with deformable stones [-]
+    balance_tolerance : unbalanced force of a block over its weight, below which it is in balance [-]
+    collapse_displacement : displacement over the smallest dimension of a block, above which it counts as collapsed if
+        it still moves [-]
+    sleep : unbalanced force over weight up to which a stone at rest may sleep; 0: no stone sleeps. Without effect in
+        relaxations and in scenes with deformable stones [-]
     """
 
     step: float = 1e-3
@@ -219,7 +219,7 @@ class TimeSettings:
 
 
 class Method(StrEnum):
-    """How the contact problem of a step is solved."""
+    """Solver of the contact problem of a step."""
 
     AUTO = "auto"
     NSGS = "nsgs"
@@ -237,13 +237,13 @@ class SolverSettings:
     Attributes
     ----------
     method : auto chooses; nsgs (Gauss–Seidel), admm (alternating directions), apgd (accelerated projected gradients),
-        interior-point, newton, cone (cone programmes: the reference). docs/theory.md §3 says which suits what
+        interior-point, newton, cone (cone programmes: the reference); docs/theory.md §3 compares them
     tolerance : natural map η (unit-free) at which a step counts as solved [-]
-    velocity_tolerance : largest velocity by which a contact may still break its law, over the largest velocity that
-        the contacts have to stop [-]
-    max_iterations : sweeps or iterations after which a step is left as it is and reported as not converged
-    threads : that sweep rigid scenes of many contacts, or factorise deformable ones, at most; sweeps give the same to
-        the last bit. More than one pays on idle cores only: where others use them, each waits for the slowest
+    velocity_tolerance : largest velocity by which a contact may violate its law, over the largest velocity that the
+        contacts have to stop [-]
+    max_iterations : sweeps or iterations after which a step is accepted as it is and reported as not converged
+    threads : largest number of threads that sweep rigid scenes of many contacts, or factorise deformable ones; results
+        of sweeps do not depend on it. More than one pays on idle cores only, as each thread waits for the slowest
     """
 
     method: Method = Method.AUTO
@@ -273,14 +273,22 @@ class SolverSettings:
 class Scene:
     """Bodies, laws, loads and settings of one simulation.
 
+    >>> import numpy as np
+    >>> from mechanics.stones.materials import Material
+    >>> corners, faces = np.vstack([np.zeros(3), np.eye(3)]), ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
+    >>> stone = Block("tetrahedron", corners, faces, Material("stone", density=2000.0, young=10e9, poisson=0.2))
+    >>> scene = Scene("fall", (stone,), time=TimeSettings(step=2e-3))
+    >>> len(scene.blocks), scene.time.step
+    (1, 0.002)
+
     Attributes
     ----------
     name : shown in reports
-    blocks : the stones; contacts are found between all pairs that are not both fixed
+    blocks : the stones; contacts are detected between all pairs that are not both fixed
     gravity : (3,) acceleration [m/s²]
     contact, time, solver : settings
-    loads : what acts besides gravity
-    frame_every : keep a frame of the motion every so many steps; 0 keeps the first and last only
+    loads : all loads besides gravity
+    frame_every : number of steps between two frames of the motion; 0 keeps the first and last only
     """
 
     name: str

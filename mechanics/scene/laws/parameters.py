@@ -1,4 +1,4 @@
-"""Checks of the parameters that laws are made with."""
+"""Checks of the parameters of laws."""
 
 from math import isfinite
 
