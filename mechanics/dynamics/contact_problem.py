@@ -10,7 +10,7 @@ from mechanics.delassus.assembly import local_velocity
 from mechanics.dynamics.contact_search import Detection
 from mechanics.dynamics.stepping import Kick
 from mechanics.model.model import Model
-from mechanics.problem.problem import ContactProblem
+from mechanics.problem.problem import ContactProblem, ContactStart
 from mechanics.scene.laws.law import Approach, Terms
 from mechanics.scene.state import State
 from mechanics.stones.validation import SMALLEST
@@ -78,9 +78,9 @@ def terms_of(problem: ContactProblem) -> Terms:
     return Terms(problem.bias, problem.friction, problem.cohesion, problem.adhesion)
 
 
-def shifted(problem: ContactProblem, impulse: Array) -> Array:
-    """Return r̃ = r + s n (nc, 3), in which a problem is stated, from r [N s]."""
-    return _moved(problem, impulse, 1.0)
+def shifted(problem: ContactProblem, start: ContactStart) -> ContactStart:
+    """Return a warm start in r̃ = r + s n, in which the problem is stated, from one in r."""
+    return replace(start, impulse=_moved(problem, start.impulse, 1.0))
 
 
 def unshifted(problem: ContactProblem, impulse: Array) -> Array:

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 
 from mechanics.arrays import Bools
-from mechanics.delassus.assembly import local_velocity
 from mechanics.dynamics.clock import Clock
 from mechanics.dynamics.contact_problem import contact_problem, shifted, unshifted
 from mechanics.dynamics.contact_search import ContactSearch
@@ -87,45 +86,45 @@ class Simulation:
         SolverError : if the motion is no longer finite
         """
         h, theta, model, start, clock = self._step, self._theta, self.model, self.start, self.clock
-        before, memory, sleepers = self.state, self._memory, self._sleepers
+        before, sleepers = self.state, self._sleepers
         with clock("advance"):
             predicted = predict(model, start, before, h * (1 - theta))
             sleepers.begin(before, predicted)
         disturbed = True
         while disturbed:
             found = self._detect(sleepers.model, predicted)
-            contacts = found.contacts
             with clock("assemble"):
-                warm, internal = memory.recall(contacts.key, found.place)
+                warm, internal = self._memory.recall(found.contacts.key, found.place)
                 free = sleepers.hold(free_kick(model, start, predicted, self._compliance, h, theta))
                 problem, approach = contact_problem(model, predicted, found, free, internal, self._first)
             with clock("solve"):
-                solution = self._solve(problem, start=replace(warm, impulse=shifted(problem, warm.impulse)))
+                solution = self._solve(problem, start=shifted(problem, warm))
             with clock("advance"):
                 r = unshifted(problem, solution.impulse)
                 kick = kicked(model, free, found, r, self._compliance)
-                disturbed = sleepers.wake_disturbed(predicted, kick, contacts, r)
+                disturbed = sleepers.wake_disturbed(predicted, kick, found.contacts, r)
         with clock("advance"):
             after = advance(model, start, predicted, kick, h * theta)
-            _refuse_infinite(after, model.scene.name)
-            u = local_velocity(contacts, found.operator, kick.velocity, kick.node_velocity)
-            internal = model.laws.after(found.law, approach, solution.impulse, u)
-            memory.store(contacts.key, replace(solution, impulse=r), internal, found.place)
-            self._first = False
-            step = Step(
-                h, before, after, predicted, kick, found, problem, solution, u, internal,
-                sleepers.forces, sleepers.wrench,
-            )  # fmt: skip
-            self.state = self._relax(sleepers.settle(step))
-            if self.state is after:
-                return step
-            return replace(step, relaxed=kinetic_energy(model, after) - kinetic_energy(model, self.state))
+            asleep = sleepers.forces, sleepers.wrench
+            return self._conclude(
+                Step(before, predicted, after, kick, found, approach, problem, solution, *asleep)
+            )
 
-
-def _refuse_infinite(state: State, where: str) -> None:
-    if not (np.isfinite(state.velocity).all() and np.isfinite(state.node_velocity).all()):
-        raise SolverError(
-            f"the velocities are not finite at t = {state.time:.6g} s",
-            where=where,
-            remedy="use a smaller time step",
+    def _conclude(self, step: Step) -> Step:
+        """Remember a step for the next one, and halt the bodies that relaxation or sleep halts after it."""
+        after, found = step.after, step.found
+        if not (np.isfinite(after.velocity).all() and np.isfinite(after.node_velocity).all()):
+            raise SolverError(
+                f"the velocities are not finite at t = {after.time:.6g} s",
+                where=self.model.scene.name,
+                remedy="use a smaller time step",
+            )
+        solution = replace(step.solution, impulse=step.active.impulse)
+        self._memory.store(found.contacts.key, solution, step.active.internal, found.place)
+        self._first = False
+        self.state = self._relax(self._sleepers.settle(step))
+        if self.state is after:
+            return step
+        return replace(
+            step, relaxed=kinetic_energy(self.model, after) - kinetic_energy(self.model, self.state)
         )

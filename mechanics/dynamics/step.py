@@ -7,12 +7,12 @@ import numpy as np
 
 from mechanics.arrays import Array, Ints
 from mechanics.contact.contacts import Contacts, gaps, joined, take
-from mechanics.delassus.assembly import world_impulse
+from mechanics.delassus.assembly import local_velocity, world_impulse
 from mechanics.dynamics.contact_problem import terms_of, unshifted
 from mechanics.dynamics.contact_search import Detection
 from mechanics.dynamics.stepping import Kick
 from mechanics.problem.problem import ContactProblem, ContactSolution
-from mechanics.scene.laws.law import Terms
+from mechanics.scene.laws.law import Approach, Terms
 from mechanics.scene.state import State
 
 __all__ = ["ContactForces", "Step"]
@@ -28,7 +28,7 @@ class ContactForces:
     terms : their laws, as shift and cone
     place : (nc, 3) in the axes of one of the two bodies [m]
     impulse : (nc, 3) r, local frame [N s]
-    shifted : (nc, 3) r̃, exact at the limits of its cone, so that it tells open and sliding contacts [N s]
+    shifted : (nc, 3) r̃, exact at the limits of its cone, which identifies open and sliding contacts [N s]
     dual : (nc, 3) û, as the solver left it [m/s]
     force : (nc, 3) mean forces r/h on the candidates, world axes [N]
     gap : (nc,) at the end of the step [m]
@@ -71,48 +71,56 @@ class Step:
 
     Attributes
     ----------
-    duration : h [s]
-    before, after : the states between which it lies; relaxation and sleep halt bodies after `after`
-    predicted : at the instant of the kick, with the velocities just before it
+    before, predicted, after : states at the start, at the kick with the velocities just before it, and at the end;
+        relaxation and sleep halt bodies after that
     kick : velocities just after it
     found : contacts of the awake bodies where they were found, with W
+    approach : these contacts as their laws see them before the kick
     problem, solution : their contact problem and its solution, in impulses r̃ that are shifted where a law has adhesion
-    relative : (nc, 3) u of these contacts just after the kick, local frame [m/s]
-    remembered : (nc, STATE) internal variables that their laws left
     asleep : contacts between sleeping bodies; None if there are none
     resting : (nb, 6) forces and moments of these on their bodies; None if there are none [N], [N m]
     relaxed : kinetic energy that relaxation, or sleep, removed at the end of the step [J]
     """
 
-    duration: float
     before: State
-    after: State
     predicted: State
+    after: State
     kick: Kick
     found: Detection
+    approach: Approach
     problem: ContactProblem
     solution: ContactSolution
-    relative: Array
-    remembered: Array
     asleep: ContactForces | None
     resting: Array | None
     relaxed: float = 0.0
 
+    @property
+    def duration(self) -> float:
+        """h [s]."""
+        return self.approach.step
+
+    @cached_property
+    def relative(self) -> Array:
+        """u (nc, 3) of the contacts of the awake bodies just after the kick, local frame [m/s]."""
+        found, kick = self.found, self.kick
+        return local_velocity(found.contacts, found.operator, kick.velocity, kick.node_velocity)
+
     @cached_property
     def active(self) -> ContactForces:
         """Contact points of the awake bodies, those of the problem, with their forces."""
-        contacts, problem, solution = self.found.contacts, self.problem, self.solution
+        found, problem, solution = self.found, self.problem, self.solution
+        contacts, laws = found.contacts, found.model.laws
         impulse = unshifted(problem, solution.impulse)
         return ContactForces(
             contacts=contacts,
             terms=terms_of(problem),
-            place=self.found.place,
+            place=found.place,
             impulse=impulse,
             shifted=solution.impulse,
             dual=solution.velocity,
             force=world_impulse(contacts, impulse) / self.duration,
             gap=gaps(contacts, self.after),
-            internal=self.remembered,
+            internal=laws.after(found.law, self.approach, solution.impulse, self.relative),
         )
 
     @cached_property

@@ -78,15 +78,17 @@ def test_adhesion_is_taken_out_of_the_free_velocity_and_given_back_to_the_impuls
     without = there.operator.apply(r) + plain.u_free
     np.testing.assert_allclose(with_bonds, without, atol=1e-12 * np.abs(there.operator.apply(raised)).max())
     np.testing.assert_allclose(unshifted(problem, raised), r, atol=1e-12 * adhesion.max())
-    np.testing.assert_allclose(shifted(problem, r), raised, rtol=1e-15)
+    start = shifted(problem, ContactStart(r, 2 * r))
+    np.testing.assert_allclose(start.impulse, raised, rtol=1e-15)
+    np.testing.assert_array_equal(start.velocity, 2 * r)
 
 
 def test_a_bond_that_bears_nothing_is_no_open_contact():
     """In weightless rest r = 0, so r̃ = s: bonded, not open; the solver finds it."""
     one = replace(column(MortarJoint(0.6, 1e5, 2e5)), gravity=(0.0, 0.0, 0.0))
     problem, approach, _ = stated(one)
-    cold = ContactStart(shifted(problem, np.zeros((8, 3))), np.zeros((8, 3)))
-    solution = NSGS(1e-12, 1e-12, 10000)(problem, cold)
+    cold = ContactStart(np.zeros((8, 3)), np.zeros((8, 3)))
+    solution = NSGS(1e-12, 1e-12, 10000)(problem, shifted(problem, cold))
     assert solution.converged
     np.testing.assert_allclose(solution.impulse[:, 0], problem.adhesion, rtol=1e-9)
     np.testing.assert_allclose(unshifted(problem, solution.impulse), 0.0, atol=1e-9 * problem.adhesion.max())
