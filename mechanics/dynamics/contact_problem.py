@@ -46,7 +46,7 @@ def contact_problem(
         speed=local_velocity(contacts, operator, predicted.velocity, predicted.node_velocity)[:, 0],
         area=contacts.area,
         size=model.surfaces.size[contacts.bodies].min(axis=1),
-        yielding=operator.diagonal[:, 0, 0],
+        compliance=operator.diagonal[:, 0, 0],
         step=time.step,
         theta=time.theta,
         push_out=time.relaxation,

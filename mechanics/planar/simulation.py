@@ -179,7 +179,7 @@ class PlanarSimulation:
             speed=operator.relative_velocity(kick.velocity)[:, 0],
             area=contacts.area,
             size=contacts.size,
-            yielding=operator.diagonal[:, 0, 0],
+            compliance=operator.diagonal[:, 0, 0],
             step=time.step,
             theta=time.theta,
             push_out=False,

@@ -81,7 +81,7 @@ class CohesiveZone:
         largest = np.maximum(state[:, OPENING], opening)
         area = step * contacts.area * self._intact(largest, state[:, SLIP]) * bonded(contacts)
         full = area * self._tension
-        unresolved = step * theta * contacts.yielding * full
+        unresolved = step * theta * contacts.compliance * full
         opened = largest > 0
         part = np.where(opened, (opening + unresolved) / np.where(opened, largest, 1.0), 1.0)
         pull = full * np.minimum(part, 1.0)

@@ -35,7 +35,7 @@ def at_limit(terms: Terms, impulse: Array) -> Bools:
 
 def slid(contacts: Approach, terms: Terms, impulse: Array, velocity: Array) -> Bools:
     """Return the contacts (n,) that slid in the step with r̃ (n, d) [N s] and u (n, d) [m/s]."""
-    acceleration = contacts.yielding * np.linalg.norm(impulse, axis=1) / contacts.step
+    acceleration = contacts.compliance * np.linalg.norm(impulse, axis=1) / contacts.step
     drift = _DRIFT * np.sqrt(acceleration * contacts.size)
     moved: Bools = at_limit(terms, impulse) & (np.linalg.norm(velocity[:, 1:], axis=1) > drift)
     return moved

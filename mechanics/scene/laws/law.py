@@ -30,7 +30,7 @@ class Approach:
     speed : (n,) u_N before the step, positive when opening [m/s]
     area : (n,) tributary area; zero at an edge or a corner [m²]
     size : (n,) smallest width of the smaller body; tolerances scale with it [m]
-    yielding : (n,) W_NN, compliance: change of u_N per unit of normal impulse [1/kg]
+    compliance : (n,) W_NN, change of u_N per unit of normal impulse [1/kg]
     step, theta : h [s] and θ; the gap is gap + h θ u_N at the end of the step, and gap + h u_N at the next kick
     push_out : overlaps are pushed out (relaxation) instead of only kept from growing
     first : first step of the run, in which bonds are made
@@ -43,7 +43,7 @@ class Approach:
     speed: Array
     area: Array
     size: Array
-    yielding: Array
+    compliance: Array
     step: float
     theta: float
     push_out: bool

@@ -10,7 +10,7 @@ from mechanics.scene.laws.law import Approach, Law, Terms
 
 __all__ = ["LawTable", "law_table"]
 
-_PER_CONTACT = ("gap", "speed", "area", "size", "yielding", "state")
+_PER_CONTACT = ("gap", "speed", "area", "size", "compliance", "state")
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What collisions of rigid stones keep: momentum, angular momentum and, with what they lose, energy."""
+"""Collisions of rigid stones: conservation of momentum and angular momentum, and balance of energy."""
 
 from dataclasses import replace
 

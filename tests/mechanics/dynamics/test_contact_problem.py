@@ -44,7 +44,7 @@ def test_what_the_laws_are_told_of_the_contacts():
     np.testing.assert_allclose(approach.speed, np.where(lower, -0.3, 0.2), atol=1e-14)
     np.testing.assert_allclose(approach.area, np.where(lower, 0.25, 0.16), rtol=1e-12)
     np.testing.assert_allclose(approach.size, np.where(lower, 0.99, 0.5), rtol=1e-12)
-    np.testing.assert_array_equal(approach.yielding, there.operator.diagonal[:, 0, 0])
+    np.testing.assert_array_equal(approach.compliance, there.operator.diagonal[:, 0, 0])
     assert (approach.step, approach.theta, approach.first, approach.push_out) == (STEP, 0.75, True, False)
 
 

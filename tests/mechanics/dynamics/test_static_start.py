@@ -49,7 +49,7 @@ EVERY = pytest.mark.parametrize("name", COLUMNS)
 
 
 def searched(one):
-    """What the search found, the model, and a run before and after it took the search over."""
+    """The result of the search, the model, and a run before and after it has taken the search over."""
     model, start = build_model(one)
     static, search = static_start(model, start, lambda _: None)
     simulation = Simulation(model, start)

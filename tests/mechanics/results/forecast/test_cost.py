@@ -1,4 +1,4 @@
-"""What a run is expected to take: counts that can be checked by hand, and rates that are known."""
+"""Expected cost of a run: amounts counted by hand, and known rates."""
 
 from dataclasses import replace
 
