@@ -20,8 +20,7 @@ from benchmarks.report import Row, Table, guarded, machine, print_json, print_ta
 from mechanics.arrays import Array
 from mechanics.results.forecast.cost import calibration, expected_cost, measures
 from mechanics.results.forecast.cost_rates import Rate
-from mechanics.results.forecast.plan import plan
-from mechanics.results.forecast.workload import Amounts
+from mechanics.results.forecast.plan import Amounts, plan
 from moma.errors import SolverError
 
 __all__ = ["fitted", "main"]

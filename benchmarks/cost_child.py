@@ -12,13 +12,13 @@ import mechanics.simulate
 from benchmarks.cost_scenes import Case
 from benchmarks.memory import peak_bytes
 from benchmarks.report import Row
+from mechanics.dynamics.clock import Clock
 from mechanics.dynamics.observers.energy import EnergyBalance
 from mechanics.dynamics.observers.equilibrium import imbalance
-from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.dynamics.simulation import Simulation
 from mechanics.dynamics.stopping import Watch
 from mechanics.model.model import build_model
-from mechanics.results.forecast.plan import plan
-from mechanics.results.forecast.workload import Amounts
+from mechanics.results.forecast.plan import Amounts, plan
 from moma.errors import SolverError
 
 __all__ = ["main"]
@@ -53,7 +53,7 @@ def _asleep(case: Case) -> Row:
     """Seconds of one step, observers and all, in which all stones sleep."""
     scene = case.scene()
     model, start = build_model(scene)
-    simulation, watch = Simulation(model, start, Clock()), Watch(model, start)
+    simulation, watch = Simulation(model, start), Watch(model, start)
     energy, begun = EnergyBalance(model, start), 0.0
     for count in range(_UNTIL_ASLEEP + _ASLEEP):
         if count == _UNTIL_ASLEEP:

@@ -12,7 +12,7 @@ import numpy as np
 from benchmarks.generated import box_faces
 from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
 from mechanics.dynamics.observers.equilibrium import imbalance, support_reaction
-from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.dynamics.simulation import Simulation
 from mechanics.dynamics.static_start import static_start
 from mechanics.model.model import build_model
 from mechanics.scene.laws.dry_joint import DryJoint
@@ -168,7 +168,7 @@ def _run(scene: Scene, steps: int, warm_up: int) -> Row:
 def _started(scene: Scene) -> tuple[Simulation, float | None]:
     """A simulation at the start that the scene asks for, and how long the search for its equilibrium took [ms]."""
     model, state = build_model(scene)
-    simulation = Simulation(model, state, Clock())
+    simulation = Simulation(model, state)
     if scene.time.start is not Start.EQUILIBRIUM:
         return simulation, None
     begun = time.perf_counter()

@@ -10,10 +10,10 @@ import numpy as np
 
 from benchmarks.scenes import engine_scene, read_scene
 from mechanics.contact.contacts import gaps, material_points
-from mechanics.dynamics.simulation import Clock, Simulation, Step
+from mechanics.dynamics.simulation import Simulation
+from mechanics.dynamics.step import Step
 from mechanics.model.model import build_model
 from mechanics.scene.scene import Scene
-from mechanics.scene.state import State
 
 __all__ = ["main"]
 
@@ -68,16 +68,8 @@ def _options() -> argparse.Namespace:
     return parser.parse_args()
 
 
-class _Fresh(Simulation):
-    """Finds contacts and makes W in every step, as LMGC90 does, though nothing has moved."""
-
-    def _stale(self, known: Any, predicted: State) -> bool:
-        return True
-
-
 def _simulation(scene: Scene, fresh: bool = False) -> Simulation:
-    model, state = build_model(scene)
-    return (_Fresh if fresh else Simulation)(model, state, Clock())
+    return Simulation(*build_model(scene), fresh_contacts=fresh)
 
 
 def _warm_up(scene: Scene) -> None:

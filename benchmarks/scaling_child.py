@@ -18,7 +18,9 @@ from mechanics.arrays import Array
 from mechanics.contact.contacts import take
 from mechanics.delassus import rigid
 from mechanics.delassus.assembly import rigid_delassus
-from mechanics.dynamics.simulation import Clock, Simulation, detector
+from mechanics.dynamics.clock import Clock
+from mechanics.dynamics.contact_search import detector
+from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
 from mechanics.planar.contacts import PlanarDetector
 from mechanics.planar.delassus import PlanarDelassus
@@ -200,8 +202,8 @@ def _wall(bricks: int, courses: int, threads: int) -> _Case:
         operator,
         operator.relative_velocity(fall),
         blocks.friction,
-        lambda: Simulation(model, state, Clock()),
-        lambda: Simulation(usual, state, Clock()),
+        lambda: Simulation(model, state),
+        lambda: Simulation(usual, state),
         len(model.mass),
     )
 

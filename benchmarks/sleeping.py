@@ -12,7 +12,7 @@ from benchmarks.report import Row, Table, guarded, machine, print_json, print_ta
 from mechanics.arrays import Array
 from mechanics.dynamics.observers.energy import EnergyBalance
 from mechanics.dynamics.observers.equilibrium import imbalance, support_reaction
-from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.loads.load import Loads
@@ -110,7 +110,7 @@ def _compared(name: str, sleeps: Sequence[float]) -> list[Row]:
 
 def _run(scene: Scene) -> _Run:
     model, start = build_model(scene)
-    simulation, energy = Simulation(model, start, Clock()), EnergyBalance(model, start)
+    simulation, energy = Simulation(model, start), EnergyBalance(model, start)
     total = max(1, round(scene.time.duration / scene.time.step))
     places, asleep, balance, unconverged = [start.centre], 0.0, 0.0, 0
     begun, observed = time.process_time(), 0.0

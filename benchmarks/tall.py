@@ -15,7 +15,7 @@ import numpy as np
 
 from benchmarks.generated import box_faces
 from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
-from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.problem.residual import residual
@@ -139,7 +139,7 @@ def first_problem(blocks: list[Block], friction: float = 0.6, tilt: float = 0.0)
 
     model, state = build_model(scene)
     with suppress(_Kept):
-        Simulation(model, state, Clock(), keep).step()
+        Simulation(model, state, solver=keep).step()
     return kept[0]
 
 

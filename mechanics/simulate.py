@@ -1,106 +1,110 @@
 """Run a scene from its start to its outcome, with its history and error measures."""
 
 from collections import Counter
-from collections.abc import Callable
+from dataclasses import fields
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from mechanics.arrays import Array
+from mechanics.dynamics.clock import Clock
 from mechanics.dynamics.observers.energy import EnergyBalance, kinetic_energy
 from mechanics.dynamics.observers.equilibrium import imbalance, settlement, speed, support_reaction
-from mechanics.dynamics.progress import Progress
-from mechanics.dynamics.simulation import Clock, Simulation, Step
+from mechanics.dynamics.outcome import Outcome, StaticStart
+from mechanics.dynamics.progress import Listener, Progress, silent
+from mechanics.dynamics.simulation import Simulation
 from mechanics.dynamics.static_start import static_start
+from mechanics.dynamics.step import Step
 from mechanics.dynamics.stopping import LASTING, Watch
 from mechanics.model.model import Model, build_model
 from mechanics.results.postprocess import Observer
-from mechanics.results.result import Energies, Errors, Frame, History, Outcome, Result, StaticStart
+from mechanics.results.result import Energies, Errors, History, Result
 from mechanics.scene.scene import Scene, Start
 from mechanics.scene.state import State
 
 __all__ = ["simulate"]
 
 
-def simulate(scene: Scene, progress: Callable[[Progress], None] | None = None) -> Result:
+def simulate(scene: Scene, progress: Listener = silent) -> Result:
     """Run a scene until it rests, has collapsed, or its duration is over.
+
+    A block that stands on a fixed one is carried by its own weight:
+
+    >>> import numpy as np
+    >>> from mechanics.scene.scene import Block, Fidelity, Scene
+    >>> from mechanics.stones.materials import Material
+    >>> cube = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
+    >>> faces = (0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)
+    >>> stone = Material("stone", density=2000.0, young=10e9, poisson=0.2)
+    >>> ground = Block("ground", cube - [0, 0, 1], faces, stone, Fidelity.FIXED)
+    >>> result = simulate(Scene("one block", (ground, Block("block", cube, faces, stone))))
+    >>> result.outcome.value, round(result.reaction / (2000.0 * 9.81), 6)
+    ('equilibrium', 1.0)
 
     Raises
     ------
     SceneError, GeometryError, MeshError : if the scene cannot be built
     SolverError : if the motion is no longer finite
     """
-    # dense products of stones are small: threads that others use too would cost more than they gain
+    # dense products of stones are small: more threads than those of the scene cost more than they gain
     with ThreadpoolController().limit(limits=scene.solver.threads, user_api="blas"):
-        return _simulate(scene, progress or (lambda _: None))
+        return _simulate(scene, progress)
 
 
-def _simulate(scene: Scene, report: Callable[[Progress], None]) -> Result:
-    clock = Clock()
+def _simulate(scene: Scene, report: Listener) -> Result:
+    clock, settings, static = Clock(), scene.time, None
     with clock("mesh"):
         model, start = build_model(scene, lambda done, total: report(Progress("mesh", done, total)))
     simulation = Simulation(model, start, clock)
-    static = None
-    if scene.time.start == Start.EQUILIBRIUM:
+    if settings.start == Start.EQUILIBRIUM:
         with clock("start"):
             static, search = static_start(model, start, report)
         if static.found:
             simulation.take_over(search)
-    log = _Log(model, start, simulation.state)
-    watch = Watch(model, start)
-    settings = scene.time
-    observer = Observer(model, start)
-    frames = [observer.first_frame(simulation.state)]
-    outcome, step = Outcome.MOVING, None
+    log, watch = _Log(model, start, simulation.state), Watch(model, start)
     total = max(1, round(settings.duration / settings.step))
     for count in range(1, total + 1):
         step = simulation.step()
         with clock("observe"):
-            if count == 1:
-                observer.begin(step)
             balance = log(step)
             outcome = watch(step.after, balance, step.solution)
-        report(
-            Progress("step", count, total, f"balance {balance.max():.1e}, η {step.solution.natural_map:.1e}")
-        )
+        text = f"balance {balance.max():.1e}, η {step.solution.natural_map:.1e}"
+        report(Progress("step", count, total, text))
         done = settings.stop_at_equilibrium and outcome is not Outcome.MOVING
         if done or count == total or (scene.frame_every and count % scene.frame_every == 0):
             with clock("stress"):
-                frames.append(observer.frame(step))
+                log.frames.append(log.observer.frame(step))
         if done:
             break
-    assert step is not None
-    return _result(model, observer, step, outcome, watch.rest_time, log, frames, clock, static)
+    return _result(log, step, outcome, watch.rest_time, clock, static)
 
 
 class _Log:
-    """Collects what the observers say of each step."""
+    """Record of a run: what the observers find in each step, and its frames."""
 
     def __init__(self, model: Model, start: State, first: State) -> None:
-        self._model, self._start = model, start
+        self.model, self._start = model, start
+        self.observer = Observer(model, start)
+        self.frames = [self.observer.first_frame(first)]
         self.balance = np.zeros(len(model.mass))
         self.energy = EnergyBalance(model, first)
-        self.penetration = 0.0
         self.unconverged = 0
-        self.rows: list[tuple[float, ...]] = []
         self.solvers: Counter[str] = Counter()
+        self._rows: list[tuple[float, ...]] = []
 
     def __call__(self, step: Step) -> Array:
         """Account for one step, and return the imbalance of each body (nb,)."""
-        model, solution = self._model, step.solution
+        model, solution = self.model, step.solution
+        if not self._rows:
+            self.observer.begin(step)
         self.energy(step)
-        overlap = float(np.max(-step.active.gap, initial=0.0))
-        resting = 0
-        if step.borne is not None:
-            overlap, resting = max(overlap, float(-step.borne.gap.min(initial=0.0))), len(step.borne.contacts)
-        self.penetration = max(self.penetration, overlap)
         self.unconverged += not solution.converged
         if solution.why:
             self.solvers[solution.why] += 1
         self.balance = balance = imbalance(
             model, step.after, step.active.contacts, step.active.force, step.kick.load, step.resting
         )
-        self.rows.append(
+        self._rows.append(  # in the order of History
             (
                 step.after.time,
                 kinetic_energy(model, step.after),
@@ -108,55 +112,39 @@ class _Log:
                 float(balance.max()),
                 solution.natural_map,
                 solution.iterations,
-                len(step.active.contacts) + resting,
-                overlap,
+                len(step.gap),
+                float(np.max(-step.gap, initial=0.0)),
                 float(settlement(model, self._start, step.after)[~model.fixed].max(initial=0.0)),
             )
         )
         return balance
 
     def history(self) -> History:
-        """One array for each quantity."""
-        time, kinetic, fastest, balance, eta, iterations, contacts, overlap, sunk = np.array(self.rows).T
-        return History(
-            time,
-            kinetic,
-            fastest,
-            balance,
-            eta,
-            iterations.astype(np.int64),
-            contacts.astype(np.int64),
-            overlap,
-            sunk,
-        )
+        """Return one array for each quantity."""
+        names = (field.name for field in fields(History))
+        columns = dict(zip(names, np.array(self._rows).T, strict=True))
+        counts = {name: columns.pop(name).astype(np.int64) for name in ("iterations", "contacts")}
+        return History(**columns, **counts)
 
 
 def _result(
-    model: Model,
-    observer: Observer,
-    last: Step,
-    outcome: Outcome,
-    rest_time: float,
-    log: _Log,
-    frames: list[Frame],
-    clock: Clock,
-    static: StaticStart | None,
+    log: _Log, last: Step, outcome: Outcome, rest_time: float, clock: Clock, static: StaticStart | None
 ) -> Result:
-    history, scene = log.history(), model.scene
+    model, observer, energy, history = log.model, log.observer, log.energy, log.history()
     support = support_reaction(model, last.contacts, last.force, last.after.time)
     with clock("stress"):
         bodies = observer.bodies(last.after, log.balance)
         contacts, joints = observer.contacts_and_joints(last)
     errors = Errors(
         natural_map=float(history.natural_map[-LASTING:].max()),
-        penetration=log.penetration / float(model.surfaces.size.min()),
+        penetration=float(history.penetration.max()) / float(model.surfaces.size.min()),
         balance=float(history.balance[-1]),
         reaction=support.error,
-        energy=log.energy.error,
+        energy=energy.error,
         unconverged_steps=log.unconverged,
     )
     return Result(
-        scene=scene,
+        scene=model.scene,
         outcome=outcome,
         steps=len(history.time),
         time=last.after.time,
@@ -164,11 +152,11 @@ def _result(
         contacts=contacts,
         joints=joints,
         errors=errors,
-        energies=Energies(log.energy.external, log.energy.contact, log.energy.scheme),
+        energies=Energies(energy.external, energy.contact, energy.scheme),
         rest_time=rest_time if outcome is Outcome.EQUILIBRIUM else None,
         reaction=support.reaction,
         weight=support.weight,
-        frames=tuple(frames),
+        frames=tuple(log.frames),
         history=history,
         wall_time=dict(clock.seconds),
         static=static,

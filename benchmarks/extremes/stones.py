@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.scene.laws.dry_joint import DryJoint
@@ -152,5 +152,5 @@ def first_problem(scene: Scene) -> ContactProblem:
         return ContactSolution(start.impulse, start.velocity, 0, 0.0, True)
 
     model, start = build_model(scene)
-    Simulation(model, start, Clock(), take).step()
+    Simulation(model, start, solver=take).step()
     return taken[0]

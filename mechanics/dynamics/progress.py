@@ -1,4 +1,4 @@
-"""Progress of long work, and who listens to it; light, so that every stage can use it."""
+"""Progress of long computations and its listeners; a light module, for every stage of the pipelines."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ __all__ = ["Listener", "Progress", "silent"]
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a run stands: `done` of `total` in a stage, with a short text; total is None if not known."""
+    """Progress of a run: `done` of `total` in a stage, with a short text; `total` is None if not known."""
 
     stage: str
     done: int
@@ -20,4 +20,4 @@ Listener = Callable[[Progress], None]
 
 
 def silent(progress: Progress) -> None:
-    """Listen to nothing."""
+    """Ignore progress."""

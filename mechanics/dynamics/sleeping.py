@@ -1,175 +1,220 @@
-"""Stones at rest sleep: they are not moved, and what they bear among themselves is not computed again.
+"""Sleep of stones at rest: they are not moved, and contact forces among them are not solved again.
 
-A sleeping stone has no velocity and bears the forces with which it fell asleep; its awake neighbours take it for held.
-Forces that lie in their cones, with u = 0, solve the contact problem of a step as far as they balance the loads; so
-what is left out is known: the force and moment by which a sleeping stone is out of balance. Where that exceeds the
-scene's `sleep`, over the stone's weight, the stone is woken within the very step, with those around it, and the step is
-solved anew. So no step ends with a sleeping stone that is further out of balance (docs/decisions/027-sleeping.md).
+A sleeping stone has no velocity and keeps the forces with which it fell asleep; its awake neighbours see it as fixed.
+Forces that lie in their cones, with u = 0, solve the contact problem of a step as far as they balance the loads, so the
+error is known: the force and moment by which a sleeping stone is out of balance. Where that exceeds the scene's
+`sleep`, over the stone's weight, the stone is woken within the same step, with those around it, and the step is solved
+again. So no step ends with a sleeping stone that is further out of balance (docs/decisions/027-sleeping.md).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from mechanics.arrays import Array, Bools
 from mechanics.contact.contacts import Contacts, material_points
-from mechanics.dynamics.contact_forces import Bearing, both
+from mechanics.delassus.assembly import world_impulse
 from mechanics.dynamics.observers.equilibrium import displacement, speed, wrenches
+from mechanics.dynamics.step import ContactForces, Step
+from mechanics.dynamics.stepping import Kick
+from mechanics.dynamics.warm_start import Memory
 from mechanics.model.model import Model
 from mechanics.scene.state import State
 
-__all__ = ["RINGS", "Sleep", "held_model"]
+__all__ = ["Sleepers"]
 
 
-# steps over which a stone must rest
-_STEPS = 50
-# a stone falls asleep only if it is so much nearer to balance than one that is woken
-_CALMER = 0.5
-# with a stone that wakes, so many rings of stones around it wake; twice as many each time that is not enough
-RINGS = 2
+_STEPS = 50  # steps over which a stone must rest before it falls asleep
+_CALMER = 0.5  # imbalance below which a stone falls asleep, over that from which it is woken [-]: no flutter
+_RINGS = 2  # rings of stones that wake around one that wakes; doubled each time that they do not suffice
 
 
-@dataclass(frozen=True)
-class Sleep:
-    """Which stones sleep, and what they bear; with state and memory all that a run needs.
+class Sleepers:
+    """The sleeping stones of a run; no stone sleeps in relaxations, nor in scenes with deformable stones.
+
+    Parameters
+    ----------
+    whole, start : the scene, and the state from which on its stones are watched
+    memory : warm start of the contacts, to which those of woken stones return
 
     Attributes
     ----------
-    asleep : (nb,) which stones sleep
-    borne : contact points between sleeping stones, or between these and fixed ones, as they fell asleep
-    wrench : (nb, 6) sums of these forces, and of their moments about the centres of mass [N], [N m]
-    watched : the state since when it is watched who rests
-    steps : taken since then
+    model : the scene as awake stones see it: sleeping ones are fixed and answer no impulse
+    asleep : (nb,) sleeping stones
+    forces : contacts among sleeping stones, or of these with fixed ones, as they fell asleep; None if there are none
     """
 
-    asleep: Bools
-    borne: Bearing | None
-    wrench: Array
-    watched: State
-    steps: int = 0
+    def __init__(self, whole: Model, start: State, memory: Memory) -> None:
+        time, count = whole.scene.time, len(whole.mass)
+        self._whole, self._memory = whole, memory
+        self._may_sleep = time.sleep > 0 and not time.relaxation and whole.rigid_only
+        self.model = whole
+        self.asleep: Bools = np.zeros(count, dtype=bool)
+        self.forces: ContactForces | None = None
+        self._wrench = np.zeros((count, 6))
+        self._watched, self._steps = start, 0
+        self._supports_rest, self._rings = True, _RINGS
 
-    @classmethod
-    def nobody(cls, state: State) -> "Sleep":
-        """All are awake, and watched from this state on."""
-        count = len(state.centre)
-        return cls(np.zeros(count, dtype=bool), None, np.zeros((count, 6)), state)
+    @property
+    def wrench(self) -> Array | None:
+        """Sums (nb, 6) of `forces`, and of their moments about the centres of mass [N], [N m]; None without forces."""
+        return None if self.forces is None else self._wrench
 
-    def restless(self, model: Model, state: State, load: Array, contacts: Contacts, force: Array) -> Bools:
-        """Sleeping stones (nb,) that are further out of balance than the scene lets them be.
+    def begin(self, before: State, predicted: State) -> None:
+        """Begin a step: supports that have moved since the last one wake all stones."""
+        self._rings = _RINGS
+        self._supports_rest = all(
+            np.array_equal(before.centre[bodies], predicted.centre[bodies])
+            and np.array_equal(before.rotation[bodies], predicted.rotation[bodies])
+            for _, bodies in self._whole.motions
+        )
+        if not self._supports_rest:
+            self._wake(self.asleep, predicted)
 
-        `load` (nb, 6) are the loads, weight included; `contacts` those with stones that are awake, with their forces
-        (nc, 3), world axes [N].
+    def hold(self, free: Kick) -> Kick:
+        """Return a free motion in which sleeping stones stay at rest."""
+        if not self.asleep.any():
+            return free
+        return replace(free, velocity=np.where(self.asleep[:, None], 0.0, free.velocity))
+
+    def wake_disturbed(self, predicted: State, kick: Kick, contacts: Contacts, impulse: Array) -> bool:
+        """Wake the stones that a solution leaves out of balance by more than `sleep`; return true if there are any.
+
+        `contacts` are those of the awake stones, with their impulses r (nc, 3), local frame [N s].
         """
-        out = _out_of_balance(model, state, load + self.wrench + _resultants(state, contacts, force))
-        found: Bools = self.asleep & ~(out <= model.scene.time.sleep)
-        return found
+        if not self.asleep.any():
+            return False
+        force = world_impulse(contacts, impulse) / self._whole.scene.time.step
+        out = self._imbalance(predicted, kick.load, contacts, force)
+        disturbed = self.asleep & ~(out <= self._whole.scene.time.sleep)
+        if not disturbed.any():
+            return False
+        # a stone that wakes pushes others at once, so the step must be solved again
+        self._wake(self._around(disturbed, self._rings), predicted)
+        self._rings *= 2
+        return True
 
-    def around(self, bodies: Bools, rings: int) -> Bools:
-        """Sleeping stones (nb,) among some bodies and, ring by ring, those that bear on them in their sleep."""
-        reached = bodies & self.asleep
-        pairs = np.zeros((0, 2), dtype=np.int64) if self.borne is None else self.borne.contacts.bodies
-        for _ in range(rings):
-            touched = reached[pairs].any(axis=1)
-            reached[pairs[touched].ravel()] = True
-            # nothing is passed on through supports
-            reached &= self.asleep
-        return reached
+    def settle(self, step: Step) -> State:
+        """Put to sleep the stones that have rested for long enough; return the state with which the run goes on."""
+        state = step.after
+        if not self._may_sleep:
+            return state
+        self._steps += 1
+        if self._steps >= _STEPS:
+            self._wake(self._uneasy(step), state)
+        if not self._supports_rest:
+            self._watched, self._steps = state, 0
+        if self._steps < _STEPS:
+            return state
+        tired = self._tired(step)
+        if tired.any():
+            self._put_to_sleep(tired, step)
+        self._watched, self._steps = state, 0
+        return (
+            replace(state, velocity=np.where(tired[:, None], 0.0, state.velocity)) if tired.any() else state
+        )
 
-    def without(self, bodies: Bools, state: State) -> tuple["Sleep", Bearing | None]:
-        """Wake some bodies (nb,); also what those bear that are watched again, for the memory."""
-        asleep = self.asleep & ~bodies
-        if self.borne is None:
-            return replace(self, asleep=asleep), None
-        rows = (self.asleep & bodies)[self.borne.contacts.bodies].any(axis=1)
-        again, borne = self.borne.take(np.flatnonzero(rows)), self.borne.take(np.flatnonzero(~rows))
-        return replace(
-            self, asleep=asleep, borne=borne, wrench=_resultants(state, borne.contacts, borne.force)
-        ), again
-
-    def uneasy(self, model: Model, state: State, active: Bearing, load: Array) -> Bools:
-        """Sleeping stones (nb,) that alone keep a scene from its equilibrium: looked for where nothing else moves.
+    def _uneasy(self, step: Step) -> Bools:
+        """Return the sleeping stones (nb,) that alone keep a scene at rest from its equilibrium.
 
         They are within `sleep`, but not within the tolerance to which a scene must be in balance to end.
         """
-        nobody = np.zeros_like(self.asleep)
-        if self.steps + 1 < _STEPS or not (model.scene.time.stop_at_equilibrium and self.asleep.any()):
-            return nobody
-        if (speed(model, state)[model.inertia.moving] > _pace(model, state)).any():
-            return nobody
-        out = _out_of_balance(
-            model, state, load + self.wrench + _resultants(state, active.contacts, active.force)
-        )
-        found: Bools = self.asleep & (out > model.scene.time.balance_tolerance)
-        return found
+        model, state, time = self._whole, step.after, self._whole.scene.time
+        at_rest = not (speed(model, state)[model.inertia.moving] > _pace(model, state)).any()
+        if not (time.stop_at_equilibrium and self.asleep.any() and at_rest):
+            return np.zeros_like(self.asleep)
+        uneasy: Bools = self.asleep & (self._imbalance_after(step) > time.balance_tolerance)
+        return uneasy
 
-    def later(self, model: Model, state: State, active: Bearing, load: Array, held: bool) -> "Sleep":
-        """After one more step: who has rested for long enough falls asleep, unless supports move (`held` false)."""
-        if not held:
-            return replace(self, watched=state, steps=0)
-        if self.steps + 1 < _STEPS:
-            return replace(self, steps=self.steps + 1)
-        tired = self._tired(model, state, active, load)
-        asleep = self.asleep | tired
-        if not tired.any():
-            return replace(self, watched=state, steps=0)
-        lying = asleep | model.fixed
-        rows = np.flatnonzero(lying[active.contacts.bodies].all(axis=1))
-        new = active.take(rows)
-        borne = new if self.borne is None else both(self.borne, new)
-        return Sleep(asleep, borne, _resultants(state, borne.contacts, borne.force), state)
-
-    def _tired(self, model: Model, state: State, active: Bearing, load: Array) -> Bools:
-        """Who has not moved since it is watched, does not move now, and is in balance (nb,)."""
-        settings, pace = model.scene.time, _pace(model, state)
-        limit = settings.sleep
-        if settings.stop_at_equilibrium:
-            limit = min(limit, settings.balance_tolerance)
-        out = _out_of_balance(
-            model, state, load + self.wrench + _resultants(state, active.contacts, active.force)
-        )
+    def _tired(self, step: Step) -> Bools:
+        """Return the stones (nb,) that have not moved since they are watched, do not move, and are in balance."""
+        model, state, time = self._whole, step.after, self._whole.scene.time
+        pace, limit = _pace(model, state), time.sleep
+        if time.stop_at_equilibrium:
+            limit = min(limit, time.balance_tolerance)
         return (
             model.inertia.moving
             & ~self.asleep
-            & (out <= _CALMER * limit)
+            & (self._imbalance_after(step) <= _CALMER * limit)
             & (speed(model, state) <= pace)
-            & (displacement(model, self.watched, state) <= pace * settings.step * _STEPS)
+            & (displacement(model, self._watched, state) <= pace * time.step * _STEPS)
         )
 
+    def _put_to_sleep(self, bodies: Bools, step: Step) -> None:
+        """Let bodies (nb,) fall asleep with the forces of a step."""
+        self.asleep = self.asleep | bodies
+        lying = self.asleep | self._whole.fixed
+        new = step.active.take(np.flatnonzero(lying[step.active.contacts.bodies].all(axis=1)))
+        self._keep(new if self.forces is None else self.forces.joined(new), step.after)
 
-def held_model(model: Model, asleep: Bools) -> Model:
-    """The model as it is for those awake: no impulse moves who sleeps."""
-    inertia = model.inertia
-    inverse_mass = np.where(asleep, 0.0, inertia.inverse_mass)
-    inverse_inertia = np.where(asleep[:, None, None], 0.0, inertia.inverse_inertia)
-    return replace(
-        model, inertia=replace(inertia, inverse_mass=inverse_mass, inverse_inertia=inverse_inertia)
-    )
+    def _wake(self, bodies: Bools, state: State) -> None:
+        """Wake bodies (nb,); the memory takes up the forces that they kept."""
+        if not bodies.any():
+            return
+        kept, woken = self.forces, self.asleep & bodies
+        self.asleep = self.asleep & ~bodies
+        if kept is not None:
+            rows = woken[kept.contacts.bodies].any(axis=1)
+            again = kept.take(np.flatnonzero(rows))
+            solution = np.hstack([again.impulse, again.dual])
+            self._memory.take_up(again.contacts.key, solution, again.internal, again.place)
+            kept = kept.take(np.flatnonzero(~rows))
+        self._keep(kept, state)
+
+    def _keep(self, forces: ContactForces | None, state: State) -> None:
+        """Keep the forces among sleeping stones; the awake ones see these as fixed."""
+        self.forces = forces
+        if forces is not None:
+            self._wrench = _resultants(state, forces.contacts, forces.force)
+        model, asleep = self._whole, self.asleep
+        inertia = replace(
+            model.inertia,
+            inverse_mass=np.where(asleep, 0.0, model.inertia.inverse_mass),
+            inverse_inertia=np.where(asleep[:, None, None], 0.0, model.inertia.inverse_inertia),
+        )
+        self.model = replace(model, inertia=inertia, fixed=model.fixed | asleep)
+
+    def _around(self, bodies: Bools, rings: int) -> Bools:
+        """Return the sleeping stones (nb,) among some bodies and, ring by ring, those in contact with them."""
+        reached = bodies & self.asleep
+        pairs = np.zeros((0, 2), dtype=np.int64) if self.forces is None else self.forces.contacts.bodies
+        for _ in range(rings):
+            touched = reached[pairs].any(axis=1)
+            reached[pairs[touched].ravel()] = True
+            # supports pass nothing on
+            reached &= self.asleep
+        return reached
+
+    def _imbalance_after(self, step: Step) -> Array:
+        active = step.active
+        return self._imbalance(step.after, step.kick.load, active.contacts, active.force)
+
+    def _imbalance(self, state: State, load: Array, contacts: Contacts, force: Array) -> Array:
+        """Return the larger of force, and of moment over the smallest width, over the weight (nb,) [-]."""
+        model = self._whole
+        resultant = load + self._wrench + _resultants(state, contacts, force)
+        parts = (
+            np.linalg.norm(resultant[:, :3], axis=1),
+            np.linalg.norm(resultant[:, 3:], axis=1) / model.surfaces.size,
+        )
+        out: Array = np.maximum(*parts) / (model.mass * _gravity(model, state.time))
+        return out
 
 
 def _resultants(state: State, contacts: Contacts, force: Array) -> Array:
-    """Forces and moments (nb, 6) about the centres of mass that contacts exert on their bodies [N], [N m]."""
+    """Return forces and moments (nb, 6) about the centres of mass that contacts exert on their bodies [N], [N m]."""
     points, bodies, count = material_points(contacts, state), contacts.bodies, len(state.centre)
     total = wrenches(state, bodies[:, 0], points[:, 0], force, count)
     total -= wrenches(state, bodies[:, 1], points[:, 1], force, count)
     return total
 
 
-def _out_of_balance(model: Model, state: State, resultant: Array) -> Array:
-    """Larger of force, and of moment over the smallest width, over the weight (nb,) [-]."""
-    parts = (
-        np.linalg.norm(resultant[:, :3], axis=1),
-        np.linalg.norm(resultant[:, 3:], axis=1) / model.surfaces.size,
-    )
-    out: Array = np.maximum(*parts) / (model.mass * _gravity(model, state.time))
-    return out
-
-
 def _pace(model: Model, state: State) -> float:
-    """Below which a stone is at rest: what `sleep` as a part of gravity gives in one step [m/s]."""
+    """Return the speed below which a stone is at rest: `sleep` as a part of gravity, over one step [m/s]."""
     settings = model.scene.time
     return settings.sleep * _gravity(model, state.time) * settings.step
 
 
 def _gravity(model: Model, time: float) -> float:
-    """g, or where there is none 1 m/s²."""
+    """Return g, or 1 m/s² without gravity."""
     return float(np.linalg.norm(model.gravity(time))) or 1.0

@@ -7,11 +7,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mechanics.arrays import Array, Ints
-from mechanics.contact.contacts import Contacts
 from mechanics.delassus.assembly import world_impulse
-from mechanics.delassus.mixed import MixedDelassus
-from mechanics.delassus.rigid import RigidDelassus
-from mechanics.model._kernels import deform, rigid_part
+from mechanics.dynamics.contact_search import Detection
+from mechanics.model._kernels import Frames, deform, rigid_part
 from mechanics.model.deformable import Compliance
 from mechanics.model.model import Model
 from mechanics.model.rigid import free_flight, inverse_inertia_world
@@ -31,7 +29,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Kick:
-    """Velocities just after the loads, and maybe the contacts, have acted.
+    """Velocities just after the loads, and possibly the contacts, have acted.
 
     Attributes
     ----------
@@ -46,12 +44,12 @@ class Kick:
 
 
 def compliances(model: Model, step: float, theta: float) -> tuple[Compliance, ...]:
-    """ŵ of every group of equal elastic stones, for this step and θ."""
+    """Return ŵ of every group of equal elastic stones, for this step and θ."""
     return tuple(Compliance(group.stone, step, theta) for group in model.elastic_stones.groups)
 
 
 def predict(model: Model, start: State, state: State, duration: float) -> State:
-    """Fly for `duration` [s]: no forces act; driven bodies follow their motion.
+    """Return the state after a flight of `duration` [s]: no forces act, and driven bodies follow their motion.
 
     An elastic stone flies as a rigid one, and in its axes its deformation grows at a constant rate. `start` is the
     state in which the run began, to which imposed motions refer.
@@ -70,8 +68,8 @@ def predict(model: Model, start: State, state: State, duration: float) -> State:
     node, node_velocity = state.node, state.node_velocity
     if elastic.groups:
         node, node_velocity = deform(
-            elastic.start, elastic.reference, state.centre, state.rotation, state.node, rate, duration,
-            centre, rotation, velocity,
+            elastic.start, elastic.reference, Frames(state.centre, state.rotation), Frames(centre, rotation), velocity,
+            state.node, rate, duration,
         )  # fmt: skip
         velocity = np.where(model.elastic[:, None], 0.0, velocity)
     return State(time, centre, rotation, velocity, node, node_velocity)
@@ -85,7 +83,7 @@ def _driven(pose: Pose, start: State, bodies: Ints) -> tuple[Array, Array]:
 def free_kick(
     model: Model, start: State, predicted: State, compliance: Sequence[Compliance], step: float, theta: float
 ) -> Kick:
-    """v_free = v + ŵ [ -h V v - h K (d + hθ v) + h P ] with P the weight and the loads; rigid: ŵ = M⁻¹, K = V = 0.
+    """Return v_free = v + ŵ [ -h V v - h K (d + hθ v) + h P ], P the weight and the loads; rigid: ŵ = M⁻¹, K = V = 0.
 
     Loads are taken at the instant of the kick; `predicted` is the state there, d that at the start of the step.
     """
@@ -98,7 +96,7 @@ def free_kick(
         answer = inverse_inertia_world(model.inertia, predicted.rotation) @ load[:, 3:, None]
         velocity[:, 3:] += step * answer[..., 0]
     for motion, bodies in model.motions:
-        # with one velocity from kick to kick, as free bodies have
+        # one velocity from kick to kick, like free bodies
         end, turn = _driven(motion.pose(predicted.time + step), start, bodies)
         velocity[bodies, :3] = (end - predicted.centre[bodies]) / step
         vector = Rotation.from_matrix(turn @ predicted.rotation[bodies].transpose(0, 2, 1)).as_rotvec()
@@ -107,7 +105,7 @@ def free_kick(
     for group, own in zip(model.elastic_stones.groups, compliance, strict=True):
         turn = predicted.rotation[group.bodies]
         inner, outer = _elastic_forces(group, predicted, gravity, step, theta)
-        # inner forces move no stone as a whole, whatever their rounding
+        # inner forces must not move a stone as a whole, not even by their rounding
         answer = own.deform(step * (inner + outer)) + own.shift(step * outer)
         node_velocity[group.nodes] += answer @ turn.transpose(0, 2, 1)
     return Kick(velocity, node_velocity, load)
@@ -116,14 +114,14 @@ def free_kick(
 def _elastic_forces(
     group: ElasticGroup, predicted: State, gravity: Array, step: float, theta: float
 ) -> tuple[Array, Array]:
-    """Nodal forces of equal stones (k, n, 3), body axes [N]: inner ones, and the others.
+    """Return the nodal forces of equal stones (k, n, 3), body axes [N]: inner and outer ones.
 
-    Inner are -K (d + (hθ + β) v) and the centrifugal forces; the others are the weight and -α M v.
+    The inner ones are -K (d + (hθ + β) v) and the centrifugal forces; the outer ones are the weight and -α M v.
     """
     stone, turn, count = group.stone, predicted.rotation[group.bodies], len(group.bodies)
     material = stone.material
     velocity = predicted.node_velocity[group.nodes] @ turn
-    # d at the kick is that of the start of the step plus h(1-θ) v; K does not see the rigid part of v
+    # d at the kick is that of the start of the step plus h(1-θ) v; the rigid part of v vanishes under K
     strained = (predicted.node[group.nodes] - predicted.centre[group.bodies, None]) @ turn - stone.mesh.nodes
     strained += (step * (2.0 * theta - 1.0) + material.stiffness_damping) * velocity
     rate = velocity.reshape(count, -1).T
@@ -140,7 +138,7 @@ def _elastic_forces(
 
 
 def _loads(model: Model, state: State, gravity: Array) -> Array:
-    """Forces and moments (nb, 6) on the rigid bodies, weight included."""
+    """Return forces and moments (nb, 6) on the rigid bodies, weight included [N], [N m]."""
     load = np.zeros((len(model.mass), 6))
     moving = model.inertia.moving
     load[moving, :3] = model.mass[moving, None] * gravity
@@ -152,28 +150,22 @@ def _loads(model: Model, state: State, gravity: Array) -> Array:
 
 
 def kicked(
-    model: Model,
-    free: Kick,
-    rotation: Array,
-    contacts: Contacts,
-    operator: RigidDelassus | MixedDelassus,
-    impulse: Array,
-    compliance: Sequence[Compliance],
+    model: Model, free: Kick, found: Detection, impulse: Array, compliance: Sequence[Compliance]
 ) -> Kick:
-    """v_{i+1} = v_free + ŵ H r; `rotation` (nb, 3, 3) is that for which the operator was made."""
-    velocity = free.velocity + operator.rigid_change(impulse)
+    """Return v_{i+1} = v_free + ŵ H r, with ŵ and H of the configuration in which the contacts were found."""
+    velocity = free.velocity + found.operator.rigid_change(impulse)
     node_velocity = free.node_velocity
     if compliance:
-        world = world_impulse(contacts, impulse)
-        nodal = contacts.weights.T @ np.stack([world, -world], axis=1).reshape(-1, 3)
+        world = world_impulse(found.contacts, impulse)
+        nodal = found.contacts.weights.T @ np.stack([world, -world], axis=1).reshape(-1, 3)
         node_velocity = node_velocity.copy()
         for group, own in zip(model.elastic_stones.groups, compliance, strict=True):
-            turn = rotation[group.bodies]
+            turn = found.configuration.rotation[group.bodies]
             node_velocity[group.nodes] += own.respond(nodal[group.nodes] @ turn) @ turn.transpose(0, 2, 1)
     return Kick(velocity, node_velocity, free.load)
 
 
 def advance(model: Model, start: State, predicted: State, kick: Kick, duration: float) -> State:
-    """q_{i+1} = q_i + h [θ v_{i+1} + (1-θ) v_i]: fly from the kick to the end of the step, for hθ = `duration`."""
+    """Return q_{i+1} = q_m + hθ v_{i+1}: fly from the kick to the end of the step, for hθ = `duration` [s]."""
     state = replace(predicted, velocity=kick.velocity, node_velocity=kick.node_velocity)
     return predict(model, start, state, duration)

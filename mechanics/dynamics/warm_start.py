@@ -1,4 +1,4 @@
-"""What is remembered from step to step of contacts that persist: the solver's solution and the laws' own variables."""
+"""Warm start: impulses, velocities and internal variables of the contacts that persist from step to step."""
 
 import numpy as np
 
@@ -9,15 +9,14 @@ from mechanics.scene.laws.law import BOND, STATE
 __all__ = ["Memory"]
 
 
-# the bits of a key below those that name the pair of shapes
-_POINT_BITS = 24
+_POINT_BITS = 24  # lowest bits of a key, which number the contact points of one pair of shapes
 
 
 class Memory:
     """Impulses, velocities and internal variables by contact key.
 
-    Bonds belong to places in a joint. A face that slides by a hair, or is cut at another edge, gets contacts with new
-    keys; where a joint has bonds, these take the internal variables of the nearest contact that the pair had.
+    Bonds belong to places in a joint. A face that slides a little, or is cut at another edge, gets contacts with new
+    keys; where a joint has bonds, these inherit the internal variables of the nearest earlier contact of the pair.
 
     Parameters
     ----------
@@ -31,9 +30,9 @@ class Memory:
         self._place: Array | None = None
 
     def recall(self, key: Ints, place: Array | None = None) -> tuple[ContactStart, Array]:
-        """What the contacts of these keys (nc,) had in the last step, and their internal variables (nc, STATE).
+        """Return the warm start of the contacts of some keys (nc,), and their internal variables (nc, STATE).
 
-        Zero for new contacts, but for the internal variables of those in a bonded joint, if their places (nc, d) [m]
+        Both are zero for new contacts, except for the internal variables in bonded joints if the places (nc, d) [m]
         are given.
         """
         if key is self._key:
@@ -51,7 +50,7 @@ class Memory:
         return ContactStart(values[:, :d], values[:, d : 2 * d]), values[:, 2 * d :]
 
     def _inherit(self, values: Array, new: Ints, key: Ints, place: Array, order: Ints) -> None:
-        """Give the new contacts (rows of `values`) of bonded joints the internal variables of the nearest old ones."""
+        """Copy the internal variables of the nearest old contacts to new ones (rows of `values`) in bonded joints."""
         state = self._values[:, 2 * self._dimension :]
         if not len(new) or self._place is None or not state[:, BOND].any():
             return
@@ -60,7 +59,7 @@ class Memory:
         heirs, count = new[high > low], (high - low)[high > low]
         if not len(heirs):
             return
-        # all old contacts of the pair of each heir, one heir after the other
+        # all old contacts of each heir's pair, heir by heir
         first = np.concatenate([[0], np.cumsum(count)[:-1]])
         old = order[np.arange(count.sum()) - np.repeat(first - low[high > low], count)]
         distance = np.linalg.norm(self._place[old] - np.repeat(place[heirs], count, axis=0), axis=1)
@@ -69,19 +68,19 @@ class Memory:
         values[heirs, 2 * self._dimension :] = state[nearest]
 
     def store(self, key: Ints, solution: ContactSolution, state: Array, place: Array | None = None) -> None:
-        """Remember this step: its solution, the internal variables (nc, STATE) that the laws left, and the places."""
+        """Remember a step: its solution, with true impulses r, internal variables (nc, STATE) and places."""
         self._key, self._place = key, place
         self._values = np.hstack([solution.impulse, solution.velocity, state])
 
     def take_up(self, key: Ints, solution: Array, state: Array, place: Array | None = None) -> None:
-        """Remember more contacts as if they had been in the last step: r and û (nc, 2d), internal variables, places."""
+        """Remember further contacts as part of the last step: r and û (nc, 2d), internal variables, places."""
         self._key = np.concatenate([self._key, key])
         self._values = np.vstack([self._values, np.hstack([solution, state])])
         if self._place is not None and place is not None:
             self._place = np.vstack([self._place, place])
 
     def at_rest(self, factor: float) -> "Memory":
-        """The same forces over a step that is `factor` times as long, in bodies that have come to rest."""
+        """Return the same forces for a step that is `factor` times as long, of bodies that have come to rest."""
         d, other = self._dimension, Memory(self._dimension)
         other._key, other._place, other._values = self._key, self._place, self._values.copy()
         other._values[:, :d] *= factor

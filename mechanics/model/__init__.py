@@ -1,1 +1,4 @@
-"""Bodies: rigid and fixed ones in arrays, deformable ones with their finite elements."""
+"""Scene packed into arrays: rigid bodies, deformable ones with their finite elements, contact surfaces.
+
+Public: `Model`, `build_model` (model); `ball` (balls); `Deformable`, `Compliance` (deformable); `RigidInertia` (rigid).
+"""

@@ -1,17 +1,31 @@
-"""Numba kernel of free rigid rotation."""
+"""Numba kernels of flight: free rotation of rigid bodies, and elastic bodies in axes that move with them."""
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-__all__ = ["deform", "fly", "rigid_part"]
+__all__ = ["Frames", "deform", "fly", "rigid_part"]
 
-# largest angle of one substep [rad]: the attitude is accurate to the second order in it
-_SUBSTEP = 0.1
+_SUBSTEP = 0.1  # largest angle of one substep [rad]: the attitude is accurate to the second order in it
+
+
+class Frames(NamedTuple):
+    """Axes of all bodies at one instant.
+
+    Attributes
+    ----------
+    centre : (nb, 3) float64 [m]
+    rotation : (nb, 3, 3) float64, from body axes to world axes
+    """
+
+    centre: np.ndarray
+    rotation: np.ndarray
 
 
 @njit(cache=True)
 def _series(x, y, z):
-    """sin(a)/a and (1 - cos(a))/a² of a rotation vector of length a (Rodrigues)."""
+    """Return sin(a)/a and (1 - cos(a))/a² of a rotation vector of length a (Rodrigues)."""
     angle = np.sqrt(x * x + y * y + z * z)
     if angle < 1e-8:
         return 1.0 - angle * angle / 6.0, 0.5 - angle * angle / 24.0
@@ -21,14 +35,14 @@ def _series(x, y, z):
 
 @njit(cache=True)
 def _row_turned(a, b, c, x, y, z, s, v):
-    """The row (a, b, c) times the exponential of a rotation vector, given its series."""
+    """Return the row (a, b, c) times the exponential of a rotation vector, given its series."""
     p, q, r = b * z - c * y, c * x - a * z, a * y - b * x
     return a + s * p + v * (q * z - r * y), b + s * q + v * (r * x - p * z), c + s * r + v * (p * y - q * x)
 
 
 @njit(cache=True)
 def _turn(rotation, x, y, z):
-    """rotation · exp(vector) in place; the vector is given in body axes [rad]."""
+    """Multiply a rotation by exp(vector) in place; the vector is given in body axes [rad]."""
     s, v = _series(x, y, z)
     for i in range(3):
         rotation[i, 0], rotation[i, 1], rotation[i, 2] = _row_turned(
@@ -38,7 +52,7 @@ def _turn(rotation, x, y, z):
 
 @njit(cache=True)
 def _straighten(rotation):
-    """Take rounding out of a rotation, in place: one step of Newton's towards the nearest, R (3 - Rᵀ R)/2."""
+    """Remove rounding from a rotation in place, by a Newton step towards the nearest one: R (3 - Rᵀ R)/2."""
     a, b, c = rotation[:, 0], rotation[:, 1], rotation[:, 2]
     aa = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
     ab = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
@@ -55,6 +69,7 @@ def _straighten(rotation):
 
 @njit(cache=True)
 def _product(m, x, y, z):
+    """Return m (x, y, z)ᵀ."""
     return (
         m[0, 0] * x + m[0, 1] * y + m[0, 2] * z,
         m[1, 0] * x + m[1, 1] * y + m[1, 2] * z,
@@ -64,6 +79,7 @@ def _product(m, x, y, z):
 
 @njit(cache=True)
 def _transposed(m, x, y, z):
+    """Return mᵀ (x, y, z)ᵀ."""
     return (
         m[0, 0] * x + m[1, 0] * y + m[2, 0] * z,
         m[0, 1] * x + m[1, 1] * y + m[2, 1] * z,
@@ -73,11 +89,23 @@ def _transposed(m, x, y, z):
 
 @njit(cache=True)
 def fly(rotation, omega, inertia, inverse, moving, duration):  # pragma: no cover - compiled
-    """Free rotation of rigid bodies: new rotations (nb, 3, 3) and angular velocities (nb, 3), world axes.
+    """Rotate rigid bodies freely for some time.
 
     With Π the angular momentum in body axes, each substep turns the body by exp(τ Ω), Ω = I⁻¹ (Π + Π')/2, and
     Π' = exp(-τ Ω) Π. So R Π, the momentum in space, stays, and ½ Π I⁻¹ Π as well, since Π' - Π is normal to Ω: the
     midpoint rule keeps quadratic invariants (Cooper 1987), here with the exponential map.
+
+    Inputs
+    ------
+    rotation : (nb, 3, 3) float64, from body axes to world axes
+    omega : (nb, 3) float64, world axes [rad/s]
+    inertia, inverse : (nb, 3, 3) float64, body axes [kg m²], [1/(kg m²)]
+    moving : (nb,) bool
+    duration : float [s]
+
+    Outputs
+    -------
+    rotation, omega : as above, after that time
     """
     new, spin = rotation.copy(), omega.copy()
     for b in range(rotation.shape[0]):
@@ -91,7 +119,7 @@ def fly(rotation, omega, inertia, inverse, moving, duration):  # pragma: no cove
         steps = min(int(angle / _SUBSTEP) + 1, 1000)
         tau = duration / steps
         o0, o1, o2 = _transposed(r, w0, w1, w2)
-        # R is a rotation but for rounding: what R Rᵀ ω lacks of ω would add up over the steps
+        # rounding makes R Rᵀ ω differ from ω, by an error that would accumulate over the steps
         d0, d1, d2 = _product(r, o0, o1, o2)
         d0, d1, d2 = _transposed(r, w0 - d0, w1 - d1, w2 - d2)
         o0, o1, o2 = o0 + d0, o1 + d1, o2 + d2
@@ -108,7 +136,7 @@ def fly(rotation, omega, inertia, inverse, moving, duration):  # pragma: no cove
                 n0, n1, n2 = c0, c1, c2
                 if change <= 1e-16 * size:
                     break
-                # by the change of Π: I⁻¹ I is not quite 1, and would scale the spin a little more each time
+                # from the change of Π: rounding of I⁻¹ I would otherwise scale the spin in every step
                 d0, d1, d2 = _product(v, n0 - p0, n1 - p1, n2 - p2)
                 e0, e1, e2 = o0 + 0.5 * d0, o1 + 0.5 * d1, o2 + 0.5 * d2
             _turn(r, tau * e0, tau * e1, tau * e2)
@@ -124,18 +152,18 @@ def fly(rotation, omega, inertia, inverse, moving, duration):  # pragma: no cove
 def rigid_part(start, reference, projector, rotation, node_velocity):  # pragma: no cover - compiled
     """Split the motion of elastic bodies into that of their frames and deformation rates.
 
-    Parameters
-    ----------
-    start : (nb+1,) first node of each body; bodies without nodes are left out
-    reference : (nn, 3) undeformed places, body axes [m]
-    projector : (nn, 6, 3) (Rᵀ M R)⁻¹ Rᵀ M, column by column: rigid velocities from nodal ones, body axes
-    rotation : (nb, 3, 3) of the frames
-    node_velocity : (nn, 3) world axes [m/s]
+    Inputs
+    ------
+    start : (nb+1,) int64, first node of each body; bodies without nodes are skipped
+    reference : (nn, 3) float64, undeformed places, body axes [m]
+    projector : (nn, 6, 3) float64, (Rᵀ M R)⁻¹ Rᵀ M, column by column: rigid velocities from nodal ones, body axes
+    rotation : (nb, 3, 3) float64, of the frames
+    node_velocity : (nn, 3) float64, world axes [m/s]
 
-    Returns
+    Outputs
     -------
-    motion : (nb, 6) velocities of the frames [m/s, rad/s], world axes
-    rate : (nn, 3) what is left, body axes; it has no part in any rigid motion [m/s]
+    motion : (nb, 6) float64, velocities of the frames [m/s, rad/s], world axes
+    rate : (nn, 3) float64, the remainder, body axes; it has no part in any rigid motion [m/s]
     """
     bodies = start.shape[0] - 1
     motion, rate = np.zeros((bodies, 6)), np.empty_like(node_velocity)
@@ -168,30 +196,39 @@ def rigid_part(start, reference, projector, rotation, node_velocity):  # pragma:
 
 
 @njit(cache=True)
-def deform(
-    start, reference, centre, rotation, node, rate, duration, new_centre, new_rotation, motion
-):  # pragma: no cover - compiled
-    """Nodes and their velocities (nn, 3) after a flight in which the frames have moved and d has grown at its rate.
+def deform(start, reference, before, after, motion, node, rate, duration):  # pragma: no cover - compiled
+    """Move the nodes of elastic bodies in a flight in which their frames move and d grows at its rate.
 
-    `centre`, `rotation` of the frames before the flight, `new_centre`, `new_rotation` and `motion` (nb, 6) after it;
-    `rate` as `rigid_part` gives it.
+    Inputs
+    ------
+    start, reference : as `rigid_part` takes them
+    before, after : Frames before and after the flight
+    motion : (nb, 6) float64, velocities of the frames after the flight [m/s, rad/s], world axes
+    node : (nn, 3) float64, before the flight, world axes [m]
+    rate : (nn, 3) float64, as `rigid_part` gives it, body axes [m/s]
+    duration : float [s]
+
+    Outputs
+    -------
+    node, velocity : (nn, 3) float64, after the flight, world axes [m], [m/s]
     """
+    centre, new_centre = before.centre, after.centre
     place, velocity = np.empty_like(node), np.empty_like(node)
     local, arm = np.empty(3), np.empty(3)
     for b in range(start.shape[0] - 1):
-        old, new = rotation[b], new_rotation[b]
+        old, new = before.rotation[b], after.rotation[b]
         w0, w1, w2 = motion[b, 3], motion[b, 4], motion[b, 5]
         for i in range(start[b], start[b + 1]):
             x, y, z = node[i, 0] - centre[b, 0], node[i, 1] - centre[b, 1], node[i, 2] - centre[b, 2]
             for k in range(3):
-                # through d, so that a stone without strain keeps none whatever the rounding of its frame
+                # by way of d, so that rounding of the frame strains no stone
                 d = old[0, k] * x + old[1, k] * y + old[2, k] * z - reference[i, k]
                 local[k] = reference[i, k] + (d + duration * rate[i, k])
             for k in range(3):
                 place[i, k] = (
                     new_centre[b, k] + new[k, 0] * local[0] + new[k, 1] * local[1] + new[k, 2] * local[2]
                 )
-                # the spin acts on the undeformed arms, as it was read off them
+                # the spin acts on the undeformed arms, from which it was computed
                 arm[k] = (
                     new[k, 0] * reference[i, 0] + new[k, 1] * reference[i, 1] + new[k, 2] * reference[i, 2]
                 )

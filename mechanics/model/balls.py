@@ -1,4 +1,4 @@
-"""Balls: thrown bodies, and the cases of rolling that have closed forms."""
+"""Balls: thrown bodies, and benchmarks of rolling with closed forms."""
 
 from collections.abc import Sequence
 
@@ -21,7 +21,7 @@ def ball(
     fidelity: Fidelity = Fidelity.RIGID,
     velocity: tuple[float, ...] = (0.0,) * 6,
 ) -> Block:
-    """A ball of a radius [m] about a centre (3,) [m]; contacts are those of the sphere, pictures show facets.
+    """Return a ball of a radius [m] about a centre (3,) [m]; contacts are those of the sphere, pictures show facets.
 
     Raises
     ------
@@ -42,7 +42,7 @@ def ball(
 
 
 def ball_properties(block: Block) -> MassProperties:
-    """Volume, centre and inertia of the sphere that a block stands for."""
+    """Return volume, centre and inertia of the sphere that a block stands for."""
     assert block.radius is not None
     volume = 4.0 / 3.0 * np.pi * block.radius**3
     inertia = 0.4 * volume * block.radius**2 * np.eye(3)

@@ -33,8 +33,7 @@ from mechanics.stones.meshing.mesh import SolidMesh
 __all__ = ["Compliance", "Deformable", "deformable"]
 
 
-# from so many nodes on, nested dissection leaves less fill-in than least degree
-_LARGE = 1500
+_LARGE = 1500  # nodes above which nested dissection gives less fill-in than minimum degree
 
 
 @dataclass(frozen=True)
@@ -68,12 +67,12 @@ class Deformable:
         return float(self.weight.sum())
 
     def stress(self, node: Array, centre: Array, rotation: Array) -> Array:
-        """Recovered nodal stress (n, 6) in world axes [Pa]."""
+        """Return the recovered nodal stress (n, 6) in world axes [Pa]."""
         local = self.recovered(self.displacement(node, centre, rotation))
         return to_voigt(rotation @ from_voigt(local) @ rotation.T)
 
     def recovered(self, displacement: Array) -> Array:
-        """Recovered nodal stress (n, 6), body axes [Pa], from displacements (n, 3) in them [m]."""
+        """Return the recovered nodal stress (n, 6), body axes [Pa], from displacements (n, 3) in them [m]."""
         local: Array = self._recovery @ sampled_stress(self.mesh, self.material, displacement)
         return local
 
@@ -82,17 +81,17 @@ class Deformable:
         return recovery(self.mesh)
 
     def displacement(self, node: Array, centre: Array, rotation: Array) -> Array:
-        """Displacement d of the nodes (n, 3) from the undeformed stone, body axes [m]."""
+        """Return the displacement d of the nodes (n, 3) from the undeformed stone, body axes [m]."""
         return (node - centre) @ rotation - self.mesh.nodes
 
     def elastic_energy(self, node: Array, centre: Array, rotation: Array) -> float:
-        """½ dᵀ K d [J]."""
+        """Return ½ dᵀ K d [J]."""
         d = self.displacement(node, centre, rotation).ravel()
         return float(0.5 * d @ (self.operators.stiffness @ d))
 
 
 def deformable(mesh: SolidMesh, material: Material, lumped: bool = False) -> tuple[Deformable, Array]:
-    """The elastic stone of a mesh, and its centre of mass (3,) [m]."""
+    """Return the elastic stone of a mesh, and its centre of mass (3,) [m]."""
     operators = elastic_operators(mesh, material, lumped)
     weight = np.asarray(operators.mass.sum(axis=1)).reshape(-1, 3)[:, 0]
     centre = weight @ mesh.nodes / weight.sum()
@@ -115,7 +114,7 @@ def deformable(mesh: SolidMesh, material: Material, lumped: bool = False) -> tup
 
 
 def _rigid_modes(nodes: Array) -> Array:
-    """R (3n, 6): nodal velocities of three unit translations and of unit rotations about three axes."""
+    """Return R (3n, 6): nodal velocities of three unit translations and of unit rotations about three axes."""
     modes = np.zeros((len(nodes), 3, 6))
     modes[:, :, :3] = np.eye(3)
     for axis in range(3):
@@ -127,7 +126,7 @@ class Compliance:
     """ŵ = (M + h θ V + h² θ² K)⁻¹ of one stone, for one time step and θ.
 
     ŵ moves the stone as a whole, through its mass, and deforms it. In long steps the first part is larger by many
-    orders, and rounding of one would drown the other; so they are kept apart, and momentum is exact.
+    orders, and its rounding would exceed the second; the two are kept apart, and momentum is exact.
 
     Parameters
     ----------
@@ -155,22 +154,22 @@ class Compliance:
 
     @property
     def matrix(self) -> "csc_array[np.float64]":
-        """ŵ⁻¹ (3n, 3n), body axes, made anew for whoever asks [kg]."""
+        """ŵ⁻¹ (3n, 3n), body axes, assembled at each access [kg]."""
         stone, h = self._stone, self._duration
         return csc_array(stone.operators.mass + h * stone.damping + h**2 * stone.operators.stiffness)
 
     def respond(self, impulse: Array) -> Array:
-        """Velocities ŵ p (…, n, 3) that nodal impulses p (…, n, 3) [N s] give, body axes [m/s]."""
+        """Return the velocities ŵ p (…, n, 3) due to nodal impulses p (…, n, 3) [N s], body axes [m/s]."""
         return self.deform(impulse) + self.shift(impulse)
 
     def deform(self, impulse: Array) -> Array:
-        """The part of ŵ p that deforms the stone."""
+        """Return the part of ŵ p that deforms the stone."""
         columns = impulse.reshape(-1, len(self._modes)).T
         velocity: Array = self._deforming(columns).T.reshape(impulse.shape)
         return velocity
 
     def shift(self, impulse: Array) -> Array:
-        """The part of ŵ p that moves the stone as a whole."""
+        """Return the part of ŵ p that moves the stone as a whole."""
         columns = impulse.reshape(-1, len(self._modes)).T
         velocity: Array = (self._modes @ (self._whole @ (self._modes.T @ columns))).T.reshape(impulse.shape)
         return velocity
@@ -183,9 +182,9 @@ class Compliance:
         return velocity
 
     def between(self, nodes: Ints) -> Array:
-        """C = S ŵ Sᵀ (3k, 3k) between k nodes, in ascending order [1/kg].
+        """Return C = S ŵ Sᵀ (3k, 3k) between k nodes, in ascending order [1/kg].
 
-        Nodes that were asked for are kept condensed: those of faces that touch are asked for again and again.
+        Condensed nodes are kept, as the same faces touch in many steps.
         """
         new = np.setdiff1d(nodes, self._nodes)
         if len(new):

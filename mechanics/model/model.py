@@ -1,4 +1,4 @@
-"""A scene made ready to compute: meshes, masses, surfaces; what does not change while it runs."""
+"""Model of a scene for computation: meshes, masses, surfaces; constant during a run."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -27,23 +27,23 @@ from moma.errors import GeometryError, SceneError
 __all__ = ["Model", "build_model"]
 
 
-# contact keys number the faces of a stone in six bits
-_MAX_FACES = 64
-# by this fraction the volume of a stone's parts may differ from that of its outline
-_SAME_VOLUME = 1e-6
+_MAX_FACES = 64  # contact keys number the faces of a stone in six bits
+_SAME_VOLUME = (
+    1e-6  # largest difference of the volume of a stone's parts from that of its outline, relative [-]
+)
 
 
 @dataclass(frozen=True)
 class Model:
-    """What does not change while a scene runs.
+    """Constants of a run, packed into arrays.
 
     Attributes
     ----------
     scene : as given
-    fixed, elastic : (nb,) which bodies no force moves, which are deformable
+    fixed, elastic : (nb,) bodies that no force moves, and deformable bodies
     motions : imposed motions, each with the bodies that it drives
     forces : forces, each with the bodies on which it acts
-    laws : contact laws, and between which bodies they hold
+    laws : contact laws, and the pairs of bodies for which they hold
     inertia : of the rigid bodies
     flight : of all bodies that move, the elastic ones by their rigid motion
     mass : (nb,) [kg]
@@ -73,24 +73,24 @@ class Model:
 
     @property
     def rigid_only(self) -> bool:
-        """Nothing is deformable."""
+        """True if no body is deformable."""
         return not bool(self.elastic.any())
 
     def gravity(self, time: float) -> Array:
-        """(3,) acceleration at a time [m/s²]."""
+        """Return gravity (3,) at a time [m/s²]."""
         gravity = np.array(self.scene.gravity, dtype=float)
         for change in self.scene.loads.gravity:
             gravity = change(time, gravity)
         return gravity
 
     def nodes_of(self, body: int) -> slice:
-        """Where the nodes of a body lie in State.node."""
+        """Return the rows of a body's nodes in State.node."""
         start = self.elastic_stones.start
         return slice(int(start[body]), int(start[body + 1]))
 
 
 def build_model(scene: Scene, progress: Callable[[int, int], None] | None = None) -> tuple[Model, State]:
-    """Mesh the deformable stones and pack all bodies; also the state at rest where the scene begins.
+    """Mesh the deformable stones and pack all bodies; return the model and the state at the start of the scene.
 
     Raises
     ------
@@ -113,8 +113,7 @@ def build_model(scene: Scene, progress: Callable[[int, int], None] | None = None
         if progress is not None:
             progress(index + 1, len(blocks))
     packed = elastic_stones(stones)
-    inertia = _inertia(blocks, properties, np.array([block.material.density for block in blocks]))
-    density = np.array([block.material.density for block in blocks])
+    inertia = _inertia(blocks, properties)
     model = Model(
         scene=scene,
         fixed=np.array([block.fidelity is Fidelity.FIXED for block in blocks]),
@@ -128,7 +127,7 @@ def build_model(scene: Scene, progress: Callable[[int, int], None] | None = None
         ),
         inertia=inertia,
         flight=_flight(inertia, stones),
-        mass=density * np.array([p.volume for p in properties]),
+        mass=inertia.mass,
         volume=np.array([p.volume for p in properties]),
         surfaces=_surfaces(blocks, centres, stones, packed.start),
         outline=tuple(block.vertices - centre for block, centre in zip(blocks, centres, strict=True)),
@@ -141,7 +140,7 @@ def build_model(scene: Scene, progress: Callable[[int, int], None] | None = None
 
 
 def _flight(inertia: RigidInertia, stones: list[Deformable | None]) -> RigidInertia:
-    """The inertia of all bodies that fly."""
+    """Return the inertia of all bodies that fly."""
     mass, inverse = inertia.mass.copy(), inertia.inverse_mass.copy()
     own, inverted = inertia.inertia.copy(), inertia.inverse_inertia.copy()
     for b, stone in enumerate(stones):
@@ -274,7 +273,8 @@ def _check(block: Block) -> None:
             )
 
 
-def _inertia(blocks: tuple[Block, ...], properties: list[MassProperties], density: Array) -> RigidInertia:
+def _inertia(blocks: tuple[Block, ...], properties: list[MassProperties]) -> RigidInertia:
+    density = np.array([block.material.density for block in blocks])
     rigid = np.array([block.fidelity is Fidelity.RIGID for block in blocks])
     mass = density * np.array([p.volume for p in properties])
     inertia = density[:, None, None] * np.array([p.inertia for p in properties])

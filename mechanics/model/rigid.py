@@ -1,4 +1,4 @@
-"""Rigid bodies, all at once in arrays: inertia, and free flight."""
+"""Rigid bodies in arrays: inertia and free flight."""
 
 from dataclasses import dataclass
 
@@ -35,17 +35,17 @@ class RigidInertia:
 
 
 def inverse_inertia_world(inertia: RigidInertia, rotation: Array) -> Array:
-    """R I⁻¹ Rᵀ of every body (nb, 3, 3) [1/(kg m²)]."""
+    """Return R I⁻¹ Rᵀ of every body (nb, 3, 3) [1/(kg m²)]."""
     return rotation @ inertia.inverse_inertia @ rotation.transpose(0, 2, 1)
 
 
 def free_flight(
     inertia: RigidInertia, centre: Array, rotation: Array, velocity: Array, duration: float
 ) -> tuple[Array, Array, Array]:
-    """Centres, rotations and velocities of the rigid bodies after a flight without any force.
+    """Return centres, rotations and velocities of the rigid bodies after a flight without forces.
 
-    Angular momentum and energy are kept to rounding, whatever the duration; the attitude is accurate to the second
-    order in substeps of at most 0.1 rad. Bodies with zero inverse mass stay as they are.
+    Angular momentum and energy are conserved to rounding for any duration; the attitude is accurate to second order in
+    substeps of at most 0.1 rad. Bodies with zero inverse mass are unchanged.
     """
     moving = inertia.moving
     turned, spin = fly(

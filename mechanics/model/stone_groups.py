@@ -1,4 +1,4 @@
-"""All elastic stones of a scene: who shares a mesh, and what their flight needs, in flat arrays."""
+"""Elastic stones of a scene, grouped by mesh, with the flat arrays of their flight."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ __all__ = ["ElasticGroup", "ElasticStones", "elastic_stones"]
 
 @dataclass(frozen=True)
 class ElasticGroup:
-    """Stones that share one mesh and material.
+    """Elastic stones with one mesh and material.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class ElasticStones:
     groups : of equal stones
     start : (nb+1,) nodes of each body in State.node
     reference : (nn, 3) undeformed places, body axes [m]
-    projector : (nn, 6, 3) as mechanics.bodies._kernels_elastic takes it
+    projector : (nn, 6, 3) as mechanics.model._kernels.rigid_part takes it
     """
 
     groups: tuple[ElasticGroup, ...]

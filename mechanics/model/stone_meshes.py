@@ -1,7 +1,7 @@
-"""The finite elements of all deformable stones of a scene; stones of one shape share a mesh.
+"""Finite elements of all deformable stones of a scene; stones of one shape share a mesh.
 
-Stones that differ by a translation share one `Deformable` with its matrices. Those that are turned too share the mesh,
-turned with them. The stone that is meshed is the one of a shape whose code comes first, so a mesh does not depend
+Stones that differ by a translation share one `Deformable` with its matrices. Those that differ by a rotation as well
+share the mesh, turned with them. Of each shape the stone with the first code is meshed, so that a mesh does not depend
 on the order of the blocks.
 """
 
@@ -9,8 +9,8 @@ from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
 
 from mechanics.arrays import Array
+from mechanics.model.contact_faces import touching_faces
 from mechanics.model.deformable import Deformable, deformable
-from mechanics.model.touching import touching_faces
 from mechanics.scene.scene import Block, Fidelity
 from mechanics.stones.meshing.congruence import Motion, classes, motion, translation
 from mechanics.stones.meshing.mesh import SolidMesh
@@ -22,7 +22,7 @@ __all__ = ["StoneWorkshop"]
 
 
 class StoneWorkshop:
-    """Makes the elastic stones of a scene, each shape once.
+    """Elastic stones of a scene, made once for each shape.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class StoneWorkshop:
         self._shape = self._classes(leaders, self._mesh_key, self._turned)
 
     def __call__(self, index: int) -> tuple[Deformable, Array]:
-        """The finite elements of a block, and its centre of mass (3,) [m].
+        """Return the finite elements of a block, and its centre of mass (3,) [m].
 
         Raises
         ------
@@ -59,7 +59,7 @@ class StoneWorkshop:
         return stone, self._blocks[index].vertices[0] + arm
 
     def report(self) -> MeshReport:
-        """How the stones were meshed that have been asked for."""
+        """Return the report on the meshes made so far."""
         made = list(self._meshed)
         quality = dict(zip(made, mesh_quality([self._meshed[b].mesh for b in made]), strict=True))
         return MeshReport(
@@ -86,7 +86,7 @@ class StoneWorkshop:
     def _classes(
         self, order: list[int], key: Callable[[int], Hashable], same: Callable[[int, int], bool]
     ) -> dict[int, int]:
-        """For each of some blocks the first that is the same."""
+        """Return for each of some blocks the first equal one."""
         own = classes(
             [key(b) for b in order],
             [self._blocks[b].vertices for b in order],

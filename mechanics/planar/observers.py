@@ -3,11 +3,11 @@
 import numpy as np
 
 from mechanics.arrays import Array
+from mechanics.dynamics.outcome import Outcome
 from mechanics.dynamics.stopping import LASTING
 from mechanics.planar.contacts import PlanarContacts
 from mechanics.planar.model import PlanarModel, PlanarState
 from mechanics.planar.simulation import PlanarStep
-from mechanics.results.result import Outcome
 
 __all__ = ["PlanarEnergy", "PlanarWatch", "disk_speed", "imbalance", "kinetic_energy", "world_force"]
 

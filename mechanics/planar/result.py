@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechanics.arrays import Array, Ints
+from mechanics.dynamics.outcome import Outcome
 from mechanics.planar.scene import PlanarScene
-from mechanics.results.result import Errors, Outcome
+from mechanics.results.result import Errors
 
 __all__ = ["PlanarContactResult", "PlanarFrame", "PlanarHistory", "PlanarResult"]
 

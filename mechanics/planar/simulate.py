@@ -4,8 +4,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from mechanics.dynamics.clock import Clock
+from mechanics.dynamics.outcome import Outcome
 from mechanics.dynamics.progress import Progress
-from mechanics.dynamics.simulation import Clock
 from mechanics.dynamics.stopping import LASTING
 from mechanics.planar.model import PlanarModel, PlanarState, build_planar_model
 from mechanics.planar.observers import (
@@ -19,7 +20,7 @@ from mechanics.planar.observers import (
 from mechanics.planar.result import PlanarContactResult, PlanarFrame, PlanarHistory, PlanarResult
 from mechanics.planar.scene import PlanarScene
 from mechanics.planar.simulation import PlanarSimulation, PlanarStep
-from mechanics.results.result import Errors, Outcome
+from mechanics.results.result import Errors
 from mechanics.scene.laws.status import contact_status
 
 __all__ = ["simulate_planar"]

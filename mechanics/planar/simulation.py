@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechanics.arrays import Array, Bools, Ints
-from mechanics.dynamics.simulation import Clock
+from mechanics.dynamics.clock import Clock
 from mechanics.dynamics.warm_start import Memory
 from mechanics.planar.contacts import PlanarContacts, PlanarDetector
 from mechanics.planar.delassus import PlanarDelassus
@@ -179,7 +179,7 @@ class PlanarSimulation:
             speed=operator.relative_velocity(kick.velocity)[:, 0],
             area=contacts.area,
             size=contacts.size,
-            yielding=operator.diagonal[:, 0, 0],
+            compliance=operator.diagonal[:, 0, 0],
             step=time.step,
             theta=time.theta,
             push_out=False,

@@ -1,1 +1,5 @@
-"""Results: contacts, joints, stresses."""
+"""Results of a run: positions, stresses, contact forces, joints.
+
+Public: `Result`, `BodyResult`, `Frame`, `History`, `Errors` (result); `ContactResult`, `JointResult` (contact_result);
+`StressValues` (stress_values); `Observer` (postprocess).
+"""

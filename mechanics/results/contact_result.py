@@ -1,4 +1,4 @@
-"""What a simulation says of contacts: point by point, and joint by joint."""
+"""Contact results of a simulation: point by point, and joint by joint."""
 
 from dataclasses import dataclass
 
@@ -10,8 +10,7 @@ from mechanics.arrays import Array, Bools, Ints
 __all__ = ["ContactResult", "JointResult"]
 
 
-# by this much a number that may be at most one may exceed it
-_ROUNDING = 1e-9
+_ROUNDING = 1e-9  # by which rounding may take a number beyond its limit of 1 [-]
 
 
 @dataclass(frozen=True)
@@ -27,10 +26,10 @@ class ContactResult:
     gap : (nc,) [m]
     area : (nc,) tributary area; zero between edges [m²]
     pressure : (nc,) normal force over area; NaN between edges [Pa]
-    opening : (nc,) how much its gap has grown since the start [m]
-    slide : (nc,) how far its two material points have moved along each other since the start [m]
+    opening : (nc,) growth of its gap since the start [m]
+    slide : (nc,) displacement of its two material points along each other since the start [m]
     status : (nc,) "open", "stick", "slip", "bonded" or "broken"
-    joint : (nc,) the joint that it belongs to; -1: none, as between edges
+    joint : (nc,) its joint; -1 without one, as between edges
     """
 
     bodies: Ints
@@ -53,8 +52,8 @@ class JointResult:
     Attributes
     ----------
     bodies : (nj, 2) indices into the scene's blocks, the lower first
-    parted : (nj,) it was closed at the start and is now open beyond the distance in which contacts are watched; its
-        polygon is that of the start, carried along by the second stone
+    parted : (nj,) closed at the start, and now open beyond the distance at which contacts are watched; its polygon is
+        that of the start, carried along by the second stone
     polygon : the common polygon of both faces, (k, 3) corners for each joint [m]
     frame : (nj, 3, 3) rows n, t1, t2; n from the second to the first stone, t1 along the larger second moment [-]
     centroid : (nj, 3) of the polygon [m]
@@ -62,18 +61,19 @@ class JointResult:
     second_moment : (nj, 2) ∫ y₁² and ∫ y₂² along t1 and t2 about the centroid [m⁴]
     force : (nj, 3) resultant on the first stone, world axes [N]
     moment : (nj, 3) about the centroid [N m]
-    centre_of_pressure : (nj, 3) where the resultant meets the joint; NaN without compression [m]
+    centre_of_pressure : (nj, 3) intersection of the resultant with the joint; NaN without compression [m]
     eccentricity : (nj, 2) the same from the centroid, along t1 and t2; NaN without compression [m]
-    kern : (nj,) largest tension that a linear pressure would have, over the mean pressure: 0 if centred, up to 1
+    kern : (nj,) largest tension of a linear pressure with this resultant, over the mean pressure: 0 if centred, up to 1
         within the kern; NaN without compression [-]
-    edge : (nj,) how far out the centre of pressure lies: 0 at the centroid, 1 at the edge; NaN without compression [-]
+    edge : (nj,) distance of the centre of pressure from the centroid, 0, relative to the edge, 1; NaN without
+        compression [-]
     pressure_mean : (nj,) compression over area; negative: tension [Pa]
-    pressure_max : (nj,) largest around a contact point, as mechanics.contact_patches has it [Pa]
+    pressure_max : (nj,) largest around a contact point, as `patch_pressure` defines it [Pa]
     gap : (nj,) largest gap, not less than zero [m]
-    opening : (nj,) by how much the gap has grown since the start, at most; of joints found later, their gap [m]
+    opening : (nj,) largest growth of the gap since the start; the gap itself of joints that were not there then [m]
     sliding : (nj,) largest slide of a contact point since the start [m]
-    slipping, open : (nj,) part of the area of the watched contact points that slips, or that bears nothing [-]
-    friction_use : (nj,) shear force over what friction and cohesion can bear; NaN where that is nothing [-]
+    slipping, open : (nj,) part of the area of the watched contact points that slips, or that carries no force [-]
+    friction_use : (nj,) shear force over the capacity of friction and cohesion; NaN without capacity [-]
     """
 
     bodies: Ints
@@ -103,11 +103,11 @@ class JointResult:
 
     @property
     def pressed(self) -> Bools:
-        """(nj,) it bears compression."""
+        """(nj,) true for joints under compression."""
         return np.isfinite(self.kern)
 
     @property
     def in_kern(self) -> Bools:
-        """(nj,) it bears compression, within the kern."""
+        """(nj,) true for joints under compression within the kern."""
         inside: Bools = self.kern <= 1.0 + _ROUNDING
         return inside

@@ -1,6 +1,6 @@
-"""Which faces of which stones touch: every contact point belongs to a pair of faces, a joint.
+"""Joints as pairs of faces in contact; every contact point between faces belongs to one.
 
-The joints in which a run begins keep their numbers while it runs, also those that have parted.
+The joints of the start of a run keep their numbers, even after they have parted.
 """
 
 from dataclasses import dataclass
@@ -17,13 +17,14 @@ from mechanics.stones.convex_polygons import following
 __all__ = ["Faces", "Interfaces", "find_interfaces", "placed_faces"]
 
 
-# those of the start may open by as much as this before a contact at their edge is no longer theirs
-_HINGED = float(np.cos(np.radians(45.0)))
+_HINGED = float(
+    np.cos(np.radians(45.0))
+)  # cosine of the angle to which a joint of the start may open on its edge
 
 
 @dataclass(frozen=True)
 class Faces:
-    """The flat faces of all stones where they are now.
+    """Flat faces of all stones at one instant.
 
     Attributes
     ----------
@@ -34,7 +35,7 @@ class Faces:
     corner : (nf, m, 3) counter-clockwise seen from outside [m]
     count : (nf,) corners of each face
     size : (nf,) smallest width of the body [m]
-    flat : (nf,) false for the facets of balls, which are for pictures
+    flat : (nf,) false for the facets of balls, which serve pictures only
     """
 
     body: Ints
@@ -49,12 +50,12 @@ class Faces:
 
 @dataclass(frozen=True)
 class Interfaces:
-    """Pairs of faces that touch, or that did at the start.
+    """Pairs of faces in contact now or at the start.
 
     Attributes
     ----------
     face : (nj, 2) numbers in `Faces`; those of the body with the lower number first
-    joint : (nc,) the pair that each contact belongs to; -1: none, as between edges
+    joint : (nc,) the pair of each contact; -1 without one, as between edges
     """
 
     face: Ints
@@ -62,7 +63,7 @@ class Interfaces:
 
 
 def placed_faces(model: Model, state: State) -> Faces:
-    """The faces of all stones at a state; a deformable stone's corners are where its nodes are."""
+    """Return the faces of all stones at a state; corners of deformable stones follow their nodes."""
     surfaces = model.surfaces
     owner = surfaces.body_of_vertex
     vertex = np.einsum("vij,vj->vi", state.rotation[owner], surfaces.vertex) + state.centre[owner]
@@ -91,12 +92,12 @@ def placed_faces(model: Model, state: State) -> Faces:
 
 
 def find_interfaces(faces: Faces, contacts: Contacts, state: State, known: Ints | None = None) -> Interfaces:
-    """The pairs of faces to which contacts belong.
+    """Return the pairs of faces to which contacts belong.
 
     Parameters
     ----------
     faces, contacts, state : at one instant
-    known : (n, 2) pairs that there are whatever the contacts, numbered first: those of the start
+    known : (n, 2) pairs that are kept with or without contacts, numbered first: those of the start
     """
     known = np.zeros((0, 2), dtype=np.int64) if known is None else known
     point, normal = material_points(contacts, state), contacts.frame[:, 0]
@@ -121,7 +122,7 @@ def find_interfaces(faces: Faces, contacts: Contacts, state: State, known: Ints 
 
 
 def _facing(faces: Faces, body: Ints, point: Array, direction: Array) -> Ints:
-    """The face of a body on which a point lies, of those that look along a direction (n, 3)."""
+    """Return the face of a body on which a point lies, among those that face a direction (n, 3)."""
     number = np.diff(faces.first)[body]
     start = np.concatenate([[0], np.cumsum(number)[:-1]]) if len(number) else number
     row = np.repeat(np.arange(len(body)), number)
@@ -134,7 +135,7 @@ def _facing(faces: Faces, body: Ints, point: Array, direction: Array) -> Ints:
 
 
 def _distance(faces: Faces, face: Ints, point: Array) -> Array:
-    """How far points (n, 3) lie off the plane of faces (n,), and beyond their edges, added up [m]."""
+    """Return the distances of points (n, 3) from the planes of faces (n,), plus those beyond their edges [m]."""
     normal, corner, count = faces.normal[face], faces.corner[face], faces.count[face]
     after = following(count, corner.shape[1])
     along = corner[np.arange(len(face))[:, None], after] - corner

@@ -1,4 +1,4 @@
-"""The polygons in which stones touch, and where a force meets them.
+"""Polygons of joints, and the centres of pressure on them.
 
 A joint is the common polygon of two flat faces, with the area A, the centroid c, and S = ∫ (y - c)(y - c)ᵀ / A. A
 force F and a moment M about c, with the compression N = F·n, meet its plane in the centre of pressure, at
@@ -20,13 +20,12 @@ from mechanics.stones.convex_polygons import following, moments, overlaps
 __all__ = ["Section", "eccentricity", "sections"]
 
 
-# faces that overlap by less than this part of the smaller one no longer make a joint
-_THIN = 1e-6
+_THIN = 1e-6  # least overlap of the faces of a joint, over the area of the smaller one [-]
 
 
 @dataclass(frozen=True)
 class Section:
-    """The polygons of joints.
+    """Polygons of joints.
 
     Attributes
     ----------
@@ -50,7 +49,7 @@ class Section:
     middle: Array
 
     def polygon(self, joint: int) -> Array:
-        """(k, 3) corners of one joint [m]."""
+        """Return the (k, 3) corners of one joint [m]."""
         own = slice(0, int(self.count[joint]))
         n, *flat = self.frame[joint]
         corner: Array = (
@@ -60,7 +59,7 @@ class Section:
 
 
 def sections(faces: Faces, pair: Ints) -> Section:
-    """The common polygons of pairs of faces (nj, 2), in the plane between them."""
+    """Return the common polygons of pairs of faces (nj, 2), in the plane between them."""
     a, b = pair.T
     n = faces.normal[b] - faces.normal[a]
     n = n / np.linalg.norm(n, axis=1, keepdims=True)
@@ -93,7 +92,7 @@ def sections(faces: Faces, pair: Ints) -> Section:
 
 
 def _axes_across(n: Array) -> Array:
-    """(nj, 2, 3) two axes at right angles to n, right-handed with it."""
+    """Return two axes (nj, 2, 3) at right angles to n, right-handed with it."""
     least = np.eye(3)[np.abs(n).argmin(axis=1)]
     first = np.cross(least, n)
     first = first / np.linalg.norm(first, axis=1, keepdims=True)
@@ -101,7 +100,7 @@ def _axes_across(n: Array) -> Array:
 
 
 def _heights(faces: Faces, face: Ints, origin: Array, n: Array, flat: Array, place: Array) -> Array:
-    """How far along n the planes of faces (nj,) lie above places (nj, m, 2) in the plane through the origin [m]."""
+    """Return the heights along n of the planes of faces (nj,) above places (nj, m, 2) in the origin's plane [m]."""
     normal = faces.normal[face]
     at = origin[:, None] + np.einsum("jkd,jdi->jki", place, flat) - faces.centre[face][:, None]
     slope = np.einsum("ji,ji->j", n, normal)
@@ -110,18 +109,18 @@ def _heights(faces: Faces, face: Ints, origin: Array, n: Array, flat: Array, pla
 
 
 def eccentricity(section: Section, force: Array, moment: Array, least: float) -> tuple[Array, Array, Array]:
-    """Where the resultants meet the joints, and what that means.
+    """Locate the resultants on the joints, relative to kern and edge.
 
     Parameters
     ----------
     force, moment : (nj, 3) on the first body, about the centroid [N], [N m]
-    least : compression below which nothing is said [N]
+    least : compression below which a joint counts as free of force [N]
 
     Returns
     -------
     place : (nj, 2) e, along t1 and t2; NaN without compression [m]
-    kern : (nj,) largest tension that a linear pressure would have, over the mean pressure; up to 1: in the kern [-]
-    edge : (nj,) how far out, from the centroid (0) to the edge of the joint (1) and beyond [-]
+    kern : (nj,) largest tension of a linear pressure, over the mean pressure; up to 1: in the kern [-]
+    edge : (nj,) distance from the centroid (0) relative to the edge of the joint (1), and beyond [-]
     """
     n, t1, t2 = np.moveaxis(section.frame, 1, 0)
     compression = np.einsum("ji,ji->j", force, n)

@@ -1,4 +1,4 @@
-"""What each joint carries: resultant and its eccentricity, pressure, opening, sliding, use of friction."""
+"""Results of each joint: resultant and eccentricity, pressure, opening, sliding, use of friction."""
 
 from dataclasses import dataclass, fields, replace
 from typing import Any
@@ -7,7 +7,7 @@ import numpy as np
 
 from mechanics.arrays import Array, Bools, Ints
 from mechanics.contact.contacts import Contacts, material_points
-from mechanics.dynamics.simulation import Step
+from mechanics.dynamics.step import Step
 from mechanics.model.model import Model
 from mechanics.results.contact_result import ContactResult, JointResult
 from mechanics.results.interfaces import Faces, find_interfaces, placed_faces
@@ -18,22 +18,20 @@ from mechanics.scene.state import State
 __all__ = ["StartingJoints", "joint_results", "parting", "starting_joints"]
 
 
-# over the size of the smaller stone
-_CLOSED = 1e-2
-# status of contacts that bear nothing
-_IDLE = ("open", "broken")
+_CLOSED = 1e-2  # gap of a closed joint over the size of the smaller stone, at most [-], as for bonds
+_IDLE = ("open", "broken")  # status of contacts without force
 
 
 @dataclass(frozen=True)
 class StartingJoints:
-    """The joints in which a run begins.
+    """Joints at the start of a run.
 
     Attributes
     ----------
-    state : where it begins
+    state : the start
     face : (nj, 2) pairs of faces
     section : their polygons then
-    closed : (nj,) whether they are open by no more than a hundredth of the smaller stone's size, as for bonds
+    closed : (nj,) open by no more than a hundredth of the smaller stone's size, as for bonds
     """
 
     state: State
@@ -43,7 +41,7 @@ class StartingJoints:
 
 
 def starting_joints(model: Model, start: State, contacts: Contacts) -> StartingJoints:
-    """The joints of the contacts of the first step."""
+    """Return the joints of the contacts of the first step."""
     faces = placed_faces(model, start)
     face = find_interfaces(faces, contacts, start).face
     section = sections(faces, face)
@@ -53,9 +51,9 @@ def starting_joints(model: Model, start: State, contacts: Contacts) -> StartingJ
 
 
 def parting(contacts: Contacts, start: State, state: State) -> tuple[Array, Array]:
-    """How far the two material points of each contact have parted since the start.
+    """Return the relative displacement of the two material points of each contact since the start.
 
-    In axes that turn with the antagonist: stones that turn together do not part.
+    It is taken in axes that turn with the antagonist: stones that turn together do not part.
 
     Returns
     -------
@@ -76,8 +74,8 @@ def joint_results(
     Parameters
     ----------
     start : the joints at the start; they come first in `face`
-    faces, face : all faces at the end of the step, and the pairs (nj, 2) that are joints
-    step, contacts : the step that gave the forces, and its contact points
+    faces, face : all faces at the end of the step, and the pairs (nj, 2) of the joints
+    step, contacts : the step of the forces, and its contact points
     """
     count, bodies = len(face), faces.body[face]
     own = np.flatnonzero(contacts.joint >= 0)
@@ -86,11 +84,11 @@ def joint_results(
     section = _with_parted(sections(faces, face), start, bodies, step.after, np.flatnonzero(away))
     force, moment = _resultants(section, bodies, contacts, own)
     n, status = section.frame[:, 0], contacts.status[own]
-    # what is less than the solver leaves is no force
+    # a force below the tolerance of the solver counts as none
     least = model.scene.solver.tolerance * float(np.linalg.norm(force, axis=1).max(initial=0.0))
     place, kern, edge = eccentricity(section, force, moment, least)
     opening, sliding = _movement(section, start, bodies, step.after, contacts, own)
-    bearing = _sums(joint, _bearing(model, step)[own], count)
+    capacity = _sums(joint, _shear_capacity(step)[own], count)
     shear = np.linalg.norm(_across(n, force), axis=1)
     return JointResult(
         bodies=bodies,
@@ -113,19 +111,19 @@ def joint_results(
         sliding=sliding,
         slipping=_share(joint, contacts.area[own], status == "slip", count),
         open=np.where(away, 1.0, _share(joint, contacts.area[own], np.isin(status, _IDLE), count)),
-        friction_use=_ratio(shear, np.where(bearing > least, bearing, 0.0)),
+        friction_use=_ratio(shear, np.where(capacity > least, capacity, 0.0)),
     )
 
 
 def _movement(
     section: Section, start: StartingJoints, bodies: Ints, state: State, contacts: ContactResult, own: Ints
 ) -> tuple[Array, Array]:
-    """(nj,) opening and sliding since the start, the largest of the corners and of the contact points [m]."""
+    """Return opening and sliding (nj,) since the start, the largest of corners and contact points [m]."""
     joint, count = contacts.joint[own], len(bodies)
     opened, slid = _moved_apart(section, start.state, state, bodies)
-    # what is new has no start from which to count
+    # new joints have no start to refer to
     opened[len(start.face) :] = _at_most(section, section.gap)[len(start.face) :]
-    # where there are contacts, these know it better: stones deform
+    # contact points, where there are any, include the deformation of the stones
     slid[np.bincount(joint, minlength=count) > 0] = 0.0
     return (
         np.maximum(opened, _largest(joint, contacts.opening[own], count)),
@@ -134,7 +132,7 @@ def _movement(
 
 
 def _resultants(section: Section, bodies: Ints, contacts: ContactResult, own: Ints) -> tuple[Array, Array]:
-    """(nj, 3) forces on the first stones, and moments about the centroids."""
+    """Return forces (nj, 3) on the first stones, and moments about the centroids [N], [N m]."""
     joint, count = contacts.joint[own], len(bodies)
     # forces act on the candidate; in a joint, on the first stone
     sign = np.where(contacts.bodies[own, 0] == bodies[joint, 0], 1.0, -1.0)
@@ -145,22 +143,22 @@ def _resultants(section: Section, bodies: Ints, contacts: ContactResult, own: In
 
 
 def _patches(contacts: ContactResult, own: Ints) -> Array:
-    """(n,) pressure around each contact point of a joint [Pa]."""
+    """Return the pressure (n,) around each contact point of a joint [Pa]."""
     area = contacts.area[own]
     return patch_pressure(contacts.point[own], contacts.pressure[own] * area, area, contacts.joint[own])
 
 
-def _bearing(model: Model, step: Step) -> Array:
-    """(nc,) shear force that friction and cohesion can bear in each contact of a step [N]."""
+def _shear_capacity(step: Step) -> Array:
+    """Return the shear force (nc,) that friction and cohesion can carry in each contact of a step [N]."""
     limit = step.terms.friction * step.shifted[:, 0] + step.terms.cohesion
-    bearing: Array = limit / model.scene.time.step
-    return bearing
+    capacity: Array = limit / step.duration
+    return capacity
 
 
 def _with_parted(
     section: Section, start: StartingJoints, bodies: Ints, state: State, parted: Ints
 ) -> Section:
-    """The sections, those of parted joints as at the start but carried along by the second stone."""
+    """Return the sections, those of parted joints as at the start but carried along by the second stone."""
     if not len(parted):
         return section
     then, second = start.section, bodies[parted, 1]
@@ -184,7 +182,7 @@ def _with_parted(
 
 
 def _sides(section: Section, rows: Ints) -> tuple[Array, Array]:
-    """Corners (n, m, 3) of some sections on the faces of the first and of the second stones [m]."""
+    """Return the corners (n, m, 3) of some sections on the faces of the first and of the second stones [m]."""
     n = section.frame[rows, 0][:, None]
     middle = section.centroid[rows, None] + np.einsum(
         "jkd,jdi->jki", section.corner[rows], section.frame[rows, 1:]
@@ -195,9 +193,9 @@ def _sides(section: Section, rows: Ints) -> tuple[Array, Array]:
 
 
 def _moved_apart(section: Section, start: State, state: State, bodies: Ints) -> tuple[Array, Array]:
-    """How far the two stones of each joint have parted since the start at its corners, at most: across it, along it.
+    """Return opening and sliding (nj,) of each joint since the start, the largest at its corners [m].
 
-    As if they were rigid. Returns (nj,), not less than zero, and (nj,) [m].
+    The stones count as rigid; the opening is not less than zero.
     """
     sides = _sides(section, np.arange(len(bodies)))
     then = [_moved(state, start, body, side) for body, side in zip(bodies.T, sides, strict=True)]
@@ -209,13 +207,13 @@ def _moved_apart(section: Section, start: State, state: State, bodies: Ints) -> 
 
 
 def _turn(start: State, state: State, body: Ints) -> Array:
-    """(n, 3, 3) by how much bodies have turned since the start."""
+    """Return the rotations (n, 3, 3) of bodies since the start."""
     turn: Array = state.rotation[body] @ start.rotation[body].transpose(0, 2, 1)
     return turn
 
 
 def _moved(start: State, state: State, body: Ints, point: Array) -> Array:
-    """Where places (n, k, 3) of bodies (n,) at the start are at a state, if these are rigid."""
+    """Return the places at a state of points (n, k, 3) of bodies (n,) at the start, as if these were rigid [m]."""
     moved: Array = state.centre[body, None] + np.einsum(
         "jab,jkb->jka", _turn(start, state, body), point - start.centre[body, None]
     )
@@ -223,7 +221,7 @@ def _moved(start: State, state: State, body: Ints, point: Array) -> Array:
 
 
 def _merged(section: Section, other: Section, rows: Ints) -> Section:
-    """A section with some rows of another one."""
+    """Return a section with some rows of another one."""
     most = max(section.corner.shape[1], other.corner.shape[1])
     wide, narrow = (
         replace(
@@ -253,20 +251,20 @@ def _put(values: Array, rows: Ints, new: Array) -> Array:
 
 
 def _across(normal: Array, vector: Array) -> Array:
-    """The part of vectors (…, 3) at right angles to unit normals."""
+    """Return the part of vectors (…, 3) at right angles to unit normals."""
     across: Array = vector - np.sum(vector * normal, axis=-1, keepdims=True) * normal
     return across
 
 
 def _at_most(section: Section, values: Array) -> Array:
-    """Largest of the values (nj, m) at the corners of each joint, not less than zero."""
+    """Return the largest of the values (nj, m) at the corners of each joint, not less than zero."""
     meant = np.arange(values.shape[1]) < section.count[:, None]
     largest: Array = np.where(meant, values, 0.0).max(axis=1, initial=0.0)
     return largest
 
 
 def _share(joint: Ints, area: Array, chosen: Bools, count: int) -> Array:
-    """Part (nj,) of the area of the contacts of each joint; zero where there are none."""
+    """Return the chosen part (nj,) of the area of the contacts of each joint; zero without contacts."""
     return np.nan_to_num(_ratio(_sums(joint, area * chosen, count), _sums(joint, area, count)))
 
 
@@ -278,14 +276,14 @@ def _sums(joint: Ints, values: Array, count: int) -> Array:
 
 
 def _largest(joint: Ints, values: Array, count: int) -> Array:
-    """Largest value of the contacts of each joint, not less than zero."""
+    """Return the largest value of the contacts of each joint, not less than zero."""
     largest = np.zeros(count)
     np.maximum.at(largest, joint, values)
     return largest
 
 
 def _ratio(number: Array, by: Array) -> Array:
-    """Their ratio; NaN where that has no meaning."""
+    """Return the ratio; NaN where the denominator is not positive."""
     return np.where(by > 0, number / _positive(by), np.nan)
 
 

@@ -1,7 +1,7 @@
-"""Contact pressure that does not depend on how the area of a joint is shared among its contact points.
+"""Contact pressure independent of the division of a joint's area among its contact points.
 
-Where the mesh of one stone overhangs the edge of another, contact points stand for slivers of area; force over area is
-large there and means nothing. Taken together with their neighbours they do mean something.
+Where the mesh of one stone overhangs the edge of another, contact points stand for slivers of area, and force over area
+is large without meaning. The mean over a contact point and its neighbours is meaningful.
 """
 
 import numpy as np
@@ -12,12 +12,11 @@ from mechanics.arrays import Array, Ints
 __all__ = ["patch_pressure"]
 
 
-# radius of a patch, over the mean distance of the contact points of a joint
-_REACH = 1.5
+_REACH = 1.5  # radius of a patch over the mean distance of the contact points of a joint [-]
 
 
 def patch_pressure(point: Array, force: Array, area: Array, joint: Ints) -> Array:
-    """Pressure (n,) of the patches around contact points: the normal forces in them over their areas [Pa].
+    """Return the pressure (n,) of the patches around contact points: their normal forces over their areas [Pa].
 
     A patch has the radius 1.5 √(A/n) in a joint of area A with n points, so that it shrinks as the mesh gets finer.
 
@@ -32,7 +31,7 @@ def patch_pressure(point: Array, force: Array, area: Array, joint: Ints) -> Arra
     radius = _REACH * np.sqrt(np.bincount(joint, area) / np.maximum(number, 1))
     first = np.full(len(number), len(joint))
     np.minimum.at(first, joint, np.arange(len(joint)))
-    # in units of the radius, and joints far from each other in a fourth direction
+    # in units of the radius; a fourth coordinate keeps joints apart
     place = np.column_stack([(point - point[first[joint]]) / radius[joint, None], 2.0 * joint])
     near = cKDTree(place).query_pairs(1.0, output_type="ndarray")
     one, other = np.concatenate([near[:, 0], near[:, 1]]), np.concatenate([near[:, 1], near[:, 0]])

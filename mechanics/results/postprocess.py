@@ -1,4 +1,4 @@
-"""From a state to what is asked of it: positions, stresses, contact forces, joints."""
+"""Postprocessing of states and steps: positions, stresses, contact forces, joints."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -7,7 +7,7 @@ import numpy as np
 
 from mechanics.arrays import Array
 from mechanics.contact.contacts import material_points
-from mechanics.dynamics.simulation import Step
+from mechanics.dynamics.step import Step
 from mechanics.model.deformable import Deformable
 from mechanics.model.model import Model
 from mechanics.results.contact_result import ContactResult, JointResult
@@ -16,7 +16,6 @@ from mechanics.results.joints import StartingJoints, joint_results, parting, sta
 from mechanics.results.result import BodyResult, Frame
 from mechanics.results.stress_values import stress_values
 from mechanics.scene.laws.status import contact_status
-from mechanics.scene.scene import Block
 from mechanics.scene.state import State
 from mechanics.stones.elasticity import (
     from_voigt,
@@ -32,7 +31,7 @@ from mechanics.stones.meshing.mesh import SolidMesh
 __all__ = ["Observer", "positions", "surface_polygons", "velocities"]
 
 
-# parts of a facet that have all its nodes for corners, counter-clockwise seen from outside
+# polygons that divide a facet, with all its nodes as corners, counter-clockwise seen from outside
 _FACET_PARTS: Mapping[Element, tuple[tuple[int, ...], ...]] = {
     Element.TET4: ((0, 1, 2),),
     Element.TET10: ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)),
@@ -43,13 +42,13 @@ _FACET_PARTS: Mapping[Element, tuple[tuple[int, ...], ...]] = {
 
 
 def surface_polygons(mesh: SolidMesh) -> tuple[tuple[int, ...], ...]:
-    """Outward polygons that cover the boundary, with a corner in every node of it."""
+    """Return outward polygons that cover the boundary, with a corner at each of its nodes."""
     parts = [mesh.facets[:, part] for part in _FACET_PARTS[mesh.element]]
     return tuple(tuple(polygon) for part in parts for polygon in part.tolist())
 
 
 def positions(model: Model, state: State) -> tuple[Array, ...]:
-    """Points of each body now: the corners of a rigid one, the nodes of a deformable one [m]."""
+    """Return the points of each body: corners of rigid ones, nodes of deformable ones [m]."""
     return tuple(
         state.node[model.nodes_of(b)]
         if stone is not None
@@ -59,7 +58,7 @@ def positions(model: Model, state: State) -> tuple[Array, ...]:
 
 
 def velocities(model: Model, state: State) -> tuple[Array, ...]:
-    """Velocities of the same points [m/s]."""
+    """Return the velocities of the same points [m/s]."""
     return tuple(
         state.node_velocity[model.nodes_of(b)]
         if stone is not None
@@ -69,11 +68,11 @@ def velocities(model: Model, state: State) -> tuple[Array, ...]:
 
 
 class Observer:
-    """What is seen of a run: frames while it goes on; bodies, contacts and joints at its end.
+    """Observer of a run: frames during it; bodies, contacts and joints at its end.
 
     Parameters
     ----------
-    model, start : the run, and its stones before they bear anything: displacements count from there
+    model, start : the scene, and its stones before they carry load, from where displacements count
     """
 
     def __init__(self, model: Model, start: State) -> None:
@@ -81,35 +80,29 @@ class Observer:
         self._joints: StartingJoints | None = None
 
     def first_frame(self, state: State) -> Frame:
-        """The instant at which the motion begins, before its first contact forces are known."""
+        """Return the frame of the start, before the first contact forces are known."""
         return self._frame(state, _no_contacts())
 
     def begin(self, step: Step) -> None:
-        """Take the contacts of the first step as the joints that there are at the start."""
+        """Take the contacts of the first step as the joints of the start."""
         self._joints = starting_joints(self._model, self._start, step.contacts)
 
     def frame(self, step: Step) -> Frame:
-        """The end of a step."""
+        """Return the frame of the end of a step."""
         _, interfaces = self._interfaces(step)
         return self._frame(step.after, self._contacts(step, interfaces))
 
     def contacts_and_joints(self, step: Step) -> tuple[ContactResult, JointResult]:
-        """The contact points of a step with their mean forces, and what they add up to."""
+        """Return the contact points of a step with their mean forces, and their sums over each joint."""
         faces, interfaces = self._interfaces(step)
         contacts = self._contacts(step, interfaces)
         assert self._joints is not None
         return contacts, joint_results(self._model, self._joints, faces, interfaces.face, step, contacts)
 
     def bodies(self, state: State, balance: Array) -> tuple[BodyResult, ...]:
-        """What became of each body; `balance` (nb,) as `imbalance` gives it."""
-        model = self._model
-        before, now = positions(model, self._start), positions(model, state)
-        return tuple(
-            _rigid_result(model, b, block, before[b], now[b], float(balance[b]))
-            if stone is None
-            else self._elastic_result(b, stone, state, before[b], float(balance[b]))
-            for b, (block, stone) in enumerate(zip(model.scene.blocks, model.stones, strict=True))
-        )
+        """Return the result of each body; `balance` (nb,) as `imbalance` gives it."""
+        points = zip(positions(self._model, self._start), positions(self._model, state), strict=True)
+        return tuple(self._body(b, state, *both, float(balance[b])) for b, both in enumerate(points))
 
     def _frame(self, state: State, contacts: ContactResult) -> Frame:
         seen = [
@@ -151,67 +144,48 @@ class Observer:
         )
 
     def _stress(self, body: int, stone: Deformable, state: State) -> tuple[Array, float]:
-        """Recovered stress of the nodes (n, 6), world axes [Pa], and its estimated relative error [-]."""
+        """Return the recovered stress of the nodes (n, 6), world axes [Pa], and its estimated relative error [-]."""
         node, turn = state.node[self._model.nodes_of(body)], state.rotation[body]
         displacement = stone.displacement(node, state.centre[body], turn)
         local = stone.recovered(displacement)
         error = stress_error(stone.mesh, stone.material, displacement, local)
         return to_voigt(turn @ from_voigt(local) @ turn.T), error
 
-    def _elastic_result(
-        self, body: int, stone: Deformable, state: State, before: Array, balance: float
-    ) -> BodyResult:
-        model, block = self._model, self._model.scene.blocks[body]
-        now, volume = state.node[model.nodes_of(body)], node_volumes(stone.mesh)
-        bare = BodyResult(
+    def _body(self, body: int, state: State, before: Array, now: Array, balance: float) -> BodyResult:
+        block, stone = self._model.scene.blocks[body], self._model.stones[body]
+        rigid = BodyResult(
             code=block.code,
             fidelity=block.fidelity,
             reference=before,
             position=now,
-            faces=surface_polygons(stone.mesh),
-            element=stone.mesh.element,
-            cells=stone.mesh.cells,
+            faces=block.faces,
+            element=None,
+            cells=np.zeros((0, 4), dtype=np.int64),
             stress=None,
             von_mises=None,
             principal=None,
-            node_volume=volume,
+            node_volume=None,
             values=None,
-            volume=float(model.volume[body]),
-            mass=float(model.mass[body]),
+            volume=float(self._model.volume[body]),
+            mass=float(self._model.mass[body]),
             balance=balance,
         )
+        if stone is None:
+            return rigid
+        mesh, volume = stone.mesh, node_volumes(stone.mesh)
+        elastic = replace(
+            rigid, faces=surface_polygons(mesh), element=mesh.element, cells=mesh.cells, node_volume=volume
+        )
         if not block.stress:
-            return bare
+            return elastic
         stress, error = self._stress(body, stone, state)
         return replace(
-            bare,
+            elastic,
             stress=stress,
             von_mises=von_mises(stress),
             principal=principal(stress)[0],
             values=stress_values(stress, now, volume, stone.material, error),
         )
-
-
-def _rigid_result(
-    model: Model, body: int, block: Block, before: Array, now: Array, balance: float
-) -> BodyResult:
-    return BodyResult(
-        code=block.code,
-        fidelity=block.fidelity,
-        reference=before,
-        position=now,
-        faces=block.faces,
-        element=None,
-        cells=np.zeros((0, 4), dtype=np.int64),
-        stress=None,
-        von_mises=None,
-        principal=None,
-        node_volume=None,
-        values=None,
-        volume=float(model.volume[body]),
-        mass=float(model.mass[body]),
-        balance=balance,
-    )
 
 
 def _no_contacts() -> ContactResult:

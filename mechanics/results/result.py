@@ -1,10 +1,10 @@
-"""What a simulation gives back."""
+"""Result of a simulation."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import StrEnum
 
 from mechanics.arrays import Array, Ints
+from mechanics.dynamics.outcome import Outcome, StaticStart
 from mechanics.results.contact_result import ContactResult, JointResult
 from mechanics.results.stress_values import StressValues
 from mechanics.scene.scene import Fidelity, Scene
@@ -22,26 +22,18 @@ __all__ = [
 ]
 
 
-class Outcome(StrEnum):
-    """How a run ended."""
-
-    EQUILIBRIUM = "equilibrium"
-    MOVING = "moving"
-    COLLAPSED = "collapsed"
-
-
 @dataclass(frozen=True)
 class Errors:
-    """The error measures of docs/theory.md §4, at the last step unless it says otherwise.
+    """Error measures of docs/theory.md §4, at the last step unless stated otherwise.
 
     Attributes
     ----------
-    natural_map : η, largest over the last five steps, those in which an equilibrium must last [-]
+    natural_map : η, largest over the last five steps, in which an equilibrium must last [-]
     penetration : deepest overlap over the smallest block's size, largest of the run [-]
     balance : unbalanced force of a block over its weight, largest over the blocks [-]
     reaction : |vertical support reaction - weight| over weight [-]
     energy : energy that no term of the balance explains, over the reference energy, whole run [-]
-    unconverged_steps : steps that the solver left above its tolerance
+    unconverged_steps : steps whose solution is above the tolerance of the solver
     """
 
     natural_map: float
@@ -64,10 +56,10 @@ class BodyResult:
     faces : outward polygons on those points (the corners' polygons, or parts of the mesh's boundary facets)
     element : kind of the finite elements; None if rigid
     cells : (nc, k) node indices of the finite elements, in VTK's order; empty for rigid and fixed blocks
-    stress : (n, 6) recovered nodal stress xx, yy, zz, xy, yz, zx in world axes [Pa]; None if rigid, or not wanted
+    stress : (n, 6) recovered nodal stress xx, yy, zz, xy, yz, zx in world axes [Pa]; None if rigid, or not requested
     von_mises : (n,) Von Mises stress of the recovered nodal stress [Pa]; None without stress
     principal : (n, 3) principal stresses of the same, largest first [Pa]; None without stress
-    node_volume : (n,) volume that each node stands for [m³]; None if rigid
+    node_volume : (n,) volume of each node [m³]; None if rigid
     values : the stress in a few numbers; None without stress
     volume : [m³]
     mass : [kg]
@@ -132,7 +124,7 @@ class History:
     iterations : of the contact solver
     contacts : contact points
     penetration : deepest overlap at the end of the step [m]
-    settlement : how far the stone that sank most has sunk along gravity [m]
+    settlement : largest displacement of a stone along gravity [m]
     """
 
     time: Array
@@ -148,37 +140,18 @@ class History:
 
 @dataclass(frozen=True)
 class Energies:
-    """Where the energy of the run came from and went, up to its end [J].
+    """Energy balance of the whole run [J].
 
     Attributes
     ----------
-    external : work of the weight, of the loads and of what drives supports
-    contact : work of the contacts; negative: they dissipate
-    scheme : dissipation of the time integration, of Rayleigh's damping and of the relaxation
+    external : work of the weight, of the loads and of driven supports
+    contact : work of the contacts; negative where they dissipate
+    scheme : dissipation of the time integration, of Rayleigh damping and of the relaxation
     """
 
     external: float
     contact: float
     scheme: float
-
-
-@dataclass(frozen=True)
-class StaticStart:
-    """How the static equilibrium was sought.
-
-    Attributes
-    ----------
-    found : whether there is one; else the run begins with all stones at rest and without stress
-    steps, iterations : of the search, and of its solver
-    natural_map : η of the last step, r and u measured against the elastic part of W [-]
-    balance : unbalanced force of a body over its weight, largest over the bodies [-]
-    """
-
-    found: bool
-    steps: int
-    iterations: int
-    natural_map: float
-    balance: float
 
 
 @dataclass(frozen=True)
@@ -194,16 +167,16 @@ class Result:
     bodies : one per block, in the scene's order
     contacts : the contact points at the end
     joints : what each joint carries at the end
-    errors : how far the result can be trusted
-    energies : where the energy went
-    rest_time : when the spell of rest began in which the run ended; None if it did not end at rest [s]
+    errors : error measures
+    energies : energy balance
+    rest_time : start of the rest in which the run ended; None if it did not end at rest [s]
     reaction : total vertical support reaction [N]
     weight : total weight of the blocks that are not fixed [N]
     frames : the motion, at least its first and last instant
     history : one value per step
     wall_time : wall seconds by stage: mesh, start, assemble, detect, solve, advance, stress
-    static : the search for the equilibrium in which the run began; None if it began at rest
-    solvers : in how many steps which method was chosen, and why, most frequent first
+    static : search for the equilibrium in which the run began; None if it began at rest
+    solvers : number of steps by chosen method and reason, most frequent first
     """
 
     scene: Scene

@@ -1,4 +1,4 @@
-"""The stress of one stone in a few numbers: where it is pulled, where it is crushed, and what that means for it.
+"""Summary of the stress of one stone: extreme tension and compression, and utilisation of its strengths.
 
 Stress is positive in tension. Principal stresses are σ1 ≥ σ2 ≥ σ3.
 """
@@ -14,8 +14,9 @@ from mechanics.stones.materials import Material
 __all__ = ["StressValues", "stress_values", "utilisation", "volume_quantile"]
 
 
-# tension below this part of a stone's mean stress is the rounding of forces and of stresses
-_NO_TENSION = 1e-3
+_NO_TENSION = (
+    1e-3  # of a stone's root mean square stress [-]: tension below it is rounding of forces and stresses
+)
 
 
 @dataclass(frozen=True)
@@ -28,13 +29,13 @@ class StressValues:
     von_mises_p99 : exceeded in 1 % of the volume [Pa]
     von_mises_mean : volume mean [Pa]
     principal_tension : largest σ1; negative if the stone is pressed everywhere in every direction [Pa]
-    tension_point, tension_direction : (3,) where it acts [m], and along which unit vector [-]
+    tension_point, tension_direction : (3,) its place [m] and direction, a unit vector [-]
     principal_compression : smallest σ3 [Pa]
     compression_point, compression_direction : (3,) of it
     mean_pressure : volume mean of -tr σ / 3 [Pa]
     tension_zone : part of the volume with σ1 above `tension_threshold` [-]
-    tension_threshold : estimated error of the stress, below which tension cannot be told from none [Pa]
-    overstressed_zone : part of the volume with σ1 above the tensile strength; None if that is not known [-]
+    tension_threshold : estimated error of the stress, below which tension is not significant [Pa]
+    overstressed_zone : part of the volume with σ1 above the tensile strength; None without it [-]
     utilisation_tension, utilisation_compression : σ1/f_t and -σ3/f_c (Rankine), largest; None without the strength [-]
     error : relative error of the stress in the energy norm, as Zienkiewicz & Zhu (1987) estimate it [-]
     """
@@ -64,7 +65,7 @@ class StressValues:
 
     @property
     def governing(self) -> str | None:
-        """What the larger utilisation is of: "tension" or "compression"."""
+        """The stress of the larger utilisation: "tension" or "compression"."""
         if self.utilisation is None:
             return None
         return "tension" if self.utilisation == self.utilisation_tension else "compression"
@@ -75,14 +76,14 @@ def stress_values(
 ) -> StressValues:
     """Sum up the stress of one stone.
 
-    A stress field with the relative error η is wrong by about η times its root mean square; tension below that, or
-    below a thousandth of it, is no finding, so it does not count as a tension zone.
+    A stress field with the relative error η is wrong by about η times its root mean square. Tension below that, or
+    below a thousandth of the root mean square, does not count as a tension zone.
 
     Parameters
     ----------
     stress : (n, 6) of the nodes, xx, yy, zz, xy, yz, zx in world axes [Pa]
-    point : (n, 3) where they are [m]
-    volume : (n,) that each stands for [m³]
+    point : (n, 3) of the nodes [m]
+    volume : (n,) of each node [m³]
     material : of the stone, with its strengths
     error : η, relative error of the stress [-]
     """
@@ -114,7 +115,7 @@ def stress_values(
 
 
 def utilisation(principal_stress: Array, material: Material) -> Array:
-    """max(σ1/f_t, -σ3/f_c, 0) of principal stresses (n, 3), with the strengths that are known; NaN with none [-]."""
+    """Return max(σ1/f_t, -σ3/f_c, 0) of principal stresses (n, 3) for the known strengths; NaN without any [-]."""
     parts = []
     if material.tensile_strength is not None:
         parts.append(principal_stress[:, 0] / material.tensile_strength)
@@ -127,7 +128,7 @@ def utilisation(principal_stress: Array, material: Material) -> Array:
 
 
 def volume_quantile(values: Array, volume: Array, part: float) -> float:
-    """The smallest of the values (n,) that at least this part of the volume (n,) does not exceed."""
+    """Return the smallest of the values (n,) that at least this part of the volume (n,) does not exceed."""
     order = np.argsort(values)
     below = np.cumsum(volume[order]) / volume.sum()
     return float(values[order][min(int(np.searchsorted(below, part)), len(values) - 1)])

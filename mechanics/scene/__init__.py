@@ -1,1 +1,5 @@
-"""Scenes: blocks, laws, loads, supports and settings that a user states."""
+"""Scenes as a user states them: blocks, laws, loads, supports and settings.
+
+Public: `Scene`, `Block`, `Part`, `Fidelity`, `ContactSettings`, `LawRule`, `TimeSettings`, `SolverSettings` (scene);
+`State` (state).
+"""

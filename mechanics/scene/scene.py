@@ -1,4 +1,4 @@
-"""The scene: everything that a simulation needs, and nothing that changes while it runs."""
+"""Scene: all input of a simulation, constant during a run."""
 
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -49,7 +49,7 @@ Growth = Annotated[
 
 
 class Fidelity(StrEnum):
-    """How a block is modelled."""
+    """Mechanical model of a block."""
 
     FIXED = "fixed"
     RIGID = "rigid"
@@ -79,11 +79,11 @@ class Block:
     element : kind of its finite elements; hexahedra suit blocks whose corners each join three faces
     velocity : (6,) initial translation [m/s] and rotation [rad/s] velocity; not for fixed blocks
     parts : convex parts that fill a non-convex stone without overlap; empty if it is convex
-    radius : the surface of a ball is the sphere about the mean of its corners; corners and faces are for pictures
-        (mechanics.balls makes them). None: a polyhedron
-    contact_size : of the faces that touch other blocks where the scene begins
+    radius : of a ball, whose surface is the sphere about the mean of its corners; corners and faces serve pictures only
+        (`mechanics.model.balls.ball`) [m]. None: a polyhedron
+    contact_size : target edge length at the faces that touch other blocks at the start; None: as inside [m]
     mesher : of its tetrahedra
-    stress : whether the stress of a deformable block is wanted; if not, it is not computed
+    stress : compute the stress of a deformable block
     """
 
     code: str
@@ -113,7 +113,7 @@ class Block:
 
 
 class Placement(StrEnum):
-    """Where the contact points of two flat faces lie."""
+    """Placement of the contact points of two flat faces."""
 
     CORNERS = "corners"
     INERTIA = "inertia"
@@ -121,7 +121,7 @@ class Placement(StrEnum):
 
 @dataclass(frozen=True)
 class LawRule:
-    """The law between two groups of stones, given by their codes; it goes before the scene's general law."""
+    """Law between two groups of stones, given by their codes; it precedes the scene's general law."""
 
     first: frozenset[str]
     second: frozenset[str]
@@ -134,10 +134,10 @@ class ContactSettings:
 
     Attributes
     ----------
-    law : where no rule says otherwise
-    rules : laws of particular joints; of two that name the same pair, the later holds
-    placement : at the *corners* a stone rocks about its very edge; by *inertia* the points carry the area and the
-        second moments of the common face exactly, as a uniform pressure does
+    law : of all joints without a rule
+    rules : laws of particular joints; of two for the same pair, the later holds
+    placement : *corners*: on the edge of the common face, so that a stone rocks about its true edge; *inertia*: inside
+        it, where they reproduce its area and second moments exactly, as a uniform pressure does
     """
 
     law: Law = field(default_factory=DryJoint)
@@ -176,10 +176,10 @@ class TimeSettings:
 
     Attributes
     ----------
-    theta : 1 finds a static equilibrium
-    relaxation : leads to a static equilibrium soonest, but the way there is no longer the true motion
-    start : at *rest* all stones are free of stress; the *equilibrium* is found at once where there is one
-    sleep : has no effect in relaxations and in scenes with deformable stones
+    theta : 1 leads to a static equilibrium
+    relaxation : the fastest way to a static equilibrium, but not the true motion
+    start : *rest*: all stones without stress; *equilibrium*: solved for directly, where there is one
+    sleep : without effect in relaxations and in scenes with deformable stones
     """
 
     step: Annotated[float, Setting("Time step h.", "s", above=0)] = 1e-3
@@ -234,7 +234,7 @@ class TimeSettings:
 
 
 class Method(StrEnum):
-    """How the contact problem of a step is solved."""
+    """Solver of the contact problem of a step."""
 
     AUTO = "auto"
     NSGS = "nsgs"
@@ -251,8 +251,8 @@ class SolverSettings:
 
     Attributes
     ----------
-    threads : also those that factorise deformable scenes. More than one pays on idle cores only: where others use
-        them, each waits for the slowest
+    threads : also those that factorise deformable scenes. More than one pays on idle cores only, as each waits for
+        the slowest
     """
 
     method: Annotated[
@@ -294,14 +294,22 @@ class SolverSettings:
 class Scene:
     """Bodies, laws, loads and settings of one simulation.
 
+    >>> import numpy as np
+    >>> from mechanics.stones.materials import Material
+    >>> corners, faces = np.vstack([np.zeros(3), np.eye(3)]), ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
+    >>> stone = Block("tetrahedron", corners, faces, Material("stone", density=2000.0, young=10e9, poisson=0.2))
+    >>> scene = Scene("fall", (stone,), time=TimeSettings(step=2e-3))
+    >>> len(scene.blocks), scene.time.step
+    (1, 0.002)
+
     Attributes
     ----------
     name : shown in reports
-    blocks : the stones; contacts are found between all pairs that are not both fixed
+    blocks : the stones; contacts are detected between all pairs that are not both fixed
     gravity : (3,) acceleration [m/s²]
     contact, time, solver : settings
-    loads : what acts besides gravity
-    frame_every : keep a frame of the motion every so many steps; 0 keeps the first and last only
+    loads : all loads besides gravity
+    frame_every : number of steps between two frames of the motion; 0 keeps the first and last only
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""The state of a simulation: what changes from step to step, and nothing else."""
+"""State of a simulation: the quantities that change from step to step."""
 
 from dataclasses import dataclass
 

@@ -8,12 +8,10 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from mechanics.contact.contacts import Contacts, gaps, material_points, take
+from mechanics.contact.contacts import material_points
 from mechanics.contact.detection import Detector
-from mechanics.delassus.assembly import mixed_delassus, rigid_delassus
-from mechanics.delassus.mixed import MixedDelassus
-from mechanics.delassus.rigid import RigidDelassus, schedule
-from mechanics.dynamics.contact_laws import state_laws
+from mechanics.dynamics.contact_problem import contact_problem
+from mechanics.dynamics.contact_search import Detection, detection
 from mechanics.dynamics.stepping import compliances, free_kick
 from mechanics.model.model import Model, build_model
 from mechanics.problem._kernels import local_factors, solve_contact
@@ -216,30 +214,27 @@ class Posed:
 
     model: Model
     state: State
-    contacts: Contacts
-    operator: RigidDelassus | MixedDelassus
+    found: Detection
     compliance: tuple
     problem: ContactProblem
+
+    @property
+    def contacts(self):
+        return self.found.contacts
+
+    @property
+    def operator(self):
+        return self.found.operator
 
 
 def posed(one, step=2e-3, theta=1.0):
     """The contact problem in the configuration in which a scene begins."""
     model, state, contacts = detected(one, one.contact.points, one.contact.placement)
     compliance = compliances(model, step, theta)
-    if model.rigid_only:
-        plan = schedule(contacts.bodies, model.inertia.moving)
-        contacts = take(contacts, plan.order)
-        operator = rigid_delassus(model, state, contacts, plan)
-        sparse = operator.sparse
-    else:
-        operator = mixed_delassus(model, state, contacts, compliance)
-        sparse = operator.sparse
+    found = detection(model, state, contacts, compliance)
     free = free_kick(model, state, state, compliance, step, theta)
-    statement = state_laws(
-        model, state, contacts, gaps(contacts, state), model.laws.of(contacts.bodies),
-        operator, lambda: sparse, free, np.zeros((len(contacts), STATE)), True,
-    )  # fmt: skip
-    return Posed(model, state, contacts, operator, compliance, statement.problem)
+    problem, _ = contact_problem(model, state, found, free, np.zeros((len(contacts), STATE)), first=True)
+    return Posed(model, state, found, compliance, problem)
 
 
 def slow_pass(dense, r, shift, mu, cohesion, order):

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechanics.arrays import Array
-from mechanics.dynamics.simulation import Clock, Simulation, Step
+from mechanics.dynamics.simulation import Simulation
+from mechanics.dynamics.step import Step
 from mechanics.model.model import Model, build_model
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import (
@@ -182,7 +183,7 @@ class Path:
 def follow(scene: Scene, until: Callable[[Step], bool] | None = None) -> Path:
     """Run a scene step by step for its duration, or until `until` is true of a step, and keep the whole motion."""
     model, state = build_model(scene)
-    simulation = Simulation(model, state, Clock())
+    simulation = Simulation(model, state)
     states, rows = [state], []
     for _ in range(round(scene.time.duration / scene.time.step)):
         step = simulation.step()

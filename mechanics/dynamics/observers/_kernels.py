@@ -1,6 +1,6 @@
-"""Numba kernels of the observers: how far the corners of rigid bodies have gone, and how fast they are.
+"""Numba kernels of the observers: displacement and speed of the corners of rigid bodies.
 
-Corners (nv, 3) are given from the centre of mass, in body axes; those of body b are first[b]:first[b + 1].
+Corners of body b are first[b]:first[b + 1].
 """
 
 import numpy as np
@@ -13,7 +13,19 @@ __all__ = ["largest_displacement", "largest_speed"]
 def largest_displacement(
     first, corner, centre, rotation, centre_then, rotation_then
 ):  # pragma: no cover - compiled
-    """Largest distance (nb,) of a corner of each body from where it was then."""
+    """Return the largest displacement of a corner of each body since an earlier configuration.
+
+    Inputs
+    ------
+    first : (nb+1,) int64, first corner of each body
+    corner : (nv, 3) float64, from the centre of mass, body axes [m]
+    centre, centre_then : (nb, 3) float64 [m]
+    rotation, rotation_then : (nb, 3, 3) float64, from body axes to world axes
+
+    Outputs
+    -------
+    largest : (nb,) float64 [m]; NaN for a body whose place is not a number
+    """
     largest = np.zeros(centre.shape[0])
     for b in range(centre.shape[0]):
         c0 = centre[b, 0] - centre_then[b, 0]
@@ -27,7 +39,7 @@ def largest_displacement(
             d1 = c1 + turn[1, 0] * x + turn[1, 1] * y + turn[1, 2] * z
             d2 = c2 + turn[2, 0] * x + turn[2, 1] * y + turn[2, 2] * z
             square = d0 * d0 + d1 * d1 + d2 * d2
-            # what is not a number must be told
+            # a comparison that lets NaN through, so that a run that has diverged is seen
             if not square <= most:
                 most = square
         largest[b] = np.sqrt(most)
@@ -36,7 +48,18 @@ def largest_displacement(
 
 @njit(cache=True)
 def largest_speed(first, corner, rotation, velocity):  # pragma: no cover - compiled
-    """Largest speed (nb,) of a corner of each body; velocity (nb, 6), world axes."""
+    """Return the largest speed of a corner of each body.
+
+    Inputs
+    ------
+    first, corner : as above
+    rotation : (nb, 3, 3) float64
+    velocity : (nb, 6) float64, translation [m/s] and rotation [rad/s], world axes
+
+    Outputs
+    -------
+    largest : (nb,) float64 [m/s]
+    """
     largest = np.zeros(velocity.shape[0])
     for b in range(velocity.shape[0]):
         v, w, r = velocity[b, :3], velocity[b, 3:], rotation[b]

@@ -1,4 +1,4 @@
-"""Energy balance of the θ-scheme: what no term explains was made by the program.
+"""Energy balance of the θ-scheme; energy that no term explains is an error of the program.
 
 With v_θ = θ v_{i+1} + (1-θ) v_i, the scheme gives exactly
 
@@ -9,28 +9,25 @@ h v_θᵀ V v_θ, counts with the scheme. The flights before and after the kick 
 bodies that turn leave a remainder of the order of their strain. W_ext holds the loads and what driven bodies put in.
 """
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from mechanics.arrays import Array
+from mechanics.delassus.assembly import local_velocity
+from mechanics.dynamics.step import Step
 from mechanics.model.model import Model
 from mechanics.model.stone_groups import ElasticGroup
 from mechanics.scene.state import State
-
-if TYPE_CHECKING:
-    from mechanics.dynamics.simulation import Step
 
 __all__ = ["EnergyBalance", "elastic_energy", "kinetic_energy"]
 
 
 def kinetic_energy(model: Model, state: State) -> float:
-    """½ vᵀ M v of all bodies that can move [J]."""
+    """Return ½ vᵀ M v of all bodies that can move [J]."""
     return 0.5 * _mass_norm(model, state.rotation, state.velocity, state.node_velocity)
 
 
 def elastic_energy(model: Model, state: State) -> float:
-    """½ dᵀ K d of all deformable bodies [J]."""
+    """Return ½ dᵀ K d of all deformable bodies [J]."""
     return sum(
         stone.elastic_energy(state.node[model.nodes_of(b)], state.centre[b], state.rotation[b])
         for b, stone in enumerate(model.stones)
@@ -50,8 +47,19 @@ def _mass_norm(model: Model, rotation: Array, velocity: Array, node_velocity: Ar
     return total
 
 
-def _elastic_dissipation(model: Model, step: "Step", theta: float, duration: float) -> float:
-    """(θ - ½) ‖Δq‖²_K + h v_θᵀ V v_θ of all deformable bodies [J]."""
+def _contact_work(model: Model, step: Step, theta: float) -> tuple[float, float]:
+    """Return r·u_θ, the work of the contacts, and the work that driven bodies put in through them [J]."""
+    contacts, operator, impulse = step.found.contacts, step.found.operator, step.active.impulse
+    before, after = step.predicted.velocity, step.kick.velocity
+    u_before = local_velocity(contacts, operator, before, step.predicted.node_velocity)
+    work = float(np.sum(impulse * (theta * step.relative + (1 - theta) * u_before)))
+    driven = np.where(model.fixed[:, None], theta * after + (1 - theta) * before, 0.0)
+    u_driven = local_velocity(contacts, operator, driven, np.zeros_like(step.after.node))
+    return work, -float(np.sum(impulse * u_driven))
+
+
+def _elastic_dissipation(model: Model, step: Step, theta: float, duration: float) -> float:
+    """Return (θ - ½) ‖Δq‖²_K + h v_θᵀ V v_θ of all deformable bodies [J]."""
     total = 0.0
     for group in model.elastic_stones.groups:
         stone, count = group.stone, len(group.bodies)
@@ -68,7 +76,7 @@ def _elastic_dissipation(model: Model, step: "Step", theta: float, duration: flo
 
 
 def _in_axes(group: ElasticGroup, state: State, nodal: Array, origin: Array | None = None) -> Array:
-    """Nodal vectors (k, n, 3) of equal stones in their own axes."""
+    """Return nodal vectors (k, n, 3) of equal stones in their own axes."""
     own = nodal[group.nodes]
     if origin is not None:
         own = own - origin[group.bodies, None]
@@ -77,14 +85,14 @@ def _in_axes(group: ElasticGroup, state: State, nodal: Array, origin: Array | No
 
 
 class EnergyBalance:
-    """Adds up the terms of the balance over a run.
+    """Terms of the energy balance, summed over a run.
 
     Attributes
     ----------
     external, contact, scheme : work of loads and driven bodies, work of the contacts, dissipation of scheme, damping
         and relaxation, so far [J]
     unexplained : ΔE - external - contact + scheme, so far [J]
-    reference : the largest energy that was in play so far, at least 10⁻⁹ of weight times smallest width [J]
+    reference : largest energy in any term so far, at least 10⁻⁹ of weight times smallest width [J]
     """
 
     def __init__(self, model: Model, state: State) -> None:
@@ -94,11 +102,12 @@ class EnergyBalance:
         weight = float(model.mass[~model.fixed].sum() * np.linalg.norm(model.gravity(state.time)))
         self.reference = max(self._energy, 1e-9 * weight * float(model.surfaces.size.min()))
 
-    def __call__(self, step: "Step") -> None:
+    def __call__(self, step: Step) -> None:
         """Account for one step."""
         model, theta = self._model, self._model.scene.time.theta
         before, kick = step.predicted, step.kick
-        external = self._load_work(step, theta) + step.driven
+        contact, driven = _contact_work(model, step, theta)
+        external = self._load_work(step, theta) + driven
         jump = _mass_norm(
             model,
             before.rotation,
@@ -107,15 +116,15 @@ class EnergyBalance:
         )
         scheme = (theta - 0.5) * jump + _elastic_dissipation(model, step, theta, model.scene.time.step)
         energy = kinetic_energy(model, step.after) + elastic_energy(model, step.after)
-        self.unexplained += energy - self._energy - external - step.work + scheme
+        self.unexplained += energy - self._energy - external - contact + scheme
         self.external += external
-        self.contact += step.work
+        self.contact += contact
         self.scheme += scheme + step.relaxed
         self._energy = energy - step.relaxed
         self.reference = max(self.reference, energy, abs(self.external), abs(self.contact), self.scheme)
 
-    def _load_work(self, step: "Step", theta: float) -> float:
-        """h P·v_θ: loads at the kick, on velocities before and after it."""
+    def _load_work(self, step: Step, theta: float) -> float:
+        """Return h P·v_θ: loads at the kick times the mean of the velocities before and after it [J]."""
         model = self._model
         moving, h = model.inertia.moving, model.scene.time.step
         mean = theta * step.kick.velocity + (1 - theta) * step.predicted.velocity

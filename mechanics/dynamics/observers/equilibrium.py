@@ -1,4 +1,4 @@
-"""Is every stone in balance, does it rest, has it fallen?"""
+"""Equilibrium of a scene: imbalance of each body, support reaction, displacement and speed."""
 
 from dataclasses import dataclass, replace
 
@@ -42,24 +42,24 @@ class Support:
 
 
 def imbalance(
-    model: Model, state: State, contacts: Contacts, force: Array, load: Array, borne: Array | None = None
+    model: Model, state: State, contacts: Contacts, force: Array, load: Array, resting: Array | None = None
 ) -> Array:
-    """Unbalanced force and moment of each body over its weight (nb,) [-]; zero for fixed bodies.
+    """Return the unbalanced force and moment of each body over its weight (nb,) [-]; zero for fixed bodies.
 
-    The sum of the loads (nb, 6) on rigid bodies, weight included, and of the contact forces (nc, 3) [N], inertia left
-    out: it is zero only for a body in static equilibrium. The moment, about the centre of mass, counts with the
-    smallest width as its arm. Forces on elastic bodies act on their undeformed shape, as small strain has it; else high
-    walls, whose lower stones carry many times their own weight, would seem out of balance by their strain. Without
-    gravity the largest contact force replaces the weight. `borne` (nb, 6) are forces and moments of contacts that
-    are not among those given: those between stones that sleep.
+    The imbalance is the sum of the loads (nb, 6) on rigid bodies, weight included, and of the contact forces (nc, 3)
+    [N], without inertia: it vanishes only in static equilibrium. The moment, about the centre of mass, is divided by
+    the smallest width. Forces on elastic bodies act on their undeformed shape, in line with small strain: otherwise the
+    lower stones of high walls, which carry many times their own weight, would be out of balance by their strain.
+    Without gravity the largest contact force replaces the weight. `resting` (nb, 6) are forces and moments of further
+    contacts, those between sleeping stones.
     """
     points = material_points(contacts, replace(state, node=_undeformed(model, state)))
     count = len(model.mass)
     resultant = wrenches(state, contacts.bodies[:, 0], points[:, 0], force, count)
     resultant -= wrenches(state, contacts.bodies[:, 1], points[:, 1], force, count)
     weight = model.mass[:, None] * model.gravity(state.time)
-    if borne is not None:
-        resultant += borne
+    if resting is not None:
+        resultant += resting
     # the load on rigid bodies holds their weight
     resultant += np.where(model.elastic[:, None], np.hstack([weight, np.zeros_like(weight)]), load)
     scale = np.linalg.norm(weight, axis=1)
@@ -72,7 +72,7 @@ def imbalance(
 
 
 def _undeformed(model: Model, state: State) -> Array:
-    """Where the nodes (nn, 3) would be if no body were strained [m]."""
+    """Return the nodes (nn, 3) of unstrained bodies in the present configuration [m]."""
     place = np.empty_like(state.node)
     for group in model.elastic_stones.groups:
         turned = group.stone.mesh.nodes @ state.rotation[group.bodies].transpose(0, 2, 1)
@@ -81,14 +81,14 @@ def _undeformed(model: Model, state: State) -> Array:
 
 
 def wrenches(state: State, body: Ints, point: Array, force: Array, count: int) -> Array:
-    """Sums (count, 6) of forces and of their moments about the centres of the bodies."""
+    """Return the sums (count, 6) of forces, and of their moments about the centres of the bodies [N], [N m]."""
     wrench = np.column_stack([force, np.cross(point - state.centre[body], force)])
-    # without contacts bincount forgets that forces are no integers
+    # bincount returns integers where there are no contacts
     return np.column_stack([np.bincount(body, column, count) for column in wrench.T]).astype(np.float64)
 
 
 def support_reaction(model: Model, contacts: Contacts, force: Array, time: float) -> Support:
-    """Sum of the contact forces (nc, 3) [N] from fixed bodies, along -gravity (along z without gravity)."""
+    """Return the sum of the contact forces (nc, 3) [N] of fixed bodies, along -gravity (along z without gravity)."""
     gravity = model.gravity(time)
     g = float(np.linalg.norm(gravity))
     up = -gravity / g if g > 0 else np.array([0.0, 0.0, 1.0])
@@ -97,7 +97,7 @@ def support_reaction(model: Model, contacts: Contacts, force: Array, time: float
 
 
 def settlement(model: Model, start: State, state: State) -> Array:
-    """How far the centre of each body has sunk along gravity since `start` (nb,) [m]; along -z without gravity."""
+    """Return how far each centre of mass has sunk since `start` (nb,) [m]; along -z without gravity."""
     gravity = model.gravity(state.time)
     g = float(np.linalg.norm(gravity))
     down = gravity / g if g > 0 else np.array([0.0, 0.0, -1.0])
@@ -106,9 +106,9 @@ def settlement(model: Model, start: State, state: State) -> Array:
 
 
 def seen_from_supports(model: Model, start: State, state: State) -> State:
-    """The state as an observer sees it who moves along with the supports, by the mean of their translations.
+    """Return the state relative to the supports, by the mean of their translations.
 
-    Where the ground shakes, what counts is how stones move against it.
+    Where the ground shakes, rest and collapse are judged by the motion of stones against it.
     """
     if not model.motions:
         return state
@@ -126,7 +126,7 @@ def seen_from_supports(model: Model, start: State, state: State) -> State:
 
 
 def displacement(model: Model, start: State, state: State) -> Array:
-    """Largest displacement of a corner or node of each body since `start` (nb,) [m]."""
+    """Return the largest displacement of a corner or node of each body since `start` (nb,) [m]."""
     own = model.surfaces
     largest = largest_displacement(
         own.body_vptr, own.vertex, state.centre, state.rotation, start.centre, start.rotation
@@ -135,7 +135,7 @@ def displacement(model: Model, start: State, state: State) -> Array:
 
 
 def speed(model: Model, state: State) -> Array:
-    """Largest speed of a corner or node of each body (nb,) [m/s]."""
+    """Return the largest speed of a corner or node of each body (nb,) [m/s]."""
     own = model.surfaces
     largest = largest_speed(own.body_vptr, own.vertex, state.rotation, state.velocity)
     return _with_nodes(model, largest, np.linalg.norm(state.node_velocity, axis=1))

@@ -1,1 +1,4 @@
-"""Forecast of the time and memory of a run."""
+"""Forecast of the time and memory of a run.
+
+Public: `plan`, `Plan`, `Amounts` (plan); `expected_cost`, `ExpectedCost` (cost); `Rate`, `RATES` (cost_rates).
+"""

@@ -1,9 +1,9 @@
-"""What a run will take, before it runs: seconds by stage, and memory.
+"""Expected cost of a run: seconds by stage, and memory.
 
-The seconds of a stage are a sum over the amounts on which its algorithm depends (mechanics.amounts), each times what
-one unit took on the machine named in mechanics.cost_rates. Two things are not known beforehand: how many iterations the
-contact problems need, and how many steps pass until a scene rests. So the answer is a range: each stage has the factor
-by which measured runs lay above and below, and the number of steps has a least, a likely and a largest value.
+The seconds of a stage are a sum over the amounts on which its algorithm depends (`Amounts`), each times the seconds of
+one unit on the machine named in cost_rates. Two numbers are unknown beforehand: the iterations of the contact problems,
+and the steps until a scene rests. The result is therefore a range: each stage has the factors by which measured runs
+lay above and below, and the number of steps has a least, a likely and a largest value.
 """
 
 import time
@@ -14,30 +14,29 @@ from functools import cache
 import numpy as np
 
 from mechanics.results.forecast.cost_rates import CALIBRATION, MEMORY, RATES
-from mechanics.results.forecast.plan import Plan
-from mechanics.results.forecast.workload import Amounts
+from mechanics.results.forecast.plan import Amounts, Plan
 from mechanics.scene.scene import Scene, Start, TimeSettings
 
 __all__ = ["ExpectedCost", "calibration", "expected_cost", "machine_slowness", "measures"]
 
-# steps in which an equilibrium must last, with the one that finds it, and how many some runs took
-_RESTING = (5, 6, 40)
-# steps of a kinetic relaxation, and of a run from rest that ends where it begins
-_RELAXING, _SETTLING = (5, 20, 80), (5, 30, 300)
+# least, likely and largest number of steps:
+_RESTING = (5, 6, 40)  # from an equilibrium: the steps in which it must last, and the one that finds it
+_RELAXING = (5, 20, 80)  # of a kinetic relaxation
+_SETTLING = (5, 30, 300)  # of a run from rest that ends where it begins
 
 
 @dataclass(frozen=True)
 class ExpectedCost:
-    """What a run will take.
+    """Expected cost of a run.
 
     Attributes
     ----------
     seconds : low, likely and high, of one processor
     longest : if no stone comes to rest before the duration is over [s]
     memory : most of the whole program [bytes]
-    asleep : likely seconds if nearly all stones slept in its steps (`[time] sleep`); None where none may, or where a
-        run ends as soon as they would
-    by_stage : likely seconds of mesh, assemble, start, steps and stress; stages that there will not be are left out
+    asleep : likely seconds if nearly all stones slept in its steps (`[time] sleep`); None where
+        no stone may sleep, or a run ends as soon as they would
+    by_stage : likely seconds of mesh, assemble, start, steps and stress, as far as the run has these stages
     steps : least, likely and largest number of steps
     """
 
@@ -50,7 +49,7 @@ class ExpectedCost:
 
 
 def expected_cost(plan: Plan, scene: Scene, slowness: float = 1.0) -> ExpectedCost:
-    """What the run of a scene will take.
+    """Return the expected cost of the run of a scene.
 
     Parameters
     ----------
@@ -94,26 +93,26 @@ def expected_cost(plan: Plan, scene: Scene, slowness: float = 1.0) -> ExpectedCo
 
 
 def measures(amounts: Amounts) -> dict[str, float]:
-    """What rates refer to: the amounts; *one*; *tangle*, contacts times the root of the number of stones."""
+    """Return the quantities that rates refer to: the amounts; *one*; *tangle*, contacts · √stones."""
     own = {name: float(value) for name, value in asdict(amounts).items()}
     return own | {"one": 1.0, "tangle": own["contacts"] * own["stones"] ** 0.5}
 
 
 def _asleep(kind: str, time_: TimeSettings, rest: float, steps: float) -> float | None:
-    """Seconds with sleep: `rest` of the other stages, `steps` of the steps."""
+    """Return the seconds with sleep: `rest` of the other stages, `steps` of the steps."""
     useless = kind == "elastic" or time_.relaxation or time_.stop_at_equilibrium
     return None if useless else rest + steps
 
 
 def _pace(time_: TimeSettings) -> str:
-    """Which steps a run has mostly."""
+    """Return the kind of step that prevails in a run."""
     if time_.relaxation:
         return "relaxing"
     return "settled" if time_.start is Start.EQUILIBRIUM and time_.stop_at_equilibrium else "moving"
 
 
 def _steps(time_: TimeSettings, until: float) -> tuple[int, int, int]:
-    """Least, likely and largest number of steps, with loads that change `until` some time [s]."""
+    """Return the least, likely and largest number of steps, with loads that change `until` some time [s]."""
     total = max(1, round(time_.duration / time_.step))
     if not time_.stop_at_equilibrium:
         return total, total, total
@@ -125,7 +124,7 @@ def _steps(time_: TimeSettings, until: float) -> tuple[int, int, int]:
 
 @cache
 def machine_slowness() -> float:
-    """Time of this machine over that of the one on which the rates were measured, from some 0.1 s of work [-].
+    """Return the time of this machine over that of the machine of the rates, from about 0.1 s of work [-].
 
     The mean, in logarithms, of Python's own loops, of passes over arrays and of products of matrices.
     """
@@ -133,7 +132,7 @@ def machine_slowness() -> float:
 
 
 def calibration() -> dict[str, float]:
-    """Processor seconds of three fixed pieces of work; the best of some."""
+    """Return the processor seconds of three fixed pieces of work, the best of several runs."""
     return {name: _best(work) for name, work in _WORK.items()}
 
 

@@ -1,4 +1,4 @@
-"""What one unit of each amount took, as `python -m benchmarks.cost --fit` measured it."""
+"""Seconds and bytes of one unit of each amount, as measured by `python -m benchmarks.cost --fit`."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ class Rate:
     above: float
 
     def __call__(self, amounts: Mapping[str, float]) -> float:
-        """The sum."""
+        """Return the sum."""
         return sum(rate * amounts[name] for name, rate in self.per.items())
 
 

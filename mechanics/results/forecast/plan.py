@@ -1,4 +1,4 @@
-"""What a scene will need, before it runs: blocks, contacts, unknowns and memory."""
+"""Size of a scene before it runs: blocks, contacts, unknowns, memory, and the amounts on which its time depends."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,35 +8,60 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from mechanics.arrays import Bools, Ints
-from mechanics.dynamics.simulation import detector
+from mechanics.delassus.multifrontal import fronts
+from mechanics.dynamics.contact_search import detector
 from mechanics.model.model import Model, build_model
-from mechanics.results.forecast.workload import Amounts, amounts
 from mechanics.scene.scene import Fidelity, Scene
 from mechanics.stones.meshing.report import MeshReport
 
-__all__ = ["Plan", "plan"]
+__all__ = ["Amounts", "Plan", "plan"]
 
 
-_NUMBER = 8  # bytes of a floating-point number
-_CONTACT_NUMBERS = (
-    80  # numbers kept for each contact point: frames, arms, impulses, its part of W, and their copies
-)
+_NUMBER = 8  # size of a floating-point number [bytes]
+_CONTACT_NUMBERS = 80  # numbers kept for each contact point: frame, arms, impulses, its part of W, and copies
+
+
+@dataclass(frozen=True)
+class Amounts:
+    """Amounts of work in a run; those of deformable stones are zero in rigid scenes.
+
+    Attributes
+    ----------
+    stones : all blocks
+    contacts : contact points at the start
+    distinct_nodes, nodes : of the meshes to be made, and of all deformable stones
+    condensed : numbers read from the factors of ŵ to condense every distinct stone on the nodes that touch:
+        3k n^(4/3) for k of n nodes, as the factors of a solid have about n^(4/3) numbers
+    blocks : numbers in the compliances of all deformable stones between their contact sides
+    fronts : groups of contacts that are eliminated together when W + Θ is factorised
+    factor, flops : numbers in these factors, and floating-point operations that they take
+    """
+
+    stones: int
+    contacts: int
+    distinct_nodes: int = 0
+    nodes: int = 0
+    condensed: float = 0.0
+    blocks: float = 0.0
+    fronts: int = 0
+    factor: float = 0.0
+    flops: float = 0.0
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What a scene will need.
+    """Size of a scene.
 
     Attributes
     ----------
     bodies : how many blocks at each fidelity
-    pairs : codes of the blocks that touch where the scene begins, pairs of fixed blocks left out
-    contacts : contact points where the scene begins
+    pairs : codes of the blocks that touch at the start, without pairs of fixed blocks
+    contacts : contact points at the start
     unknowns : velocities: six for each rigid block, three for each node of a deformable one
-    memory : estimate of the largest arrays, dense compliances above all [bytes]
+    memory : estimate of the largest arrays, mainly dense compliances [bytes]
     meshes : how the deformable blocks were meshed, and how well
     loose : codes of the blocks that no chain of touching blocks ties to a fixed one
-    amounts : of what the time of a run depends on (mechanics.cost)
+    amounts : on which the time of a run depends (`expected_cost`)
     """
 
     bodies: Mapping[Fidelity, int]
@@ -50,7 +75,7 @@ class Plan:
 
 
 def plan(scene: Scene) -> Plan:
-    """Mesh the scene and find the contacts in which it begins; nothing moves.
+    """Mesh the scene and detect its contacts at the start; nothing moves.
 
     Raises
     ------
@@ -71,12 +96,12 @@ def plan(scene: Scene) -> Plan:
         memory=_memory(model, contacts.bodies),
         meshes=model.meshes,
         loose=tuple(codes[i] for i in _loose(pairs, model.fixed)),
-        amounts=amounts(model, contacts.bodies),
+        amounts=_amounts(model, contacts.bodies),
     )
 
 
 def _memory(model: Model, bodies: Ints) -> int:
-    """Bytes of the deformable blocks' compliances, between surface nodes and contacts, and of the contact points."""
+    """Return the bytes of the compliances of deformable blocks, and of the contact points."""
     sides = np.bincount(bodies.ravel(), minlength=len(model.mass))
     numbers = _CONTACT_NUMBERS * len(bodies)
     for group in model.elastic_stones.groups:
@@ -86,8 +111,37 @@ def _memory(model: Model, bodies: Ints) -> int:
 
 
 def _loose(pairs: Ints, fixed: Bools) -> Ints:
-    """Indices of the bodies that no chain of touching bodies ties to a fixed one."""
+    """Return the indices of the bodies that no chain of touching bodies ties to a fixed one."""
     count = len(fixed)
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     _, group = connected_components(links, directed=False)
     return np.flatnonzero(~np.isin(group, group[fixed]))
+
+
+def _amounts(model: Model, bodies: Ints) -> Amounts:
+    """Return the amounts of a model with contacts between `bodies` (nc, 2)."""
+    stones, contacts = len(model.mass), len(bodies)
+    if model.rigid_only:
+        return Amounts(stones, contacts)
+    sides = np.bincount(bodies.ravel(), minlength=stones)
+    distinct, condensed, blocks = 0, 0.0, 0.0
+    for group in model.elastic_stones.groups:
+        nodes, touched = len(group.stone.mesh.nodes), len(np.unique(group.stone.mesh.facets))
+        distinct += nodes
+        condensed += 3.0 * min(touched, int(sides[group.bodies].sum())) * nodes ** (4.0 / 3.0)
+        blocks += float(((3.0 * sides[group.bodies]) ** 2).sum())
+    front, factor, flops = _factors(model, bodies)
+    nodes = int(model.elastic_stones.start[-1])
+    return Amounts(stones, contacts, distinct, nodes, condensed, blocks, front, factor, flops)
+
+
+def _factors(model: Model, bodies: Ints) -> tuple[int, float, float]:
+    """Return the number of fronts of W + Θ, the numbers in its factors, and the operations to make them."""
+    order = np.argsort(bodies.ravel(), kind="stable")
+    ends = np.cumsum(np.bincount(bodies.ravel(), minlength=len(model.mass)))[:-1]
+    sides = [own for own, fixed in zip(np.split(order, ends), model.fixed, strict=True) if not fixed]
+    pattern = fronts(bodies, [own // 2 for own in sides if len(own)])
+    pivots = pattern.width.astype(float)
+    others = np.diff(pattern.dptr) - pivots
+    flops = 2.0 / 3.0 * pivots**3 + 2.0 * pivots**2 * others + 2.0 * pivots * others**2
+    return len(pivots), float(pattern.size), float(flops.sum())

@@ -1,1 +1,5 @@
-"""Contact laws: each turns what is known of its contacts into a shift and a cone."""
+"""Contact laws: each states its contacts as a shift and a friction cone.
+
+Public: `Law`, `Approach`, `Terms` (law); `DryJoint` (dry_joint); `MortarJoint` (mortar); `CohesiveZone`
+(cohesive_zone); `LennardJones` (lennard_jones); `contact_status` (status).
+"""

@@ -1,4 +1,4 @@
-"""Bonds between stones, as mortar makes them: where the first step finds a joint closed."""
+"""Mortar bonds between stones, made in joints that are closed in the first step."""
 
 from dataclasses import replace
 
@@ -12,20 +12,19 @@ __all__ = ["BROKEN", "WHOLE", "bonded", "with_bonds"]
 # values of the internal variable BOND; between 0 and WHOLE: damaged
 WHOLE, BROKEN = 1.0, -1.0
 
-# of a body's size: mortar fills joints up to this width, open or overlapping; surveyed joints never close exactly
-_FILLED = 1e-2
+_FILLED = 1e-2  # largest gap or overlap that mortar fills, over a body's size [-]; surveyed joints never close exactly
 
 
 def with_bonds(contacts: Approach) -> Approach:
-    """The contacts with the bonds that the first step makes.
+    """Return the contacts with the bonds that are made in the first step.
 
-    A bond keeps the gap with which the run begins as REST: that gap is closed for it, and stays so when it has
-    broken, as the mortar is still there.
+    A bond keeps the gap at the start of the run as REST: that gap counts as closed, even after the bond has broken, as
+    the mortar remains in the joint.
     """
     if not contacts.first:
         return contacts
     state = contacts.state.copy()
-    # before the flight to the predicted configuration
+    # the gap before the flight to the predicted configuration
     gap = contacts.gap - contacts.step * (1 - contacts.theta) * contacts.speed
     closed = (np.abs(gap) <= _FILLED * contacts.size) & (contacts.area > 0)
     state[closed, BOND] = WHOLE
@@ -34,6 +33,6 @@ def with_bonds(contacts: Approach) -> Approach:
 
 
 def bonded(contacts: Approach) -> Bools:
-    """Which contacts (n,) are bonded, whole or damaged."""
+    """Return the contacts (n,) that are bonded, whole or damaged."""
     holds: Bools = contacts.state[:, BOND] > 0
     return holds

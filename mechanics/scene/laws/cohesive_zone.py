@@ -22,13 +22,13 @@ class CohesiveZone:
         β = 1 - δ_N/δ_f,N - δ_T/δ_f,T,   δ_f = 2 G/σ0,   r_N ≥ -h A β σ_N,   ‖r_T‖ ≤ h A β σ_T + μ r_N
 
     with the largest opening δ_N and the path of sliding δ_T so far. There is no elastic branch: a whole bond is rigid.
-    Opening alone spends G_I A, sliding alone G_II A (and friction besides); of both, the bond breaks where their parts
-    sum up to one, whatever the path: ∫σ_N β dδ_N/G_I + ∫σ_T β dδ_T/G_II = 1. A bond that closes again pulls in
-    proportion to its opening; in shear it acts as friction does.
+    Opening alone dissipates G_I A, sliding alone G_II A (besides friction); in mixed mode the bond breaks where the two
+    parts add up to one, for any path: ∫σ_N β dδ_N/G_I + ∫σ_T β dδ_T/G_II = 1. The tension of a bond that closes again
+    is proportional to its opening; its shear acts like friction.
 
-    The pull of a step is that of the opening in its middle, at the velocity before. An opening smaller than what the
-    full pull moves in one step cannot be resolved: there the pull stays full until the bond has closed. The pull in
-    proportion begins that far before closed, and so its steps h²W·(pull/opening) stay below 1/θ, where they are stable.
+    The tension of a step is that of the opening at mid-step, at the velocity before. An opening smaller than the motion
+    due to the full tension in one step cannot be resolved: there the tension stays full until the bond has closed. The
+    proportional part begins at that opening, so that h²W·(tension/opening) stays below 1/θ, where steps are stable.
     """
 
     friction: Friction
@@ -54,14 +54,14 @@ class CohesiveZone:
         return DryJoint(self.friction)
 
     def _intact(self, opening: Array, slip: Array) -> Array:
-        """β (n,) after a largest opening and a path of sliding [m], if the bond was made at all."""
+        """Return β (n,) after a largest opening and a path of sliding [m], for contacts that were bonded."""
         intact: Array = np.maximum(
             1.0 - opening / self.reach - slip * self.shear / (2.0 * self.energy_shear), 0.0
         )
         return intact
 
     def terms(self, contacts: Approach) -> Terms:
-        """The shift of bonded contacts by their opening and their damage."""
+        """Return the shift of bonded contacts for their opening and damage."""
         contacts = with_bonds(contacts)
         dry, state = self._dry.terms(contacts), contacts.state
         step, theta = contacts.step, contacts.theta
@@ -69,7 +69,7 @@ class CohesiveZone:
         largest = np.maximum(state[:, OPENING], opening)
         area = step * contacts.area * self._intact(largest, state[:, SLIP]) * bonded(contacts)
         full = area * self._tension
-        unresolved = step * theta * contacts.yielding * full
+        unresolved = step * theta * contacts.compliance * full
         opened = largest > 0
         part = np.where(opened, (opening + unresolved) / np.where(opened, largest, 1.0), 1.0)
         pull = full * np.minimum(part, 1.0)
@@ -77,13 +77,13 @@ class CohesiveZone:
         return Terms(dry.bias, dry.friction, cohesion, pull)
 
     def after(self, contacts: Approach, impulse: Array, velocity: Array) -> Array:
-        """Let openings and slides of this step damage the bonds."""
+        """Return the internal variables after the openings and slides of this step have damaged the bonds."""
         contacts = with_bonds(contacts)
         terms, holds = self.terms(contacts), bonded(contacts)
         step, state = contacts.step, contacts.state.copy()
         opening = contacts.gap - state[:, REST] + step * contacts.theta * velocity[:, 0]
         state[:, OPENING] = np.where(holds, np.maximum(state[:, OPENING], opening), state[:, OPENING])
-        # an open contact is not held in its plane; else only what lies on its cone has slid
+        # an open contact is free in its plane; of closed ones, those on their cone have slid
         free = holds & ((impulse[:, 0] <= 0) | at_limit(terms, impulse))
         state[:, SLIP] += np.where(free, step * np.linalg.norm(velocity[:, 1:], axis=1), 0.0)
         state[:, SLIDING] = slid(contacts, terms, impulse, velocity)

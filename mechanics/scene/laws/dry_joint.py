@@ -1,4 +1,4 @@
-"""Stone on stone: Signorini with gap or with Newton's restitution, Coulomb with static and dynamic friction."""
+"""Dry joint: Signorini with gap or with Newton restitution, Coulomb with static and dynamic friction."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -19,24 +19,22 @@ DynamicFriction = Annotated[
 ]
 
 
-# an impulse lies on its cone, to rounding
-_ON_CONE = 1.0 - 1e-9
-# of a body's size: a contact no farther open than this is closed for Newton's law
-_CLOSED = 1e-9
-# a contact may rest at the limit of its cone, but for what solvers leave as velocity: slower than this part of the
-# speed √(a size), of a fall over the body's size with a = W r/h, it does not slide
-_DRIFT = 1e-4
+_ON_CONE = (
+    1.0 - 1e-9
+)  # tangential impulse over its limit, from which an impulse lies on its cone, to rounding [-]
+_CLOSED = 1e-9  # gap over a body's size up to which a contact is closed for Newton's law [-]
+_DRIFT = 1e-4  # of √(a size), a = W r/h, the speed below which a contact at its limit rests: solvers leave as much [-]
 
 
 def gap_bias(contacts: Approach) -> Array:
-    """Shift of u_N (n,) with which a closing contact is closed at the next kick: g/h, docs/theory.md §3 [m/s]."""
+    """Return the shift g/h of u_N (n,), with which a contact closes at the next kick (docs/theory.md §3) [m/s]."""
     gap = contacts.gap - contacts.state[:, REST]
     bias: Array = (gap if contacts.push_out else np.maximum(gap, 0.0)) / contacts.step
     return bias
 
 
 def at_limit(terms: Terms, impulse: Array) -> Bools:
-    """Which contacts (n,) are pressed, or held by cohesion, and at the limit of their cone."""
+    """Return the contacts (n,) under pressure, or held by cohesion, at the limit of their cone."""
     tangential = np.linalg.norm(impulse[:, 1:], axis=1)
     limit = terms.friction * impulse[:, 0] + terms.cohesion
     on_cone: Bools = (tangential >= _ON_CONE * limit) & ((tangential > 0) | (impulse[:, 0] > 0))
@@ -44,8 +42,8 @@ def at_limit(terms: Terms, impulse: Array) -> Bools:
 
 
 def slid(contacts: Approach, terms: Terms, impulse: Array, velocity: Array) -> Bools:
-    """Which contacts (n,) have slid in the step that gave r̃ (n, d) [N s] and u (n, d) [m/s]."""
-    acceleration = contacts.yielding * np.linalg.norm(impulse, axis=1) / contacts.step
+    """Return the contacts (n,) that slid in the step with r̃ (n, d) [N s] and u (n, d) [m/s]."""
+    acceleration = contacts.compliance * np.linalg.norm(impulse, axis=1) / contacts.step
     drift = _DRIFT * np.sqrt(acceleration * contacts.size)
     moved: Bools = at_limit(terms, impulse) & (np.linalg.norm(velocity[:, 1:], axis=1) > drift)
     return moved
@@ -73,24 +71,24 @@ class DryJoint:
 
     @property
     def reach(self) -> float:
-        """Nothing acts across a gap [m]."""
+        """Zero: no force acts across a gap [m]."""
         return 0.0
 
     def terms(self, contacts: Approach) -> Terms:
-        """Signorini as a shift, friction by what the contact did last."""
+        """Return Signorini as a shift, with dynamic friction for contacts that slid in the last step."""
         none = np.zeros(len(contacts.gap))
         friction = np.full(len(contacts.gap), self.friction)
         if self.dynamic_friction is not None:
             friction[contacts.state[:, SLIDING] > 0] = self.dynamic_friction
         bias = gap_bias(contacts)
         if self.restitution > 0:
-            # Newton's law speaks of closed contacts; an open one waits until it is
+            # Newton's law holds for closed contacts only
             closed = contacts.gap <= _CLOSED * contacts.size
             bias = np.where(closed, self.restitution * np.minimum(contacts.speed, 0.0), np.inf)
         return Terms(bias, friction, none, none)
 
     def after(self, contacts: Approach, impulse: Array, velocity: Array) -> Array:
-        """Remember which contacts slide."""
+        """Return the internal variables with the contacts that slide."""
         state = contacts.state.copy()
         state[:, SLIDING] = slid(contacts, self.terms(contacts), impulse, velocity)
         return state

@@ -1,10 +1,10 @@
-"""What every contact law is asked, and what it answers: a shift of (u, r) and a friction cone.
+"""Protocol of contact laws: contacts in, a shift of (u, r) and a friction cone out.
 
-Once per step each law states, for all its contacts at once, the one form that every solver sees: with r̃ = r + s n
+Once per step each law states all its contacts in the common form of all solvers: with r̃ = r + s n
 
     0 ≤ u_N + bias ⊥ r̃_N ≥ 0,   ‖r_T‖ ≤ μ r̃_N + k,   and r_T opposes u_T, at the limit, while sliding
 
-To add a law, write one class with the members of `Law`; nothing else changes.
+A new law is one class with the members of `Law`.
 """
 
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ STATE = 5
 
 @dataclass(frozen=True)
 class Approach:
-    """The contacts of one law at the predicted configuration, before the step is solved.
+    """Contacts of one law at the predicted configuration, before the step is solved.
 
     Attributes
     ----------
@@ -30,10 +30,10 @@ class Approach:
     speed : (n,) u_N before the step, positive when opening [m/s]
     area : (n,) tributary area; zero at an edge or a corner [m²]
     size : (n,) smallest width of the smaller body; tolerances scale with it [m]
-    yielding : (n,) W_NN, what one unit of normal impulse does to u_N [1/kg]
+    compliance : (n,) W_NN, change of u_N per unit of normal impulse [1/kg]
     step, theta : h [s] and θ; the gap is gap + h θ u_N at the end of the step, and gap + h u_N at the next kick
     push_out : overlaps are pushed out (relaxation) instead of only kept from growing
-    first : this is the first step of the run: bonds that the scene asks for are made here
+    first : first step of the run, in which bonds are made
     state : (n, STATE) internal variables, as the law left them in the last step; zeros for new contacts.
         BOND intact fraction (1 whole, between: damaged, 0 never bonded, -1 broken), SLIDING 1 if it slid in the last
         step, OPENING largest opening so far [m], SLIP path of sliding so far [m], REST gap that counts as closed [m]
@@ -43,7 +43,7 @@ class Approach:
     speed: Array
     area: Array
     size: Array
-    yielding: Array
+    compliance: Array
     step: float
     theta: float
     push_out: bool
@@ -59,7 +59,7 @@ class Terms:
     ----------
     bias : (n,) shift of u_N [m/s]; infinite where the contact must not act in this step
     friction : (n,) μ [-]
-    cohesion : (n,) k, tangential impulse that is carried at r̃_N = 0 [N s]
+    cohesion : (n,) k, tangential impulse carried at r̃_N = 0 [N s]
     adhesion : (n,) s, largest tensile impulse; r̃_N = r_N + s [N s]
     """
 
@@ -70,17 +70,17 @@ class Terms:
 
 
 class Law(Protocol):
-    """A contact law; a frozen dataclass of its parameters, checked when made (SceneError)."""
+    """A contact law: a frozen dataclass of its parameters, checked on construction (SceneError)."""
 
     @property
     def reach(self) -> float:
-        """How far beyond the alert distance contacts must be watched, as open ones still pull [m]; mostly 0."""
+        """Gap up to which the law acts, so that contacts are watched beyond the alert distance [m]; mostly 0."""
 
     def terms(self, contacts: Approach) -> Terms:
         """State the law for one step."""
 
     def after(self, contacts: Approach, impulse: Array, velocity: Array) -> Array:
-        """New internal variables (n, STATE), from the shifted impulses r̃ (n, d) [N s] and u (n, d) [m/s].
+        """Return new internal variables (n, STATE), from the shifted impulses r̃ (n, d) [N s] and u (n, d) [m/s].
 
-        A solver's last touch of a contact is exact: r̃_N is 0 where it opened, and ‖r_T‖ lies on the cone where it slid.
+        Solvers end with an exact local solution: r̃_N = 0 where a contact opened, ‖r_T‖ on the cone where it slid.
         """

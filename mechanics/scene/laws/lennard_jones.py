@@ -15,11 +15,11 @@ __all__ = ["LennardJones"]
 
 @dataclass(frozen=True)
 class LennardJones:
-    """A constant pull γ as long as the gap is within d_w; else a dry joint.
+    """Constant attraction γ while the gap is within d_w; a dry joint beyond.
 
-    r̃_N = r_N + hγ: where the contact is open, r̃_N = 0 says that the full pull acts; where it is closed, r̃_N is the
-    pressure, and Coulomb's cone ‖r_T‖ ≤ μ r̃_N stands on it. In the step that crosses d_w, the pull acts for the part of
-    the path that lies within, so the work of an escape is γ d_w, but for what the velocity changes in that step.
+    r̃_N = r_N + hγ: in an open contact r̃_N = 0, and the full attraction acts; in a closed one r̃_N is the pressure, on
+    which Coulomb's cone ‖r_T‖ ≤ μ r̃_N stands. In the step that crosses d_w, the attraction acts for the part of the
+    path within, so that the work of an escape is γ d_w, apart from the change of velocity in that step.
     """
 
     friction: Friction
@@ -39,16 +39,16 @@ class LennardJones:
         return DryJoint(self.friction)
 
     def terms(self, contacts: Approach) -> Terms:
-        """The pull as a shift."""
+        """Return the attraction as a shift."""
         pull = contacts.step * self.force * self._within(contacts)
         return replace(self._dry.terms(contacts), adhesion=pull)
 
     def after(self, contacts: Approach, impulse: Array, velocity: Array) -> Array:
-        """Remember which contacts slide."""
+        """Return the internal variables with the contacts that slide."""
         return self._dry.after(contacts, impulse, velocity)
 
     def _within(self, contacts: Approach) -> Array:
-        """Part (n,) of this step's path that lies within d_w, at the velocity before the step [-]."""
+        """Return the part (n,) of this step's path within d_w, at the velocity before the step [-]."""
         path = contacts.step * contacts.speed
         start = contacts.gap - (1 - contacts.theta) * path
         nearest, length = np.minimum(start, start + path), np.abs(path)

@@ -1,4 +1,4 @@
-"""Mortar that breaks at once: cohesion as a shift of the normal impulse (Acary et al. 1999)."""
+"""Brittle mortar: cohesion as a shift of the normal impulse (Acary et al. 1999)."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -14,14 +14,13 @@ from mechanics.stones.settings import Setting, check_settings
 __all__ = ["MortarJoint", "held_tension"]
 
 
-# of a body's size: a bond at its tensile limit has broken when it is open by this,
-_OPENED = 1e-6
-# one at its shear limit when it slides faster than solvers let it drift, or has crept by this
-_CREPT = 1e-3
+# a bond at its limit has broken
+_OPENED = 1e-6  # in tension, when it is open by this part of a body's size [-]
+_CREPT = 1e-3  # in shear, when it has crept by this part [-], or slides faster than solvers let it drift
 
 
 def held_tension(friction: float, tension: float, shear: float) -> float:
-    """Tension that a joint holds [Pa]: `tension`, cut at the apex c_t/μ of its Mohr–Coulomb cone."""
+    """Return the tension that a joint carries [Pa]: `tension`, cut at the apex c_t/μ of its Mohr–Coulomb cone."""
     return min(tension, shear / friction) if friction > 0 else tension
 
 
@@ -45,7 +44,7 @@ class MortarJoint:
 
     @property
     def reach(self) -> float:
-        """An intact bond does not open, a broken one does not pull [m]."""
+        """Zero: an intact bond does not open, a broken one carries no tension [m]."""
         return 0.0
 
     @property
@@ -53,7 +52,7 @@ class MortarJoint:
         return DryJoint(self.friction, self.dynamic_friction)
 
     def terms(self, contacts: Approach) -> Terms:
-        """The shift of bonded contacts; broken ones are dry."""
+        """Return the shift of bonded contacts; broken ones are dry."""
         contacts = with_bonds(contacts)
         dry, holds = self._dry.terms(contacts), bonded(contacts)
         area = contacts.step * contacts.area * holds
@@ -66,7 +65,7 @@ class MortarJoint:
         )
 
     def after(self, contacts: Approach, impulse: Array, velocity: Array) -> Array:
-        """Break the bonds that opened at their tensile limit, or slid."""
+        """Return the internal variables, with bonds broken that opened at their tensile limit, or slid."""
         contacts = with_bonds(contacts)
         terms = self.terms(contacts)
         state, holds = contacts.state.copy(), bonded(contacts)

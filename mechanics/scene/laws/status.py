@@ -1,4 +1,4 @@
-"""What a contact is doing, in one word."""
+"""Status of contacts, in one word."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +14,10 @@ STATUSES = ("open", "stick", "slip", "bonded", "broken")
 
 
 def contact_status(state: Array, terms: Terms, impulse: Array) -> NDArray[np.str_]:
-    """Status (n,) of contacts, by their internal variables (n, STATE) after a step and its r̃ (n, d) [N s].
+    """Return the status (n,) of contacts, from their internal variables (n, STATE) after a step and its r̃ (n, d) [N s].
 
-    *bonded*: an intact or damaged bond; *broken*: open, where there was a bond; *slip*: pressed, and at the limit of
-    its cone; *stick*: pressed, and below it.
+    *bonded*: an intact or damaged bond; *broken*: open after a bond; *slip*: under pressure at the limit of the cone;
+    *stick*: under pressure below it.
     """
     bond, is_open = state[:, BOND], impulse[:, 0] <= 0
     return np.select(

@@ -1,4 +1,4 @@
-"""Which law holds between which bodies, and all laws of a step as one shift and cone."""
+"""Table of the laws between bodies, and all laws of a step as one shift and cone."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -10,12 +10,12 @@ from mechanics.scene.laws.law import Approach, Law, Terms
 
 __all__ = ["LawTable", "law_table"]
 
-_PER_CONTACT = ("gap", "speed", "area", "size", "yielding", "state")
+_PER_CONTACT = ("gap", "speed", "area", "size", "compliance", "state")
 
 
 @dataclass(frozen=True)
 class LawTable:
-    """The laws of a scene.
+    """Laws of a scene.
 
     Attributes
     ----------
@@ -27,7 +27,7 @@ class LawTable:
     groups: Bools
 
     def of(self, bodies: Ints) -> Ints:
-        """Index of the law of each contact, given its bodies (nc, 2); of two rules, the later holds."""
+        """Return the index of the law of each contact between bodies (nc, 2); of two rules, the later holds."""
         law = np.zeros(len(bodies), dtype=np.int64)
         one, other = bodies[:, 0], bodies[:, 1]
         for rule, (first, second) in enumerate(self.groups):
@@ -35,7 +35,7 @@ class LawTable:
         return law
 
     def terms(self, law: Ints, contacts: Approach) -> Terms:
-        """All contacts stated by their own law."""
+        """State all contacts by their own laws."""
         if len(self.laws) == 1:
             return self.laws[0].terms(contacts)
         values = {one.name: np.zeros(len(law)) for one in fields(Terms)}
@@ -47,7 +47,7 @@ class LawTable:
         return Terms(**values)
 
     def after(self, law: Ints, contacts: Approach, impulse: Array, velocity: Array) -> Array:
-        """New internal variables (nc, STATE) of all contacts."""
+        """Return new internal variables (nc, STATE) of all contacts."""
         if len(self.laws) == 1:
             return self.laws[0].after(contacts, impulse, velocity)
         state = contacts.state.copy()
@@ -58,7 +58,7 @@ class LawTable:
 
 
 def law_table(general: Law, rules: Sequence[tuple[Bools, Bools, Law]], bodies: int) -> LawTable:
-    """The table of a general law and of rules, each with the bodies (nb,) of its two groups."""
+    """Return the table of a general law and of rules, each with the bodies (nb,) of its two groups."""
     groups = np.array([[first, second] for first, second, _ in rules], dtype=bool).reshape(-1, 2, bodies)
     return LawTable((general, *(law for _, _, law in rules)), groups)
 

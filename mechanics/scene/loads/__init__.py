@@ -1,1 +1,7 @@
-"""Loads: what acts on a scene besides its weight, as functions of time."""
+"""Loads on a scene besides its weight, as functions of time.
+
+Public: `Loads`, `Force`, `Motion`, `Pose` (load); `History` (time_series); `StoneForce` (forces); `GravityRamp`,
+`TiltingTable` (gravity); `GroundMotion`, `Component` (ground_motion); `ImposedMotion`, `settlement`, `spreading`
+(motions); `Accelerogram` (accelerogram); `read_accelerogram` (record_files); `band_pass`, `without_drift`
+(record_processing); `read_history` (tables).
+"""

@@ -1,4 +1,4 @@
-"""Accelerograms: ground accelerations at equal steps of time, and what they integrate to."""
+"""Accelerograms: ground accelerations at equal steps of time, with their velocities and displacements."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -22,8 +22,8 @@ class Accelerogram:
     ----------
     dt : step of time [s]
     acceleration : (n,) [m/s²]
-    name : as the record calls itself
-    source : file, and how the record was processed
+    name : of the record
+    source : file, and processing of the record
     """
 
     dt: float
@@ -77,5 +77,5 @@ class Accelerogram:
 
 
 def _integral(samples: Array, dt: float) -> Array:
-    """Trapezoidal rule from the first sample to each (n,)."""
+    """Integrate from the first sample to each (n,) by the trapezoidal rule."""
     return np.concatenate([[0.0], np.cumsum(0.5 * dt * (samples[1:] + samples[:-1]))])

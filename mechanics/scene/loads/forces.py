@@ -16,14 +16,14 @@ __all__ = ["StoneForce"]
 
 @dataclass(frozen=True)
 class StoneForce:
-    """A force on each of some stones, at a point that moves with the stone.
+    """Force on each of some stones, at a point that moves with the stone.
 
     Attributes
     ----------
     stones : codes
     force : (3,) with time [N]
     arm : (3,) from the centre of mass to where it acts, in the axes of the start [m]
-    follows : without it, the force keeps its direction in the world
+    follows : the force turns with the stone; otherwise its direction is fixed in the world
     """
 
     stones: frozenset[str]
@@ -40,11 +40,11 @@ class StoneForce:
 
     @property
     def until(self) -> float:
-        """When the force ceases to change [s]."""
+        """Time from which the force is constant [s]."""
         return self.force.until
 
     def __call__(self, time: float, centre: Array, rotation: Array) -> tuple[Array, Array]:
-        """Force (n, 3) [N] and moment (n, 3) [N m] about the centre of mass, world axes."""
+        """Return the force (n, 3) [N] and its moment (n, 3) [N m] about the centre of mass, world axes."""
         force = np.broadcast_to(self.force(time), centre.shape)
         if self.follows:
             force = np.einsum("nij,nj->ni", rotation, force)

@@ -16,7 +16,7 @@ __all__ = ["GravityRamp", "TiltingTable"]
 
 @dataclass(frozen=True)
 class GravityRamp:
-    """Gravity grows from nothing, linearly, so that a structure takes up its weight without a shock."""
+    """Linear increase of gravity from zero, so that a structure takes up its weight without a shock."""
 
     duration: Annotated[float, Setting("Time until gravity is whole.", "s", above=0)]
 
@@ -29,16 +29,16 @@ class GravityRamp:
         return self.duration
 
     def __call__(self, time: float, gravity: Array) -> Array:
-        """g t/T up to the duration T, then g (3,) [m/s²]."""
+        """Return g t/T up to the duration T, then g (3,) [m/s²]."""
         return gravity * min(max(time / self.duration, 0.0), 1.0)
 
 
 @dataclass(frozen=True)
 class TiltingTable:
-    """Gravity as a table that turns about a horizontal axis feels it, in the axes of the table.
+    """Gravity on a table that turns about a horizontal axis, in the axes of the table.
 
     The scene is described in the axes of the table, which do not move: gravity turns by the opposite angle. The
-    table's own acceleration is left out; turn it slowly. To turn the table itself, give it an imposed motion.
+    acceleration of the table is neglected, so it must turn slowly. An imposed motion turns the table itself.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class TiltingTable:
     def at_rate_degrees(
         cls, axis: tuple[float, float, float], rate: float, limit: float, start: float = 0.0
     ) -> "TiltingTable":
-        """A table that turns at a constant rate [°/s] from the time `start` [s] up to a limit [°]."""
+        """Return a table that turns at a constant rate [°/s] from the time `start` [s] up to a limit [°]."""
         if not (rate > 0 and limit > 0 and start >= 0):
             raise SceneError(
                 f"rate = {rate:g} °/s, limit = {limit:g} °, start = {start:g} s",
@@ -72,11 +72,11 @@ class TiltingTable:
 
     @property
     def until(self) -> float:
-        """When the angle ceases to change [s]."""
+        """Time from which the angle is constant [s]."""
         return self.angle.until
 
     def __call__(self, time: float, gravity: Array) -> Array:
-        """Gravity (3,) turned by minus the angle [m/s²]."""
+        """Return gravity (3,) turned by minus the angle [m/s²]."""
         axis = np.array(self.axis) / np.linalg.norm(self.axis)
         turned: Array = Rotation.from_rotvec(-float(self.angle(time)) * axis).apply(gravity)
         return turned

@@ -1,4 +1,4 @@
-"""Shaking: accelerograms as an imposed motion of the supports."""
+"""Ground motions: accelerograms as imposed motions of the supports."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,7 +17,7 @@ __all__ = ["Component", "GroundMotion"]
 
 @dataclass(frozen=True)
 class Component:
-    """One record and the direction (3,) in which it shakes; its length does not matter."""
+    """One record and its direction (3,), of any length."""
 
     direction: tuple[float, float, float]
     record: Accelerogram
@@ -31,10 +31,10 @@ class Component:
 
 @dataclass(frozen=True)
 class GroundMotion:
-    """The ground moves as recorded, and with it its stones.
+    """Recorded motion of the ground with its stones.
 
-    The ground's velocity is linear between the samples; one step after the last it is zero, and the ground stays
-    where it is then.
+    The velocity is linear between the samples; one step after the last it is zero, and the ground then stays where it
+    is.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class GroundMotion:
 
     def __post_init__(self) -> None:
         directions = np.array([one.direction for one in self.components], dtype=float).reshape(-1, 3)
-        # of parallel directions one record would only add to the other
+        # records in parallel directions would merely add up
         if not self.components or np.linalg.matrix_rank(directions) < len(directions):
             raise SceneError(
                 f"{len(self.components)} components whose directions are not independent",
@@ -66,11 +66,11 @@ class GroundMotion:
 
     @property
     def until(self) -> float:
-        """When the ground comes to rest [s]."""
+        """Time at which the ground comes to rest [s]."""
         return max(one.until for one in self._velocity)
 
     def pose(self, time: float) -> Pose:
-        """Where the ground is at `time` [s]."""
+        """Return the pose of the ground at `time` [s]."""
         return Pose(sum((one.integral(time) for one in self._velocity), np.zeros(3)), np.eye(3), np.zeros(3))
 
     @cached_property

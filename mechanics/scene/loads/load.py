@@ -1,7 +1,7 @@
-"""What a load can be: a change of gravity, a force on stones, an imposed motion of supports.
+"""Protocols of loads: changes of gravity, forces on stones, imposed motions of supports.
 
-Each is a small frozen class behind one of three protocols; to add one, write one file. Each says `until` when it
-changes [s], infinity if it never ceases to: before that no scene has come to its equilibrium.
+Each load is a small frozen class behind one of three protocols, in a file of its own. Its `until` is the time from
+which it is constant [s], infinity if it never is; no scene reaches equilibrium before.
 """
 
 from dataclasses import dataclass
@@ -13,18 +13,18 @@ __all__ = ["Force", "GravityChange", "Loads", "Motion", "Pose"]
 
 
 class GravityChange(Protocol):
-    """Changes gravity with time: a ramp, a tilting table."""
+    """Change of gravity with time: a ramp, a tilting table."""
 
     @property
     def until(self) -> float:
-        """When it ceases to change [s]."""
+        """Time from which it is constant [s]."""
 
     def __call__(self, time: float, gravity: Array) -> Array:
-        """Gravity (3,) at `time`, given that of the scene or of the change before this one [m/s²]."""
+        """Return gravity (3,) at `time`, from that of the scene or of the preceding change [m/s²]."""
 
 
 class Force(Protocol):
-    """A force on some stones.
+    """Force on some stones.
 
     Attributes
     ----------
@@ -37,10 +37,10 @@ class Force(Protocol):
 
     @property
     def until(self) -> float:
-        """When it ceases to change [s]."""
+        """Time from which it is constant [s]."""
 
     def __call__(self, time: float, centre: Array, rotation: Array) -> tuple[Array, Array]:
-        """Force (n, 3) [N] and its moment about the centre of mass (n, 3) [N m] at `time`, world axes.
+        """Return the force (n, 3) [N] and its moment about the centre of mass (n, 3) [N m] at `time`, world axes.
 
         `centre` (n, 3) and `rotation` (n, 3, 3), from the axes of the start to world axes, are those of the stones.
         """
@@ -48,7 +48,7 @@ class Force(Protocol):
 
 @dataclass(frozen=True)
 class Pose:
-    """Where a motion has taken its stones since the start: x → pivot + rotation (x - pivot) + displacement.
+    """Displacement of stones by a motion since the start: x → pivot + rotation (x - pivot) + displacement.
 
     Attributes
     ----------
@@ -63,11 +63,11 @@ class Pose:
 
 
 class Motion(Protocol):
-    """An imposed motion of stones that are otherwise fixed: settlement, spreading, shaking.
+    """Imposed motion of stones that are otherwise fixed: settlement, spreading, shaking.
 
     Attributes
     ----------
-    stones : codes of the stones that move so
+    stones : codes of these stones
     """
 
     @property
@@ -76,15 +76,15 @@ class Motion(Protocol):
 
     @property
     def until(self) -> float:
-        """When it comes to rest [s]."""
+        """Time at which it comes to rest [s]."""
 
     def pose(self, time: float) -> Pose:
-        """Where the stones are at `time` [s]; continuous, and the identity at time 0."""
+        """Return the pose of the stones at `time` [s]; continuous, and the identity at time 0."""
 
 
 @dataclass(frozen=True)
 class Loads:
-    """Everything that acts on a scene besides constant gravity."""
+    """All loads on a scene besides constant gravity."""
 
     gravity: tuple[GravityChange, ...] = ()
     forces: tuple[Force, ...] = ()
@@ -92,6 +92,6 @@ class Loads:
 
     @property
     def until(self) -> float:
-        """When all of them have ceased to change [s]; 0 without loads."""
+        """Time from which all of them are constant [s]; 0 without loads."""
         gravity, forces = (one.until for one in self.gravity), (one.until for one in self.forces)
         return max([0.0, *gravity, *forces, *(one.until for one in self.motions)])

@@ -1,4 +1,4 @@
-"""Imposed motions of supports: settlement, spreading, and whatever velocities are given."""
+"""Imposed motions of supports: settlement, spreading, and motions of given velocities."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -28,17 +28,16 @@ def _no_spin() -> History:
 
 @dataclass(frozen=True)
 class ImposedMotion:
-    """Stones that move as one, with given velocities.
+    """Stones that move as one body, with given velocities.
 
-    Places follow from velocities by exact integration; so velocities that are linear between the given instants give
-    places without error.
+    Places follow from velocities by exact integration, as these are linear between the given instants.
 
     Attributes
     ----------
     stones : codes
     velocity : (3,) with time [m/s]
     spin : turning velocity about `axis` with time [rad/s]
-    axis : (3,); its length does not matter
+    axis : (3,) right-handed, of any length
     pivot : (3,) a point of the axis at the start; it moves with `velocity` [m]
     """
 
@@ -60,12 +59,12 @@ class ImposedMotion:
 
     @property
     def until(self) -> float:
-        """When the stones come to rest [s]; infinity if they do not."""
+        """Time at which the stones come to rest [s]; infinity if they never do."""
         moving = self.velocity.value[-1].any() or self.spin.value[-1].any()
         return float(np.inf) if moving else max(self.velocity.until, self.spin.until)
 
     def pose(self, time: float) -> Pose:
-        """Where the stones are at `time` [s]."""
+        """Return the pose of the stones at `time` [s]."""
         axis = np.array(self.axis) / np.linalg.norm(self.axis)
         turn = Rotation.from_rotvec(float(self.spin.integral(time)) * axis)
         return Pose(self.velocity.integral(time), turn.as_matrix(), np.array(self.pivot))
@@ -74,7 +73,7 @@ class ImposedMotion:
 def settlement(
     stones: Iterable[str], displacement: Vector, duration: float, start: float = 0.0
 ) -> ImposedMotion:
-    """Supports that move by `displacement` (3,) [m] within `duration` after `start` [s], without jumps of velocity."""
+    """Move supports by `displacement` (3,) [m] within `duration` after `start` [s], without jumps of velocity."""
     return ImposedMotion(frozenset(stones), History.trapezoid(start, duration, displacement))
 
 
@@ -86,7 +85,7 @@ def spreading(
     duration: float,
     start: float = 0.0,
 ) -> tuple[ImposedMotion, ImposedMotion]:
-    """Supports that part by `distance` [m]: the second group goes half of it along `direction`, the first back."""
+    """Spread supports by `distance` [m]: the second group moves by half of it along `direction`, the first back."""
     length = float(np.linalg.norm(direction))
     if length == 0.0:
         raise SceneError("direction has no length", where="spreading", remedy="give for example (1, 0, 0)")

@@ -13,8 +13,7 @@ __all__ = ["UNITS", "read_accelerogram", "read_at2", "read_csv"]
 
 UNITS = {"g": 9.80665, "m/s2": 1.0, "cm/s2": 0.01}
 
-# of a step: how far a time of a table may lie from equal steps; tables round their times
-_UNEVEN = 0.1
+_UNEVEN = 0.1  # largest deviation of the times of a table from equal steps, of a step [-]: tables round them
 
 _NUMBER = r"([0-9]*\.?[0-9]+(?:[Ee][+-]?[0-9]+)?|[0-9]+\.)"
 # both generations of the database: "NPTS=  7817, DT=   .0050 SEC" and "7817    .0050    NPTS, DT"
@@ -26,7 +25,7 @@ _HEADER = 4
 
 
 def read_accelerogram(path: str | Path, unit: str | None = None) -> Accelerogram:
-    """Read a record: PEER's format if the name ends in .at2, else a table, whose `unit` (of UNITS) must be given.
+    """Read a record: PEER's format if the name ends in .at2; otherwise a table, with its `unit` of UNITS.
 
     Raises
     ------
@@ -90,7 +89,7 @@ def read_at2(path: str | Path) -> Accelerogram:
 
 
 def _steps(path: str | Path, lines: list[tuple[int, str]]) -> tuple[int, float]:
-    """NPTS and DT from the four lines of the header, whose third must say that the unit is g."""
+    """Return NPTS and DT from the four lines of the header, whose third must give the unit g."""
     header = [line for _, line in lines[:_HEADER]]
     if len(header) < _HEADER:
         fail_at(path, len(header) or 1, "less than four lines", "give a file of PEER's AT2 format")

@@ -1,6 +1,6 @@
-"""What is done to recorded ground motions before they are used: baseline correction and filtering.
+"""Processing of recorded ground motions: baseline correction and filtering.
 
-Both follow what the PEER database documents of its own records (Ancheta et al. 2013; Boore & Bommer 2005).
+Both follow the documented processing of the PEER database (Ancheta et al. 2013; Boore & Bommer 2005).
 """
 
 from dataclasses import replace
@@ -16,7 +16,7 @@ __all__ = ["band_pass", "without_drift"]
 
 
 def without_drift(record: Accelerogram, degree: int = 6) -> Accelerogram:
-    """Take away the drift that integration makes of a wrong baseline.
+    """Remove the drift that results from integrating a wrong baseline.
 
     A polynomial of `degree`, without constant and linear term, is fitted to the displacement by least squares, and its
     second derivative is subtracted from the acceleration.
@@ -24,7 +24,7 @@ def without_drift(record: Accelerogram, degree: int = 6) -> Accelerogram:
     if degree < 2:
         raise SceneError(f"degree = {degree}", where=record.source, remedy="give 2 or more")
     powers = np.arange(2, degree + 1)
-    # in units of the duration, so that high powers stay of one size
+    # in units of the duration, so that high powers are well scaled
     place = np.linspace(0.0, 1.0, len(record))[:, None]
     coefficients = np.linalg.lstsq(place**powers, record.displacement, rcond=None)[0]
     drift = (place ** (powers - 2)) @ (coefficients * powers * (powers - 1)) / record.duration**2
@@ -40,10 +40,10 @@ def band_pass(
 ) -> Accelerogram:
     """Keep the frequencies between `low` and `high` [Hz]; without one of them, all on that side.
 
-    A Butterworth filter of `order` goes through the record forwards and backwards: no phase is shifted, and the
-    amplitude at a corner is halved. Before, the record is lengthened by zeros, 1.5 order/low in all, half in front and
-    half behind (Converse & Brady 1992). They stay: without them velocity and displacement would not begin and end at
-    rest (Boore 2005). So the motion begins 0.75 order/low later than in the record.
+    A Butterworth filter of `order` is applied forwards and backwards: it shifts no phase, and halves the amplitude at
+    a corner. The record is first padded with zeros, 1.5 order/low in all, half in front and half behind (Converse &
+    Brady 1992). The zeros are kept: without them velocity and displacement would not begin and end at rest (Boore
+    2005). The motion therefore begins 0.75 order/low later than in the record.
     """
     nyquist = 0.5 / record.dt
     corners = [corner for corner in (low, high) if corner is not None]
@@ -67,7 +67,7 @@ def band_pass(
 
 
 def _butterworth(order: int, low: float | None, high: float | None, rate: float) -> Array:
-    """Second-order sections of the filter for a sampling rate [Hz]."""
+    """Return the second-order sections of the filter for a sampling rate [Hz]."""
     if low is not None and high is not None:
         return signal.butter(order, [low, high], "bandpass", fs=rate, output="sos")
     if low is not None:

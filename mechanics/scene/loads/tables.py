@@ -1,4 +1,4 @@
-"""Columns of numbers from text files: histories, and the rows that accelerograms are made of."""
+"""Columns of numbers from text files: time series, and the rows of accelerograms."""
 
 import re
 from collections.abc import Iterator
@@ -15,10 +15,10 @@ __all__ = ["fail_at", "number_at", "numbered_lines", "read_columns", "read_histo
 
 
 def read_columns(path: str | Path, columns: str) -> tuple[Ints, Array]:
-    """Line numbers (n,) and numbers (n, k) of a text file with k columns.
+    """Return line numbers (n,) and numbers (n, k) of a text file with k columns.
 
-    Columns are parted by commas, semicolons, tabs or blanks; one header line, comments (#) and blank lines are
-    skipped. `columns` says what they are, in words with a comma between each.
+    Columns are separated by commas, semicolons, tabs or blanks; one header line, comments (#) and blank lines are
+    skipped. `columns` names them, separated by commas.
 
     Raises
     ------
@@ -46,7 +46,7 @@ def read_columns(path: str | Path, columns: str) -> tuple[Ints, Array]:
 
 
 def read_history(path: str | Path, columns: str) -> History:
-    """A history from a file of two columns, or of four for a vector; `columns` says what they are, time [s] first.
+    """Read a time series from a file of two columns, or of four for a vector; `columns` names them, time [s] first.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def read_history(path: str | Path, columns: str) -> History:
 
 
 def numbered_lines(path: str | Path) -> Iterator[tuple[int, str]]:
-    """The lines of a text file, numbered from 1 (SceneError if it cannot be read)."""
+    """Yield the lines of a text file, numbered from 1 (SceneError if it cannot be read)."""
     try:
         text = Path(path).read_text(encoding="utf-8-sig", errors="replace")
     except FileNotFoundError:
@@ -73,7 +73,7 @@ def numbered_lines(path: str | Path) -> Iterator[tuple[int, str]]:
 
 
 def number_at(path: str | Path, line: int, text: str) -> float:
-    """The number that a text means (SceneError if it is none, or not finite)."""
+    """Return the number of a text (SceneError unless it is a finite number)."""
     if not _is_number(text) or not np.isfinite(float(text)):
         fail_at(path, line, f"{text[:40]!r} is not a number", "correct it, or take the line away")
     return float(text)

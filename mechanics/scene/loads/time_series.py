@@ -13,12 +13,11 @@ from moma.errors import SceneError
 __all__ = ["History", "Outside"]
 
 
-# of its span: rounding by which a time may lie outside a history that ends
-_ROUNDING = 1e-9
+_ROUNDING = 1e-9  # of its span, by which rounding may place a time outside a history that ends [-]
 
 
 class Outside(StrEnum):
-    """What a history says before its first instant and after its last."""
+    """Values of a history before its first instant and after its last."""
 
     HOLD = "hold"
     ERROR = "error"
@@ -31,7 +30,7 @@ class History:
     Attributes
     ----------
     time : (n,) increasing instants [s]; a single one makes a constant
-    value : (n,) or (n, k) at these instants, in the unit of what it is a history of
+    value : (n,) or (n, k) at these instants, in the unit of the quantity
     outside : before and after them, *hold* the first and the last value, or *error*
     """
 
@@ -62,14 +61,14 @@ class History:
 
     @classmethod
     def constant(cls, value: ArrayLike) -> "History":
-        """The same at all times."""
+        """Return a history with the same value at all times."""
         return cls(np.zeros(1), np.asarray(value, dtype=np.float64)[None])
 
     @classmethod
     def trapezoid(cls, start: float, duration: float, area: ArrayLike, ramp: float = 0.1) -> "History":
-        """From zero to a plateau and back to zero, with a given integral `area` in all.
+        """Return a rise from zero to a plateau and a fall back to zero, with the integral `area`.
 
-        `ramp` is the part of the duration that the way up takes, and again the way down: a velocity without jumps.
+        The rise and the fall take the part `ramp` of the duration each, so that a velocity has no jumps.
         """
         if not (duration > 0 and start >= 0):
             raise _wrong(
@@ -82,16 +81,16 @@ class History:
 
     @property
     def components(self) -> int:
-        """How many numbers a value has: k, or 1 for a scalar."""
+        """Number of components of a value: k, or 1 for a scalar."""
         return 1 if self.value.ndim == 1 else self.value.shape[1]
 
     @property
     def until(self) -> float:
-        """When it ceases to change [s]; 0 for a constant."""
+        """Time from which it is constant [s]; 0 for a constant."""
         return float(self.time[-1]) if len(self.time) > 1 else 0.0
 
     def __call__(self, time: float) -> Array:
-        """Value () or (k,) at `time` [s].
+        """Return the value () or (k,) at `time` [s].
 
         Raises
         ------
@@ -106,7 +105,7 @@ class History:
         return value
 
     def integral(self, time: float) -> Array:
-        """∫ value dt () or (k,) from 0 to `time` [s], exactly.
+        """Return ∫ value dt () or (k,) from 0 to `time` [s], exactly.
 
         Raises
         ------
@@ -116,11 +115,11 @@ class History:
         return area
 
     def _antiderivative(self, time: float) -> Array:
-        """∫ value dt from the first instant."""
+        """Return ∫ value dt from the first instant to `time` [s]."""
         place = self._inside(time)
         before = int(np.searchsorted(self.time, place, side="right")) - 1
         within = self._sums[before] + (place - self.time[before]) * (self.value[before] + self(place)) / 2
-        # held before and after: the place is then that of the first or the last instant
+        # outside the given instants the value of the first or last one holds
         held: Array = within + (time - place) * self(place)
         return held
 
@@ -132,7 +131,7 @@ class History:
         return np.concatenate([np.zeros_like(self.value[:1]), np.cumsum(areas, axis=0)])
 
     def _inside(self, time: float) -> float:
-        """The instant nearest to `time` at which the value is given."""
+        """Return the instant nearest to `time` within the history [s]."""
         first, last = float(self.time[0]), float(self.time[-1])
         slack = _ROUNDING * max(last - first, abs(last))
         if self.outside is Outside.ERROR and not first - slack <= time <= last + slack:

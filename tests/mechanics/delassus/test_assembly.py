@@ -8,9 +8,10 @@ from scipy.spatial.transform import Rotation
 
 from mechanics.contact.contacts import gaps
 from mechanics.contact.detection import Detector
-from mechanics.delassus.assembly import local_velocity, mixed_delassus, world_impulse
+from mechanics.delassus.assembly import local_velocity, world_impulse
 from mechanics.delassus.mixed import ELASTIC, NONE, RIGID
-from mechanics.dynamics.contact_laws import state_laws
+from mechanics.dynamics.contact_problem import contact_problem
+from mechanics.dynamics.contact_search import detection
 from mechanics.dynamics.stepping import advance, compliances, free_kick, kicked, predict
 from mechanics.model.model import build_model
 from mechanics.problem.problem import scale_of
@@ -52,7 +53,8 @@ class Assembled:
         self.compliance = compliances(self.model, STEP, THETA)
         find = Detector(self.model.surfaces, self.model.fixed, 0.05)
         self.contacts = find(self.state, np.zeros(len(one.blocks)))
-        self.operator = mixed_delassus(self.model, self.state, self.contacts, self.compliance)
+        self.found = detection(self.model, self.state, self.contacts, self.compliance)
+        self.operator = self.found.operator
         self.form = self.operator.sparse
         self.w_hat, self.transpose = dense_operator(self.model, self.state, self.contacts, self.compliance)
         self.dense = self.transpose @ self.w_hat @ self.transpose.T
@@ -62,8 +64,7 @@ class Assembled:
         return free_kick(self.model, self.state, predicted, self.compliance, STEP, THETA)
 
     def kick(self, free, impulse):
-        rotation = self.state.rotation
-        return kicked(self.model, free, rotation, self.contacts, self.operator, impulse, self.compliance)
+        return kicked(self.model, free, self.found, impulse, self.compliance)
 
 
 @pytest.fixture(scope="module")
@@ -117,10 +118,8 @@ def test_local_velocity_is_the_transpose_of_the_lift(step):
 def test_velocity_after_a_step_is_w_r_plus_u_free(step):
     contacts, state = step.contacts, step.state
     free = step.free(state)
-    problem = state_laws(
-        step.model, state, contacts, gaps(contacts, state), step.model.laws.of(contacts.bodies),
-        step.operator, lambda: step.form, free, np.zeros((len(contacts), STATE)), True,
-    ).problem  # fmt: skip
+    internal = np.zeros((len(contacts), STATE))
+    problem, _ = contact_problem(step.model, state, step.found, free, internal, first=True)
     r = np.random.default_rng(2).normal(size=(len(contacts), 3))
     kick = step.kick(free, r)
     found = local_velocity(contacts, step.operator, kick.velocity, kick.node_velocity)

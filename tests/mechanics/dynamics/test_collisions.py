@@ -1,4 +1,4 @@
-"""What collisions of rigid stones keep: momentum, angular momentum and, with what they lose, energy."""
+"""Collisions of rigid stones: conservation of momentum and angular momentum, and balance of energy."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from mechanics.dynamics.observers.energy import EnergyBalance, kinetic_energy
-from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import Block, ContactSettings, Fidelity, SolverSettings
@@ -35,7 +35,7 @@ def rolling(seed, stones=5):
 
 def run(one, steps):
     model, start = build_model(one)
-    simulation = Simulation(model, start, Clock())
+    simulation = Simulation(model, start)
     return model, start, [simulation.step() for _ in range(steps)]
 
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mechanics.dynamics.observers.energy import EnergyBalance
-from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
 from mechanics.scene.loads.forces import StoneForce
 from mechanics.scene.loads.load import Loads, Pose
@@ -56,7 +56,7 @@ TABLE = frozenset({"ground"})
 def started(*blocks, motions=(), forces=(), eta=1e-9, **settings):
     one = replace(scene(*blocks, **settings), loads=Loads(motions=motions, forces=forces))
     one = replace(one, solver=SolverSettings(tolerance=eta))
-    return Simulation(*build_model(one), Clock())
+    return Simulation(*build_model(one))
 
 
 # --- driven bodies ---

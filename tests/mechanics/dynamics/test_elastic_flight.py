@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from mechanics.dynamics.observers.energy import elastic_energy, kinetic_energy
-from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.dynamics.simulation import Simulation
 from mechanics.dynamics.stepping import predict
-from mechanics.model._kernels import deform, rigid_part
+from mechanics.model._kernels import Frames, deform, rigid_part
 from mechanics.model.model import build_model
 from mechanics.scene.scene import Fidelity
 from mechanics.stones.meshing.elements import Element
@@ -102,16 +102,15 @@ def rigid_part_twin(model, rotation, node_velocity):
     return motion, rate
 
 
-def deform_twin(model, centre, rotation, node, rate, duration, new_centre, new_rotation, motion):
+def deform_twin(model, before, after, motion, node, rate, duration):
     place, velocity = np.zeros_like(node), np.zeros_like(node)
     for b, stone in enumerate(model.stones):
         if stone is None:
             continue
-        own, rest = model.nodes_of(b), stone.mesh.nodes
-        d = (node[own] - centre[b]) @ rotation[b] - rest + duration * rate[own]
-        place[own] = new_centre[b] + (rest + d) @ new_rotation[b].T
-        velocity[own] = motion[b, :3] + np.cross(motion[b, 3:], rest @ new_rotation[b].T)
-        velocity[own] += rate[own] @ new_rotation[b].T
+        own, rest, turn = model.nodes_of(b), stone.mesh.nodes, after.rotation[b].T
+        d = (node[own] - before.centre[b]) @ before.rotation[b] - rest + duration * rate[own]
+        place[own] = after.centre[b] + (rest + d) @ turn
+        velocity[own] = motion[b, :3] + np.cross(motion[b, 3:], rest @ turn) + rate[own] @ turn
     return place, velocity
 
 
@@ -137,13 +136,9 @@ def test_deformed_places_are_those_of_the_slow_twin(duration):
     rate, motion = rng.normal(size=start.node.shape), rng.normal(size=(len(start.centre), 6))
     centre = start.centre + rng.normal(size=start.centre.shape)
     own = model.elastic_stones
-    fast = deform(
-        own.start, own.reference, state.centre, state.rotation, state.node, rate, duration, centre,
-        other.rotation, motion,
-    )  # fmt: skip
-    slow = deform_twin(
-        model, state.centre, state.rotation, state.node, rate, duration, centre, other.rotation, motion
-    )
+    before, after = Frames(state.centre, state.rotation), Frames(centre, other.rotation)
+    fast = deform(own.start, own.reference, before, after, motion, state.node, rate, duration)
+    slow = deform_twin(model, before, after, motion, state.node, rate, duration)
     for one, twin in zip(fast, slow, strict=True):
         np.testing.assert_allclose(one, twin, atol=1e-12)
 
@@ -263,7 +258,7 @@ def test_rigid_stones_fly_as_if_alone():
 def test_momentum_is_kept_through_kicks_too():
     """200 steps of 1 ms with elastic forces and centrifugal ones: they push no stone as a whole."""
     model, start = build(step=1e-3, theta=0.5)
-    simulation = Simulation(model, start, Clock())
+    simulation = Simulation(model, start)
     simulation.state = before = shaken(model, start, 9, strain=1e-4)
     for _ in range(200):
         after = simulation.step().after

@@ -8,7 +8,7 @@ import pytest
 
 from mechanics.dynamics.observers.energy import EnergyBalance, elastic_energy, kinetic_energy
 from mechanics.dynamics.observers.equilibrium import displacement, imbalance, speed, support_reaction
-from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
 from mechanics.results.result import Outcome
 from mechanics.scene.scene import Fidelity, SolverSettings
@@ -20,10 +20,10 @@ BOTH = pytest.mark.parametrize("fidelity", [Fidelity.RIGID, SOFT])
 G = 9.81
 
 
-def run(one, steps):
+def run(one, steps, **settings):
     """The steps of a scene, and its model."""
     model, start = build_model(one)
-    simulation = Simulation(model, start, Clock())
+    simulation = Simulation(model, start, **settings)
     return model, start, [simulation.step() for _ in range(steps)]
 
 
@@ -177,6 +177,9 @@ def test_contacts_are_looked_for_again_only_when_something_has_moved():
     block = brick("a", (0, 0, 0), (0.5, 0.5, 0.4))
     _, _, resting_ = run(scene(ground(), block, step=1e-3), 5)
     assert all(step.contacts is resting_[0].contacts for step in resting_)
+    _, _, fresh = run(scene(ground(), block, step=1e-3), 5, fresh_contacts=True)
+    assert all(a.contacts is not b.contacts for a, b in itertools.pairwise(fresh))
+    np.testing.assert_allclose(fresh[-1].force, resting_[-1].force, atol=1e-9 * np.abs(fresh[-1].force).max())
     pushed = replace(block, velocity=(0.1, 0, 0, 0, 0, 0))
     _, _, sliding = run(scene(ground(), pushed, step=1e-3), 5)
     assert all(a.contacts is not b.contacts for a, b in itertools.pairwise(sliding))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mechanics.dynamics.observers.equilibrium import imbalance, support_reaction
-from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
 from mechanics.results.result import Outcome
 from mechanics.scene.laws.dry_joint import DryJoint
@@ -41,7 +41,7 @@ def stack(count, x=0.0, side=0.4, rise=0.2):
 def run(one, steps=None):
     """Every step, with who sleeps after it."""
     model, start = build_model(one)
-    simulation = Simulation(model, start, Clock())
+    simulation = Simulation(model, start)
     for _ in range(steps or round(one.time.duration / one.time.step)):
         yield simulation, simulation.step()
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mechanics.dynamics.observers.equilibrium import speed, support_reaction
-from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.dynamics.simulation import Simulation
 from mechanics.dynamics.static_start import static_start
 from mechanics.dynamics.warm_start import Memory
 from mechanics.model.model import build_model
@@ -49,10 +49,10 @@ EVERY = pytest.mark.parametrize("name", COLUMNS)
 
 
 def searched(one):
-    """What the search found, the model, and a run before and after it took the search over."""
+    """The result of the search, the model, and a run before and after it has taken the search over."""
     model, start = build_model(one)
     static, search = static_start(model, start, lambda _: None)
-    simulation = Simulation(model, start, Clock())
+    simulation = Simulation(model, start)
     simulation.take_over(search)
     return model, start, static, search, simulation
 
@@ -101,7 +101,7 @@ def test_bodies_stay_at_rest_and_the_solver_finds_its_work_done(name):
 @EVERY
 def test_the_clock_starts_at_zero_with_all_bodies_at_rest(name):
     _, start, _, search, _ = begun(name)
-    simulation = Simulation(begun(name)[0], start, Clock())
+    simulation = Simulation(begun(name)[0], start)
     simulation.take_over(search)
     assert simulation.state.time == 0.0
     assert not simulation.state.velocity.any()

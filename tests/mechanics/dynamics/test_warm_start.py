@@ -1,4 +1,4 @@
-"""What is remembered of contacts from step to step, by their keys."""
+"""Memory of contacts from step to step, by their keys."""
 
 import numpy as np
 import pytest

@@ -75,7 +75,7 @@ def soft(block, size, element=Element.TET4):
 
 @pytest.mark.parametrize("turn", [np.eye(3), TURN], ids=["straight", "turned"])
 def test_the_facets_of_a_deformable_stone_lie_on_the_faces_of_its_parts(turn):
-    """What lies between parts has none; the outer walls are cut along the seam, and facets reach across it."""
+    """Faces between parts have no facets; the outer walls are cut along the seam, and facets reach across it."""
     model, state = build_model(scene(moved(soft(portal(), 0.4), turn)))
     own = model.surfaces
     area = []

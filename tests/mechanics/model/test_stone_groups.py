@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
 from mechanics.model.stone_groups import elastic_stones
 from mechanics.scene.scene import Fidelity
@@ -175,7 +175,7 @@ def test_shared_stones_move_as_separate_ones(monkeypatch):
 
     def run():
         model, start = build_model(one)
-        simulation = Simulation(model, start, Clock())
+        simulation = Simulation(model, start)
         steps = [simulation.step() for _ in range(20)]
         return model, steps[-1].after
 

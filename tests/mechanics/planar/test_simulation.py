@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mechanics.dynamics.simulation import Clock
+from mechanics.dynamics.clock import Clock
 from mechanics.planar.contacts import PlanarDetector
 from mechanics.planar.model import build_planar_model
 from mechanics.planar.scene import Disk, PlanarScene, PlanarTime, Wall

@@ -41,7 +41,7 @@ def rectangle(width, depth, away=(0.0, 0.0)):
 
 
 def pressed_at(section, place, force=1000.0):
-    """Where a force upright to the section, at a world place, is found to act, as (kern, edge)."""
+    """The position (kern, edge) found for a force normal to the section at a world place."""
     n = section.frame[:, 0]
     push = force * n
     moment = np.cross(place - section.centroid, push)

@@ -1,4 +1,4 @@
-"""What joints carry, against statics and kinematics by hand: blocks that press, lean, slide, rock and fly."""
+"""Results of joints against statics and kinematics by hand: blocks that press, lean, slide, rock and fly."""
 
 from dataclasses import replace
 

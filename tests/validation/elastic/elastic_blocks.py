@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.arrays import Array, Bools
-from mechanics.dynamics.simulation import Clock, Simulation, Step
+from mechanics.dynamics.simulation import Simulation
+from mechanics.dynamics.step import Step
 from mechanics.model.model import Model, build_model
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.law import Law
@@ -147,7 +148,7 @@ def elastic_follow(scene: Scene, body=None, start=None) -> ElasticPath:
     model, state = build_model(scene)
     if start is not None:
         state = start(model, state)
-    simulation = Simulation(model, state, Clock())
+    simulation = Simulation(model, state)
     index = next(b for b, stone in enumerate(model.stones) if stone is not None) if body is None else body
     rows = model.nodes_of(index)
     states, support, eta = [state], [], []

@@ -11,7 +11,7 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from mechanics.contact.contacts import material_points
-from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.dynamics.simulation import Simulation
 from mechanics.model.balls import ball
 from mechanics.model.model import build_model
 from mechanics.results.result import Outcome
@@ -226,7 +226,7 @@ def driven(monkeypatch, cells, friction, poisson, goal, state=None):
         loads=Loads(motions=(motion,)), time=TimeSettings(step=h), solver=SolverSettings(tolerance=1e-7),
     )  # fmt: skip
     model, start = build_model(scene)
-    simulation = Simulation(model, start if state is None else replace(state, time=0.0), Clock())
+    simulation = Simulation(model, start if state is None else replace(state, time=0.0))
     for _ in range(10):
         step = simulation.step()
         assert step.solution.natural_map < 1e-5

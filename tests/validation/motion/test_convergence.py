@@ -1,4 +1,4 @@
-"""How fast the motion nears the exact one as the step shrinks: order 2 in flight, 1 on and through contacts."""
+"""Convergence of the motion with the time step: order 2 in flight, 1 on and through contacts."""
 
 import numpy as np
 import pytest

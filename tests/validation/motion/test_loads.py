@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
 from mechanics.results.result import Outcome
 from mechanics.scene.laws.dry_joint import DryJoint
@@ -34,7 +34,7 @@ def scene(*blocks, loads, friction=0.6, gravity=(0.0, 0.0, -G), step=2e-3, theta
 
 
 def started(*blocks, **settings):
-    return Simulation(*build_model(scene(*blocks, **settings)), Clock())
+    return Simulation(*build_model(scene(*blocks, **settings)))
 
 
 def low_block():

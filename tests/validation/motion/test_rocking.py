@@ -266,7 +266,7 @@ def sine(acceleration, period, lasting):
 
 
 def overturns(acceleration, duration):
-    """Whether Housner's model turns over; starts at the instant where the pulse lifts the block."""
+    """Housner's model overturns; it starts at the instant at which the pulse lifts the block."""
     alpha, _ = slenderness(SLENDER)
     times = np.linspace(0, duration, 20001)
     pull = np.array([acceleration(t) for t in times]) / G

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.dynamics.simulation import Simulation
 from mechanics.model.balls import ball
 from mechanics.model.model import build_model
 from mechanics.scene.laws.dry_joint import DryJoint
@@ -21,7 +21,7 @@ def rolled(friction, gravity, duration, velocity=(0.0,) * 6, step=1e-3):
         time=TimeSettings(step, 0.5, duration),
     )
     model, state = build_model(scene)
-    simulation = Simulation(model, state, Clock())
+    simulation = Simulation(model, state)
     for _ in range(round(duration / step)):
         simulation.step()
     return simulation.state.velocity[1]

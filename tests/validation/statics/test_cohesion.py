@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
 from mechanics.scene.laws.cohesive_zone import CohesiveZone
 from mechanics.scene.laws.dry_joint import DryJoint
@@ -28,7 +28,7 @@ def started(blocks, contact, loads=None, gravity=(0.0, 0.0, -G), theta=0.5, step
         time=TimeSettings(step, theta),
         loads=loads or Loads(),
     )
-    return Simulation(*build_model(scene), Clock())
+    return Simulation(*build_model(scene))
 
 
 def broken_at(simulation, steps):

@@ -1,4 +1,4 @@
-"""How far and how fast corners are: the kernels beside readable numpy."""
+"""Displacement and speed of corners: the kernels beside readable numpy."""
 
 import itertools
 

@@ -1,4 +1,4 @@
-"""What a run is expected to take: counts that can be checked by hand, and rates that are known."""
+"""Expected cost of a run: amounts counted by hand, and known rates."""
 
 from dataclasses import replace
 
@@ -9,8 +9,7 @@ from benchmarks.cost import fitted
 from benchmarks.cost_scenes import KINDS, Case
 from mechanics.results.forecast.cost import expected_cost, machine_slowness, measures
 from mechanics.results.forecast.cost_rates import RATES, Rate
-from mechanics.results.forecast.plan import plan
-from mechanics.results.forecast.workload import Amounts
+from mechanics.results.forecast.plan import Amounts, plan
 from mechanics.scene.loads.gravity import GravityRamp
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.scene import Fidelity, Scene, Start, TimeSettings

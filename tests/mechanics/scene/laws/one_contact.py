@@ -10,8 +10,8 @@ from mechanics.scene.laws.law import STATE, Approach, Law
 def approach(gap, speed=0.0, state=None, **changed):
     """Contacts as a law sees them; numbers are repeated for each."""
     gap = np.atleast_1d(np.asarray(gap, dtype=float))
-    given = {"area": 1.0, "size": 1.0, "yielding": 1.0} | {
-        name: changed.pop(name) for name in ("area", "size", "yielding") if name in changed
+    given = {"area": 1.0, "size": 1.0, "compliance": 1.0} | {
+        name: changed.pop(name) for name in ("area", "size", "compliance") if name in changed
     }
     full = {name: np.broadcast_to(np.asarray(value, dtype=float), gap.shape) for name, value in given.items()}
     settings = {"step": 1e-3, "theta": 0.5, "push_out": False, "first": False} | changed
@@ -50,7 +50,7 @@ class Block:
             self.state,
             area=self.area,
             size=self.size,
-            yielding=1 / mass,
+            compliance=1 / mass,
             step=h,
             theta=theta,
             first=self.first,

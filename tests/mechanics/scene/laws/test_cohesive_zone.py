@@ -29,7 +29,7 @@ def test_the_full_opening_follows_from_strength_and_energy():
 
 def test_traction_falls_linearly_with_the_opening():
     for part in (0.0, 0.25, 0.5, 1.0, 2.0):
-        contacts = approach([part * FULL], 0.0, damaged(), area=0.01, step=1e-3, yielding=1e-9)
+        contacts = approach([part * FULL], 0.0, damaged(), area=0.01, step=1e-3, compliance=1e-9)
         expected = 1e-3 * 0.01 * STRENGTH * max(1 - part, 0.0)
         terms = ZONE.terms(contacts)
         assert terms.adhesion[0] == pytest.approx(expected, rel=1e-12)
@@ -38,9 +38,9 @@ def test_traction_falls_linearly_with_the_opening():
 
 def test_the_pull_of_a_step_is_that_in_its_middle():
     speed, step = 0.1, 1e-4
-    at_start = approach([0.2 * FULL], speed, damaged(), step=step, theta=1.0, yielding=1e-9)
+    at_start = approach([0.2 * FULL], speed, damaged(), step=step, theta=1.0, compliance=1e-9)
     in_flight = approach(
-        [0.2 * FULL + step / 2 * speed], speed, damaged(), step=step, theta=0.5, yielding=1e-9
+        [0.2 * FULL + step / 2 * speed], speed, damaged(), step=step, theta=0.5, compliance=1e-9
     )
     expected = step * STRENGTH * (1 - (0.2 * FULL + step / 2 * speed) / FULL)
     assert ZONE.terms(at_start).adhesion[0] == pytest.approx(expected, rel=1e-12)
@@ -48,7 +48,7 @@ def test_the_pull_of_a_step_is_that_in_its_middle():
 
 
 def test_a_bond_that_closes_again_pulls_in_proportion_to_its_opening():
-    contacts = approach([0.1 * FULL], 0.0, damaged(0.4 * FULL), step=1e-3, yielding=1e-12)
+    contacts = approach([0.1 * FULL], 0.0, damaged(0.4 * FULL), step=1e-3, compliance=1e-12)
     assert ZONE.terms(contacts).adhesion[0] == pytest.approx(1e-3 * STRENGTH * 0.6 * 0.25, rel=1e-6)
 
 
@@ -64,7 +64,7 @@ def test_shear_is_mohr_coulomb_scaled_by_what_is_intact():
 
 def test_damage_grows_with_opening_and_sliding_and_never_heals():
     contacts = approach(
-        np.zeros(4), 0.0, np.repeat(damaged(), 4, axis=0), step=1e-3, theta=1.0, yielding=1e-9
+        np.zeros(4), 0.0, np.repeat(damaged(), 4, axis=0), step=1e-3, theta=1.0, compliance=1e-9
     )
     k = ZONE.terms(contacts).cohesion[0]
     impulse = np.array([[0, 0, 0], [1, k, 0], [0, k, 0], [1, 0.9 * k, 0]], dtype=float)

@@ -80,14 +80,14 @@ def test_a_bond_breaks_once_and_for_all_when_it_opens_or_slides_at_its_limit():
 def test_a_bond_at_its_limit_drifts_without_breaking_but_does_not_creep_for_ever():
     """h = 1 s, W = 4 /kg and ‖r̃‖ = 1e4 N s: slower than 1e-4 √(4e4 · 1 m) = 0.02 m/s it drifts; until 1 mm."""
     strong = MortarJoint(0.0, 0.0, 1e4)
-    contacts = approach(np.zeros(3), 0.0, whole(3), step=1.0, yielding=4.0)
+    contacts = approach(np.zeros(3), 0.0, whole(3), step=1.0, compliance=4.0)
     impulse = np.tile([0.0, 1e4, 0.0], (3, 1))
     velocity = np.array([[0.0, -2.1e-2, 0.0], [0.0, -0.9e-3, 0.0], [0.0, -0.3e-3, 0.0]])
     state = strong.after(contacts, impulse, velocity)
     np.testing.assert_array_equal(state[:, BOND], [BROKEN, WHOLE, WHOLE])
     np.testing.assert_array_equal(state[:, SLIDING], [1.0, 0.0, 0.0])
     for _ in range(2):
-        state = strong.after(approach(np.zeros(3), 0.0, state, step=1.0, yielding=4.0), impulse, velocity)
+        state = strong.after(approach(np.zeros(3), 0.0, state, step=1.0, compliance=4.0), impulse, velocity)
     np.testing.assert_array_equal(state[:, BOND], [BROKEN, BROKEN, WHOLE])
 
 

@@ -1,4 +1,4 @@
-"""Which law holds between which stones."""
+"""Table of the laws between stones."""
 
 from dataclasses import replace
 
@@ -70,7 +70,7 @@ def mixed_contacts():
 
 
 def only(contacts, row):
-    names = ("gap", "speed", "area", "size", "yielding", "state")
+    names = ("gap", "speed", "area", "size", "compliance", "state")
     return replace(contacts, **{name: getattr(contacts, name)[row : row + 1] for name in names})
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mechanics.delassus.stored import StoredDelassus
-from mechanics.dynamics.simulation import Clock, Simulation
+from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
 from mechanics.problem.problem import ContactProblem, ContactStart
 from mechanics.scene.scene import Scene
@@ -41,7 +41,7 @@ def first_problem(scene):
         seen.append(problem)
         return NSGS(max_iterations=1)(problem, start)
 
-    Simulation(model, start, Clock(), solver).step()
+    Simulation(model, start, solver=solver).step()
     return seen[0]
 
 

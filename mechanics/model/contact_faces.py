@@ -1,4 +1,4 @@
-"""Which faces of stones touch other stones where a scene begins."""
+"""Faces of stones that touch other stones at the start of a scene."""
 
 from collections.abc import Sequence
 
@@ -13,20 +13,18 @@ from mechanics.stones.polyhedra import face_plane
 __all__ = ["touching_faces"]
 
 
-# faces look at each other within about 15 degrees
-_FACING = -0.966
-# the part of the smaller face that has to lie over the other one
-_SHARED = 1e-3
+_FACING = -0.966  # cosine between the normals of faces that face each other: within about 15°
+_SHARED = 1e-3  # least overlap of two faces over the area of the smaller one [-]
 
 
 def touching_faces(blocks: Sequence[Block], wanted: Sequence[int], near: float) -> dict[int, tuple[int, ...]]:
-    """Faces of the wanted blocks that another block faces nearer than `near` times the smaller one's size.
+    """Return the faces of the wanted blocks that another block faces, nearer than `near` times the smaller one's size.
 
     Parameters
     ----------
     blocks : of a scene
-    wanted : indices of the blocks whose faces are asked for
-    near : distance over size, as that at which contacts are watched [-]
+    wanted : indices of blocks
+    near : distance over size, like that at which contacts are watched [-]
     """
     low = np.array([block.vertices.min(axis=0) for block in blocks])
     high = np.array([block.vertices.max(axis=0) for block in blocks])
@@ -59,7 +57,7 @@ def touching_faces(blocks: Sequence[Block], wanted: Sequence[int], near: float) 
 def _facing(
     block: Block, own: tuple[Array, Array], other: Block, its: tuple[Array, Array], gap: float
 ) -> list[int]:
-    """Faces of a block over which a face of the other lies, nearer than a gap [m]."""
+    """Return the faces of a block over which a face of the other lies, nearer than a gap [m]."""
     if block.radius is not None or other.radius is not None:
         return []
     (normals, origins), (facing, places) = own, its
@@ -75,7 +73,7 @@ def _facing(
 
 
 def _over(polygon: Array, other: Array, normal: Array) -> bool:
-    """A polygon and another one, seen along the normal of the first, have area in common."""
+    """Return true if two polygons overlap, seen along the normal of the first."""
     u = polygon[1] - polygon[0]
     u = u / np.linalg.norm(u)
     axes = np.column_stack([u, np.cross(normal, u)])

@@ -1,0 +1,128 @@
+"""Contacts of a configuration with their Delassus operator, made again once bodies have moved."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mechanics.arrays import Array, Ints
+from mechanics.contact.contacts import Contacts, take
+from mechanics.contact.detection import Detector
+from mechanics.delassus.assembly import mixed_delassus, rigid_delassus
+from mechanics.delassus.mixed import MixedDelassus
+from mechanics.delassus.rigid import RigidDelassus, schedule
+from mechanics.dynamics.clock import Clock
+from mechanics.dynamics.observers.equilibrium import displacement, speed
+from mechanics.model.deformable import Compliance
+from mechanics.model.model import Model
+from mechanics.scene.state import State
+
+__all__ = ["ContactSearch", "Detection", "detection", "detector"]
+
+
+# displacements since the last detection, over the smallest width, from which contacts are detected again [-]:
+_MOVED_RIGID = 1e-6  # rigid stones: at rest nothing changes, in motion W is that of the very instant
+_MOVED = 1e-3  # deformable stones, whose Delassus operator is expensive
+_MOVED_SETTLED = 1e-6  # deformable stones that come to rest, so that the last detection does not lag behind
+_SLOWED = 1e-2  # they come to rest where one step moves them by less than this part of that displacement [-]
+
+
+@dataclass(frozen=True)
+class Detection:
+    """Contact points where they were detected, with their Delassus operator.
+
+    Attributes
+    ----------
+    model : the bodies that impulses move there
+    configuration : the state
+    contacts : the contact points, in the order of the operator
+    place : (nc, 3) in the axes of one of the two bodies, the same whichever is the candidate [m]
+    law : (nc,) index of the law of each
+    operator : W
+    """
+
+    model: Model
+    configuration: State
+    contacts: Contacts
+    place: Array
+    law: Ints
+    operator: RigidDelassus | MixedDelassus
+
+
+def detector(model: Model) -> Detector:
+    """Return the contact detector of a scene."""
+    settings = model.scene.contact
+    return Detector(
+        model.surfaces,
+        model.fixed,
+        settings.alert_distance,
+        settings.points,
+        settings.placement,
+        max(law.reach for law in model.laws.laws),
+    )
+
+
+def detection(
+    model: Model,
+    state: State,
+    contacts: Contacts,
+    compliance: Sequence[Compliance],
+    elastic_scale: bool = False,
+) -> Detection:
+    """Return the contacts of a state with their places, laws and W; rigid ones in the order of their schedule."""
+    operator: RigidDelassus | MixedDelassus
+    if model.rigid_only:
+        plan = schedule(contacts.bodies, model.inertia.moving)
+        contacts = take(contacts, plan.order)
+        operator = rigid_delassus(model, state, contacts, plan)
+    else:
+        operator = mixed_delassus(model, state, contacts, compliance, elastic_scale)
+    side = contacts.bodies.argmin(axis=1)
+    place = contacts.arm[np.arange(len(side)), side]
+    return Detection(model, state, contacts, place, model.laws.of(contacts.bodies), operator)
+
+
+class ContactSearch:
+    """Contact detection that keeps the last result while nothing has moved.
+
+    Parameters
+    ----------
+    model : the scene
+    compliance : ŵ of every group of equal elastic stones
+    clock : takes the time of each stage
+    every_step : detect whenever asked
+    elastic_scale : as `mixed_delassus` takes it
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        compliance: Sequence[Compliance],
+        clock: Clock,
+        every_step: bool = False,
+        elastic_scale: bool = False,
+    ) -> None:
+        self._detector, self._compliance, self._clock = detector(model), compliance, clock
+        self._every_step, self._elastic_scale = every_step, elastic_scale
+        self._last: Detection | None = None
+
+    def __call__(self, model: Model, predicted: State) -> Detection:
+        """Return the contacts at a predicted configuration; `model` has sleeping bodies as fixed ones."""
+        if self._last is not None and not self._is_stale(self._last, model, predicted):
+            return self._last
+        with self._clock("detect"):
+            reach = model.scene.time.step * speed(model, predicted)
+            contacts = replace(self._detector, fixed=model.fixed)(predicted, reach)
+        with self._clock("assemble"):
+            self._last = detection(model, predicted, contacts, self._compliance, self._elastic_scale)
+        return self._last
+
+    def _is_stale(self, last: Detection, model: Model, predicted: State) -> bool:
+        if self._every_step or last.model is not model:
+            return True
+        width = float(model.surfaces.size.min())
+        moved = float(displacement(model, last.configuration, predicted).max()) / width
+        if model.rigid_only:
+            return moved > _MOVED_RIGID
+        pace = model.scene.time.step * float(speed(model, predicted).max()) / width
+        return moved > _MOVED or (moved > _MOVED_SETTLED and pace < _SLOWED * moved)

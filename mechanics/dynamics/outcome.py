@@ -1,0 +1,33 @@
+"""Start and end of a run; a light module, so that results and reports load quickly."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+__all__ = ["Outcome", "StaticStart"]
+
+
+class Outcome(StrEnum):
+    """End of a run."""
+
+    EQUILIBRIUM = "equilibrium"
+    MOVING = "moving"
+    COLLAPSED = "collapsed"
+
+
+@dataclass(frozen=True)
+class StaticStart:
+    """Search for the static equilibrium in which a run begins.
+
+    Attributes
+    ----------
+    found : there is one; otherwise the run begins with all stones at rest and without stress
+    steps, iterations : of the search, and of its solver
+    natural_map : η of the last step, r and u measured against the elastic part of W [-]
+    balance : unbalanced force of a body over its weight, largest over the bodies [-]
+    """
+
+    found: bool
+    steps: int
+    iterations: int
+    natural_map: float
+    balance: float
