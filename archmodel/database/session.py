@@ -9,7 +9,7 @@ from typing import Protocol, Self
 
 from sqlalchemy import Connection, Engine, insert, inspect, make_url, select
 from sqlalchemy.exc import ArgumentError, DBAPIError
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, configure_mappers
 
 from archmodel.database import postgresql, sqlite
 from archmodel.database.postgresql import PostgresqlServer
@@ -109,6 +109,7 @@ def open_database(url: str, create: bool = True, *, lock_timeout: float = 10.0) 
     MissingLibraryError
         if psycopg is not installed
     """
+    configure_mappers()  # takes a new process longest, so not while others wait for the lock
     home = home_of(url, lock_timeout)
     engine = home.engine(create)
     try:
@@ -162,7 +163,7 @@ def version_of(connection: Connection, place: str) -> int | None:
         return None
     if SchemaVersion.__tablename__ not in tables:
         raise DatabaseError("is not a MOMA database", where=place, remedy="name another database with --db")
-    return connection.scalar(select(SchemaVersion.version)) or 0
+    return connection.scalar(select(SchemaVersion.__table__.c.version)) or 0
 
 
 def _prepare(connection: Connection, home: Home, create: bool) -> None:
