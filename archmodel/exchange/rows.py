@@ -5,9 +5,8 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
-from archmodel.exchange.json_types import Mismatch
 from archmodel.exchange.sections import Section
-from archmodel.exchange.values import said
+from archmodel.exchange.values import Mismatch, said
 from archmodel.query.grammar import parse
 from archmodel.tables.entities import Entity
 from archmodel.tables.registered import RegisteredKind

@@ -13,6 +13,7 @@ from sqlalchemy import ColumnElement, insert, or_, select, update
 from sqlalchemy.orm import Session
 
 from archmodel.store.bulk import batches
+from archmodel.store.remeasuring import MEASURED
 from archmodel.store.revisions import NOTHING, Outcome, end_rows
 from archmodel.store.stone_record import StoneRecord
 from archmodel.store.stones import insert_stones
@@ -24,10 +25,8 @@ from moma.errors import DatabaseError, UsageError
 
 __all__ = ["not_withdrawn", "store_hypotheses", "withdraw_hypotheses"]
 
-_GIVEN_UP = ("course", "zone", "length", "height", "area", "volume", "x", "y", "z")
-"""What is not known any more of a hypothesis that is withdrawn, besides its depth."""
-
-_DEPTH = ("depth", "depth_sigma", "depth_source", "depth_origin")
+_GIVEN_UP = ("course", "zone", *(name for name in MEASURED if name != "hypothesis"))
+"""Columns that become unknown when a hypothesis is withdrawn."""
 
 
 def store_hypotheses(
@@ -128,7 +127,6 @@ def _end_geometry(session: Session, entry: Entry, entities: Sequence[Entity]) ->
         Measurement.entity_id.in_(numbers), Measurement.superseded_id.is_(None)
     )
     end_rows(session, entry, Measurement, list(session.scalars(measured)))
-    names = (*_GIVEN_UP, *_DEPTH)
     rows = [
         {
             "entity_id": one.id,
@@ -138,10 +136,10 @@ def _end_geometry(session: Session, entry: Entry, entities: Sequence[Entity]) ->
             "after": None,
         }
         for one in entities
-        for name in names
+        for name in _GIVEN_UP
         if getattr(one, name) is not None
     ]
     session.execute(insert(Correction), rows)
-    session.execute(update(Entity).where(Entity.id.in_(numbers)).values(dict.fromkeys(names)))
+    session.execute(update(Entity).where(Entity.id.in_(numbers)).values(dict.fromkeys(_GIVEN_UP)))
     for one in entities:
         session.expire(one)

@@ -6,17 +6,14 @@ better one supersedes them (`supersedes_id`), or they are withdrawn (`superseded
 """
 
 from datetime import date
-from typing import TYPE_CHECKING
 
 from sqlalchemy import Date, ForeignKey, Index, text
 from sqlalchemy.orm import Mapped, declared_attr, mapped_column, relationship
 
 from archmodel.tables.base import JSON_TYPE, Base
+from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry, Recorded
 from archmodel.tables.structures import Structure
-
-if TYPE_CHECKING:
-    from archmodel.tables.entities import Entity
 
 __all__ = [
     "OBSERVATIONS",
@@ -183,7 +180,7 @@ class Statement(Recorded, Base):
     observed_on: Mapped[date | None] = mapped_column(Date)
     supersedes_id: Mapped[int | None] = mapped_column(ForeignKey("statement.id"))
 
-    entity: Mapped["Entity | None"] = relationship()
+    entity: Mapped[Entity | None] = relationship()
     structure: Mapped[Structure | None] = relationship()
     document: Mapped[Document | None] = relationship()
 
@@ -306,5 +303,5 @@ class Correction(Base):
     before: Mapped[float | int | str | None] = mapped_column(JSON_TYPE)
     after: Mapped[float | int | str | None] = mapped_column(JSON_TYPE)
 
-    entity: Mapped["Entity"] = relationship()
+    entity: Mapped[Entity] = relationship()
     entry: Mapped[Entry] = relationship()

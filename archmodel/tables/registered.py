@@ -7,8 +7,8 @@ from weakref import WeakSet
 from sqlalchemy import Engine, ForeignKey, inspect, select
 from sqlalchemy.orm import Mapped, Session, mapped_column
 
-from archmodel.tables.base import JSON_TYPE, Base
-from archmodel.tables.entities import Entity, OwnAttribute, kinds
+from archmodel.tables.base import JSON_TYPE, Base, StoneAttribute
+from archmodel.tables.entities import Entity, kinds
 from moma.errors import DatabaseError
 
 __all__ = ["RegisteredKind", "declare_registered", "release_registered"]
@@ -109,7 +109,7 @@ def _declared(kind: RegisteredKind) -> type[Entity]:
 
 def _made(kind: RegisteredKind, parent: Any) -> type[Entity]:
     """The class of a kind; its attributes are in ``Entity.own``."""
-    own = tuple(OwnAttribute(name, unit, meaning) for name, (unit, meaning) in kind.attributes.items())
+    own = tuple(StoneAttribute(name, unit, meaning) for name, (unit, meaning) in kind.attributes.items())
     contents: dict[str, object] = {
         "__doc__": kind.definition,
         # two definitions of one name are two classes

@@ -1,16 +1,12 @@
 """How entities stand to one another, and which structures they are members of."""
 
-from typing import TYPE_CHECKING
-
 from sqlalchemy import ForeignKey, Index
 from sqlalchemy.orm import Mapped, mapped_column, relationship
 
 from archmodel.tables.base import Base
+from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Recorded
 from archmodel.tables.structures import Structure
-
-if TYPE_CHECKING:
-    from archmodel.tables.entities import Entity
 
 __all__ = ["INVERSE", "RELATIONS", "SYMMETRIC", "Membership", "Relation"]
 
@@ -58,8 +54,8 @@ class Relation(Recorded, Base):
     ny: Mapped[float | None]
     nz: Mapped[float | None]
 
-    subject: Mapped["Entity"] = relationship(foreign_keys=[subject_id])
-    object: Mapped["Entity"] = relationship(foreign_keys=[object_id])
+    subject: Mapped[Entity] = relationship(foreign_keys=[subject_id])
+    object: Mapped[Entity] = relationship(foreign_keys=[object_id])
 
 
 class Membership(Recorded, Base):
@@ -83,5 +79,5 @@ class Membership(Recorded, Base):
     rank: Mapped[int | None]
     declared: Mapped[bool]
 
-    entity: Mapped["Entity"] = relationship()
+    entity: Mapped[Entity] = relationship()
     structure: Mapped[Structure] = relationship()

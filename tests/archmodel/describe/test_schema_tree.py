@@ -172,7 +172,8 @@ def test_a_kind_with_a_column_of_its_own_is_asked_for_like_any_other() -> None:
     program = '''
 from sqlalchemy.orm import Mapped
 from archmodel.database.session import open_database
-from archmodel.tables.entities import Ashlar, OwnAttribute
+from archmodel.tables.base import attribute
+from archmodel.tables.entities import Ashlar
 from archmodel.query.api import find
 from archmodel.store.stones import store_survey
 from tests.archmodel.stones import SHA, box_stone
@@ -184,10 +185,9 @@ with open_database("sqlite://") as database, database.session() as session:
 class Merlon(Ashlar):
     """A stone of a parapet between two openings."""
 
-    __own__ = (OwnAttribute("top_width", "m", "of its upper face"),)
     __canon__ = "top_width < length"
 
-    top_width: Mapped[float | None]
+    top_width: Mapped[float | None] = attribute("m", "of its upper face")
 
 with open_database("sqlite://") as database, database.session() as session:
     store_survey(session, "parapet", "p", SHA, [box_stone("M1", "merlon"), box_stone("M2", "merlon")])
