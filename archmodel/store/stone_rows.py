@@ -78,12 +78,11 @@ def _row(columns: Mapping[str, "Converter"], stone: StoneRecord, place: str) -> 
 
 def stone_record(entity: Entity, measured: Measurement) -> StoneRecord:
     """Return the record that was stored, with arrays of its own."""
-    return StoneRecord(
-        **{
-            name: restore(getattr(entity if name in _OF_ENTITY else measured, name), entity)
-            for name, restore in _RESTORERS.items()
-        }
-    )
+    values = {name: getattr(entity, name) for name in _OF_ENTITY}
+    values |= {name: getattr(measured, name) for name in _OF_MEASUREMENT}
+    for name, restore in _RESTORERS:
+        values[name] = restore(values[name], entity)
+    return StoneRecord(**values)
 
 
 def _kind(name: str, place: str) -> str:
@@ -184,15 +183,15 @@ _PLAIN: dict[object, Callable[[Any], object]] = {
 """Values of a column by its annotation or, without a special one, by its type in Python."""
 
 
-def _restorer(field: Field[Any], column: Column[Any]) -> Restorer:
-    """Return the function from a value of a column, and its entity, to that of a record."""
+def _restorer(field: Field[Any], column: Column[Any]) -> Restorer | None:
+    """Return the function from a value of a column, and its entity, to that of a record; None where they are equal."""
     kind, optional = column.type, "None" in str(field.type)
     if isinstance(kind, ArrayType):
         return lambda value, entity: None if value is None else value.copy()
     if isinstance(kind, JSON):
         return lambda value, entity: dict(value) if isinstance(value, dict) else _tuples(value)
     if optional or not column.nullable:
-        return lambda value, entity: value
+        return None
     if isinstance(kind, Float):
         return lambda value, entity: _known(value, field.name, entity)
     default = "" if field.default is MISSING else field.default
@@ -222,10 +221,11 @@ _ENTITY = {
     name: _converter(column, Entity.__mapper__) for name, column in _OF_ENTITY.items() if name != "kind"
 }
 _MEASUREMENT = {name: _converter(column, Measurement.__mapper__) for name, column in _OF_MEASUREMENT.items()}
-_RESTORERS = {
-    field.name: _restorer(field, {**_OF_MEASUREMENT, **_OF_ENTITY}[field.name])
+_RESTORERS = [
+    (field.name, restore)
     for field in fields(StoneRecord)
-}
+    if (restore := _restorer(field, {**_OF_MEASUREMENT, **_OF_ENTITY}[field.name])) is not None
+]
 
 ENTITY_COLUMNS = ("kind", *_ENTITY, "volume", "x", "y", "z")
 """Columns of `entity_rows`."""
