@@ -1,4 +1,4 @@
-"""The head of a building document: what it is, what wrote it, in which units and which frame."""
+"""Head of a building document: its format, its writer, units and frame."""
 
 import re
 from importlib.metadata import version
@@ -17,10 +17,10 @@ __all__ = ["FORMAT", "FORMAT_VERSION", "HEAD", "TABLES", "check_head", "head_of"
 
 FORMAT = "moma building"
 FORMAT_VERSION = 1
-"""Of the document's grammar; what the tables hold is said by the version of the schema."""
+"""Version of the document's grammar; that of the tables is `SCHEMA_VERSION`."""
 
 TABLES = "tables"
-"""Key of the object that holds the sections; it is the last."""
+"""Key of the object that holds the sections; it comes last."""
 
 UNITS = {
     "length": "m",
@@ -38,10 +38,10 @@ HEAD = ("format", "format_version", "moma", "schema_version", "recorded_until", 
 
 
 def head_of(session: Session) -> dict[str, Any]:
-    """The head of a document; the same as long as nothing is recorded, hence no time of writing."""
+    """Return the head of a document; it holds no time of writing, so that an unchanged database gives the same."""
     latest = session.scalar(select(func.max(Entry.recorded_at)))
     instant = value_of(Column("recorded_at", UtcDateTime()))
-    said_head = (
+    values = (
         FORMAT,
         FORMAT_VERSION,
         version("moma-masonry"),
@@ -50,11 +50,11 @@ def head_of(session: Session) -> dict[str, Any]:
         UNITS,
         FRAME,
     )
-    return dict(zip(HEAD, said_head, strict=True))
+    return dict(zip(HEAD, values, strict=True))
 
 
 def check_head(head: dict[str, Any], name: str) -> None:
-    """Refuse what another program, another layout of the tables or other units wrote.
+    """Refuse documents of other programs, layouts of the tables, or units.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def check_head(head: dict[str, Any], name: str) -> None:
 
 
 def head_schema() -> dict[str, Schema]:
-    """JSON Schema of each key of the head."""
+    """Return the JSON Schema of each key of the head."""
     return {
         "format": {"const": FORMAT, "description": "what the document is"},
         "format_version": {"const": FORMAT_VERSION, "description": "of the document's grammar"},

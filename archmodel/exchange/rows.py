@@ -1,4 +1,4 @@
-"""One row of a building document, checked and made a row of its table."""
+"""Rows of a building document, checked and converted to rows of tables."""
 
 import difflib
 import re
@@ -17,7 +17,7 @@ __all__ = ["Row", "RowReader", "said_key"]
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A row, and where it came from.
+    """A row and its place in the document.
 
     Attributes
     ----------
@@ -35,12 +35,12 @@ class Row:
     line: int
 
     def wrong(self, what: str, path: str = "", remedy: str | None = None) -> ExchangeError:
-        """An error at this row, or within it."""
+        """Return an error at this row, or within it."""
         return ExchangeError(what, where=f"{self.document}:{self.line} {self.path}{path}", remedy=remedy)
 
 
 class RowReader:
-    """Reads the rows of one section.
+    """Reader of the rows of one section.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class RowReader:
         self._kinds = _built_in(section)
 
     def read(self, given: Any, index: int, line: int) -> Row:
-        """The row at this index of the section, at this line.
+        """Return the row at this index of the section, at this line.
 
         Raises
         ------
@@ -104,7 +104,7 @@ class RowReader:
             row.labels[name] = value
 
     def _check_order(self, row: Row) -> None:
-        """Rows come in the order of their keys, so none comes twice."""
+        """Refuse rows that are not in the order of their keys; so none comes twice."""
         key = tuple(row.values[name] for name in self._section.key)
         if self._last is not None and key <= self._last:
             names = ", ".join(self._section.key)
@@ -132,13 +132,13 @@ class RowReader:
 
 
 def _built_in(section: Section) -> frozenset[str]:
-    """The kinds of a table's rows, without those that open databases register."""
+    """Return the kinds of a table's rows, without those that open databases register."""
     classes = ((str(name), mapper.class_) for name, mapper in section.mapper.polymorphic_map.items())
     return frozenset(name for name, cls in classes if getattr(cls, "__users__", None) is None)
 
 
 def _check_registered(row: Row) -> None:
-    """A registered kind can be asked for, and its proportions too."""
+    """Refuse a registered kind that queries could not name, or with proportions that they could not parse."""
     name, canon = row.values["name"], row.values["canon"]
     if not re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", name):
         raise row.wrong(f"is {said(name)}, which is not the name of a kind", ".name", "as corner_merlon, say")
@@ -150,5 +150,5 @@ def _check_registered(row: Row) -> None:
 
 
 def said_key(key: tuple[Any, ...]) -> str:
-    """A key as an error quotes it."""
+    """Return a key as an error quotes it."""
     return ", ".join(said(part) for part in key)

@@ -23,7 +23,7 @@ __all__ = ["INSTANT", "NUMBER", "Mismatch", "Schema", "Value", "said", "value_of
 Schema = dict[str, Any]
 
 INFINITIES = {"Infinity": math.inf, "-Infinity": -math.inf}
-"""JSON has no word for them."""
+"""Infinite numbers, for which JSON has no word."""
 
 INTEGERS = (-(2**63), 2**63 - 1)
 
@@ -35,7 +35,7 @@ _REFERENCE: Schema = {"$ref": "#/$defs/number"}
 
 
 class Mismatch(ValueError):
-    """A value is not what its column holds.
+    """A value that does not suit its column.
 
     Attributes
     ----------

@@ -26,7 +26,7 @@ COMPRESSION = 4
 """Of gzip: higher levels take twice the time for a few percent."""
 
 ROWS, ROWS_WITH_ARRAYS = 1000, 100
-"""Rows that are fetched at once."""
+"""Numbers of rows that are fetched at once."""
 
 _READABLE = json.JSONEncoder(ensure_ascii=False, allow_nan=False)
 _ESCAPED = json.JSONEncoder(ensure_ascii=True, allow_nan=False)

@@ -1,8 +1,8 @@
-"""Stones that nobody has seen: stored with the grounds on which they are thought to be there, and withdrawn again.
+"""Hypothetical stones: stored with their grounds, and withdrawn again.
 
 A hypothesis is an entity like others, whose `hypothesis` is true and whose measurement has the provenance
 "hypothesis". One that is withdrawn loses its geometry, its course and its zone: it is in no relation and no scene any
-more, and queries do not find it; what was said of it stays in its history.
+more, and queries do not find it; its statements stay in its history.
 """
 
 import hashlib
@@ -38,7 +38,7 @@ def store_hypotheses(
     author: str | None = None,
     settings: Mapping[str, object] | None = None,
 ) -> tuple[Entry, tuple[int, ...]]:
-    """Take in stones that nobody has seen: all of them or, if anything is wrong, none.
+    """Store hypothetical stones: all of them or, if anything is wrong, none.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def store_hypotheses(
 
 
 def withdraw_hypotheses(session: Session, entry: Entry, entities: Iterable[int]) -> Outcome:
-    """Say that stones that nobody has seen are not thought to be there any more.
+    """Withdraw hypothetical stones.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def withdraw_hypotheses(session: Session, entry: Entry, entities: Iterable[int])
 
 
 def not_withdrawn(entity: Any) -> ColumnElement[bool]:
-    """The condition that an entity, as a table or an alias of it, is no hypothesis that was withdrawn."""
+    """Return the condition that an entity, as a table or an alias of it, is not a withdrawn hypothesis."""
     return or_(~entity.hypothesis, entity.x.is_not(None))
 
 
@@ -119,7 +119,7 @@ def _check(session: Session, stones: Sequence[StoneRecord]) -> None:
 
 
 def _end_geometry(session: Session, entry: Entry, entities: Sequence[Entity]) -> None:
-    """End the measurements of entities, and take from them what follows from these; nothing is forgotten."""
+    """End the measurements of entities and the attributes that follow from them; corrections keep the values."""
     if not entities:
         return
     numbers = [one.id for one in entities]

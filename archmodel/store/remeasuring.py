@@ -1,4 +1,4 @@
-"""Entities that were measured again: new measurements, old ones superseded, and corrections of what follows."""
+"""Replacement of measurements, with corrections of the attributes that follow from them."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -28,7 +28,7 @@ def supersede_measurements(
     stones: Sequence[StoneRecord],
     places: Sequence[str],
 ) -> None:
-    """Give entities the measurements of these records in place of those they have, if they have any.
+    """Replace the measurements of entities by those of these records.
 
     Parameters
     ----------

@@ -243,6 +243,13 @@ def solid_volume(vertices: Array, faces: Faces) -> tuple[float, Array]:
     ----------
     vertices : (nv, 3) [m]
     faces : vertex indices of each planar face, counter-clockwise seen from outside
+
+    Examples
+    --------
+    >>> corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 6.0]])
+    >>> volume, centroid = solid_volume(corners, [(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)])
+    >>> round(volume, 12), centroid.tolist()
+    (1.0, [0.25, 0.25, 1.5])
     """
     volumes, centroids = _alike(vertices[None], faces)
     return float(volumes[0]), centroids[0]

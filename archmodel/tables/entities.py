@@ -1,4 +1,4 @@
-"""The hierarchy of entities: one word, one role, indivisible.
+"""Hierarchy of entities: one word, one role, indivisible.
 
 ::
 
@@ -97,7 +97,7 @@ CORRECTABLE = ("kind", "code", "course", "zone")
 
 @cache
 def kind_of(cls: type["Entity"]) -> str:
-    """Name of a kind as users write it: its ``__kind__``, else the class's name as rib_segment of RibSegment."""
+    """Return the name of a kind as users write it: its ``__kind__`` or, without one, rib_segment for RibSegment."""
     own = cls.__dict__.get("__kind__")
     return str(own) if own is not None else re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
 
@@ -319,7 +319,7 @@ class Joint(Entity):
 
 
 def kinds() -> Mapping[str, type[Entity]]:
-    """Every kind by its name, general before particular."""
+    """Return every kind by its name, general before particular."""
     return {kind_of(cls): cls for cls in _descend(Entity)}
 
 
@@ -332,7 +332,7 @@ def _descend(cls: type[Entity]) -> Iterator[type[Entity]]:
 
 
 def kind_named(name: str) -> type[Entity]:
-    """The kind of this name, in upper or lower case, with _ or a hyphen or a blank between its words.
+    """Return the kind of this name, in upper or lower case, with _, hyphen or blank between its words.
 
     Raises
     ------
@@ -348,27 +348,27 @@ def kind_named(name: str) -> type[Entity]:
 
 
 def kind_chain(cls: type[Entity]) -> tuple[type[Entity], ...]:
-    """The kind and what it inherits from, most general first: Entity, Ashlar, Voussoir, Keystone."""
+    """Return the kind and its ancestors, most general first: Entity, Ashlar, Voussoir, Keystone."""
     return tuple(base for base in reversed(cls.__mro__) if issubclass(base, Entity))
 
 
 def definition_of(cls: type[Entity]) -> str:
-    """The one sentence that defines a kind."""
+    """Return the one sentence that defines a kind."""
     return (cls.__doc__ or "").strip().split("\n", 1)[0]
 
 
 def own_attributes(cls: type[Entity]) -> Mapping[str, StoneAttribute]:
-    """The attributes that a kind has besides those of every entity: its parents' and its own."""
+    """Return the attributes that a kind has besides those of every entity: its parents' and its own."""
     return {one.name: one for base in kind_chain(cls) for one in base.__own__}
 
 
 def canon_of(cls: type[Entity]) -> str | None:
-    """The canonical proportions of a kind, as a query expression; None if it has none."""
+    """Return the canonical proportions of a kind as a query expression; None if it has none."""
     return cls.__canon__
 
 
 def refuse_unknown_kinds(session: Session) -> None:
-    """Check that every kind in the database is declared, as it is not if another program added its own.
+    """Refuse a database with kinds that are not declared, because another program added its own.
 
     Raises
     ------
@@ -384,7 +384,7 @@ def refuse_unknown_kinds(session: Session) -> None:
 
 
 def _stored_kinds(session: Session) -> list[str]:
-    """The kinds that entities in the database are of: from one to the next in the index, not all entities."""
+    """Return the kinds of stored entities, stepping through the index from one to the next."""
     kind = Entity.__table__.c.kind
     stored = select(func.min(kind).label("kind")).cte("stored", recursive=True)
     following = select(func.min(kind)).where(kind > stored.c.kind).correlate(stored).scalar_subquery()

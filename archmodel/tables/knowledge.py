@@ -1,8 +1,8 @@
-"""What is known besides the geometry: materials, phases, documents, and statements about entities and structures.
+"""Knowledge besides the geometry: materials, phases, documents, and statements about entities and structures.
 
-A statement is one thing that somebody says of one entity or structure, on stated grounds: that it is of a material
-or a phase, bears a mason mark, is eroded, is so deep, is treated in a document. Statements are never changed; a
-better one supersedes them (`supersedes_id`), or they are withdrawn (`superseded_id` without a successor).
+A statement is one fact that somebody records of one entity or structure, on stated grounds: its material, its phase,
+a mason mark, erosion, a depth, a document. Statements are never changed; a better one supersedes them
+(`supersedes_id`), or they are withdrawn (`superseded_id` without a successor).
 """
 
 from datetime import date
@@ -48,7 +48,7 @@ OBSERVATIONS = {
 
 
 def _current(name: str, *columns: str) -> Index:
-    """A unique index over the rows that are held now."""
+    """Return a unique index over the rows that are held now."""
     now = text("superseded_id IS NULL")
     return Index(name, *columns, unique=True, sqlite_where=now, postgresql_where=now)
 
@@ -146,12 +146,12 @@ class Document(Recorded, Base):
 
 
 class Statement(Recorded, Base):
-    """One thing said of one entity or of one structure.
+    """Statement about one entity or one structure.
 
     Attributes
     ----------
     kind : name of its class
-    entity, structure : what it is said of, exactly one of them
+    entity, structure : its subject, exactly one of them
     text : in words; None if the rest says enough
     document, locator : the document that says so, and where in it (page, number of the figure)
     observed_on : date on which it was seen; None if not known
@@ -195,7 +195,7 @@ class Statement(Recorded, Base):
 
 
 class MadeOf(Statement):
-    """It is of a material."""
+    """Material of the subject."""
 
     __kind__ = "made_of"
 
@@ -205,7 +205,7 @@ class MadeOf(Statement):
 
 
 class OfPhase(Statement):
-    """It was built, or put where it is, in a phase."""
+    """Phase in which the subject was built or put into its place."""
 
     __kind__ = "of_phase"
 
@@ -215,7 +215,7 @@ class OfPhase(Statement):
 
 
 class MasonMark(Statement):
-    """It bears a mason's mark.
+    """Mason's mark on the subject.
 
     Attributes
     ----------
@@ -230,7 +230,7 @@ class MasonMark(Statement):
 
 
 class Observation(Statement):
-    """Something was seen on it.
+    """Observation of damage or change on the subject.
 
     Attributes
     ----------
@@ -251,7 +251,7 @@ class Observation(Statement):
 
 
 class DepthEvidence(Statement):
-    """How deep it is said to be, on what evidence.
+    """Recorded depth of the subject, with its evidence.
 
     Attributes
     ----------
@@ -265,13 +265,13 @@ class DepthEvidence(Statement):
 
 
 class Reference(Statement):
-    """A document or photograph treats or shows it."""
+    """Document or photograph that treats or shows the subject."""
 
     __kind__ = "reference"
 
 
 class Note(Statement):
-    """A word of the surveyor, under a key.
+    """Note of the surveyor, under a key.
 
     Attributes
     ----------
@@ -284,7 +284,7 @@ class Note(Statement):
 
 
 class Correction(Base):
-    """One attribute of an entity was changed; the entity has the new value, this row has both.
+    """Change of one attribute of an entity; the entity has the new value, this row has both.
 
     Attributes
     ----------

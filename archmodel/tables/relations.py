@@ -1,4 +1,4 @@
-"""How entities stand to one another, and which structures they are members of."""
+"""Relations between entities, and their membership of structures."""
 
 from sqlalchemy import ForeignKey, Index
 from sqlalchemy.orm import Mapped, mapped_column, relationship
@@ -21,13 +21,13 @@ INVERSE = {"rests_on": "supports", "supports": "rests_on", **{name: name for nam
 
 
 class Relation(Recorded, Base):
-    """One entity in relation to another: subject rests on object, say.
+    """Relation of one entity to another: subject rests on object, say.
 
     Attributes
     ----------
     kind : one of RELATIONS
     subject, object : the two entities
-    declared : somebody says so; otherwise it was computed from the geometry
+    declared : a person recorded it; otherwise it was computed from the geometry
     area : that the two faces share; None if declared [m²]
     gap : mean width of the joint between them; None if declared [m]
     x, y, z : centroid of the shared area; None if declared [m]
@@ -59,12 +59,12 @@ class Relation(Recorded, Base):
 
 
 class Membership(Recorded, Base):
-    """An entity is a member of a structure.
+    """Membership of an entity in a structure.
 
     Attributes
     ----------
     rank : its place in the structure, from 1; None if there is no order
-    declared : somebody says so; otherwise it follows from the survey or from the geometry
+    declared : a person recorded it; otherwise it follows from the survey or from the geometry
     """
 
     __tablename__ = "membership"

@@ -10,7 +10,7 @@ from archmodel.tables.entries import Entry
 __all__ = ["FIDELITIES", "ContactPoint", "EntityResult", "JointResult", "Run"]
 
 FIDELITIES = ("fixed", "rigid", "deformable")
-"""How a stone can be modelled in a run."""
+"""Ways to model a stone in a run."""
 
 
 class Run(Base):

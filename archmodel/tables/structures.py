@@ -1,4 +1,4 @@
-"""What entities make up: the divisible parts of a building, from the building itself to a course.
+"""Structures: the divisible parts of a building, from the building itself to a course.
 
 ::
 
@@ -58,7 +58,7 @@ __all__ = [
 
 
 def structure_kind_of(cls: type["Structure"]) -> str:
-    """Name of a kind of structure as users write it: wall_facing for WallFacing."""
+    """Return the name of a kind of structure as users write it: wall_facing for WallFacing."""
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
 
 
@@ -173,13 +173,13 @@ class Crenelation(Structure):
 
 
 def structure_kinds() -> Mapping[str, type[Structure]]:
-    """Every kind of structure by its name."""
+    """Return every kind of structure by its name."""
     classes: tuple[type[Structure], ...] = (Structure, *Structure.__subclasses__())
     return {structure_kind_of(cls): cls for cls in classes}
 
 
 def structure_kind_named(name: str) -> type[Structure]:
-    """The kind of structure of this name.
+    """Return the kind of structure of this name.
 
     Raises
     ------

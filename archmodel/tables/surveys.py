@@ -1,4 +1,4 @@
-"""What was measured: survey files, measurements of entities, and the solids that stood for them in runs."""
+"""Survey files, measurements of entities, and the solids that stood for them in runs."""
 
 import numpy as np
 from sqlalchemy import ForeignKey, Index, text
@@ -39,7 +39,7 @@ class Survey(Base):
 
 
 class Measurement(Recorded, Base):
-    """What was measured of one entity, the plane fitted to it, and the solid made of it.
+    """Measurement of one entity, the plane fitted to it, and the solid made of it.
 
     An entity that is measured again, or whose depth is corrected, gets a new measurement; the old one is
     superseded and kept.
@@ -125,12 +125,12 @@ class Measurement(Recorded, Base):
 
     @property
     def residuals(self) -> Array:
-        """(np,) distances of the measured points from the fitted plane, positive towards the observer [m]."""
+        """Distances (np,) of the measured points from the fitted plane, positive towards the observer [m]."""
         return np.asarray((self.points - self.centroid) @ self.normal)
 
 
 class Simplification(Base):
-    """The solid that stood for an entity in one run, and how far it is from the surveyed one.
+    """Solid that stood for an entity in one run, and its distance from the surveyed one.
 
     Attributes
     ----------
