@@ -1,6 +1,5 @@
 """Import: a JSON document read row by row into an empty database, all of it or nothing."""
 
-import difflib
 import gzip
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,7 +11,7 @@ from sqlalchemy.orm import Session
 from archmodel.database.session import Database
 from archmodel.exchange.head import HEAD, TABLES, check_head
 from archmodel.exchange.json_stream import JsonText
-from archmodel.exchange.rows import Row, RowReader
+from archmodel.exchange.rows import Row, RowReader, nearest
 from archmodel.exchange.sections import Section, sections
 from archmodel.exchange.store import SectionStore
 from archmodel.tables.registered import RegisteredKind, declare_registered, release_registered
@@ -101,11 +100,7 @@ def _key(text: JsonText, before: dict[str, Any], known: Sequence[str]) -> str:
     if key in before:
         text.refuse(f"the key {key} comes twice")
     if key not in known:
-        near = difflib.get_close_matches(key[:40], known, n=1)
-        text.refuse(
-            f"unknown key {key[:40]!a}",
-            f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}",
-        )
+        text.refuse(f"unknown key {key[:40]!a}", nearest(key, known))
     text.take(":")
     return key
 

@@ -2,6 +2,7 @@
 
 import difflib
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +13,7 @@ from archmodel.tables.entities import Entity
 from archmodel.tables.registered import RegisteredKind
 from moma.errors import ExchangeError, QueryError
 
-__all__ = ["Row", "RowReader", "said_key"]
+__all__ = ["Row", "RowReader", "nearest", "said_key"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,9 +97,7 @@ class RowReader:
         for name, value in rest.items():
             if name not in self._labels:
                 known = [field.name for field in self._section.fields] + sorted(self._labels)
-                near = difflib.get_close_matches(name[:40], known, n=1)
-                remedy = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"
-                raise row.wrong(f"unknown key {name[:40]!a}", remedy=remedy)
+                raise row.wrong(f"unknown key {name[:40]!a}", remedy=nearest(name, known))
             if type(value) is not str:
                 raise row.wrong(f"is {said(value)}, expected a text", f".{name}")
             row.labels[name] = value
@@ -126,8 +125,7 @@ class RowReader:
             return
         kind = row.values[self._kind]
         if kind not in self._kinds and not (self._of_entities and kind in self._registered):
-            near = difflib.get_close_matches(kind[:40], self._kinds, n=1)
-            remedy = f"did you mean {near[0]}?" if near else f"known are {', '.join(sorted(self._kinds))}"
+            remedy = nearest(kind, sorted(self._kinds))
             raise row.wrong(f"is {said(kind)}, which is no kind", f".{self._kind}", remedy)
 
 
@@ -152,3 +150,9 @@ def _check_registered(row: Row) -> None:
 def said_key(key: tuple[Any, ...]) -> str:
     """Return a key as an error quotes it."""
     return ", ".join(said(part) for part in key)
+
+
+def nearest(name: str, known: Sequence[str]) -> str:
+    """Return the remedy for an unknown name: the known one that is most like it, or all."""
+    near = difflib.get_close_matches(name[:40], known, n=1)
+    return f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
-from sqlalchemy import select
+from sqlalchemy import ColumnElement, select
 from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from archmodel.store.bulk import batches
@@ -82,27 +82,27 @@ def subjects(session: Session, stones: Iterable[str] = (), structures: Iterable[
 
 def entity_numbers(session: Session, codes: Sequence[str]) -> dict[str, int]:
     """Return the primary keys of entities by code, in the order of the codes."""
-    found: dict[str, int] = {}
-    for batch in batches(dict.fromkeys(codes)):
-        rows = session.execute(select(Entity.code, Entity.id).where(Entity.code.in_(_typable(batch))))
-        found.update((code, number) for code, number in rows)
-    for code in codes:
-        if code not in found:
-            raise no_such_code(session, code, Entity.code)
-    return {code: found[code] for code in codes}
+    return _numbers(session, codes, Entity)
 
 
 def structure_numbers(session: Session, codes: Sequence[str]) -> dict[str, int]:
     """Return the primary keys of the structures that are held now, by code, in the order of the codes."""
+    return _numbers(session, codes, Structure, Structure.superseded_id.is_(None))
+
+
+def _numbers(
+    session: Session,
+    codes: Sequence[str],
+    cls: type[Entity] | type[Structure],
+    *conditions: ColumnElement[bool],
+) -> dict[str, int]:
     found: dict[str, int] = {}
     for batch in batches(dict.fromkeys(codes)):
-        statement = select(Structure.code, Structure.id).where(
-            Structure.superseded_id.is_(None), Structure.code.in_(_typable(batch))
-        )
-        found.update((code, number) for code, number in session.execute(statement))
+        rows = session.execute(select(cls.code, cls.id).where(cls.code.in_(_typable(batch)), *conditions))
+        found.update((code, number) for code, number in rows)
     for code in codes:
         if code not in found:
-            raise no_such_code(session, code, Structure.code)
+            raise no_such_code(session, code, cls.code)
     return {code: found[code] for code in codes}
 
 

@@ -9,12 +9,12 @@ from collections.abc import Mapping
 from datetime import UTC, datetime
 from importlib.metadata import version
 
-from sqlalchemy import ColumnElement, ForeignKey, func, or_, select
+from sqlalchemy import ColumnElement, ForeignKey, Index, func, or_, select, text
 from sqlalchemy.orm import Mapped, Session, declared_attr, mapped_column, relationship
 
 from archmodel.tables.base import Base
 
-__all__ = ["ACTIONS", "Entry", "Recorded", "held_at", "latest_entry", "new_entry"]
+__all__ = ["ACTIONS", "Entry", "Recorded", "held_at", "held_index", "latest_entry", "new_entry"]
 
 ACTIONS = ("ingest", "geometry", "declaration", "correction", "run", "migration")
 """Kinds of entries: a survey taken in, relations computed, knowledge declared, attributes corrected, a simulation,
@@ -107,3 +107,9 @@ def held_at(table: type[Recorded], entry: int | None = None) -> ColumnElement[bo
     if entry is None:
         return table.superseded_id.is_(None)
     return (table.entry_id <= entry) & or_(table.superseded_id.is_(None), table.superseded_id > entry)
+
+
+def held_index(name: str, *columns: str) -> Index:
+    """Return a unique index over the rows that are held now."""
+    now = text("superseded_id IS NULL")
+    return Index(name, *columns, unique=True, sqlite_where=now, postgresql_where=now)

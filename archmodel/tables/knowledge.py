@@ -12,7 +12,7 @@ from sqlalchemy.orm import Mapped, declared_attr, mapped_column, relationship
 
 from archmodel.tables.base import JSON_TYPE, Base
 from archmodel.tables.entities import Entity
-from archmodel.tables.entries import Entry, Recorded
+from archmodel.tables.entries import Entry, Recorded, held_index
 from archmodel.tables.structures import Structure
 
 __all__ = [
@@ -47,12 +47,6 @@ OBSERVATIONS = {
 """Types of observations and their definitions."""
 
 
-def _current(name: str, *columns: str) -> Index:
-    """Return a unique index over the rows that are held now."""
-    now = text("superseded_id IS NULL")
-    return Index(name, *columns, unique=True, sqlite_where=now, postgresql_where=now)
-
-
 class Material(Recorded, Base):
     """A stone or a mortar, under one name.
 
@@ -63,7 +57,7 @@ class Material(Recorded, Base):
     """
 
     __tablename__ = "material"
-    __table_args__ = (_current("ix_material_name", "name"),)
+    __table_args__ = (held_index("ix_material_name", "name"),)
 
     id: Mapped[int] = mapped_column(primary_key=True)
     name: Mapped[str]
@@ -85,7 +79,7 @@ class MaterialProperty(Recorded, Base):
     """
 
     __tablename__ = "material_property"
-    __table_args__ = (_current("ix_material_property_name", "material_id", "name"),)
+    __table_args__ = (held_index("ix_material_property_name", "material_id", "name"),)
 
     id: Mapped[int] = mapped_column(primary_key=True)
     material_id: Mapped[int] = mapped_column(ForeignKey("material.id"))
@@ -110,7 +104,7 @@ class Phase(Recorded, Base):
     """
 
     __tablename__ = "phase"
-    __table_args__ = (_current("ix_phase_name", "name"),)
+    __table_args__ = (held_index("ix_phase_name", "name"),)
 
     id: Mapped[int] = mapped_column(primary_key=True)
     name: Mapped[str]
@@ -133,7 +127,7 @@ class Document(Recorded, Base):
     """
 
     __tablename__ = "document"
-    __table_args__ = (_current("ix_document_code", "code"),)
+    __table_args__ = (held_index("ix_document_code", "code"),)
 
     id: Mapped[int] = mapped_column(primary_key=True)
     code: Mapped[str]

@@ -27,11 +27,11 @@ import difflib
 import re
 from collections.abc import Mapping
 
-from sqlalchemy import ForeignKey, Index, text
+from sqlalchemy import ForeignKey, Index
 from sqlalchemy.orm import Mapped, declared_attr, mapped_column, relationship
 
 from archmodel.tables.base import Base
-from archmodel.tables.entries import Recorded
+from archmodel.tables.entries import Recorded, held_index
 from moma.errors import UsageError
 
 __all__ = [
@@ -78,13 +78,7 @@ class Structure(Recorded, Base):
 
     __tablename__ = "structure"
     __table_args__ = (
-        Index(
-            "ix_structure_code",
-            "code",
-            unique=True,
-            sqlite_where=text("superseded_id IS NULL"),
-            postgresql_where=text("superseded_id IS NULL"),
-        ),
+        held_index("ix_structure_code", "code"),
         Index("ix_structure_parent_id", "parent_id"),
     )
 

@@ -1,12 +1,12 @@
 """Survey files, measurements of entities, and the solids that stood for them in runs."""
 
 import numpy as np
-from sqlalchemy import ForeignKey, Index, text
+from sqlalchemy import ForeignKey, Index
 from sqlalchemy.orm import Mapped, mapped_column, relationship
 
 from archmodel.arrays import Array
 from archmodel.tables.base import JSON_TYPE, ArrayType, Base, attribute
-from archmodel.tables.entries import Entry, Recorded
+from archmodel.tables.entries import Entry, Recorded, held_index
 
 __all__ = ["Measurement", "Simplification", "Survey"]
 
@@ -74,13 +74,7 @@ class Measurement(Recorded, Base):
 
     __tablename__ = "measurement"
     __table_args__ = (
-        Index(
-            "ix_measurement_current",
-            "entity_id",
-            unique=True,
-            sqlite_where=text("superseded_id IS NULL"),
-            postgresql_where=text("superseded_id IS NULL"),
-        ),
+        held_index("ix_measurement_current", "entity_id"),
         Index("ix_measurement_entity_id", "entity_id"),
         Index("ix_measurement_survey_id", "survey_id"),
     )
