@@ -95,13 +95,15 @@ class PostgresqlServer:
     def refusal(self, error: Exception) -> DatabaseError:
         """Translate a complaint of the server for users."""
         cause: Any = error.orig if isinstance(error, DBAPIError) else error
-        said = _first_line(str(cause))
+        message = _first_line(str(cause))
         state = str(getattr(cause, "sqlstate", None) or "")
         for states, words, what, remedy in _COMPLAINTS:
-            if (state and state.startswith(states)) or (not state and any(word in said for word in words)):
+            if (state and state.startswith(states)) or (not state and any(word in message for word in words)):
                 remedy = remedy.format(name=self.url.database)
-                return DatabaseError(what.format(said=said), where=self.place, remedy=remedy)
-        return DatabaseError(f"the database refused: {said}", where=self.place, remedy="nothing was changed")
+                return DatabaseError(what.format(message=message), where=self.place, remedy=remedy)
+        return DatabaseError(
+            f"the database refused: {message}", where=self.place, remedy="nothing was changed"
+        )
 
 
 def _on_begin(connection: Connection) -> None:
@@ -116,9 +118,9 @@ def _on_begin(connection: Connection) -> None:
         connection.exec_driver_sql(f"SELECT pg_advisory_xact_lock({WRITE_LOCK})")
 
 
-def _first_line(said: str) -> str:
+def _first_line(message: str) -> str:
     """Return the complaint without the statement and the hints that follow it."""
-    lines = [line for line in said.splitlines() if line.strip()]
+    lines = [line for line in message.splitlines() if line.strip()]
     return lines[0] if lines else "it does not say why"
 
 
@@ -134,25 +136,25 @@ _COMPLAINTS: tuple[_Complaint, ...] = (
     (
         ("3D000",),
         ("does not exist", "no such database"),
-        "there is no such database or user ({said})",
+        "there is no such database or user ({message})",
         "make it on the server: createdb {name}",
     ),
     (
         ("28P01", "28000"),
         ("authentication failed", "no password supplied", "pg_hba.conf"),
-        "the server does not let you in: wrong user or password ({said})",
+        "the server does not let you in: wrong user or password ({message})",
         "write the password in ~/.pgpass or in the variable PGPASSWORD",
     ),
     (
         ("25006",),
         (),
-        "the database cannot be written ({said})",
+        "the database cannot be written ({message})",
         "only a writing session can change it; is the server a replica?",
     ),
     (
         ("42501",),
         (),
-        "you may not do this in the database ({said})",
+        "you may not do this in the database ({message})",
         "ask its owner for the permission, or use a database of your own: createdb NAME",
     ),
     (("53100",), (), "the disk of the server is full", "make room on it and try again; nothing was changed"),
@@ -165,13 +167,13 @@ _COMPLAINTS: tuple[_Complaint, ...] = (
     (
         ("08", "57P"),
         (),
-        "the connection to the server was lost ({said})",
+        "the connection to the server was lost ({message})",
         "nothing was changed; start the server and try again",
     ),
     (
         (),
         ("connect", "translate host name", "resolve host", "starting up", "shutting down"),
-        "no PostgreSQL server answers ({said})",
+        "no PostgreSQL server answers ({message})",
         "start it, or correct host and port of the URL",
     ),
 )

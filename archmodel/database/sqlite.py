@@ -97,11 +97,13 @@ class SqliteFile:
 
     def refusal(self, error: Exception) -> DatabaseError:
         """Translate a complaint of SQLite for users."""
-        said = _said(error)
+        message = _first_message(error)
         for words, what, remedy in _COMPLAINTS:
-            if any(word in said for word in words):
-                return DatabaseError(what.format(said=said), where=self.place, remedy=remedy)
-        return DatabaseError(f"the database refused: {said}", where=self.place, remedy="nothing was changed")
+            if any(word in message for word in words):
+                return DatabaseError(what.format(message=message), where=self.place, remedy=remedy)
+        return DatabaseError(
+            f"the database refused: {message}", where=self.place, remedy="nothing was changed"
+        )
 
 
 _COMPLAINTS = (
@@ -111,26 +113,30 @@ _COMPLAINTS = (
         "wait until the other program is done, then try again",
     ),
     (("not a database",), "is not a MOMA database", "name another file with --db"),
-    (("malformed",), "the file is damaged ({said})", "restore a copy of it, or try: sqlite3 FILE .recover"),
+    (
+        ("malformed",),
+        "the file is damaged ({message})",
+        "restore a copy of it, or try: sqlite3 FILE .recover",
+    ),
     (("is full",), "the disk is full", "make room on it and try again; nothing was changed"),
     (
         ("readonly", "unable to open"),
-        "the database cannot be written ({said})",
+        "the database cannot be written ({message})",
         "check the permissions of the file and of its folder",
     ),
 )
 """Words of SQLite, their meaning, and the remedy."""
 
 
-def _said(error: Exception) -> str:
+def _first_message(error: Exception) -> str:
     """Return the first message of SQLite: after some failures it has ended the transaction and lost its savepoints."""
-    said: str = str(error.orig if isinstance(error, DBAPIError) else error)
+    message: str = str(error.orig if isinstance(error, DBAPIError) else error)
     before = error.__context__
-    while "no such savepoint" in said and before is not None:
+    while "no such savepoint" in message and before is not None:
         if isinstance(before, sqlite3.Error):
-            said = str(before)
+            message = str(before)
         before = before.__context__
-    return said
+    return message
 
 
 def _check_file(file: Path, create: bool) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 from sqlalchemy import Column, func, select
 from sqlalchemy.orm import Session
 
-from archmodel.exchange.values import INSTANT, Schema, said, value_of
+from archmodel.exchange.values import INSTANT, Schema, quoted, value_of
 from archmodel.tables.base import UtcDateTime
 from archmodel.tables.entries import Entry
 from archmodel.tables.layout import SCHEMA_VERSION
@@ -77,14 +77,16 @@ def check_head(head: dict[str, Any], name: str) -> None:
             raise ExchangeError("is missing", where=place, remedy=remedies.get(key))
         given = head[key]
         if key in expected and (type(given), given) != (type(expected[key]), expected[key]):
-            what = f"is {said(given)}, expected {expected[key]!r}"
+            what = f"is {quoted(given)}, expected {expected[key]!r}"
             raise ExchangeError(what, where=place, remedy=remedies[key])
     until = head["recorded_until"]
     if until is not None and not (type(until) is str and re.match(INSTANT, until)):
-        what = f"is {said(until)}, expected the instant of the latest entry, or null"
+        what = f"is {quoted(until)}, expected the instant of the latest entry, or null"
         raise ExchangeError(what, where=f"{name} $.recorded_until")
     if type(head["moma"]) is not str:
-        raise ExchangeError(f"is {said(head['moma'])}, expected the version of MOMA", where=f"{name} $.moma")
+        raise ExchangeError(
+            f"is {quoted(head['moma'])}, expected the version of MOMA", where=f"{name} $.moma"
+        )
 
 
 def head_schema() -> dict[str, Schema]:

@@ -87,9 +87,9 @@ def _column(section: Section, field: Field, meanings: dict[str, str]) -> Schema:
     if not field.required and _NULL not in schema.get("anyOf", ()):
         others = schema["anyOf"] if [*schema] == ["anyOf"] else [schema]
         schema = {"anyOf": [*others, _NULL]}
-    said = [meanings.get(field.name) or meanings.get(field.name.removesuffix("_id"))]
-    said += [f"refers to {key.target_fullname}" for key in field.column.foreign_keys]
-    text = "; ".join(one for one in said if one)
+    parts = [meanings.get(field.name) or meanings.get(field.name.removesuffix("_id"))]
+    parts += [f"refers to {key.target_fullname}" for key in field.column.foreign_keys]
+    text = "; ".join(one for one in parts if one)
     return schema | {"description": text} if text else schema
 
 

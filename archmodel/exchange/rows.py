@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from archmodel.exchange.sections import Section
-from archmodel.exchange.values import Mismatch, said
+from archmodel.exchange.values import Mismatch, quoted
 from archmodel.query.grammar import parse
 from archmodel.tables.entities import Entity
 from archmodel.tables.registered import RegisteredKind
 from moma.errors import ExchangeError, QueryError
 
-__all__ = ["Row", "RowReader", "nearest", "said_key"]
+__all__ = ["Row", "RowReader", "nearest", "quoted_key"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +73,7 @@ class RowReader:
         """
         row = Row({}, {}, {}, self._document, f"$.tables.{self._section.name}[{index}]", line)
         if type(given) is not dict:
-            raise row.wrong(f"is {said(given)}, expected an object")
+            raise row.wrong(f"is {quoted(given)}, expected an object")
         for name, decode, required, within in self._fields:
             value = given.pop(name, None)
             if value is None:
@@ -99,7 +99,7 @@ class RowReader:
                 known = [field.name for field in self._section.fields] + sorted(self._labels)
                 raise row.wrong(f"unknown key {name[:40]!a}", remedy=nearest(name, known))
             if type(value) is not str:
-                raise row.wrong(f"is {said(value)}, expected a text", f".{name}")
+                raise row.wrong(f"is {quoted(value)}, expected a text", f".{name}")
             row.labels[name] = value
 
     def _check_order(self, row: Row) -> None:
@@ -107,7 +107,7 @@ class RowReader:
         key = tuple(row.values[name] for name in self._section.key)
         if self._last is not None and key <= self._last:
             names = ", ".join(self._section.key)
-            what = f"{names} {said_key(key)} comes after {said_key(self._last)}"
+            what = f"{names} {quoted_key(key)} comes after {quoted_key(self._last)}"
             raise row.wrong(what, remedy=f"sort the rows by {names}, each once")
         self._last = key
         # What refers to an earlier row can be stored as it is.
@@ -126,7 +126,7 @@ class RowReader:
         kind = row.values[self._kind]
         if kind not in self._kinds and not (self._of_entities and kind in self._registered):
             remedy = nearest(kind, sorted(self._kinds))
-            raise row.wrong(f"is {said(kind)}, which is no kind", f".{self._kind}", remedy)
+            raise row.wrong(f"is {quoted(kind)}, which is no kind", f".{self._kind}", remedy)
 
 
 def _built_in(section: Section) -> frozenset[str]:
@@ -139,7 +139,9 @@ def _check_registered(row: Row) -> None:
     """Refuse a registered kind that queries could not name, or with proportions that they could not parse."""
     name, canon = row.values["name"], row.values["canon"]
     if not re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", name):
-        raise row.wrong(f"is {said(name)}, which is not the name of a kind", ".name", "as corner_merlon, say")
+        raise row.wrong(
+            f"is {quoted(name)}, which is not the name of a kind", ".name", "as corner_merlon, say"
+        )
     try:
         if canon is not None:
             parse(canon)
@@ -147,9 +149,9 @@ def _check_registered(row: Row) -> None:
         raise row.wrong(str(error), ".canon") from None
 
 
-def said_key(key: tuple[Any, ...]) -> str:
+def quoted_key(key: tuple[Any, ...]) -> str:
     """Return a key as an error quotes it."""
-    return ", ".join(said(part) for part in key)
+    return ", ".join(quoted(part) for part in key)
 
 
 def nearest(name: str, known: Sequence[str]) -> str:

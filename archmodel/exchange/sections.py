@@ -112,7 +112,7 @@ def _ordered(mappers: dict[Any, Mapper[Any]]) -> Iterator[Table]:
         known = module in _READING_ORDER
         return _READING_ORDER.index(module) if known else len(_READING_ORDER), declared.index(table)
 
-    # The version of the layout is said in the head.
+    # The version of the layout is in the head.
     declared = [table for table in Base.metadata.tables.values() if table is not SchemaVersion.__table__]
     waiting = sorted(declared, key=rank)
     while waiting:
@@ -144,14 +144,14 @@ def _field(column: Column[Any], mapper: Mapper[Any]) -> Field:
 
 
 def _label(column: Column[Any], target: Column[Any]) -> Label | None:
-    told = next(
+    column_shown = next(
         (target.table.columns[name] for name in ("code", "name") if name in target.table.columns), None
     )
-    if told is None:
+    if column_shown is None:
         return None
     name = column.name.removesuffix("_id")
     if name in column.table.columns:
         raise TypeError(
-            f"{column.table.name} has a column {name} where the document has the {told.name} of {column}"
+            f"{column.table.name} has a column {name} where the document has the {column_shown.name} of {column}"
         )
-    return Label(name, column, told, target)
+    return Label(name, column, column_shown, target)

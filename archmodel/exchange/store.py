@@ -8,9 +8,9 @@ from sqlalchemy import Column, UniqueConstraint, bindparam, select, update
 from sqlalchemy.exc import DataError, DBAPIError, IntegrityError, StatementError
 from sqlalchemy.orm import Session
 
-from archmodel.exchange.rows import Row, said_key
+from archmodel.exchange.rows import Row, quoted_key
 from archmodel.exchange.sections import Label, Section
-from archmodel.exchange.values import said
+from archmodel.exchange.values import quoted
 from archmodel.store.bulk import BATCH, insert_rows
 from moma.errors import ExchangeError
 
@@ -94,20 +94,20 @@ class SectionStore:
     def _check_label(self, label: Label, rows: Sequence[Row]) -> None:
         """Refuse a reference whose label is not that of the row it refers to."""
         name, key = label.column.name, label.name
-        told = [row for row in rows if key in row.labels]
-        wanted = {row.values[name] for row in told} - {None}
-        if not told:
+        labelled = [row for row in rows if key in row.labels]
+        wanted = {row.values[name] for row in labelled} - {None}
+        if not labelled:
             return
         pairs = select(label.number, label.target).where(label.number.in_(wanted))
         found: dict[Any, str] = {number: code for number, code in self._session.execute(pairs)}  # noqa: C416
-        for row in told:
+        for row in labelled:
             number, code = row.values[name], row.labels[key]
             if number is None:
-                raise row.wrong(f"is {said(code)}, but {name} is null", f".{key}")
+                raise row.wrong(f"is {quoted(code)}, but {name} is null", f".{key}")
             if number not in found:
                 raise row.wrong(f"there is no {label.target.table.name} {number}", f".{name}")
             if found[number] != code:
-                what = f"is {said(code)}, but {name} {number} is {said(found[number])}"
+                what = f"is {quoted(code)}, but {name} {number} is {quoted(found[number])}"
                 raise row.wrong(what, f".{key}", f"correct one of them, or leave {key} out")
 
     def _refer(self, rows: Sequence[Row]) -> None:
@@ -154,12 +154,14 @@ class SectionStore:
             target = values.get(field.name)
             for key in field.column.foreign_keys if target is not None else ():
                 if self._session.scalar(select(key.column).where(key.column == target)) is None:
-                    return row.wrong(f"there is no {key.column.table.name} {said(target)}", f".{field.name}")
+                    return row.wrong(
+                        f"there is no {key.column.table.name} {quoted(target)}", f".{field.name}"
+                    )
         for columns, where in self._unique():
             if (other := self._same(row, columns, where)) is not None:
                 names = ", ".join(column.name for column in columns)
-                mine = said_key(tuple(row.values[column.name] for column in columns))
-                what = f"{names} {mine} is also that of {', '.join(self._section.key)} {said_key(other)}"
+                mine = quoted_key(tuple(row.values[column.name] for column in columns))
+                what = f"{names} {mine} is also that of {', '.join(self._section.key)} {quoted_key(other)}"
                 return row.wrong(what, remedy="each may be there once")
         cause = error.orig if isinstance(error, StatementError) else error
         lines = str(cause).strip().splitlines() or [type(cause).__name__]

@@ -18,7 +18,7 @@ from sqlalchemy import JSON, Boolean, Column, Date, Float, Integer, String
 from archmodel.arrays import Array
 from archmodel.tables.base import ArrayType, UtcDateTime
 
-__all__ = ["INSTANT", "NUMBER", "Mismatch", "Schema", "Value", "said", "value_of"]
+__all__ = ["INSTANT", "NUMBER", "Mismatch", "Schema", "Value", "quoted", "value_of"]
 
 Schema = dict[str, Any]
 
@@ -95,7 +95,7 @@ def _same(value: Any) -> Any:
 
 def _text(given: Any) -> str:
     if type(given) is not str:
-        raise Mismatch(f"is {said(given)}, expected a text")
+        raise Mismatch(f"is {quoted(given)}, expected a text")
     if not given.isascii() and any("\ud800" <= letter <= "\udfff" for letter in given):
         raise Mismatch("has half of a surrogate pair, which no database can keep")
     return given
@@ -103,13 +103,13 @@ def _text(given: Any) -> str:
 
 def _integer(given: Any) -> int:
     if type(given) is not int or not INTEGERS[0] <= given <= INTEGERS[1]:
-        raise Mismatch(f"is {said(given)}, expected a whole number of 64 bits")
+        raise Mismatch(f"is {quoted(given)}, expected a whole number of 64 bits")
     return given
 
 
 def _boolean(given: Any) -> bool:
     if type(given) is not bool:
-        raise Mismatch(f"is {said(given)}, expected true or false")
+        raise Mismatch(f"is {quoted(given)}, expected true or false")
     return given
 
 
@@ -131,7 +131,7 @@ def _number(given: Any) -> float:
             pass
     elif type(given) is str and given in INFINITIES:
         return INFINITIES[given]
-    raise Mismatch(f"is {said(given)}, expected a number of 64 bits")
+    raise Mismatch(f"is {quoted(given)}, expected a number of 64 bits")
 
 
 def _date(given: Any) -> date:
@@ -140,7 +140,7 @@ def _date(given: Any) -> date:
             return date.fromisoformat(given)
         except ValueError:
             pass
-    raise Mismatch(f'is {said(given)}, expected a date, as "2024-05-31"')
+    raise Mismatch(f'is {quoted(given)}, expected a date, as "2024-05-31"')
 
 
 def _written_instant(value: datetime) -> str:
@@ -153,7 +153,7 @@ def _instant(given: Any) -> datetime:
             return datetime.fromisoformat(given)
         except ValueError:
             pass
-    raise Mismatch(f'is {said(given)}, expected an instant in UTC, as "2024-05-31T14:05:00Z"')
+    raise Mismatch(f'is {quoted(given)}, expected an instant in UTC, as "2024-05-31T14:05:00Z"')
 
 
 _SIMPLE: tuple[tuple[type[Any], Value], ...] = (
@@ -196,7 +196,7 @@ def _flattened(given: Any, shape: tuple[int, ...], path: str) -> list[Any]:
     if type(given) is not list or size not in (-1, len(given)):
         wanted = "a list of numbers" if len(shape) == 1 else f"a list of {_wording(shape[1:])}"
         count = "" if size == -1 else f", {size} of them"
-        raise Mismatch(f"is {said(given)}, expected {wanted}{count}", path)
+        raise Mismatch(f"is {quoted(given)}, expected {wanted}{count}", path)
     if len(shape) == 1:
         return given
     inner = shape[1]
@@ -336,7 +336,7 @@ def _union(options: list[_Shape]) -> _Shape:
     )
 
 
-def said(given: Any) -> str:
+def quoted(given: Any) -> str:
     """Return a value as an error quotes it, always short."""
     if isinstance(given, list):
         return f"a list of {len(given)}"

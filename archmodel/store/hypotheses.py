@@ -46,7 +46,7 @@ def store_hypotheses(
     name : what proposed them
     stones : with `hypothesis` true, at least one
     source : on what grounds
-    author : who says so; None if a program does
+    author : person who recorded it; None for a program
     settings : of the program that computed them
 
     Returns

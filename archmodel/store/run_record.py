@@ -198,7 +198,7 @@ class RunRecord:
     summary : the contents of summary.json
     versions : of the programs and libraries, by name; at least of "moma"
     results : one per stone of the scene
-    settings : of time, solver and contacts as they were used, defaults filled in, in values that JSON can say
+    settings : of time, solver and contacts as they were used, defaults filled in, in values that JSON can hold
     as_of : the last entry in the database when its stones were read; None if that is not known
     steps : how many were done
     simulated, wall : simulated time and time of work [s]

@@ -65,13 +65,13 @@ def plain(value: Mapping[str, object], name: str, place: str) -> dict[str, Any]:
     Raises
     ------
     DatabaseError
-        if JSON cannot say it
+        if JSON cannot hold it
     """
     try:
-        said: dict[str, Any] = json.loads(json.dumps(dict(value), allow_nan=False))
+        copy: dict[str, Any] = json.loads(json.dumps(dict(value), allow_nan=False))
     except (TypeError, ValueError) as error:
         raise DatabaseError(f"the {name} cannot be stored: {error}", where=place) from error
-    return said
+    return copy
 
 
 def result_row(result: StoneResult, place: str) -> dict[str, object]:

@@ -27,7 +27,7 @@ class Entry(Base):
     Attributes
     ----------
     action : one of ACTIONS
-    author : who says so; None if a program does
+    author : person who recorded it; None for a program
     source : on what grounds: the file, the document, the reasoning
     settings : of the program that computed it, e.g. tolerances
     version : of MOMA
@@ -79,8 +79,8 @@ def new_entry(
     session : a writing session
     action : one of ACTIONS
     source : on what grounds
-    author : who says so; None if a program does
-    settings : of the program that computed it, in values that JSON can say
+    author : person who recorded it; None for a program
+    settings : of the program that computed it, in values that JSON can hold
     """
     if action not in ACTIONS:
         raise ValueError(f"action {action!r} is none of {', '.join(ACTIONS)}")

@@ -229,7 +229,7 @@ class Observation(Statement):
     Attributes
     ----------
     type : one of OBSERVATIONS
-    severity : from 0 (traces) to 4 (lost, or about to be); None if not said
+    severity : from 0 (traces) to 4 (lost, or about to be); None if not stated
     place : on the stone, in words
     x, y, z : where, in the frame of the site [m]; None if not measured
     """

@@ -37,14 +37,14 @@ Rows = dict[str, list[str]]
 
 
 def declare(patch: pytest.MonkeyPatch) -> None:
-    """Let the program be one whose layout is version 2."""
+    """Make version 2 the newest of the program."""
     patch.setattr("archmodel.migrations.migrate.VERSION_FOLDERS", FOLDERS)
     for module in ("archmodel.tables.layout", "archmodel.migrations.migrate", "archmodel.database.session"):
         patch.setattr(f"{module}.SCHEMA_VERSION", 2)
 
 
 def rows_of(url: str, version: int) -> Rows:
-    """The rows of a database by table, as text, in the order of their keys."""
+    """Return the rows of a database by table, as text, in the order of their keys."""
     with connected(url) as connection:
         return {
             table.name: [
@@ -57,7 +57,7 @@ def rows_of(url: str, version: int) -> Rows:
 
 @contextmanager
 def connected(url: str) -> Iterator[Connection]:
-    """A connection with a transaction for the time of a block, without MOMA's locks and checks."""
+    """Open a connection with a transaction, without MOMA's locks and checks."""
     engine = create_engine(url.replace("postgresql:", "postgresql+psycopg:"))
     try:
         with engine.begin() as connection:
@@ -67,7 +67,7 @@ def connected(url: str) -> Iterator[Connection]:
 
 
 def run_alembic(connection: Connection, revision: str) -> None:
-    """Alembic's own way from nothing up to a revision."""
+    """Let Alembic itself lay out a revision from nothing."""
     config = Config()
     config.set_main_option("script_location", "archmodel:migrations")
     config.set_main_option("path_separator", "newline")

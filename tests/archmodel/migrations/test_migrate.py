@@ -30,13 +30,13 @@ NewUrl = Callable[[], str]
 
 
 def differences(url: str, version: int) -> list[Any]:
-    """What Alembic finds to be other in a database than declared."""
+    """Return where a database differs from what is declared, as Alembic finds."""
     with connected(url) as connection:
         return list(compare_metadata(MigrationContext.configure(connection), LAYOUTS[version]))
 
 
 def names(url: str) -> set[tuple[str, str | None]]:
-    """Tables, indexes, keys and sequences."""
+    """Return tables, indexes, keys and sequences."""
     with connected(url) as connection:
         inspector = inspect(connection)
         found: set[tuple[str, str | None]] = {(table, None) for table in inspector.get_table_names()}
@@ -58,7 +58,7 @@ def wall(new_url: NewUrl) -> str:
 
 @pytest.fixture
 def second(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The program of which version 2 is the newest."""
+    """Make version 2 the newest of the program."""
     second_version.declare(monkeypatch)
 
 

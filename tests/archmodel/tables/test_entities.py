@@ -44,7 +44,7 @@ def test_every_attribute_of_a_kind_is_a_column_with_a_definition() -> None:
         for name, own in own_attributes(cls).items():
             assert name in cls.__mapper__.columns
             assert own.definition
-            assert own.unit in ("m", "rad", "-", None)
+            assert own.unit is None or set(own.unit.split("/")) <= {"-", "1", "m", "dm", "rad"}
 
 
 def test_a_kind_inherits_attributes_and_proportions() -> None:
