@@ -1,22 +1,19 @@
-"""The architectural model: entities, what is known of them, and what was computed, in a database.
+"""The architectural model: entities, knowledge of them, and results of runs, in a database.
 
-Where things are::
+Rooms, each on those above it::
 
-    tables       base, entries, entities, structures, relations, knowledge, surveys, runs, registered → layout
-    databases    database, sqlite, postgresql, bulk; migrating, migrations/
-    surveys in   records → rows, measures → store; remeasuring; hypotheses
-    runs in      run_records → run_rows → store_runs
-    relations    relating, arch_rows → relation_store, composing, arches, computed_values; stone_columns
-    saying       declaring, arranging, statements, correcting, withdrawing, registering; recording, finding, values
-    asking       query ← expressions ← grammar, tokens; scope, columns, attributes, said; functions ← places,
-                 related, told, lookups, usages; geojson, schema_tree
-    walking      graph, load_paths
-    telling      description, description_knowledge, description_relations, run_description; history, versions,
-                 wording; trace
-    exchange     exchange ← exchange_writing, exchange_reading, …; exchange_schema
+    tables       what the database holds: entities, structures, relations, knowledge, surveys, runs
+    database     opening it, on SQLite or PostgreSQL
+    migrations   carrying it to another version of its layout
+    store        stones, runs and revisions of rows, into it and out of it
+    query        the query language and its API
+    relations    neighbours, courses, arches and load paths computed from the geometry
+    assertions   declaring, correcting and withdrawing knowledge
+    describe     descriptions of a stone or a structure, its history and its sources
+    exchange     the whole of it as one JSON document
 
-Nothing is imported here, so that programs which only need the plain values of ``records`` and ``run_records`` do
-not load SQLAlchemy.
+Nothing is imported here, so that programs that need only the plain values of ``store.stone_record`` and
+``store.run_record`` do not load SQLAlchemy.
 """
 
 __all__: list[str] = []

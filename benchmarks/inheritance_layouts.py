@@ -7,7 +7,8 @@ from typing import Any
 from sqlalchemy import JSON, Float, ForeignKey, Index, Integer, MetaData, String
 from sqlalchemy.orm import DeclarativeBase, mapped_column
 
-from archmodel.tables.entities import Entity, OwnAttribute, kind_of, kinds
+from archmodel.tables.base import StoneAttribute
+from archmodel.tables.entities import Entity, kind_of, kinds
 
 __all__ = ["LAYOUTS", "Layout", "make_layout"]
 
@@ -103,7 +104,7 @@ def make_layout(name: str) -> Layout:
     return Layout(name, Base.metadata, made)
 
 
-def _column(one: OwnAttribute, layout: str) -> Any:
+def _column(one: StoneAttribute, layout: str) -> Any:
     kind = Integer if one.unit == "-" else Float
     return mapped_column(kind, use_existing_column=layout == "one table", nullable=True)
 

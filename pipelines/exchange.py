@@ -9,8 +9,8 @@ from sqlalchemy import URL
 
 from archmodel.database.session import home_of, open_database
 from archmodel.database.sqlite import SqliteFile
-from archmodel.exchange.document import export_building, import_building
-from archmodel.exchange.writer import write_building
+from archmodel.exchange.reader import import_building
+from archmodel.exchange.writer import export_building, write_building
 from moma.errors import DatabaseError, ExchangeError
 
 __all__ = ["ExchangeReport", "export_database", "export_to_stream", "import_database"]

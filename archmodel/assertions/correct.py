@@ -19,23 +19,20 @@ from archmodel.assertions.validation import (
     checked_whole,
 )
 from archmodel.store.find_by_code import no_such_code
+from archmodel.store.remeasuring import MEASURED
 from archmodel.store.revisions import Outcome, table_of
 from archmodel.store.stone_record import StoneRecord
 from archmodel.store.stone_rows import entity_rows, measurement_row
-from archmodel.tables.entities import Entity, OwnAttribute, kind_named, kind_of, own_attributes
+from archmodel.tables.base import StoneAttribute
+from archmodel.tables.entities import CORRECTABLE, Entity, kind_named, kind_of, own_attributes
 from archmodel.tables.entries import Entry
 from archmodel.tables.knowledge import Correction
 from archmodel.tables.surveys import Measurement
 from moma.errors import DatabaseError, UsageError
 
-__all__ = ["CORRECTABLE", "correct", "replace_measurement"]
-
-CORRECTABLE = ("kind", "code", "course", "zone")
-"""Attributes of every entity that can be corrected; those of its kind can be too."""
+__all__ = ["correct", "replace_measurement"]
 
 _GEOMETRY = ("depth", "depth_sigma", "depth_source", "depth_origin", "volume", "x", "y", "z")
-
-_FOLLOWS = frozenset({"length", "height", "area", "volume", "x", "y", "z", "hypothesis"})
 
 
 def correct(session: Session, entry: Entry, code: str, values: Mapping[str, object]) -> Outcome:
@@ -117,13 +114,13 @@ def _kind(value: object) -> str:
     return kind_of(kind_named(value))
 
 
-def _checked(name: str, value: object, own: Mapping[str, OwnAttribute], code: str) -> object:
+def _checked(name: str, value: object, own: Mapping[str, StoneAttribute], code: str) -> object:
     """Check a value against its column."""
     if name == "kind":
         return _kind(value)
     if name in own:
         return _own_value(own[name], value)
-    if name in _FOLLOWS:
+    if name in MEASURED and not name.startswith("depth"):
         raise UsageError(
             f"{name} of {code} follows from its survey", remedy="measure it again, or give its depth"
         )
@@ -139,7 +136,7 @@ def _checked(name: str, value: object, own: Mapping[str, OwnAttribute], code: st
     return checked_label(name, value)
 
 
-def _own_value(attribute: OwnAttribute, value: object) -> object:
+def _own_value(attribute: StoneAttribute, value: object) -> object:
     """Check a value of a kind's attribute: an integer for an integer column, a number with a unit, or a text."""
     if value is None:
         return None
@@ -158,7 +155,7 @@ def _value(row: Mapping[str, Any], name: str) -> object:
     return row[name] if name in row else (row["own"] or {}).get(name)
 
 
-def _lost(row: Mapping[str, Any], own: Mapping[str, OwnAttribute]) -> set[str]:
+def _lost(row: Mapping[str, Any], own: Mapping[str, StoneAttribute]) -> set[str]:
     """List attributes of the old kind that have a value and that the new kind lacks."""
     before = own_attributes(kind_named(row["kind"]))
     return {name for name in before if name not in own and _value(row, name) is not None}

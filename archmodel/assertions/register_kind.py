@@ -13,7 +13,8 @@ from archmodel.query.functions.registry import FUNCTIONS, STRUCTURE_FUNCTIONS
 from archmodel.query.grammar import Call, parse
 from archmodel.query.tokens import KEYWORDS, Token, complaint
 from archmodel.store.revisions import Outcome
-from archmodel.tables.entities import OwnAttribute, kind_chain, kind_named, kind_of, kinds, own_attributes
+from archmodel.tables.base import StoneAttribute
+from archmodel.tables.entities import kind_chain, kind_named, kind_of, kinds, own_attributes
 from archmodel.tables.entries import Entry
 from archmodel.tables.registered import RegisteredKind, declare_registered
 from moma.errors import QueryError, UsageError
@@ -91,7 +92,7 @@ def register_kind(
 
 
 def _check_attributes(
-    given: Mapping[str, tuple[str | None, str]], inherited: Mapping[str, OwnAttribute]
+    given: Mapping[str, tuple[str | None, str]], inherited: Mapping[str, StoneAttribute]
 ) -> None:
     """Refuse an attribute without a name of its own, for which a query could not ask."""
     # what the classes call their own members (own, entry, metadata, …) would be written over

@@ -1,4 +1,4 @@
-"""What is particular to databases on a PostgreSQL server; the driver is psycopg 3."""
+"""Databases on a PostgreSQL server, by the driver psycopg 3."""
 
 from dataclasses import dataclass
 from typing import Any, Self
@@ -35,7 +35,7 @@ class PostgresqlServer:
 
     @classmethod
     def of(cls, url: URL, lock_timeout: float) -> Self:
-        """The database that a URL names.
+        """Return the database that a URL names.
 
         Raises
         ------
@@ -50,16 +50,16 @@ class PostgresqlServer:
 
     @property
     def place(self) -> str:
-        """Where the database is, for messages."""
+        """Its name in messages."""
         return self.shown
 
     @property
     def shown(self) -> str:
-        """The URL, to be printed: a password in it is not shown."""
+        """The URL, to be printed, with its password hidden."""
         return self.url.set(drivername="postgresql").render_as_string(hide_password=True)
 
     def engine(self, create: bool) -> Engine:
-        """An engine on the database, which must be there; MOMA makes its tables, not the database."""
+        """Return an engine on the database, which must exist: MOMA makes tables, not databases."""
         ours = {"connect_timeout": "10", "application_name": "moma"}
         arguments = {name: value for name, value in ours.items() if name not in self.url.query}
         try:
@@ -80,32 +80,34 @@ class PostgresqlServer:
         return engine
 
     def _on_connect(self, connection: DBAPIConnection, entry: ConnectionPoolEntry) -> None:
-        """Wait for locks as long as was asked: writers for one another, readers for a migration alone."""
+        """Set how long to wait for locks: writers wait for one another, readers for migrations alone."""
         patience = max(1, round(1000 * self.lock_timeout))  # [ms]; zero would wait for ever
         cursor = connection.cursor()
         cursor.execute(f"SET lock_timeout = {patience}")
-        # To compile a statement of many small parts takes seconds, to answer it takes milliseconds.
+        # Compiling a statement of many small parts takes seconds, answering it milliseconds.
         cursor.execute("SET jit = off")
         cursor.close()
         connection.commit()
 
     def settle(self, engine: Engine) -> None:
-        """Nothing to do: the server lets readers and a writer work at once."""
+        """Do nothing: the server lets readers and a writer work at once."""
 
     def refusal(self, error: Exception) -> DatabaseError:
-        """The server's complaint in the user's words."""
+        """Translate a complaint of the server for users."""
         cause: Any = error.orig if isinstance(error, DBAPIError) else error
-        said = _first_line(str(cause))
+        message = _first_line(str(cause))
         state = str(getattr(cause, "sqlstate", None) or "")
         for states, words, what, remedy in _COMPLAINTS:
-            if (state and state.startswith(states)) or (not state and any(word in said for word in words)):
+            if (state and state.startswith(states)) or (not state and any(word in message for word in words)):
                 remedy = remedy.format(name=self.url.database)
-                return DatabaseError(what.format(said=said), where=self.place, remedy=remedy)
-        return DatabaseError(f"the database refused: {said}", where=self.place, remedy="nothing was changed")
+                return DatabaseError(what.format(message=message), where=self.place, remedy=remedy)
+        return DatabaseError(
+            f"the database refused: {message}", where=self.place, remedy="nothing was changed"
+        )
 
 
 def _on_begin(connection: Connection) -> None:
-    """Readers see one state of the database; writers go one after another.
+    """Give readers one state of the database, and let writers go one after another.
 
     A writer reads committed rows, not a snapshot: its first statement is the wait for the lock, and what was written
     until then must be seen.
@@ -116,9 +118,9 @@ def _on_begin(connection: Connection) -> None:
         connection.exec_driver_sql(f"SELECT pg_advisory_xact_lock({WRITE_LOCK})")
 
 
-def _first_line(said: str) -> str:
-    """What went wrong, without the statement and the hints that follow it."""
-    lines = [line for line in said.splitlines() if line.strip()]
+def _first_line(message: str) -> str:
+    """Return the complaint without the statement and the hints that follow it."""
+    lines = [line for line in message.splitlines() if line.strip()]
     return lines[0] if lines else "it does not say why"
 
 
@@ -134,25 +136,25 @@ _COMPLAINTS: tuple[_Complaint, ...] = (
     (
         ("3D000",),
         ("does not exist", "no such database"),
-        "there is no such database or user ({said})",
+        "there is no such database or user ({message})",
         "make it on the server: createdb {name}",
     ),
     (
         ("28P01", "28000"),
         ("authentication failed", "no password supplied", "pg_hba.conf"),
-        "the server does not let you in: wrong user or password ({said})",
+        "the server does not let you in: wrong user or password ({message})",
         "write the password in ~/.pgpass or in the variable PGPASSWORD",
     ),
     (
         ("25006",),
         (),
-        "the database cannot be written ({said})",
+        "the database cannot be written ({message})",
         "only a writing session can change it; is the server a replica?",
     ),
     (
         ("42501",),
         (),
-        "you may not do this in the database ({said})",
+        "you may not do this in the database ({message})",
         "ask its owner for the permission, or use a database of your own: createdb NAME",
     ),
     (("53100",), (), "the disk of the server is full", "make room on it and try again; nothing was changed"),
@@ -165,14 +167,14 @@ _COMPLAINTS: tuple[_Complaint, ...] = (
     (
         ("08", "57P"),
         (),
-        "the connection to the server was lost ({said})",
+        "the connection to the server was lost ({message})",
         "nothing was changed; start the server and try again",
     ),
     (
         (),
         ("connect", "translate host name", "resolve host", "starting up", "shutting down"),
-        "no PostgreSQL server answers ({said})",
+        "no PostgreSQL server answers ({message})",
         "start it, or correct host and port of the URL",
     ),
 )
-"""SQL states (or their beginnings), words where there is no state, what they mean, and what to do."""
+"""SQL states or their beginnings, words where there is no state, their meaning, and the remedy."""

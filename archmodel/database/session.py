@@ -1,4 +1,4 @@
-"""Opening the entity database, and working in it one transaction at a time."""
+"""Opening the entity database, and transactions in it."""
 
 import re
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ from typing import Protocol, Self
 
 from sqlalchemy import Connection, Engine, insert, inspect, make_url, select
 from sqlalchemy.exc import ArgumentError, DBAPIError
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, configure_mappers
 
 from archmodel.database import postgresql, sqlite
 from archmodel.database.postgresql import PostgresqlServer
@@ -22,24 +22,24 @@ __all__ = ["Database", "Home", "home_of", "open_database", "version_of"]
 
 
 class Home(Protocol):
-    """Where a database lives: a file, a server."""
+    """Place of a database: a file or a server."""
 
     @property
     def place(self) -> str:
-        """Where it is, for messages."""
+        """Its name in messages."""
 
     @property
     def shown(self) -> str:
         """Its URL without a password."""
 
     def engine(self, create: bool) -> Engine:
-        """An engine whose transactions are those of `Database.session`."""
+        """Return an engine whose transactions are those of `Database.session`."""
 
     def settle(self, engine: Engine) -> None:
-        """What is to be done once the tables are there."""
+        """Finish the database once its tables are there."""
 
     def refusal(self, error: Exception) -> DatabaseError:
-        """The complaint of the driver in the user's words."""
+        """Translate a complaint of the driver for users."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Database:
     ----------
     url : as SQLAlchemy writes it; a password is shown as ***
     engine : for plain SQLAlchemy work
-    home : where it lives
+    home : its file or server
     """
 
     url: str
@@ -59,7 +59,7 @@ class Database:
 
     @contextmanager
     def session(self, *, read_only: bool = False) -> Iterator[Session]:
-        """One transaction: committed at the end of the block, undone if an error leaves it.
+        """Open one transaction: committed at the end of the block, rolled back if an error leaves it.
 
         A writing session holds the database's write lock from its first statement on, so that what it
         has read is still true when it writes; keep it short. A reading session sees the database as it was at
@@ -78,7 +78,7 @@ class Database:
             raise self.home.refusal(error) from error
 
     def close(self) -> None:
-        """Give the connections back, and let go of the kinds it registers; the database can be opened again."""
+        """Return the connections and release the registered kinds; the database can be opened again."""
         release_registered(self.engine)
         self.engine.dispose()
 
@@ -92,7 +92,7 @@ class Database:
 
 
 def open_database(url: str, create: bool = True, *, lock_timeout: float = 10.0) -> Database:
-    """Open the database at `url`, and lay it out first where there is nothing and `create` allows.
+    """Open the database at `url`; lay it out first where it is empty or missing and `create` allows it.
 
     Parameters
     ----------
@@ -108,7 +108,16 @@ def open_database(url: str, create: bool = True, *, lock_timeout: float = 10.0) 
         or of another version, a locked one
     MissingLibraryError
         if psycopg is not installed
+
+    Examples
+    --------
+    >>> from sqlalchemy import func, select
+    >>> from archmodel.tables.entities import Entity
+    >>> with open_database("sqlite://") as database, database.session(read_only=True) as session:
+    ...     session.scalar(select(func.count(Entity.id)))
+    0
     """
+    configure_mappers()  # takes a new process longest, so not while others wait for the lock
     home = home_of(url, lock_timeout)
     engine = home.engine(create)
     try:
@@ -129,7 +138,7 @@ def open_database(url: str, create: bool = True, *, lock_timeout: float = 10.0) 
 
 
 def home_of(url: str, lock_timeout: float = 10.0) -> Home:
-    """Where the database of a URL lives.
+    """Return the file or server of a URL.
 
     Raises
     ------
@@ -150,7 +159,7 @@ def home_of(url: str, lock_timeout: float = 10.0) -> Home:
 
 
 def version_of(connection: Connection, place: str) -> int | None:
-    """Version of the layout of a database; None if it has no tables.
+    """Return the version of the layout of a database; None if it has no tables.
 
     Raises
     ------
@@ -162,11 +171,11 @@ def version_of(connection: Connection, place: str) -> int | None:
         return None
     if SchemaVersion.__tablename__ not in tables:
         raise DatabaseError("is not a MOMA database", where=place, remedy="name another database with --db")
-    return connection.scalar(select(SchemaVersion.version)) or 0
+    return connection.scalar(select(SchemaVersion.__table__.c.version)) or 0
 
 
 def _prepare(connection: Connection, home: Home, create: bool) -> None:
-    """Check that this is a MOMA database of our version; lay out an empty one."""
+    """Check that this is a MOMA database of this program's version; lay out an empty one."""
     read_only = connection.execution_options(moma_read_only=True)
     with read_only.begin():
         if _is_ours(read_only, home):
@@ -176,14 +185,14 @@ def _prepare(connection: Connection, home: Home, create: bool) -> None:
         raise NoDatabaseError("the database is empty", where=home.place, remedy=remedy)
     writing = connection.execution_options(moma_read_only=False)
     with writing.begin():
-        # Another program may have laid it out since we looked; now nobody else can.
+        # Another program may have laid it out in the meantime; under the lock no other can.
         if not _is_ours(writing, home):
             metadata.create_all(writing, checkfirst=False)
             writing.execute(insert(SchemaVersion).values(version=SCHEMA_VERSION))
 
 
 def _is_ours(connection: Connection, home: Home) -> bool:
-    """Whether the database has our layout; False if it is empty; an error if it has another."""
+    """Return whether the database is laid out, False if it is empty; refuse other layouts."""
     version = version_of(connection, home.place)
     if version is None:
         return False

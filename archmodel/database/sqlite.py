@@ -1,4 +1,4 @@
-"""What is particular to databases that are one SQLite file, or lie in memory."""
+"""Databases in one SQLite file, or in memory."""
 
 import sqlite3
 import time
@@ -37,7 +37,7 @@ class SqliteFile:
 
     @classmethod
     def of(cls, url: URL, lock_timeout: float) -> Self:
-        """The file that a URL names.
+        """Return the file that a URL names.
 
         Raises
         ------
@@ -52,7 +52,7 @@ class SqliteFile:
 
     @property
     def place(self) -> str:
-        """Where the database is, for messages."""
+        """Its name in messages."""
         return "memory" if self.file is None else str(self.file)
 
     @property
@@ -61,7 +61,7 @@ class SqliteFile:
         return self.url.render_as_string()
 
     def engine(self, create: bool) -> Engine:
-        """An engine on the file, which may be missing if `create` allows it."""
+        """Return an engine on the file, which may be missing if `create` allows it."""
         if self.file is not None:
             _check_file(self.file, create)
         engine = create_engine(
@@ -72,10 +72,10 @@ class SqliteFile:
         return engine
 
     def settle(self, engine: Engine) -> None:
-        """Let readers and one writer work at once: the write-ahead log.
+        """Switch to the write-ahead log, with which readers and one writer work at once.
 
-        The file remembers it, so mostly there is nothing to do. It cannot be done within a transaction, hence
-        on the bare connection; and SQLite does not wait for another program's write lock here, hence the loop.
+        The file remembers it, so that this has an effect only once. It cannot be done within a transaction, hence
+        the bare connection; and SQLite does not wait here for another program's write lock, hence the loop.
         """
         if self.file is None:
             return
@@ -96,12 +96,14 @@ class SqliteFile:
             connection.close()
 
     def refusal(self, error: Exception) -> DatabaseError:
-        """SQLite's complaint in the user's words."""
-        said = _said(error)
+        """Translate a complaint of SQLite for users."""
+        message = _first_message(error)
         for words, what, remedy in _COMPLAINTS:
-            if any(word in said for word in words):
-                return DatabaseError(what.format(said=said), where=self.place, remedy=remedy)
-        return DatabaseError(f"the database refused: {said}", where=self.place, remedy="nothing was changed")
+            if any(word in message for word in words):
+                return DatabaseError(what.format(message=message), where=self.place, remedy=remedy)
+        return DatabaseError(
+            f"the database refused: {message}", where=self.place, remedy="nothing was changed"
+        )
 
 
 _COMPLAINTS = (
@@ -111,30 +113,34 @@ _COMPLAINTS = (
         "wait until the other program is done, then try again",
     ),
     (("not a database",), "is not a MOMA database", "name another file with --db"),
-    (("malformed",), "the file is damaged ({said})", "restore a copy of it, or try: sqlite3 FILE .recover"),
+    (
+        ("malformed",),
+        "the file is damaged ({message})",
+        "restore a copy of it, or try: sqlite3 FILE .recover",
+    ),
     (("is full",), "the disk is full", "make room on it and try again; nothing was changed"),
     (
         ("readonly", "unable to open"),
-        "the database cannot be written ({said})",
+        "the database cannot be written ({message})",
         "check the permissions of the file and of its folder",
     ),
 )
-"""Words of SQLite, what they mean, and what to do."""
+"""Words of SQLite, their meaning, and the remedy."""
 
 
-def _said(error: Exception) -> str:
-    """What SQLite said first: after some failures it has ended the transaction, and knows its savepoints no more."""
-    said: str = str(error.orig if isinstance(error, DBAPIError) else error)
+def _first_message(error: Exception) -> str:
+    """Return the first message of SQLite: after some failures it has ended the transaction and lost its savepoints."""
+    message: str = str(error.orig if isinstance(error, DBAPIError) else error)
     before = error.__context__
-    while "no such savepoint" in said and before is not None:
+    while "no such savepoint" in message and before is not None:
         if isinstance(before, sqlite3.Error):
-            said = str(before)
+            message = str(before)
         before = before.__context__
-    return said
+    return message
 
 
 def _check_file(file: Path, create: bool) -> None:
-    """Say what is wrong with the path before SQLite says it less clearly, or makes an empty file."""
+    """Refuse a wrong path before SQLite does so less clearly, or makes an empty file."""
     if file.is_dir():
         raise DatabaseError("is a folder, not a database", where=str(file), remedy="name a file in it")
     if not file.exists() and not create:
@@ -145,7 +151,7 @@ def _check_file(file: Path, create: bool) -> None:
 
 
 def _on_connect(connection: DBAPIConnection, entry: ConnectionPoolEntry) -> None:
-    """Leave transactions to SQLAlchemy (sqlite3 would begin them too late) and enforce foreign keys."""
+    """Leave transactions to SQLAlchemy, since sqlite3 would begin them too late, and enforce foreign keys."""
     connection.isolation_level = None
     cursor = connection.cursor()
     cursor.execute("PRAGMA foreign_keys = ON")
@@ -153,7 +159,7 @@ def _on_connect(connection: DBAPIConnection, entry: ConnectionPoolEntry) -> None
 
 
 def _on_begin(connection: Connection) -> None:
-    """Writers lock at once: a transaction that reads first and locks later can fail half-way."""
+    """Lock at once for writing: a transaction that reads first and locks later can fail half-way."""
     read_only = connection.get_execution_options().get("moma_read_only", False)
     connection.exec_driver_sql(f"PRAGMA query_only = {'ON' if read_only else 'OFF'}")
     connection.exec_driver_sql("BEGIN" if read_only else "BEGIN IMMEDIATE")

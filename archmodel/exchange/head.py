@@ -1,4 +1,4 @@
-"""The head of a building document: what it is, what wrote it, in which units and which frame."""
+"""Head of a building document: its format, its writer, units and frame."""
 
 import re
 from importlib.metadata import version
@@ -7,7 +7,7 @@ from typing import Any
 from sqlalchemy import Column, func, select
 from sqlalchemy.orm import Session
 
-from archmodel.exchange.values import INSTANT, Schema, said, value_of
+from archmodel.exchange.values import INSTANT, Schema, quoted, value_of
 from archmodel.tables.base import UtcDateTime
 from archmodel.tables.entries import Entry
 from archmodel.tables.layout import SCHEMA_VERSION
@@ -17,10 +17,10 @@ __all__ = ["FORMAT", "FORMAT_VERSION", "HEAD", "TABLES", "check_head", "head_of"
 
 FORMAT = "moma building"
 FORMAT_VERSION = 1
-"""Of the document's grammar; what the tables hold is said by the version of the schema."""
+"""Version of the document's grammar; that of the tables is `SCHEMA_VERSION`."""
 
 TABLES = "tables"
-"""Key of the object that holds the sections; it is the last."""
+"""Key of the object that holds the sections; it comes last."""
 
 UNITS = {
     "length": "m",
@@ -38,10 +38,10 @@ HEAD = ("format", "format_version", "moma", "schema_version", "recorded_until", 
 
 
 def head_of(session: Session) -> dict[str, Any]:
-    """The head of a document; the same as long as nothing is recorded, hence no time of writing."""
+    """Return the head of a document; it holds no time of writing, so that an unchanged database gives the same."""
     latest = session.scalar(select(func.max(Entry.recorded_at)))
     instant = value_of(Column("recorded_at", UtcDateTime()))
-    said_head = (
+    values = (
         FORMAT,
         FORMAT_VERSION,
         version("moma-masonry"),
@@ -50,11 +50,11 @@ def head_of(session: Session) -> dict[str, Any]:
         UNITS,
         FRAME,
     )
-    return dict(zip(HEAD, said_head, strict=True))
+    return dict(zip(HEAD, values, strict=True))
 
 
 def check_head(head: dict[str, Any], name: str) -> None:
-    """Refuse what another program, another layout of the tables or other units wrote.
+    """Refuse documents of other programs, layouts of the tables, or units.
 
     Raises
     ------
@@ -77,18 +77,20 @@ def check_head(head: dict[str, Any], name: str) -> None:
             raise ExchangeError("is missing", where=place, remedy=remedies.get(key))
         given = head[key]
         if key in expected and (type(given), given) != (type(expected[key]), expected[key]):
-            what = f"is {said(given)}, expected {expected[key]!r}"
+            what = f"is {quoted(given)}, expected {expected[key]!r}"
             raise ExchangeError(what, where=place, remedy=remedies[key])
     until = head["recorded_until"]
     if until is not None and not (type(until) is str and re.match(INSTANT, until)):
-        what = f"is {said(until)}, expected the instant of the latest entry, or null"
+        what = f"is {quoted(until)}, expected the instant of the latest entry, or null"
         raise ExchangeError(what, where=f"{name} $.recorded_until")
     if type(head["moma"]) is not str:
-        raise ExchangeError(f"is {said(head['moma'])}, expected the version of MOMA", where=f"{name} $.moma")
+        raise ExchangeError(
+            f"is {quoted(head['moma'])}, expected the version of MOMA", where=f"{name} $.moma"
+        )
 
 
 def head_schema() -> dict[str, Schema]:
-    """JSON Schema of each key of the head."""
+    """Return the JSON Schema of each key of the head."""
     return {
         "format": {"const": FORMAT, "description": "what the document is"},
         "format_version": {"const": FORMAT_VERSION, "description": "of the document's grammar"},

@@ -1,19 +1,19 @@
-"""The JSON Schema of a building document, from the tables and what is written of them.
+"""JSON Schema of a building document, derived from the tables, their attributes and docstrings.
 
-``python -m archmodel.exchange.document.json_schema`` prints ``docs/exchange.schema.json``.
+``python -m archmodel.exchange.json_schema`` prints ``docs/exchange.schema.json``.
 """
 
 import inspect
 import json
 import re
 import sys
-from importlib import import_module
 from typing import Any
 
 from archmodel.exchange.head import HEAD, TABLES, head_schema
 from archmodel.exchange.sections import Field, Section, sections
 from archmodel.exchange.values import NUMBER, Schema
-from archmodel.tables.entities import Entity, OwnAttribute
+from archmodel.tables.base import declared_attribute
+from archmodel.tables.entities import Entity
 from archmodel.tables.layout import SCHEMA_VERSION
 
 __all__ = ["building_schema", "schema_text"]
@@ -27,7 +27,7 @@ _DESCRIPTION = (
 
 
 def building_schema() -> Schema:
-    """JSON Schema, draft 2020-12, of the documents that this version writes and reads."""
+    """Return the JSON Schema, draft 2020-12, of the documents that this version writes and reads."""
     known = sections()
     tables = {
         "type": "object",
@@ -58,7 +58,7 @@ def building_schema() -> Schema:
 
 
 def schema_text() -> str:
-    """The schema as it is published."""
+    """Return the schema as it is published."""
     return json.dumps(building_schema(), indent=1, ensure_ascii=False) + "\n"
 
 
@@ -87,24 +87,23 @@ def _column(section: Section, field: Field, meanings: dict[str, str]) -> Schema:
     if not field.required and _NULL not in schema.get("anyOf", ()):
         others = schema["anyOf"] if [*schema] == ["anyOf"] else [schema]
         schema = {"anyOf": [*others, _NULL]}
-    said = [meanings.get(field.name) or meanings.get(field.name.removesuffix("_id"))]
-    said += [f"refers to {key.target_fullname}" for key in field.column.foreign_keys]
-    text = "; ".join(one for one in said if one)
+    parts = [meanings.get(field.name) or meanings.get(field.name.removesuffix("_id"))]
+    parts += [f"refers to {key.target_fullname}" for key in field.column.foreign_keys]
+    text = "; ".join(one for one in parts if one)
     return schema | {"description": text} if text else schema
 
 
 def _meanings(section: Section) -> dict[str, str]:
-    """What the docstrings of a table's classes say of its columns."""
+    """Return what attributes and docstrings of a table's classes say of its columns."""
     found: dict[str, str] = {}
     for mapper in section.mapper.self_and_descendants:
         if getattr(mapper.class_, "__users__", None) is not None:
             continue  # registered in an open database, not a part of MOMA
         for cls in (mapper.class_, *mapper.class_.__bases__):
             found = _documented(cls) | found
-        own: tuple[OwnAttribute, ...] = mapper.class_.__dict__.get("__own__", ())
-        found = {
-            one.name: f"{one.definition} [{one.unit}]" if one.unit else one.definition for one in own
-        } | found
+    for column in section.table.columns:
+        if (one := declared_attribute(column)) is not None:
+            found[column.name] = f"{one.definition} [{one.unit}]" if one.unit else one.definition
     return {**_OF_ALL, **found}
 
 
@@ -118,27 +117,20 @@ _OF_ALL = {
 
 
 def _documented(cls: type[Any]) -> dict[str, str]:
-    """What a class's docstring says of its attributes, or the docstring of another class to which it points."""
+    """Return what a class's docstring says of its attributes."""
     text = inspect.cleandoc(cls.__dict__.get("__doc__") or "")
-    found = {name: _plain(meaning, cls) for name, meaning in _entries(text).items()}
-    found = {name: meaning for name, meaning in found.items() if not _ELSEWHERE.match(meaning)}
-    for module, name in _ELSEWHERE.findall(text):
-        found = _documented(getattr(import_module(f"archmodel.{module}"), name)) | found
-    return found
-
-
-_ELSEWHERE = re.compile(r"as in ``(\w+)\.(\w+)``")
+    return {name: _plain(meaning, cls) for name, meaning in _entries(text).items()}
 
 
 def _plain(meaning: str, cls: type[Any]) -> str:
-    """In the words of JSON, with the names that a constant has."""
+    """Return a meaning in the words of JSON, with the values of constants that it names."""
     meaning = re.sub(r"\b(?:None|NaN)\b", "null", meaning)
     constants = vars(sys.modules[cls.__module__])
     return re.sub(r"\b[A-Z]{4,}\b", lambda word: ", ".join(constants.get(word[0], [word[0]])), meaning)
 
 
 def _entries(text: str) -> dict[str, str]:
-    """The entries of a section "Attributes" in numpydoc."""
+    """Return the entries of a numpydoc section "Attributes" by name."""
     match = re.search(r"^Attributes\n-+\n(.*?)(?:\n\n|\Z)", text, re.MULTILINE | re.DOTALL)
     found: dict[str, str] = {}
     for entry in re.split(r"\n(?=\S)", match[1]) if match else ():
@@ -149,8 +141,7 @@ def _entries(text: str) -> dict[str, str]:
 
 
 def _first_sentence(cls: type[Any]) -> str:
-    sentence = inspect.cleandoc(cls.__doc__ or "").partition("\n")[0]
-    return re.sub(r"[;,][^;,]* as in ``[^`]*``", "", sentence)
+    return inspect.cleandoc(cls.__doc__ or "").partition("\n")[0]
 
 
 if __name__ == "__main__":

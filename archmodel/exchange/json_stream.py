@@ -1,8 +1,8 @@
-"""The text of a JSON document, read forward one value at a time, each with its place.
+"""Text of a JSON document, read forward one value at a time, each with its place.
 
-The standard library's decoder reads the values. It is as fast as the event parsers that were tried, gives the same
-float64 back for every number whatever the locale, knows whole numbers of any size, sees keys that come twice and
-says where it stumbled.
+The standard library's decoder reads the values. It is as fast as the event parsers that were tried, returns the same
+float64 for every number whatever the locale, reads whole numbers of any size, detects repeated keys and reports the
+place of an error.
 """
 
 import codecs
@@ -22,13 +22,13 @@ VALUE_LIMIT = 1 << 28
 """Characters of the longest value: a stone with some four million points."""
 
 _LONGEST_WORD = 16
-"""An error this close to the end of what was read may come of a word, a number or an escape that was cut in two."""
+"""Errors this close to the end of what was read may come from a word, a number or an escape cut in two."""
 
 _BLANKS = re.compile(r"[ \t\r\n]*")
 
 
 class _Unreadable(ValueError):
-    """A value that is JSON by its grammar, but not for us."""
+    """A value that JSON's grammar allows and this program refuses."""
 
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -45,7 +45,7 @@ def _refuse_constant(word: str) -> NoReturn:
 
 
 def _ended(error: JSONDecodeError) -> bool:
-    """Whether the end of the document is the mistake."""
+    """Return whether the error is that the document ends."""
     rest = error.doc[error.pos :]
     if error.msg.startswith("Unterminated string") or (
         error.msg.startswith("Invalid \\") and '"' not in rest
@@ -55,7 +55,7 @@ def _ended(error: JSONDecodeError) -> bool:
 
 
 class JsonText:
-    """A document, with a place in it.
+    """A document with a current place in it.
 
     Parameters
     ----------
@@ -74,18 +74,18 @@ class JsonText:
 
     @property
     def line(self) -> int:
-        """Of the place, from 1."""
+        """Line of the place, from 1."""
         self._line += self._text.count("\n", self._counted, self._at)
         self._counted = self._at
         return self._line
 
     @property
     def consumed(self) -> int:
-        """Characters before the place."""
+        """Number of characters before the place."""
         return self._before + self._at
 
     def peek(self) -> str:
-        """The next character that is not blank; empty at the end."""
+        """Return the next character that is not blank; empty at the end."""
         while True:
             self._at = _BLANKS.match(self._text, self._at).end()  # type: ignore[union-attr]
             if self._at < len(self._text):
@@ -94,7 +94,7 @@ class JsonText:
                 return ""
 
     def take(self, *wanted: str) -> str:
-        """The next character that is not blank, which must be one of these; "" stands for the end."""
+        """Return the next character that is not blank, which must be one of these; "" stands for the end."""
         found = self.peek()
         if found not in wanted:
             expected = " or ".join(character or "the end" for character in wanted)
@@ -103,7 +103,7 @@ class JsonText:
         return found
 
     def value(self) -> Any:
-        """The next value, whole."""
+        """Return the next value, whole."""
         self.peek()
         while True:
             try:
@@ -126,16 +126,16 @@ class JsonText:
 
     @property
     def column(self) -> int:
-        """Of the place in its line, from 1."""
+        """Column of the place in its line, from 1."""
         newline = self._text.rfind("\n", 0, self._at)
         return self._at - newline if newline >= 0 else self._column + self._at
 
     def refuse(self, what: str, remedy: str | None = None) -> NoReturn:
-        """Say what is wrong here."""
+        """Raise an error at this place."""
         raise ExchangeError(what, where=f"{self._name}:{self.line} character {self.column}", remedy=remedy)
 
     def _cut(self, error: JSONDecodeError) -> bool:
-        """Whether the error may come of the text's not having been read further."""
+        """Return whether the error may vanish when more text is read."""
         return error.pos >= len(self._text) - _LONGEST_WORD or error.msg.startswith("Unterminated string")
 
     def _more(self) -> bool:

@@ -1,31 +1,32 @@
-"""A building document, read row by row into an empty database: all of it or nothing."""
+"""Import: a JSON document read row by row into an empty database, all of it or nothing."""
 
-import difflib
+import gzip
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, BinaryIO
 
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
+from archmodel.database.session import Database
 from archmodel.exchange.head import HEAD, TABLES, check_head
 from archmodel.exchange.json_stream import JsonText
-from archmodel.exchange.rows import Row, RowReader
+from archmodel.exchange.rows import Row, RowReader, nearest
 from archmodel.exchange.sections import Section, sections
 from archmodel.exchange.store import SectionStore
 from archmodel.tables.registered import RegisteredKind, declare_registered, release_registered
 from moma.errors import DatabaseError, ExchangeError
 
-__all__ = ["read_building"]
+__all__ = ["import_building"]
 
 
-def read_building(session: Session, stream: BinaryIO, name: str) -> dict[str, int]:
-    """Take in all that a document says.
+def import_building(path: str | Path, database: Database) -> dict[str, int]:
+    """Read a document into an empty database, all of it or nothing.
 
     Parameters
     ----------
-    session : a writing session of an empty database; after an error it must be rolled back
-    stream : of the document's bytes
-    name : of the document, for errors
+    path : of the document; compressed if it ends in ``.gz``
+    database : open, laid out, without rows
 
     Returns
     -------
@@ -35,8 +36,24 @@ def read_building(session: Session, stream: BinaryIO, name: str) -> dict[str, in
     Raises
     ------
     ExchangeError
-        at the JSON path and the line, if anything is wrong
+        if the database is not empty, or anything in the document is wrong
+    DatabaseError
+        if the database cannot be written
     """
+    path = Path(path)
+    try:
+        file = path.open("rb")
+    except OSError as error:
+        raise ExchangeError(f"it cannot be read: {error.strerror}", where=str(path)) from error
+    with file, database.session() as session:
+        if path.suffix == ".gz":
+            with gzip.GzipFile(fileobj=file, mode="rb") as stream:
+                return _read_building(session, stream, str(path))  # type: ignore[arg-type]
+        return _read_building(session, file, str(path))
+
+
+def _read_building(session: Session, stream: BinaryIO, name: str) -> dict[str, int]:
+    """Read a document; after an error the session must be rolled back."""
     _refuse_filled(session)
     text = JsonText(stream, name)
     try:
@@ -60,7 +77,7 @@ def _refuse_filled(session: Session) -> None:
 
 
 def _read_head(text: JsonText, name: str) -> None:
-    """Up to the value of `TABLES`."""
+    """Read up to the value of `TABLES`."""
     head: dict[str, Any] = {}
     text.take("{")
     if text.peek() != "}":
@@ -76,24 +93,20 @@ def _read_head(text: JsonText, name: str) -> None:
 
 
 def _key(text: JsonText, before: dict[str, Any], known: Sequence[str]) -> str:
-    """The next key of an object, and its colon."""
+    """Return the next key of an object, past its colon."""
     if text.peek() != '"':
         text.take('"')
     key = str(text.value())
     if key in before:
         text.refuse(f"the key {key} comes twice")
     if key not in known:
-        near = difflib.get_close_matches(key[:40], known, n=1)
-        text.refuse(
-            f"unknown key {key[:40]!a}",
-            f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}",
-        )
+        text.refuse(f"unknown key {key[:40]!a}", nearest(key, known))
     text.take(":")
     return key
 
 
 def _read_tables(session: Session, text: JsonText, name: str) -> dict[str, int]:
-    """The sections, which come in our order, so that references can be checked at once."""
+    """Read the sections, whose order is fixed so that references can be checked at once."""
     known = [section.name for section in sections()]
     counts: dict[str, int] = {}
     kinds: set[str] = set()
@@ -137,7 +150,7 @@ def _read_section(session: Session, section: Section, text: JsonText, name: str,
 
 
 def _declare(session: Session, name: str) -> None:
-    """Let the registered kinds be kinds, so that entities can be of them."""
+    """Declare the registered kinds, so that entities can be of them."""
     try:
         declare_registered(session)
     except DatabaseError as error:

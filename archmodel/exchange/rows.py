@@ -1,24 +1,24 @@
-"""One row of a building document, checked and made a row of its table."""
+"""Rows of a building document, checked and converted to rows of tables."""
 
 import difflib
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from archmodel.exchange.json_types import Mismatch
 from archmodel.exchange.sections import Section
-from archmodel.exchange.values import said
+from archmodel.exchange.values import Mismatch, quoted
 from archmodel.query.grammar import parse
 from archmodel.tables.entities import Entity
 from archmodel.tables.registered import RegisteredKind
 from moma.errors import ExchangeError, QueryError
 
-__all__ = ["Row", "RowReader", "said_key"]
+__all__ = ["Row", "RowReader", "nearest", "quoted_key"]
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A row, and where it came from.
+    """A row and its place in the document.
 
     Attributes
     ----------
@@ -36,12 +36,12 @@ class Row:
     line: int
 
     def wrong(self, what: str, path: str = "", remedy: str | None = None) -> ExchangeError:
-        """An error at this row, or within it."""
+        """Return an error at this row, or within it."""
         return ExchangeError(what, where=f"{self.document}:{self.line} {self.path}{path}", remedy=remedy)
 
 
 class RowReader:
-    """Reads the rows of one section.
+    """Reader of the rows of one section.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class RowReader:
         self._kinds = _built_in(section)
 
     def read(self, given: Any, index: int, line: int) -> Row:
-        """The row at this index of the section, at this line.
+        """Return the row at this index of the section, at this line.
 
         Raises
         ------
@@ -73,7 +73,7 @@ class RowReader:
         """
         row = Row({}, {}, {}, self._document, f"$.tables.{self._section.name}[{index}]", line)
         if type(given) is not dict:
-            raise row.wrong(f"is {said(given)}, expected an object")
+            raise row.wrong(f"is {quoted(given)}, expected an object")
         for name, decode, required, within in self._fields:
             value = given.pop(name, None)
             if value is None:
@@ -97,19 +97,17 @@ class RowReader:
         for name, value in rest.items():
             if name not in self._labels:
                 known = [field.name for field in self._section.fields] + sorted(self._labels)
-                near = difflib.get_close_matches(name[:40], known, n=1)
-                remedy = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"
-                raise row.wrong(f"unknown key {name[:40]!a}", remedy=remedy)
+                raise row.wrong(f"unknown key {name[:40]!a}", remedy=nearest(name, known))
             if type(value) is not str:
-                raise row.wrong(f"is {said(value)}, expected a text", f".{name}")
+                raise row.wrong(f"is {quoted(value)}, expected a text", f".{name}")
             row.labels[name] = value
 
     def _check_order(self, row: Row) -> None:
-        """Rows come in the order of their keys, so none comes twice."""
+        """Refuse rows that are not in the order of their keys; so none comes twice."""
         key = tuple(row.values[name] for name in self._section.key)
         if self._last is not None and key <= self._last:
             names = ", ".join(self._section.key)
-            what = f"{names} {said_key(key)} comes after {said_key(self._last)}"
+            what = f"{names} {quoted_key(key)} comes after {quoted_key(self._last)}"
             raise row.wrong(what, remedy=f"sort the rows by {names}, each once")
         self._last = key
         # What refers to an earlier row can be stored as it is.
@@ -127,22 +125,23 @@ class RowReader:
             return
         kind = row.values[self._kind]
         if kind not in self._kinds and not (self._of_entities and kind in self._registered):
-            near = difflib.get_close_matches(kind[:40], self._kinds, n=1)
-            remedy = f"did you mean {near[0]}?" if near else f"known are {', '.join(sorted(self._kinds))}"
-            raise row.wrong(f"is {said(kind)}, which is no kind", f".{self._kind}", remedy)
+            remedy = nearest(kind, sorted(self._kinds))
+            raise row.wrong(f"is {quoted(kind)}, which is no kind", f".{self._kind}", remedy)
 
 
 def _built_in(section: Section) -> frozenset[str]:
-    """The kinds of a table's rows, without those that open databases register."""
+    """Return the kinds of a table's rows, without those that open databases register."""
     classes = ((str(name), mapper.class_) for name, mapper in section.mapper.polymorphic_map.items())
     return frozenset(name for name, cls in classes if getattr(cls, "__users__", None) is None)
 
 
 def _check_registered(row: Row) -> None:
-    """A registered kind can be asked for, and its proportions too."""
+    """Refuse a registered kind that queries could not name, or with proportions that they could not parse."""
     name, canon = row.values["name"], row.values["canon"]
     if not re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", name):
-        raise row.wrong(f"is {said(name)}, which is not the name of a kind", ".name", "as corner_merlon, say")
+        raise row.wrong(
+            f"is {quoted(name)}, which is not the name of a kind", ".name", "as corner_merlon, say"
+        )
     try:
         if canon is not None:
             parse(canon)
@@ -150,6 +149,12 @@ def _check_registered(row: Row) -> None:
         raise row.wrong(str(error), ".canon") from None
 
 
-def said_key(key: tuple[Any, ...]) -> str:
-    """A key as an error quotes it."""
-    return ", ".join(said(part) for part in key)
+def quoted_key(key: tuple[Any, ...]) -> str:
+    """Return a key as an error quotes it."""
+    return ", ".join(quoted(part) for part in key)
+
+
+def nearest(name: str, known: Sequence[str]) -> str:
+    """Return the remedy for an unknown name: the known one that is most like it, or all."""
+    near = difflib.get_close_matches(name[:40], known, n=1)
+    return f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"

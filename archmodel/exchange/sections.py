@@ -1,19 +1,18 @@
-"""The sections of a building document: one for each table, derived from the table's metadata.
+"""Sections of a building document, one for each table, derived from the table's metadata.
 
 A new column or table needs nothing here, unless its type has no form in JSON yet.
 """
 
-import inspect
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, get_args
+from typing import Any
 
 from sqlalchemy import Column, Table
 from sqlalchemy.orm import Mapper
 
 from archmodel.exchange.values import Value, value_of
-from archmodel.tables.base import Base
+from archmodel.tables.base import Base, annotation_of
 from archmodel.tables.entities import Entity
 from archmodel.tables.layout import SchemaVersion
 from archmodel.tables.registered import RegisteredKind
@@ -30,12 +29,12 @@ _READING_ORDER = (
     "knowledge",
     "runs",
 )
-"""Modules of archmodel, in the order in which a reader wants their tables, as far as references allow it."""
+"""Modules of `archmodel.tables`, in the order in which a reader wants their tables, as far as references allow."""
 
 
 @dataclass(frozen=True)
 class Label:
-    """The code or name of the row that a reference is to, written beside the number for those who read.
+    """Code or name of the row that a reference is to, written beside the number for human readers.
 
     Attributes
     ----------
@@ -94,26 +93,26 @@ class Section:
 
     @property
     def labels(self) -> tuple[Label, ...]:
-        """Of all fields."""
+        """Labels of all fields."""
         return tuple(field.label for field in self.fields if field.label is not None)
 
 
 @cache
 def sections() -> tuple[Section, ...]:
-    """All sections, in an order in which what a row refers to comes before it."""
+    """Return all sections, in an order in which every row comes after what it refers to."""
     mappers = {mapper.local_table: mapper.base_mapper for mapper in Base.registry.mappers}
     return tuple(_section(table, mappers[table]) for table in _ordered(mappers))
 
 
 def _ordered(mappers: dict[Any, Mapper[Any]]) -> Iterator[Table]:
-    """Tables, what they refer to first; among those that could come next, the first in reading order."""
+    """Yield tables after what they refer to; of those that could come next, the first in reading order."""
 
     def rank(table: Table) -> tuple[int, int]:
         module = mappers[table].class_.__module__.rpartition(".")[2]
         known = module in _READING_ORDER
         return _READING_ORDER.index(module) if known else len(_READING_ORDER), declared.index(table)
 
-    # The version of the layout is said in the head.
+    # The version of the layout is in the head.
     declared = [table for table in Base.metadata.tables.values() if table is not SchemaVersion.__table__]
     waiting = sorted(declared, key=rank)
     while waiting:
@@ -123,7 +122,7 @@ def _ordered(mappers: dict[Any, Mapper[Any]]) -> Iterator[Table]:
 
 
 def _needs(table: Table) -> set[Table]:
-    """Tables that must come before this one."""
+    """Return the tables that must come before this one."""
     needed = {key.column.table for key in table.foreign_keys} - {table}
     # Kinds are known by name, without a foreign key.
     return needed | {RegisteredKind.__table__} if table is Entity.__table__ else needed  # type: ignore[arg-type]
@@ -140,29 +139,19 @@ def _field(column: Column[Any], mapper: Mapper[Any]) -> Field:
     target = next((key.column for key in column.foreign_keys), None)
     within = target is not None and target.table is column.table
     label = None if target is None or within else _label(column, target)
-    value = value_of(column, _annotation(column, mapper))
+    value = value_of(column, annotation_of(column, mapper))
     return Field(column.name, column, value, not column.nullable, label, within)
 
 
 def _label(column: Column[Any], target: Column[Any]) -> Label | None:
-    told = next(
+    column_shown = next(
         (target.table.columns[name] for name in ("code", "name") if name in target.table.columns), None
     )
-    if told is None:
+    if column_shown is None:
         return None
     name = column.name.removesuffix("_id")
     if name in column.table.columns:
         raise TypeError(
-            f"{column.table.name} has a column {name} where the document has the {told.name} of {column}"
+            f"{column.table.name} has a column {name} where the document has the {column_shown.name} of {column}"
         )
-    return Label(name, column, told, target)
-
-
-def _annotation(column: Column[Any], mapper: Mapper[Any]) -> object:
-    """The Python type that a column is declared with, without ``Mapped``; object if it is not known."""
-    for one in mapper.self_and_descendants:
-        for cls in one.class_.__mro__:
-            declared = inspect.get_annotations(cls).get(column.key)
-            if declared is not None and get_args(declared):
-                return get_args(declared)[0]
-    return object
+    return Label(name, column, column_shown, target)

@@ -1,4 +1,4 @@
-"""Rows of one section into the database, many at a time, each refusal brought back to its row."""
+"""Storing the rows of a section, many at a time, with each refusal traced to its row."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -8,9 +8,9 @@ from sqlalchemy import Column, UniqueConstraint, bindparam, select, update
 from sqlalchemy.exc import DataError, DBAPIError, IntegrityError, StatementError
 from sqlalchemy.orm import Session
 
-from archmodel.exchange.rows import Row, said_key
+from archmodel.exchange.rows import Row, quoted_key
 from archmodel.exchange.sections import Label, Section
-from archmodel.exchange.values import said
+from archmodel.exchange.values import quoted
 from archmodel.store.bulk import BATCH, insert_rows
 from moma.errors import ExchangeError
 
@@ -19,11 +19,11 @@ __all__ = ["SectionStore"]
 Values = dict[str, Any]
 
 WEIGHT = 1 << 22
-"""Characters of the document that are stored at once at the most, whatever the number of rows."""
+"""Most characters of the document that are stored at once, whatever the number of rows."""
 
 
 class SectionStore:
-    """Stores the rows of one section in their order.
+    """Store of the rows of one section, in their order.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class SectionStore:
         self._later: list[Row] = []
 
     def add(self, row: Row, weight: int) -> None:
-        """Store a row, sooner or later.
+        """Take a row, to be stored with others.
 
         Parameters
         ----------
@@ -55,7 +55,7 @@ class SectionStore:
             self._store()
 
     def finish(self) -> None:
-        """Store what waits, then the references to rows that came later."""
+        """Store the remaining rows, then the references to rows that came later."""
         self._store()
         for start in range(0, len(self._later), BATCH):
             self._refer(self._later[start : start + BATCH])
@@ -65,7 +65,7 @@ class SectionStore:
                 self._refuse_rings(field.column)
 
     def _refuse_rings(self, column: Column[Any]) -> None:
-        """Nothing is a part or a successor of itself, be it by way of others."""
+        """Refuse rows that are parts or successors of themselves, even by way of others."""
         key = self._section.table.c[self._section.key[0]]
         pairs = self._session.execute(select(key, column).where(column.is_not(None)))
         target: dict[Any, Any] = {number: other for number, other in pairs}  # noqa: C416
@@ -92,22 +92,22 @@ class SectionStore:
         insert_rows(self._session, self._section.mapper.class_, [row.values for row in rows])
 
     def _check_label(self, label: Label, rows: Sequence[Row]) -> None:
-        """What a reference is said to be to is what it is to."""
+        """Refuse a reference whose label is not that of the row it refers to."""
         name, key = label.column.name, label.name
-        told = [row for row in rows if key in row.labels]
-        wanted = {row.values[name] for row in told} - {None}
-        if not told:
+        labelled = [row for row in rows if key in row.labels]
+        wanted = {row.values[name] for row in labelled} - {None}
+        if not labelled:
             return
         pairs = select(label.number, label.target).where(label.number.in_(wanted))
         found: dict[Any, str] = {number: code for number, code in self._session.execute(pairs)}  # noqa: C416
-        for row in told:
+        for row in labelled:
             number, code = row.values[name], row.labels[key]
             if number is None:
-                raise row.wrong(f"is {said(code)}, but {name} is null", f".{key}")
+                raise row.wrong(f"is {quoted(code)}, but {name} is null", f".{key}")
             if number not in found:
                 raise row.wrong(f"there is no {label.target.table.name} {number}", f".{name}")
             if found[number] != code:
-                what = f"is {said(code)}, but {name} {number} is {said(found[number])}"
+                what = f"is {quoted(code)}, but {name} {number} is {quoted(found[number])}"
                 raise row.wrong(what, f".{key}", f"correct one of them, or leave {key} out")
 
     def _refer(self, rows: Sequence[Row]) -> None:
@@ -129,7 +129,7 @@ class SectionStore:
     def _run(
         self, execute: Callable[[Sequence[Row]], None], rows: Sequence[Row], values: list[Values]
     ) -> None:
-        """All at once; if the database refuses, one by one to find out which row it is."""
+        """Store all rows at once; if the database refuses, one by one to find the row."""
         if self._try(execute, rows) is None:
             return
         for row, columns in zip(rows, values, strict=True):
@@ -138,7 +138,7 @@ class SectionStore:
         raise rows[0].wrong("the database refuses this row together with those after it")
 
     def _try(self, execute: Callable[[Sequence[Row]], None], rows: Sequence[Row]) -> Exception | None:
-        """Execute it, or undo it and say why the rows are refused."""
+        """Execute it; if the rows are refused, undo it and return the error."""
         try:
             with self._session.begin_nested():
                 execute(rows)
@@ -149,24 +149,26 @@ class SectionStore:
         return None
 
     def _refusal(self, row: Row, values: Values, error: Exception) -> ExchangeError:
-        """Why the database refuses the values of a row, at its place."""
+        """Return the reason why the database refuses a row, at its place."""
         for field in self._section.fields:
             target = values.get(field.name)
             for key in field.column.foreign_keys if target is not None else ():
                 if self._session.scalar(select(key.column).where(key.column == target)) is None:
-                    return row.wrong(f"there is no {key.column.table.name} {said(target)}", f".{field.name}")
+                    return row.wrong(
+                        f"there is no {key.column.table.name} {quoted(target)}", f".{field.name}"
+                    )
         for columns, where in self._unique():
             if (other := self._same(row, columns, where)) is not None:
                 names = ", ".join(column.name for column in columns)
-                mine = said_key(tuple(row.values[column.name] for column in columns))
-                what = f"{names} {mine} is also that of {', '.join(self._section.key)} {said_key(other)}"
+                mine = quoted_key(tuple(row.values[column.name] for column in columns))
+                what = f"{names} {mine} is also that of {', '.join(self._section.key)} {quoted_key(other)}"
                 return row.wrong(what, remedy="each may be there once")
         cause = error.orig if isinstance(error, StatementError) else error
         lines = str(cause).strip().splitlines() or [type(cause).__name__]
         return row.wrong(f"the database refuses this row: {lines[0]}")
 
     def _unique(self) -> Iterator[tuple[list[Column[Any]], Any]]:
-        """What must be unique: columns, and the condition on the rows for which it holds, or None."""
+        """Yield what must be unique: columns, and the condition on the rows concerned, or None."""
         for constraint in self._section.table.constraints:
             if isinstance(constraint, UniqueConstraint):
                 yield [*constraint.columns], None
@@ -175,7 +177,7 @@ class SectionStore:
                 yield [*index.columns], index.dialect_options["sqlite"]["where"]
 
     def _same(self, row: Row, columns: list[Column[Any]], where: Any) -> tuple[Any, ...] | None:
-        """The key of another row with the values that must be unique."""
+        """Return the key of another row with the same unique values."""
         if not {column.name for column in columns} <= row.values.keys():
             return None  # only a reference was to be set
         if where is not None and row.values["superseded_id"] is not None:

@@ -1,29 +1,29 @@
-"""How the value of a column is written in JSON and read again, for each type of column.
+"""Forms of column values in JSON, by the type of the column, for writing and reading.
 
-A null of the database is not written at all, so what is here never sees None.
+A null of the database is not written at all, so no function here meets None.
 """
 
 import math
 import re
-from collections.abc import Callable
+import types
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
 from itertools import chain
-from typing import Any
+from typing import Any, Union, get_args, get_origin
 
 import numpy as np
 from sqlalchemy import JSON, Boolean, Column, Date, Float, Integer, String
 
 from archmodel.arrays import Array
-from archmodel.exchange.json_types import JsonShape, Mismatch
 from archmodel.tables.base import ArrayType, UtcDateTime
 
-__all__ = ["INSTANT", "NUMBER", "Schema", "Value", "said", "value_of"]
+__all__ = ["INSTANT", "NUMBER", "Mismatch", "Schema", "Value", "quoted", "value_of"]
 
 Schema = dict[str, Any]
 
 INFINITIES = {"Infinity": math.inf, "-Infinity": -math.inf}
-"""JSON has no word for them."""
+"""Infinite numbers, for which JSON has no word."""
 
 INTEGERS = (-(2**63), 2**63 - 1)
 
@@ -34,13 +34,27 @@ NUMBER: Schema = {"anyOf": [{"type": "number"}, {"enum": list(INFINITIES)}]}
 _REFERENCE: Schema = {"$ref": "#/$defs/number"}
 
 
-@dataclass(frozen=True)
-class Value:
-    """How the values of one column are written.
+class Mismatch(ValueError):
+    """A value that does not suit its column.
 
     Attributes
     ----------
-    encode : from the database's value to one that JSON can say
+    what : "is …, expected …"
+    path : from the value to the place in it, as "[3][1]"
+    """
+
+    def __init__(self, what: str, path: str = "") -> None:
+        super().__init__(path, what)
+        self.what, self.path = what, path
+
+
+@dataclass(frozen=True)
+class Value:
+    """Form of the values of one column.
+
+    Attributes
+    ----------
+    encode : from the database's value to one that JSON can hold
     decode : back, bit for bit; raises Mismatch
     schema : JSON Schema of what is written
     """
@@ -51,7 +65,7 @@ class Value:
 
 
 def value_of(column: Column[Any], annotation: object = object) -> Value:
-    """How a column is written.
+    """Return the form of a column's values.
 
     Parameters
     ----------
@@ -67,10 +81,10 @@ def value_of(column: Column[Any], annotation: object = object) -> Value:
     if isinstance(kind, ArrayType):
         return _array(kind.shape)
     if isinstance(kind, JSON):
-        shape = JsonShape.of(annotation)
+        shape = _shape_of(annotation)
         return Value(shape.checked, shape.checked, shape.schema)
-    for types, value in _SIMPLE:
-        if isinstance(kind, types):
+    for column_types, value in _SIMPLE:
+        if isinstance(kind, column_types):
             return value
     raise TypeError(f"{column}: there is no JSON form for {kind!r}; declare one in {__name__}")
 
@@ -81,7 +95,7 @@ def _same(value: Any) -> Any:
 
 def _text(given: Any) -> str:
     if type(given) is not str:
-        raise Mismatch(f"is {said(given)}, expected a text")
+        raise Mismatch(f"is {quoted(given)}, expected a text")
     if not given.isascii() and any("\ud800" <= letter <= "\udfff" for letter in given):
         raise Mismatch("has half of a surrogate pair, which no database can keep")
     return given
@@ -89,13 +103,13 @@ def _text(given: Any) -> str:
 
 def _integer(given: Any) -> int:
     if type(given) is not int or not INTEGERS[0] <= given <= INTEGERS[1]:
-        raise Mismatch(f"is {said(given)}, expected a whole number of 64 bits")
+        raise Mismatch(f"is {quoted(given)}, expected a whole number of 64 bits")
     return given
 
 
 def _boolean(given: Any) -> bool:
     if type(given) is not bool:
-        raise Mismatch(f"is {said(given)}, expected true or false")
+        raise Mismatch(f"is {quoted(given)}, expected true or false")
     return given
 
 
@@ -117,7 +131,7 @@ def _number(given: Any) -> float:
             pass
     elif type(given) is str and given in INFINITIES:
         return INFINITIES[given]
-    raise Mismatch(f"is {said(given)}, expected a number of 64 bits")
+    raise Mismatch(f"is {quoted(given)}, expected a number of 64 bits")
 
 
 def _date(given: Any) -> date:
@@ -126,7 +140,7 @@ def _date(given: Any) -> date:
             return date.fromisoformat(given)
         except ValueError:
             pass
-    raise Mismatch(f'is {said(given)}, expected a date, as "2024-05-31"')
+    raise Mismatch(f'is {quoted(given)}, expected a date, as "2024-05-31"')
 
 
 def _written_instant(value: datetime) -> str:
@@ -139,7 +153,7 @@ def _instant(given: Any) -> datetime:
             return datetime.fromisoformat(given)
         except ValueError:
             pass
-    raise Mismatch(f'is {said(given)}, expected an instant in UTC, as "2024-05-31T14:05:00Z"')
+    raise Mismatch(f'is {quoted(given)}, expected an instant in UTC, as "2024-05-31T14:05:00Z"')
 
 
 _SIMPLE: tuple[tuple[type[Any], Value], ...] = (
@@ -153,7 +167,7 @@ _SIMPLE: tuple[tuple[type[Any], Value], ...] = (
 
 
 def _array(shape: tuple[int, ...]) -> Value:
-    """An array as nested lists; null for NaN."""
+    """Return the form of an array: nested lists, with null for NaN."""
 
     def encode(array: Array) -> list[Any]:
         nested: list[Any] = array.tolist()
@@ -177,12 +191,12 @@ def _sayable(nested: Any) -> Any:
 
 
 def _flattened(given: Any, shape: tuple[int, ...], path: str) -> list[Any]:
-    """All numbers of nested lists of this shape, whatever they are."""
+    """Return the innermost values of nested lists of this shape, unchecked."""
     size = shape[0]
     if type(given) is not list or size not in (-1, len(given)):
         wanted = "a list of numbers" if len(shape) == 1 else f"a list of {_wording(shape[1:])}"
         count = "" if size == -1 else f", {size} of them"
-        raise Mismatch(f"is {said(given)}, expected {wanted}{count}", path)
+        raise Mismatch(f"is {quoted(given)}, expected {wanted}{count}", path)
     if len(shape) == 1:
         return given
     inner = shape[1]
@@ -197,7 +211,7 @@ def _wording(shape: tuple[int, ...]) -> str:
 
 
 def _read_one_by_one(given: Any, flat: list[Any], shape: tuple[int, ...]) -> Array:
-    """The slow way, for arrays with NaN, infinities, whole numbers, and mistakes, which it locates."""
+    """Read the slow way arrays with NaN, infinities, whole numbers, and mistakes, which it locates."""
     array = np.empty(len(flat))
     for index, item in enumerate(flat):
         try:
@@ -216,8 +230,114 @@ def _array_schema(shape: tuple[int, ...]) -> Schema:
     return schema if shape[0] == -1 else schema | {"minItems": shape[0], "maxItems": shape[0]}
 
 
-def said(given: Any) -> str:
-    """A value as an error quotes it: short, whatever it is."""
+@dataclass(frozen=True)
+class _Shape:
+    """Condition on a JSON value.
+
+    Attributes
+    ----------
+    name : in words
+    fits : whether a value is of this kind, without its items
+    items : the items of a value, each with its step in the path and its shape
+    schema : the same condition as JSON Schema
+    """
+
+    name: str
+    fits: Callable[[Any], bool]
+    items: Callable[[Any], Iterable[tuple[str, Any, "_Shape"]]]
+    schema: Schema
+
+    def checked(self, value: Any) -> Any:
+        """Return the value itself; raise Mismatch unless it is of this shape."""
+        if not self.fits(value):
+            found = "null" if value is None else type(value).__name__
+            raise Mismatch(f"is {_JSON_NAMES.get(found, found)}, expected {self.name}")
+        for step, item, shape in self.items(value):
+            try:
+                shape.checked(item)
+            except Mismatch as wrong:
+                raise Mismatch(wrong.what, step + wrong.path) from None
+        return value
+
+
+_JSON_NAMES = {
+    "dict": "an object",
+    "list": "a list",
+    "str": "a text",
+    "bool": "true or false",
+    "int": "a number",
+    "float": "a number",
+}
+
+_PLAIN: dict[object, tuple[str, frozenset[type[Any]], Schema]] = {
+    float: ("a number", frozenset({float, int}), {"type": "number"}),
+    int: ("a whole number", frozenset({int}), {"type": "integer"}),
+    str: ("a text", frozenset({str}), {"type": "string"}),
+    bool: ("true or false", frozenset({bool}), {"type": "boolean"}),
+    types.NoneType: ("null", frozenset({types.NoneType}), {"type": "null"}),
+}
+
+
+def _shape_of(annotation: object) -> _Shape:
+    """Return the shape that a type annotation describes: numbers, texts, lists, tuples, dicts, unions, object."""
+    if annotation in (object, Any):
+        return _Shape("any value", lambda value: True, _no_items, {})
+    if annotation in _PLAIN:
+        name, kinds, schema = _PLAIN[annotation]
+        return _Shape(name, lambda value: type(value) in kinds, _no_items, schema)
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    shapes = [_shape_of(one) for one in arguments]
+    if origin in (types.UnionType, Union):
+        return _union(shapes)
+    if origin is list:
+        (item,) = shapes
+        return _Shape(
+            "a list",
+            lambda value: type(value) is list,
+            lambda value: ((f"[{index}]", one, item) for index, one in enumerate(value)),
+            {"type": "array", "items": item.schema},
+        )
+    if origin is dict and arguments[0] is str:
+        item = shapes[1]
+        return _Shape(
+            "an object",
+            lambda value: type(value) is dict,
+            lambda value: ((f".{ascii(key[:40])[1:-1]}", one, item) for key, one in value.items()),
+            {"type": "object"} | ({"additionalProperties": item.schema} if item.schema else {}),
+        )
+    if origin is tuple:
+        return _tuple(shapes)
+    raise TypeError(f"there is no JSON form for {annotation!r}")
+
+
+def _no_items(value: Any) -> tuple[()]:
+    return ()
+
+
+def _tuple(shapes: list[_Shape]) -> _Shape:
+    size = len(shapes)
+    schema = {"prefixItems": [shape.schema for shape in shapes], "minItems": size, "maxItems": size}
+    return _Shape(
+        f"a list of {size}",
+        lambda value: type(value) is list and len(value) == size,
+        lambda value: (
+            (f"[{i}]", one, shape) for i, (one, shape) in enumerate(zip(value, shapes, strict=True))
+        ),
+        {"type": "array", **schema},
+    )
+
+
+def _union(options: list[_Shape]) -> _Shape:
+    return _Shape(
+        " or ".join(option.name for option in options),
+        lambda value: any(option.fits(value) for option in options),
+        lambda value: [("", value, next(option for option in options if option.fits(value)))],
+        {"anyOf": [option.schema for option in options]},
+    )
+
+
+def quoted(given: Any) -> str:
+    """Return a value as an error quotes it, always short."""
     if isinstance(given, list):
         return f"a list of {len(given)}"
     if isinstance(given, dict):

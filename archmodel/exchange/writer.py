@@ -1,29 +1,86 @@
-"""A building document, written row by row: one line for each row, whatever the size of the database."""
+"""Export: a whole database as one JSON document, written row by row.
 
+``docs/exchange.md`` describes the document, and how to read it without MOMA.
+"""
+
+import gzip
 import json
+import os
 from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, BinaryIO
 
 from sqlalchemy import Select, select
 from sqlalchemy.orm import Session
 
 from archmodel.exchange.head import TABLES, head_of
-from archmodel.exchange.json_types import Mismatch
 from archmodel.exchange.sections import Section, sections
+from archmodel.exchange.values import Mismatch
 from archmodel.tables.base import ArrayType
 from moma.errors import ExchangeError
 
-__all__ = ["write_building"]
+__all__ = ["export_building", "write_building"]
+
+COMPRESSION = 4
+"""Of gzip: higher levels take twice the time for a few percent."""
 
 ROWS, ROWS_WITH_ARRAYS = 1000, 100
-"""Rows that are fetched at once."""
+"""Numbers of rows that are fetched at once."""
 
 _READABLE = json.JSONEncoder(ensure_ascii=False, allow_nan=False)
 _ESCAPED = json.JSONEncoder(ensure_ascii=True, allow_nan=False)
 
 
+def export_building(session: Session, path: str | Path) -> dict[str, int]:
+    """Write a whole database into one document.
+
+    The document replaces an older one only when it is complete.
+
+    Parameters
+    ----------
+    session : a reading session, which sees one state of the database
+    path : of the document; compressed if it ends in ``.gz``
+
+    Returns
+    -------
+    dict
+        number of rows by section
+
+    Raises
+    ------
+    ExchangeError
+        if the file cannot be written, or a row holds a value without a JSON form
+    """
+    path = Path(path)
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with part.open("wb") as file:
+            with _compressed(file, path) as stream:
+                counts = write_building(session, stream)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+    except OSError as error:
+        raise ExchangeError(f"it cannot be written: {error.strerror}", where=str(path)) from error
+    finally:
+        part.unlink(missing_ok=True)
+    return counts
+
+
+@contextmanager
+def _compressed(file: BinaryIO, path: Path) -> Iterator[BinaryIO]:
+    """Open the stream that goes into the file."""
+    if path.suffix != ".gz":
+        yield file
+        return
+    # Without a name and a time, the same database gives the same bytes.
+    with gzip.GzipFile("", "wb", COMPRESSION, file, mtime=0) as stream:
+        yield stream  # type: ignore[misc]
+
+
 def write_building(session: Session, stream: BinaryIO) -> dict[str, int]:
-    """Write all that a database holds.
+    """Write a whole database to a stream.
 
     Parameters
     ----------
@@ -38,7 +95,7 @@ def write_building(session: Session, stream: BinaryIO) -> dict[str, int]:
     Raises
     ------
     ExchangeError
-        if a row holds what JSON cannot say
+        if a row holds a value without a JSON form
     """
     stream.write(b"{\n")
     for key, value in head_of(session).items():
@@ -64,7 +121,7 @@ def _write_section(session: Session, section: Section, stream: BinaryIO) -> int:
 
 
 def _lines(session: Session, section: Section) -> Iterator[bytes]:
-    """The rows in the order of their keys."""
+    """Yield the rows in the order of their keys, as lines."""
     columns = _columns(section)
     heavy = any(isinstance(field.column.type, ArrayType) for field in section.fields)
     options = {"yield_per": ROWS_WITH_ARRAYS if heavy else ROWS}
@@ -83,7 +140,7 @@ def _lines(session: Session, section: Section) -> Iterator[bytes]:
 
 
 def _statement(section: Section) -> Select[Any]:
-    """Every column, with the label of each reference behind it."""
+    """Select every column, each reference followed by its label."""
     chosen: list[Any] = []
     joined: Any = section.table
     for field in section.fields:
@@ -96,7 +153,7 @@ def _statement(section: Section) -> Select[Any]:
 
 
 def _columns(section: Section) -> list[tuple[str, Any]]:
-    """Key and encoder for each column of the statement."""
+    """Return key and encoder of each column of the statement."""
     columns: list[tuple[str, Any]] = []
     for field in section.fields:
         columns.append((field.name, field.value.encode))
@@ -109,12 +166,12 @@ def _encoded(row: dict[str, Any]) -> bytes:
     try:
         return _READABLE.encode(row).encode()
     except UnicodeEncodeError:
-        # Half of a surrogate pair, in a JSON column: JSON can say it, UTF-8 cannot.
+        # Half of a surrogate pair, in a JSON column: JSON can escape it, UTF-8 cannot encode it.
         return _ESCAPED.encode(row).encode()
 
 
 def _unsayable(section: Section, row: Any, columns: list[tuple[str, Any]], error: Exception) -> ExchangeError:
-    """Which value of the row it is."""
+    """Return the error that names the value without a JSON form."""
     key = ", ".join(f"{name} {value}" for name, value in zip(section.key, row, strict=False))
     place, what = f"{section.name} {key}", "is nested too deeply"
     for (name, encode), value in zip(columns, row, strict=True):

@@ -1,7 +1,6 @@
-"""How databases of older layouts become those of newer ones, and back; run by `archmodel.migrations.migrate`.
+"""Migration of databases between versions of the layout, up and down, run by Alembic.
 
-`layouts` holds the tables of each version as they were declared then, `versions` the steps between them. Nothing here
-may use the tables of the program as it is now: they change, these do not.
+Public: `Migration`, `migrate` (migrate); `begin_layout`, `carry`, `carry_rows`, `end_layout`, `read` (steps).
 """
 
 __all__: list[str] = []

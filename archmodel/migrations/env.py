@@ -1,4 +1,4 @@
-"""What Alembic runs to migrate: on the connection that it is given, in the transaction that is open there."""
+"""Alembic environment: migrates on the connection that it is given, in the transaction that is open there."""
 
 from alembic import context
 

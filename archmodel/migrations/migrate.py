@@ -1,4 +1,4 @@
-"""Databases of an older layout to the one of this program, and back: all of it, or nothing."""
+"""Databases carried to another version of the layout: all rows, or nothing changes."""
 
 import os
 import shutil
@@ -10,31 +10,31 @@ from pathlib import Path
 
 from alembic import command
 from alembic.config import Config
+from alembic.script import ScriptDirectory
 from sqlalchemy import Connection, Engine, inspect
 from sqlalchemy.exc import DBAPIError
 
 from archmodel.database.session import Home, home_of, version_of
 from archmodel.database.sqlite import SqliteFile
-from archmodel.migrations.versions import v2_frames_and_shapes, v3_architectural_model, v4_hypotheses
 from archmodel.tables.layout import SCHEMA_VERSION
 from moma.errors import DatabaseError, UsageError
 
 __all__ = ["Migration", "migrate"]
 
-_STEPS_DOWN = {4: v4_hypotheses, 3: v3_architectural_model, 2: v2_frames_and_shapes}
-"""What knows what is lost by a step down from a version."""
+VERSION_FOLDERS = ["archmodel:migrations/versions"]
+"""Folders of the scripts, as Alembic names them."""
 
 
 @dataclass(frozen=True)
 class Migration:
-    """What became of a database.
+    """Outcome of a migration.
 
     Attributes
     ----------
     url : without a password
-    before, after : versions of its layout; the same if there was nothing to do
-    backup : copy of the SQLite file as it was; None if there is none
-    lost : what the older layout could not hold, in words
+    before, after : versions of the layout; equal if there was nothing to do
+    backup : copy of the SQLite file made before; None on a server and where nothing was done
+    lost : descriptions of what the older layout could not hold
     """
 
     url: str
@@ -44,27 +44,26 @@ class Migration:
     lost: tuple[str, ...] = ()
 
 
-def migrate(
-    url: str, to: int = SCHEMA_VERSION, *, lossy: bool = False, lock_timeout: float = 10.0
-) -> Migration:
-    """Give a database the layout of a version.
+def migrate(url: str, to: int | None = None, *, lossy: bool = False, lock_timeout: float = 10.0) -> Migration:
+    """Migrate a database to a version of the layout.
 
-    Nobody else can write meanwhile. Of an SQLite file a copy is kept beside it.
+    The migration holds the write lock. A copy of an SQLite file is kept beside it.
 
     Parameters
     ----------
     url : of the database
-    to : the version
-    lossy : to an older version: drop what it cannot hold
+    to : the version; None: the newest
+    lossy : drop what an older version cannot hold
     lock_timeout : how long to wait for another program's lock [s]
 
     Raises
     ------
     UsageError
-        for a version that this program does not know; if something would be lost and `lossy` is not given
+        for an unknown version; if something would be lost and `lossy` is not given
     DatabaseError
-        if there is no MOMA database, or a newer one, or it refuses; it is as it was then
+        if there is no MOMA database, or it is newer than this program, or refuses; nothing is changed then
     """
+    to = SCHEMA_VERSION if to is None else to
     if not 1 <= to <= SCHEMA_VERSION:
         raise UsageError(
             f"version {to} of the layout is not known", remedy=f"name one up to {SCHEMA_VERSION}"
@@ -81,7 +80,7 @@ def migrate(
 
 
 def _migrate(connection: Connection, home: Home, to: int, lossy: bool) -> Migration:
-    """All of it, on a connection that holds the write lock."""
+    """Migrate on a connection that holds the write lock."""
     before = version_of(connection, home.place)
     if before is None:
         raise DatabaseError("the database is empty", where=home.place, remedy="there is nothing to migrate")
@@ -105,29 +104,33 @@ def _migrate(connection: Connection, home: Home, to: int, lossy: bool) -> Migrat
 
 
 def _run(connection: Connection, before: int, to: int) -> tuple[str, ...]:
-    """The steps of Alembic, each of which leaves the number of its version; what those down have lost."""
+    """Run the scripts, each of which records its version; return what those on the way down lost."""
     config = Config()
     config.set_main_option("script_location", "archmodel:migrations")
+    config.set_main_option("path_separator", "newline")
+    config.set_main_option("version_locations", "\n".join(VERSION_FOLDERS))
     config.attributes["connection"] = connection
     if not inspect(connection).has_table("alembic_version"):
         command.stamp(config, f"{before:04d}")
     if to > before:
         command.upgrade(config, f"{to:04d}")
         return ()
+    scripts = ScriptDirectory.from_config(config)
     lost: list[str] = []
     for version in range(before, to, -1):
-        lost += _STEPS_DOWN[version].losses(connection)
+        losses = getattr(scripts.get_revision(f"{version:04d}").module, "losses", None)
+        lost += losses(connection) if losses else ()
         command.downgrade(config, f"{version - 1:04d}")
     return tuple(lost)
 
 
 @contextmanager
 def _rebuilding(engine: Engine) -> Iterator[Connection]:
-    """A writing transaction in which SQLite lets tables be rebuilt: references are checked at its end, not within."""
+    """Open a writing transaction in which SQLite lets tables be rebuilt, without checks of references."""
     with engine.connect() as plain:
         if engine.dialect.name == "sqlite":
             cursor = plain.connection.cursor()
-            cursor.execute("PRAGMA foreign_keys = OFF")  # means nothing within a transaction
+            cursor.execute("PRAGMA foreign_keys = OFF")  # has no effect within a transaction
             cursor.close()
         connection = plain.execution_options(moma_read_only=False)
         with connection.begin():
@@ -135,7 +138,7 @@ def _rebuilding(engine: Engine) -> Iterator[Connection]:
 
 
 def _check_references(connection: Connection, place: str) -> None:
-    """SQLite: no row may refer to one that is not there."""
+    """Refuse rows that refer to missing ones; PostgreSQL checks this itself."""
     if connection.dialect.name != "sqlite":
         return
     if (broken := connection.exec_driver_sql("PRAGMA foreign_key_check").first()) is not None:
@@ -144,7 +147,7 @@ def _check_references(connection: Connection, place: str) -> None:
 
 
 def _copy_beside(file: Path, version: int) -> Path:
-    """A copy of an SQLite file under a name that nothing has yet: FILE.v1.bak, FILE.v1.2.bak, …"""
+    """Copy an SQLite file to the first free name of FILE.v1.bak, FILE.v1.2.bak, …"""
     number = 1
     while True:
         middle = f"v{version}" if number == 1 else f"v{version}.{number}"

@@ -1,6 +1,6 @@
-"""What migrations have in common: old tables are set aside, new ones made, rows carried over, the old ones dropped.
+"""Steps of a migration: set the old tables aside, make the new ones, carry the rows over, drop the old tables.
 
-So every layout that was migrated to is the same as one that was made afresh, to the names of its indexes.
+A migrated layout therefore equals a newly made one, down to the names of its indexes.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -16,7 +16,7 @@ _BATCH = 500  # rows: memory does not grow with the database
 
 
 def begin_layout(connection: Connection, before: MetaData, after: MetaData) -> Mapping[str, Table]:
-    """Set the tables of one layout aside and make those of the next; the old ones, by their old names."""
+    """Set the tables of one layout aside and make those of the next; return the old ones by their old names."""
     aside = {}
     for table in before.sorted_tables:
         if table.name != "moma_schema":
@@ -29,7 +29,7 @@ def begin_layout(connection: Connection, before: MetaData, after: MetaData) -> M
 
 
 def end_layout(connection: Connection, before: MetaData, after: MetaData, version: int) -> None:
-    """Drop the tables that were set aside, number further rows after those that are there, say the version."""
+    """Drop the tables set aside, continue the numbering of rows, and record the version."""
     for table in reversed(before.sorted_tables):
         if table.name != "moma_schema":
             connection.execute(text(f'DROP TABLE "{_ASIDE}{table.name}"'))
@@ -41,25 +41,25 @@ def end_layout(connection: Connection, before: MetaData, after: MetaData, versio
 
 
 def carry(connection: Connection, table: Table, rows: Select[Any]) -> None:
-    """Insert what a query finds, whose columns have the names of the table's."""
+    """Insert the rows of a query whose columns are named as those of the table."""
     names = [column.name for column in rows.selected_columns]
     connection.execute(insert(table).from_select(names, rows))
 
 
 def carry_rows(connection: Connection, table: Table, rows: Iterable[Mapping[str, Any]]) -> None:
-    """Insert rows that were worked on in Python, some at a time."""
+    """Insert rows that Python has changed, a batch at a time."""
     source = iter(rows)
     while batch := list(islice(source, _BATCH)):
         connection.execute(insert(table), batch)
 
 
 def read(connection: Connection, query: Select[Any]) -> Iterator[Row[Any]]:
-    """The rows that a query finds, some at a time."""
+    """Yield the rows of a query, fetched a batch at a time."""
     yield from connection.execute(query.execution_options(yield_per=_BATCH))
 
 
 def _set_aside(connection: Connection, table: Table) -> None:
-    """Rename a table, and everything of it whose name its successor needs."""
+    """Rename a table, with its keys, sequences and indexes, whose names its successor needs."""
     inspector = inspect(connection)
     for index in inspector.get_indexes(table.name):
         if "duplicates_constraint" not in index:
@@ -76,13 +76,14 @@ def _set_aside(connection: Connection, table: Table) -> None:
 
 
 def _sequence(connection: Connection, table: Table) -> str | None:
-    """The sequence that numbers a table's rows in PostgreSQL, if they have numbers of their own."""
+    """Return the PostgreSQL sequence that numbers a table's rows, if there is one."""
     if "id" not in table.columns:
         return None
     return connection.scalar(select(func.pg_get_serial_sequence(table.name, "id")))
 
 
 def _continue_numbers(connection: Connection, table: Table) -> None:
+    """Number further rows after the largest number there is."""
     last = connection.scalar(select(func.max(table.columns.id)))
     if last is not None:
         connection.execute(select(func.setval(_sequence(connection, table), last)))

@@ -1,10 +1,10 @@
 """Attributes that queries can ask for, and their places in the tables."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import ColumnElement, func
+from sqlalchemy import Boolean, ColumnElement, func
 from sqlalchemy.orm import Session
 
 from archmodel.query.columns import (
@@ -25,10 +25,11 @@ from archmodel.query.columns import (
 )
 from archmodel.query.scope import Scope
 from archmodel.store.run_record import STONE_VALUES
-from archmodel.tables.entities import Entity, OwnAttribute, kinds, own_attributes
+from archmodel.tables.base import Base, StoneAttribute, declared_attributes
+from archmodel.tables.entities import Entity, kinds, own_attributes
 from archmodel.tables.knowledge import Correction
-from archmodel.tables.runs import FIDELITIES, EntityResult
-from archmodel.tables.surveys import Measurement
+from archmodel.tables.runs import EntityResult
+from archmodel.tables.surveys import Measurement, Simplification
 
 __all__ = ["ATTRIBUTES", "Attribute", "attributes_of", "kinds_of", "own_attributes_of"]
 
@@ -67,57 +68,21 @@ class Attribute:
         return self.unit or ("true/false" if self.is_truth else "text")
 
 
-def _result(
-    name: str, unit: str | None, definition: str, value: Value, words: tuple[str, ...] | None = None
-) -> Attribute:
-    return Attribute(name, unit, definition, value, of_run=True, words=words)
+def _declared(cls: type[Base], place: Callable[[str], Value], of_run: bool = False) -> Iterator[Attribute]:
+    """Yield the attributes that the columns of a class declare, and the named numbers among their values."""
+    declared = {column.name: one for column, one in declared_attributes(cls.__mapper__)}
+    for column in cls.__mapper__.local_table.columns:
+        if (one := declared.get(column.name)) is not None:
+            is_truth = isinstance(column.type, Boolean)
+            value = place(column.name)
+            yield Attribute(one.name, one.unit, one.definition, value, of_run, one.words, is_truth)
+        elif cls is EntityResult and column.name == "values":
+            for name, (unit, meaning) in STONE_VALUES.items():
+                yield Attribute(name, unit, meaning, of_values(name), of_run)
 
-
-_BUILT = (
-    Attribute("code", None, "name of the stone in the survey", of_entity("code")),
-    Attribute("kind", None, "its own kind, e.g. keystone", of_entity("kind")),
-    Attribute("course", "-", "number of its course, from the ground", of_entity("course")),
-    Attribute("zone", None, "part of the building", of_entity("zone")),
-    Attribute("depth", "m", "how far it reaches into the wall", of_entity("depth")),
-    Attribute("depth_sigma", "m", "standard deviation of the depth", of_entity("depth_sigma")),
-    Attribute(
-        "depth_origin", None, "evidence: stone, rule, kind, structure or solid", of_entity("depth_origin")
-    ),
-    Attribute("depth_source", None, "that evidence in words", of_entity("depth_source")),
-    Attribute("length", "m", "horizontal extent of its face", of_entity("length")),
-    Attribute("height", "m", "extent of its face upwards", of_entity("height")),
-    Attribute("area", "m²", "area of its face", of_entity("area")),
-    Attribute("volume", "m³", "volume of its solid", of_entity("volume")),
-    Attribute("x", "m", "centroid of its solid", of_entity("x")),
-    Attribute("y", "m", "centroid of its solid", of_entity("y")),
-    Attribute("z", "m", "centroid of its solid", of_entity("z")),
-    Attribute(
-        "hypothesis",
-        None,
-        "nobody has seen it: missing, or hidden in the wall",
-        of_entity("hypothesis"),
-        is_truth=True,
-    ),
-)
 
 _MEASURED = (
-    Attribute(
-        "rms", "m", "root mean square distance of its points from the fitted plane", of_measurement("rms")
-    ),
-    Attribute("redundancy", "-", "accepted points minus 3", of_measurement("redundancy")),
-    Attribute("points", "-", "measured points on its face", of_measurement("point_count")),
-    Attribute("rejected", "-", "points left out as blunders", of_measurement("rejected_count")),
-    Attribute(
-        "shape", None, "of its face: plane, bevelled, curved, rough, untested", of_measurement("shape")
-    ),
-    Attribute(
-        "provenance",
-        None,
-        "of its face: points, photograph, solid or hypothesis",
-        of_measurement("provenance"),
-    ),
-    Attribute("station", None, "where the instrument stood", of_measurement("station")),
-    Attribute("photograph", None, "on which its face was drawn", of_measurement("photograph")),
+    *_declared(Measurement, of_measurement),
     Attribute(
         "survey", None, "name of the survey that measured it", lambda scope, run: scope.survey().c.name
     ),
@@ -178,47 +143,22 @@ _RELATED = (
 )
 
 _COMPUTED = (
-    _result("von_mises_max", "Pa", "largest Von Mises stress", of_result("von_mises_max")),
-    _result("von_mises_mean", "Pa", "mean Von Mises stress", of_result("von_mises_mean")),
-    _result("displacement_max", "m", "largest displacement", of_result("displacement_max")),
-    _result("contact_force_max", "N", "largest contact force", of_result("contact_force_max")),
-    *(_result(name, unit, meaning, of_values(name)) for name, (unit, meaning) in STONE_VALUES.items()),
-    _result("fidelity", None, "fixed, rigid or deformable", of_result("fidelity"), FIDELITIES),
-    _result(
-        "simplified_by",
-        "m",
-        "farthest that a corner of its solid was moved for the run",
-        of_simplification("displacement_max"),
-    ),
-    _result("solid_shape", None, "of its simplified solid, e.g. hexahedron", of_simplification("shape")),
-    _result(
-        "blockiness",
-        "-",
-        "what it and a hexahedron have in common, over what they fill together",
-        of_simplification("blockiness"),
-    ),
-    _result(
-        "worst_angle",
-        "rad",
-        "largest departure from a right angle between two faces of that solid",
-        of_simplification("worst_angle"),
-    ),
+    *_declared(EntityResult, of_result, of_run=True),
+    *_declared(Simplification, of_simplification, of_run=True),
     Attribute(
-        "within_tolerance",
+        "outcome",
         None,
-        "simplifying kept within what the survey can tell",
-        of_simplification("within_tolerance"),
+        "equilibrium, moving or collapsed",
+        lambda scope, run: scope.run(run).c.outcome,
         of_run=True,
-        is_truth=True,
     ),
-    _result("outcome", None, "equilibrium, moving or collapsed", lambda scope, run: scope.run(run).c.outcome),
-    _result("scene", None, "name of the scene", lambda scope, run: scope.run(run).c.scene),
+    Attribute("scene", None, "name of the scene", lambda scope, run: scope.run(run).c.scene, of_run=True),
     Attribute("run", "-", "number of the run that these are of", of_result("run_id")),
     Attribute("runs", "-", "runs that hold it", rows(EntityResult, "entity_id", now=False)),
 )
 
 ATTRIBUTES: Mapping[str, Attribute] = {
-    one.name: one for one in (*_BUILT, *_MEASURED, *_KNOWN, *_RELATED, *_COMPUTED)
+    one.name: one for one in (*_declared(Entity, of_entity), *_MEASURED, *_KNOWN, *_RELATED, *_COMPUTED)
 }
 """The attributes of every entity by name."""
 
@@ -260,7 +200,7 @@ def own_attributes_of(
     return found
 
 
-def _own(own: OwnAttribute) -> Attribute:
+def _own(own: StoneAttribute) -> Attribute:
     """Make the attribute of a kind: in a column or, for a registered kind, in the entity's JSON."""
 
     def value(scope: Scope, run: int | None) -> ColumnElement[Any]:

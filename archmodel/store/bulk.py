@@ -1,4 +1,4 @@
-"""Many rows at once: numbers for them, and the shortest way into the tables."""
+"""Bulk inserts: primary keys and the fastest way into the tables."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import chain, islice
@@ -21,15 +21,15 @@ Row = tuple[Any, ...]
 
 
 def first_free_id(session: Session, table: type[Base]) -> int:
-    """A primary key from which on all are free, in a writing session, which nobody else writes beside."""
+    """Return a primary key from which on all are free; the session's write lock keeps them free."""
     return int(session.scalar(select(func.coalesce(func.max(_table(table).c.id), 0))) or 0) + 1
 
 
 def insert_rows(session: Session, table: type[Base], rows: Iterable[Mapping[str, Any]]) -> int:
-    """Insert rows that all have the same columns, primary keys included; how many they were.
+    """Insert rows that all have the same columns, primary keys included; return their number.
 
-    Rows are not kept: the source may be as long as it likes. They go around SQLAlchemy's statements, which
-    take as long as all the rest of a row's way; its types still convert the values.
+    Rows are not kept, so that the source may have any length. They bypass SQLAlchemy's statements, which take
+    half of the time; its types still convert the values.
     """
     source = iter(rows)
     first = next(source, None)
@@ -50,7 +50,7 @@ def insert_rows(session: Session, table: type[Base], rows: Iterable[Mapping[str,
 
 
 def batches(items: Iterable[T]) -> Iterator[list[T]]:
-    """The items in lists of `BATCH`."""
+    """Yield the items in lists of `BATCH`."""
     source = iter(items)
     while batch := list(islice(source, BATCH)):
         yield batch
@@ -63,7 +63,7 @@ def _table(table: type[Base]) -> Table:
 
 
 def _converter(table: Table, names: Sequence[str], dialect: Dialect) -> Callable[[Mapping[str, Any]], Row]:
-    """From a row to the values that the driver takes, in the order of the names."""
+    """Return the function from a row to the values that the driver takes, in the order of the names."""
     processors = [table.c[name].type.dialect_impl(dialect).bind_processor(dialect) for name in names]
     active = [(place, process) for place, process in enumerate(processors) if process is not None]
     taken = itemgetter(*names)
@@ -97,7 +97,7 @@ def _send_to_postgresql(
 
 
 def _quoted(names: Sequence[str]) -> str:
-    """Columns of our own tables, as SQL names them."""
+    """Quote columns of MOMA's own tables for SQL."""
     return ", ".join(f'"{name}"' for name in names)
 
 

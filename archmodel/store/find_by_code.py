@@ -1,11 +1,11 @@
-"""Entities and structures by their codes; what is not there is an error that names the nearest codes."""
+"""Search for entities and structures by code; errors name the nearest codes."""
 
 import difflib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
-from sqlalchemy import select
+from sqlalchemy import ColumnElement, select
 from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from archmodel.store.bulk import batches
@@ -29,7 +29,7 @@ __all__ = [
 T = TypeVar("T", Material, Phase, Document, Structure)
 
 MAX_CANDIDATES = 1000
-"""Codes that are looked through for one that is like a mistyped code."""
+"""Most codes among which to search for one like a mistyped code."""
 
 SHOWN = 12
 """Names that an error lists where none is like what was written."""
@@ -37,7 +37,7 @@ SHOWN = 12
 
 @dataclass(frozen=True)
 class Subjects:
-    """What something is said of.
+    """Subjects of a statement.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class Subjects:
 
 
 def check_entry(session: Session, at: int | None) -> None:
-    """Refuse a number that is not that of an entry; None is always right: it means now.
+    """Refuse a number that is not that of an entry; None means now.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def check_entry(session: Session, at: int | None) -> None:
 
 
 def subjects(session: Session, stones: Iterable[str] = (), structures: Iterable[str] = ()) -> Subjects:
-    """Stones and structures by their codes; each counts once.
+    """Find stones and structures by their codes; each counts once.
 
     Raises
     ------
@@ -81,33 +81,33 @@ def subjects(session: Session, stones: Iterable[str] = (), structures: Iterable[
 
 
 def entity_numbers(session: Session, codes: Sequence[str]) -> dict[str, int]:
-    """Primary keys of entities by code, in the order of the codes."""
-    found: dict[str, int] = {}
-    for batch in batches(dict.fromkeys(codes)):
-        rows = session.execute(select(Entity.code, Entity.id).where(Entity.code.in_(_typable(batch))))
-        found.update((code, number) for code, number in rows)
-    for code in codes:
-        if code not in found:
-            raise no_such_code(session, code, Entity.code)
-    return {code: found[code] for code in codes}
+    """Return the primary keys of entities by code, in the order of the codes."""
+    return _numbers(session, codes, Entity)
 
 
 def structure_numbers(session: Session, codes: Sequence[str]) -> dict[str, int]:
-    """Primary keys of the structures that are held now, by code, in the order of the codes."""
+    """Return the primary keys of the structures that are held now, by code, in the order of the codes."""
+    return _numbers(session, codes, Structure, Structure.superseded_id.is_(None))
+
+
+def _numbers(
+    session: Session,
+    codes: Sequence[str],
+    cls: type[Entity] | type[Structure],
+    *conditions: ColumnElement[bool],
+) -> dict[str, int]:
     found: dict[str, int] = {}
     for batch in batches(dict.fromkeys(codes)):
-        statement = select(Structure.code, Structure.id).where(
-            Structure.superseded_id.is_(None), Structure.code.in_(_typable(batch))
-        )
-        found.update((code, number) for code, number in session.execute(statement))
+        rows = session.execute(select(cls.code, cls.id).where(cls.code.in_(_typable(batch)), *conditions))
+        found.update((code, number) for code, number in rows)
     for code in codes:
         if code not in found:
-            raise no_such_code(session, code, Structure.code)
+            raise no_such_code(session, code, cls.code)
     return {code: found[code] for code in codes}
 
 
 def no_such_code(session: Session, code: str, *columns: InstrumentedAttribute[str]) -> UsageError:
-    """The error for a code that is in none of the columns, with the nearest that are; the first says what it is of."""
+    """Return the error for a code that is in none of the columns, the first of which gives the kind of thing."""
     things = "stone" if columns[0].class_ is Entity else "structure"
     if not code.isprintable():
         remedy = "list the codes by: moma query entity"
@@ -125,12 +125,12 @@ def no_such_code(session: Session, code: str, *columns: InstrumentedAttribute[st
 
 
 def _typable(codes: Iterable[str]) -> list[str]:
-    """The codes that can be in a database: what cannot be printed, PostgreSQL does not even take as a value."""
+    """Return the codes that can be stored: PostgreSQL refuses some unprintable characters even as values."""
     return [code for code in codes if code.isprintable()]
 
 
 def _renamed(session: Session, code: str) -> str | None:
-    """The code that an entity has now which had this one before it was corrected."""
+    """Return the present code of the entity that had this one before a correction."""
     rows = session.execute(
         select(Correction.before, Entity.code)
         .join(Correction.entity)
@@ -141,7 +141,7 @@ def _renamed(session: Session, code: str) -> str | None:
 
 
 def held_named(session: Session, cls: type[T], name: str) -> T:
-    """The material, phase, document or structure of this name or code that is held now.
+    """Return the material, phase, document or structure of this name or code that is held now.
 
     Raises
     ------
@@ -166,7 +166,7 @@ def held_named(session: Session, cls: type[T], name: str) -> T:
 
 
 def held_or_none(session: Session, cls: type[T], name: str) -> T | None:
-    """As `held_named`, but None where there is none."""
+    """Return what `held_named` finds, or None."""
     if not name.isprintable():
         return None
     return session.scalar(select(cls).where(_name_column(cls) == name, cls.superseded_id.is_(None)))

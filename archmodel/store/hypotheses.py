@@ -1,8 +1,8 @@
-"""Stones that nobody has seen: stored with the grounds on which they are thought to be there, and withdrawn again.
+"""Hypothetical stones: stored with their grounds, and withdrawn again.
 
 A hypothesis is an entity like others, whose `hypothesis` is true and whose measurement has the provenance
 "hypothesis". One that is withdrawn loses its geometry, its course and its zone: it is in no relation and no scene any
-more, and queries do not find it; what was said of it stays in its history.
+more, and queries do not find it; its statements stay in its history.
 """
 
 import hashlib
@@ -13,6 +13,7 @@ from sqlalchemy import ColumnElement, insert, or_, select, update
 from sqlalchemy.orm import Session
 
 from archmodel.store.bulk import batches
+from archmodel.store.remeasuring import MEASURED
 from archmodel.store.revisions import NOTHING, Outcome, end_rows
 from archmodel.store.stone_record import StoneRecord
 from archmodel.store.stones import insert_stones
@@ -24,10 +25,8 @@ from moma.errors import DatabaseError, UsageError
 
 __all__ = ["not_withdrawn", "store_hypotheses", "withdraw_hypotheses"]
 
-_GIVEN_UP = ("course", "zone", "length", "height", "area", "volume", "x", "y", "z")
-"""What is not known any more of a hypothesis that is withdrawn, besides its depth."""
-
-_DEPTH = ("depth", "depth_sigma", "depth_source", "depth_origin")
+_GIVEN_UP = ("course", "zone", *(name for name in MEASURED if name != "hypothesis"))
+"""Columns that become unknown when a hypothesis is withdrawn."""
 
 
 def store_hypotheses(
@@ -39,7 +38,7 @@ def store_hypotheses(
     author: str | None = None,
     settings: Mapping[str, object] | None = None,
 ) -> tuple[Entry, tuple[int, ...]]:
-    """Take in stones that nobody has seen: all of them or, if anything is wrong, none.
+    """Store hypothetical stones: all of them or, if anything is wrong, none.
 
     Parameters
     ----------
@@ -47,7 +46,7 @@ def store_hypotheses(
     name : what proposed them
     stones : with `hypothesis` true, at least one
     source : on what grounds
-    author : who says so; None if a program does
+    author : person who recorded it; None for a program
     settings : of the program that computed them
 
     Returns
@@ -75,7 +74,7 @@ def store_hypotheses(
 
 
 def withdraw_hypotheses(session: Session, entry: Entry, entities: Iterable[int]) -> Outcome:
-    """Say that stones that nobody has seen are not thought to be there any more.
+    """Withdraw hypothetical stones.
 
     Parameters
     ----------
@@ -99,7 +98,7 @@ def withdraw_hypotheses(session: Session, entry: Entry, entities: Iterable[int])
 
 
 def not_withdrawn(entity: Any) -> ColumnElement[bool]:
-    """The condition that an entity, as a table or an alias of it, is no hypothesis that was withdrawn."""
+    """Return the condition that an entity, as a table or an alias of it, is not a withdrawn hypothesis."""
     return or_(~entity.hypothesis, entity.x.is_not(None))
 
 
@@ -120,7 +119,7 @@ def _check(session: Session, stones: Sequence[StoneRecord]) -> None:
 
 
 def _end_geometry(session: Session, entry: Entry, entities: Sequence[Entity]) -> None:
-    """End the measurements of entities, and take from them what follows from these; nothing is forgotten."""
+    """End the measurements of entities and the attributes that follow from them; corrections keep the values."""
     if not entities:
         return
     numbers = [one.id for one in entities]
@@ -128,7 +127,6 @@ def _end_geometry(session: Session, entry: Entry, entities: Sequence[Entity]) ->
         Measurement.entity_id.in_(numbers), Measurement.superseded_id.is_(None)
     )
     end_rows(session, entry, Measurement, list(session.scalars(measured)))
-    names = (*_GIVEN_UP, *_DEPTH)
     rows = [
         {
             "entity_id": one.id,
@@ -138,10 +136,10 @@ def _end_geometry(session: Session, entry: Entry, entities: Sequence[Entity]) ->
             "after": None,
         }
         for one in entities
-        for name in names
+        for name in _GIVEN_UP
         if getattr(one, name) is not None
     ]
     session.execute(insert(Correction), rows)
-    session.execute(update(Entity).where(Entity.id.in_(numbers)).values(dict.fromkeys(names)))
+    session.execute(update(Entity).where(Entity.id.in_(numbers)).values(dict.fromkeys(_GIVEN_UP)))
     for one in entities:
         session.expire(one)

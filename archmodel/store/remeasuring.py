@@ -1,4 +1,4 @@
-"""Entities that were measured again: new measurements, old ones superseded, and corrections of what follows."""
+"""Replacement of measurements, with corrections of the attributes that follow from them."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -8,28 +8,15 @@ from sqlalchemy.orm import Session
 
 from archmodel.store.bulk import first_free_id, insert_rows
 from archmodel.store.stone_record import StoneRecord
-from archmodel.store.stone_rows import entity_rows, measurement_row
-from archmodel.tables.entities import Entity
+from archmodel.store.stone_rows import ENTITY_COLUMNS, entity_rows, measurement_row
+from archmodel.tables.entities import CORRECTABLE, Entity
 from archmodel.tables.knowledge import Correction
 from archmodel.tables.surveys import Measurement
 
-__all__ = ["supersede_measurements"]
+__all__ = ["MEASURED", "supersede_measurements"]
 
-_MEASURED = (
-    "depth",
-    "depth_sigma",
-    "depth_source",
-    "depth_origin",
-    "length",
-    "height",
-    "area",
-    "volume",
-    "x",
-    "y",
-    "z",
-    "hypothesis",
-)
-"""Columns of an entity that follow from its measurement. Kind, course and zone do not: whoever corrected them since
+MEASURED = tuple(name for name in ENTITY_COLUMNS if name not in CORRECTABLE)
+"""Columns of an entity that follow from its measurement. Kind, code, course and zone do not: whoever corrected them
 knew more than the survey."""
 
 
@@ -41,7 +28,7 @@ def supersede_measurements(
     stones: Sequence[StoneRecord],
     places: Sequence[str],
 ) -> None:
-    """Give entities the measurements of these records in place of those they have, if they have any.
+    """Replace the measurements of entities by those of these records.
 
     Parameters
     ----------
@@ -72,15 +59,15 @@ def supersede_measurements(
 
 def _correct(session: Session, entry_id: int, made: Mapping[int, Mapping[str, object]]) -> None:
     """Write the new values into the entities, and a correction for each that differs."""
-    columns = [getattr(Entity, name) for name in _MEASURED]
+    columns = [getattr(Entity, name) for name in MEASURED]
     held = session.execute(select(Entity.id, *columns).where(Entity.id.in_(made))).mappings()
     corrections: list[dict[str, Any]] = []
     changed = []
     for row in held:
         new = made[row["id"]]
-        differing = [name for name in _MEASURED if row[name] != new[name]]
+        differing = [name for name in MEASURED if row[name] != new[name]]
         if differing:
-            changed.append({"id": row["id"], **{name: new[name] for name in _MEASURED}})
+            changed.append({"id": row["id"], **{name: new[name] for name in MEASURED}})
         corrections += [
             {
                 "entity_id": row["id"],

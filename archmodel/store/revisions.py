@@ -1,4 +1,4 @@
-"""Nothing is overwritten: how rows come to be held no longer, and what replaces them.
+"""Superseding, revising and withdrawing rows; nothing is overwritten.
 
 Rows that nothing refers to (statements, properties, relations, memberships) are replaced by new rows. Materials,
 phases, documents and structures are what other rows refer to by number, so the number stays with the row that is
@@ -34,7 +34,7 @@ __all__ = ["NOTHING", "Outcome", "end_rows", "revise", "supersede", "table_of", 
 
 @dataclass(frozen=True)
 class Outcome:
-    """How many rows were new, replaced others, were there already, or were withdrawn."""
+    """Numbers of rows that were new, replaced others, were there already, or were withdrawn."""
 
     new: int = 0
     replaced: int = 0
@@ -51,7 +51,7 @@ class Outcome:
 
     @property
     def changes(self) -> int:
-        """Rows that say something which was not known before."""
+        """Number of rows that record something new."""
         return self.new + self.replaced + self.withdrawn
 
 
@@ -59,14 +59,14 @@ NOTHING = Outcome()
 
 
 def table_of(cls: type[Base]) -> Table:
-    """The table of a class, for statements on many rows."""
+    """Return the table of a class, for statements on many rows."""
     table = cls.__table__
     assert isinstance(table, Table)
     return table
 
 
 def supersede(session: Session, entry: Entry, old: Any, new: Any) -> None:
-    """Put a new statement or property in the place of an old one of its class.
+    """Replace a statement or property by a new one of its class.
 
     Raises
     ------
@@ -86,9 +86,7 @@ def supersede(session: Session, entry: Entry, old: Any, new: Any) -> None:
 
 
 def withdraw(session: Session, entry: Entry, row: Any) -> Outcome:
-    """Say that a row is held no longer, without anything in its place.
-
-    With a material go its properties, with a structure its memberships.
+    """Withdraw a row without replacing it, with the properties of a material or the memberships of a structure.
 
     Raises
     ------
@@ -136,14 +134,14 @@ def revise(session: Session, entry: Entry, row: Any, values: Mapping[str, object
 
 
 def end_rows(session: Session, entry: Entry, cls: type[Base], numbers: list[int]) -> None:
-    """Mark rows as held no longer; at most as many as fit into one statement."""
+    """Mark rows as no longer held; at most as many as fit into one statement."""
     table = table_of(cls)
     session.execute(update(table).where(table.c.id.in_(numbers)).values(superseded_id=entry.id))
     _read_again(session, cls)
 
 
 def _end_where(session: Session, entry: Entry, cls: type[Base], **owner: int) -> int:
-    """End the held rows that belong to a row; how many they were."""
+    """End the held rows that belong to a row; return their number."""
     table = table_of(cls)
     conditions = [table.c[name] == value for name, value in owner.items()]
     held = select(func.count()).select_from(table).where(table.c.superseded_id.is_(None), *conditions)
@@ -156,7 +154,7 @@ def _end_where(session: Session, entry: Entry, cls: type[Base], **owner: int) ->
 
 
 def _read_again(session: Session, cls: type[Base]) -> None:
-    """Loaded rows of a class may have ended behind the session's back."""
+    """Expire loaded rows of a class, which may have ended without the session's knowledge."""
     for row in [one for one in session.identity_map.values() if isinstance(one, cls)]:
         session.expire(row, ["superseded_id"])
 
@@ -168,7 +166,7 @@ def _refuse_ended(row: Recorded) -> None:
 
 
 def _refuse_needed(session: Session, row: Any) -> None:
-    """A row that others refer to is withdrawn after them."""
+    """Refuse to withdraw a row that others refer to."""
     users: dict[str, Any] = {}
     if isinstance(row, Material):
         of_it = select(MadeOf.id).where(MadeOf.material_id == row.id, MadeOf.superseded_id.is_(None))

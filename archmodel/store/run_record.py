@@ -1,7 +1,7 @@
-"""Plain values of a simulation run that go into the database; no SQLAlchemy here.
+"""Plain values of a simulation run that go into the database, without SQLAlchemy.
 
-Joints and contact points, of which a run can have a million, are structures of arrays; in them, NaN says that there
-is nothing to say, and becomes null.
+Joints and contact points, of which a run can have a million, are structures of arrays; in them NaN marks an undefined
+value, and becomes null.
 """
 
 from collections.abc import Mapping
@@ -45,7 +45,7 @@ STONE_VALUES: Mapping[str, tuple[str, str]] = {
 
 @dataclass(frozen=True)
 class StoneResult:
-    """What a run computed for one stone.
+    """Results of a run for one stone.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class StoneResult:
 
 @dataclass(frozen=True)
 class ErrorMeasures:
-    """How far a run can be trusted, by the measures of docs/theory.md §4 [-]; None where it was not measured.
+    """Error measures of a run, as defined in docs/theory.md §4 [-]; None where not measured.
 
     Attributes
     ----------
@@ -100,8 +100,8 @@ class JointArrays:
     force_normal, force_shear : (nj,) across it, compression positive, and the size of the rest [N]
     pressure_mean, pressure_max : (nj,) [Pa]; NaN where it has no area, as all that may be NaN
     kern : (nj,) up to 1: the resultant is within the kern; NaN without compression [-]
-    friction_use : (nj,) shear over what friction and cohesion can bear; NaN where that is nothing [-]
-    slipping, open : (nj,) parts of its contact area that slip, that bear nothing; NaN where it has none [-]
+    friction_use : (nj,) shear over the strength of friction and cohesion; NaN where that is zero [-]
+    slipping, open : (nj,) parts of its contact area that slip, that transmit nothing; NaN where it has none [-]
     gap : (nj,) largest [m]
     opening, sliding : (nj,) largest since the start [m]
     width : (nj,) as surveyed, which is the thickness of its mortar; NaN where not known [m]; None: not known of any
@@ -157,7 +157,7 @@ class ContactArrays:
 
 @dataclass(frozen=True)
 class SimplificationRecord:
-    """The solid that stood for a stone, in the frame of the site, and how far it is from the surveyed one.
+    """Solid that stood for a stone, in the frame of the site, and its distance from the surveyed one.
 
     Attributes
     ----------
@@ -198,11 +198,11 @@ class RunRecord:
     summary : the contents of summary.json
     versions : of the programs and libraries, by name; at least of "moma"
     results : one per stone of the scene
-    settings : of time, solver and contacts as they were used, defaults filled in, in values that JSON can say
+    settings : of time, solver and contacts as they were used, defaults filled in, in values that JSON can hold
     as_of : the last entry in the database when its stones were read; None if that is not known
     steps : how many were done
     simulated, wall : simulated time and time of work [s]
-    errors : how far it can be trusted
+    errors : its error measures
     joints, contacts : at its end; None if they are not kept
     simplifications : of its stones; () if they are not kept
     """

@@ -1,4 +1,4 @@
-"""From the record of a run to rows of its tables, with every number checked on the way in."""
+"""Storing of runs: records to rows of the tables, with every number checked."""
 
 import json
 import math
@@ -31,7 +31,7 @@ from moma.errors import DatabaseError
 __all__ = ["contact_rows", "joint_rows", "plain", "result_row", "run_row", "simplification_row", "store_run"]
 
 _CHUNK = 5_000
-"""Rows that are Python objects at a time: of a million contact points the arrays alone are all in memory."""
+"""Rows that are Python objects at a time, so that of a million contact points only the arrays are in memory."""
 
 _JOINT_NUMBERS = ("area", "force_normal", "force_shear", "gap", "opening", "sliding")
 _JOINT_UNKNOWNS = ("pressure_mean", "pressure_max", "kern", "friction_use", "slipping", "open")
@@ -39,7 +39,7 @@ _CONTACT_NUMBERS = ("area", "gap", "opening", "slide")
 
 
 def run_row(run: RunRecord, place: str) -> dict[str, object]:
-    """Row of the `run` table, without its keys.
+    """Return the row of the `run` table, without its keys.
 
     Parameters
     ----------
@@ -60,22 +60,22 @@ def run_row(run: RunRecord, place: str) -> dict[str, object]:
 
 
 def plain(value: Mapping[str, object], name: str, place: str) -> dict[str, Any]:
-    """The mapping as JSON will give it back.
+    """Return the mapping as JSON will give it back.
 
     Raises
     ------
     DatabaseError
-        if JSON cannot say it
+        if JSON cannot hold it
     """
     try:
-        said: dict[str, Any] = json.loads(json.dumps(dict(value), allow_nan=False))
+        copy: dict[str, Any] = json.loads(json.dumps(dict(value), allow_nan=False))
     except (TypeError, ValueError) as error:
         raise DatabaseError(f"the {name} cannot be stored: {error}", where=place) from error
-    return said
+    return copy
 
 
 def result_row(result: StoneResult, place: str) -> dict[str, object]:
-    """Row of the `entity_result` table, without its keys."""
+    """Return the row of the `entity_result` table, without its keys."""
     if result.fidelity not in FIDELITIES:
         what = f"fidelity {result.fidelity!r} is none of {', '.join(FIDELITIES)}"
         raise DatabaseError(what, where=place)
@@ -91,7 +91,7 @@ def result_row(result: StoneResult, place: str) -> dict[str, object]:
 
 
 def simplification_row(record: SimplificationRecord, place: str) -> dict[str, object]:
-    """Row of the `simplification` table, without its keys."""
+    """Return the row of the `simplification` table, without its keys."""
     vertices = np.asarray(record.vertices, dtype=np.float64)
     if vertices.ndim != 2 or vertices.shape[1] != 3 or not np.isfinite(vertices).all():
         raise DatabaseError("the corners of its solid are not (n, 3) finite numbers", where=place)
@@ -109,7 +109,7 @@ def simplification_row(record: SimplificationRecord, place: str) -> dict[str, ob
 
 
 def joint_rows(joints: JointArrays, entities: Ints, run: int, place: str) -> Iterator[dict[str, Any]]:
-    """Rows of the `joint_result` table, checked before the first of them comes.
+    """Return the rows of the `joint_result` table, all checked before the first is yielded.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def joint_rows(joints: JointArrays, entities: Ints, run: int, place: str) -> Ite
 
 
 def contact_rows(contacts: ContactArrays, entities: Ints, run: int, place: str) -> Iterator[dict[str, Any]]:
-    """Rows of the `contact_point` table; as `joint_rows`."""
+    """Return the rows of the `contact_point` table; as `joint_rows`."""
     joint = np.ma.masked_less(contacts.joint, 0)
     columns: dict[str, NDArray[Any]] = {"number": np.arange(len(joint)), "joint": joint}
     columns |= _stones(contacts.stones, entities, ("candidate_id", "antagonist_id"), place)
@@ -142,7 +142,7 @@ def contact_rows(contacts: ContactArrays, entities: Ints, run: int, place: str) 
 
 
 def _rows(columns: Mapping[str, NDArray[Any]], run: int) -> Iterator[dict[str, Any]]:
-    """One mapping per row, made a chunk at a time, None where it is masked; every column must be equally long."""
+    """Yield one mapping per row, made a chunk at a time, None where masked; columns must be equally long."""
     names, count = ("run_id", *columns), len(next(iter(columns.values())))
     for start in range(0, count, _CHUNK):
         lists = [column[start : start + _CHUNK].tolist() for column in columns.values()]
@@ -151,7 +151,7 @@ def _rows(columns: Mapping[str, NDArray[Any]], run: int) -> Iterator[dict[str, A
 
 
 def _stones(stones: Ints, entities: Ints, names: tuple[str, str], place: str) -> dict[str, NDArray[Any]]:
-    """Primary keys in place of the indices of the two stones."""
+    """Replace the indices of the two stones by their primary keys."""
     if len(stones) and not (stones.min() >= 0 and stones.max() < len(entities)):
         raise DatabaseError(
             f"a pair of stones is not among the {len(entities)} stones of the run", where=place
@@ -160,12 +160,12 @@ def _stones(stones: Ints, entities: Ints, names: tuple[str, str], place: str) ->
 
 
 def _vectors(values: Array, names: tuple[str, str, str], place: str) -> dict[str, NDArray[Any]]:
-    """The three components, by name."""
+    """Return the three components by name."""
     return {name: _all_finite(values[:, axis], name, place) for axis, name in enumerate(names)}
 
 
 def _all_finite(values: Array, name: str, place: str) -> Array:
-    """The values, of which each must be a number."""
+    """Return the values, each of which must be finite."""
     if not np.isfinite(values).all():
         number = int(np.flatnonzero(~np.isfinite(values))[0])
         what = f"{name} is {values[number]}, not a finite number"
@@ -174,7 +174,7 @@ def _all_finite(values: Array, name: str, place: str) -> Array:
 
 
 def _known(values: Array, name: str, place: str) -> NDArray[Any]:
-    """The values, masked where there is nothing to say; infinity is no value."""
+    """Return the values, masked where they are undefined (NaN); refuse infinity."""
     unknown = np.isnan(values)
     known = _all_finite(np.where(unknown, 0.0, values), name, place)
     return np.ma.masked_array(known, unknown)
@@ -189,7 +189,7 @@ def _finite(value: float | None, name: str, place: str) -> float | None:
 
 
 def store_run(session: Session, run: RunRecord) -> int:
-    """Keep a run with its results by stone, by joint and by contact point: all of it or nothing.
+    """Store a run with its results by stone, by joint and by contact point: all of it or nothing.
 
     Parameters
     ----------
@@ -254,7 +254,7 @@ def _refuse_twice(codes: Sequence[str], what: str, place: str) -> None:
 
 
 def _primary_keys(session: Session, codes: Sequence[str], place: str) -> Ints:
-    """(n,) primary keys of the stones; every one must be there."""
+    """Return the (n,) primary keys of the stones, all of which must be stored."""
     numbers: dict[str, int] = {}
     for batch in batches(codes):
         rows = session.execute(select(Entity.code, Entity.id).where(Entity.code.in_(batch)))

@@ -1,4 +1,4 @@
-"""Stones out of the database as columns: what a search among a hundred thousand of them needs, and no objects."""
+"""Stones read as columns instead of objects, for searches among a hundred thousand of them."""
 
 import json
 from collections.abc import Collection, Iterable, Iterator, Sequence
@@ -26,14 +26,14 @@ _AT_ONCE = 2000  # rows that are fetched together
 _RANGES = 200  # ranges of numbers in one condition, far below SQLite's limit of parameters
 
 ENTITY = table_of(Entity).c
-"""Columns of entities, for statements that make no objects."""
+"""Columns of entities, for statements without objects."""
 
 _MEASUREMENT = table_of(Measurement).c
 
 
 @dataclass(frozen=True)
 class StoneColumns:
-    """What is known of many stones, in the order of their numbers.
+    """Columns of many stones, in the order of their numbers.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class StoneColumns:
 
 
 def stone_columns(session: Session, *conditions: ColumnElement[bool]) -> StoneColumns:
-    """The stones for which the conditions on ENTITY hold."""
+    """Return the stones for which the conditions on ENTITY hold."""
     statement = (
         select(
             ENTITY.id,
@@ -78,7 +78,7 @@ def stone_columns(session: Session, *conditions: ColumnElement[bool]) -> StoneCo
 
 
 def _columns(rows: Sequence[Any]) -> StoneColumns:
-    """Some rows, of which only the numbers are kept and each name once."""
+    """Return the columns of some rows, each name kept in memory once."""
     ids, kinds, zones, courses, x, y, z, normals = zip(*rows, strict=True)
     packed = b"".join(_UNKNOWN if one is None else one for one in normals)
     return StoneColumns(
@@ -95,7 +95,7 @@ _UNKNOWN = np.full(3, np.nan).tobytes()
 
 
 def joined(parts: Sequence[StoneColumns]) -> StoneColumns:
-    """Stones of several columns, each once, in the order of their numbers."""
+    """Join columns of stones; each stone comes once, in the order of the numbers."""
     ids = np.concatenate([np.zeros(0, np.int64), *(part.ids for part in parts)])
     ids, order = np.unique(ids, return_index=True)
     kinds = [kind for part in parts for kind in part.kinds]
@@ -112,7 +112,7 @@ def joined(parts: Sequence[StoneColumns]) -> StoneColumns:
 
 
 def stone_shapes(session: Session, *conditions: ColumnElement[bool]) -> Iterator[tuple[int, Array, Faces]]:
-    """Number, vertices (nv, 3) [m] and faces of the solid of each measured stone for which the conditions hold."""
+    """Yield number, vertices (nv, 3) [m] and faces of the solid of each measured stone that meets the conditions."""
     statement = (
         select(
             ENTITY.id,
@@ -132,25 +132,25 @@ def stone_shapes(session: Session, *conditions: ColumnElement[bool]) -> Iterator
 
 @lru_cache(maxsize=1024)
 def _faces(text: str) -> Faces:
-    """The faces that a JSON text says; most solids have the same."""
+    """Return the faces in a JSON text; most solids have the same."""
     return tuple(tuple(face) for face in json.loads(text))
 
 
 def _parts(session: Session, statement: Executable) -> Iterator[Sequence[Any]]:
-    """The rows of a statement, some at a time."""
+    """Yield the rows of a statement, some at a time."""
     yield from session.execute(statement, execution_options={"yield_per": _AT_ONCE}).partitions()
 
 
 def id_conditions(
     column: ColumnElement[int] | InstrumentedAttribute[int], numbers: Collection[int]
 ) -> Iterator[ColumnElement[bool]]:
-    """Conditions that together hold for these numbers, each number in one: few where they follow one another."""
+    """Yield conditions that together hold for these numbers: few where numbers are consecutive."""
     for some in _chunks(_runs(sorted(set(numbers)))):
         yield or_(*(column.between(low, high) for low, high in some))
 
 
 def _runs(numbers: Sequence[int]) -> Iterator[tuple[int, int]]:
-    """First and last of numbers without a gap between them."""
+    """Yield first and last of each run of consecutive numbers."""
     if not numbers:
         return
     first = last = numbers[0]
@@ -175,7 +175,7 @@ def _chunks(runs: Iterable[tuple[int, int]]) -> Iterator[list[tuple[int, int]]]:
 
 
 def near_box(low: Array, high: Array, reach: float) -> ColumnElement[bool]:
-    """The condition that a stone may come within a distance of a box.
+    """Return the condition that a stone may come within a distance of a box.
 
     No corner of a solid is farther from its centroid than its length, height and depth together.
 

@@ -1,22 +1,39 @@
-"""From plain records to rows of the tables and back, with every value checked on the way in."""
+"""Records of stones to rows of the tables and back, with every value checked on the way in.
+
+A field of `StoneRecord` is stored in the column of its name, of `Entity` or `Measurement`; the type of the column says
+how it is checked and converted. A new field needs a column, and nothing here.
+"""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import MISSING, Field, fields
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
+from sqlalchemy import JSON, Column, Float
+from sqlalchemy.orm import Mapper
 
 from archmodel.arrays import Array
 from archmodel.store.stone_record import StoneRecord
+from archmodel.tables.base import ArrayType, Base, annotation_of
 from archmodel.tables.entities import Entity, kind_named, kind_of
 from archmodel.tables.surveys import Measurement
 from moma.errors import DatabaseError, GeometryError, SurveyError, UsageError
 
-__all__ = ["entity_rows", "measurement_row", "solid_volume", "solid_volumes", "stone_record", "storable"]
+__all__ = [
+    "ENTITY_COLUMNS",
+    "entity_rows",
+    "measurement_row",
+    "solid_volume",
+    "solid_volumes",
+    "stone_record",
+    "storable",
+]
 
 
 def entity_rows(stones: Sequence[StoneRecord], places: Sequence[str]) -> list[dict[str, object]]:
-    """Rows of the `entity` table, without their keys.
+    """Return the rows of the `entity` table, without their keys.
 
     Parameters
     ----------
@@ -41,132 +58,35 @@ def _entity_row(stone: StoneRecord, place: str, volume: float, centroid: list[fl
     if not volume > 0.0:
         remedy = "its faces must be counter-clockwise seen from outside, and its depth above zero"
         raise GeometryError(f"the volume of the solid is {volume:g} m³", where=place, remedy=remedy)
-    depth_sigma = None if stone.depth_sigma is None else _number(stone.depth_sigma, "depth_sigma", place)
-    x, y, z = centroid
-    return {
-        "code": _text(stone.code, "code", place),
-        "course": None if stone.course is None else int(stone.course),
-        "depth": _number(stone.depth, "depth", place),
-        "depth_sigma": depth_sigma,
-        "depth_source": storable(stone.depth_source),
-        "depth_origin": stone.depth_origin,
-        "zone": None if stone.zone is None else _text(stone.zone, "zone", place),
-        "hypothesis": bool(stone.hypothesis),
-        "length": _number(stone.length, "length", place),
-        "height": _number(stone.height, "height", place),
-        "area": _number(stone.area, "area", place),
-        "volume": volume,
-        "x": x,
-        "y": y,
-        "z": z,
-    }
+    return _row(_ENTITY, stone, place) | {"volume": volume, **dict(zip("xyz", centroid, strict=True))}
 
 
 def measurement_row(stone: StoneRecord, place: str) -> dict[str, object]:
-    """Row of the `measurement` table, without its key."""
-    rejected = [int(index) for index in stone.rejected]
-    points = _array(stone.points, (-1, 3), "points", place)
-    if any(not 0 <= index < len(points) for index in rejected):
-        raise SurveyError(f"rejected point {max(rejected)} of {len(points)} points", where=place)
-    return {
-        "line": int(stone.line),
-        "sigma": _number(stone.sigma, "sigma", place),
-        "offset": _number(stone.offset, "offset", place),
-        "rms": _number(stone.rms, "rms", place),
-        "redundancy": int(stone.redundancy),
-        "point_count": len(points),
-        "rejected_count": len(rejected),
-        "rejected": tuple(rejected),
-        "rejected_vertices": tuple(int(index) for index in stone.rejected_vertices),
-        "provenance": stone.provenance,
-        "provenance_text": storable(stone.provenance_text),
-        "shape": stone.shape,
-        "shape_text": stone.shape_text,
-        "station": stone.station,
-        "photograph": stone.photograph,
-        "tail": _number(stone.tail, "tail", place),
-        "direction": None if stone.direction is None else _array(stone.direction, (3,), "direction", place),
-        "centroid": _array(stone.centroid, (3,), "centroid", place),
-        "axes": _array(stone.axes, (2, 3), "axes", place),
-        "vertex_sigma": np.asarray(stone.vertex_sigma, dtype=np.float64).reshape(-1, 3),
-        "image": _array(stone.image, (-1, 2), "image", place),
-        "sigmas": None if stone.sigmas is None else _array(stone.sigmas, (-1,), "sigmas", place),
-        "names": stone.names,
-        "remarks": stone.remarks,
-        "normal": _array(stone.normal, (3,), "normal", place),
-        "covariance": _array(stone.covariance, (3, 3), "covariance", place),
-        "vertices": _array(stone.vertices, (-1, 3), "vertices", place),
-        "points": points,
-        "outline": _array(stone.outline, (-1, 3), "outline", place),
-        "solid_vertices": _array(stone.solid_vertices, (-1, 3), "solid_vertices", place),
-        "solid_faces": _plain_faces(stone.solid_faces),
-        "notes": {str(key): str(value) for key, value in stone.notes.items()},
+    """Return the row of the `measurement` table, without its key."""
+    count = len(stone.points)
+    if any(not 0 <= index < count for index in stone.rejected):
+        raise SurveyError(f"rejected point {max(stone.rejected)} of {count} points", where=place)
+    return _row(_MEASUREMENT, stone, place) | {
+        "point_count": count,
+        "rejected_count": len(stone.rejected),
     }
 
 
+def _row(columns: Mapping[str, "Converter"], stone: StoneRecord, place: str) -> dict[str, object]:
+    return {name: convert(getattr(stone, name), place) for name, convert in columns.items()}
+
+
 def stone_record(entity: Entity, measured: Measurement) -> StoneRecord:
-    """The record that was stored, with arrays of its own."""
-    return StoneRecord(
-        code=entity.code,
-        kind=entity.kind,
-        course=entity.course,
-        line=measured.line,
-        vertices=measured.vertices.copy(),
-        points=measured.points.copy(),
-        sigma=measured.sigma,
-        normal=measured.normal.copy(),
-        offset=measured.offset,
-        centroid=measured.centroid.copy(),
-        axes=measured.axes.copy(),
-        covariance=measured.covariance.copy(),
-        rms=measured.rms,
-        redundancy=measured.redundancy,
-        rejected=tuple(measured.rejected),
-        outline=measured.outline.copy(),
-        length=_known("length", entity),
-        height=_known("height", entity),
-        area=_known("area", entity),
-        depth=_known("depth", entity),
-        depth_sigma=entity.depth_sigma,
-        depth_source=entity.depth_source or "",
-        solid_vertices=measured.solid_vertices.copy(),
-        solid_faces=tuple(tuple(face) for face in measured.solid_faces),
-        vertex_sigma=measured.vertex_sigma.copy(),
-        notes=dict(measured.notes),
-        zone=entity.zone,
-        depth_origin=entity.depth_origin or "stone",
-        provenance=measured.provenance,
-        provenance_text=measured.provenance_text,
-        station=measured.station,
-        photograph=measured.photograph,
-        image=measured.image.copy(),
-        sigmas=None if measured.sigmas is None else measured.sigmas.copy(),
-        names=tuple(measured.names),
-        rejected_vertices=tuple(measured.rejected_vertices),
-        shape=measured.shape,
-        shape_text=measured.shape_text,
-        direction=None if measured.direction is None else measured.direction.copy(),
-        tail=measured.tail,
-        remarks=tuple(measured.remarks),
-        hypothesis=entity.hypothesis,
-    )
-
-
-def _known(name: str, entity: Entity) -> float:
-    """A number that every measured entity has."""
-    value: float | None = getattr(entity, name)
-    if value is None:
-        raise DatabaseError(f"the {name} of {entity.code} is not known", where=f"entity {entity.id}")
-    return value
-
-
-def storable(text: str) -> str:
-    """The text with undecodable bytes (of a file's name, say) spelled out, since no database takes them."""
-    return text.encode("utf-8", "backslashreplace").decode("utf-8")
+    """Return the record that was stored, with arrays of its own."""
+    values = {name: getattr(entity, name) for name in _OF_ENTITY}
+    values |= {name: getattr(measured, name) for name in _OF_MEASUREMENT}
+    for name, restore in _RESTORERS:
+        values[name] = restore(values[name], entity)
+    return StoneRecord(**values)
 
 
 def _kind(name: str, place: str) -> str:
-    """The kind's own spelling; a kind of the hierarchy or an error at its place in the survey."""
+    """Return a kind in its own spelling; an unknown one is an error at its place in the survey."""
     try:
         return kind_of(kind_named(name))
     except UsageError as error:
@@ -187,25 +107,19 @@ def _number(value: float, name: str, place: str) -> float:
 
 
 def _array(value: Array, shape: tuple[int, ...], name: str, place: str) -> Array:
-    """`value` as floats; an error unless it has the shape (first -1: any length) and only finite numbers."""
+    """Return `value` as floats; refuse other shapes (-1 first: any length) and numbers that are not finite."""
     array = np.asarray(value, dtype=np.float64)
     found = array.shape
     if found != shape and (shape[0] != -1 or len(found) != len(shape) or found[1:] != shape[1:]):
         raise SurveyError(f"{name} has shape {array.shape}, expected {shape}", where=place)
-    # a sum that is finite has finite terms; the other way round it need not be so
+    # a finite sum has finite terms; the converse need not hold
     if not math.isfinite(array.sum()) and not np.isfinite(array).all():
         raise SurveyError(f"{name} has a coordinate that is not a finite number", where=place)
     return array
 
 
-@lru_cache(maxsize=256)
-def _plain_faces(faces: tuple[tuple[int, ...], ...]) -> tuple[tuple[int, ...], ...]:
-    """The faces in Python's own integers; those of most stones are alike."""
-    return tuple(tuple(int(index) for index in face) for face in faces)
-
-
 def _check_solid(stone: StoneRecord, place: str) -> None:
-    """The solid is made of polygons on its vertices."""
+    """Refuse a solid that is not made of polygons on its vertices."""
     vertices = _array(stone.solid_vertices, (-1, 3), "solid_vertices", place)
     count = len(vertices)
     if not stone.solid_faces:
@@ -215,11 +129,113 @@ def _check_solid(stone: StoneRecord, place: str) -> None:
         raise GeometryError(what, where=place)
 
 
+Converter = Callable[[Any, str], object]
+Restorer = Callable[[Any, Entity], Any]
+
+_TYPED = frozenset({"code", "zone"})
+"""Texts that users type, and that must therefore be visible."""
+
+_WITH_GAPS = frozenset({"vertex_sigma"})
+"""Arrays in which NaN stands for what is not known."""
+
+
+def _converter(column: Column[Any], mapper: Mapper[Any]) -> Converter:
+    """Return the function from a value of a record, and its place, to the checked value of a column."""
+    convert = _strict_converter(column.name, column.type, annotation_of(column, mapper))
+    if not column.nullable:
+        return convert
+    return lambda value, place: None if value is None else convert(value, place)
+
+
+def _strict_converter(name: str, kind: Any, annotation: object) -> Converter:
+    if isinstance(kind, ArrayType):
+        if name in _WITH_GAPS:
+            return lambda value, place: np.asarray(value, dtype=np.float64).reshape(kind.shape)
+        return lambda value, place: _array(value, kind.shape, name, place)
+    if isinstance(kind, Float):
+        return lambda value, place: _number(value, name, place)
+    if name in _TYPED:
+        return lambda value, place: _text(value, name, place)
+    plain = _PLAIN.get(annotation) or _PLAIN[kind.python_type]
+    return lambda value, place: plain(value)
+
+
+def storable(text: str) -> str:
+    """Return the text with undecodable bytes (of a file's name, say), which no database takes, spelled out."""
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
+@lru_cache(maxsize=256)
+def _plain_faces(faces: tuple[tuple[int, ...], ...]) -> tuple[tuple[int, ...], ...]:
+    """Return the faces in Python's own integers; most stones have the same faces."""
+    return tuple(tuple(int(index) for index in face) for face in faces)
+
+
+_PLAIN: dict[object, Callable[[Any], object]] = {
+    bool: bool,
+    int: int,
+    str: storable,
+    list[int]: lambda values: tuple(int(one) for one in values),
+    list[str]: lambda values: values,
+    list[list[int]]: _plain_faces,
+    dict[str, str]: lambda notes: {str(key): str(value) for key, value in notes.items()},
+}
+"""Values of a column by its annotation or, without a special one, by its type in Python."""
+
+
+def _restorer(field: Field[Any], column: Column[Any]) -> Restorer | None:
+    """Return the function from a value of a column, and its entity, to that of a record; None where they are equal."""
+    kind, optional = column.type, "None" in str(field.type)
+    if isinstance(kind, ArrayType):
+        return lambda value, entity: None if value is None else value.copy()
+    if isinstance(kind, JSON):
+        return lambda value, entity: dict(value) if isinstance(value, dict) else _tuples(value)
+    if optional or not column.nullable:
+        return None
+    if isinstance(kind, Float):
+        return lambda value, entity: _known(value, field.name, entity)
+    default = "" if field.default is MISSING else field.default
+    return lambda value, entity: value or default
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(_tuples(one) for one in value) if isinstance(value, list | tuple) else value
+
+
+def _known(value: object, name: str, entity: Entity) -> object:
+    """Return a number that every measured entity has."""
+    if value is None:
+        raise DatabaseError(f"the {name} of {entity.code} is not known", where=f"entity {entity.id}")
+    return value
+
+
+def _columns_of(cls: type[Base]) -> dict[str, Column[Any]]:
+    """Return the columns of a class that records have too, by name."""
+    names = {field.name for field in fields(StoneRecord)}
+    mapper = cls.__mapper__
+    return {column.name: column for column in mapper.columns if column.name in names}
+
+
+_OF_ENTITY, _OF_MEASUREMENT = _columns_of(Entity), _columns_of(Measurement)
+_ENTITY = {
+    name: _converter(column, Entity.__mapper__) for name, column in _OF_ENTITY.items() if name != "kind"
+}
+_MEASUREMENT = {name: _converter(column, Measurement.__mapper__) for name, column in _OF_MEASUREMENT.items()}
+_RESTORERS = [
+    (field.name, restore)
+    for field in fields(StoneRecord)
+    if (restore := _restorer(field, {**_OF_MEASUREMENT, **_OF_ENTITY}[field.name])) is not None
+]
+
+ENTITY_COLUMNS = ("kind", *_ENTITY, "volume", "x", "y", "z")
+"""Columns of `entity_rows`."""
+
+
 Faces = Sequence[Sequence[int]]
 
 
 def solid_volume(vertices: Array, faces: Faces) -> tuple[float, Array]:
-    """Volume [m³] and centroid (3,) [m] of a closed polyhedron, by the divergence theorem.
+    """Return volume [m³] and centroid (3,) [m] of a closed polyhedron, by the divergence theorem.
 
     The volume is negative if the faces are clockwise seen from outside.
 
@@ -227,13 +243,20 @@ def solid_volume(vertices: Array, faces: Faces) -> tuple[float, Array]:
     ----------
     vertices : (nv, 3) [m]
     faces : vertex indices of each planar face, counter-clockwise seen from outside
+
+    Examples
+    --------
+    >>> corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 6.0]])
+    >>> volume, centroid = solid_volume(corners, [(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)])
+    >>> round(volume, 12), centroid.tolist()
+    (1.0, [0.25, 0.25, 1.5])
     """
     volumes, centroids = _alike(vertices[None], faces)
     return float(volumes[0]), centroids[0]
 
 
 def solid_volumes(solids: Sequence[tuple[Array, tuple[tuple[int, ...], ...]]]) -> tuple[Array, Array]:
-    """As `solid_volume` of many solids, (n,) and (n, 3); those with the same faces are computed together.
+    """Return `solid_volume` of many solids, (n,) and (n, 3); those with equal faces are computed together.
 
     Parameters
     ----------
@@ -249,8 +272,8 @@ def solid_volumes(solids: Sequence[tuple[Array, tuple[tuple[int, ...], ...]]]) -
 
 
 def _alike(vertices: Array, faces: Faces) -> tuple[Array, Array]:
-    """Volumes (n,) and centroids (n, 3) of solids that differ in their vertices (n, nv, 3) only."""
-    origin = vertices.mean(axis=1)  # sums of small numbers, wherever the site's frame has its origin
+    """Return volumes (n,) and centroids (n, 3) of solids that differ in their vertices (n, nv, 3) only."""
+    origin = vertices.mean(axis=1)  # keeps the sums small, wherever the origin of the site lies
     fans = np.array([(face[0], face[i], face[i + 1]) for face in faces for i in range(1, len(face) - 1)])
     local = vertices - origin[:, None]
     a, b, c = (local[:, fans[:, k]] for k in range(3))

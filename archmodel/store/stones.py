@@ -1,4 +1,4 @@
-"""Surveyed stones into the database and out again."""
+"""Storing and loading of surveyed stones."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,12 +20,12 @@ __all__ = ["StoredSurvey", "insert_stones", "load_stones", "store_survey", "surv
 
 @dataclass(frozen=True)
 class StoredSurvey:
-    """What became of a survey.
+    """Outcome of storing a survey.
 
     Attributes
     ----------
     survey, entry : their numbers in the database
-    new : primary keys of the entities that it brought, in the order of the file
+    new : primary keys of its new entities, in the order of the file
     again : of those that it measured again
     """
 
@@ -46,7 +46,7 @@ def store_survey(
     frame: Mapping[str, object] | None = None,
     again: bool = False,
 ) -> StoredSurvey:
-    """Take in one survey file: all of it, or, if anything is wrong, nothing.
+    """Store the stones of one survey file: all of them or, if anything is wrong, none.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def store_survey(
     sha256 : of the file's bytes, in hexadecimal
     stones : its stones, at least one; read once, never all in memory
     stations : where instruments and observers stood, by name, (x, y, z) [m]
-    frame : how the survey was carried into the frame of the site, in values that JSON can say
+    frame : how the survey was carried into the frame of the site, in values that JSON can hold
     again : stones whose code is there already were measured again; otherwise they are an error
 
     Raises
@@ -99,12 +99,12 @@ def store_survey(
 
 
 def survey_with_hash(session: Session, sha256: str) -> Survey | None:
-    """The survey that was taken in from a file with these bytes, if any."""
+    """Return the survey that was taken in from a file with these bytes, if any."""
     return session.scalar(select(Survey).where(Survey.sha256 == sha256))
 
 
 def load_stones(session: Session, entities: Iterable[Entity]) -> list[StoneRecord]:
-    """The survey's records of these entities, in the same order, exactly as they were stored."""
+    """Return the records of these entities, in the same order, exactly as they were stored."""
     wanted = [entity.id for entity in entities]
     found: dict[int, StoneRecord] = {}
     for batch in batches(dict.fromkeys(wanted)):
@@ -121,7 +121,7 @@ def load_stones(session: Session, entities: Iterable[Entity]) -> list[StoneRecor
 
 
 def _refuse_again(session: Session, source_path: str, sha256: str) -> None:
-    """A file is taken in once."""
+    """Refuse a file that was taken in before."""
     if (known := survey_with_hash(session, sha256)) is not None:
         what = f"this file is in the database already, as survey {known.name!r} from {known.path}"
         raise DatabaseError(
@@ -130,7 +130,7 @@ def _refuse_again(session: Session, source_path: str, sha256: str) -> None:
 
 
 def _known_codes(session: Session, batch: Sequence[StoneRecord]) -> dict[str, tuple[int, str]]:
-    """Which of the codes are in the database before this file: primary key, and where it was measured."""
+    """Return the codes that were stored before this file: primary key, and place of measurement."""
     found = session.execute(
         select(Entity.code, Entity.id, Survey.path, Measurement.line)
         .outerjoin(Entity.measurement)
@@ -149,7 +149,7 @@ def _refuse_codes(
     lines: dict[str, int],
     path: str,
 ) -> None:
-    """A code names one stone of the database. `lines` holds this file's codes so far, and is added to."""
+    """Refuse codes that are taken; `lines` holds this file's codes so far, and is added to."""
     for stone in batch:
         remedy = "give each stone a code of its own"
         if stone.code in lines:
@@ -165,12 +165,12 @@ def _refuse_codes(
 
 
 def _places(batch: Sequence[StoneRecord], path: str) -> list[str]:
-    """Where errors find the stones."""
+    """Return the places of stones, for errors."""
     return [f"{path}:{stone.line} stone {stone.code}" for stone in batch]
 
 
 def insert_stones(session: Session, batch: Sequence[StoneRecord], survey: Survey) -> range:
-    """The rows of one batch of new stones, checked; primary keys of the entities, in their order."""
+    """Check and insert one batch of new stones; return the primary keys of the entities, in their order."""
     places = _places(batch, survey.path)
     first = first_free_id(session, Entity)
     entities = [

@@ -1,1 +1,8 @@
-"""Declarative models: the database schema."""
+"""Database schema: declared tables of entities, structures, relations, knowledge, surveys and runs.
+
+Public: `Entity`, `kind_named`, `kinds`, `own_attributes` (entities); `Structure`, `structure_kinds` (structures);
+`Membership`, `Relation` (relations); `Correction`, `Material`, `Phase`, `Statement` (knowledge); `Measurement`,
+`Simplification`, `Survey` (surveys); `ContactPoint`, `EntityResult`, `JointResult`, `Run` (runs); `Entry`,
+`held_at`, `new_entry` (entries); `StoneAttribute`, `attribute` (base); `RegisteredKind` (registered);
+`SCHEMA_VERSION`, `metadata` (layout).
+"""

@@ -1,30 +1,50 @@
-"""The declarative base, and the column types that SQL does not have: arrays and instants."""
+"""The declarative base, column types that SQL lacks (arrays, instants), and declared attributes of stones.
 
+A column made by `attribute` declares what it means, once: rows, records, queries, the exchange document and the
+documentation take it from there.
+"""
+
+import inspect
+from collections.abc import Iterator
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import lru_cache
 from json import JSONEncoder
+from typing import Any, cast, get_args
 
 import numpy as np
-from sqlalchemy import JSON, DateTime, LargeBinary, String
+from sqlalchemy import JSON, Column, DateTime, LargeBinary, String, Table
 from sqlalchemy.engine import Dialect
-from sqlalchemy.orm import DeclarativeBase
+from sqlalchemy.orm import DeclarativeBase, MappedColumn, Mapper, mapped_column
 from sqlalchemy.types import TypeDecorator
 
 from archmodel.arrays import Array
 
-__all__ = ["JSON_TYPE", "TEXT", "ArrayType", "Base", "UtcDateTime", "json_text"]
+__all__ = [
+    "JSON_TYPE",
+    "TEXT",
+    "ArrayType",
+    "Base",
+    "StoneAttribute",
+    "UtcDateTime",
+    "annotation_of",
+    "attribute",
+    "declared_attribute",
+    "declared_attributes",
+    "json_text",
+]
 
 TEXT = String().with_variant(String(collation="C"), "postgresql")
-"""Texts compare by their characters' code points on every database, whatever its locale."""
+"""Text compared by code points on every database, whatever its locale."""
 
 JSON_TYPE = JSON(none_as_null=True)
-"""Not JSONB on PostgreSQL: what comes out is what went in, to the order of the keys."""
+"""Plain JSON, not JSONB, on PostgreSQL: values come back unchanged, even in the order of their keys."""
 
 
 def json_text(value: object) -> str:
-    """JSON of a column's value, for ``create_engine``; what JSON cannot say (NaN) is an error.
+    """Encode a column's value for ``create_engine``; values without a JSON form (NaN) are an error.
 
-    Tuples are of what does not change, like the faces of a solid, and mostly alike: their text is kept.
+    The text of tuples is cached: they hold what does not change, such as the faces of a solid, and many are equal.
     """
     if type(value) is tuple:
         return _text_of_tuple(value)
@@ -59,30 +79,30 @@ class ArrayType(TypeDecorator[Array]):
         self.shape = shape
 
     def process_bind_param(self, value: Array | None, dialect: Dialect) -> bytes | None:
-        """Array to bytes."""
+        """Convert an array to bytes."""
         if value is None:
             return None
         return np.asarray(value, dtype="<f8").reshape(self.shape).tobytes()
 
     def process_result_value(self, value: bytes | None, dialect: Dialect) -> Array | None:
-        """Bytes to a read-only array."""
+        """Convert bytes to a read-only array."""
         if value is None:
             return None
         return np.frombuffer(value, dtype="<f8").astype(np.float64, copy=False).reshape(self.shape)
 
 
 class UtcDateTime(TypeDecorator[datetime]):
-    """An instant: stored as UTC without a zone, given back with the zone UTC."""
+    """An instant, stored as UTC without a zone and given back with the zone UTC."""
 
     impl = DateTime
     cache_ok = True
 
     def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
-        """Zoned instant to UTC without a zone."""
+        """Convert a zoned instant to UTC without a zone."""
         return None if value is None else value.astimezone(UTC).replace(tzinfo=None)
 
     def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:
-        """Stored instant to one in UTC."""
+        """Give a stored instant the zone UTC."""
         return None if value is None else value.replace(tzinfo=UTC)
 
 
@@ -94,3 +114,66 @@ class Base(DeclarativeBase):
         datetime: UtcDateTime(),
         dict[str, object]: JSON_TYPE,
     }
+
+
+@dataclass(frozen=True)
+class StoneAttribute:
+    """An attribute of stones, as its column declares it.
+
+    Attributes
+    ----------
+    name : as users write it
+    unit : "m", "rad", …; "-" for counts and numbers without a unit; None for texts and truths
+    definition : in a few words
+    words : all texts that it can be; None if it can be any
+    """
+
+    name: str
+    unit: str | None
+    definition: str
+    words: tuple[str, ...] | None = None
+
+
+def attribute(
+    unit: str | None,
+    definition: str,
+    *,
+    name: str = "",
+    words: tuple[str, ...] | None = None,
+    **column: Any,
+) -> MappedColumn[Any]:
+    """Declare a column that is an attribute of stones; the rest is passed to ``mapped_column``.
+
+    Parameters
+    ----------
+    unit, definition, words : as in `StoneAttribute`
+    name : as users write it; "": the name of the column
+    """
+    return mapped_column(info={"attribute": StoneAttribute(name, unit, definition, words)}, **column)
+
+
+def declared_attribute(column: Column[Any], name: str | None = None) -> StoneAttribute | None:
+    """Return the attribute that a column declares, if any, under the name that users write."""
+    found: StoneAttribute | None = column.info.get("attribute")
+    if found is None:
+        return None
+    return StoneAttribute(found.name or name or column.name, found.unit, found.definition, found.words)
+
+
+def declared_attributes(mapper: Mapper[Any]) -> Iterator[tuple[Column[Any], StoneAttribute]]:
+    """Yield the columns of a class itself, not of its subclasses, that are attributes of stones."""
+    own = mapper.columns
+    for column in cast(Table, mapper.local_table).columns:
+        found = declared_attribute(column)
+        if found is not None and own.contains_column(column):
+            yield column, found
+
+
+def annotation_of(column: Column[Any], mapper: Mapper[Any]) -> object:
+    """Return the Python type with which a column is declared, without ``Mapped``; object if unknown."""
+    for one in mapper.self_and_descendants:
+        for cls in one.class_.__mro__:
+            declared = inspect.get_annotations(cls).get(column.key)
+            if declared is not None and get_args(declared):
+                return get_args(declared)[0]
+    return object

@@ -1,4 +1,4 @@
-"""The hierarchy of entities: one word, one role, indivisible.
+"""Hierarchy of entities: one word, one role, indivisible.
 
 ::
 
@@ -30,31 +30,29 @@
     ├── Infill
     └── Joint
 
-To add a kind, write one class with a docstring; all kinds live in one table and differ in the column `kind`
-(single-table inheritance, see ``docs/decisions/015-one-table-of-entities.md``). Attributes of its own are typed
-columns of that table, named with their units in ``__own__``. A query of a kind finds its subkinds too. Kinds
-that a user registers in a database (``archmodel.tables.registered``) become classes of this hierarchy when it is
-opened.
+To add a kind, write one class with a docstring. To add an attribute of a kind, and of its subkinds, write one column
+with `attribute`. All kinds live in one table and differ in the column `kind` (single-table inheritance, see
+``docs/decisions/015-one-table-of-entities.md``). A query of a kind finds its subkinds too. Kinds that a user registers
+in a database (``archmodel.tables.registered``) become classes of this hierarchy while it is open.
 """
 
 import difflib
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import cache
 from typing import Any, ClassVar
 from weakref import WeakSet
 
 from sqlalchemy import ForeignKey, Index, func, select
-from sqlalchemy.orm import Mapped, Session, declared_attr, mapped_column, relationship
+from sqlalchemy.orm import Mapped, MappedColumn, Session, declared_attr, mapped_column, relationship
 
-from archmodel.tables.base import Base
+from archmodel.tables.base import Base, StoneAttribute, attribute, declared_attribute
 from archmodel.tables.entries import Entry
-from archmodel.tables.runs import EntityResult
 from archmodel.tables.surveys import Measurement
 from moma.errors import DatabaseError, UsageError
 
 __all__ = [
+    "CORRECTABLE",
     "Ashlar",
     "Boss",
     "Capital",
@@ -71,7 +69,6 @@ __all__ = [
     "Keystone",
     "Lintel",
     "Mullion",
-    "OwnAttribute",
     "Quoin",
     "RibSegment",
     "Rubble",
@@ -94,25 +91,13 @@ __all__ = [
 ]
 
 
-@dataclass(frozen=True)
-class OwnAttribute:
-    """An attribute that one kind has and its parents have not.
-
-    Attributes
-    ----------
-    name : as users write it
-    unit : "m", "rad", …; "-" for counts and numbers without a unit; None for texts
-    definition : what it is, in a few words
-    """
-
-    name: str
-    unit: str | None
-    definition: str
+CORRECTABLE = ("kind", "code", "course", "zone")
+"""Attributes of every entity that can be corrected, besides those of its kind; the others follow from its survey."""
 
 
 @cache
 def kind_of(cls: type["Entity"]) -> str:
-    """Name of a kind as users write it: its ``__kind__``, else the class's name as rib_segment of RibSegment."""
+    """Return the name of a kind as users write it: its ``__kind__`` or, without one, rib_segment for RibSegment."""
     own = cls.__dict__.get("__kind__")
     return str(own) if own is not None else re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
 
@@ -120,26 +105,17 @@ def kind_of(cls: type["Entity"]) -> str:
 class Entity(Base):
     """A part of the building that has one role and is not divided further.
 
+    The columns made by `attribute` say what they are.
+
     Attributes
     ----------
-    code : the name that the survey gave it, unique in the database
-    kind : name of its class
-    course : number of its course, counted from the ground; None if it belongs to none
-    zone : part of the building, as the survey names it; None if it does not
-    depth : how far it reaches into the wall [m], with its standard deviation, its evidence, and what kind of
-        evidence that is; None if not known, as are all that follow
-    length, height : of its face, horizontally and upwards in the face's plane [m]
-    area : of its face [m²]
-    volume : of its solid [m³]
-    x, y, z : centroid of its solid [m]
-    hypothesis : nobody has seen it: a stone that is missing, or hidden within the wall, and thought to be there
     own : values of the attributes of a registered kind, by name
     entry : the act of recording that it came with; later changes are `knowledge.Correction`
 
     Class attributes, for those who write kinds
     -------------------------------------------
     __kind__ : the name, if it is not that of the class
-    __own__ : the attributes that the kind has and its parents have not
+    __own__ : the attributes that the kind has and its parents have not; taken from its columns
     __canon__ : canonical proportions, as a query expression; None: those of the parent
     __users__ : the open databases that register the kind; None: it is built in
     """
@@ -151,28 +127,30 @@ class Entity(Base):
         Index("ix_entity_zone_course", "zone", "course"),
         Index("ix_entity_place", "x", "y", "z"),
     )
-    __own__: ClassVar[tuple[OwnAttribute, ...]] = ()
+    __own__: ClassVar[tuple[StoneAttribute, ...]] = ()
     __canon__: ClassVar[str | None] = None
     __users__: ClassVar["WeakSet[Any] | None"] = None
 
     id: Mapped[int] = mapped_column(primary_key=True)
-    kind: Mapped[str]
-    code: Mapped[str] = mapped_column(unique=True)
+    code: Mapped[str] = attribute(None, "name of the stone in the survey", unique=True)
+    kind: Mapped[str] = attribute(None, "its own kind, e.g. keystone")
     entry_id: Mapped[int] = mapped_column(ForeignKey("entry.id"))
-    course: Mapped[int | None]
-    zone: Mapped[str | None]
-    depth: Mapped[float | None]
-    depth_sigma: Mapped[float | None]
-    depth_source: Mapped[str | None]
-    depth_origin: Mapped[str | None]
-    length: Mapped[float | None]
-    height: Mapped[float | None]
-    area: Mapped[float | None]
-    volume: Mapped[float | None]
-    x: Mapped[float | None]
-    y: Mapped[float | None]
-    z: Mapped[float | None]
-    hypothesis: Mapped[bool] = mapped_column(default=False)
+    course: Mapped[int | None] = attribute("-", "number of its course, from the ground")
+    zone: Mapped[str | None] = attribute(None, "part of the building")
+    depth: Mapped[float | None] = attribute("m", "how far it reaches into the wall")
+    depth_sigma: Mapped[float | None] = attribute("m", "standard deviation of the depth")
+    depth_origin: Mapped[str | None] = attribute(None, "evidence: stone, rule, kind, structure or solid")
+    depth_source: Mapped[str | None] = attribute(None, "that evidence in words")
+    length: Mapped[float | None] = attribute("m", "horizontal extent of its face")
+    height: Mapped[float | None] = attribute("m", "extent of its face upwards")
+    area: Mapped[float | None] = attribute("m²", "area of its face")
+    volume: Mapped[float | None] = attribute("m³", "volume of its solid")
+    x: Mapped[float | None] = attribute("m", "centroid of its solid")
+    y: Mapped[float | None] = attribute("m", "centroid of its solid")
+    z: Mapped[float | None] = attribute("m", "centroid of its solid")
+    hypothesis: Mapped[bool] = attribute(
+        None, "nobody has seen it: missing, or hidden in the wall", default=False
+    )
     own: Mapped[dict[str, object] | None]
 
     entry: Mapped[Entry] = relationship()
@@ -180,10 +158,14 @@ class Entity(Base):
         primaryjoin="and_(Measurement.entity_id == Entity.id, Measurement.superseded_id.is_(None))",
         viewonly=True,
     )
-    measurements: Mapped[list[Measurement]] = relationship(
-        back_populates="entity", order_by=Measurement.entry_id
-    )
-    results: Mapped[list[EntityResult]] = relationship(back_populates="entity", order_by=EntityResult.run_id)
+    measurements: Mapped[list[Measurement]] = relationship(order_by=Measurement.entry_id)
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        columns = [(name, one.column) for name, one in vars(cls).items() if isinstance(one, MappedColumn)]
+        declared = [declared_attribute(column, name) for name, column in columns]
+        if declared:
+            cls.__own__ = tuple(one for one in declared if one is not None)
+        super().__init_subclass__(**options)
 
     @declared_attr.directive
     @classmethod
@@ -211,10 +193,9 @@ class Ashlar(Stone):
 class Header(Ashlar):
     """An ashlar laid across the wall, so that its short side is seen and its length binds the wall."""
 
-    __own__ = (OwnAttribute("tail_length", "m", "how far it reaches behind the stretchers beside it"),)
     __canon__ = "depth >= length"
 
-    tail_length: Mapped[float | None]
+    tail_length: Mapped[float | None] = attribute("m", "how far it reaches behind the stretchers beside it")
 
 
 class Stretcher(Ashlar):
@@ -240,10 +221,9 @@ class Sill(Ashlar):
 class Lintel(Ashlar):
     """An ashlar that spans an opening and carries what is above by bending."""
 
-    __own__ = (OwnAttribute("span", "m", "clear width of the opening below it"),)
     __canon__ = "length >= height"
 
-    span: Mapped[float | None]
+    span: Mapped[float | None] = attribute("m", "clear width of the opening below it")
 
 
 class Mullion(Ashlar):
@@ -255,9 +235,7 @@ class Mullion(Ashlar):
 class Corbel(Ashlar):
     """An ashlar built into the wall whose free end carries what projects from it."""
 
-    __own__ = (OwnAttribute("projection", "m", "how far it projects from the face of the wall"),)
-
-    projection: Mapped[float | None]
+    projection: Mapped[float | None] = attribute("m", "how far it projects from the face of the wall")
 
 
 class Coping(Ashlar):
@@ -275,15 +253,11 @@ class Slab(Ashlar):
 class Voussoir(Ashlar):
     """A wedge-shaped ashlar of an arch, which carries by pressing on its neighbours."""
 
-    __own__ = (
-        OwnAttribute("ring", "-", "number of its ring of the arch, from the intrados outwards"),
-        OwnAttribute("rank", "-", "its place in the ring, from 1 at one springer to the other"),
-        OwnAttribute("intrados_angle", "rad", "angle between its two joints, seen along the arch's axis"),
+    ring: Mapped[int | None] = attribute("-", "number of its ring of the arch, from the intrados outwards")
+    rank: Mapped[int | None] = attribute("-", "its place in the ring, from 1 at one springer to the other")
+    intrados_angle: Mapped[float | None] = attribute(
+        "rad", "angle between its two joints, seen along the arch's axis"
     )
-
-    ring: Mapped[int | None]
-    rank: Mapped[int | None]
-    intrados_angle: Mapped[float | None]
 
 
 class Keystone(Voussoir):
@@ -297,9 +271,9 @@ class Springer(Voussoir):
 class RibSegment(Ashlar):
     """A moulded ashlar of the rib of a vault."""
 
-    __own__ = (OwnAttribute("rank", "-", "its place in the rib, from 1 at the springing"),)
-
-    rank: Mapped[int | None] = mapped_column(use_existing_column=True)
+    rank: Mapped[int | None] = attribute(
+        "-", "its place in the rib, from 1 at the springing", use_existing_column=True
+    )
 
 
 class Boss(RibSegment):
@@ -319,9 +293,7 @@ class ColumnBase(ColumnPart):
 class Shaft(ColumnPart):
     """A drum of a column, or the whole of it between base and capital."""
 
-    __own__ = (OwnAttribute("drum", "-", "number of the drum, from the base upwards"),)
-
-    drum: Mapped[int | None]
+    drum: Mapped[int | None] = attribute("-", "number of the drum, from the base upwards")
 
 
 class Capital(ColumnPart):
@@ -343,13 +315,11 @@ class Infill(Entity):
 class Joint(Entity):
     """The mortar between two entities."""
 
-    __own__ = (OwnAttribute("thickness", "m", "distance of the two faces that it fills"),)
-
-    thickness: Mapped[float | None]
+    thickness: Mapped[float | None] = attribute("m", "distance of the two faces that it fills")
 
 
 def kinds() -> Mapping[str, type[Entity]]:
-    """Every kind by its name, general before particular."""
+    """Return every kind by its name, general before particular."""
     return {kind_of(cls): cls for cls in _descend(Entity)}
 
 
@@ -362,7 +332,7 @@ def _descend(cls: type[Entity]) -> Iterator[type[Entity]]:
 
 
 def kind_named(name: str) -> type[Entity]:
-    """The kind of this name, in upper or lower case, with _ or a hyphen or a blank between its words.
+    """Return the kind of this name, in upper or lower case, with _, hyphen or blank between its words.
 
     Raises
     ------
@@ -378,27 +348,27 @@ def kind_named(name: str) -> type[Entity]:
 
 
 def kind_chain(cls: type[Entity]) -> tuple[type[Entity], ...]:
-    """The kind and what it inherits from, most general first: Entity, Ashlar, Voussoir, Keystone."""
+    """Return the kind and its ancestors, most general first: Entity, Ashlar, Voussoir, Keystone."""
     return tuple(base for base in reversed(cls.__mro__) if issubclass(base, Entity))
 
 
 def definition_of(cls: type[Entity]) -> str:
-    """The one sentence that defines a kind."""
+    """Return the one sentence that defines a kind."""
     return (cls.__doc__ or "").strip().split("\n", 1)[0]
 
 
-def own_attributes(cls: type[Entity]) -> Mapping[str, OwnAttribute]:
-    """The attributes that a kind has besides those of every entity: its parents' and its own."""
+def own_attributes(cls: type[Entity]) -> Mapping[str, StoneAttribute]:
+    """Return the attributes that a kind has besides those of every entity: its parents' and its own."""
     return {one.name: one for base in kind_chain(cls) for one in base.__own__}
 
 
 def canon_of(cls: type[Entity]) -> str | None:
-    """The canonical proportions of a kind, as a query expression; None if it has none."""
+    """Return the canonical proportions of a kind as a query expression; None if it has none."""
     return cls.__canon__
 
 
 def refuse_unknown_kinds(session: Session) -> None:
-    """Check that every kind in the database is declared, as it is not if another program added its own.
+    """Refuse a database with kinds that are not declared, because another program added its own.
 
     Raises
     ------
@@ -414,7 +384,7 @@ def refuse_unknown_kinds(session: Session) -> None:
 
 
 def _stored_kinds(session: Session) -> list[str]:
-    """The kinds that entities in the database are of: from one to the next in the index, not all entities."""
+    """Return the kinds of stored entities, stepping through the index from one to the next."""
     kind = Entity.__table__.c.kind
     stored = select(func.min(kind).label("kind")).cte("stored", recursive=True)
     following = select(func.min(kind)).where(kind > stored.c.kind).correlate(stored).scalar_subquery()

@@ -1,4 +1,4 @@
-"""Acts of recording: who put what into the database, when and on what grounds.
+"""Acts of recording: author, date and grounds of every change of the database.
 
 Every row that says something of the building names the entry that it came with, and, once it is no longer
 held to be true, the entry that superseded it. Nothing is overwritten and nothing is deleted, so what was known
@@ -9,16 +9,16 @@ from collections.abc import Mapping
 from datetime import UTC, datetime
 from importlib.metadata import version
 
-from sqlalchemy import ColumnElement, ForeignKey, func, or_, select
+from sqlalchemy import ColumnElement, ForeignKey, Index, func, or_, select, text
 from sqlalchemy.orm import Mapped, Session, declared_attr, mapped_column, relationship
 
 from archmodel.tables.base import Base
 
-__all__ = ["ACTIONS", "Entry", "Recorded", "held_at", "latest_entry", "new_entry"]
+__all__ = ["ACTIONS", "Entry", "Recorded", "held_at", "held_index", "latest_entry", "new_entry"]
 
 ACTIONS = ("ingest", "geometry", "declaration", "correction", "run", "migration")
-"""What an entry can be: a survey file taken in, relations computed, knowledge declared, attributes corrected, a
-simulation, rows that were moved from an older layout of the database."""
+"""Kinds of entries: a survey taken in, relations computed, knowledge declared, attributes corrected, a simulation,
+rows moved from an older layout of the database."""
 
 
 class Entry(Base):
@@ -27,7 +27,7 @@ class Entry(Base):
     Attributes
     ----------
     action : one of ACTIONS
-    author : who says so; None if a program does
+    author : person who recorded it; None for a program
     source : on what grounds: the file, the document, the reasoning
     settings : of the program that computed it, e.g. tolerances
     version : of MOMA
@@ -46,7 +46,7 @@ class Entry(Base):
 
 
 class Recorded:
-    """What every row has that says something of the building: its entry, and the entry that superseded it."""
+    """Columns of every row that describes the building: its entry, and the entry that superseded it."""
 
     entry_id: Mapped[int] = mapped_column(ForeignKey("entry.id"))
     superseded_id: Mapped[int | None] = mapped_column(ForeignKey("entry.id"))
@@ -79,8 +79,8 @@ def new_entry(
     session : a writing session
     action : one of ACTIONS
     source : on what grounds
-    author : who says so; None if a program does
-    settings : of the program that computed it, in values that JSON can say
+    author : person who recorded it; None for a program
+    settings : of the program that computed it, in values that JSON can hold
     """
     if action not in ACTIONS:
         raise ValueError(f"action {action!r} is none of {', '.join(ACTIONS)}")
@@ -103,7 +103,13 @@ def latest_entry(session: Session) -> int | None:
 
 
 def held_at(table: type[Recorded], entry: int | None = None) -> ColumnElement[bool]:
-    """The condition that a row is held to be true: now, or as it was when the given entry had just been made."""
+    """Return the condition that a row is held to be true: now, or just after the given entry."""
     if entry is None:
         return table.superseded_id.is_(None)
     return (table.entry_id <= entry) & or_(table.superseded_id.is_(None), table.superseded_id > entry)
+
+
+def held_index(name: str, *columns: str) -> Index:
+    """Return a unique index over the rows that are held now."""
+    now = text("superseded_id IS NULL")
+    return Index(name, *columns, unique=True, sqlite_where=now, postgresql_where=now)

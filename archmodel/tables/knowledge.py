@@ -1,22 +1,19 @@
-"""What is known besides the geometry: materials, phases, documents, and statements about entities and structures.
+"""Knowledge besides the geometry: materials, phases, documents, and statements about entities and structures.
 
-A statement is one thing that somebody says of one entity or structure, on stated grounds: that it is of a material
-or a phase, bears a mason mark, is eroded, is so deep, is treated in a document. Statements are never changed; a
-better one supersedes them (`supersedes_id`), or they are withdrawn (`superseded_id` without a successor).
+A statement is one fact that somebody records of one entity or structure, on stated grounds: its material, its phase,
+a mason mark, erosion, a depth, a document. Statements are never changed; a better one supersedes them
+(`supersedes_id`), or they are withdrawn (`superseded_id` without a successor).
 """
 
 from datetime import date
-from typing import TYPE_CHECKING
 
 from sqlalchemy import Date, ForeignKey, Index, text
 from sqlalchemy.orm import Mapped, declared_attr, mapped_column, relationship
 
 from archmodel.tables.base import JSON_TYPE, Base
-from archmodel.tables.entries import Entry, Recorded
+from archmodel.tables.entities import Entity
+from archmodel.tables.entries import Entry, Recorded, held_index
 from archmodel.tables.structures import Structure
-
-if TYPE_CHECKING:
-    from archmodel.tables.entities import Entity
 
 __all__ = [
     "OBSERVATIONS",
@@ -50,12 +47,6 @@ OBSERVATIONS = {
 """Types of observations and their definitions."""
 
 
-def _current(name: str, *columns: str) -> Index:
-    """A unique index over the rows that are held now."""
-    now = text("superseded_id IS NULL")
-    return Index(name, *columns, unique=True, sqlite_where=now, postgresql_where=now)
-
-
 class Material(Recorded, Base):
     """A stone or a mortar, under one name.
 
@@ -66,7 +57,7 @@ class Material(Recorded, Base):
     """
 
     __tablename__ = "material"
-    __table_args__ = (_current("ix_material_name", "name"),)
+    __table_args__ = (held_index("ix_material_name", "name"),)
 
     id: Mapped[int] = mapped_column(primary_key=True)
     name: Mapped[str]
@@ -88,7 +79,7 @@ class MaterialProperty(Recorded, Base):
     """
 
     __tablename__ = "material_property"
-    __table_args__ = (_current("ix_material_property_name", "material_id", "name"),)
+    __table_args__ = (held_index("ix_material_property_name", "material_id", "name"),)
 
     id: Mapped[int] = mapped_column(primary_key=True)
     material_id: Mapped[int] = mapped_column(ForeignKey("material.id"))
@@ -113,7 +104,7 @@ class Phase(Recorded, Base):
     """
 
     __tablename__ = "phase"
-    __table_args__ = (_current("ix_phase_name", "name"),)
+    __table_args__ = (held_index("ix_phase_name", "name"),)
 
     id: Mapped[int] = mapped_column(primary_key=True)
     name: Mapped[str]
@@ -136,7 +127,7 @@ class Document(Recorded, Base):
     """
 
     __tablename__ = "document"
-    __table_args__ = (_current("ix_document_code", "code"),)
+    __table_args__ = (held_index("ix_document_code", "code"),)
 
     id: Mapped[int] = mapped_column(primary_key=True)
     code: Mapped[str]
@@ -149,12 +140,12 @@ class Document(Recorded, Base):
 
 
 class Statement(Recorded, Base):
-    """One thing said of one entity or of one structure.
+    """Statement about one entity or one structure.
 
     Attributes
     ----------
     kind : name of its class
-    entity, structure : what it is said of, exactly one of them
+    entity, structure : its subject, exactly one of them
     text : in words; None if the rest says enough
     document, locator : the document that says so, and where in it (page, number of the figure)
     observed_on : date on which it was seen; None if not known
@@ -183,7 +174,7 @@ class Statement(Recorded, Base):
     observed_on: Mapped[date | None] = mapped_column(Date)
     supersedes_id: Mapped[int | None] = mapped_column(ForeignKey("statement.id"))
 
-    entity: Mapped["Entity | None"] = relationship()
+    entity: Mapped[Entity | None] = relationship()
     structure: Mapped[Structure | None] = relationship()
     document: Mapped[Document | None] = relationship()
 
@@ -198,7 +189,7 @@ class Statement(Recorded, Base):
 
 
 class MadeOf(Statement):
-    """It is of a material."""
+    """Material of the subject."""
 
     __kind__ = "made_of"
 
@@ -208,7 +199,7 @@ class MadeOf(Statement):
 
 
 class OfPhase(Statement):
-    """It was built, or put where it is, in a phase."""
+    """Phase in which the subject was built or put into its place."""
 
     __kind__ = "of_phase"
 
@@ -218,7 +209,7 @@ class OfPhase(Statement):
 
 
 class MasonMark(Statement):
-    """It bears a mason's mark.
+    """Mason's mark on the subject.
 
     Attributes
     ----------
@@ -233,12 +224,12 @@ class MasonMark(Statement):
 
 
 class Observation(Statement):
-    """Something was seen on it.
+    """Observation of damage or change on the subject.
 
     Attributes
     ----------
     type : one of OBSERVATIONS
-    severity : from 0 (traces) to 4 (lost, or about to be); None if not said
+    severity : from 0 (traces) to 4 (lost, or about to be); None if not stated
     place : on the stone, in words
     x, y, z : where, in the frame of the site [m]; None if not measured
     """
@@ -254,7 +245,7 @@ class Observation(Statement):
 
 
 class DepthEvidence(Statement):
-    """How deep it is said to be, on what evidence.
+    """Recorded depth of the subject, with its evidence.
 
     Attributes
     ----------
@@ -268,13 +259,13 @@ class DepthEvidence(Statement):
 
 
 class Reference(Statement):
-    """A document or photograph treats or shows it."""
+    """Document or photograph that treats or shows the subject."""
 
     __kind__ = "reference"
 
 
 class Note(Statement):
-    """A word of the surveyor, under a key.
+    """Note of the surveyor, under a key.
 
     Attributes
     ----------
@@ -287,7 +278,7 @@ class Note(Statement):
 
 
 class Correction(Base):
-    """One attribute of an entity was changed; the entity has the new value, this row has both.
+    """Change of one attribute of an entity; the entity has the new value, this row has both.
 
     Attributes
     ----------
@@ -306,5 +297,5 @@ class Correction(Base):
     before: Mapped[float | int | str | None] = mapped_column(JSON_TYPE)
     after: Mapped[float | int | str | None] = mapped_column(JSON_TYPE)
 
-    entity: Mapped["Entity"] = relationship()
+    entity: Mapped[Entity] = relationship()
     entry: Mapped[Entry] = relationship()

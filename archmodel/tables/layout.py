@@ -16,12 +16,12 @@ from archmodel.tables.base import Base
 
 __all__ = ["SCHEMA_VERSION", "SchemaVersion", "metadata"]
 
-SCHEMA_VERSION = 4
-"""Layout of the tables that this version of MOMA reads and writes."""
+SCHEMA_VERSION = 1
+"""Version of the layout that this program reads and writes."""
 
 
 class SchemaVersion(Base):
-    """One row that says that this is a MOMA database, and how its tables are laid out."""
+    """One row that marks a MOMA database and holds the version of its layout."""
 
     __tablename__ = "moma_schema"
 

@@ -1,4 +1,4 @@
-"""Kinds that a user registers: kept in the database, and classes of the hierarchy while it is open."""
+"""Kinds that users register: rows of the database, and classes of the hierarchy while it is open."""
 
 import re
 from typing import Any
@@ -7,8 +7,8 @@ from weakref import WeakSet
 from sqlalchemy import Engine, ForeignKey, inspect, select
 from sqlalchemy.orm import Mapped, Session, mapped_column
 
-from archmodel.tables.base import JSON_TYPE, Base
-from archmodel.tables.entities import Entity, OwnAttribute, kinds
+from archmodel.tables.base import JSON_TYPE, Base, StoneAttribute
+from archmodel.tables.entities import Entity, kinds
 from moma.errors import DatabaseError
 
 __all__ = ["RegisteredKind", "declare_registered", "release_registered"]
@@ -36,20 +36,19 @@ class RegisteredKind(Base):
     entry_id: Mapped[int] = mapped_column(ForeignKey("entry.id"))
 
     def says(self) -> tuple[object, ...]:
-        """All that defines it; two kinds of one name that say the same are one."""
+        """Return all that defines the kind; two kinds for which it is equal are one."""
         own = {name: tuple(one) for name, one in self.attributes.items()}
         return self.name, self.parent, self.definition, self.canon, tuple(own.items())
 
 
 _CLASSES: dict[tuple[object, ...], type[Entity]] = {}
-"""Every class that was made in this process, by its parent and what defines it: a class cannot be unmade, but it can be
-found again."""
+"""Every class made in this process, by its parent and definition: a class cannot be unmade, but it can be reused."""
 
 
 def declare_registered(session: Session) -> None:
-    """Make the kinds that this database registers known, and let go of those that it does not register any more.
+    """Declare the kinds that this database registers, and release those that it no longer registers.
 
-    They are known until `release_registered`. A kind is not registered any more if that was rolled back.
+    They are known until `release_registered`. Rolling back a registration ends it.
 
     Raises
     ------
@@ -79,19 +78,19 @@ def declare_registered(session: Session) -> None:
 
 
 def release_registered(engine: Engine) -> None:
-    """Say that a database is closed: kinds that no open database registers are known no longer."""
+    """Release the kinds of a closing database; kinds that no open database registers are no longer known."""
     for cls in _CLASSES.values():
         _users(cls).discard(engine.dialect)
 
 
 def _users(cls: type[Entity]) -> "WeakSet[Any]":
-    """The open databases that register a kind."""
+    """Return the open databases that register a kind."""
     assert cls.__users__ is not None
     return cls.__users__
 
 
 def _declared(kind: RegisteredKind) -> type[Entity]:
-    """The class of a kind, made or found."""
+    """Return the class of a kind, made or reused."""
     held = kinds().get(kind.name)
     parent = kinds()[kind.parent]
     key = (parent, *kind.says())
@@ -108,8 +107,8 @@ def _declared(kind: RegisteredKind) -> type[Entity]:
 
 
 def _made(kind: RegisteredKind, parent: Any) -> type[Entity]:
-    """The class of a kind; its attributes are in ``Entity.own``."""
-    own = tuple(OwnAttribute(name, unit, meaning) for name, (unit, meaning) in kind.attributes.items())
+    """Make the class of a kind; its attributes are in ``Entity.own``."""
+    own = tuple(StoneAttribute(name, unit, meaning) for name, (unit, meaning) in kind.attributes.items())
     contents: dict[str, object] = {
         "__doc__": kind.definition,
         # two definitions of one name are two classes

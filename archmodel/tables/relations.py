@@ -1,16 +1,12 @@
-"""How entities stand to one another, and which structures they are members of."""
-
-from typing import TYPE_CHECKING
+"""Relations between entities, and their membership of structures."""
 
 from sqlalchemy import ForeignKey, Index
 from sqlalchemy.orm import Mapped, mapped_column, relationship
 
 from archmodel.tables.base import Base
+from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Recorded
 from archmodel.tables.structures import Structure
-
-if TYPE_CHECKING:
-    from archmodel.tables.entities import Entity
 
 __all__ = ["INVERSE", "RELATIONS", "SYMMETRIC", "Membership", "Relation"]
 
@@ -25,13 +21,13 @@ INVERSE = {"rests_on": "supports", "supports": "rests_on", **{name: name for nam
 
 
 class Relation(Recorded, Base):
-    """One entity in relation to another: subject rests on object, say.
+    """Relation of one entity to another: subject rests on object, say.
 
     Attributes
     ----------
     kind : one of RELATIONS
     subject, object : the two entities
-    declared : somebody says so; otherwise it was computed from the geometry
+    declared : a person recorded it; otherwise it was computed from the geometry
     area : that the two faces share; None if declared [m²]
     gap : mean width of the joint between them; None if declared [m]
     x, y, z : centroid of the shared area; None if declared [m]
@@ -58,17 +54,17 @@ class Relation(Recorded, Base):
     ny: Mapped[float | None]
     nz: Mapped[float | None]
 
-    subject: Mapped["Entity"] = relationship(foreign_keys=[subject_id])
-    object: Mapped["Entity"] = relationship(foreign_keys=[object_id])
+    subject: Mapped[Entity] = relationship(foreign_keys=[subject_id])
+    object: Mapped[Entity] = relationship(foreign_keys=[object_id])
 
 
 class Membership(Recorded, Base):
-    """An entity is a member of a structure.
+    """Membership of an entity in a structure.
 
     Attributes
     ----------
     rank : its place in the structure, from 1; None if there is no order
-    declared : somebody says so; otherwise it follows from the survey or from the geometry
+    declared : a person recorded it; otherwise it follows from the survey or from the geometry
     """
 
     __tablename__ = "membership"
@@ -83,5 +79,5 @@ class Membership(Recorded, Base):
     rank: Mapped[int | None]
     declared: Mapped[bool]
 
-    entity: Mapped["Entity"] = relationship()
+    entity: Mapped[Entity] = relationship()
     structure: Mapped[Structure] = relationship()

@@ -1,20 +1,16 @@
-"""What was computed: simulation runs, and their results by entity, by joint and by contact point."""
-
-from typing import TYPE_CHECKING
+"""Simulation runs and their results by entity, by joint and by contact point."""
 
 from sqlalchemy import ForeignKey, Index
 from sqlalchemy.orm import Mapped, mapped_column, relationship
 
-from archmodel.tables.base import JSON_TYPE, Base
+from archmodel.tables.base import JSON_TYPE, Base, attribute
+from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry
-
-if TYPE_CHECKING:
-    from archmodel.tables.entities import Entity
 
 __all__ = ["FIDELITIES", "ContactPoint", "EntityResult", "JointResult", "Run"]
 
 FIDELITIES = ("fixed", "rigid", "deformable")
-"""How a stone can be modelled in a run."""
+"""Ways to model a stone in a run."""
 
 
 class Run(Base):
@@ -59,9 +55,14 @@ class Run(Base):
 
 
 class EntityResult(Base):
-    """What one run computed for one entity; units and meaning as in ``run_records.StoneResult``.
+    """Results of one run for one entity.
 
-    The primary key begins with the entity: "its latest run" is one step in that index.
+    The primary key begins with the entity, so that its latest run is one step in that index. Stresses are null where
+    the stone was rigid.
+
+    Attributes
+    ----------
+    values : further numbers, by name
     """
 
     __tablename__ = "entity_result"
@@ -69,19 +70,19 @@ class EntityResult(Base):
 
     entity_id: Mapped[int] = mapped_column(ForeignKey("entity.id"), primary_key=True)
     run_id: Mapped[int] = mapped_column(ForeignKey("run.id"), primary_key=True)
-    fidelity: Mapped[str]
-    von_mises_max: Mapped[float | None]
-    von_mises_mean: Mapped[float | None]
-    displacement_max: Mapped[float]
-    contact_force_max: Mapped[float | None]
+    von_mises_max: Mapped[float | None] = attribute("Pa", "largest Von Mises stress")
+    von_mises_mean: Mapped[float | None] = attribute("Pa", "mean Von Mises stress")
+    displacement_max: Mapped[float] = attribute("m", "largest displacement")
+    contact_force_max: Mapped[float | None] = attribute("N", "largest contact force")
     values: Mapped[dict[str, float]] = mapped_column(JSON_TYPE)
+    fidelity: Mapped[str] = attribute(None, "fixed, rigid or deformable", words=FIDELITIES)
 
-    entity: Mapped["Entity"] = relationship(back_populates="results")
+    entity: Mapped[Entity] = relationship()
     run: Mapped[Run] = relationship(back_populates="results")
 
 
 class JointResult(Base):
-    """What one run computed for the joint of two entities; meaning as in ``run_records.JointArrays``.
+    """Result of one run for the joint of two entities.
 
     Attributes
     ----------
@@ -130,12 +131,12 @@ class JointResult(Base):
     width: Mapped[float | None]
 
     run: Mapped[Run] = relationship()
-    first: Mapped["Entity"] = relationship(foreign_keys=[first_id])
-    second: Mapped["Entity"] = relationship(foreign_keys=[second_id])
+    first: Mapped[Entity] = relationship(foreign_keys=[first_id])
+    second: Mapped[Entity] = relationship(foreign_keys=[second_id])
 
 
 class ContactPoint(Base):
-    """One contact point at the end of a run; meaning as in ``run_records.ContactArrays``.
+    """One contact point at the end of a run.
 
     Attributes
     ----------
@@ -177,5 +178,5 @@ class ContactPoint(Base):
     status: Mapped[str]
 
     run: Mapped[Run] = relationship()
-    candidate: Mapped["Entity"] = relationship(foreign_keys=[candidate_id])
-    antagonist: Mapped["Entity"] = relationship(foreign_keys=[antagonist_id])
+    candidate: Mapped[Entity] = relationship(foreign_keys=[candidate_id])
+    antagonist: Mapped[Entity] = relationship(foreign_keys=[antagonist_id])

@@ -1,4 +1,4 @@
-"""What entities make up: the divisible parts of a building, from the building itself to a course.
+"""Structures: the divisible parts of a building, from the building itself to a course.
 
 ::
 
@@ -27,11 +27,11 @@ import difflib
 import re
 from collections.abc import Mapping
 
-from sqlalchemy import ForeignKey, Index, text
+from sqlalchemy import ForeignKey, Index
 from sqlalchemy.orm import Mapped, declared_attr, mapped_column, relationship
 
 from archmodel.tables.base import Base
-from archmodel.tables.entries import Recorded
+from archmodel.tables.entries import Recorded, held_index
 from moma.errors import UsageError
 
 __all__ = [
@@ -58,7 +58,7 @@ __all__ = [
 
 
 def structure_kind_of(cls: type["Structure"]) -> str:
-    """Name of a kind of structure as users write it: wall_facing for WallFacing."""
+    """Return the name of a kind of structure as users write it: wall_facing for WallFacing."""
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
 
 
@@ -78,13 +78,7 @@ class Structure(Recorded, Base):
 
     __tablename__ = "structure"
     __table_args__ = (
-        Index(
-            "ix_structure_code",
-            "code",
-            unique=True,
-            sqlite_where=text("superseded_id IS NULL"),
-            postgresql_where=text("superseded_id IS NULL"),
-        ),
+        held_index("ix_structure_code", "code"),
         Index("ix_structure_parent_id", "parent_id"),
     )
 
@@ -173,13 +167,13 @@ class Crenelation(Structure):
 
 
 def structure_kinds() -> Mapping[str, type[Structure]]:
-    """Every kind of structure by its name."""
+    """Return every kind of structure by its name."""
     classes: tuple[type[Structure], ...] = (Structure, *Structure.__subclasses__())
     return {structure_kind_of(cls): cls for cls in classes}
 
 
 def structure_kind_named(name: str) -> type[Structure]:
-    """The kind of structure of this name.
+    """Return the kind of structure of this name.
 
     Raises
     ------

@@ -1,17 +1,12 @@
-"""What was measured: survey files, measurements of entities, and the solids that stood for them in runs."""
-
-from typing import TYPE_CHECKING
+"""Survey files, measurements of entities, and the solids that stood for them in runs."""
 
 import numpy as np
-from sqlalchemy import ForeignKey, Index, text
+from sqlalchemy import ForeignKey, Index
 from sqlalchemy.orm import Mapped, mapped_column, relationship
 
 from archmodel.arrays import Array
-from archmodel.tables.base import JSON_TYPE, ArrayType, Base
-from archmodel.tables.entries import Entry, Recorded
-
-if TYPE_CHECKING:
-    from archmodel.tables.entities import Entity
+from archmodel.tables.base import JSON_TYPE, ArrayType, Base, attribute
+from archmodel.tables.entries import Entry, Recorded, held_index
 
 __all__ = ["Measurement", "Simplification", "Survey"]
 
@@ -44,41 +39,42 @@ class Survey(Base):
 
 
 class Measurement(Recorded, Base):
-    """What was measured of one entity, the plane fitted to it, and the solid made of it.
+    """Measurement of one entity, the plane fitted to it, and the solid made of it.
 
     An entity that is measured again, or whose depth is corrected, gets a new measurement; the old one is
     superseded and kept.
 
+    The columns made by `attribute` say what they are.
+
     Attributes
     ----------
     line : of the survey file, where the record begins
-    vertices, points : (n, 3) as measured [m]
+    vertices, points : (n, 3) measured face corners, in order, and points on the face [m]
     sigma : standard deviation of a measured coordinate [m]
-    normal, offset : the fitted plane n·x = d [-], [m]
-    centroid, axes : point of the plane [m], directions in it
-    covariance : (3, 3) of two tilts [rad] and the height at the centroid [m]
-    rms : root mean square of the residuals [m]
-    redundancy : number of accepted points minus 3
-    point_count, rejected_count : sizes of `points` and `rejected`, for queries
-    rejected : indices into `points` of the blunders
+    sigmas : (np + nv,) standard deviations of the points, then of the corners [m]; None: all `sigma`
+    names : of the points, then of the corners, as the instrument numbers them; () if they have none
+    normal : (3,) unit normal n of the fitted plane n·x = d, towards the observer
+    offset : signed distance d of the plane from the origin [m]
+    centroid : (3,) mean of the accepted points, on the plane [m]
+    axes : (2, 3) unit directions in the plane
+    covariance : (3, 3) of two tilts [rad] and the height at the centroid [m]; tilt i turns the normal towards
+        -axes[i]
+    rejected : indices into `points` of the outliers
     rejected_vertices : indices into `outline` of broken or eroded corners
-    outline : (nv, 3) corners on the plane [m]
+    outline : (nv, 3) the corners moved onto the plane, counter-clockwise seen from outside [m]
+    image : (nv, 2) corners on the photograph [px]
     solid_vertices, solid_faces : the extruded stone [m]
-    vertex_sigma : standard deviations of `solid_vertices` [m]; NaN where not known
-    provenance, provenance_text, shape, shape_text, station, photograph, image, sigmas, names, direction, tail,
-        remarks : as in ``records.StoneRecord``
-    notes : the surveyor's observations
+    vertex_sigma : (nv, 3) standard deviations of `solid_vertices` [m]; NaN where not known
+    direction : (3,) of the extrusion; None: square to the face
+    tail : size of the hidden face over that of the visible one
+    shape_text, provenance_text : shape and provenance in words, with numbers
+    remarks : what was changed to make the outline a polygon
+    notes : observations of the surveyor, e.g. {"edge": "eroded"}
     """
 
     __tablename__ = "measurement"
     __table_args__ = (
-        Index(
-            "ix_measurement_current",
-            "entity_id",
-            unique=True,
-            sqlite_where=text("superseded_id IS NULL"),
-            postgresql_where=text("superseded_id IS NULL"),
-        ),
+        held_index("ix_measurement_current", "entity_id"),
         Index("ix_measurement_entity_id", "entity_id"),
         Index("ix_measurement_survey_id", "survey_id"),
     )
@@ -89,18 +85,18 @@ class Measurement(Recorded, Base):
     line: Mapped[int]
     sigma: Mapped[float]
     offset: Mapped[float]
-    rms: Mapped[float]
-    redundancy: Mapped[int]
-    point_count: Mapped[int]
-    rejected_count: Mapped[int]
+    rms: Mapped[float] = attribute("m", "root mean square distance of its points from the fitted plane")
+    redundancy: Mapped[int] = attribute("-", "accepted points minus 3")
+    point_count: Mapped[int] = attribute("-", "measured points on its face", name="points")
+    rejected_count: Mapped[int] = attribute("-", "points left out as blunders", name="rejected")
     rejected: Mapped[list[int]] = mapped_column(JSON_TYPE)
     rejected_vertices: Mapped[list[int]] = mapped_column(JSON_TYPE)
-    provenance: Mapped[str]
-    provenance_text: Mapped[str]
-    shape: Mapped[str]
+    shape: Mapped[str] = attribute(None, "of its face: plane, bevelled, curved, rough, untested")
     shape_text: Mapped[str]
-    station: Mapped[str | None]
-    photograph: Mapped[str | None]
+    provenance: Mapped[str] = attribute(None, "of its face: points, photograph, solid or hypothesis")
+    provenance_text: Mapped[str]
+    station: Mapped[str | None] = attribute(None, "where the instrument stood")
+    photograph: Mapped[str | None] = attribute(None, "on which its face was drawn")
     tail: Mapped[float]
     direction: Mapped[Array | None] = mapped_column(ArrayType(3))
     normal: Mapped[Array] = mapped_column(ArrayType(3))
@@ -120,23 +116,20 @@ class Measurement(Recorded, Base):
     notes: Mapped[dict[str, str]] = mapped_column(JSON_TYPE)
 
     survey: Mapped[Survey] = relationship(back_populates="measurements")
-    entity: Mapped["Entity"] = relationship(back_populates="measurements")
 
     @property
     def residuals(self) -> Array:
-        """(np,) distances of the measured points from the fitted plane, positive towards the observer [m]."""
+        """Distances (np,) of the measured points from the fitted plane, positive towards the observer [m]."""
         return np.asarray((self.points - self.centroid) @ self.normal)
 
 
 class Simplification(Base):
-    """The solid that stood for an entity in one run, and how far it is from the surveyed one.
+    """Solid that stood for an entity in one run, and its distance from the surveyed one.
 
     Attributes
     ----------
     mode : what became of the joints: close, mortar or as-surveyed
-    displacement_max : farthest that a corner was moved [m]
-    volume_change : relative to the surveyed solid [-]
-    shape, blockiness, worst_angle, within_tolerance : as in ``run_records.SimplificationRecord``
+    volume_change : volume over that of the surveyed solid, minus 1 [-]
     vertices, faces : the solid [m]
     """
 
@@ -146,11 +139,21 @@ class Simplification(Base):
     entity_id: Mapped[int] = mapped_column(ForeignKey("entity.id"), primary_key=True)
     run_id: Mapped[int] = mapped_column(ForeignKey("run.id"), primary_key=True)
     mode: Mapped[str]
-    displacement_max: Mapped[float]
+    displacement_max: Mapped[float] = attribute(
+        "m", "farthest that a corner of its solid was moved for the run", name="simplified_by"
+    )
     volume_change: Mapped[float]
-    shape: Mapped[str | None]
-    blockiness: Mapped[float | None]
-    worst_angle: Mapped[float | None]
-    within_tolerance: Mapped[bool | None]
+    shape: Mapped[str | None] = attribute(
+        None, "of its simplified solid, e.g. hexahedron", name="solid_shape"
+    )
+    blockiness: Mapped[float | None] = attribute(
+        "-", "what it and a hexahedron have in common, over what they fill together"
+    )
+    worst_angle: Mapped[float | None] = attribute(
+        "rad", "largest departure from a right angle between two faces of that solid"
+    )
+    within_tolerance: Mapped[bool | None] = attribute(
+        None, "simplifying kept within what the survey can tell"
+    )
     vertices: Mapped[Array] = mapped_column(ArrayType(-1, 3))
     faces: Mapped[list[list[int]]] = mapped_column(JSON_TYPE)

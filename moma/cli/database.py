@@ -28,12 +28,11 @@ def migrate(
 ) -> None:
     """Give a database the layout of this program, or of an older one: all of it, or nothing."""
     from archmodel.migrations.migrate import migrate as change
-    from archmodel.tables.layout import SCHEMA_VERSION
     from moma.cli.text.formats import as_json
 
     if yes and to is None:
         raise UsageError("--yes without --to", remedy="name the older version with --to")
-    done = change(db, SCHEMA_VERSION if to is None else to, lossy=yes)
+    done = change(db, to, lossy=yes)
     if json:
         print(as_json(asdict(done)))
         return

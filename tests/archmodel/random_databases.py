@@ -1,6 +1,5 @@
 """Buildings of random rows in every table, from the metadata alone, and what tables hold, bit for bit."""
 
-import inspect
 import math
 import struct
 import types
@@ -11,10 +10,10 @@ from typing import Any, Union, get_args, get_origin
 
 import numpy as np
 from sqlalchemy import JSON, Boolean, Date, Float, Integer, String, Table, insert, select, update
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Mapper, Session
 
 from archmodel.database.session import Database
-from archmodel.tables.base import ArrayType, Base, UtcDateTime
+from archmodel.tables.base import ArrayType, Base, UtcDateTime, annotation_of
 from archmodel.tables.entities import kinds as entity_kinds
 from archmodel.tables.layout import SchemaVersion
 
@@ -97,7 +96,7 @@ def _row(table: Table, number: int, rows: int, random: Random, known: dict[str, 
         elif column.name in ("code", "name", "sha256"):
             row[column.name] = f"{random.choice(TEXTS[:-1])}{number}"
         else:
-            row[column.name] = value(column.type, _annotation(table, column.key), random)
+            row[column.name] = value(column.type, annotation_of(column, _mapper(table)), random)
     if table.name == "measurement":
         row["entity_id"] = known["entity"][number]["id"]
     return row
@@ -105,11 +104,14 @@ def _row(table: Table, number: int, rows: int, random: Random, known: dict[str, 
 
 def _kind(table: Table, random: Random) -> str:
     """A kind that has a class, so that the row can be loaded."""
-    mapper = next(one for one in Base.registry.mappers if one.local_table is table).base_mapper
-    kinds = sorted(mapper.polymorphic_map)
+    kinds = sorted(_mapper(table).polymorphic_map)
     if table.name == "entity":
         kinds = [name for name, cls in entity_kinds().items() if cls.__users__ is None] + ["own_kind_0"]
     return random.choice(kinds) if kinds else "rests_on"
+
+
+def _mapper(table: Table) -> Mapper[Any]:
+    return next(one for one in Base.registry.mappers if one.local_table is table).base_mapper
 
 
 def _registered(number: int, random: Random) -> Values:
@@ -132,14 +134,6 @@ def _refer_within(session: Session, table: Table, made: list[Values], random: Ra
             for place, row in enumerate(rows[1:], 1):
                 target = {column.name: random.choice(rows[:place])["id"]}
                 session.execute(update(table).where(table.c.id == row["id"]).values(target))
-
-
-def _annotation(table: Table, name: str) -> object:
-    for mapper in Base.registry.mappers:
-        declared = inspect.get_annotations(mapper.class_).get(name)
-        if mapper.local_table is table and declared is not None:
-            return get_args(declared)[0]
-    return object
 
 
 def value(kind: Any, annotation: object, random: Random) -> Any:

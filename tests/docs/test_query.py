@@ -2,7 +2,8 @@
 
 import re
 import shlex
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -48,18 +49,25 @@ def table(heading: str) -> list[list[str]]:
     return [rows[0], *rows[2:]]
 
 
+@contextmanager
+def furnished_wall(url: str) -> Iterator[Database]:
+    """The wall of the page in a new database."""
+    with open_database(url) as database:
+        with database.session() as session:
+            store_survey(session, "window", "window.moma", SHA, WALL)
+        furnish(database)
+        yield database
+
+
 @pytest.fixture
-def furnished(filled: Database) -> Database:
-    furnish(filled)
-    return filled
+def furnished(new_url: Callable[[], str]) -> Iterator[Database]:
+    with furnished_wall(new_url()) as database:
+        yield database
 
 
 @pytest.fixture(scope="module")
 def example() -> Iterator[Database]:
-    with open_database("sqlite://") as database:
-        with database.session() as session:
-            store_survey(session, "window", "window.moma", SHA, WALL)
-        furnish(database)
+    with furnished_wall("sqlite://") as database:
         yield database
 
 
@@ -166,10 +174,8 @@ def test_the_python_of_the_page_runs(
 ) -> None:
     (program,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     monkeypatch.chdir(tmp_path)
-    with open_database("sqlite:///moma.db") as database:
-        with database.session() as session:
-            store_survey(session, "window", "window.moma", SHA, WALL)
-        furnish(database)
+    with furnished_wall("sqlite:///moma.db"):
+        pass
     names: dict[str, object] = {}
     exec(program, names)
     assert names["rows"] == [{"code": "W01-01", "von_mises_max@2": None}]

@@ -13,7 +13,14 @@ from archmodel.database.session import Database
 from archmodel.describe.schema_tree import schema
 from archmodel.query.api import attributes, condition, find, find_rows
 from archmodel.store.stones import store_survey
-from archmodel.tables.entities import Entity, definition_of, kind_of, kinds
+from archmodel.tables.entities import (
+    Entity,
+    Keystone,
+    definition_of,
+    kind_of,
+    kinds,
+    own_attributes,
+)
 from archmodel.tables.entries import new_entry
 from archmodel.tables.registered import RegisteredKind, declare_registered
 from archmodel.tables.relations import INVERSE
@@ -55,7 +62,7 @@ def test_one_kind_tells_what_it_inherits() -> None:
     tree: Any = schema(kind="keystone")
     assert list(tree) == ["kinds"]
     (keystone,) = tree["kinds"]
-    assert [one["name"] for one in keystone["attributes"]] == ["ring", "rank", "intrados_angle"]
+    assert [one["name"] for one in keystone["attributes"]] == [*own_attributes(Keystone)]
     assert keystone["kinds"] == []
     with pytest.raises(UsageError, match="did you mean keystone"):
         schema(kind="kestone")
@@ -172,7 +179,8 @@ def test_a_kind_with_a_column_of_its_own_is_asked_for_like_any_other() -> None:
     program = '''
 from sqlalchemy.orm import Mapped
 from archmodel.database.session import open_database
-from archmodel.tables.entities import Ashlar, OwnAttribute
+from archmodel.tables.base import attribute
+from archmodel.tables.entities import Ashlar
 from archmodel.query.api import find
 from archmodel.store.stones import store_survey
 from tests.archmodel.stones import SHA, box_stone
@@ -184,10 +192,9 @@ with open_database("sqlite://") as database, database.session() as session:
 class Merlon(Ashlar):
     """A stone of a parapet between two openings."""
 
-    __own__ = (OwnAttribute("top_width", "m", "of its upper face"),)
     __canon__ = "top_width < length"
 
-    top_width: Mapped[float | None]
+    top_width: Mapped[float | None] = attribute("m", "of its upper face")
 
 with open_database("sqlite://") as database, database.session() as session:
     store_survey(session, "parapet", "p", SHA, [box_stone("M1", "merlon"), box_stone("M2", "merlon")])

@@ -10,8 +10,8 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from archmodel.database.session import Database, open_database
-from archmodel.exchange.document import export_building
 from archmodel.exchange.json_schema import building_schema, schema_text
+from archmodel.exchange.writer import export_building
 from tests.archmodel.random_databases import fill, tables
 from tests.paths import ROOT
 

@@ -11,8 +11,9 @@ from typing import Any
 import pytest
 
 from archmodel.database.session import Database, open_database
-from archmodel.exchange.document import export_building, import_building
 from archmodel.exchange.head import FRAME, UNITS
+from archmodel.exchange.reader import import_building
+from archmodel.exchange.writer import export_building
 from archmodel.tables.entities import kinds
 from archmodel.tables.layout import SCHEMA_VERSION
 from archmodel.tables.registered import release_registered

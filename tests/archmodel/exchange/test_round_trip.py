@@ -31,9 +31,10 @@ from sqlalchemy import (
 )
 
 from archmodel.database.session import Database, open_database
-from archmodel.exchange.document import export_building, import_building
+from archmodel.exchange.reader import import_building
 from archmodel.exchange.sections import sections
 from archmodel.exchange.values import value_of
+from archmodel.exchange.writer import export_building
 from archmodel.tables.base import ArrayType, UtcDateTime
 from archmodel.tables.entities import Entity, Header, kinds
 from archmodel.tables.entries import Entry, new_entry
