@@ -6,7 +6,6 @@ import struct
 import xml.etree.ElementTree as ElementTree
 import zlib
 from dataclasses import replace
-from html.parser import HTMLParser
 
 import numpy as np
 import pytest
@@ -27,6 +26,7 @@ from pipelines.results.vtu import CELL_TYPES
 from pipelines.run.stone_values import stone_results, stress_statistics
 from pipelines.run.summary import as_json, summarise
 from pipelines.scene.table_keys import PICTURES
+from tests.pipelines.reports.page import Page
 from tests.pipelines.results_by_hand import (
     BOX_FACES,
     LIMESTONE,
@@ -394,22 +394,6 @@ def test_a_drawing_process_that_fails_is_reported_not_followed(mixed, tmp_path, 
         draw_pictures(mixed, tmp_path, ("von_mises",), TOWARDS)
 
 
-class Words(HTMLParser):
-    """Text of a page, and the addresses that it loads from."""
-
-    def __init__(self):
-        super().__init__()
-        self.text, self.sources = [], []
-
-    def handle_data(self, data):
-        self.text.append(data)
-
-    def handle_starttag(self, tag, attrs):
-        self.sources += [
-            value for name, value in attrs if name in ("src", "href") and not value.startswith("#")
-        ]
-
-
 def test_the_report_explains_the_run_and_needs_no_other_file(mixed, tmp_path):
     pixel = base64.b64decode(
         "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
@@ -417,8 +401,7 @@ def test_the_report_explains_the_run_and_needs_no_other_file(mixed, tmp_path):
     (tmp_path / "von_mises.png").write_bytes(pixel)
     summary = summarise(mixed, version="1.2", seconds={"solve": 1.0})
     write_report(tmp_path / "report.html", mixed, summary, stone_results(mixed), ["a <warning>"])
-    page = Words()
-    page.feed((tmp_path / "report.html").read_text(encoding="utf-8"))
+    page = Page(tmp_path / "report.html")
     text = " ".join(page.text)
     for words in ("It stands", "D1", "2.0000 MPa", "20.01 kN", "a <warning>", "not known", "4.0e-04"):
         assert words in text
@@ -429,9 +412,7 @@ def test_the_report_explains_the_run_and_needs_no_other_file(mixed, tmp_path):
 def test_the_report_names_the_worst_stones_and_joints(strong, tmp_path):
     summary = summarise(strong, version="1.2", seconds={})
     write_report(tmp_path / "report.html", strong, summary, stone_results(strong), [])
-    page = Words()
-    page.feed((tmp_path / "report.html").read_text(encoding="utf-8"))
-    words = [word for word in page.text if word.strip()]
+    words = Page(tmp_path / "report.html").text
     place = words.index("Stones nearest to their strength")
     assert words[place + 7 : place + 10] == ["D1", "0.5", words[place + 9]]
     place = words.index("Joints with the most eccentric resultants")
@@ -447,6 +428,31 @@ def test_the_report_of_a_rigid_collapse_says_so(rigid, tmp_path):
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "It falls" in text
     assert "Most stressed" not in text
+
+
+def test_no_text_of_a_run_becomes_markup(tmp_path):
+    """Codes, material, scene, warnings, profile and stages, all named like a script."""
+    name = "<script>alert('1')</script>"
+    bodies = [
+        rigid_body(f"{name} base", (0, 0, 0), (1, 1, 1), Fidelity.FIXED),
+        deformable_body(
+            name,
+            (0, 0, 1),
+            (1, 1, 3),
+            height,
+            size=0.5,
+            material=replace(LIMESTONE, name=name, tensile_strength=1e6),
+        ),
+    ]
+    result = result_of(bodies, name=name)
+    profile = {"name": name, "about": name, "settings": {name: name}, "expected": {"p99": {"of": name}}}
+    profile["expected"]["p99"] |= {"bound": True, "value": 0.1}
+    summary = {**summarise(result, version=name, seconds={name: 1.0}), "profile": profile}
+    write_report(tmp_path / "report.html", result, summary, stone_results(result), [name])
+    page = Page(tmp_path / "report.html")
+    assert "script" not in page.tags
+    assert sum("<script>" in text.lower() for text in page.text) >= 12
+    assert "<script" not in (tmp_path / "report.html").read_text(encoding="utf-8").lower()
 
 
 def test_every_status_of_a_contact_has_its_number():
