@@ -4,14 +4,9 @@ import json
 from collections.abc import Callable
 
 import pytest
-from typer.testing import CliRunner, Result
 
-from moma.cli import app
 from tests.archmodel.migrations.old_databases import make_old, rows_of
-
-
-def moma(*arguments: str) -> Result:
-    return CliRunner().invoke(app, list(arguments))
+from tests.moma.commands import invoke
 
 
 @pytest.fixture
@@ -23,25 +18,25 @@ def old(new_url: Callable[[], str]) -> str:
 
 
 def test_an_old_database_is_refused_with_the_command_that_helps(old: str) -> None:
-    refused = moma("query", "header", "--db", old)
+    refused = invoke("query", "header", "--db", old)
     assert refused.exit_code == 1
     command = refused.stderr.partition("; moma ")[2].split()
-    done = moma(*command)
+    done = invoke(*command)
     assert done.exit_code == 0, done.stderr
     assert "from version 1 to 4" in done.stdout
-    assert "W01-01" in moma("query", "header", "--db", old).stdout
-    assert "has version 4 already" in moma(*command).stdout
+    assert "W01-01" in invoke("query", "header", "--db", old).stdout
+    assert "has version 4 already" in invoke(*command).stdout
 
 
 def test_going_down_asks_for_consent_where_something_is_lost(old: str) -> None:
-    assert moma("migrate", "--db", old).exit_code == 0
+    assert invoke("migrate", "--db", old).exit_code == 0
     before = rows_of(old, 4)
-    refused = moma("migrate", "--db", old, "--to", "1")
+    refused = invoke("migrate", "--db", old, "--to", "1")
     assert refused.exit_code == 2
     assert "cannot hold: what kind of evidence depths have (9); " in refused.stderr
     assert "give --yes" in refused.stderr
     assert rows_of(old, 4) == before
-    done = moma("migrate", "--db", old, "--to", "1", "--yes", "--json")
+    done = invoke("migrate", "--db", old, "--to", "1", "--yes", "--json")
     assert done.exit_code == 0
     told = json.loads(done.stdout)
     assert (told["before"], told["after"], len(told["lost"])) == (4, 1, 2)
@@ -61,7 +56,7 @@ def test_wrong_use_is_one_line(
     arguments: list[str], code: int, said: str, monkeypatch: pytest.MonkeyPatch, tmp_path: object
 ) -> None:
     monkeypatch.chdir(str(tmp_path))
-    refused = moma("migrate", *arguments)
+    refused = invoke("migrate", *arguments)
     assert refused.exit_code == code
     assert said in refused.stderr
     assert refused.stderr.count("\n") == 1

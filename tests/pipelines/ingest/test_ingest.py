@@ -6,15 +6,14 @@ import math
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from archmodel.database.session import open_database
 from archmodel.query.api import find
 from archmodel.store.stones import load_stones
-from moma.cli import app
 from moma.errors import DatabaseError, GeometryError, SurveyError, UsageError
 from pipelines.ingest.ingest import ingest
 from pipelines.ingest.reading_options import reading_options
+from tests.moma.commands import invoke, prints
 
 HEAD = """\
 moma-survey 1
@@ -111,9 +110,7 @@ class Desk:
             return {one.code: one for one in load_stones(session, find(session, "entity", []))}
 
     def show(self, code, *more, name="wall"):
-        done = CliRunner().invoke(app, ["show", code, "--db", self.url(name), *more])
-        assert done.exit_code == 0, done.output
-        return done.stdout
+        return prints("show", code, "--db", self.url(name), *more)
 
     def left(self):
         """What is there beside the files that were put there."""
@@ -370,10 +367,6 @@ def test_two_files_are_taken_in_together_or_not_at_all(desk):
     assert [file.stones for file in report.files] == [{"header": 1}, {"header": 1}]
     assert [file.rejects for file in report.files] == [str(desk.folder / "bad.rejects.moma"), None]
     same_wall(desk.stones(), ["W0", "W1"])
-
-
-def invoke(*words):
-    return CliRunner().invoke(app, [str(word) for word in words])
 
 
 def finite_only(text):

@@ -9,9 +9,7 @@ from enum import Enum
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from moma.cli import app
 from moma.cli.text.runs_and_surveys import survey_report_lines
 from moma.errors import SurveyError, UsageError
 from pipelines.ingest.reading_options import reading_options
@@ -19,6 +17,7 @@ from pipelines.reports.survey import report as survey_report
 from pipelines.reports.survey.page import write_survey_page
 from pipelines.reports.survey.report import report_surveys
 from pipelines.reports.survey.study import study_surveys
+from tests.moma.commands import answer, fails, prints
 from tests.paths import ROOT
 from tests.pipelines.reports.page import Page
 
@@ -356,25 +355,18 @@ def place(tmp_path, monkeypatch):
     return tmp_path
 
 
-def invoke(*arguments):
-    return CliRunner().invoke(app, ["survey-report", *map(str, arguments)])
-
-
 def test_the_command_needs_no_database_and_says_where_its_report_lies(place):
-    done = invoke(SAMPLE)
-    assert done.exit_code == 0, done.output
-    assert "out/survey-window/report.html" in done.stdout
-    assert "98 stones" in done.stdout
+    text = prints("survey-report", SAMPLE)
+    assert "out/survey-window/report.html" in text
+    assert "98 stones" in text
     assert [entry.name for entry in place.iterdir()] == ["out"]
 
 
 def test_the_command_prints_json_for_programs_and_takes_the_options_of_readers(place):
-    done = invoke(
-        WALL / "points.txt", "--format", "pnezd", "--codes", CODES, "--header", WALL / "head.moma",
-        "--sigma", "0.004", "--out", "wall", "--json",
+    content = answer(
+        "survey-report", WALL / "points.txt", "--format", "pnezd", "--codes", CODES,
+        "--header", WALL / "head.moma", "--sigma", "0.004", "--out", "wall",
     )  # fmt: skip
-    assert done.exit_code == 0, done.output
-    content = json.loads(done.stdout)
     assert content == json.loads((place / "wall/survey.json").read_text(encoding="utf-8"))
     assert "sigma is too large" in content["quality"]["verdict"]  # 2 mm are right, 4 were stated
     assert content["quality"]["sigma"] == pytest.approx(0.004, rel=1e-3)
@@ -390,10 +382,7 @@ def test_the_command_prints_json_for_programs_and_takes_the_options_of_readers(p
     ],
 )
 def test_wrong_use_is_told_in_one_line(place, arguments, words):
-    done = invoke(*arguments)
-    assert done.exit_code == 2
-    assert words in done.stderr
-    assert len(done.stderr.splitlines()) == 1
+    assert words in fails(2, "survey-report", *arguments)
     assert list(place.iterdir()) == []
 
 
