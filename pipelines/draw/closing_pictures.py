@@ -1,4 +1,4 @@
-"""Pictures of how surveyed stones became solids that touch: elevations of what is flat, and the whole in space."""
+"""Pictures of how surveyed stones became touching solids: elevations of flat facades, and all stones in space."""
 
 import json
 import tempfile
@@ -24,18 +24,18 @@ from survey.quality.facades import Facade, find_facades
 __all__ = ["closing_surface", "draw_closing", "draw_elevations", "draw_in_space", "flat_facades", "viewpoint"]
 
 
-_FLAT = 0.2  # depth of a facade over its extent, up to which an elevation shows it truly
-_LOOKING = np.cos(np.radians(25.0))  # mean of the normals' components square to it
-_SHARE = 0.08  # of all visible area: smaller facades are not worth an elevation
-_MOST = 4  # elevations
-_NOTHING = 5e-5  # movements below are rounding [m]
-_MAINLY = 0.6  # of all visible area, that flat facades must have together
-_LEVEL = 0.25  # length of the mean normal, below which the stones look nowhere in particular
-_STEEP = np.deg2rad(32.0)  # how far from above, or from below, vaults and floors are looked at
+_FLAT = 0.2  # largest depth of a facade over its extent [-]: a deeper one is distorted by an elevation
+_LOOKING = np.cos(np.radians(25.0))  # smallest mean component of the normals across the facade [-]
+_SHARE = 0.08  # smallest share of the visible area [-]: smaller facades are not worth an elevation
+_MOST = 4  # elevations of one scene
+_NOTHING = 5e-5  # smaller movements are rounding [m]
+_MAINLY = 0.6  # least share of the visible area in flat facades together [-]
+_LEVEL = 0.25  # length of the mean normal [-]: below it the stones have no common direction
+_STEEP = np.deg2rad(32.0)  # elevation of the viewer over vaults and floors [rad]
 
 
 def draw_closing(folder: Path, shapes: ClosingShapes) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Draw all pictures into a folder that is there: names of the files, and what could not be drawn."""
+    """Draw all pictures into an existing folder; return the file names, and warnings about missing pictures."""
     flat = draw_elevations(folder, shapes)
     try:
         return (*flat, *draw_in_space(folder, shapes)), ()
@@ -44,7 +44,7 @@ def draw_closing(folder: Path, shapes: ClosingShapes) -> tuple[tuple[str, ...], 
 
 
 def draw_elevations(folder: Path, shapes: ClosingShapes) -> tuple[str, ...]:
-    """Draw each flat facade: what simplifying moved, what closing moved, and the joints; names of the files."""
+    """Draw each flat facade: corners moved by simplifying and by closing, and the joints; return the file names."""
     facades = flat_facades(shapes)
     names: list[str] = []
     for number, facade in enumerate(facades, start=1):
@@ -58,7 +58,7 @@ def draw_elevations(folder: Path, shapes: ClosingShapes) -> tuple[str, ...]:
 
 
 def draw_in_space(folder: Path, shapes: ClosingShapes) -> tuple[str, ...]:
-    """Draw all stones and all joints from one side; names of the files.
+    """Draw all stones and all joints from one side; return the file names.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def draw_in_space(folder: Path, shapes: ClosingShapes) -> tuple[str, ...]:
 
 
 def flat_facades(shapes: ClosingShapes) -> tuple[Facade, ...]:
-    """The facades that elevations show truly, largest first: two of a corner; none of a vault, or of a dome."""
+    """Find the facades that an elevation shows undistorted, largest first; a vault or a dome has none."""
     seen = np.array([k for k, one in enumerate(shapes.stones) if not one.core])
     if not len(seen):
         return ()
@@ -118,7 +118,7 @@ def flat_facades(shapes: ClosingShapes) -> tuple[Facade, ...]:
 
 
 def viewpoint(shapes: ClosingShapes) -> tuple[Array, float]:
-    """From where all stones are looked at: the level direction to the viewer (3,), and the height above it [rad]."""
+    """Choose a viewpoint for all stones: horizontal direction to the viewer (3,), and elevation above it [rad]."""
     areas = np.array([one.area for one in shapes.stones])
     mean = areas @ np.array([one.normal for one in shapes.stones]) / areas.sum()
     level = mean * [1.0, 1.0, 0.0]
@@ -131,7 +131,7 @@ def viewpoint(shapes: ClosingShapes) -> tuple[Array, float]:
 
 
 def _along(shapes: ClosingShapes) -> Array:
-    """The level direction in which the fewest faces look: the axis of a vault, from its southern end."""
+    """Return the horizontal direction that the fewest faces look in: the axis of a vault, from its southern end."""
     areas = np.array([one.area for one in shapes.stones])
     level = np.array([one.normal for one in shapes.stones])[:, :2]
     _, directions = np.linalg.eigh((level * areas[:, None]).T @ level)
@@ -141,7 +141,7 @@ def _along(shapes: ClosingShapes) -> Array:
 
 
 def closing_surface(shapes: ClosingShapes, step: str = "moved") -> ClosingSurface:
-    """The faces of all stones and joints; corners have what simplifying, or closing the joints, moved."""
+    """Gather the faces of all stones and joints, with the movement of each corner in one of the two steps."""
     simplified = step == "simplified"
     solids = [one.surveyed if simplified else one.simple for one in shapes.stones]
     starts = np.cumsum([0, *(len(one.vertices) for one in solids)])
@@ -174,7 +174,7 @@ _TITLES = {"simplified": "what simplifying moved", "moved": "what closing the jo
 
 
 def _steps(shapes: ClosingShapes) -> list[str]:
-    """What moved anything: simplifying, closing the joints, or both."""
+    """List the steps that moved any corner: simplifying, closing the joints, or both."""
     known = {
         "simplified": any(np.nanmax(one.simplified, initial=0.0) > _NOTHING for one in shapes.stones),
         "moved": any(np.nanmax(one.moved, initial=0.0) > _NOTHING for one in shapes.stones),
@@ -191,7 +191,7 @@ def _note(shapes: ClosingShapes) -> str:
 
 
 def _fans(joints: Sequence[DrawnJoint]) -> tuple[Array, Ints, Ints]:
-    """Corners, triangles, and the joint of each triangle."""
+    """Fan the polygons of joints into triangles; return corners, triangles and the joint of each triangle."""
     points: list[Array] = [np.zeros((0, 3))]
     triangles: list[tuple[int, int, int]] = []
     owners: list[int] = []
@@ -211,7 +211,7 @@ def _fans(joints: Sequence[DrawnJoint]) -> tuple[Array, Ints, Ints]:
 
 
 def _edges(solid: Solid) -> Ints:
-    """(ne, 2) sides of the faces, each once."""
+    """List the sides of the faces, (ne, 2), each once."""
     sides = {
         (min(a, b), max(a, b))
         for face in solid.faces

@@ -1,4 +1,4 @@
-"""The history of a run as a small plot."""
+"""Time series of a run as a small plot."""
 
 import io
 import logging
@@ -18,7 +18,7 @@ _CURVES = (
 
 
 def history_svg(history: History) -> str:
-    """Speed, balance and residual against time, as an SVG element."""
+    """Plot speed, balance and residual against time; return an SVG element."""
     # matplotlib tells on stderr that it builds its font cache, once per machine
     logging.getLogger("matplotlib.font_manager").setLevel(logging.ERROR)
     from matplotlib.figure import Figure
@@ -38,5 +38,5 @@ def history_svg(history: History) -> str:
 
 
 def _positive(values: Array) -> Array:
-    """Zeros cannot be drawn on a logarithmic axis: leave gaps there."""
+    """Replace zeros by NaN, since a logarithmic axis has no place for them."""
     return np.where(values > 0.0, values, np.nan)

@@ -1,4 +1,4 @@
-"""Pictures of a result: what to draw, in a process of its own, and what to say when it cannot be drawn."""
+"""Pictures of a result, drawn by a child process, and remedies where nothing can be drawn."""
 
 import json
 import os
@@ -21,7 +21,7 @@ from pipelines.draw.offscreen.surfaces import FIELDS, save_surface, stone_fields
 
 __all__ = ["draw_apart", "draw_pictures", "missing", "package_of"]
 
-_TIMEOUT = 300.0  # seconds; software rendering of 10⁵ triangles takes a few
+_TIMEOUT = 300.0  # [s]; software rendering of 10⁵ triangles takes a few
 _PACKAGES = {
     "libGL": "libgl1",
     "libGLX": "libglx0",
@@ -57,13 +57,13 @@ _ENDINGS = {
 
 
 def package_of(message: str) -> str | None:
-    """Debian package of the shared library that a loader's message names; None if it names none."""
+    """Return the Debian package of the shared library that a loader's message names; None if it names none."""
     found = re.search(r"(lib[A-Za-z0-9_+-]+?)(?:-\d[\d.]*)?\.so", message)
     return _PACKAGES.get(found.group(1)) if found else None
 
 
 def draw_pictures(result: Result, folder: Path, names: Sequence[str], towards: Array) -> tuple[str, ...]:
-    """Draw the named pictures into a folder, seen from the side `towards`; the file names.
+    """Draw the named pictures into a folder, seen from the side `towards`; return the file names.
 
     Pictures for which `missing` has a reason are left out.
 
@@ -97,7 +97,7 @@ def draw_pictures(result: Result, folder: Path, names: Sequence[str], towards: A
 
 
 def missing(result: Result, name: str) -> str | None:
-    """Why a picture would show nothing of this result; None: it shows something."""
+    """Give the reason why a picture would show nothing of this result; None if it shows something."""
     stressed = [body.values for body in result.bodies if body.values is not None]
     if name in ("pressure", "resultants"):
         return None if result.joints.pressed.any() else "no joint is pressed"
@@ -110,7 +110,7 @@ def missing(result: Result, name: str) -> str | None:
 
 
 def _top(result: Result, name: str) -> float | None:
-    """End of the scale: what 1 % of the volume exceeds; None: the largest value."""
+    """Return the end of the scale, exceeded in 1 % of the volume; None stands for the largest value."""
     if name not in ("von_mises", "principal_tension", "principal_compression", "utilisation"):
         return None
     known = [
@@ -128,7 +128,7 @@ def _fields_of(body: BodyResult, material: Material, name: str) -> Array:
 
 
 def draw_apart(module: str, job_file: Path) -> None:
-    """Run a module that draws on a job; its noise about displays is kept back unless it fails.
+    """Draw pictures in a child process; its output about displays is suppressed unless it fails.
 
     EGL comes first: it needs no X server, and no X libraries either.
 
@@ -155,7 +155,7 @@ def draw_apart(module: str, job_file: Path) -> None:
 
 
 def _attempt(module: str, job_file: Path, window: str | None) -> "subprocess.CompletedProcess[str]":
-    """One process that draws, with the given kind of VTK window; None: the one that VTK would take."""
+    """Run one drawing process with the given kind of VTK window; None leaves the choice to VTK."""
     root = str(Path(__file__).resolve().parents[2])
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([root, os.environ.get("PYTHONPATH", "")])}
     if window is not None:
@@ -175,7 +175,7 @@ def _attempt(module: str, job_file: Path, window: str | None) -> "subprocess.Com
 
 
 def _last_words(stderr: str) -> str:
-    """The last line that a process said, without VTK's time stamps and colours."""
+    """Return the last line of a process's output, without VTK's time stamps and colours."""
     lines = [re.sub(r"\x1b\[[0-9;]*m", "", line).strip() for line in stderr.splitlines()]
     last = next((line for line in reversed(lines) if line), "")
     return re.split(r"(?:WARN|ERR)\| ", last)[-1][:200].rstrip(".")

@@ -1,4 +1,4 @@
-"""HTML pages that need no other file, and the numbers in them."""
+"""Self-contained HTML pages, and the format of the numbers in them."""
 
 import base64
 from functools import cache
@@ -31,7 +31,7 @@ def write_page(path: Path, template: str, **values: object) -> None:
 
 
 def picture(path: Path, caption: str) -> Picture:
-    """Read a PNG that a page holds within itself."""
+    """Read a PNG for embedding in a page."""
     return {"caption": caption, "content": base64.b64encode(path.read_bytes()).decode("ascii")}
 
 

@@ -1,4 +1,4 @@
-"""report.html: one page that explains a run to whoever was not there; it needs no other file."""
+"""report.html: one self-contained page that explains a run to readers who were not there."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -96,14 +96,14 @@ def write_report(
     stones: Sequence[StoneResult],
     warnings: Sequence[str],
 ) -> None:
-    """Write the page, with the pictures that lie in its folder inside it.
+    """Write the page and embed the pictures of its folder.
 
     Parameters
     ----------
     path : report.html
     summary : as in summary.json
     stones : one per stone
-    warnings : what went less well than asked
+    warnings : shown at the top
     """
     pictures = [path.parent / name for name in _CAPTIONS]
     write_page(

@@ -1,4 +1,4 @@
-"""Elevations of stones that were simplified and whose joints were closed: how far each corner was moved."""
+"""Elevations of the distance by which simplifying, or closing the joints, moved each corner."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -36,9 +36,9 @@ __all__ = ["SeenFace", "back_to_front", "draw_moved", "guess_key", "hatch", "nam
 SeenFace = tuple[Array, tuple[int, ...]]
 
 _UNKNOWN = "#dcd9d4"
-_SEEN = np.cos(np.radians(60.0))  # a face that is turned farther away is not seen in an elevation
-_ROBUST = 98.0  # per cent of the corners that the colour scale reaches
-_FINEST = 0.1  # the colour scale ends here at least: what moved less is not worth a colour [mm]
+_SEEN = np.cos(np.radians(60.0))  # faces turned farther away are not drawn
+_ROBUST = 98.0  # percentile of the corners at which the colour scale ends
+_FINEST = 0.1  # shortest colour scale: smaller movements are not worth a colour [mm]
 _DASHES = (0.0, (4.0, 2.0))
 _LABELS = {
     "simplified": "moved by simplifying the stone [mm]",
@@ -52,8 +52,8 @@ def draw_moved(path: Path, shapes: ClosingShapes, facade: Facade, step: str) -> 
     Parameters
     ----------
     path : PNG
-    shapes : what there is to draw
-    facade : which of the stones, and the frame to draw them in
+    shapes : stones and joints to draw
+    facade : its stones are drawn, in its frame
     step : "simplified": on the stones as surveyed, with lines about those that became others; "moved": in closing the
         joints, on the stones as simplified, with lines about all as simulated
     """
@@ -85,13 +85,13 @@ def draw_moved(path: Path, shapes: ClosingShapes, facade: Facade, step: str) -> 
 
 
 def back_to_front(stones: Sequence[DrawnStone], facade: Facade) -> list[DrawnStone]:
-    """The facade's stones, the farthest from the viewer first, so that nearer ones are drawn over them."""
+    """Sort the facade's stones, the farthest from the viewer first, so that nearer ones are drawn over them."""
     out = facade.frame.axes[2]
     return sorted((stones[i] for i in facade.members.tolist()), key=lambda one: float(one.centroid @ out))
 
 
 def seen(solid: Solid, facade: Facade) -> list[SeenFace]:
-    """Faces of a solid that look to the viewer: corners (k, 2) in the elevation, and which corners they are."""
+    """List the faces of a solid that look to the viewer: corners (k, 2) in the elevation, and their indices."""
     found = []
     for face in solid.faces:
         area = area_vector(solid.vertices[list(face)])
@@ -101,7 +101,7 @@ def seen(solid: Solid, facade: Facade) -> list[SeenFace]:
 
 
 def hatch(axes: "Axes", stones: Sequence[DrawnStone], faces: Sequence[Sequence[SeenFace]]) -> None:
-    """Hatch the stones that nobody has seen."""
+    """Hatch hypothetical stones."""
     from matplotlib.collections import PolyCollection
 
     guessed = [
@@ -116,7 +116,7 @@ def hatch(axes: "Axes", stones: Sequence[DrawnStone], faces: Sequence[Sequence[S
 def name_stones(
     axes: "Axes", stones: Sequence[DrawnStone], faces: Sequence[Sequence[SeenFace]], shade: Sequence[float]
 ) -> None:
-    """Write the codes of the stones, where there are not too many, each on its largest face.
+    """Write the code of each stone on its largest face, unless there are too many stones.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def name_stones(
 
 
 def guess_key() -> Any:
-    """What the hatching means, for a legend."""
+    """Make the legend entry of the hatching."""
     from matplotlib.patches import Patch
 
     return Patch(
@@ -142,24 +142,24 @@ def guess_key() -> Any:
 
 
 def _shade_all(axes: "Axes", faces: Sequence[Sequence[SeenFace]], values: Sequence[Array], end: float) -> Any:
-    """Colour all faces by the values at their corners; what the scale is of, None if nothing is known."""
+    """Colour all faces by the values at their corners; return the mappable of the scale, None without any value."""
     from matplotlib.collections import PolyCollection
 
-    told = [
+    coloured = [
         (corners, moved[list(indices)])
         for one, moved in zip(faces, values, strict=True)
         for corners, indices in one
     ]
-    unknown = [corners for corners, moved in told if not np.isfinite(moved).all()]
+    unknown = [corners for corners, moved in coloured if not np.isfinite(moved).all()]
     axes.add_collection(PolyCollection(unknown, facecolors=_UNKNOWN, edgecolors="none"))
-    fans = [_fan(corners, moved) for corners, moved in told if np.isfinite(moved).all()]
+    fans = [_fan(corners, moved) for corners, moved in coloured if np.isfinite(moved).all()]
     shading = None
     if fans:
         points, heights, triangles = zip(*fans, strict=True)
         starts = np.cumsum([0, *map(len, points)])[:-1]
         x, y = np.concatenate(points).T
         rows = np.concatenate([one + start for one, start in zip(triangles, starts, strict=True)])
-        # triangles are drawn in their order, so that nearer stones cover those behind
+        # triangles are drawn in order, so that nearer stones cover those behind
         shading = axes.tripcolor(
             x,
             y,
@@ -169,13 +169,13 @@ def _shade_all(axes: "Axes", faces: Sequence[Sequence[SeenFace]], values: Sequen
             cmap=palette(_UNKNOWN),
             clim=(0.0, end),
         )
-    outlines = [corners for corners, _ in told]
+    outlines = [corners for corners, _ in coloured]
     axes.add_collection(PolyCollection(outlines, facecolors="none", edgecolors=PALE, linewidths=0.9))
     return shading
 
 
 def _fan(corners: Array, values: Array) -> tuple[Array, Array, NDArray[np.intp]]:
-    """Triangles about the middle of a polygon, or, where they would turn over, cut from its corners."""
+    """Divide a polygon into triangles about its middle or, where these would turn over, from its corners."""
     count = len(corners)
     middle = corners.mean(axis=0)
     turns = corners - middle

@@ -1,4 +1,4 @@
-"""What pictures show of how surveyed stones became solids that touch: stones, joints and what is wrong with them."""
+"""Shapes for the pictures of closed joints: stones before and after, joints, gaps and overlaps."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ __all__ = ["ClosingShapes", "DrawnJoint", "DrawnStone", "Place", "closing_shapes
 
 @dataclass(frozen=True)
 class DrawnStone:
-    """One stone, as surveyed and as it is simulated.
+    """One stone, as surveyed and as simulated.
 
     Attributes
     ----------
@@ -25,8 +25,8 @@ class DrawnStone:
     normal : (3,) of its visible face, outwards [-]
     centroid : (3,) of its visible face [m]
     area : of its visible face [m²]
-    hypothesis : nobody has seen it
-    core : it lies behind the stones of a facing
+    hypothesis : whether it is hypothetical
+    core : whether it lies behind the stones of a facing
     """
 
     surveyed: Solid
@@ -42,7 +42,7 @@ class DrawnStone:
 
     @property
     def code(self) -> str:
-        """Of the stone."""
+        """Code of the stone."""
         return self.closed.code
 
 
@@ -62,14 +62,14 @@ class DrawnJoint:
 
 @dataclass(frozen=True)
 class Place:
-    """Something that is not as it should be, to be found on the wall.
+    """Defect of a joint, with its position on the wall.
 
     Attributes
     ----------
-    kind : gap or overlap
+    kind : "gap" or "overlap"
     stones : codes of the two
     centroid : (3,) [m]
-    text : what it is, in words, with numbers
+    text : description with its measure
     """
 
     kind: str
@@ -80,7 +80,7 @@ class Place:
 
 @dataclass(frozen=True)
 class ClosingShapes:
-    """All that the pictures show.
+    """Everything that the pictures show.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ def closing_shapes(
     hypotheses: frozenset[str],
     core: frozenset[str] = frozenset(),
 ) -> ClosingShapes:
-    """What to draw of stones and of the report on their joints.
+    """Gather the shapes of stones and of the report on their joints.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def closing_shapes(
 
 
 def places(closing: ClosingReport) -> tuple[Place, ...]:
-    """Overlaps, then gaps, the largest first, in words."""
+    """List overlaps, then gaps, the largest of each first."""
     overlaps = [
         Place(
             "overlap",
@@ -169,7 +169,7 @@ def _pair(stones: tuple[str, str]) -> str:
 
 
 def _of_corners(values: Array | None, solid: Solid) -> Array:
-    """A value for each corner of a solid; the largest for all where they are of other corners."""
+    """Return a value for each corner of a solid; the largest for all where `values` belong to other corners."""
     count = len(solid.vertices)
     if values is None or not len(values):
         return np.full(count, np.nan)

@@ -1,4 +1,4 @@
-"""The pictures of a survey report: elevations and residuals."""
+"""Pictures of a survey report: elevations and residuals."""
 
 import math
 from collections.abc import Sequence
@@ -32,17 +32,17 @@ __all__ = ["draw_elevation", "draw_residuals"]
 
 
 _UNKNOWN = "#dcd9d4"
-_ROBUST = 98.0  # per cent of the stones that the colour scale reaches
-_FINEST = 0.01  # the colour scale ends here at least: smaller residuals are not worth a colour [mm]
+_ROBUST = 98.0  # percentile of the stones at which the colour scale ends
+_FINEST = 0.01  # shortest colour scale: smaller residuals are not worth a colour [mm]
 
 
 def draw_elevation(path: Path, facade: Facade, stones: Sequence[StoneQuality], flagged: set[str]) -> None:
-    """Draw the stones of a facade, coloured by how well their planes fit; those to measure again are outlined.
+    """Draw the stones of a facade, coloured by the misfit of their planes; outline those to measure again.
 
     Parameters
     ----------
     path : PNG
-    facade : which stones, and the frame to draw them in
+    facade : its stones are drawn, in its frame
     stones : all stones of the survey
     flagged : codes of stones to measure again
     """
@@ -79,7 +79,7 @@ def draw_elevation(path: Path, facade: Facade, stones: Sequence[StoneQuality], f
 
 
 def draw_residuals(path: Path, residuals: Histogram, verdict: str) -> None:
-    """Draw how often standardised residuals fall where, beside the normal distribution."""
+    """Draw the histogram of standardised residuals beside the normal distribution."""
     figure = new_sheet((8.0, 4.2))
     axes = figure.subplots()
     middles, width = (residuals.edges[:-1] + residuals.edges[1:]) / 2.0, np.diff(residuals.edges)

@@ -32,8 +32,8 @@ __all__ = ["ClosingSurface", "draw", "load_surface", "save_surface"]
 
 _GAP, _OVERLAP, _BALL = "#d55e00", "#000000", 26.0  # colours, and the size of a sign [px]
 _MOVED, _WIDTH = ("YlGnBu", 0.9), ("viridis_r", 1.0)
-_ROBUST = 98.0  # per cent of the values that a colour scale reaches
-_FINEST = 0.1  # a colour scale ends here at least [mm]
+_ROBUST = 98.0  # percentile of the values at which a colour scale ends
+_FINEST = 0.1  # shortest colour scale [mm]
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class ClosingSurface:
     ----------
     points : (n, 3) corners of the stones [m]
     triangles, edges : (nt, 3) and (ne, 2) of the stones
-    moved : (n,) how far each corner was moved [m]; NaN where that is not known
+    moved : (n,) distance by which each corner was moved [m]; NaN if unknown
     joint_points : (m, 3) corners of closed joints [m]
     joint_triangles : (k, 3)
     joint_width : (k,) of the joint of each triangle, as surveyed [m]
@@ -120,7 +120,7 @@ def _add_joints(pyvista: Any, plotter: Any, surface: ClosingSurface, label: str)
 
 
 def _add_places(pyvista: Any, plotter: Any, surface: ClosingSurface) -> None:
-    """Balls at gaps and overlaps, a good way before the stones, so that none is hidden."""
+    """Add balls at gaps and overlaps, well in front of the stones, so that none is hidden."""
     toward = np.array(plotter.camera.position) - np.array(plotter.camera.focal_point)
     for places, colour in ((surface.gaps, _GAP), (surface.overlaps, _OVERLAP)):
         if len(places):

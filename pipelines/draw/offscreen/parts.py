@@ -1,4 +1,4 @@
-"""Parts that all pictures drawn by PyVista are made of: the sheet, the viewer, edges, colours and their scale."""
+"""Common parts of the pictures drawn by PyVista: jobs, sheet, camera, edges, colours and their scale."""
 
 from dataclasses import dataclass
 from math import ceil, floor, log10
@@ -33,21 +33,21 @@ LIGHT: dict[str, Any] = {"ambient": 0.55, "diffuse": 0.5, "specular": 0.0}
 _ROUND = {1.0: 5, 1.2: 6, 1.5: 5, 2.0: 4, 2.5: 5, 3.0: 6, 4.0: 4, 5.0: 5, 6.0: 6, 8.0: 4}  # end: intervals
 _AZIMUTH = np.deg2rad(-24.0)
 OBLIQUELY = np.deg2rad(14.0)
-"""How far from above a wall is looked at, so that depth is seen [rad]."""
+"""Elevation of the viewer above a wall, so that its depth can be seen [rad]."""
 
 
 @dataclass(frozen=True)
 class Colouring:
-    """How a quantity is shown.
+    """Values of a quantity with their colour scale.
 
     Attributes
     ----------
     values : (n,) in the unit of the scalar bar; NaN is drawn grey
     title : of the scalar bar, with unit
     top : end of the scale
-    intervals : how many the scalar bar has between its labels, so that these are round numbers
+    intervals : number of intervals of the scalar bar, so that its labels are round numbers
     saturated : whether some values lie above the end
-    palette : name of a matplotlib colour map, and how much of it is used
+    palette : name of a matplotlib colour map, and the part of it that is used
     """
 
     values: Array
@@ -59,7 +59,7 @@ class Colouring:
 
 
 def nice_ceiling(value: float) -> tuple[float, int]:
-    """A round number that reaches a positive value, and how many round intervals divide it."""
+    """Round a positive value up; return the round number, and the count of round intervals that divide it."""
     decade = 10.0 ** floor(log10(value))
     for step, intervals in _ROUND.items():
         if value <= step * decade * (1.0 + 1e-9):
@@ -68,14 +68,14 @@ def nice_ceiling(value: float) -> tuple[float, int]:
 
 
 def new_plotter(pyvista: Any) -> Any:
-    """An empty picture, without a window."""
+    """Make an empty picture, without a window."""
     plotter = pyvista.Plotter(off_screen=True, window_size=list(_SIZE), lighting="none")
     plotter.set_background("white")
     return plotter
 
 
 def save_picture(plotter: Any, path: Path, title: str, note: str) -> None:
-    """Write a picture as PNG, with a title above and perhaps a note below."""
+    """Write a picture as PNG, with a title above and an optional note below."""
     plotter.add_text("\n" + title, position="upper_edge", font_size=15, color=INK)
     if note:
         plotter.add_text(note + "\n", position="lower_edge", font_size=13, color=INK)
@@ -85,7 +85,7 @@ def save_picture(plotter: Any, path: Path, title: str, note: str) -> None:
 
 
 def add_coloured(plotter: Any, mesh: Any, colours: Colouring, *, lit: bool = True) -> None:
-    """A mesh in the colours of its "value", and their scale; not lit, it has just these colours."""
+    """Add a mesh in the colours of its "value", with their scale; without light the colours are exact."""
     light = LIGHT if lit else {"lighting": False}
     plotter.add_mesh(
         mesh,
@@ -99,12 +99,12 @@ def add_coloured(plotter: Any, mesh: Any, colours: Colouring, *, lit: bool = Tru
 
 
 def add_glass(pyvista: Any, plotter: Any, points: Array, triangles: Ints) -> None:
-    """The stones, so that one sees what is in their joints."""
+    """Add the stones as glass, so that their joints can be seen."""
     plotter.add_mesh(mesh_of(pyvista, points, triangles), color=PLAIN, opacity=0.15, lighting=False)
 
 
 def add_edges(pyvista: Any, plotter: Any, points: Array, edges: Ints) -> None:
-    """Edges of the stones, a hair before their faces so that they are not drawn half hidden."""
+    """Add the edges of the stones, slightly in front of their faces so that they are not half hidden."""
     toward = plotter.camera.position - np.array(plotter.camera.focal_point)
     lines = pyvista.PolyData()
     lines.points = points + 1e-4 * toward
@@ -113,7 +113,7 @@ def add_edges(pyvista: Any, plotter: Any, points: Array, edges: Ints) -> None:
 
 
 def _palette(name: str, part: float) -> Any:
-    """The lighter part of a colour map: on its darkest part the edges of the stones cannot be seen."""
+    """Return the lighter part of a colour map: the edges of stones cannot be seen on its darkest part."""
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
 
@@ -121,7 +121,7 @@ def _palette(name: str, part: float) -> Any:
 
 
 def mesh_of(pyvista: Any, points: Array, triangles: Ints) -> Any:
-    """Triangles on points, as PyVista has them."""
+    """Make a PyVista mesh of triangles."""
     return pyvista.PolyData(points, faces=np.column_stack([np.full(len(triangles), 3), triangles]).ravel())
 
 

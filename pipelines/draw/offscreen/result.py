@@ -1,4 +1,4 @@
-"""Pictures of a wall, drawn off screen by PyVista.
+"""Pictures of a result, drawn off screen by PyVista.
 
 This module runs in a process of its own (``python -m pipelines.draw.offscreen.result JOB.json``): a graphics library
 that is missing or broken may end the process that uses it, and must not take the results along.
@@ -36,7 +36,7 @@ _LONGEST = 0.12  # the longest stroke of a resultant, over the wall's diagonal
 
 
 def colouring(surface: WallSurface, quantity: str, top: float | None) -> Colouring:
-    """Values, scale and palette of one of FIELDS, or of the `pressure` of the joints' triangles.
+    """Choose values, scale and palette of one of FIELDS, or of the `pressure` of the joints' triangles.
 
     The scale ends at `top`, rounded up; without it, at the largest value.
     """
@@ -56,7 +56,7 @@ def colouring(surface: WallSurface, quantity: str, top: float | None) -> Colouri
 
 
 def draw(surface: WallSurface, path: Path, job: dict[str, Any]) -> None:
-    """Draw one picture as PNG; `job` has quantity, top, title, towards (to the viewer), up, and maybe a note."""
+    """Draw one picture as PNG; `job` has quantity, top, title, towards (to the viewer), up and optionally note."""
     import pyvista
 
     plotter = new_plotter(pyvista)
@@ -126,7 +126,7 @@ def _add_joints(pyvista: Any, plotter: Any, surface: WallSurface, colours: Colou
 
 
 def _add_resultants(pyvista: Any, plotter: Any, surface: WallSurface) -> None:
-    """A stroke through each joint, along the resultant and as long as it is large."""
+    """Add a stroke through each joint, along its resultant and proportional to it."""
     force = np.linalg.norm(surface.resultants, axis=1)
     reach = _LONGEST * float(np.linalg.norm(np.ptp(surface.points, axis=0)))
     half = 0.5 * reach * surface.resultants / force.max(initial=1e-300)

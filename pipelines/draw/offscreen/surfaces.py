@@ -1,4 +1,4 @@
-"""What pictures show of a result: faces, edges and fields of the stones, joints and resultants; in one .npz file."""
+"""Surfaces for the pictures of a result: faces, edges and fields of the stones, joints and resultants."""
 
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -18,7 +18,7 @@ __all__ = ["FIELDS", "WallSurface", "load_surface", "save_surface", "stone_field
 FIELDS = ("von_mises", "displacement", "principal_tension", "principal_compression", "utilisation", "error")
 """Columns of `WallSurface.fields`."""
 
-_EDGE_ANGLE = np.deg2rad(20.0)  # faces that meet at less than this are one face of the stone
+_EDGE_ANGLE = np.deg2rad(20.0)  # triangles that meet at a smaller angle belong to one face
 
 
 @dataclass(frozen=True)
@@ -56,13 +56,13 @@ class WallSurface:
     in_kern: Bools
 
     def field(self, name: str) -> Array:
-        """(n,) one of FIELDS."""
+        """Return one of FIELDS, (n,)."""
         column: Array = self.fields[:, FIELDS.index(name)]
         return column
 
 
 def wall_surface(result: Result) -> WallSurface:
-    """Surface of all stones of a result."""
+    """Gather the surface of all stones of a result."""
     sizes = [len(body.reference) for body in result.bodies]
     offsets = np.concatenate([[0], np.cumsum(sizes)[:-1]])
     triangles = [_fans(body.faces) for body in result.bodies]
@@ -96,7 +96,7 @@ def wall_surface(result: Result) -> WallSurface:
 
 
 def stone_fields(body: BodyResult, material: Material) -> Array:
-    """FIELDS of the points of one stone (n, len(FIELDS)), as in `WallSurface`."""
+    """Compute the FIELDS of the points of one stone, (n, len(FIELDS)), as in `WallSurface`."""
     fields_ = np.full((len(body.reference), len(FIELDS)), np.nan)
     fields_[:, 1] = np.linalg.norm(body.displacement, axis=1)
     if body.von_mises is not None and body.principal is not None and body.values is not None:
@@ -109,7 +109,7 @@ def stone_fields(body: BodyResult, material: Material) -> Array:
 
 
 def _joints(joints: JointResult, chosen: Ints) -> tuple[Array, Ints, Array]:
-    """Corners, triangles and pressures of some joints."""
+    """Gather the corners, triangles and pressures of some joints."""
     polygons = [joints.polygon[number] for number in chosen]
     starts = np.cumsum([0, *map(len, polygons)])
     fans = [
@@ -134,14 +134,14 @@ def load_surface(path: Path) -> WallSurface:
 
 
 def _fans(faces: tuple[tuple[int, ...], ...]) -> Ints:
-    """(nt, 3) triangles of convex polygons."""
+    """Fan convex polygons into triangles (nt, 3)."""
     return np.array(
         [(face[0], face[k], face[k + 1]) for face in faces for k in range(1, len(face) - 1)], dtype=np.int64
     ).reshape(-1, 3)
 
 
 def _stone_edges(body: BodyResult, triangles: Ints) -> Ints:
-    """(ne, 2) edges where two triangles meet at an angle; those inside a flat face are left out."""
+    """List the edges (ne, 2) where two triangles meet at an angle; those inside a flat face are left out."""
     a, b, c = body.reference[triangles].transpose(1, 0, 2)
     normals = np.cross(b - a, c - a)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)

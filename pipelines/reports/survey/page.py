@@ -1,4 +1,4 @@
-"""report.html of a survey: one page for the surveyor, who decides by it what to measure again."""
+"""report.html of a survey: one page by which the surveyor decides what to measure again."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -22,13 +22,13 @@ Row = tuple[str, ...]
 
 
 def write_survey_page(path: Path, study: SurveyStudy, pictures: Mapping[str, str], version: str) -> None:
-    """Write the page, with the pictures that lie in its folder inside it.
+    """Write the page and embed the pictures of its folder.
 
     Parameters
     ----------
     path : report.html
-    study : what was found
-    pictures : file name of each picture and its caption, in order
+    study : findings
+    pictures : caption of each picture by its file name, in order
     version : of the program
     """
     inside = {name: picture(path.parent / name, caption) for name, caption in pictures.items()}
