@@ -1,7 +1,5 @@
 """Pictures of how surveyed stones became touching solids: elevations of flat facades, and all stones in space."""
 
-import json
-import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +12,7 @@ from pipelines.arrays import Array, Ints
 from pipelines.draw.elevations.closing import draw_moved
 from pipelines.draw.elevations.closing_shapes import ClosingShapes, DrawnJoint
 from pipelines.draw.elevations.joints import draw_joints
-from pipelines.draw.offscreen.closing import ClosingSurface, save_surface
+from pipelines.draw.offscreen.closing import ClosingSurface
 from pipelines.draw.offscreen.parts import OBLIQUELY
 from pipelines.draw.pictures import draw_apart
 from survey.geometry.solids import Solid
@@ -66,34 +64,22 @@ def draw_in_space(folder: Path, shapes: ClosingShapes) -> tuple[str, ...]:
     """
     towards, elevation = viewpoint(shapes)
     step = _steps(shapes)[-1:]
-    shared: dict[str, Any] = {"towards": towards.tolist(), "elevation": elevation}
-    jobs = [
+    looks = [(f"{one}-3d.png", "moved", _LABELS[one], f"{shapes.scene}: {_TITLES[one]}") for one in step]
+    title = f"{shapes.scene}: joints by their surveyed width\n{_note(shapes)}"
+    looks.append(("joints-3d.png", "joints", "Width of the joints as surveyed [mm]", title))
+    pictures: list[dict[str, Any]] = [
         {
-            "quantity": "moved",
-            "label": _LABELS[one],
-            "title": f"{shapes.scene}: {_TITLES[one]}",
-            **shared,
+            "path": str((folder / name).absolute()),
+            "quantity": quantity,
+            "label": label,
+            "title": title,
+            "towards": towards.tolist(),
+            "elevation": elevation,
         }
-        for one in step
+        for name, quantity, label, title in looks
     ]
-    jobs.append(
-        {
-            "quantity": "joints",
-            "label": "Width of the joints as surveyed [mm]",
-            "title": f"{shapes.scene}: joints by their surveyed width\n{_note(shapes)}",
-            **shared,
-        }
-    )
-    names = [*(f"{one}-3d.png" for one in step), "joints-3d.png"]
-    with tempfile.TemporaryDirectory() as scratch:
-        surface = Path(scratch) / "surface.npz"
-        save_surface(surface, closing_surface(shapes, *step))
-        paths = [{"path": str((folder / name).absolute())} for name in names]
-        pictures = [job | path for job, path in zip(jobs, paths, strict=True)]
-        job_file = Path(scratch) / "job.json"
-        job_file.write_text(json.dumps({"surface": str(surface), "pictures": pictures}), encoding="utf-8")
-        draw_apart("pipelines.draw.offscreen.closing", job_file)
-    return tuple(names)
+    draw_apart("pipelines.draw.offscreen.closing", closing_surface(shapes, *step), pictures)
+    return tuple(name for name, *_ in looks)
 
 
 def flat_facades(shapes: ClosingShapes) -> tuple[Facade, ...]:

@@ -1,12 +1,12 @@
 """Time series of a run as a small plot."""
 
 import io
-import logging
 
 import numpy as np
 
 from mechanics.results.result import History
 from pipelines.arrays import Array
+from pipelines.draw.elevations.sheet import new_sheet
 
 __all__ = ["history_svg"]
 
@@ -19,11 +19,7 @@ _CURVES = (
 
 def history_svg(history: History) -> str:
     """Plot speed, balance and residual against time; return an SVG element."""
-    # matplotlib tells on stderr that it builds its font cache, once per machine
-    logging.getLogger("matplotlib.font_manager").setLevel(logging.ERROR)
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(8.5, 3.6), layout="constrained")
+    figure = new_sheet((8.5, 3.6))
     axes = figure.subplots()
     for name, label, colour in _CURVES:
         values = _positive(getattr(history, name))

@@ -1,13 +1,13 @@
 """Pictures of a result, drawn by a child process, and remedies where nothing can be drawn."""
 
-import json
 import os
 import re
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +17,8 @@ from mechanics.scene.scene import Fidelity
 from mechanics.stones.materials import Material
 from moma.errors import MissingLibraryError
 from pipelines.arrays import Array
-from pipelines.draw.offscreen.surfaces import FIELDS, save_surface, stone_fields, wall_surface
+from pipelines.draw.offscreen.jobs import save_job
+from pipelines.draw.offscreen.surfaces import FIELDS, stone_fields, wall_surface
 
 __all__ = ["draw_apart", "draw_pictures", "missing", "package_of"]
 
@@ -87,12 +88,7 @@ def draw_pictures(result: Result, folder: Path, names: Sequence[str], towards: A
         }
         for name in wanted
     ]
-    with tempfile.TemporaryDirectory() as scratch:
-        surface = Path(scratch) / "surface.npz"
-        save_surface(surface, wall_surface(result))
-        job_file = Path(scratch) / "job.json"
-        job_file.write_text(json.dumps({"surface": str(surface), "pictures": jobs}), encoding="utf-8")
-        draw_apart("pipelines.draw.offscreen.result", job_file)
+    draw_apart("pipelines.draw.offscreen.result", wall_surface(result), jobs)
     return tuple(f"{name}.png" for name in wanted)
 
 
@@ -127,27 +123,34 @@ def _fields_of(body: BodyResult, material: Material, name: str) -> Array:
     return stone_fields(body, material)[:, FIELDS.index(name)]
 
 
-def draw_apart(module: str, job_file: Path) -> None:
+def draw_apart(module: str, surface: object, pictures: Sequence[Mapping[str, Any]]) -> None:
     """Draw pictures in a child process; its output about displays is suppressed unless it fails.
 
     EGL comes first: it needs no X server, and no X libraries either.
+
+    Parameters
+    ----------
+    module : with the function `draw`, of `pipelines.draw.offscreen`
+    surface : dataclass of arrays
+    pictures : absolute path of each, and what the module reads of it
 
     Raises
     ------
     MissingLibraryError : VTK cannot be loaded or cannot draw on this machine
     """
     reason = ""
-    for window in ("vtkEGLRenderWindow", None):
-        done = _attempt(module, job_file, window)
-        if done.returncode == 0:
-            return
-        if done.returncode == 3:
-            reason = done.stdout.strip()
-            package = package_of(reason) or "libgl1 libxrender1 libegl1"
-            raise MissingLibraryError(
-                f"VTK cannot be loaded: {reason}", remedy=f"install what it needs: apt-get install {package}"
-            )
-        reason = reason or _last_words(done.stderr) or f"it ended with code {done.returncode}"
+    with tempfile.TemporaryDirectory() as scratch:
+        job = save_job(Path(scratch), surface, pictures)
+        for window in ("vtkEGLRenderWindow", None):
+            done = _attempt(module, job, window)
+            if done.returncode == 0:
+                return
+            if done.returncode == 3:
+                reason = done.stdout.strip()
+                package = package_of(reason) or "libgl1 libxrender1 libegl1"
+                remedy = f"install what it needs: apt-get install {package}"
+                raise MissingLibraryError(f"VTK cannot be loaded: {reason}", remedy=remedy)
+            reason = reason or _last_words(done.stderr) or f"it ended with code {done.returncode}"
     raise MissingLibraryError(
         f"VTK cannot draw off screen: {reason}",
         remedy="install software rendering: apt-get install libegl1 libgl1-mesa-dri",

@@ -31,8 +31,12 @@ __all__ = [
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.colors import Colormap
+    from matplotlib.figure import Figure
 
 
+_DPI = 150
+INK, PALE = "#222222", "#a9a59e"
+FLAG, PLAIN = "#d55e00", "#0072b2"  # vermilion and blue of Okabe and Ito, safe for colour-blind readers
 CODES = 250
 """Largest number of stones named on an elevation."""
 
@@ -103,15 +107,6 @@ def palette(unknown: str) -> "Colormap":
     from matplotlib.colors import ListedColormap
 
     return ListedColormap(colormaps[_PALETTE](np.linspace(0.0, _LIGHTER, 256))).with_extremes(bad=unknown)
-
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-
-_DPI = 150
-INK, PALE = "#222222", "#a9a59e"
-FLAG, PLAIN = "#d55e00", "#0072b2"  # vermilion and blue of Okabe and Ito, safe for colour-blind readers
 
 
 def new_sheet(size: tuple[float, float]) -> "Figure":

@@ -1,19 +1,14 @@
-"""Pictures of closed joints in space, drawn off screen by PyVista.
+"""Pictures of closed joints in space, drawn off screen by PyVista (``python -m`` this module ``JOB.json``)."""
 
-Like `pipelines.draw.offscreen.result`, this runs in a process of its own: ``python -m
-pipelines.draw.offscreen.closing JOB.json``.
-"""
-
-import json
 import sys
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pipelines.arrays import Array, Ints
+from pipelines.draw.offscreen.jobs import run_job
 from pipelines.draw.offscreen.parts import (
     LIGHT,
     PLAIN,
@@ -27,7 +22,7 @@ from pipelines.draw.offscreen.parts import (
     save_picture,
 )
 
-__all__ = ["ClosingSurface", "draw", "load_surface", "save_surface"]
+__all__ = ["ClosingSurface", "draw"]
 
 
 _GAP, _OVERLAP, _BALL = "#d55e00", "#000000", 26.0  # colours, and the size of a sign [px]
@@ -64,17 +59,6 @@ class ClosingSurface:
     gap_triangles: Ints
     gaps: Array
     overlaps: Array
-
-
-def save_surface(path: Path, surface: ClosingSurface) -> None:
-    """Write a surface as .npz."""
-    np.savez(path, **{one.name: getattr(surface, one.name) for one in fields(surface)})
-
-
-def load_surface(path: Path) -> ClosingSurface:
-    """Read what `save_surface` wrote."""
-    with np.load(path, allow_pickle=False) as arrays:
-        return ClosingSurface(**{one.name: arrays[one.name] for one in fields(ClosingSurface)})
 
 
 def draw(surface: ClosingSurface, path: Path, job: dict[str, Any]) -> None:
@@ -137,19 +121,5 @@ def _colouring(values: Array, label: str, palette: tuple[str, float]) -> Colouri
     return Colouring(values, label, end, intervals, saturated, palette)
 
 
-def _main(arguments: Sequence[str]) -> int:
-    """Draw what a job file asks for; exit code 3 if a library cannot be loaded, its message on stdout."""
-    job = json.loads(Path(arguments[1]).read_text(encoding="utf-8"))
-    try:
-        import pyvista  # noqa: F401
-    except ImportError as error:
-        print(error)
-        return 3
-    surface = load_surface(Path(job["surface"]))
-    for picture in job["pictures"]:
-        draw(surface, Path(picture["path"]), picture)
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(_main(sys.argv))
+    sys.exit(run_job(sys.argv, ClosingSurface, draw))

@@ -1,10 +1,5 @@
-"""Pictures of a result, drawn off screen by PyVista.
+"""Pictures of a result, drawn off screen by PyVista (``python -m`` this module ``JOB.json``)."""
 
-This module runs in a process of its own (``python -m pipelines.draw.offscreen.result JOB.json``): a graphics library
-that is missing or broken may end the process that uses it, and must not take the results along.
-"""
-
-import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -12,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from pipelines.draw.offscreen.jobs import run_job
 from pipelines.draw.offscreen.parts import (
     LIGHT,
     PLAIN,
@@ -25,7 +21,7 @@ from pipelines.draw.offscreen.parts import (
     place_camera,
     save_picture,
 )
-from pipelines.draw.offscreen.surfaces import WallSurface, load_surface
+from pipelines.draw.offscreen.surfaces import WallSurface
 
 __all__ = ["colouring", "draw"]
 
@@ -143,19 +139,5 @@ def _add_resultants(pyvista: Any, plotter: Any, surface: WallSurface) -> None:
         plotter.add_mesh(heads, color=colour, point_size=11.0, render_points_as_spheres=True, lighting=False)
 
 
-def _main(job_path: str) -> int:
-    """Draw what a job file asks for; exit code 3 if a library cannot be loaded, its message on stdout."""
-    job = json.loads(Path(job_path).read_text(encoding="utf-8"))
-    try:
-        import pyvista  # noqa: F401
-    except ImportError as error:
-        print(error)
-        return 3
-    surface = load_surface(Path(job["surface"]))
-    for picture in job["pictures"]:
-        draw(surface, Path(picture["path"]), picture)
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(_main(sys.argv[1]))
+    sys.exit(run_job(sys.argv, WallSurface, draw))

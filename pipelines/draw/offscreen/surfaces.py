@@ -1,7 +1,6 @@
 """Surfaces for the pictures of a result: faces, edges and fields of the stones, joints and resultants."""
 
-from dataclasses import dataclass, fields
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from mechanics.scene.scene import Fidelity
 from mechanics.stones.materials import Material
 from pipelines.arrays import Array, Bools, Ints
 
-__all__ = ["FIELDS", "WallSurface", "load_surface", "save_surface", "stone_fields", "wall_surface"]
+__all__ = ["FIELDS", "WallSurface", "stone_fields", "wall_surface"]
 
 
 FIELDS = ("von_mises", "displacement", "principal_tension", "principal_compression", "utilisation", "error")
@@ -120,17 +119,6 @@ def _joints(joints: JointResult, chosen: Ints) -> tuple[Array, Ints, Array]:
         np.concatenate([*fans, np.zeros((0, 3), dtype=np.int64)]),
         np.repeat(joints.pressure_mean[chosen], [len(one) for one in fans]),
     )
-
-
-def save_surface(path: Path, surface: WallSurface) -> None:
-    """Write a surface as .npz."""
-    np.savez(path, **{one.name: getattr(surface, one.name) for one in fields(surface)})
-
-
-def load_surface(path: Path) -> WallSurface:
-    """Read what `save_surface` wrote."""
-    with np.load(path, allow_pickle=False) as arrays:
-        return WallSurface(**{one.name: arrays[one.name] for one in fields(WallSurface)})
 
 
 def _fans(faces: tuple[tuple[int, ...], ...]) -> Ints:

@@ -15,7 +15,8 @@ from pipelines.draw.closing_pictures import (
 )
 from pipelines.draw.elevations.closing_shapes import closing_shapes, places
 from pipelines.draw.elevations.sheet import FLAG
-from pipelines.draw.offscreen.closing import load_surface, save_surface
+from pipelines.draw.offscreen.closing import ClosingSurface
+from pipelines.draw.offscreen.jobs import load_surface, save_surface
 from survey.geometry.solids import Solid, area_vector
 from survey.joints.report import ClosingReport, Gap, Joint, Overlap
 from survey.joints.settings import JointMode
@@ -132,7 +133,7 @@ def test_the_surface_has_all_faces_and_joints(tmp_path):
     assert area(surface.gap_points, surface.gap_triangles) == pytest.approx(0.24)
     np.testing.assert_array_equal(surface.joint_width, 0.012)
     save_surface(tmp_path / "surface.npz", surface)
-    again = load_surface(tmp_path / "surface.npz")
+    again = load_surface(tmp_path / "surface.npz", ClosingSurface)
     np.testing.assert_array_equal(again.triangles, surface.triangles)
 
 

@@ -16,9 +16,10 @@ from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.meshers.mesher import mesh_block
 from moma.errors import MissingLibraryError
 from pipelines.draw import pictures
+from pipelines.draw.offscreen.jobs import load_surface, save_surface
 from pipelines.draw.offscreen.parts import nice_ceiling
 from pipelines.draw.offscreen.result import colouring
-from pipelines.draw.offscreen.surfaces import load_surface, save_surface, wall_surface
+from pipelines.draw.offscreen.surfaces import WallSurface, wall_surface
 from pipelines.draw.pictures import draw_pictures, missing, package_of
 from pipelines.reports.run import write_report
 from pipelines.results.vtk import contact_grid, write_frames
@@ -252,7 +253,7 @@ def test_the_edges_drawn_are_those_of_the_stones_not_of_the_mesh(mixed):
 def test_a_surface_survives_its_file(mixed, tmp_path):
     surface = wall_surface(mixed)
     save_surface(tmp_path / "s.npz", surface)
-    again = load_surface(tmp_path / "s.npz")
+    again = load_surface(tmp_path / "s.npz", WallSurface)
     assert np.array_equal(again.field("von_mises"), surface.field("von_mises"), equal_nan=True)
     assert np.array_equal(again.resultants, surface.resultants)
     assert np.array_equal(again.edges, surface.edges)
