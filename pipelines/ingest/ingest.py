@@ -1,4 +1,4 @@
-"""Survey files into the database: read, fit, outline, find the depth, extrude, store; one stone at a time."""
+"""Ingest of survey files: read, fit, outline, find the depth, extrude and store, one stone at a time."""
 
 import hashlib
 import os
@@ -30,9 +30,9 @@ from survey.stones import survey_stones
 __all__ = ["ingest"]
 
 
-_PATIENCE = 300.0
-"""How long to wait for another program that writes [s]: not less than a large survey takes, since waiting is cheaper
-than fitting it anew."""
+_PATIENCE = (
+    300.0  # longest wait for another writer [s]; waiting for a large survey is cheaper than fitting again
+)
 
 
 def ingest(
@@ -47,15 +47,15 @@ def ingest(
     again: bool = False,
     rules: Sequence[KindRule] = (),
 ) -> IngestReport:
-    """Take survey files into the database: all of them, or, if anything is wrong in any, none.
+    """Ingest survey files: all of them or, if anything is wrong in any, none.
 
     Parameters
     ----------
     paths : survey files
-    url : of the database, made if it does not exist
+    url : of the database, created if it does not exist
     format : name of their format
-    progress : told after every stone
-    options : what the files leave unsaid
+    progress : called after every stone
+    options : defaults for what the files leave out
     keep_going : take the good stones of each file, and write the others to a file of rejects with the reasons
     rejects : that file, if there is one survey file; by default ``NAME.rejects.SUFFIX`` beside each survey file
     again : stones that are in the database already were measured again: their old measurements are kept as superseded;
@@ -102,8 +102,8 @@ def ingest(
         with open_database(url, lock_timeout=_PATIENCE) as database, database.session() as session:
             solids = KnownSolids()
             for tally, spool in zip(tallies, spools, strict=True):
-                stones = _told(spool, tally, progress)
-                # of stones that are measured again, the numbers are not the next ones
+                stones = _with_progress(spool, tally, progress)
+                # stones measured again keep their numbers, so that their solids cannot be numbered in advance
                 _store(session, tally, stones if again else _kept(stones, session, solids), again)
             progress(Progress("relate", 0, None))
             relate(session, only=[number for tally in tallies for number in tally.stored], solids=solids)
@@ -115,11 +115,11 @@ def ingest(
 
 
 def _open_if_there(url: str, held: ExitStack) -> None:
-    """Open the database early: the kinds that it registers are known then, and what is wrong with it is said first."""
+    """Open an existing database early, to know its registered kinds and to report its faults first."""
     try:
         held.enter_context(open_database(url, create=False))
     except NoDatabaseError:
-        home_of(url).engine(create=True).dispose()  # whether one could be made
+        home_of(url).engine(create=True).dispose()  # fails if none could be created
 
 
 def _check_files(surveys: Sequence[Path]) -> None:
@@ -132,7 +132,7 @@ def _check_files(surveys: Sequence[Path]) -> None:
 
 
 def _check_codes(tallies: Sequence[Tally], spools: Sequence[Spool]) -> None:
-    """Refuse files that contradict each other before a database is made for them."""
+    """Refuse files that give one code to two stones, before a database is created for them."""
     places: dict[str, str] = {}
     for tally, spool in zip(tallies, spools, strict=True):
         for stone in spool:
@@ -146,7 +146,7 @@ _LISTS = ("pnezd", "penzd")
 
 
 def _listed_stations(tally: Tally, options: ReadingOptions | None) -> list[int]:
-    """Lines of the stations that stand among the points of a list, not in its header file."""
+    """List the lines of the stations that are given among the points, not in the header file."""
     elsewhere = () if options is None or options.head is None else options.head.stations
     known = {one.name for one in elsewhere}
     return [one.line for one in tally.stream.head.stations if one.name not in known]
@@ -161,7 +161,7 @@ def _measure(
     keep_going: bool,
     progress: Listener,
 ) -> Tally:
-    """The good stones of one file into a spool; the first bad one ends it, or is kept for the rejects."""
+    """Write the good stones of one file into a spool; raise at the first bad one, or keep it for the rejects."""
     tally = Tally(path, survey_stones(open_survey(path, format, options)))
     stage, head, kinds = f"fit {path.name}", tally.stream.head, set[str]()
     for one in tally.stream.stones:
@@ -197,7 +197,7 @@ def _store(session: Session, tally: Tally, stones: Iterator[StoneRecord], again:
     tally.again = len(stored.again)
 
 
-def _told(stones: Iterable[StoneRecord], tally: Tally, progress: Listener) -> Iterator[StoneRecord]:
+def _with_progress(stones: Iterable[StoneRecord], tally: Tally, progress: Listener) -> Iterator[StoneRecord]:
     total = tally.stones.total()
     for number, stone in enumerate(stones, start=1):
         progress(Progress(f"store {tally.path.name}", number, total, stone.code))
@@ -205,14 +205,14 @@ def _told(stones: Iterable[StoneRecord], tally: Tally, progress: Listener) -> It
 
 
 def _kept(stones: Iterator[StoneRecord], session: Session, solids: KnownSolids) -> Iterator[StoneRecord]:
-    """The stones on their way to the database, and their solids for their relations."""
+    """Pass stones on to the database, and keep their solids for the relations."""
     for number, stone in enumerate(stones, start=first_free_id(session, Entity)):
         solids.add(number, stone.solid_vertices, stone.solid_faces)
         yield stone
 
 
 def _of_known_kind(block: SurveyedBlock, path: str, known: set[str]) -> SurveyedBlock | Reject:
-    """The stone, if the hierarchy has its kind; `known` holds kinds that were found there, and is added to."""
+    """Return the stone, or a reject if the hierarchy has no such kind; `known` collects kinds found there."""
     if block.kind in known:
         return block
     try:
@@ -232,7 +232,7 @@ def _sha256(path: Path) -> str:
 
 @contextmanager
 def _published(path: Path, text: bytes) -> Iterator[None]:
-    """A file that appears whole, and only if nothing fails until the end of the block."""
+    """Write a file that appears complete, and only if nothing fails until the end of the block."""
     part = path.with_name(f"{path.name}.part")
     try:
         part.write_bytes(text)

@@ -1,4 +1,4 @@
-"""Between the survey pillar's stones and the records that the database keeps of them."""
+"""Conversion between surveyed stones and the records of the database."""
 
 import math
 from dataclasses import replace
@@ -20,7 +20,7 @@ __all__ = ["frame_record", "stone_record", "surveyed_block"]
 
 
 def stone_record(block: SurveyedBlock) -> StoneRecord:
-    """What the database keeps of a stone."""
+    """Convert a surveyed stone to its record."""
     face, fit, record = block.face, block.face.fit, block.face.record
     return StoneRecord(
         code=block.code,
@@ -69,16 +69,16 @@ def stone_record(block: SurveyedBlock) -> StoneRecord:
 
 
 def surveyed_block(stone: StoneRecord) -> SurveyedBlock:
-    """The stone as the survey pillar knows it, from what the database keeps of it.
+    """Restore a surveyed stone from its record.
 
-    A face that was measured in space is fitted anew: from the same measurements it is the same face, and the
+    A face that was measured in space is fitted again: from the same measurements it is the same face, and the
     database need not keep what follows from others of its columns.
     """
     measured = _block_record(stone)
     depth = Depth(stone.depth, stone.depth_sigma, stone.depth_source, _origin(stone), stone.line)
     extrusion = Extrusion(stone.direction, stone.tail)
     if stone.provenance == "points":
-        # any point on the stored side of the plane tells which side is outside
+        # any point on the stored side of the plane defines the outside
         outside = stone.outline.mean(axis=0) + 100.0 * stone.normal
         return extrude(outline_face(measured, outside), depth, extrusion)
     face = _kept_face(stone, measured)
@@ -124,7 +124,7 @@ def _source(stone: StoneRecord) -> Source:
 
 
 def _kept_face(stone: StoneRecord, measured: BlockRecord) -> Face:
-    """A face whose plane was not fitted to its corners: that of its neighbours, or the side of a solid."""
+    """Restore a face whose plane was not fitted to its corners: its neighbours' plane, or the side of a solid."""
     residuals = (stone.vertices - stone.centroid) @ stone.normal
     on_solid = stone.provenance in ("solid", "hypothesis")
     fit = FaceFit(
@@ -141,7 +141,7 @@ def _kept_face(stone: StoneRecord, measured: BlockRecord) -> Face:
         residuals=residuals if on_solid else np.empty(0),
         standardised=np.zeros(len(residuals)) if on_solid else np.empty(0),
     )
-    # a lifted corner is on the plane but for rounding, and stays where it is
+    # a lifted corner lies on the plane to within rounding, and stays where it is
     corners = stone.vertices - np.outer(residuals, stone.normal) if on_solid else stone.vertices
     face = face_on(
         fit,
@@ -154,7 +154,7 @@ def _kept_face(stone: StoneRecord, measured: BlockRecord) -> Face:
 
 
 def frame_record(transform: SiteTransform | None) -> dict[str, Any] | None:
-    """The transform with its precision and what each control point says of it; None if there is none."""
+    """Describe the transform with its precision and the residuals of its control points; None without one."""
     if transform is None:
         return None
     points = zip(transform.names, transform.residuals.tolist(), transform.standardised.tolist(), strict=True)

@@ -1,4 +1,4 @@
-"""Every key of a file of knowledge: type, unit, bounds. docs/knowledge.md is held to these lists by a test."""
+"""Keys of a file of knowledge: type, unit, bounds. A test compares docs/knowledge.md with these lists."""
 
 from collections.abc import Mapping
 
@@ -26,7 +26,7 @@ WITHDRAWN = (
     "structure",
     "hypothesis",
 )
-"""What can be withdrawn; a depth is replaced by another one, a kind of one's own stays."""
+"""Records that can be withdrawn; a depth is replaced by another one, a registered kind stays."""
 
 RECORD = (
     Key("author", Kind.TEXT, "Who says all this; `--author` goes before it.", default=None),
@@ -45,7 +45,7 @@ _STONES_OR_NONE = Key("stones", Kind.TEXTS, "Codes or expressions of the stones.
 _STRUCTURES = Key("structures", Kind.TEXTS, "Codes of structures.", default=())
 
 ABOUT = (_STONES_OR_NONE, _STRUCTURES)
-"""What a statement is about; at least one of them is given."""
+"""Keys for the subjects of a statement; at least one of them is given."""
 
 CITED = (
     Key("text", Kind.TEXT, "In words.", default=None),
@@ -53,7 +53,7 @@ CITED = (
     Key("locator", Kind.TEXT, "Where in the document: page, number of the figure.", default=None),
     Key("date", Kind.DATE, "Date on which it was seen.", default=None),
 )
-"""What every statement can say."""
+"""Keys of every statement for its evidence."""
 
 _SAID = (*ABOUT, *CITED, *WHO)
 
@@ -75,7 +75,7 @@ ATTRIBUTE = (
     Key("unit", Kind.TEXT, "Its unit, `-` for a number without one; left out: a text.", default=None),
     Key("definition", Kind.TEXT, "What it is, in a few words."),
 )
-"""Keys of one attribute of a kind of one's own."""
+"""Keys of one attribute of a registered kind."""
 
 _MATERIAL = (
     Key("name", Kind.TEXT, "Its name."),
@@ -204,4 +204,4 @@ ARRAYS: Mapping[str, tuple[Key, ...]] = {
     "reference": _SAID,
     "note": (Key("key", Kind.TEXT, "What the word is about, e.g. `edge`."), *_SAID),
 }
-"""Keys of every array of tables, in the order in which they are recorded."""
+"""Keys of every array of tables, in the order of recording."""
