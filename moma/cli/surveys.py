@@ -83,8 +83,7 @@ def ingest(
             format.value,
             listener,
             options=options,
-            keep_going=keep_going,
-            rejects=rejects,
+            keep_going=rejects or keep_going,
             again=again,
             rules=rules,
         )

@@ -42,8 +42,7 @@ def ingest(
     progress: Listener = silent,
     *,
     options: ReadingOptions | None = None,
-    keep_going: bool = False,
-    rejects: str | Path | None = None,
+    keep_going: bool | str | Path = False,
     again: bool = False,
     rules: Sequence[KindRule] = (),
 ) -> IngestReport:
@@ -56,8 +55,8 @@ def ingest(
     format : name of their format
     progress : called after every stone
     options : defaults for what the files leave out
-    keep_going : take the good stones of each file, and write the others to a file of rejects with the reasons
-    rejects : that file, if there is one survey file; by default ``NAME.rejects.SUFFIX`` beside each survey file
+    keep_going : ingest the good stones of each file, and write the others with the reasons to a file of rejects: the
+        given one, for a single survey file, or, if True, ``NAME.rejects.SUFFIX`` beside each survey file
     again : stones that are in the database already were measured again: their old measurements are kept as superseded;
         otherwise they are an error
     rules : which solids are of which kind
@@ -73,6 +72,7 @@ def ingest(
     surveys = [Path(path) for path in paths]
     if not surveys:
         raise UsageError("no survey file", remedy="name at least one")
+    rejects = None if isinstance(keep_going, bool) else Path(keep_going)
     if rejects is not None and len(surveys) > 1:
         raise UsageError(
             f"one file of rejects for {len(surveys)} survey files", remedy="take in one file at a time"
@@ -81,7 +81,7 @@ def ingest(
         remedy = "give it with --format solids; surveys say the kind of each stone"
         raise UsageError(f"a rule for solids, and format {format}", where=rules[0].option, remedy=remedy)
     _check_files(surveys)
-    targets = [Path(rejects) if rejects is not None else default_path(survey) for survey in surveys]
+    targets = [rejects or default_path(survey) for survey in surveys]
     if keep_going:
         check_targets(targets, surveys)
     with ExitStack() as held:
@@ -89,7 +89,7 @@ def ingest(
         check_kinds(rules)
         spools = [held.enter_context(Spool()) for _ in surveys]
         tallies = [
-            _measure(path, spool, format, options, rules, keep_going, progress)
+            _measure(path, spool, format, options, rules, bool(keep_going), progress)
             for path, spool in zip(surveys, spools, strict=True)
         ]
         if len(surveys) > 1:

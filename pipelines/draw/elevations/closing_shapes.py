@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from pipelines.draw.elevations.joint_polygons import joint_polygon
 from survey.geometry.solids import Solid, area_vector
 from survey.joints.report import ClosingReport, Joint
 
-__all__ = ["ClosingShapes", "DrawnJoint", "DrawnStone", "Place", "closing_shapes", "places"]
+__all__ = ["ClosingShapes", "DrawnJoint", "DrawnStone", "Place", "Stages", "closing_shapes", "places"]
 
 
 @dataclass(frozen=True)
@@ -95,11 +96,17 @@ class ClosingShapes:
     places: tuple[Place, ...]
 
 
+class Stages(NamedTuple):
+    """Solids of all stones, in one order, at three stages: as surveyed, as simplified, as simulated."""
+
+    surveyed: Sequence[Solid]
+    simple: Sequence[Solid]
+    closed: Sequence[Solid]
+
+
 def closing_shapes(
     scene: str,
-    surveyed: Sequence[Solid],
-    simple: Sequence[Solid],
-    closed: Sequence[Solid],
+    solids: Stages,
     simplified: Mapping[str, Array],
     closing: ClosingReport,
     faces: Sequence[Array],
@@ -111,12 +118,12 @@ def closing_shapes(
     Parameters
     ----------
     scene : its name
-    surveyed, simple, closed : solids of the stones as in DrawnStone, in the same order
-    simplified : by code, how far each corner of the surveyed solid was moved [m]
-    closing : what closing the joints changed
+    solids : of the stones
+    simplified : by code, the movement of each corner of the surveyed solid [m]
+    closing : changes by closing the joints
     faces : (nv, 3) outline of each stone's visible face, counter-clockwise seen from outside [m]
-    hypotheses : codes of stones that nobody has seen
-    core : codes of what lies behind the stones of a facing
+    hypotheses : codes of hypothetical stones
+    core : codes of those that lie behind the stones of a facing
     """
     stones = tuple(
         DrawnStone(
@@ -131,11 +138,11 @@ def closing_shapes(
             hypothesis=after.code in hypotheses,
             core=after.code in core,
         )
-        for before, between, after, face in zip(surveyed, simple, closed, faces, strict=True)
+        for before, between, after, face in zip(*solids, faces, strict=True)
     )
-    solids = {one.code: one for one in closed}
+    closed = {one.code: one for one in solids.closed}
     joints = tuple(
-        DrawnJoint(one, joint_polygon(solids[one.stones[0]], solids[one.stones[1]], one.normal, one.centroid))
+        DrawnJoint(one, joint_polygon(closed[one.stones[0]], closed[one.stones[1]], one.normal, one.centroid))
         for one in closing.joints
     )
     return ClosingShapes(scene, stones, joints, places(closing))

@@ -314,21 +314,21 @@ def test_rejects_never_replace_the_survey_itself_or_each_other(desk):
     for survey in (path, rejects):
         before = survey.read_bytes()
         with pytest.raises(UsageError, match="is the survey file itself"):
-            desk.ingest(survey, "moma", keep_going=True, rejects=survey)
+            desk.ingest(survey, "moma", keep_going=survey)
         assert survey.read_bytes() == before
     solids = [desk.write(obj(0), "wall.obj"), desk.write(obj(1), "wall.stl")]
     with pytest.raises(UsageError, match=r"rejects of .*wall\.obj and of .*wall\.stl"):
         ingest(solids, desk.url(), "solids", keep_going=True)
     with pytest.raises(UsageError, match="is a folder"):
-        desk.ingest(path, "moma", keep_going=True, rejects=desk.folder)
+        desk.ingest(path, "moma", keep_going=desk.folder)
     with pytest.raises(UsageError, match="one file of rejects for 2"):
-        ingest([path, rejects], desk.url(), keep_going=True, rejects=desk.folder / "r.moma")
+        ingest([path, rejects], desk.url(), keep_going=desk.folder / "r.moma")
 
 
 def test_nothing_is_left_behind_where_the_rejects_cannot_be_written(desk):
     path = desk.write(HEAD + moma(0) + moma(1, "heder"), "wall.moma")
     with pytest.raises(UsageError, match="rejects cannot be written"):
-        desk.ingest(path, "moma", keep_going=True, rejects=desk.folder / "none" / "r.moma")
+        desk.ingest(path, "moma", keep_going=desk.folder / "none" / "r.moma")
     assert desk.left() == set()
 
 
