@@ -91,7 +91,7 @@ def _publish(part: Path, file: Path) -> None:
     try:
         os.link(part, file)
     except FileExistsError:
-        what = "another program has made this database meanwhile"
+        what = "another process has created this database in the meantime"
         raise ExchangeError(what, where=str(file), remedy="name a new database with --db") from None
     except OSError:
         part.rename(file)  # a file system without links

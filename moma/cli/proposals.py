@@ -1,4 +1,4 @@
-"""The command that proposes what no survey sees."""
+"""Command that proposes unseen stones."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -18,14 +18,14 @@ __all__ = ["CoreShape", "What", "propose"]
 
 
 class What(StrEnum):
-    """What can be proposed."""
+    """Subjects of proposals."""
 
     MISSING = "missing"
     INFILL = "infill"
 
 
 class CoreShape(StrEnum):
-    """What the core of a wall can be made of."""
+    """Shapes of the core of a wall."""
 
     BLOCKS = "blocks"
     STOREYS = "storeys"
@@ -39,36 +39,40 @@ def propose(
     where: Annotated[
         list[str] | None,
         typer.Option(
-            "--where", metavar="EXPR", help="Only with stones for which this holds; all given ones hold."
+            "--where",
+            metavar="EXPR",
+            help="Only with stones for which this holds; if repeated, all must hold.",
         ),
     ] = None,
     shape: Annotated[
         CoreShape | None,
-        typer.Option("--as", help="The core as blocks, or as one continuum a storey; else blocks."),
+        typer.Option("--as", help="The core as blocks, or as one continuum per storey; default: blocks."),
     ] = None,
     storey_height: Annotated[
         float | None,
         typer.Option(
-            "--storey-height", metavar="M", help="Height of a storey in metres; else the whole wall is one."
+            "--storey-height", metavar="M", help="Height of a storey in metres; default: the whole wall."
         ),
     ] = None,
     facings: Annotated[
         tuple[str, str] | None,
-        typer.Option("--facings", metavar="EXPR EXPR", help="Two facings of one wall; else recognised."),
+        typer.Option("--facings", metavar="EXPR EXPR", help="Two facings of one wall; default: recognised."),
     ] = None,
     record: Annotated[
-        bool, typer.Option("--record", help="Put them into the database, as hypotheses.")
+        bool, typer.Option("--record", help="Record them in the database, as hypotheses.")
     ] = False,
-    author: Annotated[str | None, typer.Option("--author", metavar="NAME", help="Who records them.")] = None,
+    author: Annotated[
+        str | None, typer.Option("--author", metavar="NAME", help="Author of the record.")
+    ] = None,
     source: Annotated[
         str | None,
-        typer.Option("--source", metavar="TEXT", help="On what grounds; else those of each proposal."),
+        typer.Option("--source", metavar="TEXT", help="Grounds; default: those of each proposal."),
     ] = None,
     db: Db = DEFAULT_DB,
     json: Json = False,
     verbose: Verbose = False,
 ) -> None:
-    """Propose stones that are missing, or the core between two facings; see docs/unseen.md."""
+    """Propose missing stones, or the core between two facings; see docs/unseen.md."""
     from moma.cli.text.formats import as_json
     from pipelines.propose.propose import Recording, propose_core, propose_stones
     from survey.unseen.core.settings import InfillSettings, InfillShape
@@ -100,7 +104,7 @@ def _refuse_others(
     author: str | None,
     source: str | None,
 ) -> None:
-    """Options that do not belong together."""
+    """Refuse options that exclude each other."""
     if what is What.MISSING:
         for name, value in given.items():
             if value is not None:
@@ -139,4 +143,4 @@ def _summary(report: "ProposalReport", record: bool) -> str:
     if report.entry is None:
         return f"{text}; nothing is recorded: give --record" if not record else text
     text += f"; recorded as entry {report.entry}"
-    return text if report.related is None else f"{text}, relations computed anew as entry {report.related}"
+    return text if report.related is None else f"{text}, relations recomputed as entry {report.related}"

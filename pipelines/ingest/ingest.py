@@ -15,7 +15,7 @@ from archmodel.store.stones import store_survey
 from archmodel.tables.entities import Entity, kind_named
 from mechanics.dynamics.progress import Listener, Progress, silent
 from moma.errors import NoDatabaseError, SurveyError, UsageError
-from pipelines.ingest.kind_rules import KindRule, check_kinds, ruled
+from pipelines.ingest.kind_rules import KindRule, apply_rules, check_kinds
 from pipelines.ingest.reading_options import check_survey_file
 from pipelines.ingest.records import frame_record, stone_record
 from pipelines.ingest.rejects import check_targets, default_path, rejects_text
@@ -75,11 +75,11 @@ def ingest(
     rejects = None if isinstance(keep_going, bool) else Path(keep_going)
     if rejects is not None and len(surveys) > 1:
         raise UsageError(
-            f"one file of rejects for {len(surveys)} survey files", remedy="take in one file at a time"
+            f"one file of rejects for {len(surveys)} survey files", remedy="ingest one file at a time"
         )
     if rules and format != "solids":
-        remedy = "give it with --format solids; surveys say the kind of each stone"
-        raise UsageError(f"a rule for solids, and format {format}", where=rules[0].option, remedy=remedy)
+        remedy = "give it with --format solids; surveys give the kind of each stone"
+        raise UsageError(f"a rule for solids with format {format}", where=rules[0].option, remedy=remedy)
     _check_files(surveys)
     targets = [rejects or default_path(survey) for survey in surveys]
     if keep_going:
@@ -127,7 +127,7 @@ def _check_files(surveys: Sequence[Path]) -> None:
     for path in surveys:
         check_survey_file(path)
         if path.resolve() in seen:
-            raise UsageError("is named twice", where=str(path), remedy="name each survey file once")
+            raise UsageError("is given twice", where=str(path), remedy="name each survey file once")
         seen.add(path.resolve())
 
 
@@ -165,7 +165,7 @@ def _measure(
     tally = Tally(path, survey_stones(open_survey(path, format, options)))
     stage, head, kinds = f"fit {path.name}", tally.stream.head, set[str]()
     for one in tally.stream.stones:
-        made = one if isinstance(one, Reject) else _of_known_kind(ruled(one, rules), head.path, kinds)
+        made = one if isinstance(one, Reject) else _of_known_kind(apply_rules(one, rules), head.path, kinds)
         if not isinstance(made, Reject):
             tally.count(made)
             spool.append(stone_record(made))
@@ -176,7 +176,7 @@ def _measure(
             raise made.error
     if not tally.stones:
         first = f"; the first: {tally.refused[0].error}" if tally.refused else ""
-        what = f"none of its {len(tally.refused)} stones can be taken in{first}"
+        what = f"none of its {len(tally.refused)} stones can be ingested{first}"
         raise SurveyError(what, where=str(path), remedy="correct the file")
     return tally
 

@@ -18,7 +18,7 @@ from moma.errors import UsageError
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.solids import area_vector
 
-__all__ = ["RULE_ATTRIBUTES", "KindRule", "check_kinds", "kind_rules", "ruled"]
+__all__ = ["RULE_ATTRIBUTES", "KindRule", "apply_rules", "check_kinds", "kind_rules"]
 
 Value = float | str | None
 
@@ -105,7 +105,7 @@ def check_kinds(rules: Sequence[KindRule]) -> None:
             raise error.at(rule.option) from error
 
 
-def ruled(block: SurveyedBlock, rules: Sequence[KindRule]) -> SurveyedBlock:
+def apply_rules(block: SurveyedBlock, rules: Sequence[KindRule]) -> SurveyedBlock:
     """Give a stone its kind by the rules."""
     if not rules:
         return block

@@ -50,7 +50,7 @@ def check_targets(targets: Sequence[Path], surveys: Sequence[Path]) -> None:
             raise UsageError("is the survey file itself", where=str(target), remedy=remedy)
         if target in targets[:number]:
             what = f"would hold the rejects of {surveys[targets.index(target)]} and of {surveys[number]}"
-            raise UsageError(what, where=str(target), remedy="take in one file at a time")
+            raise UsageError(what, where=str(target), remedy="ingest one file at a time")
         _check_replaceable(target)
 
 
@@ -92,9 +92,9 @@ def _check_replaceable(path: Path) -> None:
     lines = path.read_bytes().splitlines(keepends=True)
     mark = next((line for line in lines[:2] if line.startswith(MARK)), None)
     if mark is None:
-        what = "is there already, and is not a file of rejects"
+        what = "exists and is not a file of rejects"
     elif mark.split()[-1].decode("ascii", "replace") != _digest([line for line in lines if line is not mark]):
-        what = "is there already, and was changed since it was written"
+        what = "exists and was changed since it was written"
     else:
         return
     raise UsageError(what, where=str(path), remedy="move it away, or name another file with --rejects")

@@ -58,12 +58,12 @@ def _extrude(
     entities = session.scalars(select(Entity).where(Entity.code.in_(codes)).order_by(Entity.id)).all()
     for entity in entities:
         if entity.measurement is None:
-            raise UsageError(f"{entity.code} was not measured", remedy="take in a survey of its face first")
+            raise UsageError(f"{entity.code} was not measured", remedy="ingest a survey of its face first")
     changed = [one for one in entities if (one.depth, one.depth_sigma) != (value, sigma)]
     for stone in load_stones(session, changed):
         if stone.provenance == "solid":
             what = f"the depth of {stone.code} is that of its solid, which was surveyed"
-            raise UsageError(what, remedy="take in a better solid")
+            raise UsageError(what, remedy="ingest a better solid")
         deeper = replace(stone, depth=value, depth_sigma=sigma, depth_source=evidence, depth_origin="stone")
         outcome += replace_measurement(session, entry, stone_record(surveyed_block(deeper)), stone.code)
     return outcome

@@ -54,5 +54,5 @@ def named_subjects(session: Session, file: RecordFile, table: Table) -> Subjects
     with file.at(*table.path):
         if not len(about):
             remedy = "give stones = […] or structures = […]"
-            raise UsageError(f"[[{table.name}]] is about nothing", remedy=remedy)
+            raise UsageError(f"[[{table.name}]] has no subject", remedy=remedy)
     return about

@@ -182,7 +182,7 @@ def _statement(work: _Work) -> Outcome:
 def _correction(work: _Work) -> Outcome:
     values = {**work["set"], **dict.fromkeys(work["unset"])}
     if not values:
-        raise UsageError("a correction of nothing", remedy='give set = { kind = "quoin" }, say')
+        raise UsageError("empty correction", remedy='give set = { kind = "quoin" }, for example')
     outcome = NOTHING
     for code in named_stones(work.session, work.file, work.table):
         with work.file.at(*work.table.path, "set"):
@@ -197,7 +197,7 @@ def _withdraw(work: _Work) -> Outcome:
     if what == "relation":
         of, to = (named_stones(work.session, work.file, work.table, key) for key in ("stones", "to"))
         if work["kind"] is None:
-            raise UsageError("the relation has no kind", remedy='give kind = "beside", say')
+            raise UsageError("the relation has no kind", remedy='give kind = "beside", for example')
         return withdraw_relations(
             work.session, work.entry, work["kind"], list(of.values()), list(to.values())
         )
@@ -228,7 +228,9 @@ def _withdraw_named(work: _Work, what: str) -> Outcome:
         return withdraw(work.session, work.entry, row)
     column = cls.name if cls in (Material, Phase) else cls.code
     if work.session.scalar(select(cls.id).where(column == name).limit(1)) is None:
-        raise UsageError(f"there never was a {cls.__name__.lower()} {name[:40]!r}", remedy="check its name")
+        raise UsageError(
+            f"there has never been a {cls.__name__.lower()} {name[:40]!r}", remedy="check its name"
+        )
     return Outcome(unchanged=1)
 
 

@@ -26,7 +26,7 @@ __all__ = ["write_report"]
 
 _OUTCOMES = {
     "equilibrium": "It stands: every stone came to rest, in balance.",
-    "moving": "It was still moving when the simulated time was over: neither at rest nor collapsed.",
+    "moving": "It was still moving at the end of the simulated time: neither at rest nor collapsed.",
     "collapsed": "It falls: at least one stone moved too far to come back, and was still moving.",
 }
 
@@ -34,42 +34,46 @@ _ERRORS = (
     (
         "natural_map",
         "Contact law",
-        "How far the contact forces are from satisfying friction and non-penetration: the residual η of the "
-        "natural map, without unit. Below the solver's tolerance the step is solved.",
+        "Distance of the contact forces from satisfying friction and non-penetration: the residual η of the "
+        "natural map, dimensionless. Below the solver's tolerance the step is solved.",
     ),
-    ("penetration", "Overlap", "Deepest overlap of two stones, over the size of the smallest one."),
-    ("balance", "Balance of each stone", "Force that nothing holds, over the stone's weight; worst stone."),
-    ("reaction", "Balance of the whole", "Supports' reaction minus weight, over the weight."),
-    ("energy", "Energy", "Energy that no term of the balance explains, over the run's reference energy."),
+    ("penetration", "Overlap", "Deepest overlap of two stones over the size of the smallest one."),
+    ("balance", "Balance of each stone", "Unbalanced force over the stone's weight; worst stone."),
+    ("reaction", "Balance of the whole", "Reaction of the supports minus weight, over the weight."),
+    (
+        "energy",
+        "Energy",
+        "Energy that no term of the balance explains, over the reference energy of the run.",
+    ),
     ("unconverged_steps", "Unsolved steps", "Steps that the solver left above its tolerance."),
     (
         "stress",
         "Stress",
-        "Relative error of the stress of all stones that deform, estimated from its jumps between finite elements.",
+        "Relative error of the stress of all deformable stones, estimated from its jumps between finite elements.",
     ),
 )
 
-_GREY = "Grey stones are fixed or rigid, or their stress was not asked for."
+_GREY = "Grey stones are fixed or rigid, or their stress was not requested."
 _CAPTIONS = {
     "von_mises.png": "Von Mises stress on the stones' surface, in MPa. The scale ends at the stress that 1 % "
     f"of the volume exceeds, rounded up. {_GREY}",
-    "displacement.png": "How far each point has moved since the start; stones are drawn where they are now, "
-    "not exaggerated. Fixed stones are grey.",
+    "displacement.png": "Displacement of each point since the start; stones are drawn at their final position, "
+    "without exaggeration. Fixed stones are grey.",
     "principal_tension.png": f"Largest principal stress, where it is tension. {_GREY}",
     "principal_compression.png": f"Smallest principal stress, where it is compression. {_GREY}",
     "utilisation.png": f"Stress over strength, the larger of tension and compression: at 1 a stone fails. {_GREY}",
     "error.png": "Estimated error of the stress of each stone (Zienkiewicz and Zhu): where it is large, the mesh is "
     f"too coarse for its stress. {_GREY}",
-    "pressure.png": "Mean pressure of each joint that is pressed; the stones are drawn as glass.",
-    "resultants.png": "The resultant of each joint, drawn through the point where it meets the joint, as long as it is "
-    "large. Blue: within the kern, so that a linear pressure presses everywhere. Red: outside, so that part of the "
-    "joint bears nothing.",
+    "pressure.png": "Mean pressure of each compressed joint; the stones are transparent.",
+    "resultants.png": "The resultant of each joint, drawn through the point where it meets the joint, its length in "
+    "proportion. Blue: within the kern, so that a linear pressure acts everywhere. Red: outside, so that part of the "
+    "joint is unloaded.",
 }
 
 
 _KERN = (
-    "The resultant of a joint lies within its kern, up to 1 here, if a linear pressure under it presses the whole "
-    "joint; beyond, part of the joint bears nothing. Where it reaches the edge, at 1 in the next column, a hinge forms."
+    "The resultant of a joint lies within its kern, up to 1 here, if a linear pressure compresses the whole "
+    "joint; beyond, part of the joint is unloaded. Where it reaches the edge, at 1 in the next column, a hinge forms."
 )
 _STRESS_ERROR = (
     "Estimated from the jumps of the stress between finite elements; a finer mesh makes it smaller."

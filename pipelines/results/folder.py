@@ -35,7 +35,7 @@ def check_replaceable(folder: Path, index: str = _INDEX) -> None:
     foreign = sorted({entry.name for entry in folder.iterdir()} - _own_files(folder, index))
     if foreign:
         shown = ", ".join(foreign[:3]) + (", …" if len(foreign) > 3 else "")
-        raise UsageError(f"holds what no run of MOMA wrote ({shown})", where=place, remedy=remedy)
+        raise UsageError(f"holds files that no run of MOMA wrote ({shown})", where=place, remedy=remedy)
 
 
 @contextmanager

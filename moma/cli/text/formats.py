@@ -1,4 +1,4 @@
-"""Rows and entities as text: tables for people, CSV and JSON for programs."""
+"""Formats of rows and entities: tables for people, CSV and JSON for programs."""
 
 import csv
 import io
@@ -24,7 +24,7 @@ USUAL_COLUMNS = (
     "von_mises_max",
     "displacement_max",
 )
-"""What a table shows besides what is asked for; CSV and JSON give every attribute."""
+"""Columns of a table beside requested ones; CSV and JSON have every attribute."""
 
 _UNITS = {
     "length": "m",
@@ -52,13 +52,13 @@ _PLACES = frozenset({"x", "y", "z", "centroid", "offset"})
 def shown_columns(
     names: Iterable[str], rows: Sequence[Mapping[str, object]], asked: Iterable[str] = ()
 ) -> list[str]:
-    """Columns of a table: of the usual ones those in which any row has a value, and those that are asked for."""
+    """Choose the columns of a table: those in which any row has a value, and those in `asked`."""
     wanted = {"code", *asked}
     return [name for name in names if name in wanted or any(row[name] is not None for row in rows)]
 
 
 def as_table(columns: Mapping[str, str | None], rows: Sequence[Mapping[str, object]]) -> str:
-    """Aligned text; `columns` gives the unit of each column, None or "-" for none."""
+    """Format rows as an aligned table; `columns` gives the unit of each column, None or "-" for none."""
     heads = [name if unit in (None, "-") else f"{name} [{unit}]" for name, unit in columns.items()]
     cells = [[_cell(row[name], name) for name in columns] for row in rows]
     numeric = [
@@ -79,7 +79,7 @@ def as_table(columns: Mapping[str, str | None], rows: Sequence[Mapping[str, obje
 
 
 def as_csv(columns: Iterable[str], rows: Iterable[Mapping[str, object]]) -> str:
-    """CSV with a header line; nothing where a value is not known."""
+    """Format rows as CSV with a header line; unknown values are empty."""
     out = io.StringIO()
     writer = csv.DictWriter(out, list(columns), lineterminator="\n")
     writer.writeheader()
@@ -88,18 +88,18 @@ def as_csv(columns: Iterable[str], rows: Iterable[Mapping[str, object]]) -> str:
 
 
 def as_json(value: object) -> str:
-    """JSON, indented."""
+    """Format a value as indented JSON."""
     return json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False)
 
 
 def as_geojson(collection: Mapping[str, Any]) -> str:
-    """A FeatureCollection with one feature on each line."""
+    """Format a FeatureCollection with one feature on each line."""
     features = (json.dumps(one, ensure_ascii=False, allow_nan=False) for one in collection["features"])
     return '{"type": "FeatureCollection", "features": [\n' + ",\n".join(features) + "\n]}"
 
 
 def as_lines(value: Mapping[str, Any], indent: int = 0) -> str:
-    """A nested mapping as indented lines; what is empty or not known is left out."""
+    """Format a nested mapping as indented lines, without empty or unknown values."""
     lines = []
     margin = "  " * indent
     for name, content in value.items():

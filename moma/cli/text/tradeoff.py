@@ -1,4 +1,4 @@
-"""What a study of speed against accuracy has found, in a table and a few lines for a person."""
+"""Findings of `moma trade` as text."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -21,7 +21,7 @@ _COLUMNS = (
 
 
 def trade_lines(report: "TradeReport", verbose: bool) -> list[str]:
-    """The table, what the reference is, what is recommended, and where the files lie."""
+    """Describe a study: table, reference, recommendation and files."""
     record = report.record
     rows = record["rows"]
     done = [row for row in rows if row["status"] == "done"]
@@ -42,7 +42,7 @@ def trade_lines(report: "TradeReport", verbose: bool) -> list[str]:
 
 
 def _table(record: Mapping[str, Any], done: Sequence[Mapping[str, Any]]) -> str:
-    """Costs and errors of the runs that are done; those on the front are marked, the reference's are estimates."""
+    """Tabulate costs and errors of the completed runs; mark the Pareto front; estimate the reference's errors."""
     asked = dict.fromkeys([record["quantity"], *_COLUMNS])
     shown = [name for name in asked if any(row["errors"][name] is not None for row in done)]
     columns = {"": None, "setting": None, "CPU": "s", "wall": "s", "memory": "MiB", "nodes": None}
@@ -107,10 +107,10 @@ def _advice_lines(record: Mapping[str, Any]) -> list[str]:
 
 
 def _other_lines(rows: Sequence[Mapping[str, Any]], verbose: bool) -> list[str]:
-    """Settings without a result, each with its reason; without -v only those that were begun."""
-    told = [row for row in rows if verbose or row["status"] != "not begun"]
-    lines = [f"{row['status']}: {row['setting']}: {row['reason']}" for row in told]
-    if rest := len(rows) - len(told):
+    """List the settings without a result, with reasons; without -v only those that were begun."""
+    shown = [row for row in rows if verbose or row["status"] != "not begun"]
+    lines = [f"{row['status']}: {row['setting']}: {row['reason']}" for row in shown]
+    if rest := len(rows) - len(shown):
         lines.append(f"{rest} more settings were not begun; -v says why")
     return lines
 

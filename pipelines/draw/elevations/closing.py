@@ -13,11 +13,11 @@ from pipelines.draw.elevations.sheet import (
     CODES,
     INK,
     PALE,
-    elevated,
     extent,
     frame_elevation,
     new_sheet,
     palette,
+    project,
     save_sheet,
     sheet_size,
     write_codes,
@@ -31,9 +31,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["SeenFace", "back_to_front", "draw_moved", "guess_key", "hatch", "name_stones", "seen"]
+__all__ = ["VisibleFace", "back_to_front", "draw_moved", "guess_key", "hatch", "name_stones", "visible_faces"]
 
-SeenFace = tuple[Array, tuple[int, ...]]
+VisibleFace = tuple[Array, tuple[int, ...]]
 
 _UNKNOWN = "#dcd9d4"
 _SEEN = np.cos(np.radians(60.0))  # faces turned farther away are not drawn
@@ -60,7 +60,7 @@ def draw_moved(path: Path, shapes: ClosingShapes, facade: Facade, step: str) -> 
     own = back_to_front(shapes.stones, facade)
     simplified = step == "simplified"
     values = [1e3 * (stone.simplified if simplified else stone.moved) for stone in own]
-    faces = [seen(stone.surveyed if simplified else stone.simple, facade) for stone in own]
+    faces = [visible_faces(stone.surveyed if simplified else stone.simple, facade) for stone in own]
     known = np.concatenate(values)
     known = known[np.isfinite(known)]
     end, _ = nice_ceiling(max(float(np.percentile(known, _ROBUST)) if len(known) else 0.0, _FINEST))
@@ -73,7 +73,7 @@ def draw_moved(path: Path, shapes: ClosingShapes, facade: Facade, step: str) -> 
         (one.simple if simplified else one.closed, one.simplified if simplified else one.moved) for one in own
     ]
     changed = [solid for solid, moved in after if np.nanmax(moved, initial=0.0) > 1e-3 * _FINEST]
-    _outline(axes, [corners for solid in changed for corners, _ in seen(solid, facade)])
+    _outline(axes, [corners for solid in changed for corners, _ in visible_faces(solid, facade)])
     shade = [float(np.nanmean(moved)) / end if np.isfinite(moved).any() else np.nan for moved in values]
     name_stones(axes, own, faces, shade)
     frame_elevation(axes, facade, low, high, _title(shapes.scene, facade, step, own, values))
@@ -90,17 +90,17 @@ def back_to_front(stones: Sequence[DrawnStone], facade: Facade) -> list[DrawnSto
     return sorted((stones[i] for i in facade.members.tolist()), key=lambda one: float(one.centroid @ out))
 
 
-def seen(solid: Solid, facade: Facade) -> list[SeenFace]:
+def visible_faces(solid: Solid, facade: Facade) -> list[VisibleFace]:
     """List the faces of a solid that look to the viewer: corners (k, 2) in the elevation, and their indices."""
     found = []
     for face in solid.faces:
         area = area_vector(solid.vertices[list(face)])
         if area @ facade.frame.axes[2] > _SEEN * float(np.linalg.norm(area)):
-            found.append((elevated(solid.vertices[list(face)], facade), face))
+            found.append((project(solid.vertices[list(face)], facade), face))
     return found
 
 
-def hatch(axes: "Axes", stones: Sequence[DrawnStone], faces: Sequence[Sequence[SeenFace]]) -> None:
+def hatch(axes: "Axes", stones: Sequence[DrawnStone], faces: Sequence[Sequence[VisibleFace]]) -> None:
     """Hatch hypothetical stones."""
     from matplotlib.collections import PolyCollection
 
@@ -114,7 +114,7 @@ def hatch(axes: "Axes", stones: Sequence[DrawnStone], faces: Sequence[Sequence[S
 
 
 def name_stones(
-    axes: "Axes", stones: Sequence[DrawnStone], faces: Sequence[Sequence[SeenFace]], shade: Sequence[float]
+    axes: "Axes", stones: Sequence[DrawnStone], faces: Sequence[Sequence[VisibleFace]], shade: Sequence[float]
 ) -> None:
     """Write the code of each stone on its largest face, unless there are too many stones.
 
@@ -141,7 +141,9 @@ def guess_key() -> Any:
     )
 
 
-def _shade_all(axes: "Axes", faces: Sequence[Sequence[SeenFace]], values: Sequence[Array], end: float) -> Any:
+def _shade_all(
+    axes: "Axes", faces: Sequence[Sequence[VisibleFace]], values: Sequence[Array], end: float
+) -> Any:
     """Colour all faces by the values at their corners; return the mappable of the scale, None without any value."""
     from matplotlib.collections import PolyCollection
 

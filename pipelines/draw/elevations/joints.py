@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pipelines.arrays import Array
-from pipelines.draw.elevations.closing import back_to_front, guess_key, hatch, name_stones, seen
+from pipelines.draw.elevations.closing import back_to_front, guess_key, hatch, name_stones, visible_faces
 from pipelines.draw.elevations.closing_shapes import ClosingShapes, DrawnJoint, Place
 from pipelines.draw.elevations.sheet import (
     FLAG,
     PALE,
-    elevated,
     extent,
     frame_elevation,
     new_sheet,
+    project,
     save_sheet,
     sheet_size,
 )
@@ -52,7 +52,7 @@ def draw_joints(path: Path, shapes: ClosingShapes, facade: Facade) -> None:
 
     own = back_to_front(shapes.stones, facade)
     codes = {stone.code for stone in own}
-    faces = [seen(stone.closed, facade) for stone in own]
+    faces = [visible_faces(stone.closed, facade) for stone in own]
     flat = [corners for one in faces for corners, _ in one]
     low, high = extent(flat)
     shown = [one for one in shapes.joints if _is_seen(one, facade, codes)]
@@ -122,12 +122,12 @@ def _trace(one: DrawnJoint, facade: Facade) -> Array:
     if one.polygon is None:
         along = np.cross(one.joint.normal, facade.frame.axes[2])
         reach = 0.5 * np.sqrt(max(one.joint.area, 0.0)) * along / max(float(np.linalg.norm(along)), 1e-9)
-        return elevated(np.array([one.joint.centroid - reach, one.joint.centroid + reach]), facade)
+        return project(np.array([one.joint.centroid - reach, one.joint.centroid + reach]), facade)
     out = one.polygon @ facade.frame.axes[2]
     front = one.polygon[out >= 0.5 * (out.min() + out.max())]
     along = np.cross(one.joint.normal, facade.frame.axes[2])
     place = front @ along
-    return elevated(front[[int(place.argmin()), int(place.argmax())]], facade)
+    return project(front[[int(place.argmin()), int(place.argmax())]], facade)
 
 
 def _width_colours() -> Any:
@@ -141,7 +141,7 @@ def _width_colours() -> Any:
 def _mark(axes: "Axes", marked: Sequence[Place], facade: Facade) -> None:
     """Mark each gap and overlap, and number the first of them."""
     for number, place in enumerate(marked, start=1):
-        x, y = elevated(place.centroid, facade)
+        x, y = project(place.centroid, facade)
         marker, colour = ("D", _OVERLAP) if place.kind == "overlap" else ("o", FLAG)
         size = 12.0 if number <= _NUMBERED else 5.0
         axes.plot([x], [y], marker, color=colour, markersize=size, markeredgecolor="white", zorder=5)

@@ -18,11 +18,11 @@ __all__ = [
     "INK",
     "PALE",
     "PLAIN",
-    "elevated",
     "extent",
     "frame_elevation",
     "new_sheet",
     "palette",
+    "project",
     "save_sheet",
     "sheet_size",
     "write_codes",
@@ -45,7 +45,7 @@ _LIGHTER = 0.8  # part of it that is used [-]: codes and outlines cannot be read
 _DARK = 0.7  # part of the scale beyond which codes are written in white [-]
 
 
-def elevated(points: Array, facade: Facade) -> Array:
+def project(points: Array, facade: Facade) -> Array:
     """Project points (…, 3) onto the elevation, (…, 2): along the facade, and up (z, if the facade stands) [m]."""
     flat = facade.frame.flatten(points)
     if facade.azimuth is not None:

@@ -12,11 +12,11 @@ from pipelines.draw.elevations.sheet import (
     FLAG,
     INK,
     PALE,
-    elevated,
     extent,
     frame_elevation,
     new_sheet,
     palette,
+    project,
     save_sheet,
     sheet_size,
     write_codes,
@@ -49,7 +49,7 @@ def draw_elevation(path: Path, facade: Facade, stones: Sequence[StoneQuality], f
     from matplotlib.collections import PolyCollection
 
     own = [stones[i] for i in facade.members.tolist()]
-    polygons = [elevated(one.outline, facade) for one in own]
+    polygons = [project(one.outline, facade) for one in own]
     low, high = extent(polygons)
     figure = new_sheet(sheet_size(high - low))
     axes = figure.subplots()

@@ -93,8 +93,8 @@ def _draw(study: SurveyStudy, folder: Path) -> dict[str, str]:
         name = f"elevation{ending}"
         draw_elevation(folder / name, facade, study.stones, flagged)
         captions[name] = (
-            f"{facade.name[:1].upper()}{facade.name[1:]}, seen from outside, coloured by how far the points of each "
-            "stone lie from its plane. Stones with an orange outline are to be measured again."
+            f"{facade.name[:1].upper()}{facade.name[1:]}, seen from outside, coloured by the distance of the points of "
+            "each stone from its plane. Stones with an orange outline are to be measured again."
         )
         lines = [line for line in study.courses if line.facade == facade.name]
         if lines:
@@ -106,7 +106,7 @@ def _draw(study: SurveyStudy, folder: Path) -> dict[str, str]:
     if study.quality.residuals.counts.any():
         draw_residuals(folder / "residuals.png", study.quality.residuals, study.quality.verdict)
         captions["residuals.png"] = (
-            "Residuals of the accepted points and corners, each over its own standard deviation. A wider heap than "
-            "the curve: the points are less precise than stated. Long tails: blunders that were not found."
+            "Residuals of the accepted points and corners, each over its own standard deviation. A histogram wider "
+            "than the curve: the points are less precise than stated. Long tails: blunders that were not detected."
         )
     return captions

@@ -101,7 +101,7 @@ def test_show_tells_what_is_known_and_of_what_it_is_said() -> None:
         "  1                  wall WALL",
         "    density            1900 ± 50 kg/m³ (cores)",
         "    poisson            0.2 (by eye)",
-        "    evidence           said of WALL",
+        "    evidence           inherited from WALL",
         "    years              1240–?",
         "    1                  type crack, severity 3, place left, at (1, 2, 3.5), seen 2024-05-14 "
         "[entry 2, B, by eye]",
@@ -130,7 +130,7 @@ def test_show_goes_back_in_time() -> None:
     [
         (("show", "WALLL"), "there is no stone 'WALLL' in the database; did you mean WALL?"),
         (("show", "V1", "--at", "99"), "there is no entry 99"),
-        (("show", "V1", "--at", "1", "--history"), "--history and --at ask for two things"),
+        (("show", "V1", "--at", "1", "--history"), "--history and --at exclude each other"),
         (("record", "none.toml"), "none.toml: no such file"),
     ],
 )

@@ -240,7 +240,7 @@ def test_whatever_ends_the_study_ends_its_runs(place, tmp_path, ending):
     process.send_signal(ending)
     _, complaint = process.communicate(timeout=PATIENCE)
     assert process.returncode == (1 if ending is signal.SIGINT else -ending)
-    assert (b"the same command goes on from there" in complaint) == (ending is signal.SIGINT)
+    assert (b"the same command resumes from there" in complaint) == (ending is signal.SIGINT)
     awaited(lambda: not Path(f"/proc/{child}").exists() or "Z" in state_of(child))
     for file in (tmp_path / "study").rglob("*"):
         assert file.is_dir() or file.suffix == ".json"

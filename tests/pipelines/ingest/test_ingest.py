@@ -281,7 +281,7 @@ def test_a_face_that_cannot_be_is_a_reject_with_its_place(desk):
 
 def test_a_survey_of_nothing_but_wrong_stones_is_a_failure(desk):
     path = desk.write(HEAD + moma(0, "heder") + moma(1, "heder"), "wall.moma")
-    with pytest.raises(SurveyError, match=r"none of its 2 stones can be taken in; the first: .*heder"):
+    with pytest.raises(SurveyError, match=r"none of its 2 stones can be ingested; the first: .*heder"):
         desk.ingest(path, "moma", keep_going=True)
     assert desk.left() == set()
 
@@ -345,7 +345,7 @@ def test_nothing_is_left_behind_where_the_database_refuses(desk):
     twin = desk.write(HEAD.replace("bay 3", "bay 4") + moma(0), "twin.moma")
     words = r"twin\.moma:8: the code W0 is taken by the stone at .*first\.moma:8"
     for pair, error, said in (
-        ([first, first], UsageError, "named twice"),
+        ([first, first], UsageError, "given twice"),
         ([first, twin], SurveyError, words),
     ):
         with pytest.raises(error, match=said):
@@ -397,7 +397,7 @@ def test_the_command_says_what_became_of_the_stones(desk, format):
     assert done.exit_code == 0, done.output
     said = done.stdout
     assert "4 stones of survey" in said
-    assert "1 stones not taken in, to be corrected in" in said
+    assert "1 stones rejected, to be corrected in" in said
     assert "unknown kind 'heder'" in said
     assert "nan" not in said.split()
     assert ("worst plane: W" in said) == (format != "solids")

@@ -378,7 +378,7 @@ def test_the_command_prints_json_for_programs_and_takes_the_options_of_readers(p
         (("none.moma",), "no such file"),
         ((SAMPLE, "--sigma", "0"), "--sigma"),
         ((SAMPLE, "--header", "none"), "--header"),
-        ((SAMPLE, "--out", ROOT), "holds what no run of MOMA wrote"),
+        ((SAMPLE, "--out", ROOT), "holds files that no run of MOMA wrote"),
     ],
 )
 def test_wrong_use_is_told_in_one_line(place, arguments, words):
