@@ -65,8 +65,7 @@ def propose(
         str | None, typer.Option("--author", metavar="NAME", help="Author of the record.")
     ] = None,
     source: Annotated[
-        str | None,
-        typer.Option("--source", metavar="TEXT", help="Grounds; default: those of each proposal."),
+        str | None, typer.Option("--source", metavar="TEXT", help="Grounds; default: those of each proposal.")
     ] = None,
     db: Db = DEFAULT_DB,
     json: Json = False,

@@ -47,8 +47,7 @@ _TABLES = {
 @reporting
 def runs(
     number: Annotated[
-        int | None,
-        typer.Argument(metavar="[N]", help="Number of a run to show in full; default: list all."),
+        int | None, typer.Argument(metavar="[N]", help="Number of a run to show in full; default: list all.")
     ] = None,
     against: Annotated[int | None, typer.Option("--against", metavar="M", help="Compare with run M.")] = None,
     db: Db = DEFAULT_DB,

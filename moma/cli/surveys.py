@@ -56,8 +56,7 @@ def ingest(
     again: Annotated[
         bool,
         typer.Option(
-            "--again",
-            help="Accept new measurements of stones in the database; earlier ones are kept.",
+            "--again", help="Accept new measurements of stones in the database; earlier ones are kept."
         ),
     ] = False,
     db: Db = DEFAULT_DB,

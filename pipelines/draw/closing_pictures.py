@@ -1,6 +1,5 @@
 """Pictures of how surveyed stones became touching solids: elevations of flat facades, and all stones in space."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,10 +9,10 @@ import numpy as np
 from moma.errors import MissingLibraryError
 from pipelines.arrays import Array, Ints
 from pipelines.draw.elevations.closing import draw_moved
-from pipelines.draw.elevations.closing_shapes import ClosingShapes, DrawnJoint
+from pipelines.draw.elevations.closing_shapes import ClosingShapes
 from pipelines.draw.elevations.joints import draw_joints
 from pipelines.draw.offscreen.closing import ClosingSurface
-from pipelines.draw.offscreen.parts import OBLIQUELY
+from pipelines.draw.offscreen.parts import OBLIQUELY, fan_polygons
 from pipelines.draw.pictures import draw_apart
 from survey.geometry.solids import Solid
 from survey.geometry.watertight import triangulate
@@ -133,8 +132,10 @@ def closing_surface(shapes: ClosingShapes, step: str = "moved") -> ClosingSurfac
     starts = np.cumsum([0, *(len(one.vertices) for one in solids)])
     shut = [one for one in shapes.joints if not one.joint.left_open and one.polygon is not None]
     left = [one for one in shapes.joints if one.joint.left_open and one.polygon is not None]
-    joint_points, joint_triangles, of_joint = _fans(shut)
-    gap_points, gap_triangles, _ = _fans(left)
+    joint_points, joint_triangles, of_joint = fan_polygons(
+        [one.polygon for one in shut if one.polygon is not None]
+    )
+    gap_points, gap_triangles, _ = fan_polygons([one.polygon for one in left if one.polygon is not None])
     return ClosingSurface(
         points=np.concatenate([one.vertices for one in solids]),
         triangles=np.concatenate(
@@ -152,10 +153,7 @@ def closing_surface(shapes: ClosingShapes, step: str = "moved") -> ClosingSurfac
     )
 
 
-_LABELS = {
-    "simplified": "Moved by simplifying the stones [mm]",
-    "moved": "Moved by closing the joints [mm]",
-}
+_LABELS = {"simplified": "Moved by simplifying the stones [mm]", "moved": "Moved by closing the joints [mm]"}
 _TITLES = {"simplified": "what simplifying moved", "moved": "what closing the joints moved"}
 
 
@@ -171,29 +169,9 @@ def _steps(shapes: ClosingShapes) -> list[str]:
 def _note(shapes: ClosingShapes) -> str:
     gaps = sum(one.kind == "gap" for one in shapes.places)
     overlaps = len(shapes.places) - gaps
-    said = [f"orange: {gaps} gap{'s' * (gaps > 1)}"] if gaps else []
-    said += [f"black: {overlaps} overlap{'s' * (overlaps > 1)}"] if overlaps else []
-    return "; ".join(said) or "no gaps, no overlaps"
-
-
-def _fans(joints: Sequence[DrawnJoint]) -> tuple[Array, Ints, Ints]:
-    """Fan the polygons of joints into triangles; return corners, triangles and the joint of each triangle."""
-    points: list[Array] = [np.zeros((0, 3))]
-    triangles: list[tuple[int, int, int]] = []
-    owners: list[int] = []
-    start = 0
-    for number, one in enumerate(joints):
-        assert one.polygon is not None
-        count = len(one.polygon)
-        points.append(one.polygon)
-        triangles += [(start, start + k, start + k + 1) for k in range(1, count - 1)]
-        owners += [number] * (count - 2)
-        start += count
-    return (
-        np.concatenate(points),
-        np.array(triangles, dtype=np.int64).reshape(-1, 3),
-        np.array(owners, dtype=np.int64),
-    )
+    parts = [f"orange: {gaps} gap{'s' * (gaps > 1)}"] if gaps else []
+    parts += [f"black: {overlaps} overlap{'s' * (overlaps > 1)}"] if overlaps else []
+    return "; ".join(parts) or "no gaps, no overlaps"
 
 
 def _edges(solid: Solid) -> Ints:

@@ -47,9 +47,7 @@ _TITLES = {
     "pressure": "pressure in the joints",
     "resultants": "resultants of the joints",
 }
-_NOTES = {
-    "resultants": "strokes: as long as the force is large; blue: within the kern, red: outside",
-}
+_NOTES = {"resultants": "strokes: as long as the force is large; blue: within the kern, red: outside"}
 _ENDINGS = {
     Outcome.EQUILIBRIUM: "at equilibrium",
     Outcome.MOVING: "still moving",

@@ -24,6 +24,7 @@ from survey.unseen.missing.settings import MissingSettings
 
 __all__ = ["Facings", "Proposal", "ProposalReport", "Recording", "propose_core", "propose_stones"]
 
+_SIZE = ("code", "kind", "course", "zone", "length", "height", "depth")
 _NO_STONES = frozenset({"infill", "joint", "support"})
 
 Facings = tuple[str, str]
@@ -156,8 +157,8 @@ def propose_core(
         known = _measured(session, find(session, "infill"))
         new = [one for one in found if not is_known(one, known)]
         pairs: list[tuple[StoneRecord, tuple[str, ...]]] = [(core_record(one), ()) for one in new]
-        said = {**asdict(settings), "facings": None if facings is None else list(facings)}
-        return _report("infill", session, len(records), pairs, said, recording)
+        given = {**asdict(settings), "facings": None if facings is None else list(facings)}
+        return _report("infill", session, len(records), pairs, given, recording)
 
 
 def _stones(session: Session, where: Sequence[str]) -> list[StoneRecord]:
@@ -222,13 +223,7 @@ def _report(
 
 def _proposal(record: StoneRecord, notes: tuple[str, ...]) -> Proposal:
     return Proposal(
-        code=record.code,
-        kind=record.kind,
-        course=record.course,
-        zone=record.zone,
-        length=record.length,
-        height=record.height,
-        depth=record.depth,
+        **{name: getattr(record, name) for name in _SIZE},
         volume=record_volume(record),
         outline=tuple((x, y, z) for x, y, z in record.outline.tolist()),
         evidence=record.provenance_text,

@@ -166,13 +166,7 @@ def contact_grid(contacts: ContactResult) -> Grid:
         points=contacts.point,
         cells=cells_of(VERTEX, [[index] for index in range(count)]),
         point_data={
-            "force": contacts.force,
-            "pressure": contacts.pressure,
-            "normal": contacts.normal,
-            "gap": contacts.gap,
-            "opening": contacts.opening,
-            "slide": contacts.slide,
-            "area": contacts.area,
+            **{name: getattr(contacts, name) for name in _CONTACT_ARRAYS},
             "status": status,
             "bodies": contacts.bodies.astype(np.int64),
             "joint": contacts.joint.astype(np.int64),
@@ -206,20 +200,8 @@ def joint_grid(joints: JointResult) -> Grid:
     )
 
 
+_CONTACT_ARRAYS = ("force", "pressure", "normal", "gap", "opening", "slide", "area")
 _JOINT_ARRAYS = (
-    "area",
-    "force",
-    "moment",
-    "centre_of_pressure",
-    "eccentricity",
-    "kern",
-    "edge",
-    "pressure_mean",
-    "pressure_max",
-    "gap",
-    "opening",
-    "sliding",
-    "slipping",
-    "open",
-    "friction_use",
-)
+    "area", "force", "moment", "centre_of_pressure", "eccentricity", "kern", "edge", "pressure_mean", "pressure_max",
+    "gap", "opening", "sliding", "slipping", "open", "friction_use",
+)  # fmt: skip

@@ -22,7 +22,7 @@ from pipelines.draw.elevations.sheet import (
     sheet_size,
     write_codes,
 )
-from pipelines.draw.offscreen.parts import nice_ceiling
+from pipelines.draw.offscreen.parts import robust_ceiling
 from survey.geometry.solids import Solid, area_vector
 from survey.geometry.watertight import triangulate
 from survey.quality.facades import Facade
@@ -37,13 +37,9 @@ VisibleFace = tuple[Array, tuple[int, ...]]
 
 _UNKNOWN = "#dcd9d4"
 _SEEN = np.cos(np.radians(60.0))  # faces turned farther away are not drawn
-_ROBUST = 98.0  # percentile of the corners at which the colour scale ends
 _FINEST = 0.1  # shortest colour scale: smaller movements are not worth a colour [mm]
 _DASHES = (0.0, (4.0, 2.0))
-_LABELS = {
-    "simplified": "moved by simplifying the stone [mm]",
-    "moved": "moved by closing the joints [mm]",
-}
+_LABELS = {"simplified": "moved by simplifying the stone [mm]", "moved": "moved by closing the joints [mm]"}
 
 
 def draw_moved(path: Path, shapes: ClosingShapes, facade: Facade, step: str) -> None:
@@ -63,7 +59,7 @@ def draw_moved(path: Path, shapes: ClosingShapes, facade: Facade, step: str) -> 
     faces = [visible_faces(stone.surveyed if simplified else stone.simple, facade) for stone in own]
     known = np.concatenate(values)
     known = known[np.isfinite(known)]
-    end, _ = nice_ceiling(max(float(np.percentile(known, _ROBUST)) if len(known) else 0.0, _FINEST))
+    end, _ = robust_ceiling(known, _FINEST)
     low, high = extent([corners for one in faces for corners, _ in one])
     figure = new_sheet(sheet_size(high - low))
     axes = figure.subplots()

@@ -20,7 +20,7 @@ from pipelines.draw.elevations.sheet import (
     save_sheet,
     sheet_size,
 )
-from pipelines.draw.offscreen.parts import nice_ceiling
+from pipelines.draw.offscreen.parts import robust_ceiling
 from survey.quality.facades import Facade
 
 if TYPE_CHECKING:
@@ -32,7 +32,6 @@ __all__ = ["draw_joints"]
 
 _STONE, _OVERLAP, _NEGATIVE = "#efede9", "#000000", "#cc79a7"
 _EDGE_ON = np.sin(np.radians(50.0))  # joints turned farther to the viewer lie behind the faces
-_ROBUST = 98.0  # percentile of the joints at which the colour scale ends
 _FINEST = 0.1  # shortest colour scale [mm]
 _NUMBERED = 12  # gaps and overlaps
 _WIDE = 125  # characters of a line below the picture
@@ -85,7 +84,7 @@ def _add_closed(
     if not joints:
         return
     width = np.array([1e3 * one.joint.width for one in joints])
-    end, _ = nice_ceiling(max(float(np.percentile(width, _ROBUST)), _FINEST))
+    end, _ = robust_ceiling(width, _FINEST)
     lines = LineCollection(
         [_trace(one, facade) for one in joints],
         array=width,

@@ -21,7 +21,7 @@ from pipelines.draw.elevations.sheet import (
     sheet_size,
     write_codes,
 )
-from pipelines.draw.offscreen.parts import nice_ceiling
+from pipelines.draw.offscreen.parts import robust_ceiling
 from survey.quality.facades import Facade
 from survey.quality.precision import Histogram, StoneQuality
 
@@ -32,7 +32,6 @@ __all__ = ["draw_elevation", "draw_residuals"]
 
 
 _UNKNOWN = "#dcd9d4"
-_ROBUST = 98.0  # percentile of the stones at which the colour scale ends
 _FINEST = 0.01  # shortest colour scale: smaller residuals are not worth a colour [mm]
 
 
@@ -54,9 +53,7 @@ def draw_elevation(path: Path, facade: Facade, stones: Sequence[StoneQuality], f
     figure = new_sheet(sheet_size(high - low))
     axes = figure.subplots()
     rms = np.array([one.rms * 1e3 if one.measured and one.redundancy else np.nan for one in own])
-    end, _ = nice_ceiling(
-        max(float(np.nanpercentile(rms, _ROBUST)), _FINEST) if np.isfinite(rms).any() else 1.0
-    )
+    end, _ = robust_ceiling(rms, _FINEST if np.isfinite(rms).any() else 1.0)
     fine = 0.9 if len(own) <= 2000 else 0.15
     faces = PolyCollection(
         polygons, array=rms, cmap=palette(_UNKNOWN), clim=(0.0, end), edgecolors=PALE, linewidths=fine

@@ -17,8 +17,8 @@ from pipelines.draw.offscreen.parts import (
     add_edges,
     mesh_of,
     new_plotter,
-    nice_ceiling,
     place_camera,
+    robust_ceiling,
     save_picture,
 )
 
@@ -27,7 +27,6 @@ __all__ = ["ClosingSurface", "draw"]
 
 _GAP, _OVERLAP, _BALL = "#d55e00", "#000000", 26.0  # colours, and the size of a sign [px]
 _MOVED, _WIDTH = ("YlGnBu", 0.9), ("viridis_r", 1.0)
-_ROBUST = 98.0  # percentile of the values at which a colour scale ends
 _FINEST = 0.1  # shortest colour scale [mm]
 
 
@@ -116,7 +115,7 @@ def _add_places(pyvista: Any, plotter: Any, surface: ClosingSurface) -> None:
 
 def _colouring(values: Array, label: str, palette: tuple[str, float]) -> Colouring:
     known = values[np.isfinite(values)]
-    end, intervals = nice_ceiling(max(float(np.percentile(known, _ROBUST)), _FINEST))
+    end, intervals = robust_ceiling(values, _FINEST)
     saturated = bool(known.max() > end)
     return Colouring(values, label, end, intervals, saturated, palette)
 

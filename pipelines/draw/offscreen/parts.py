@@ -1,5 +1,6 @@
 """Common parts of the pictures drawn by PyVista: jobs, sheet, camera, edges, colours and their scale."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, floor, log10
 from pathlib import Path
@@ -18,10 +19,12 @@ __all__ = [
     "add_coloured",
     "add_edges",
     "add_glass",
+    "fan_polygons",
     "mesh_of",
     "new_plotter",
     "nice_ceiling",
     "place_camera",
+    "robust_ceiling",
     "save_picture",
 ]
 
@@ -31,6 +34,7 @@ _EDGE = "#3a3733"
 PLAIN, INK = "#c9c6c0", "#222222"
 LIGHT: dict[str, Any] = {"ambient": 0.55, "diffuse": 0.5, "specular": 0.0}
 _ROUND = {1.0: 5, 1.2: 6, 1.5: 5, 2.0: 4, 2.5: 5, 3.0: 6, 4.0: 4, 5.0: 5, 6.0: 6, 8.0: 4}  # end: intervals
+_ROBUST = 98.0  # percentile of the values at which a colour scale ends
 _AZIMUTH = np.deg2rad(-24.0)
 OBLIQUELY = np.deg2rad(14.0)
 """Elevation of the viewer above a wall, so that its depth can be seen [rad]."""
@@ -65,6 +69,12 @@ def nice_ceiling(value: float) -> tuple[float, int]:
         if value <= step * decade * (1.0 + 1e-9):
             return step * decade, intervals
     return 10.0 * decade, _ROUND[1.0]
+
+
+def robust_ceiling(values: Array, finest: float) -> tuple[float, int]:
+    """Round up the 98th percentile of the finite values, at least `finest`, like `nice_ceiling`."""
+    known = values[np.isfinite(values)]
+    return nice_ceiling(max(float(np.percentile(known, _ROBUST)) if len(known) else 0.0, finest))
 
 
 def new_plotter(pyvista: Any) -> Any:
@@ -123,6 +133,20 @@ def _palette(name: str, part: float) -> Any:
 def mesh_of(pyvista: Any, points: Array, triangles: Ints) -> Any:
     """Make a PyVista mesh of triangles."""
     return pyvista.PolyData(points, faces=np.column_stack([np.full(len(triangles), 3), triangles]).ravel())
+
+
+def fan_polygons(polygons: Sequence[Array]) -> tuple[Array, Ints, Ints]:
+    """Divide convex polygons, (k, 3) each, into triangles; return corners, triangles and the polygon of each."""
+    starts = np.cumsum([0, *map(len, polygons)]).tolist()
+    fans = [
+        [(start, start + k, start + k + 1) for k in range(1, len(polygon) - 1)]
+        for start, polygon in zip(starts, polygons, strict=False)
+    ]
+    return (
+        np.concatenate([*polygons, np.zeros((0, 3))]),
+        np.array([triangle for fan in fans for triangle in fan], dtype=np.int64).reshape(-1, 3),
+        np.repeat(np.arange(len(fans)), [len(fan) for fan in fans]),
+    )
 
 
 def _add_scalar_bar(plotter: Any, colours: Colouring) -> None:

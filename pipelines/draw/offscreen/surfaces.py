@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.results.contact_result import JointResult
 from mechanics.results.result import BodyResult, Result
 from mechanics.results.stress_values import utilisation
 from mechanics.scene.scene import Fidelity
 from mechanics.stones.materials import Material
 from pipelines.arrays import Array, Bools, Ints
+from pipelines.draw.offscreen.parts import fan_polygons
 
 __all__ = ["FIELDS", "WallSurface", "stone_fields", "wall_surface"]
 
@@ -67,7 +67,7 @@ def wall_surface(result: Result) -> WallSurface:
     triangles = [_fans(body.faces) for body in result.bodies]
     counts = [len(one) for one in triangles]
     pressed = np.flatnonzero(result.joints.pressed)
-    corners, of_joints, pressure = _joints(result.joints, pressed)
+    corners, of_joints, owners = fan_polygons([result.joints.polygon[number] for number in pressed])
     return WallSurface(
         points=np.concatenate([body.position for body in result.bodies]),
         triangles=np.concatenate([one + offset for one, offset in zip(triangles, offsets, strict=True)]),
@@ -87,7 +87,7 @@ def wall_surface(result: Result) -> WallSurface:
         ),
         joint_points=corners,
         joint_triangles=of_joints,
-        joint_pressure=pressure,
+        joint_pressure=result.joints.pressure_mean[pressed][owners],
         resultant_points=result.joints.centre_of_pressure[pressed],
         resultants=result.joints.force[pressed],
         in_kern=result.joints.in_kern[pressed],
@@ -105,20 +105,6 @@ def stone_fields(body: BodyResult, material: Material) -> Array:
         fields_[:, 4] = utilisation(body.principal, material)
         fields_[:, 5] = body.values.error
     return fields_
-
-
-def _joints(joints: JointResult, chosen: Ints) -> tuple[Array, Ints, Array]:
-    """Gather the corners, triangles and pressures of some joints."""
-    polygons = [joints.polygon[number] for number in chosen]
-    starts = np.cumsum([0, *map(len, polygons)])
-    fans = [
-        _fans((tuple(range(len(one))),)) + start for one, start in zip(polygons, starts[:-1], strict=True)
-    ]
-    return (
-        np.concatenate([*polygons, np.zeros((0, 3))]),
-        np.concatenate([*fans, np.zeros((0, 3), dtype=np.int64)]),
-        np.repeat(joints.pressure_mean[chosen], [len(one) for one in fans]),
-    )
 
 
 def _fans(faces: tuple[tuple[int, ...], ...]) -> Ints:
