@@ -14,10 +14,10 @@ from moma.errors import UsageError
 if TYPE_CHECKING:
     from pipelines.propose.propose import ProposalReport
 
-__all__ = ["CoreShape", "What", "propose"]
+__all__ = ["CoreShape", "Subject", "propose"]
 
 
-class What(StrEnum):
+class Subject(StrEnum):
     """Subjects of proposals."""
 
     MISSING = "missing"
@@ -34,7 +34,7 @@ class CoreShape(StrEnum):
 @reporting
 def propose(
     what: Annotated[
-        What, typer.Argument(metavar="missing|infill", help="Missing stones, or the core of walls.")
+        Subject, typer.Argument(metavar="missing|infill", help="Missing stones, or the core of walls.")
     ],
     where: Annotated[
         list[str] | None,
@@ -79,7 +79,7 @@ def propose(
     given = {"--as": shape, "--storey-height": storey_height, "--facings": facings}
     _refuse_others(what, given, shape, record, author, source)
     recording = Recording(author, source) if record else None
-    if what is What.MISSING:
+    if what is Subject.MISSING:
         report = propose_stones(db, where or (), recording=recording)
     else:
         settings = InfillSettings(shape=InfillShape(shape or CoreShape.BLOCKS), storey_height=storey_height)
@@ -96,7 +96,7 @@ def propose(
 
 
 def _refuse_others(
-    what: What,
+    what: Subject,
     given: Mapping[str, object],
     shape: CoreShape | None,
     record: bool,
@@ -104,7 +104,7 @@ def _refuse_others(
     source: str | None,
 ) -> None:
     """Refuse options that exclude each other."""
-    if what is What.MISSING:
+    if what is Subject.MISSING:
         for name, value in given.items():
             if value is not None:
                 raise UsageError(f"{name} is for the core of walls", remedy="leave it out, or propose infill")

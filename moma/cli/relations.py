@@ -13,8 +13,6 @@ if TYPE_CHECKING:
 
 __all__ = ["load_path", "relate"]
 
-_SHOWN = 6  # codes listed where a path ends
-
 
 @reporting
 def relate(
@@ -82,7 +80,7 @@ def load_path(
     """Show all stones that carry a stone, directly or through others; with --up, all that it carries."""
     from archmodel.database.session import open_database
     from archmodel.relations.graph import load_path as follow
-    from moma.cli.text.formats import as_json, as_table
+    from moma.cli.text.formats import as_json, as_table, some
 
     with open_database(db, create=False) as database, database.session(read_only=True) as session:
         path = follow(session, code, up=up, as_of=at)
@@ -97,9 +95,8 @@ def load_path(
     shown = {name: None for name in columns if any(row[name] is not None for row in rows)}
     print(as_table(shown, rows))
     last = [stone.code for stone in path.last]
-    more = f" and {len(last) - _SHOWN} more" if len(last) > _SHOWN else ""
     say(
-        f"{len(path.stones)} stones on {path.levels} levels; it ends at {', '.join(last[:_SHOWN])}{more}"
+        f"{len(path.stones)} stones on {path.levels} levels; it ends at {some(last)}"
         if last
         else f"{len(path.stones)} stones on {path.levels} levels, in a circle"
     )

@@ -11,15 +11,8 @@ from moma.errors import UsageError
 __all__ = ["runs"]
 
 _LIST = {
-    "run": None,
-    "scene": None,
-    "stored_at": None,
-    "outcome": None,
-    "stones": "-",
-    "contacts": "-",
-    "natural_map": "-",
-    "balance": "-",
-    "reaction": "-",
+    **dict.fromkeys(("run", "scene", "stored_at", "outcome")),
+    **dict.fromkeys(("stones", "contacts", "natural_map", "balance", "reaction"), "-"),
     "wall": "s",
 }
 _MORE = {"penetration": "-", "energy": "-"}

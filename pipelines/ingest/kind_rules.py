@@ -53,7 +53,7 @@ _OPERATORS: Mapping[str, Callable[[float | str, float | str], bool]] = {
 
 @dataclass(frozen=True)
 class KindRule:
-    """The kind of all stones for which an expression holds.
+    """Kind of all stones for which an expression holds.
 
     Attributes
     ----------

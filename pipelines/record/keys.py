@@ -11,21 +11,9 @@ from pipelines.toml.schema import Key, Kind
 __all__ = ["ABOUT", "ARRAYS", "ATTRIBUTE", "CITED", "PROPERTY", "RECORD", "WHO", "WITHDRAWN"]
 
 WITHDRAWN = (
-    "made_of",
-    "of_phase",
-    "mark",
-    "observation",
-    "reference",
-    "note",
-    "relation",
-    "member",
-    "material",
-    "property",
-    "phase",
-    "document",
-    "structure",
-    "hypothesis",
-)
+    "made_of", "of_phase", "mark", "observation", "reference", "note", "relation", "member", "material", "property",
+    "phase", "document", "structure", "hypothesis",
+)  # fmt: skip
 """Records that can be withdrawn; a depth is replaced by another one, a registered kind stays."""
 
 RECORD = (

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from moma.cli.text.formats import shorten
+
 if TYPE_CHECKING:
     from pipelines.run.check_report import CheckReport, MeshQualityReport
     from pipelines.run.closing_check import JointsReport, SimplificationReport
@@ -163,9 +165,7 @@ def _joint_lines(report: "JointsReport", verbose: bool) -> list[str]:
 
 def _shortened(lines: Sequence[str], verbose: bool) -> list[str]:
     """Return the first lines, and the number of the others."""
-    if verbose or len(lines) <= _SHOWN:
-        return list(lines)
-    return [*lines[:_SHOWN], f"    and {len(lines) - _SHOWN} more, with -v"]
+    return list(lines) if verbose else shorten(lines, _SHOWN, "    ", ", with -v")
 
 
 def duration(seconds: float) -> str:

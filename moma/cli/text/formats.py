@@ -8,41 +8,34 @@ from typing import Any
 
 from archmodel.store.run_record import STONE_VALUES
 
-__all__ = ["USUAL_COLUMNS", "as_csv", "as_geojson", "as_json", "as_lines", "as_table", "shown_columns"]
+__all__ = [
+    "USUAL_COLUMNS",
+    "as_csv",
+    "as_geojson",
+    "as_json",
+    "as_lines",
+    "as_table",
+    "shorten",
+    "shown_columns",
+    "some",
+]
 
 USUAL_COLUMNS = (
-    "code",
-    "kind",
-    "course",
-    "depth",
-    "length",
-    "height",
-    "volume",
-    "rms",
-    "rejected",
-    "fidelity",
-    "von_mises_max",
+    "code", "kind", "course", "depth", "length", "height", "volume", "rms", "rejected", "fidelity", "von_mises_max",
     "displacement_max",
-)
+)  # fmt: skip
 """Columns of a table beside requested ones; CSV and JSON have every attribute."""
 
 _UNITS = {
-    "length": "m",
-    "height": "m",
+    **dict.fromkeys(("length", "height", "centroid", "value", "sigma", "offset", "height_sigma", "rms"), "m"),
     "area": "m²",
     "volume": "m³",
-    "centroid": "m",
-    "value": "m",
-    "sigma": "m",
-    "offset": "m",
-    "height_sigma": "m",
+    "mass": "kg",
     "tilt_sigma": "rad",
-    "rms": "m",
+    "displacement_max": "m",
     "von_mises_max": "Pa",
     "von_mises_mean": "Pa",
-    "displacement_max": "m",
     "contact_force_max": "N",
-    "mass": "kg",
     **{name: unit for name, (unit, _) in STONE_VALUES.items() if unit != "-"},
 }
 
@@ -85,6 +78,17 @@ def as_csv(columns: Iterable[str], rows: Iterable[Mapping[str, object]]) -> str:
     writer.writeheader()
     writer.writerows(rows)
     return out.getvalue().rstrip("\n")
+
+
+def shorten(lines: Sequence[str], shown: int, margin: str = "", hint: str = "") -> list[str]:
+    """Keep the first lines, and count the others."""
+    rest = len(lines) - shown
+    return [*lines[:shown], f"{margin}and {rest} more{hint}"] if rest > 0 else list(lines)
+
+
+def some(names: Sequence[str], shown: int = 6) -> str:
+    """List the first names in one line, and count the others."""
+    return ", ".join(names[:shown]) + (f" and {len(names) - shown} more" if len(names) > shown else "")
 
 
 def as_json(value: object) -> str:

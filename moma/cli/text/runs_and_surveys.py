@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING, Any
 
+from moma.cli.text.formats import shorten, some
+
 if TYPE_CHECKING:
     from pipelines.ingest.report import IngestReport, SolidsReport
     from pipelines.reports.survey.report import SurveyReport
@@ -28,7 +30,7 @@ def ingest_lines(report: "IngestReport", verbose: bool) -> list[str]:
         if file.frame is not None:
             lines.append(f"  {_frame_line(file.frame)}")
         if file.shapes:
-            lines.append(f"  {len(file.shapes)} faces are not one plane: {_some(list(file.shapes))}")
+            lines.append(f"  {len(file.shapes)} faces are not one plane: {some(list(file.shapes))}")
         if verbose:
             lines += [f"  {code}: {count} left out" for code, count in file.rejected.items()]
             lines += [f"  {code}: {text}" for code, text in file.shapes.items()]
@@ -36,10 +38,8 @@ def ingest_lines(report: "IngestReport", verbose: bool) -> list[str]:
             lines += _solid_lines(file.solids, verbose)
         if file.refused:
             lines.append(f"  {len(file.refused)} stones rejected, to be corrected in {file.rejects}:")
-            shown = file.refused if verbose else file.refused[:5]
-            lines += [f"    {one.reason}" for one in shown]
-            if len(shown) < len(file.refused):
-                lines.append(f"    and {len(file.refused) - len(shown)} more")
+            reasons = [f"    {one.reason}" for one in file.refused]
+            lines += reasons if verbose else shorten(reasons, 5, "    ")
     return lines
 
 
@@ -53,12 +53,10 @@ def _solid_lines(solids: "SolidsReport", verbose: bool) -> list[str]:
             f"  {snapping.contacts} contacts brought into {snapping.planes} planes within "
             f"{snapping.tolerance:g} m; corners moved by up to {snapping.largest_movement:.2g} m"
         )
-        shown = snapping.left_open if verbose else snapping.left_open[:5]
         if snapping.left_open:
             lines.append(f"  {len(snapping.left_open)} contacts left as they are:")
-        lines += [f"    {' and '.join(one.stones)}: {one.reason}" for one in shown]
-        if len(shown) < len(snapping.left_open):
-            lines.append(f"    and {len(snapping.left_open) - len(shown)} more, with -v")
+        left = [f"    {' and '.join(one.stones)}: {one.reason}" for one in snapping.left_open]
+        lines += left if verbose else shorten(left, 5, "    ", ", with -v")
     elif solids.decimals is not None:
         lines.append(
             f"  coordinates have {solids.decimals} decimals: if they are rounded, --snap "
@@ -87,10 +85,6 @@ def _frame_line(frame: dict[str, Any]) -> str:
     )
 
 
-def _some(names: list[str]) -> str:
-    return ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")
-
-
 def run_lines(report: "RunReport", verbose: bool) -> list[str]:
     """Describe the outcome of a run, and list its files."""
     summary = report.summary
@@ -117,8 +111,8 @@ def run_lines(report: "RunReport", verbose: bool) -> list[str]:
     joints = summary["joints"]
     if joints["count"]:
         lines.append(
-            f"  {joints['count']} joints: {joints['out_of_kern']} of {joints['pressed']} pressed ones bear outside "
-            f"their kern, largest opening {joints['largest_opening'] * 1e3:.3g} mm, "
+            f"  {joints['count']} joints: {joints['out_of_kern']} of {joints['pressed']} compressed ones have their "
+            f"resultant outside the kern, largest opening {joints['largest_opening'] * 1e3:.3g} mm, "
             f"largest sliding {joints['largest_sliding'] * 1e3:.3g} mm"
         )
     lines += _profile_lines(summary["profile"])
@@ -194,11 +188,9 @@ def survey_report_lines(report: "SurveyReport", verbose: bool) -> list[str]:
     ]
     lines += _course_lines(report, verbose)
     lines += [f"  {one.code} is called a {one.kind}, but {one.text}" for one in study.contradictions[:_SHOWN]]
-    again = study.remeasures if verbose else study.remeasures[:_SHOWN]
+    again = [f"  {one.code or '(no code)'}: {one.reason}; {one.action}" for one in study.remeasures]
     lines.append("measure again:" if again else "nothing needs to be measured again")
-    lines += [f"  {one.code or '(no code)'}: {one.reason}; {one.action}" for one in again]
-    if len(again) < len(study.remeasures):
-        lines.append(f"  and {len(study.remeasures) - len(again)} more, with -v")
+    lines += again if verbose else shorten(again, _SHOWN, "  ", ", with -v")
     return [*lines, *(f"  {report.folder / name}" for name in report.content["files"])]
 
 

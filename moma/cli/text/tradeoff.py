@@ -88,7 +88,7 @@ def _advice_lines(record: Mapping[str, Any]) -> list[str]:
     quantity = record["quantity"]
     if advice is None:
         return [
-            f"no recommendation: the error of {quantity} is known of no run; look at --of, or allow more --budget"
+            f"no recommendation: no run has a known error of {quantity}; try another --of, or allow more --budget"
         ]
     bound = f"{_percent(advice['error']):g} %"
     if advice["holds"]:
@@ -102,7 +102,7 @@ def _advice_lines(record: Mapping[str, Any]) -> list[str]:
             f"{advice['setting']}; allow more --budget for a finer reference"
         ]
     if not advice["lines"]:
-        return [*lines, "  nothing has to be changed in the scene"]
+        return [*lines, "  the scene needs no change"]
     return [*lines, "  in the scene:", *(f"    {line}".rstrip() for line in advice["lines"].splitlines())]
 
 
@@ -111,7 +111,7 @@ def _other_lines(rows: Sequence[Mapping[str, Any]], verbose: bool) -> list[str]:
     shown = [row for row in rows if verbose or row["status"] != "not begun"]
     lines = [f"{row['status']}: {row['setting']}: {row['reason']}" for row in shown]
     if rest := len(rows) - len(shown):
-        lines.append(f"{rest} more settings were not begun; -v says why")
+        lines.append(f"{rest} more settings were not begun; -v gives the reasons")
     return lines
 
 

@@ -133,7 +133,7 @@ def guess_key() -> Any:
     from matplotlib.patches import Patch
 
     return Patch(
-        facecolor="none", edgecolor=INK, hatch="///", alpha=0.5, label="hypothesis: nobody has seen it"
+        facecolor="none", edgecolor=INK, hatch="///", alpha=0.5, label="hypothetical stone, not surveyed"
     )
 
 

@@ -75,30 +75,22 @@ def _length_unit(largest: float) -> tuple[float, str]:
     return (1e3, "mm") if largest >= 1e-4 else (1e6, "µm")
 
 
-def _megapascals(_: float) -> tuple[float, str]:
-    return 1e-6, "MPa"
-
-
 def _pascals(largest: float) -> tuple[float, str]:
     return (1e-6, "MPa") if largest >= 1e5 else (1e-3, "kPa")
 
 
-def _percent(_: float) -> tuple[float, str]:
-    return 100.0, "%"
-
-
-def _ratio(_: float) -> tuple[float, str]:
-    return 1.0, ""
+def _always(factor: float, unit: str) -> Callable[[float], tuple[float, str]]:
+    return lambda _: (factor, unit)
 
 
 # of each quantity: title, factor and unit by the end of the scale, palette
 _LOOKS: dict[str, tuple[str, Callable[[float], tuple[float, str]], tuple[str, float]]] = {
-    "von_mises": ("Von Mises stress", _megapascals, ("inferno_r", 0.85)),
+    "von_mises": ("Von Mises stress", _always(1e-6, "MPa"), ("inferno_r", 0.85)),
     "displacement": ("Displacement", _length_unit, ("viridis_r", 1.0)),
     "principal_tension": ("Largest principal stress, tension", _pascals, ("Reds", 1.0)),
     "principal_compression": ("Smallest principal stress, compression", _pascals, ("Blues", 1.0)),
-    "utilisation": ("Stress over strength", _ratio, ("YlOrRd", 1.0)),
-    "error": ("Estimated error of the stress", _percent, ("Purples", 1.0)),
+    "utilisation": ("Stress over strength", _always(1.0, ""), ("YlOrRd", 1.0)),
+    "error": ("Estimated error of the stress", _always(100.0, "%"), ("Purples", 1.0)),
     "pressure": ("Mean pressure of the joints", _pascals, ("inferno_r", 0.85)),
 }
 

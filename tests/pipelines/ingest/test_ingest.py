@@ -33,7 +33,7 @@ control C4 12 1 1 site 652012 6862001 41
 
 
 def corners(k):
-    """Of stone k of a wall in the plane y = 0, counter-clockwise for the observer in front of it."""
+    """Return the corners of stone k of a wall in the plane y = 0, counter-clockwise for an observer in front of it."""
     x = 10.0 + 0.7 * k
     return [(x, 0.0, 0.5), (x + 0.6, 0.0, 0.5), (x + 0.6, 0.0, 0.8), (x, 0.0, 0.8)]
 
@@ -113,7 +113,7 @@ class Desk:
         return prints("show", code, "--db", self.url(name), *more)
 
     def left(self):
-        """What is there beside the files that were put there."""
+        """List the files beside those of the test."""
         return {path.name for path in self.folder.iterdir()} - self.files
 
 

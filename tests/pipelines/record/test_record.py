@@ -80,7 +80,7 @@ Write = Callable[[str], Path]
 
 
 def counts(url: str) -> dict[str, int]:
-    """How many rows there are of each."""
+    """Count the rows of each table."""
     with open_database(url) as database, database.session(read_only=True) as session:
         tables = (Entry, Material, Structure, Statement, Correction, Relation, Phase)
         return {cls.__name__: session.scalar(select(func.count()).select_from(cls)) or 0 for cls in tables}
