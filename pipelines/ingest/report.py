@@ -19,8 +19,8 @@ from survey.stones import SurveyedStream
 __all__ = ["FileReport", "IngestReport", "Refusal", "SolidsReport", "Tally"]
 
 
-# coordinates with 3 to 6 decimals [m] may be rounded; with fewer they are whole centimetres by design
-_LEAST_DECIMALS, _MOST_DECIMALS = 3, 6
+_LEAST_DECIMALS = 3  # of rounded coordinates [m]; with fewer they are whole centimetres by design
+_MOST_DECIMALS = 6  # of rounded coordinates [m]; with more they are not rounded
 
 
 @dataclass(frozen=True)

@@ -25,8 +25,11 @@ from pipelines.draw.offscreen.parts import (
 __all__ = ["ClosingSurface", "draw"]
 
 
-_GAP, _OVERLAP, _BALL = "#d55e00", "#000000", 26.0  # colours, and the size of a sign [px]
-_MOVED, _WIDTH = ("YlGnBu", 0.9), ("viridis_r", 1.0)
+_GAP = "#d55e00"
+_OVERLAP = "#000000"
+_BALL = 26.0  # diameter of a sign [px]
+_MOVED = ("YlGnBu", 0.9)  # colour map, and the part of it that is used
+_WIDTH = ("viridis_r", 1.0)
 _FINEST = 0.1  # shortest colour scale [mm]
 
 
