@@ -13,7 +13,7 @@ from pathlib import Path
 
 from benchmarks.masonry import courses, running_bond, semicircular_arch
 from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
-from mechanics.results.result import Outcome
+from mechanics.dynamics.outcome import Outcome
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene, TimeSettings
 from mechanics.simulate import simulate

@@ -16,7 +16,7 @@ import numpy as np
 from benchmarks.deformable_wall import wall_scene
 from benchmarks.memory import peak_bytes
 from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
-from mechanics.results.result import Outcome
+from mechanics.dynamics.outcome import Outcome
 from mechanics.scene.scene import Scene, Start
 from mechanics.simulate import simulate
 from mechanics.stones.meshing.elements import Element

@@ -1,16 +1,28 @@
 """MOMA: from a stone-by-stone survey of a historic building to a mechanical simulation of it.
 
-What scripts need, each loaded when it is first used::
+Each name of `__all__` is loaded when it is first used. A survey goes into a database, which is then asked for stones::
 
-    import moma
+    >>> import moma
+    >>> from tempfile import TemporaryDirectory
+    >>> folder = TemporaryDirectory()
+    >>> url = f"sqlite:///{folder.name}/moma.db"
+    >>> files = moma.ingest(["data/samples/window/window.moma"], url).files
+    >>> with moma.open_database(url) as database, database.session(read_only=True) as session:
+    ...     [stone.code for stone in moma.find(session, "voussoir", ["depth < 0.44", "volume > 0.065"])]
+    ['V1', 'V7']
+    >>> folder.cleanup()
 
-    moma.report_surveys(["window.moma"], "out/survey-window")
-    moma.ingest(["window.moma"], "sqlite:///moma.db")
-    moma.record(["knowledge.toml"], "sqlite:///moma.db")
-    with moma.open_database("sqlite:///moma.db") as database, database.session(read_only=True) as session:
-        deep = moma.find(session, "header", ["depth > 0.4"])
-    done = moma.run_scene("window.toml", "sqlite:///moma.db", "out/window")
-    print(done.summary["outcome"])
+`run_scene` simulates stones of a database as a scene file says. Without a database, a scene is made of blocks::
+
+    >>> import numpy as np
+    >>> corners = np.array([(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))], dtype=float)
+    >>> faces = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
+    >>> limestone = moma.Material("limestone", density=2000.0, young=1e10, poisson=0.2)
+    >>> base = moma.Block("base", corners, faces, limestone, moma.Fidelity.FIXED)
+    >>> stone = moma.Block("stone", corners + [0.0, 0.0, 1.0], faces, limestone)
+    >>> result = moma.simulate(moma.Scene("two blocks", (base, stone)))
+    >>> print(f"{result.outcome}: the base carries {result.reaction:.1f} N")
+    equilibrium: the base carries 19620.0 N
 """
 
 from importlib import import_module
@@ -25,8 +37,9 @@ if TYPE_CHECKING:
     from archmodel.query.api import find, find_rows
     from archmodel.relations.graph import load_path
     from mechanics.results.result import Result
-    from mechanics.scene.scene import Block, Scene
+    from mechanics.scene.scene import Block, Fidelity, Scene
     from mechanics.simulate import simulate
+    from mechanics.stones.materials import Material
     from pipelines.ingest.ingest import ingest
     from pipelines.record.record import record
     from pipelines.reports.survey.report import report_surveys
@@ -38,6 +51,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Block",
+    "Fidelity",
+    "Material",
     "MomaError",
     "ReadingOptions",
     "Result",
@@ -62,6 +77,8 @@ __all__ = [
 
 _HOMES = {
     "Block": "mechanics.scene.scene",
+    "Fidelity": "mechanics.scene.scene",
+    "Material": "mechanics.stones.materials",
     "ReadingOptions": "survey.formats.reading",
     "Result": "mechanics.results.result",
     "Scene": "mechanics.scene.scene",

@@ -1,4 +1,4 @@
-"""``python -m moma`` is the command ``moma``."""
+"""Entry point of ``python -m moma``, the same as the command ``moma``."""
 
 from moma.cli import main
 

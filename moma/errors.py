@@ -1,21 +1,21 @@
-"""The error tree: every failure that MOMA foresees, and its exit code.
+"""Error tree of MOMA: every foreseen failure, with its exit code.
 
 ::
 
     MomaError                      exit 1   anything foreseen
-    ├── UsageError                 exit 2   what the user asked for is wrong
+    ├── UsageError                 exit 2   wrong use
     │   ├── QueryError             exit 2   a query expression
     │   └── SceneError             exit 2   a scene file
     ├── SurveyError                exit 1   the contents of a survey file
     ├── GeometryError              exit 1   stones that cannot be built or closed
     ├── DatabaseError              exit 1   the entity database
-    │   └── NoDatabaseError        exit 1   ... of which there is none at that place
-    ├── ExchangeError              exit 1   a building as one document
+    │   └── NoDatabaseError        exit 1   ... that does not exist
+    ├── ExchangeError              exit 1   an exchange document
     ├── MeshError                  exit 1   a stone that cannot be meshed
     ├── SolverError                exit 1   a step that was not solved
-    └── MissingLibraryError        exit 1   a shared library of the system is absent
+    └── MissingLibraryError        exit 1   a missing shared library
 
-Each error says what is wrong, where, and what to do: ``where: what; remedy``.
+Each message gives the place, the fact and the remedy: ``where: what; remedy``.
 """
 
 from typing import Self
@@ -37,11 +37,11 @@ __all__ = [
 
 
 class MomaError(Exception):
-    """A failure that MOMA foresees, in one line.
+    """Foreseen failure, described in one line.
 
     Parameters
     ----------
-    what : the fact, with the value that was found
+    what : the fact, with the value found
     where : the place: ``file:line``, a stone's code, an option
     remedy : what the user can do about it
     """
@@ -54,51 +54,51 @@ class MomaError(Exception):
         super().__init__(text if remedy is None else f"{text}; {remedy}")
 
     def at(self, where: str) -> Self:
-        """The same failure at another place, as only the caller knows it."""
+        """Return the same error at another place, known to the caller only."""
         return type(self)(self.what, where=where, remedy=self.remedy)
 
 
 class UsageError(MomaError):
-    """What the user asked for is wrong: an option, an argument, a name."""
+    """Wrong use: an option, an argument or a name."""
 
     exit_code = 2
 
 
 class QueryError(UsageError):
-    """A query expression cannot be understood."""
+    """Query expression that cannot be parsed or evaluated."""
 
 
 class SceneError(UsageError):
-    """A scene file is wrong."""
+    """Mistake in a scene file."""
 
 
 class SurveyError(MomaError):
-    """The contents of a survey file are wrong."""
+    """Mistake in the contents of a survey file."""
 
 
 class GeometryError(MomaError):
-    """A stone cannot be built from its faces, or its joints cannot be closed."""
+    """Stone that cannot be built from its faces, or joints that cannot be closed."""
 
 
 class DatabaseError(MomaError):
-    """The entity database cannot be opened, read or written."""
+    """Entity database that cannot be opened, read or written."""
 
 
 class NoDatabaseError(DatabaseError):
-    """There is no database at the place that was named, or an empty one."""
+    """Missing or empty entity database."""
 
 
 class ExchangeError(MomaError):
-    """A document that holds a whole building cannot be written, or is not what it should be."""
+    """Exchange document that cannot be written, or is malformed."""
 
 
 class MeshError(MomaError):
-    """A stone cannot be meshed."""
+    """Stone that cannot be meshed."""
 
 
 class SolverError(MomaError):
-    """A time step was not solved, and the scene asked for that to be an error."""
+    """Time step that was not solved, where the scene makes this an error."""
 
 
 class MissingLibraryError(MomaError):
-    """A shared library of the system is absent; the remedy names the package to install."""
+    """Missing shared library of the system; the remedy names the package to install."""

@@ -1,4 +1,4 @@
-"""A whole building out of a database into one document, and back."""
+"""Exchange of a whole building between a database and one document."""
 
 import os
 from dataclasses import dataclass
@@ -18,14 +18,14 @@ __all__ = ["ExchangeReport", "export_database", "export_to_stream", "import_data
 
 @dataclass(frozen=True)
 class ExchangeReport:
-    """What was carried.
+    """Rows transferred between a database and a document.
 
     Attributes
     ----------
     path : of the document
     database : its URL, without a password
     bytes : of the document
-    rows : how many, by section
+    rows : number of rows, by section
     """
 
     path: str
@@ -35,7 +35,7 @@ class ExchangeReport:
 
 
 def export_database(url: str, path: Path) -> ExchangeReport:
-    """Write all that a database holds into one document; see `export_building`."""
+    """Write the contents of a database into one document; see `export_building`."""
     with open_database(url, create=False) as database:
         with database.session(read_only=True) as session:
             rows = export_building(session, path)
@@ -43,15 +43,15 @@ def export_database(url: str, path: Path) -> ExchangeReport:
 
 
 def export_to_stream(url: str, stream: BinaryIO) -> None:
-    """The same into a stream of bytes, which may have got a part of it when there is an error."""
+    """Write the contents of a database into a stream of bytes; an error may leave a part of it there."""
     with open_database(url, create=False) as database, database.session(read_only=True) as session:
         write_building(session, stream)
 
 
 def import_database(path: Path, url: str) -> ExchangeReport:
-    """Make a database of a document, all of it or nothing.
+    """Create a database from a document, all of it or nothing.
 
-    A file that is not there yet is made under another name and appears when it is complete.
+    A new file is written under another name and appears when it is complete.
 
     Raises
     ------
@@ -87,11 +87,11 @@ def _import_new(path: Path, file: Path) -> dict[str, int]:
 
 
 def _publish(part: Path, file: Path) -> None:
-    """Give the complete database its name, unless somebody else was faster."""
+    """Give the complete database its name, unless another process was faster."""
     try:
         os.link(part, file)
     except FileExistsError:
-        what = "another program has made this database meanwhile"
+        what = "another process has created this database in the meantime"
         raise ExchangeError(what, where=str(file), remedy="name a new database with --db") from None
     except OSError:
         part.rename(file)  # a file system without links

@@ -125,7 +125,7 @@ def _told(statement: Statement, far: Mapping[int, Owner]) -> Values:
     values = statement_values(statement)
     owner = far.get(_of(statement))
     if owner is not None:
-        values["phase_or_material_of"] = owner.structure.code
+        values["said_of"] = owner.structure.code
     return values | entry_values(statement.entry)
 
 

@@ -1,4 +1,4 @@
-"""The command ``moma``. Everything heavy is imported by the command that needs it, so that help is fast."""
+"""Command line of MOMA. Commands import heavy packages themselves, so that help is fast."""
 
 from typing import Annotated
 
@@ -46,7 +46,7 @@ def _common(
     pass
 
 
-# in the order in which they are mostly used; import is a word of the language, import_ is not
+# in the usual order of use
 _COMMANDS = (
     ingest,
     survey_report,

@@ -1,4 +1,4 @@
-"""What the command line shows beside its results, on stderr: progress, warnings, errors."""
+"""Output on stderr, beside the results: progress, warnings, errors."""
 
 import sys
 import traceback
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rich.progress import TaskID
 
     from mechanics.dynamics.progress import Listener
-    from mechanics.dynamics.progress import Progress as Told
+    from mechanics.dynamics.progress import Progress as ProgressReport
 
 __all__ = ["progress_bars", "reporting", "say"]
 
@@ -24,12 +24,12 @@ P = ParamSpec("P")
 
 
 def say(message: str) -> None:
-    """One line for the person at the terminal, beside the results."""
+    """Print one line on stderr."""
     print(f"moma: {message}", file=sys.stderr)
 
 
 def reporting(command: Callable[P, None]) -> Callable[P, None]:
-    """Make a command end in one line and an exit code when it fails; with ``-v``, in the traceback too."""
+    """Decorate a command to fail with one line and an exit code; with ``-v``, the traceback too."""
 
     @wraps(command)
     def run(*arguments: P.args, **options: P.kwargs) -> None:
@@ -43,7 +43,7 @@ def reporting(command: Callable[P, None]) -> Callable[P, None]:
             say(f"error: {' '.join(str(error).split())}")
             raise typer.Exit(error.exit_code) from None
         except Exception as error:
-            # typer ends a command by exceptions of its own; those, and broken pipes, are its business
+            # typer handles its own exceptions, which end a command, and broken pipes
             if verbose or isinstance(error, typer.Exit | typer.Abort | BrokenPipeError):
                 raise
             say(f"error: unexpected {type(error).__name__}: {error}; please report it with the output of -v")
@@ -54,7 +54,7 @@ def reporting(command: Callable[P, None]) -> Callable[P, None]:
 
 @contextmanager
 def _short_warnings() -> Iterator[None]:
-    """Warnings of the libraries in one line each, without the place in the source."""
+    """Show each warning in one line, without its place in the source."""
 
     def show(
         message: Warning | str,
@@ -73,7 +73,7 @@ def _short_warnings() -> Iterator[None]:
 
 @contextmanager
 def progress_bars() -> "Iterator[Listener]":
-    """A listener that draws one bar per stage on a terminal, and nothing elsewhere."""
+    """Yield a listener that draws one bar per stage on a terminal, and nothing elsewhere."""
     if not sys.stderr.isatty():
         yield lambda report: None
         return
@@ -90,7 +90,7 @@ def progress_bars() -> "Iterator[Listener]":
     with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
         tasks: dict[str, TaskID] = {}
 
-        def show(report: "Told") -> None:
+        def show(report: "ProgressReport") -> None:
             if report.stage not in tasks:
                 tasks[report.stage] = bars.add_task(report.stage, total=report.total, text="")
             bars.update(tasks[report.stage], completed=report.done, total=report.total, text=report.text)

@@ -1,4 +1,4 @@
-"""The command that changes the layout of a database."""
+"""Commands for whole databases: their layout, export and import."""
 
 import sys
 from dataclasses import asdict
@@ -17,16 +17,16 @@ __all__ = ["export", "import_", "migrate"]
 @reporting
 def migrate(
     to: Annotated[
-        int | None, typer.Option("--to", metavar="N", help="Version of the layout; else this program's.")
+        int | None, typer.Option("--to", metavar="N", help="Version of the layout; default: the newest.")
     ] = None,
     yes: Annotated[
-        bool, typer.Option("--yes", help="To an older version: drop what it cannot hold.")
+        bool, typer.Option("--yes", help="Going to an older version, drop what it cannot hold.")
     ] = False,
     db: Db = DEFAULT_DB,
     json: Json = False,
     verbose: Verbose = False,
 ) -> None:
-    """Give a database the layout of this program, or of an older one: all of it, or nothing."""
+    """Migrate a database to the newest layout, or to an older one: completely or not at all."""
     from archmodel.migrations.migrate import migrate as change
     from moma.cli.text.formats import as_json
 
@@ -43,7 +43,7 @@ def migrate(
     for one in done.lost:
         print(f"dropped: {one}")
     if done.backup is not None:
-        print(f"as it was: {done.backup}")
+        print(f"backup: {done.backup}")
 
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ Target = Annotated[
 
 @reporting
 def export(document: Target, db: Db = DEFAULT_DB, json: Json = False, verbose: Verbose = False) -> None:
-    """Write all that the database holds into one JSON document."""
+    """Export the whole database as one JSON document."""
     from moma.cli.text.formats import as_json
     from pipelines.exchange import export_database, export_to_stream
 
@@ -78,7 +78,7 @@ def export(document: Target, db: Db = DEFAULT_DB, json: Json = False, verbose: V
 
 @reporting
 def import_(document: Document, db: Db = DEFAULT_DB, json: Json = False, verbose: Verbose = False) -> None:
-    """Make a database of such a document: all of it, or none if anything is wrong."""
+    """Create a database from an exported document: completely, or not at all if anything is wrong."""
     from moma.cli.text.formats import as_json
     from pipelines.exchange import import_database
 
@@ -87,7 +87,7 @@ def import_(document: Document, db: Db = DEFAULT_DB, json: Json = False, verbose
 
 
 def _lines(report: "ExchangeReport", way: str, verbose: bool) -> list[str]:
-    """How many rows were carried; of empty sections too if `verbose`."""
+    """Count the rows by section; list empty sections too if `verbose`."""
     total = sum(report.rows.values())
     lines = [f"{report.path}: {total} rows {way} {report.database} ({report.bytes / 1e6:.1f} MB)"]
     return lines + [f"  {count:>8} {name}" for name, count in report.rows.items() if count or verbose]

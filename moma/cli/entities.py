@@ -1,4 +1,4 @@
-"""The commands that ask the database."""
+"""Commands that query the database."""
 
 from typing import Annotated
 
@@ -12,7 +12,7 @@ __all__ = ["query", "schema", "show"]
 
 RunNumber = Annotated[
     int | None,
-    typer.Option("--run", metavar="N", help="Run whose results are meant; else each stone's latest."),
+    typer.Option("--run", metavar="N", help="Run whose results are shown; default: each stone's latest."),
 ]
 Columns = Annotated[
     str | None,
@@ -27,13 +27,15 @@ def query(
     ],
     where: Annotated[
         list[str] | None,
-        typer.Option("--where", metavar="EXPR", help="Condition, e.g. 'depth > 0.4'; all given ones hold."),
+        typer.Option(
+            "--where", metavar="EXPR", help="Condition, e.g. 'depth > 0.4'; if repeated, all must hold."
+        ),
     ] = None,
     run: RunNumber = None,
     columns: Columns = None,
-    format: Annotated[ListFormat | None, typer.Option(help="Format of the list; else table.")] = None,
+    format: Annotated[ListFormat | None, typer.Option(help="Format of the list; default: table.")] = None,
     flat: Annotated[
-        bool, typer.Option("--flat", help="GeoJSON in the plane of the wall: along it, and upwards.")
+        bool, typer.Option("--flat", help="GeoJSON in the plane of the wall: along it, and up.")
     ] = False,
     db: Db = DEFAULT_DB,
     json: Json = False,
@@ -44,7 +46,7 @@ def query(
     from moma.cli.text.query import Question, answer
 
     if json and format not in (None, ListFormat.JSON):
-        raise UsageError(f"--json and --format {format} ask for two formats", remedy="give one of them")
+        raise UsageError(f"--json and --format {format} request two formats", remedy="give one of them")
     wanted = ListFormat.JSON if json else format or ListFormat.TABLE
     if flat and wanted is not ListFormat.GEOJSON:
         raise UsageError("--flat is for faces", remedy="give --format geojson too")
@@ -70,13 +72,13 @@ def schema(
             "--db",
             metavar="URL",
             envvar="MOMA_DB",
-            help="Entity database whose own kinds are shown too; else moma.db, if there is one.",
+            help="Entity database whose registered kinds are shown too; default: moma.db, if it exists.",
         ),
     ] = None,
     json: Json = False,
     verbose: Verbose = False,
 ) -> None:
-    """Show what there can be: kinds with their attributes, structures, relations."""
+    """Show the model: kinds with their attributes, structures, relations."""
     from pathlib import Path
 
     from archmodel.database.session import open_database
@@ -98,18 +100,19 @@ def schema(
 
 @reporting
 def show(
-    code: Annotated[str, typer.Argument(metavar="CODE", help="Code of a stone or of a structure.")],
+    code: Annotated[str, typer.Argument(metavar="CODE", help="Code of a stone or structure.")],
     history: Annotated[
-        bool, typer.Option("--history", help="All that was ever said of it, in the order of the records.")
+        bool, typer.Option("--history", help="Show everything recorded about it, in order.")
     ] = False,
     at: Annotated[
-        int | None, typer.Option("--at", metavar="ENTRY", help="As it was known when this entry was made.")
+        int | None,
+        typer.Option("--at", metavar="ENTRY", help="Show what was known when this entry was made."),
     ] = None,
     db: Db = DEFAULT_DB,
     json: Json = False,
     verbose: Verbose = False,
 ) -> None:
-    """Show one stone or structure: what it is, what is known of it, what was measured and computed."""
+    """Show one stone or structure: kind, knowledge, measurements and results."""
     from dataclasses import asdict
 
     from archmodel.database.session import open_database
@@ -119,7 +122,7 @@ def show(
     from moma.cli.text.formats import as_json
 
     if history and at is not None:
-        raise UsageError("--history and --at ask for two things", remedy="give one of them")
+        raise UsageError("--history and --at exclude each other", remedy="give one of them")
     with open_database(db, create=False) as database, database.session(read_only=True) as session:
         if history:
             events = [asdict(event) for event in past.history(session, code)]

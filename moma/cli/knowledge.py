@@ -1,4 +1,4 @@
-"""The command that puts knowledge into the database."""
+"""Command that records knowledge in the database."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -18,10 +18,13 @@ def record(
         list[Path], typer.Argument(metavar="FILE.toml…", help="Files of knowledge; see docs/knowledge.md.")
     ],
     author: Annotated[
-        str | None, typer.Option("--author", metavar="NAME", help="Who says it; else the files say so.")
+        str | None,
+        typer.Option(
+            "--author", metavar="NAME", help="Author of the statements; default: that of the files."
+        ),
     ] = None,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Say what would be recorded, and change nothing.")
+        bool, typer.Option("--dry-run", help="Report what would be recorded; change nothing.")
     ] = False,
     db: Db = DEFAULT_DB,
     json: Json = False,
@@ -30,7 +33,7 @@ def record(
     """Record knowledge of a building: materials, phases, structures, marks, observations, corrections, …"""
     from moma.cli.text.formats import as_json
     from moma.cli.text.knowledge import record_lines
-    from pipelines.record.record import record as put_in
+    from pipelines.record.record import record as record_files
 
-    report = put_in(files, db, author=author, dry_run=dry_run)
+    report = record_files(files, db, author=author, dry_run=dry_run)
     print(as_json(asdict(report)) if json else "\n".join(record_lines(report, verbose)))

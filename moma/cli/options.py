@@ -1,4 +1,4 @@
-"""Options and arguments that several commands share."""
+"""Options and arguments shared by several commands."""
 
 from enum import StrEnum
 from pathlib import Path
@@ -51,7 +51,7 @@ class ListFormat(StrEnum):
 
 
 class ProfileName(StrEnum):
-    """Those of pipelines.profiles, which is not loaded for a help text."""
+    """Names in pipelines.tuning.profiles, which is not loaded for a help text."""
 
     FAST = "fast"
     BALANCED = "balanced"
@@ -71,11 +71,11 @@ Profile = Annotated[
     ProfileName | None,
     typer.Option(
         "--profile",
-        help="Settings by name, which go before the scene's own; see docs/runs.md. Else the scene as it is written.",
+        help="Named settings that override the scene's; see docs/runs.md. Default: the scene as written.",
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")]
-Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Say more; show the traceback of an error.")]
+Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Print more; show the traceback of an error.")]
 SurveyFiles = Annotated[
     list[Path], typer.Argument(metavar="FILE…", help="Survey files; see docs/formats.md.")
 ]
@@ -83,22 +83,22 @@ Format = Annotated[SurveyFormat, typer.Option(help="Format of the survey files."
 Header = Annotated[
     Path | None,
     typer.Option(
-        "--header", metavar="FILE", help="Head (stations, control, depths) for formats without their own."
+        "--header", metavar="FILE", help="Header (stations, control, depths) for formats without one."
     ),
 ]
 Codes = Annotated[
     str | None,
-    typer.Option("--codes", metavar="TEMPLATE", help="How codes are made up, e.g. '{block}:{role}'."),
+    typer.Option("--codes", metavar="TEMPLATE", help="Parts of a point code, e.g. '{block}:{role}'."),
 ]
 Kind = Annotated[
-    str | None, typer.Option("--kind", metavar="KIND", help="Kind of stones that do not say it; else ashlar.")
+    str | None, typer.Option("--kind", metavar="KIND", help="Kind of stones without one; default: ashlar.")
 ]
 Sigma = Annotated[
     float | None,
     typer.Option(
         "--sigma",
         metavar="S",
-        help="Standard deviation of a coordinate in metres, where a file does not say it.",
+        help="Standard deviation of a coordinate in metres, where the file gives none.",
     ),
 ]
 KindWhere = Annotated[
@@ -106,7 +106,7 @@ KindWhere = Annotated[
     typer.Option(
         "--kind-where",
         metavar="RULE",
-        help="Kind of solids by rule, e.g. 'voussoir: z > 0.5'; may be repeated, the last that holds counts.",
+        help="Kind of solids by rule, e.g. 'voussoir: z > 0.5'; may be repeated, the last match counts.",
     ),
 ]
 Support = Annotated[
@@ -114,19 +114,19 @@ Support = Annotated[
     typer.Option(
         "--support",
         metavar="EXPR",
-        help="Solids that are supports, e.g. 'z < 0.01': z is the lowest corner; may be repeated.",
+        help="Solids that are supports, e.g. 'z < 0.01', z being the lowest corner; may be repeated.",
     ),
 ]
 Unit = Annotated[
     str | None,
-    typer.Option("--unit", metavar="UNIT", help="Unit of solids: m, dm, cm, mm, ft or in; else m."),
+    typer.Option("--unit", metavar="UNIT", help="Unit of solids: m, dm, cm, mm, ft or in; default: m."),
 ]
 Snap = Annotated[
     float | None,
     typer.Option(
         "--snap",
         metavar="T",
-        help="Bring faces of neighbouring solids that match within T metres into one plane, e.g. 0.002.",
+        help="Bring matching faces of neighbouring solids within T metres into one plane, e.g. 0.002.",
     ),
 ]
 SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene file; see docs/scene.md.")]

@@ -1,4 +1,4 @@
-"""The command that proposes what no survey sees."""
+"""Command that proposes unseen stones."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -14,18 +14,18 @@ from moma.errors import UsageError
 if TYPE_CHECKING:
     from pipelines.propose.propose import ProposalReport
 
-__all__ = ["CoreShape", "What", "propose"]
+__all__ = ["CoreShape", "Subject", "propose"]
 
 
-class What(StrEnum):
-    """What can be proposed."""
+class Subject(StrEnum):
+    """Subjects of proposals."""
 
     MISSING = "missing"
     INFILL = "infill"
 
 
 class CoreShape(StrEnum):
-    """What the core of a wall can be made of."""
+    """Shapes of the core of a wall."""
 
     BLOCKS = "blocks"
     STOREYS = "storeys"
@@ -34,41 +34,44 @@ class CoreShape(StrEnum):
 @reporting
 def propose(
     what: Annotated[
-        What, typer.Argument(metavar="missing|infill", help="Missing stones, or the core of walls.")
+        Subject, typer.Argument(metavar="missing|infill", help="Missing stones, or the core of walls.")
     ],
     where: Annotated[
         list[str] | None,
         typer.Option(
-            "--where", metavar="EXPR", help="Only with stones for which this holds; all given ones hold."
+            "--where",
+            metavar="EXPR",
+            help="Only with stones for which this holds; if repeated, all must hold.",
         ),
     ] = None,
     shape: Annotated[
         CoreShape | None,
-        typer.Option("--as", help="The core as blocks, or as one continuum a storey; else blocks."),
+        typer.Option("--as", help="The core as blocks, or as one continuum per storey; default: blocks."),
     ] = None,
     storey_height: Annotated[
         float | None,
         typer.Option(
-            "--storey-height", metavar="M", help="Height of a storey in metres; else the whole wall is one."
+            "--storey-height", metavar="M", help="Height of a storey in metres; default: the whole wall."
         ),
     ] = None,
     facings: Annotated[
         tuple[str, str] | None,
-        typer.Option("--facings", metavar="EXPR EXPR", help="Two facings of one wall; else recognised."),
+        typer.Option("--facings", metavar="EXPR EXPR", help="Two facings of one wall; default: recognised."),
     ] = None,
     record: Annotated[
-        bool, typer.Option("--record", help="Put them into the database, as hypotheses.")
+        bool, typer.Option("--record", help="Record them in the database, as hypotheses.")
     ] = False,
-    author: Annotated[str | None, typer.Option("--author", metavar="NAME", help="Who records them.")] = None,
+    author: Annotated[
+        str | None, typer.Option("--author", metavar="NAME", help="Author of the record.")
+    ] = None,
     source: Annotated[
-        str | None,
-        typer.Option("--source", metavar="TEXT", help="On what grounds; else those of each proposal."),
+        str | None, typer.Option("--source", metavar="TEXT", help="Grounds; default: those of each proposal.")
     ] = None,
     db: Db = DEFAULT_DB,
     json: Json = False,
     verbose: Verbose = False,
 ) -> None:
-    """Propose stones that are missing, or the core between two facings; see docs/unseen.md."""
+    """Propose missing stones, or the core between two facings; see docs/unseen.md."""
     from moma.cli.text.formats import as_json
     from pipelines.propose.propose import Recording, propose_core, propose_stones
     from survey.unseen.core.settings import InfillSettings, InfillShape
@@ -76,7 +79,7 @@ def propose(
     given = {"--as": shape, "--storey-height": storey_height, "--facings": facings}
     _refuse_others(what, given, shape, record, author, source)
     recording = Recording(author, source) if record else None
-    if what is What.MISSING:
+    if what is Subject.MISSING:
         report = propose_stones(db, where or (), recording=recording)
     else:
         settings = InfillSettings(shape=InfillShape(shape or CoreShape.BLOCKS), storey_height=storey_height)
@@ -93,15 +96,15 @@ def propose(
 
 
 def _refuse_others(
-    what: What,
+    what: Subject,
     given: Mapping[str, object],
     shape: CoreShape | None,
     record: bool,
     author: str | None,
     source: str | None,
 ) -> None:
-    """Options that do not belong together."""
-    if what is What.MISSING:
+    """Refuse options that exclude each other."""
+    if what is Subject.MISSING:
         for name, value in given.items():
             if value is not None:
                 raise UsageError(f"{name} is for the core of walls", remedy="leave it out, or propose infill")
@@ -139,4 +142,4 @@ def _summary(report: "ProposalReport", record: bool) -> str:
     if report.entry is None:
         return f"{text}; nothing is recorded: give --record" if not record else text
     text += f"; recorded as entry {report.entry}"
-    return text if report.related is None else f"{text}, relations computed anew as entry {report.related}"
+    return text if report.related is None else f"{text}, relations recomputed as entry {report.related}"

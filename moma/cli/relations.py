@@ -1,4 +1,4 @@
-"""The commands of how stones stand to one another."""
+"""Commands about relations between stones."""
 
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Annotated
@@ -13,15 +13,13 @@ if TYPE_CHECKING:
 
 __all__ = ["load_path", "relate"]
 
-_SHOWN = 6  # codes that are named where a path ends
-
 
 @reporting
 def relate(
     width: Annotated[
         float | None,
         typer.Option(
-            "--width", metavar="M", help="Widest open joint in metres; else as last time, at first 0.04."
+            "--width", metavar="M", help="Widest open joint in metres; default: as last time, initially 0.04."
         ),
     ] = None,
     angle: Annotated[
@@ -29,14 +27,14 @@ def relate(
         typer.Option(
             "--angle",
             metavar="DEG",
-            help="Largest angle between the faces of a joint; else as last time, at first 12.",
+            help="Largest angle between the faces of a joint; default: as last time, initially 12.",
         ),
     ] = None,
     db: Db = DEFAULT_DB,
     json: Json = False,
     verbose: Verbose = False,
 ) -> None:
-    """Compute again what rests on what, and which courses and arches there are; see docs/relations.md."""
+    """Recompute the relations between stones, the courses and the arches; see docs/relations.md."""
     from archmodel.database.session import open_database
     from archmodel.relations.store import held_settings
     from moma.cli.text.formats import as_json, as_table
@@ -53,11 +51,11 @@ def relate(
     if report.entry is None:
         say(f"{report.stones} stones; nothing changed")
     else:
-        say(f"{report.stones} stones; {report.values} values of theirs are new; entry {report.entry}")
+        say(f"{report.stones} stones with {report.values} new values; entry {report.entry}")
 
 
 def _changes(report: "RelationReport") -> list[dict[str, object]]:
-    """What became of the rows of each sort."""
+    """Tabulate the changes of each kind of row."""
     sorts = {**report.relations, "structures": report.structures, "memberships": report.memberships}
     return [
         {"what": name, "new": one.added, "as before": one.kept, "no longer": one.superseded}
@@ -68,19 +66,21 @@ def _changes(report: "RelationReport") -> list[dict[str, object]]:
 @reporting
 def load_path(
     code: Annotated[str, typer.Argument(metavar="CODE", help="Code of a stone.")],
-    up: Annotated[bool, typer.Option("--up", help="What it carries, instead of what carries it.")] = False,
+    up: Annotated[
+        bool, typer.Option("--up", help="Show the stones that it carries, not those that carry it.")
+    ] = False,
     at: Annotated[
         int | None,
-        typer.Option("--at", metavar="ENTRY", help="As it was known when this entry had just been made."),
+        typer.Option("--at", metavar="ENTRY", help="Show what was known when this entry was made."),
     ] = None,
     db: Db = DEFAULT_DB,
     json: Json = False,
     verbose: Verbose = False,
 ) -> None:
-    """Show all stones on which one rests, directly or through others; with --up, all that rest on it."""
+    """Show all stones that carry a stone, directly or through others; with --up, all that it carries."""
     from archmodel.database.session import open_database
     from archmodel.relations.graph import load_path as follow
-    from moma.cli.text.formats import as_json, as_table
+    from moma.cli.text.formats import as_json, as_table, some
 
     with open_database(db, create=False) as database, database.session(read_only=True) as session:
         path = follow(session, code, up=up, as_of=at)
@@ -88,16 +88,15 @@ def load_path(
         print(as_json(asdict(path)))
         return
     if not path.stones:
-        say(f"nothing rests on {code}" if up else f"{code} rests on nothing that is known")
+        say(f"nothing is known to rest on {code}" if up else f"{code} is not known to rest on anything")
         return
     columns = dict.fromkeys(("level", "code", "kind", "course", "zone", "through"))
     rows = [{**asdict(stone), "through": ", ".join(stone.through)} for stone in path.stones]
     shown = {name: None for name in columns if any(row[name] is not None for row in rows)}
     print(as_table(shown, rows))
     last = [stone.code for stone in path.last]
-    more = f" and {len(last) - _SHOWN} more" if len(last) > _SHOWN else ""
     say(
-        f"{len(path.stones)} stones on {path.levels} levels; it ends at {', '.join(last[:_SHOWN])}{more}"
+        f"{len(path.stones)} stones on {path.levels} levels; it ends at {some(last)}"
         if last
         else f"{len(path.stones)} stones on {path.levels} levels, in a circle"
     )

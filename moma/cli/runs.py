@@ -1,4 +1,4 @@
-"""The command that lists and tells simulation runs."""
+"""Command that lists, shows and compares simulation runs."""
 
 from typing import Annotated, Any
 
@@ -11,15 +11,8 @@ from moma.errors import UsageError
 __all__ = ["runs"]
 
 _LIST = {
-    "run": None,
-    "scene": None,
-    "stored_at": None,
-    "outcome": None,
-    "stones": "-",
-    "contacts": "-",
-    "natural_map": "-",
-    "balance": "-",
-    "reaction": "-",
+    **dict.fromkeys(("run", "scene", "stored_at", "outcome")),
+    **dict.fromkeys(("stones", "contacts", "natural_map", "balance", "reaction"), "-"),
     "wall": "s",
 }
 _MORE = {"penetration": "-", "energy": "-"}
@@ -47,12 +40,9 @@ _TABLES = {
 @reporting
 def runs(
     number: Annotated[
-        int | None,
-        typer.Argument(metavar="[N]", help="Number of a run, to see it in full; else all are listed."),
+        int | None, typer.Argument(metavar="[N]", help="Number of a run to show in full; default: list all.")
     ] = None,
-    against: Annotated[
-        int | None, typer.Option("--against", metavar="M", help="Say what is different from run M.")
-    ] = None,
+    against: Annotated[int | None, typer.Option("--against", metavar="M", help="Compare with run M.")] = None,
     db: Db = DEFAULT_DB,
     json: Json = False,
     verbose: Verbose = False,
@@ -66,27 +56,27 @@ def runs(
         raise UsageError("--against needs a run to compare", remedy=f"moma runs N --against {against}")
     with open_database(db, create=False) as database, database.session(read_only=True) as session:
         if number is not None and against is not None:
-            told: Any = compare_runs(session, number, against)
+            found: Any = compare_runs(session, number, against)
         else:
-            told = list_runs(session) if number is None else describe_run(session, number)
+            found = list_runs(session) if number is None else describe_run(session, number)
     if json:
-        print(as_json(told))
-    elif number is None and told:
-        print(as_table(_LIST | _MORE if verbose else _LIST, told))
-        say(f"{len(told)} found")
+        print(as_json(found))
+    elif number is None and found:
+        print(as_table(_LIST | _MORE if verbose else _LIST, found))
+        say(f"{len(found)} found")
     elif number is None:
         say("no run found; simulate with moma run SCENE.toml")
     else:
-        print(_comparison(told) if against is not None else _full(told, verbose))
+        print(_comparison(found) if against is not None else _full(found, verbose))
 
 
-def _full(told: dict[str, Any], verbose: bool) -> str:
-    """One run as lines and tables; the scene file only if asked for more."""
+def _full(run: dict[str, Any], verbose: bool) -> str:
+    """Format one run as lines and tables; with the scene file if `verbose`."""
     from moma.cli.text.formats import as_lines, as_table
 
-    scene_text = told.pop("scene_text")
-    tables = {name: told.pop(name) for name in _TABLES}
-    parts = [as_lines(told)]
+    scene_text = run.pop("scene_text")
+    tables = {name: run.pop(name) for name in _TABLES}
+    parts = [as_lines(run)]
     for name, rows in tables.items():
         heading, columns = _TABLES[name]
         if rows:
@@ -94,14 +84,14 @@ def _full(told: dict[str, Any], verbose: bool) -> str:
     return "\n\n".join([*parts, *([f"scene file\n{scene_text.rstrip()}"] if verbose else [])])
 
 
-def _comparison(told: dict[str, Any]) -> str:
-    """Two runs beside each other."""
+def _comparison(change: dict[str, Any]) -> str:
+    """Format the differences between two runs."""
     from moma.cli.text.formats import as_lines, as_table
 
     names = {"stresses": ("largest changes of Von Mises stress", "Pa")}
     names["displacements"] = ("largest changes of displacement", "m")
-    tables = {name: told.pop(name) for name in names}
-    parts = [as_lines(told)]
+    tables = {name: change.pop(name) for name in names}
+    parts = [as_lines(change)]
     for name, rows in tables.items():
         heading, unit = names[name]
         if rows:

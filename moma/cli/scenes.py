@@ -1,4 +1,4 @@
-"""The commands that simulate."""
+"""Commands that check and simulate scenes."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -20,18 +20,18 @@ def check(
         typer.Option(
             "--pictures",
             metavar="DIR",
-            help="Draw into DIR how far corners were moved, how wide joints were, and what does not meet.",
+            help="Draw into DIR the movements of corners, the widths of joints, gaps and overlaps.",
         ),
     ] = None,
     explain: Annotated[
-        bool, typer.Option("--explain", help="Say of each stone how it is modelled, and why.")
+        bool, typer.Option("--explain", help="List the model of each stone, with the reason.")
     ] = False,
     profile: Profile = None,
     db: Db = DEFAULT_DB,
     json: Json = False,
     verbose: Verbose = False,
 ) -> None:
-    """Say whether a scene is sound and what it will cost; run nothing."""
+    """Check whether a scene is sound, and estimate its cost; run nothing."""
     from moma.cli.text.checks import check_lines
     from moma.cli.text.formats import as_json
     from moma.cli.text.runs_and_surveys import profile_lines
@@ -54,14 +54,14 @@ def check(
 def run(
     scene: SceneArgument,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results; else out/SCENE.")
+        Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results; default: out/SCENE.")
     ] = None,
     profile: Profile = None,
     db: Db = DEFAULT_DB,
     json: Json = False,
     verbose: Verbose = False,
 ) -> None:
-    """Simulate a scene; write tables, pictures and a report, and keep the results in the database."""
+    """Simulate a scene; write tables, pictures and a report, and store the results in the database."""
     from moma.cli.text.formats import as_json
     from moma.cli.text.runs_and_surveys import run_lines
     from pipelines.run.run import run_scene
@@ -79,7 +79,7 @@ def trade(
     budget: Annotated[
         float,
         typer.Option(
-            "--budget", metavar="MINUTES", help="Time of all runs, those of earlier calls included."
+            "--budget", metavar="MINUTES", help="Time for all runs, including those of earlier calls."
         ),
     ] = 10.0,
     error: Annotated[
@@ -90,21 +90,21 @@ def trade(
         typer.Option(
             "--of",
             metavar="QUANTITY",
-            help="What the error is of: von_mises_p99, support_reactions, …; see docs/howto/trade.md.",
+            help="Quantity of the error: von_mises_p99, support_reactions, …; see docs/howto/trade.md.",
         ),
     ] = None,
     jobs: Annotated[
-        int, typer.Option("--jobs", metavar="N", help="Runs at a time, at most one per core.")
+        int, typer.Option("--jobs", metavar="N", help="Number of parallel runs, at most one per core.")
     ] = 1,
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="DIR", help="Folder of the study; else out/SCENE-trade."),
+        typer.Option("--out", metavar="DIR", help="Folder of the study; default: out/SCENE-trade."),
     ] = None,
     db: Db = DEFAULT_DB,
     json: Json = False,
     verbose: Verbose = False,
 ) -> None:
-    """Run a scene at many settings: what does each cost, and how far is it from the finest?"""
+    """Run a scene at many settings; compare the cost and the error of each with the finest."""
     from moma.cli.text.formats import as_json
     from moma.cli.text.tradeoff import trade_lines
     from pipelines.tradeoff.study import Asked, run_trade
@@ -115,7 +115,7 @@ def trade(
         with progress_bars() as listener:
             done = run_trade(scene, db, folder, asked, listener)
     except KeyboardInterrupt:
-        say(f"stopped; what has ended is kept in {folder}, and the same command goes on from there")
+        say(f"stopped; completed runs are kept in {folder}, and the same command resumes from there")
         raise typer.Exit(1) from None
     print(as_json(done.record) if json else "\n".join(trade_lines(done, verbose)))
     if done.record["reference"] is None:

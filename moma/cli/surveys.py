@@ -1,4 +1,4 @@
-"""The commands that read survey files."""
+"""Commands that read survey files."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -43,29 +43,30 @@ def ingest(
     support: Support = None,
     keep_going: Annotated[
         bool,
-        typer.Option("--keep-going", help="Take the good stones, write the others to a file of rejects."),
+        typer.Option(
+            "--keep-going", help="Ingest the good stones, and write the others to a file of rejects."
+        ),
     ] = False,
     rejects: Annotated[
         Path | None,
         typer.Option(
-            "--rejects", metavar="FILE", help="That file; else NAME.rejects beside the survey file."
+            "--rejects", metavar="FILE", help="File of rejects; default: NAME.rejects beside the survey file."
         ),
     ] = None,
     again: Annotated[
         bool,
         typer.Option(
-            "--again",
-            help="Stones that are there already were measured again; what was measured before is kept.",
+            "--again", help="Accept new measurements of stones in the database; earlier ones are kept."
         ),
     ] = False,
     db: Db = DEFAULT_DB,
     json: Json = False,
     verbose: Verbose = False,
 ) -> None:
-    """Take survey files into the database: all of them, or none if anything is wrong."""
+    """Ingest survey files into the database: all of them, or none if anything is wrong."""
     from moma.cli.text.formats import as_json
     from moma.cli.text.runs_and_surveys import ingest_lines
-    from pipelines.ingest.ingest import ingest as take_in
+    from pipelines.ingest.ingest import ingest as ingest_files
     from pipelines.ingest.kind_rules import kind_rules
     from pipelines.ingest.reading_options import reading_options
 
@@ -77,14 +78,13 @@ def ingest(
     options = reading_options(header, codes, kind, sigma, unit, snap)
     rules = kind_rules(kind_where or (), support or ())
     with progress_bars() as listener:
-        report = take_in(
+        report = ingest_files(
             files,
             db,
             format.value,
             listener,
             options=options,
-            keep_going=keep_going,
-            rejects=rejects,
+            keep_going=rejects or keep_going,
             again=again,
             rules=rules,
         )
@@ -100,12 +100,13 @@ def survey_report(
     kind: Kind = None,
     sigma: Sigma = None,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Folder for the report; else out/survey-FILE.")
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Folder for the report; default: out/survey-FILE."),
     ] = None,
     json: Json = False,
     verbose: Verbose = False,
 ) -> None:
-    """Judge survey files: precision, what to measure again, courses, kinds; no database is needed."""
+    """Judge survey files without a database: precision, courses, kinds, stones to measure again."""
     from moma.cli.text.runs_and_surveys import survey_report_lines
     from pipelines.ingest.reading_options import reading_options
     from pipelines.reports.survey.report import INDEX, report_surveys

@@ -1,8 +1,5 @@
-"""Pictures of how surveyed stones became solids that touch: elevations of what is flat, and the whole in space."""
+"""Pictures of how surveyed stones became touching solids: elevations of flat facades, and all stones in space."""
 
-import json
-import tempfile
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,10 +9,10 @@ import numpy as np
 from moma.errors import MissingLibraryError
 from pipelines.arrays import Array, Ints
 from pipelines.draw.elevations.closing import draw_moved
-from pipelines.draw.elevations.closing_shapes import ClosingShapes, DrawnJoint
+from pipelines.draw.elevations.closing_shapes import ClosingShapes
 from pipelines.draw.elevations.joints import draw_joints
-from pipelines.draw.offscreen.closing import ClosingSurface, save_surface
-from pipelines.draw.offscreen.parts import OBLIQUELY
+from pipelines.draw.offscreen.closing import ClosingSurface
+from pipelines.draw.offscreen.parts import OBLIQUELY, fan_polygons
 from pipelines.draw.pictures import draw_apart
 from survey.geometry.solids import Solid
 from survey.geometry.watertight import triangulate
@@ -24,18 +21,18 @@ from survey.quality.facades import Facade, find_facades
 __all__ = ["closing_surface", "draw_closing", "draw_elevations", "draw_in_space", "flat_facades", "viewpoint"]
 
 
-_FLAT = 0.2  # depth of a facade over its extent, up to which an elevation shows it truly
-_LOOKING = np.cos(np.radians(25.0))  # mean of the normals' components square to it
-_SHARE = 0.08  # of all visible area: smaller facades are not worth an elevation
-_MOST = 4  # elevations
-_NOTHING = 5e-5  # movements below are rounding [m]
-_MAINLY = 0.6  # of all visible area, that flat facades must have together
-_LEVEL = 0.25  # length of the mean normal, below which the stones look nowhere in particular
-_STEEP = np.deg2rad(32.0)  # how far from above, or from below, vaults and floors are looked at
+_FLAT = 0.2  # largest depth of a facade over its extent [-]: a deeper one is distorted by an elevation
+_LOOKING = np.cos(np.radians(25.0))  # smallest mean component of the normals across the facade [-]
+_SHARE = 0.08  # smallest share of the visible area [-]: smaller facades are not worth an elevation
+_MOST = 4  # elevations of one scene
+_NOTHING = 5e-5  # smaller movements are rounding [m]
+_MAINLY = 0.6  # least share of the visible area in flat facades together [-]
+_LEVEL = 0.25  # length of the mean normal [-]: below it the stones have no common direction
+_STEEP = np.deg2rad(32.0)  # elevation of the viewer over vaults and floors [rad]
 
 
 def draw_closing(folder: Path, shapes: ClosingShapes) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Draw all pictures into a folder that is there: names of the files, and what could not be drawn."""
+    """Draw all pictures into an existing folder; return the file names, and warnings about missing pictures."""
     flat = draw_elevations(folder, shapes)
     try:
         return (*flat, *draw_in_space(folder, shapes)), ()
@@ -44,7 +41,7 @@ def draw_closing(folder: Path, shapes: ClosingShapes) -> tuple[tuple[str, ...], 
 
 
 def draw_elevations(folder: Path, shapes: ClosingShapes) -> tuple[str, ...]:
-    """Draw each flat facade: what simplifying moved, what closing moved, and the joints; names of the files."""
+    """Draw each flat facade: corners moved by simplifying and by closing, and the joints; return the file names."""
     facades = flat_facades(shapes)
     names: list[str] = []
     for number, facade in enumerate(facades, start=1):
@@ -58,7 +55,7 @@ def draw_elevations(folder: Path, shapes: ClosingShapes) -> tuple[str, ...]:
 
 
 def draw_in_space(folder: Path, shapes: ClosingShapes) -> tuple[str, ...]:
-    """Draw all stones and all joints from one side; names of the files.
+    """Draw all stones and all joints from one side; return the file names.
 
     Raises
     ------
@@ -66,38 +63,26 @@ def draw_in_space(folder: Path, shapes: ClosingShapes) -> tuple[str, ...]:
     """
     towards, elevation = viewpoint(shapes)
     step = _steps(shapes)[-1:]
-    shared: dict[str, Any] = {"towards": towards.tolist(), "elevation": elevation}
-    jobs = [
+    looks = [(f"{one}-3d.png", "moved", _LABELS[one], f"{shapes.scene}: {_TITLES[one]}") for one in step]
+    title = f"{shapes.scene}: joints by their surveyed width\n{_note(shapes)}"
+    looks.append(("joints-3d.png", "joints", "Width of the joints as surveyed [mm]", title))
+    pictures: list[dict[str, Any]] = [
         {
-            "quantity": "moved",
-            "label": _LABELS[one],
-            "title": f"{shapes.scene}: {_TITLES[one]}",
-            **shared,
+            "path": str((folder / name).absolute()),
+            "quantity": quantity,
+            "label": label,
+            "title": title,
+            "towards": towards.tolist(),
+            "elevation": elevation,
         }
-        for one in step
+        for name, quantity, label, title in looks
     ]
-    jobs.append(
-        {
-            "quantity": "joints",
-            "label": "Width of the joints as surveyed [mm]",
-            "title": f"{shapes.scene}: joints by their surveyed width\n{_note(shapes)}",
-            **shared,
-        }
-    )
-    names = [*(f"{one}-3d.png" for one in step), "joints-3d.png"]
-    with tempfile.TemporaryDirectory() as scratch:
-        surface = Path(scratch) / "surface.npz"
-        save_surface(surface, closing_surface(shapes, *step))
-        paths = [{"path": str((folder / name).absolute())} for name in names]
-        pictures = [job | path for job, path in zip(jobs, paths, strict=True)]
-        job_file = Path(scratch) / "job.json"
-        job_file.write_text(json.dumps({"surface": str(surface), "pictures": pictures}), encoding="utf-8")
-        draw_apart("pipelines.draw.offscreen.closing", job_file)
-    return tuple(names)
+    draw_apart("pipelines.draw.offscreen.closing", closing_surface(shapes, *step), pictures)
+    return tuple(name for name, *_ in looks)
 
 
 def flat_facades(shapes: ClosingShapes) -> tuple[Facade, ...]:
-    """The facades that elevations show truly, largest first: two of a corner; none of a vault, or of a dome."""
+    """Find the facades that an elevation shows undistorted, largest first; a vault or a dome has none."""
     seen = np.array([k for k, one in enumerate(shapes.stones) if not one.core])
     if not len(seen):
         return ()
@@ -118,7 +103,7 @@ def flat_facades(shapes: ClosingShapes) -> tuple[Facade, ...]:
 
 
 def viewpoint(shapes: ClosingShapes) -> tuple[Array, float]:
-    """From where all stones are looked at: the level direction to the viewer (3,), and the height above it [rad]."""
+    """Choose a viewpoint for all stones: horizontal direction to the viewer (3,), and elevation above it [rad]."""
     areas = np.array([one.area for one in shapes.stones])
     mean = areas @ np.array([one.normal for one in shapes.stones]) / areas.sum()
     level = mean * [1.0, 1.0, 0.0]
@@ -131,7 +116,7 @@ def viewpoint(shapes: ClosingShapes) -> tuple[Array, float]:
 
 
 def _along(shapes: ClosingShapes) -> Array:
-    """The level direction in which the fewest faces look: the axis of a vault, from its southern end."""
+    """Return the horizontal direction that the fewest faces look in: the axis of a vault, from its southern end."""
     areas = np.array([one.area for one in shapes.stones])
     level = np.array([one.normal for one in shapes.stones])[:, :2]
     _, directions = np.linalg.eigh((level * areas[:, None]).T @ level)
@@ -141,14 +126,16 @@ def _along(shapes: ClosingShapes) -> Array:
 
 
 def closing_surface(shapes: ClosingShapes, step: str = "moved") -> ClosingSurface:
-    """The faces of all stones and joints; corners have what simplifying, or closing the joints, moved."""
+    """Gather the faces of all stones and joints, with the movement of each corner in one of the two steps."""
     simplified = step == "simplified"
     solids = [one.surveyed if simplified else one.simple for one in shapes.stones]
     starts = np.cumsum([0, *(len(one.vertices) for one in solids)])
     shut = [one for one in shapes.joints if not one.joint.left_open and one.polygon is not None]
     left = [one for one in shapes.joints if one.joint.left_open and one.polygon is not None]
-    joint_points, joint_triangles, of_joint = _fans(shut)
-    gap_points, gap_triangles, _ = _fans(left)
+    joint_points, joint_triangles, of_joint = fan_polygons(
+        [one.polygon for one in shut if one.polygon is not None]
+    )
+    gap_points, gap_triangles, _ = fan_polygons([one.polygon for one in left if one.polygon is not None])
     return ClosingSurface(
         points=np.concatenate([one.vertices for one in solids]),
         triangles=np.concatenate(
@@ -166,15 +153,12 @@ def closing_surface(shapes: ClosingShapes, step: str = "moved") -> ClosingSurfac
     )
 
 
-_LABELS = {
-    "simplified": "Moved by simplifying the stones [mm]",
-    "moved": "Moved by closing the joints [mm]",
-}
+_LABELS = {"simplified": "Moved by simplifying the stones [mm]", "moved": "Moved by closing the joints [mm]"}
 _TITLES = {"simplified": "what simplifying moved", "moved": "what closing the joints moved"}
 
 
 def _steps(shapes: ClosingShapes) -> list[str]:
-    """What moved anything: simplifying, closing the joints, or both."""
+    """List the steps that moved any corner: simplifying, closing the joints, or both."""
     known = {
         "simplified": any(np.nanmax(one.simplified, initial=0.0) > _NOTHING for one in shapes.stones),
         "moved": any(np.nanmax(one.moved, initial=0.0) > _NOTHING for one in shapes.stones),
@@ -185,33 +169,13 @@ def _steps(shapes: ClosingShapes) -> list[str]:
 def _note(shapes: ClosingShapes) -> str:
     gaps = sum(one.kind == "gap" for one in shapes.places)
     overlaps = len(shapes.places) - gaps
-    said = [f"orange: {gaps} gap{'s' * (gaps > 1)}"] if gaps else []
-    said += [f"black: {overlaps} overlap{'s' * (overlaps > 1)}"] if overlaps else []
-    return "; ".join(said) or "no gaps, no overlaps"
-
-
-def _fans(joints: Sequence[DrawnJoint]) -> tuple[Array, Ints, Ints]:
-    """Corners, triangles, and the joint of each triangle."""
-    points: list[Array] = [np.zeros((0, 3))]
-    triangles: list[tuple[int, int, int]] = []
-    owners: list[int] = []
-    start = 0
-    for number, one in enumerate(joints):
-        assert one.polygon is not None
-        count = len(one.polygon)
-        points.append(one.polygon)
-        triangles += [(start, start + k, start + k + 1) for k in range(1, count - 1)]
-        owners += [number] * (count - 2)
-        start += count
-    return (
-        np.concatenate(points),
-        np.array(triangles, dtype=np.int64).reshape(-1, 3),
-        np.array(owners, dtype=np.int64),
-    )
+    parts = [f"orange: {gaps} gap{'s' * (gaps > 1)}"] if gaps else []
+    parts += [f"black: {overlaps} overlap{'s' * (overlaps > 1)}"] if overlaps else []
+    return "; ".join(parts) or "no gaps, no overlaps"
 
 
 def _edges(solid: Solid) -> Ints:
-    """(ne, 2) sides of the faces, each once."""
+    """List the sides of the faces, (ne, 2), each once."""
     sides = {
         (min(a, b), max(a, b))
         for face in solid.faces

@@ -1,12 +1,12 @@
-"""The history of a run as a small plot."""
+"""Time series of a run as a small plot."""
 
 import io
-import logging
 
 import numpy as np
 
 from mechanics.results.result import History
 from pipelines.arrays import Array
+from pipelines.draw.elevations.sheet import new_sheet
 
 __all__ = ["history_svg"]
 
@@ -18,12 +18,8 @@ _CURVES = (
 
 
 def history_svg(history: History) -> str:
-    """Speed, balance and residual against time, as an SVG element."""
-    # matplotlib tells on stderr that it builds its font cache, once per machine
-    logging.getLogger("matplotlib.font_manager").setLevel(logging.ERROR)
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(8.5, 3.6), layout="constrained")
+    """Plot speed, balance and residual against time; return an SVG element."""
+    figure = new_sheet((8.5, 3.6))
     axes = figure.subplots()
     for name, label, colour in _CURVES:
         values = _positive(getattr(history, name))
@@ -38,5 +34,5 @@ def history_svg(history: History) -> str:
 
 
 def _positive(values: Array) -> Array:
-    """Zeros cannot be drawn on a logarithmic axis: leave gaps there."""
+    """Replace zeros by NaN, since a logarithmic axis has no place for them."""
     return np.where(values > 0.0, values, np.nan)

@@ -1,13 +1,13 @@
-"""Pictures of a result: what to draw, in a process of its own, and what to say when it cannot be drawn."""
+"""Pictures of a result, drawn by a child process, and remedies where nothing can be drawn."""
 
-import json
 import os
 import re
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,11 +17,12 @@ from mechanics.scene.scene import Fidelity
 from mechanics.stones.materials import Material
 from moma.errors import MissingLibraryError
 from pipelines.arrays import Array
-from pipelines.draw.offscreen.surfaces import FIELDS, save_surface, stone_fields, wall_surface
+from pipelines.draw.offscreen.jobs import save_job
+from pipelines.draw.offscreen.surfaces import FIELDS, stone_fields, wall_surface
 
 __all__ = ["draw_apart", "draw_pictures", "missing", "package_of"]
 
-_TIMEOUT = 300.0  # seconds; software rendering of 10⁵ triangles takes a few
+_TIMEOUT = 300.0  # [s]; software rendering of 10⁵ triangles takes a few
 _PACKAGES = {
     "libGL": "libgl1",
     "libGLX": "libglx0",
@@ -46,9 +47,7 @@ _TITLES = {
     "pressure": "pressure in the joints",
     "resultants": "resultants of the joints",
 }
-_NOTES = {
-    "resultants": "strokes: as long as the force is large; blue: within the kern, red: outside",
-}
+_NOTES = {"resultants": "strokes: as long as the force is large; blue: within the kern, red: outside"}
 _ENDINGS = {
     Outcome.EQUILIBRIUM: "at equilibrium",
     Outcome.MOVING: "still moving",
@@ -57,13 +56,13 @@ _ENDINGS = {
 
 
 def package_of(message: str) -> str | None:
-    """Debian package of the shared library that a loader's message names; None if it names none."""
+    """Return the Debian package of the shared library that a loader's message names; None if it names none."""
     found = re.search(r"(lib[A-Za-z0-9_+-]+?)(?:-\d[\d.]*)?\.so", message)
     return _PACKAGES.get(found.group(1)) if found else None
 
 
 def draw_pictures(result: Result, folder: Path, names: Sequence[str], towards: Array) -> tuple[str, ...]:
-    """Draw the named pictures into a folder, seen from the side `towards`; the file names.
+    """Draw the named pictures into a folder, seen from the side `towards`; return the file names.
 
     Pictures for which `missing` has a reason are left out.
 
@@ -87,17 +86,12 @@ def draw_pictures(result: Result, folder: Path, names: Sequence[str], towards: A
         }
         for name in wanted
     ]
-    with tempfile.TemporaryDirectory() as scratch:
-        surface = Path(scratch) / "surface.npz"
-        save_surface(surface, wall_surface(result))
-        job_file = Path(scratch) / "job.json"
-        job_file.write_text(json.dumps({"surface": str(surface), "pictures": jobs}), encoding="utf-8")
-        draw_apart("pipelines.draw.offscreen.result", job_file)
+    draw_apart("pipelines.draw.offscreen.result", wall_surface(result), jobs)
     return tuple(f"{name}.png" for name in wanted)
 
 
 def missing(result: Result, name: str) -> str | None:
-    """Why a picture would show nothing of this result; None: it shows something."""
+    """Give the reason why a picture would show nothing of this result; None if it shows something."""
     stressed = [body.values for body in result.bodies if body.values is not None]
     if name in ("pressure", "resultants"):
         return None if result.joints.pressed.any() else "no joint is pressed"
@@ -110,7 +104,7 @@ def missing(result: Result, name: str) -> str | None:
 
 
 def _top(result: Result, name: str) -> float | None:
-    """End of the scale: what 1 % of the volume exceeds; None: the largest value."""
+    """Return the end of the scale, exceeded in 1 % of the volume; None stands for the largest value."""
     if name not in ("von_mises", "principal_tension", "principal_compression", "utilisation"):
         return None
     known = [
@@ -127,27 +121,34 @@ def _fields_of(body: BodyResult, material: Material, name: str) -> Array:
     return stone_fields(body, material)[:, FIELDS.index(name)]
 
 
-def draw_apart(module: str, job_file: Path) -> None:
-    """Run a module that draws on a job; its noise about displays is kept back unless it fails.
+def draw_apart(module: str, surface: object, pictures: Sequence[Mapping[str, Any]]) -> None:
+    """Draw pictures in a child process; its output about displays is suppressed unless it fails.
 
     EGL comes first: it needs no X server, and no X libraries either.
+
+    Parameters
+    ----------
+    module : with the function `draw`, of `pipelines.draw.offscreen`
+    surface : dataclass of arrays
+    pictures : absolute path of each, and what the module reads of it
 
     Raises
     ------
     MissingLibraryError : VTK cannot be loaded or cannot draw on this machine
     """
     reason = ""
-    for window in ("vtkEGLRenderWindow", None):
-        done = _attempt(module, job_file, window)
-        if done.returncode == 0:
-            return
-        if done.returncode == 3:
-            reason = done.stdout.strip()
-            package = package_of(reason) or "libgl1 libxrender1 libegl1"
-            raise MissingLibraryError(
-                f"VTK cannot be loaded: {reason}", remedy=f"install what it needs: apt-get install {package}"
-            )
-        reason = reason or _last_words(done.stderr) or f"it ended with code {done.returncode}"
+    with tempfile.TemporaryDirectory() as scratch:
+        job = save_job(Path(scratch), surface, pictures)
+        for window in ("vtkEGLRenderWindow", None):
+            done = _attempt(module, job, window)
+            if done.returncode == 0:
+                return
+            if done.returncode == 3:
+                reason = done.stdout.strip()
+                package = package_of(reason) or "libgl1 libxrender1 libegl1"
+                remedy = f"install what it needs: apt-get install {package}"
+                raise MissingLibraryError(f"VTK cannot be loaded: {reason}", remedy=remedy)
+            reason = reason or _last_words(done.stderr) or f"it ended with code {done.returncode}"
     raise MissingLibraryError(
         f"VTK cannot draw off screen: {reason}",
         remedy="install software rendering: apt-get install libegl1 libgl1-mesa-dri",
@@ -155,7 +156,7 @@ def draw_apart(module: str, job_file: Path) -> None:
 
 
 def _attempt(module: str, job_file: Path, window: str | None) -> "subprocess.CompletedProcess[str]":
-    """One process that draws, with the given kind of VTK window; None: the one that VTK would take."""
+    """Run one drawing process with the given kind of VTK window; None leaves the choice to VTK."""
     root = str(Path(__file__).resolve().parents[2])
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([root, os.environ.get("PYTHONPATH", "")])}
     if window is not None:
@@ -175,7 +176,7 @@ def _attempt(module: str, job_file: Path, window: str | None) -> "subprocess.Com
 
 
 def _last_words(stderr: str) -> str:
-    """The last line that a process said, without VTK's time stamps and colours."""
+    """Return the last line of a process's output, without VTK's time stamps and colours."""
     lines = [re.sub(r"\x1b\[[0-9;]*m", "", line).strip() for line in stderr.splitlines()]
     last = next((line for line in reversed(lines) if line), "")
     return re.split(r"(?:WARN|ERR)\| ", last)[-1][:200].rstrip(".")

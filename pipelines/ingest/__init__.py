@@ -1,1 +1,5 @@
-"""From survey files to the database (`moma ingest`)."""
+"""From survey files to the database (`moma ingest`).
+
+Public: `ingest` (ingest); `relate`, `RelationReport` (relate); `reading_options` (reading_options); `kind_rules`,
+`KindRule` (kind_rules); `IngestReport`, `FileReport` (report); `stone_record`, `surveyed_block` (records).
+"""

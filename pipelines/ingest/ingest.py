@@ -1,4 +1,4 @@
-"""Survey files into the database: read, fit, outline, find the depth, extrude, store; one stone at a time."""
+"""Ingest of survey files: read, fit, outline, find the depth, extrude and store, one stone at a time."""
 
 import hashlib
 import os
@@ -15,7 +15,7 @@ from archmodel.store.stones import store_survey
 from archmodel.tables.entities import Entity, kind_named
 from mechanics.dynamics.progress import Listener, Progress, silent
 from moma.errors import NoDatabaseError, SurveyError, UsageError
-from pipelines.ingest.kind_rules import KindRule, check_kinds, ruled
+from pipelines.ingest.kind_rules import KindRule, apply_rules, check_kinds
 from pipelines.ingest.reading_options import check_survey_file
 from pipelines.ingest.records import frame_record, stone_record
 from pipelines.ingest.rejects import check_targets, default_path, rejects_text
@@ -30,9 +30,9 @@ from survey.stones import survey_stones
 __all__ = ["ingest"]
 
 
-_PATIENCE = 300.0
-"""How long to wait for another program that writes [s]: not less than a large survey takes, since waiting is cheaper
-than fitting it anew."""
+_PATIENCE = (
+    300.0  # longest wait for another writer [s]; waiting for a large survey is cheaper than fitting again
+)
 
 
 def ingest(
@@ -42,22 +42,21 @@ def ingest(
     progress: Listener = silent,
     *,
     options: ReadingOptions | None = None,
-    keep_going: bool = False,
-    rejects: str | Path | None = None,
+    keep_going: bool | str | Path = False,
     again: bool = False,
     rules: Sequence[KindRule] = (),
 ) -> IngestReport:
-    """Take survey files into the database: all of them, or, if anything is wrong in any, none.
+    """Ingest survey files: all of them or, if anything is wrong in any, none.
 
     Parameters
     ----------
     paths : survey files
-    url : of the database, made if it does not exist
+    url : of the database, created if it does not exist
     format : name of their format
-    progress : told after every stone
-    options : what the files leave unsaid
-    keep_going : take the good stones of each file, and write the others to a file of rejects with the reasons
-    rejects : that file, if there is one survey file; by default ``NAME.rejects.SUFFIX`` beside each survey file
+    progress : called after every stone
+    options : defaults for what the files leave out
+    keep_going : ingest the good stones of each file, and write the others with the reasons to a file of rejects: the
+        given one, for a single survey file, or, if True, ``NAME.rejects.SUFFIX`` beside each survey file
     again : stones that are in the database already were measured again: their old measurements are kept as superseded;
         otherwise they are an error
     rules : which solids are of which kind
@@ -73,15 +72,16 @@ def ingest(
     surveys = [Path(path) for path in paths]
     if not surveys:
         raise UsageError("no survey file", remedy="name at least one")
+    rejects = None if isinstance(keep_going, bool) else Path(keep_going)
     if rejects is not None and len(surveys) > 1:
         raise UsageError(
-            f"one file of rejects for {len(surveys)} survey files", remedy="take in one file at a time"
+            f"one file of rejects for {len(surveys)} survey files", remedy="ingest one file at a time"
         )
     if rules and format != "solids":
-        remedy = "give it with --format solids; surveys say the kind of each stone"
-        raise UsageError(f"a rule for solids, and format {format}", where=rules[0].option, remedy=remedy)
+        remedy = "give it with --format solids; surveys give the kind of each stone"
+        raise UsageError(f"a rule for solids with format {format}", where=rules[0].option, remedy=remedy)
     _check_files(surveys)
-    targets = [Path(rejects) if rejects is not None else default_path(survey) for survey in surveys]
+    targets = [rejects or default_path(survey) for survey in surveys]
     if keep_going:
         check_targets(targets, surveys)
     with ExitStack() as held:
@@ -89,7 +89,7 @@ def ingest(
         check_kinds(rules)
         spools = [held.enter_context(Spool()) for _ in surveys]
         tallies = [
-            _measure(path, spool, format, options, rules, keep_going, progress)
+            _measure(path, spool, format, options, rules, bool(keep_going), progress)
             for path, spool in zip(surveys, spools, strict=True)
         ]
         if len(surveys) > 1:
@@ -102,8 +102,8 @@ def ingest(
         with open_database(url, lock_timeout=_PATIENCE) as database, database.session() as session:
             solids = KnownSolids()
             for tally, spool in zip(tallies, spools, strict=True):
-                stones = _told(spool, tally, progress)
-                # of stones that are measured again, the numbers are not the next ones
+                stones = _with_progress(spool, tally, progress)
+                # stones measured again keep their numbers, so that their solids cannot be numbered in advance
                 _store(session, tally, stones if again else _kept(stones, session, solids), again)
             progress(Progress("relate", 0, None))
             relate(session, only=[number for tally in tallies for number in tally.stored], solids=solids)
@@ -115,11 +115,11 @@ def ingest(
 
 
 def _open_if_there(url: str, held: ExitStack) -> None:
-    """Open the database early: the kinds that it registers are known then, and what is wrong with it is said first."""
+    """Open an existing database early, to know its registered kinds and to report its faults first."""
     try:
         held.enter_context(open_database(url, create=False))
     except NoDatabaseError:
-        home_of(url).engine(create=True).dispose()  # whether one could be made
+        home_of(url).engine(create=True).dispose()  # fails if none could be created
 
 
 def _check_files(surveys: Sequence[Path]) -> None:
@@ -127,12 +127,12 @@ def _check_files(surveys: Sequence[Path]) -> None:
     for path in surveys:
         check_survey_file(path)
         if path.resolve() in seen:
-            raise UsageError("is named twice", where=str(path), remedy="name each survey file once")
+            raise UsageError("is given twice", where=str(path), remedy="name each survey file once")
         seen.add(path.resolve())
 
 
 def _check_codes(tallies: Sequence[Tally], spools: Sequence[Spool]) -> None:
-    """Refuse files that contradict each other before a database is made for them."""
+    """Refuse files that give one code to two stones, before a database is created for them."""
     places: dict[str, str] = {}
     for tally, spool in zip(tallies, spools, strict=True):
         for stone in spool:
@@ -146,7 +146,7 @@ _LISTS = ("pnezd", "penzd")
 
 
 def _listed_stations(tally: Tally, options: ReadingOptions | None) -> list[int]:
-    """Lines of the stations that stand among the points of a list, not in its header file."""
+    """List the lines of the stations that are given among the points, not in the header file."""
     elsewhere = () if options is None or options.head is None else options.head.stations
     known = {one.name for one in elsewhere}
     return [one.line for one in tally.stream.head.stations if one.name not in known]
@@ -161,11 +161,11 @@ def _measure(
     keep_going: bool,
     progress: Listener,
 ) -> Tally:
-    """The good stones of one file into a spool; the first bad one ends it, or is kept for the rejects."""
+    """Write the good stones of one file into a spool; raise at the first bad one, or keep it for the rejects."""
     tally = Tally(path, survey_stones(open_survey(path, format, options)))
     stage, head, kinds = f"fit {path.name}", tally.stream.head, set[str]()
     for one in tally.stream.stones:
-        made = one if isinstance(one, Reject) else _of_known_kind(ruled(one, rules), head.path, kinds)
+        made = one if isinstance(one, Reject) else _of_known_kind(apply_rules(one, rules), head.path, kinds)
         if not isinstance(made, Reject):
             tally.count(made)
             spool.append(stone_record(made))
@@ -176,7 +176,7 @@ def _measure(
             raise made.error
     if not tally.stones:
         first = f"; the first: {tally.refused[0].error}" if tally.refused else ""
-        what = f"none of its {len(tally.refused)} stones can be taken in{first}"
+        what = f"none of its {len(tally.refused)} stones can be ingested{first}"
         raise SurveyError(what, where=str(path), remedy="correct the file")
     return tally
 
@@ -197,7 +197,7 @@ def _store(session: Session, tally: Tally, stones: Iterator[StoneRecord], again:
     tally.again = len(stored.again)
 
 
-def _told(stones: Iterable[StoneRecord], tally: Tally, progress: Listener) -> Iterator[StoneRecord]:
+def _with_progress(stones: Iterable[StoneRecord], tally: Tally, progress: Listener) -> Iterator[StoneRecord]:
     total = tally.stones.total()
     for number, stone in enumerate(stones, start=1):
         progress(Progress(f"store {tally.path.name}", number, total, stone.code))
@@ -205,14 +205,14 @@ def _told(stones: Iterable[StoneRecord], tally: Tally, progress: Listener) -> It
 
 
 def _kept(stones: Iterator[StoneRecord], session: Session, solids: KnownSolids) -> Iterator[StoneRecord]:
-    """The stones on their way to the database, and their solids for their relations."""
+    """Pass stones on to the database, and keep their solids for the relations."""
     for number, stone in enumerate(stones, start=first_free_id(session, Entity)):
         solids.add(number, stone.solid_vertices, stone.solid_faces)
         yield stone
 
 
 def _of_known_kind(block: SurveyedBlock, path: str, known: set[str]) -> SurveyedBlock | Reject:
-    """The stone, if the hierarchy has its kind; `known` holds kinds that were found there, and is added to."""
+    """Return the stone, or a reject if the hierarchy has no such kind; `known` collects kinds found there."""
     if block.kind in known:
         return block
     try:
@@ -232,7 +232,7 @@ def _sha256(path: Path) -> str:
 
 @contextmanager
 def _published(path: Path, text: bytes) -> Iterator[None]:
-    """A file that appears whole, and only if nothing fails until the end of the block."""
+    """Write a file that appears complete, and only if nothing fails until the end of the block."""
     part = path.with_name(f"{path.name}.part")
     try:
         part.write_bytes(text)

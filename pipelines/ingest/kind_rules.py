@@ -1,8 +1,8 @@
-"""What kind a solid is, by rule: ``support: z < 0.01``.
+"""Rules for the kinds of solids, such as ``support: z < 0.01``.
 
-The expressions are those of ``moma query --where``, without functions, of what a solid says of itself. `x`, `y` and
-`z` are the lower corner of its box, `x_max`, `y_max` and `z_max` the upper one: ``z < 0.01`` is what stands on the
-ground, however high it is.
+The expressions are those of ``moma query --where``, without functions, over attributes of a solid. `x`, `y` and
+`z` are the lower corner of its box, `x_max`, `y_max` and `z_max` the upper one: ``z < 0.01`` holds for solids that
+stand on the ground, however high they are.
 """
 
 import difflib
@@ -18,7 +18,7 @@ from moma.errors import UsageError
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.solids import area_vector
 
-__all__ = ["RULE_ATTRIBUTES", "KindRule", "check_kinds", "kind_rules", "ruled"]
+__all__ = ["RULE_ATTRIBUTES", "KindRule", "apply_rules", "check_kinds", "kind_rules"]
 
 Value = float | str | None
 
@@ -37,7 +37,7 @@ RULE_ATTRIBUTES: Mapping[str, str] = {
     "height": "extent of its face upwards [m]",
     "depth": "how far it reaches behind its face [m]",
 }
-"""What a rule may ask for."""
+"""Attributes in a rule."""
 
 _TEXTS = frozenset({"code", "kind"})
 _SUPPORT = "support"
@@ -53,7 +53,7 @@ _OPERATORS: Mapping[str, Callable[[float | str, float | str], bool]] = {
 
 @dataclass(frozen=True)
 class KindRule:
-    """The kind of all stones for which an expression holds.
+    """Kind of all stones for which an expression holds.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class KindRule:
 
 
 def kind_rules(texts: Sequence[str] = (), supports: Sequence[str] = ()) -> tuple[KindRule, ...]:
-    """Read rules; of those that hold for a stone the last one counts, and those of supports after all others.
+    """Read rules; the last one that holds for a stone counts, and those of supports come after all others.
 
     Parameters
     ----------
@@ -105,8 +105,8 @@ def check_kinds(rules: Sequence[KindRule]) -> None:
             raise error.at(rule.option) from error
 
 
-def ruled(block: SurveyedBlock, rules: Sequence[KindRule]) -> SurveyedBlock:
-    """The stone with the kind that the rules give it."""
+def apply_rules(block: SurveyedBlock, rules: Sequence[KindRule]) -> SurveyedBlock:
+    """Give a stone its kind by the rules."""
     if not rules:
         return block
     values = _values(block)
@@ -142,7 +142,7 @@ def _checked(expression: str) -> Node:
 
 
 def _check(node: Node) -> None:
-    """Refuse what a solid does not say of itself, and numbers against texts."""
+    """Refuse attributes that a solid does not have, and comparisons of numbers with texts."""
     match node:
         case All(operands) | AnyOf(operands):
             for operand in operands:
@@ -173,7 +173,7 @@ def _check_attribute(token: Token) -> None:
 
 
 def _check_value(attribute: Token, value: Token) -> None:
-    """A number is compared with a number, or with another attribute that is one."""
+    """Refuse to compare a number with anything other than a number or a numeric attribute."""
     if attribute.text in _TEXTS or value.role == "number":
         return
     if value.role != "word" or value.text not in RULE_ATTRIBUTES or value.text in _TEXTS:
@@ -182,7 +182,7 @@ def _check_value(attribute: Token, value: Token) -> None:
 
 
 def _holds(node: Node, values: Mapping[str, Value]) -> bool | None:
-    """Whether an expression is true of a stone; None where it asks for what the stone does not say."""
+    """Evaluate an expression for a stone; None where a value is missing."""
     match node:
         case All(operands):
             found = [_holds(one, values) for one in operands]
@@ -220,7 +220,7 @@ def _value(attribute: Token, token: Token, values: Mapping[str, Value]) -> Value
 
 
 def _matches(text: str, pattern: str) -> bool:
-    """As in queries: % stands for any text, _ for one character; capitals are as small letters."""
+    """Match a pattern as in queries: % stands for any text, _ for one character; case is ignored."""
     escaped = "".join(_wild(pattern))
     return fnmatch.fnmatchcase(text.lower(), escaped.lower())
 

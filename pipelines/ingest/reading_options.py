@@ -1,4 +1,4 @@
-"""What a user says of survey files beside their names, as the readers want it."""
+"""Reading options from what a user gives beside the names of survey files."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -15,7 +15,7 @@ UNITS: Mapping[str, float] = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "ft"
 
 
 def check_survey_file(path: Path) -> None:
-    """Refuse what is no file, before anything is read."""
+    """Refuse a path that is not a file, before anything is read."""
     if not path.is_file():
         what = "is a folder" if path.is_dir() else "no such file"
         raise UsageError(what, where=str(path), remedy="name a survey file")
@@ -29,14 +29,14 @@ def reading_options(
     unit: str | None = None,
     snap: float | None = None,
 ) -> ReadingOptions:
-    """Gather the options of a reader; what is None keeps its default.
+    """Gather the options of a reader; None keeps the default.
 
     Parameters
     ----------
-    header : file with a head, for formats that have none
+    header : header file, for formats without a header
     codes : template of the codes of a point list
-    kind : of stones that do not say it
-    sigma : of a coordinate, where the file does not say it; it holds before that of the header file [m]
+    kind : of stones without one
+    sigma : of a coordinate, where the file has none; it takes precedence over the header file [m]
     unit : one of `UNITS`, in which solids are given
     snap : tolerance within which faces of neighbouring solids are brought into one plane [m]
 

@@ -1,6 +1,7 @@
-"""Between the survey pillar's stones and the records that the database keeps of them."""
+"""Conversion between surveyed stones and the records of the database."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, get_args
 
@@ -19,45 +20,33 @@ from survey.registration.site_frame import SiteTransform
 __all__ = ["frame_record", "stone_record", "surveyed_block"]
 
 
+_STONE = ("code", "kind", "course")
+_MEASURED = (
+    "line", "vertices", "points", "sigma", "notes", "zone", "station", "photograph", "image", "sigmas", "names",
+)  # fmt: skip
+_PLANE = ("normal", "offset", "centroid", "axes", "covariance", "rms", "redundancy")
+"""Names that stones and their records share: of the stone, of its BlockRecord, of its FaceFit."""
+
+
 def stone_record(block: SurveyedBlock) -> StoneRecord:
-    """What the database keeps of a stone."""
+    """Convert a surveyed stone to its record."""
     face, fit, record = block.face, block.face.fit, block.face.record
     return StoneRecord(
-        code=block.code,
-        kind=block.kind,
-        course=block.course,
-        line=record.line,
-        vertices=record.vertices,
-        points=record.points,
-        sigma=record.sigma,
-        normal=fit.normal,
-        offset=fit.offset,
-        centroid=fit.centroid,
-        axes=fit.axes,
-        covariance=fit.covariance,
-        rms=fit.rms,
-        redundancy=fit.redundancy,
+        **_values(block, _STONE),
+        **_values(record, _MEASURED),
+        **_values(fit, _PLANE),
+        **_values(face.measures, ("length", "height", "area")),
         rejected=face.rejected_points,
         outline=face.outline,
-        length=face.measures.length,
-        height=face.measures.height,
-        area=face.measures.area,
         depth=block.depth.value,
         depth_sigma=block.depth.sigma,
         depth_source=block.depth.source,
         solid_vertices=block.solid.vertices,
         solid_faces=block.solid.faces,
         vertex_sigma=block.vertex_sigma,
-        notes=record.notes,
-        zone=record.zone,
         depth_origin=block.depth.origin,
         provenance=face.provenance.source,
         provenance_text=face.provenance.text,
-        station=record.station,
-        photograph=record.photograph,
-        image=record.image,
-        sigmas=record.sigmas,
-        names=record.names,
         rejected_vertices=face.rejected_vertices,
         shape=str(face.shape.kind),
         shape_text=face.shape.text,
@@ -69,49 +58,28 @@ def stone_record(block: SurveyedBlock) -> StoneRecord:
 
 
 def surveyed_block(stone: StoneRecord) -> SurveyedBlock:
-    """The stone as the survey pillar knows it, from what the database keeps of it.
+    """Restore a surveyed stone from its record.
 
-    A face that was measured in space is fitted anew: from the same measurements it is the same face, and the
+    A face that was measured in space is fitted again: from the same measurements it is the same face, and the
     database need not keep what follows from others of its columns.
     """
-    measured = _block_record(stone)
+    measured = BlockRecord(**_values(stone, (*_STONE, *_MEASURED)))
     depth = Depth(stone.depth, stone.depth_sigma, stone.depth_source, _origin(stone), stone.line)
     extrusion = Extrusion(stone.direction, stone.tail)
     if stone.provenance == "points":
-        # any point on the stored side of the plane tells which side is outside
+        # any point on the stored side of the plane defines the outside
         outside = stone.outline.mean(axis=0) + 100.0 * stone.normal
         return extrude(outline_face(measured, outside), depth, extrusion)
     face = _kept_face(stone, measured)
     if stone.provenance == "photograph":
         return extrude(face, depth, extrusion)
     return SurveyedBlock(
-        code=stone.code,
-        kind=stone.kind,
-        course=stone.course,
+        **_values(stone, _STONE),
         face=face,
         depth=depth,
         extrusion=extrusion,
         solid=Solid(stone.code, stone.solid_vertices, stone.solid_faces),
         vertex_sigma=stone.vertex_sigma,
-    )
-
-
-def _block_record(stone: StoneRecord) -> BlockRecord:
-    return BlockRecord(
-        code=stone.code,
-        kind=stone.kind,
-        course=stone.course,
-        vertices=stone.vertices,
-        points=stone.points,
-        sigma=stone.sigma,
-        line=stone.line,
-        notes=stone.notes,
-        zone=stone.zone,
-        station=stone.station,
-        photograph=stone.photograph,
-        image=stone.image,
-        sigmas=stone.sigmas,
-        names=stone.names,
     )
 
 
@@ -124,24 +92,18 @@ def _source(stone: StoneRecord) -> Source:
 
 
 def _kept_face(stone: StoneRecord, measured: BlockRecord) -> Face:
-    """A face whose plane was not fitted to its corners: that of its neighbours, or the side of a solid."""
+    """Restore a face whose plane was not fitted to its corners: its neighbours' plane, or the side of a solid."""
     residuals = (stone.vertices - stone.centroid) @ stone.normal
     on_solid = stone.provenance in ("solid", "hypothesis")
     fit = FaceFit(
-        normal=stone.normal,
-        offset=stone.offset,
-        centroid=stone.centroid,
-        axes=stone.axes,
+        **_values(stone, _PLANE),
         singular_values=np.full(3, np.nan),
-        covariance=stone.covariance,
-        rms=stone.rms,
         sigma0=float("nan"),
-        redundancy=stone.redundancy,
         rejected=stone.rejected,
         residuals=residuals if on_solid else np.empty(0),
         standardised=np.zeros(len(residuals)) if on_solid else np.empty(0),
     )
-    # a lifted corner is on the plane but for rounding, and stays where it is
+    # a lifted corner lies on the plane to within rounding, and stays where it is
     corners = stone.vertices - np.outer(residuals, stone.normal) if on_solid else stone.vertices
     face = face_on(
         fit,
@@ -154,7 +116,7 @@ def _kept_face(stone: StoneRecord, measured: BlockRecord) -> Face:
 
 
 def frame_record(transform: SiteTransform | None) -> dict[str, Any] | None:
-    """The transform with its precision and what each control point says of it; None if there is none."""
+    """Describe the transform with its precision and the residuals of its control points; None without one."""
     if transform is None:
         return None
     points = zip(transform.names, transform.residuals.tolist(), transform.standardised.tolist(), strict=True)
@@ -177,6 +139,10 @@ def frame_record(transform: SiteTransform | None) -> dict[str, Any] | None:
             for name, residual, standardised in points
         ],
     }
+
+
+def _values(source: object, names: Iterable[str]) -> dict[str, Any]:
+    return {name: getattr(source, name) for name in names}
 
 
 def _finite(value: float) -> float | None:

@@ -1,7 +1,6 @@
-"""Stones that could not be taken in: their lines of the survey file, each with the reason, to be corrected.
+"""Files of rejected stones: their lines of the survey file, each with the reason, ready for correction.
 
-What is written is itself a file of the survey's format, with the head of the survey: once corrected it can be
-taken in by itself.
+A file of rejects has the format and the header of the survey: once corrected, it can be ingested by itself.
 """
 
 import codecs
@@ -17,13 +16,13 @@ from survey.records.survey import Reject
 __all__ = ["MARK", "check_targets", "default_path", "rejects_text"]
 
 MARK = b"# rejected by moma"
-"""What the files begin with, or have as their second line, by which they are known again."""
+"""First or second line of the files, by which they are recognised."""
 
 _STONE = re.compile(rb"\s*stone\b")
 
 
 def default_path(survey: Path) -> Path:
-    """Where the rejects of a survey file go if nobody says: beside it, ``NAME.rejects.SUFFIX``."""
+    """Return the default file for the rejects of a survey file: beside it, ``NAME.rejects.SUFFIX``."""
     suffix = survey.suffix if survey.suffix.lower() not in _SOLIDS else ".txt"
     return survey.with_name(f"{survey.stem}.rejects{suffix}")
 
@@ -32,17 +31,17 @@ _SOLIDS = frozenset({".obj", ".ply", ".stl", ".msh"})
 
 
 def check_targets(targets: Sequence[Path], surveys: Sequence[Path]) -> None:
-    """Check that files of rejects replace no survey, nor each other, nor anything else of the user's.
+    """Check that files of rejects replace neither a survey, nor each other, nor any other file of the user.
 
     Parameters
     ----------
-    targets : the files, that of each survey
+    targets : file of rejects of each survey
     surveys : the survey files
 
     Raises
     ------
     UsageError
-        naming what would be lost
+        naming the file that would be lost
     """
     read = {survey.resolve() for survey in surveys}
     for number, target in enumerate(targets):
@@ -51,19 +50,19 @@ def check_targets(targets: Sequence[Path], surveys: Sequence[Path]) -> None:
             raise UsageError("is the survey file itself", where=str(target), remedy=remedy)
         if target in targets[:number]:
             what = f"would hold the rejects of {surveys[targets.index(target)]} and of {surveys[number]}"
-            raise UsageError(what, where=str(target), remedy="take in one file at a time")
+            raise UsageError(what, where=str(target), remedy="ingest one file at a time")
         _check_replaceable(target)
 
 
 def rejects_text(survey: Path, format: str, rejects: Sequence[Reject], kept: Iterable[int] = ()) -> bytes:
-    """The rejected stones of a survey file in its own format.
+    """Write the rejected stones of a survey file in its own format.
 
     Parameters
     ----------
     survey : the file
     format : name of its format
-    rejects : what could not be taken in
-    kept : lines of the survey that its stones cannot do without, such as stations in a list of points
+    rejects : stones that could not be ingested
+    kept : lines of the survey that its stones depend on, such as stations in a list of points
     """
     head = [] if format == "solids" else _head_lines(survey, format)
     ordered = sorted(rejects, key=lambda one: one.spans[0].start if one.spans else 0)
@@ -80,12 +79,12 @@ def rejects_text(survey: Path, format: str, rejects: Sequence[Reject], kept: Ite
 
 
 def _digest(lines: Sequence[bytes]) -> str:
-    """By which a file of rejects is known to be as it was written, but for the line that says it."""
+    """Compute the digest that shows whether a file of rejects was changed after it was written."""
     return hashlib.sha256(b"".join(lines)).hexdigest()[:16]
 
 
 def _check_replaceable(path: Path) -> None:
-    """Refuse a file that this program has not written, or that was changed since."""
+    """Refuse a file that MOMA has not written, or that was changed since."""
     if path.is_dir():
         raise UsageError("is a folder", where=str(path), remedy="name a file with --rejects")
     if not path.exists():
@@ -93,16 +92,16 @@ def _check_replaceable(path: Path) -> None:
     lines = path.read_bytes().splitlines(keepends=True)
     mark = next((line for line in lines[:2] if line.startswith(MARK)), None)
     if mark is None:
-        what = "is there already, and is not a file of rejects"
+        what = "exists and is not a file of rejects"
     elif mark.split()[-1].decode("ascii", "replace") != _digest([line for line in lines if line is not mark]):
-        what = "is there already, and was changed since it was written"
+        what = "exists and was changed since it was written"
     else:
         return
     raise UsageError(what, where=str(path), remedy="move it away, or name another file with --rejects")
 
 
 def _head_lines(survey: Path, format: str) -> list[bytes]:
-    """The lines that hold for all stones of a file."""
+    """Return the lines that hold for all stones of a file."""
     head = []
     with survey.open("rb") as file:
         for line in _ended(file):
@@ -124,7 +123,7 @@ def _picked(survey: Path, wanted: set[int]) -> Iterator[tuple[int, bytes]]:
 
 
 def _ended(file: BinaryIO) -> Iterator[bytes]:
-    """Lines, each with a line feed at its end, without a byte order mark: other lines will come before them."""
+    """Yield lines that end in a line feed, without a byte order mark, since other lines will precede them."""
     for number, line in enumerate(file):
         plain = line.removeprefix(codecs.BOM_UTF8) if number == 0 else line
         yield plain if plain.endswith(b"\n") else plain + b"\n"

@@ -1,4 +1,4 @@
-"""How stones stand to one another: from the solids in the database to relations, courses and arches in it."""
+"""Relations of stones: from the solids in the database to its relations, courses and arches."""
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass, field
@@ -37,13 +37,13 @@ Faces = tuple[tuple[int, ...], ...]
 
 @dataclass
 class KnownSolids:
-    """Solids that the caller has at hand, so that they are not read back; to be filled stone by stone."""
+    """Solids at hand, filled stone by stone, so that they need not be read back from the database."""
 
     ids: list[int] = field(default_factory=list)
     _builder: PolyhedraBuilder = field(default_factory=PolyhedraBuilder)
 
     def add(self, entity: int, vertices: Array, faces: Faces) -> None:
-        """The solid of one entity, by its number: vertices (nv, 3) [m] and faces; one without faces is none."""
+        """Add the solid of an entity, by its number: vertices (nv, 3) [m] and faces; ignore one without faces."""
         if not faces:
             return
         self.ids.append(entity)
@@ -53,11 +53,11 @@ class KnownSolids:
         return len(self.ids)
 
     def build(self) -> Polyhedra:
-        """All solids, in the order of `ids`."""
+        """Assemble all solids in the order of `ids`."""
         return self._builder.build()
 
     def box(self, entities: Collection[int]) -> tuple[Array, Array] | None:
-        """Lower and upper corner (3,) of the box around some of the solids; None if none of them is here [m]."""
+        """Return the lower and upper corner (3,) of the box around some of the solids; None without any of them [m]."""
         shapes, wanted = self.build(), np.isin(np.array(self.ids, dtype=np.int64), list(entities))
         if not wanted.any():
             return None
@@ -69,14 +69,14 @@ class KnownSolids:
 
 @dataclass(frozen=True)
 class RelationReport:
-    """What became of the computed relations of a database.
+    """Changes of the computed relations of a database.
 
     Attributes
     ----------
-    stones : how many were looked at
+    stones : number of stones considered
     relations : changes by kind of relation
-    structures, memberships : changes of zones, courses and arches, and of who belongs to them
-    values : how many attributes of stones were filled in or corrected
+    structures, memberships : changes of zones, courses and arches, and of their members
+    values : number of attributes of stones that were added or corrected
     entry : number of the act of recording; None if nothing changed
     """
 
@@ -94,17 +94,17 @@ def relate(
     only: Collection[int] | None = None,
     solids: KnownSolids | None = None,
 ) -> RelationReport:
-    """Compute how stones stand to one another, and keep what follows: relations, courses, arches, tails of headers.
+    """Compute the relations of stones and what follows from them: courses, arches, tails of headers.
 
-    What is found again stays as it is; what is no longer found is superseded; what was declared is left alone.
-    A second time, nothing changes.
+    Rows found again stay, rows no longer found are superseded, and declared ones are left alone.
+    A repeated call changes nothing.
 
     Parameters
     ----------
     session : a writing session
-    settings : tolerances; None: those with which this database was related last, else RelationSettings()
-    only : numbers of entities; their relations alone are computed, with all stones near them. None: of all
-    solids : that are at hand; those that are missing are read from the database, and added
+    settings : tolerances; None: those of the last call on this database, initially RelationSettings()
+    only : numbers of entities whose relations, with all stones near them, are computed; None: all
+    solids : solids at hand; missing ones are read from the database and added
     """
     settings = settings or held_settings(session)
     act = Act(session, "the solids of the stones", asdict(settings))
@@ -123,7 +123,7 @@ def relate(
     arches = find_arches(session)
     changes.append(store_parts(session, arch_parts(session, arches), act, kinds=("arch",)))
     values += give_values(session, arch_values(arches), act)
-    session.expire_all()  # objects that were loaded before have the values of before
+    session.expire_all()  # objects loaded earlier hold outdated values
     return RelationReport(
         stones=len(ids),
         relations=relations,
@@ -135,7 +135,7 @@ def relate(
 
 
 def _chosen(session: Session, only: Collection[int]) -> set[int] | None:
-    """The entities of which the relations are computed; None if they are all that there are."""
+    """Return the entities whose relations are computed; None if these are all."""
     chosen = set(only)
     count = session.scalar(select(func.count()).select_from(Entity))
     return None if count == len(chosen) else chosen
@@ -144,7 +144,7 @@ def _chosen(session: Session, only: Collection[int]) -> set[int] | None:
 def _stones(
     session: Session, settings: RelationSettings, only: set[int] | None, solids: KnownSolids
 ) -> tuple[StoneColumns, KnownSolids]:
-    """All stones, or those that come near the chosen ones, and their solids."""
+    """Load all stones, or those near the chosen ones, and their solids."""
     if only is None:
         stones = stone_columns(session)
     else:
@@ -158,7 +158,7 @@ def _stones(
 
 
 def _read_missing(session: Session, wanted: set[int] | None, solids: KnownSolids) -> None:
-    """Add the solids of some entities, or of all, that are not at hand."""
+    """Read the solids of some entities, or of all, that are not at hand."""
     conditions: Iterable[ColumnElement[bool]] = [ENTITY.id.is_not(None)]
     if wanted is not None:
         conditions = id_conditions(ENTITY.id, wanted.difference(solids.ids))
@@ -170,7 +170,7 @@ def _read_missing(session: Session, wanted: set[int] | None, solids: KnownSolids
 def _relations(
     stones: StoneColumns, solids: KnownSolids, settings: RelationSettings, only: set[int] | None
 ) -> tuple[FoundRelations, Ints]:
-    """Relations among the stones, and the numbers of the entities that they speak of, growing."""
+    """Find the relations of the stones; return them with the numbers of the entities, ascending."""
     ids = np.array(solids.ids, dtype=np.int64)
     wanted = np.isin(ids, stones.ids)
     among = wanted if only is None else wanted & np.isin(ids, list(only))

@@ -1,4 +1,4 @@
-"""What became of survey files: counted while their stones go by, and told at the end."""
+"""Report on ingested survey files, counted stone by stone."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -19,13 +19,13 @@ from survey.stones import SurveyedStream
 __all__ = ["FileReport", "IngestReport", "Refusal", "SolidsReport", "Tally"]
 
 
-# coordinates that end so soon may be rounded; with fewer decimals they are whole centimetres by design
-_LEAST_DECIMALS, _MOST_DECIMALS = 3, 6
+_LEAST_DECIMALS = 3  # of rounded coordinates [m]; with fewer they are whole centimetres by design
+_MOST_DECIMALS = 6  # of rounded coordinates [m]; with more they are not rounded
 
 
 @dataclass(frozen=True)
 class Refusal:
-    """A stone that was not taken in, and why."""
+    """A rejected stone and the reason."""
 
     code: str | None
     reason: str
@@ -33,15 +33,15 @@ class Refusal:
 
 @dataclass(frozen=True)
 class SolidsReport:
-    """What the solids of a file are like.
+    """Properties of the solids of a file.
 
     Attributes
     ----------
-    convex : how many are
+    convex : number of convex solids
     not_convex : codes of the others
-    remarks : what was settled or moved to make them solids with plane faces, by code
-    snapping : what bringing their faces into common planes has changed; None if that was not asked for
-    decimals : of all their coordinates in metres, 3 to 6 at most; None if they have fewer, or more
+    remarks : changes that made them solids with plane faces, by code
+    snapping : changes by bringing their faces into common planes; None if not requested
+    decimals : decimals of their coordinates in metres, from 3 to 6; None if they have fewer or more
     """
 
     convex: int
@@ -53,22 +53,22 @@ class SolidsReport:
 
 @dataclass(frozen=True)
 class FileReport:
-    """What became of one file.
+    """Report on one file.
 
     Attributes
     ----------
     path : the file
     survey : name of the survey in the database
-    stones : how many it holds, by kind
+    stones : number of its stones, by kind
     rejected : measured points left out as blunders, by stone code
-    rms : root mean square distance of the accepted points from their planes, worst stone [m]
+    rms : root mean square distance of the accepted points of the worst stone from its plane [m]
     worst : code of that stone; empty if none was measured in space
     shapes : faces that are not one plane, in words, by stone code
-    refused : stones that were not taken in
+    refused : rejected stones
     rejects : the file that holds them; None if there are none
-    frame : how the survey was carried into the frame of the site; None if it was there
-    again : how many of the stones were in the database already, and have a new measurement now
-    solids : what they are like, in a file of solids
+    frame : transform of the survey into the frame of the site; None if it was surveyed there
+    again : number of stones that were in the database and now have a new measurement
+    solids : properties of the stones, in a file of solids
     """
 
     path: str
@@ -87,7 +87,7 @@ class FileReport:
 
 @dataclass(frozen=True)
 class IngestReport:
-    """What became of all files."""
+    """Report on all files."""
 
     url: str
     files: tuple[FileReport, ...]
@@ -95,7 +95,7 @@ class IngestReport:
 
 @dataclass
 class Tally:
-    """What is counted while the stones of a file go by."""
+    """Running counts over the stones of a file."""
 
     path: Path
     stream: SurveyedStream
@@ -113,7 +113,7 @@ class Tally:
     decimals: int = 0
 
     def count(self, block: SurveyedBlock) -> None:
-        """One more stone that is taken in."""
+        """Count one more accepted stone."""
         face = block.face
         self.stones[block.kind] += 1
         if face.rejected_points:
@@ -143,7 +143,7 @@ class Tally:
         return SolidsReport(self.convex[True], codes, self.remarks, self.stream.snapping, decimals)
 
     def report(self, rejects: Path | None) -> FileReport:
-        """What is told of the file; `rejects` is the file that holds the refused stones."""
+        """Make the report on the file; `rejects` is the file with the rejected stones."""
         return FileReport(
             path=self.stream.head.path,
             survey=self.stream.head.name,
@@ -161,6 +161,6 @@ class Tally:
 
 
 def _has_decimals(places: Array, count: int) -> bool:
-    """Whether coordinates have no more decimals, but for what doubles leave of them."""
+    """Return True if coordinates have at most so many decimals, to within double precision."""
     scaled = places * 10.0**count
     return bool(np.abs(scaled - np.round(scaled)).max() <= 1e-6)

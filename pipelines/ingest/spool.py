@@ -1,6 +1,6 @@
-"""Stones on their way to the database, kept on disk: the database is written only once all of them are good.
+"""Temporary file for stones on their way to the database, which is written only once all of them are good.
 
-So a bad survey leaves the database as it was, and makes none; the database is locked while it is written and
+Thus a bad survey leaves the database unchanged and creates none; the database is locked while it is written and
 not while planes are fitted; and memory does not grow with the survey.
 """
 
@@ -21,11 +21,11 @@ from pipelines.arrays import Array
 __all__ = ["Spool"]
 
 _BATCH = 200
-"""Stones that are written at once: what they have in common is written once."""
+"""Number of stones written at once, so that common values are pickled once."""
 
 
 class Spool:
-    """A list of stones that is not in memory; to be used as a context, filled once and read in the same order."""
+    """List of stones on disk, used as a context: filled once and read in the same order."""
 
     def __init__(self) -> None:
         self._file = tempfile.TemporaryFile(prefix="moma-")  # noqa: SIM115  (closed by __exit__)
@@ -41,12 +41,12 @@ class Spool:
         self._file.close()
 
     def append(self, stone: StoneRecord) -> None:
-        """Keep one more stone.
+        """Add one more stone.
 
         Raises
         ------
         SurveyError
-            if there is no room for it on the disk
+            if there is no space left on the disk
         """
         self._waiting.append(stone)
         if len(self._waiting) == _BATCH:
@@ -74,13 +74,13 @@ class Spool:
 
 @dataclass(frozen=True)
 class _Numbers:
-    """Stands for an array of this shape, whose numbers are kept elsewhere."""
+    """Placeholder for an array of this shape, whose numbers are kept elsewhere."""
 
     shape: tuple[int, ...]
 
 
 def _packed(stones: Sequence[StoneRecord]) -> tuple[list[dict[str, Any]], Array]:
-    """The stones without their arrays, and all of these in one: a dozen small ones each would take much longer."""
+    """Separate stones from their arrays and join these into one, which is much faster than a dozen small ones each."""
     numbers: list[Array] = []
     states = []
     for stone in stones:
@@ -94,7 +94,7 @@ def _packed(stones: Sequence[StoneRecord]) -> tuple[list[dict[str, Any]], Array]
 
 
 def _unpacked(states: Sequence[dict[str, Any]], numbers: Array) -> Iterator[StoneRecord]:
-    """The stones again; their arrays are views."""
+    """Restore the stones; their arrays are views."""
     start = 0
     for state in states:
         for name, value in state.items():

@@ -1,1 +1,4 @@
-"""Proposals for unseen stones (`moma propose`)."""
+"""Proposals for unseen stones (`moma propose`).
+
+Public: `propose_stones`, `propose_core`, `Recording`, `ProposalReport` (propose).
+"""

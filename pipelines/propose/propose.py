@@ -1,4 +1,4 @@
-"""Proposals of what no survey sees: missing stones and the core of walls, from the database and, if asked, into it."""
+"""Proposals of unseen stones: missing ones and the core of walls, from the database and optionally recorded in it."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass
@@ -24,20 +24,21 @@ from survey.unseen.missing.settings import MissingSettings
 
 __all__ = ["Facings", "Proposal", "ProposalReport", "Recording", "propose_core", "propose_stones"]
 
+_SIZE = ("code", "kind", "course", "zone", "length", "height", "depth")
 _NO_STONES = frozenset({"infill", "joint", "support"})
 
 Facings = tuple[str, str]
-"""Expressions that name the stones of the two facings of a wall."""
+"""Expressions for the stones of the two facings of a wall."""
 
 
 @dataclass(frozen=True)
 class Recording:
-    """How proposals are put into the database.
+    """Provenance of proposals that are recorded.
 
     Attributes
     ----------
-    author : who takes them over; None if nobody says so
-    source : on what grounds; None: those of the proposals themselves
+    author : person responsible for them; None if unknown
+    source : grounds; None: those of the proposals themselves
     """
 
     author: str | None = None
@@ -46,16 +47,16 @@ class Recording:
 
 @dataclass(frozen=True)
 class Proposal:
-    """A stone, or a part of the core, that nobody has seen.
+    """Hypothetical stone, or part of the core.
 
     Attributes
     ----------
     code, kind, course, zone : as of any entity
     length, height, depth, volume : its size [m], [m³]
     outline : (nv, 3) corners of its face [m]
-    evidence : on what it rests, in words
-    depth_source : on what its depth rests
-    notes : what makes it less certain
+    evidence : its grounds, in words
+    depth_source : grounds of its depth
+    notes : reservations
     """
 
     code: str
@@ -74,15 +75,15 @@ class Proposal:
 
 @dataclass(frozen=True)
 class ProposalReport:
-    """What was proposed, and what was recorded of it.
+    """Proposals, and what was recorded of them.
 
     Attributes
     ----------
     what : "missing" or "infill"
-    stones : how many stones were looked at
-    proposals : in order; of those that are in the database already none
+    stones : number of stones considered
+    proposals : in order, without those already in the database
     entry : number of the act of recording; None if nothing was recorded
-    related : number of that in which relations were computed; None if none changed
+    related : number of the act in which relations were computed; None if none changed
     """
 
     what: str
@@ -104,8 +105,8 @@ def propose_stones(
     ----------
     url : of the database
     where : expressions; only stones between two that satisfy all of them are proposed
-    settings : what counts as a hole, and what as an opening
-    recording : put the proposals into the database; None: change nothing
+    settings : limits of holes and openings
+    recording : record the proposals; None: change nothing
     """
     settings = settings or MissingSettings()
     with (
@@ -135,9 +136,9 @@ def propose_core(
     ----------
     url : of the database
     where : expressions; only stones that satisfy all of them count
-    settings : what the core is made of, and how facings are recognised
-    recording : put the proposals into the database; None: change nothing
-    facings : of one wall; None: they are recognised
+    settings : shape of the core, and limits for recognising facings
+    recording : record the proposals; None: change nothing
+    facings : two facings of one wall; None: recognise them
 
     Raises
     ------
@@ -156,12 +157,12 @@ def propose_core(
         known = _measured(session, find(session, "infill"))
         new = [one for one in found if not is_known(one, known)]
         pairs: list[tuple[StoneRecord, tuple[str, ...]]] = [(core_record(one), ()) for one in new]
-        said = {**asdict(settings), "facings": None if facings is None else list(facings)}
-        return _report("infill", session, len(records), pairs, said, recording)
+        given = {**asdict(settings), "facings": None if facings is None else list(facings)}
+        return _report("infill", session, len(records), pairs, given, recording)
 
 
 def _stones(session: Session, where: Sequence[str]) -> list[StoneRecord]:
-    """Measured stones, hypotheses among them, but for the core."""
+    """Load the measured stones, including hypotheses, without the core."""
     found = find(session, "entity", where)
     return _measured(session, [entity for entity in found if entity.kind not in _NO_STONES])
 
@@ -175,7 +176,7 @@ def _codes(session: Session) -> set[str]:
 
 
 def _named(session: Session, where: Sequence[str], facings: Facings) -> tuple[set[str], set[str]]:
-    """Codes of the stones of two facings."""
+    """Find the codes of the stones of two facings."""
     codes = []
     for expression in facings:
         some = {record.code for record in _stones(session, [*where, expression])}
@@ -188,7 +189,7 @@ def _named(session: Session, where: Sequence[str], facings: Facings) -> tuple[se
 
 
 def _beside(chosen: Collection[str] | None, found: Sequence[tuple[str, tuple[str, str]]]) -> set[str]:
-    """Codes of the proposals between two chosen stones, or between proposals that are."""
+    """Find the codes of the proposals between two chosen stones, or beside such proposals."""
     kept: set[str] = set()
     for code, beside in found:
         if chosen is None or all(one in chosen or one in kept for one in beside):
@@ -222,13 +223,7 @@ def _report(
 
 def _proposal(record: StoneRecord, notes: tuple[str, ...]) -> Proposal:
     return Proposal(
-        code=record.code,
-        kind=record.kind,
-        course=record.course,
-        zone=record.zone,
-        length=record.length,
-        height=record.height,
-        depth=record.depth,
+        **{name: getattr(record, name) for name in _SIZE},
         volume=record_volume(record),
         outline=tuple((x, y, z) for x, y, z in record.outline.tolist()),
         evidence=record.provenance_text,

@@ -1,4 +1,4 @@
-"""Between parts of the core of a wall and the records that the database keeps of them."""
+"""Records of proposed parts of the core of a wall."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -18,12 +18,12 @@ from survey.unseen.core.propose import InfillProposal
 __all__ = ["core_record", "is_known", "record_volume"]
 
 
-_FAR = 1000.0  # metres before the wall, from where its front is seen squarely
-_SAME = 1e-3  # metres, and part of a volume: proposals that differ by less are the same
+_FAR = 1000.0  # distance of the viewpoint in front of the wall [m], large enough to see it squarely
+_SAME = 1e-3  # largest difference of equal proposals, in position [m] and relative volume [-]
 
 
 def core_record(proposal: InfillProposal) -> StoneRecord:
-    """A part of the core as an entity of kind infill, whose face is its side towards the first facing."""
+    """Make the record of a part of the core: kind infill, its face being the side towards the first facing."""
     solid = proposal.solid
     record = SolidRecord(proposal.code, "infill", proposal.course, solid.vertices, solid.faces)
     viewpoint = solid.vertices.mean(axis=0) + _FAR * proposal.normal
@@ -34,12 +34,12 @@ def core_record(proposal: InfillProposal) -> StoneRecord:
 
 
 def record_volume(record: StoneRecord) -> float:
-    """Volume of the stone [m³]."""
+    """Compute the volume of a recorded stone [m³]."""
     return volume_of(Solid(record.code, record.solid_vertices, record.solid_faces))
 
 
 def is_known(proposal: InfillProposal, known: Sequence[StoneRecord]) -> bool:
-    """Whether a part of the core is in the database already, as it is or as another that has its middle in common."""
+    """Return True if a part of the core is already in the database, or another part shares its middle."""
     middle = proposal.solid.vertices.mean(axis=0)
     low, high = proposal.solid.vertices.min(axis=0), proposal.solid.vertices.max(axis=0)
     for record in known:
@@ -56,7 +56,7 @@ def is_known(proposal: InfillProposal, known: Sequence[StoneRecord]) -> bool:
 
 
 def _contains(solid: Solid, point: Array) -> bool:
-    """Whether a point is in a closed solid: the solid angle under which it sees the faces is 4π there, else nothing."""
+    """Test a point for being in a closed solid, by the solid angle of its faces: 4π inside, 0 outside."""
     a, b, c = np.moveaxis(solid.vertices[triangulate(solid)] - point, 1, 0)
     la, lb, lc = (np.linalg.norm(one, axis=1) for one in (a, b, c))
     volume = (a * np.cross(b, c)).sum(axis=1)

@@ -1,1 +1,4 @@
-"""Recording of knowledge from TOML files (`moma record`)."""
+"""Recording of knowledge from TOML files (`moma record`).
+
+Public: `record`, `RecordReport` (record); `read_record`, `RecordFile` (file); `record_depth` (depth); `ARRAYS` (keys).
+"""

@@ -1,4 +1,4 @@
-"""Depths that are known better: the statement, and the solids that follow from it, extruded anew."""
+"""Depths of stones: the statement, and the solids extruded to them."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -28,18 +28,18 @@ def record_depth(
     sigma: float | None = None,
     remark: Remark = PLAIN,
 ) -> Outcome:
-    """Say how deep stones are, and extrude their measured faces to that depth.
+    """Record the depth of stones, and extrude their measured faces to it.
 
     Parameters
     ----------
     codes : of the stones
     value, sigma : depth and its standard deviation [m]
-    remark : its text is the evidence; else the source of the entry is
+    remark : its text is the evidence; without one, the source of the entry
 
     Raises
     ------
     UsageError
-        if there is no such stone, or it was not measured by its face, so that no solid could follow
+        if there is no such stone, or its face was not measured, so that there is nothing to extrude
     GeometryError
         if the face cannot be extruded to this depth
     """
@@ -53,17 +53,17 @@ def record_depth(
 def _extrude(
     session: Session, entry: Entry, codes: Sequence[str], value: float, sigma: float | None, evidence: str
 ) -> Outcome:
-    """Solids to a depth; those that have it, on whatever evidence, stay as they are."""
+    """Extrude solids to a depth; those of this depth, on whatever evidence, stay as they are."""
     outcome = NOTHING
     entities = session.scalars(select(Entity).where(Entity.code.in_(codes)).order_by(Entity.id)).all()
     for entity in entities:
         if entity.measurement is None:
-            raise UsageError(f"{entity.code} was not measured", remedy="take in a survey of its face first")
+            raise UsageError(f"{entity.code} was not measured", remedy="ingest a survey of its face first")
     changed = [one for one in entities if (one.depth, one.depth_sigma) != (value, sigma)]
     for stone in load_stones(session, changed):
         if stone.provenance == "solid":
             what = f"the depth of {stone.code} is that of its solid, which was surveyed"
-            raise UsageError(what, remedy="take in a better solid")
+            raise UsageError(what, remedy="ingest a better solid")
         deeper = replace(stone, depth=value, depth_sigma=sigma, depth_source=evidence, depth_origin="stone")
         outcome += replace_measurement(session, entry, stone_record(surveyed_block(deeper)), stone.code)
     return outcome

@@ -1,4 +1,4 @@
-"""Files of knowledge: TOML text → a RecordFile in which every key has been checked. No database is read here."""
+"""Files of knowledge: from TOML text to a checked RecordFile, without a database."""
 
 import hashlib
 from collections.abc import Iterator, Mapping
@@ -29,8 +29,8 @@ class Table:
 
     Attributes
     ----------
-    path : where it stands, for messages: ("mark", "0")
-    values : of all its keys, those that are not given as None, () or {}
+    path : its position in the file, for messages: ("mark", "0")
+    values : of all its keys; missing ones as None, () or {}
     """
 
     path: Path
@@ -44,14 +44,14 @@ class Table:
 
 @dataclass(frozen=True)
 class RecordFile:
-    """A file of knowledge as its author wrote it, checked.
+    """Checked file of knowledge.
 
     Attributes
     ----------
     document : file and lines, for error messages
     sha256 : of its text, in hexadecimal
     record : the table [record]
-    tables : all others, in the order in which they are recorded
+    tables : all others, in the order of recording
     """
 
     document: Document
@@ -61,7 +61,7 @@ class RecordFile:
 
     @contextmanager
     def at(self, *path: str) -> Iterator[None]:
-        """Let a failure in a with-block name the key that it comes from, if it names no line of this file."""
+        """Add the line of a key to errors raised in a with-block that name no line of this file."""
         try:
             yield
         except (UsageError, DatabaseError, SurveyError, GeometryError) as error:
@@ -77,13 +77,13 @@ def read_record(path: str | FilePath) -> RecordFile:
 
     Raises
     ------
-    UsageError : with file and line, at the first thing that is wrong
+    UsageError : naming file and line of the first mistake
     """
     return parse_record(read_text(path, UsageError, encoding="utf-8-sig"), str(path))
 
 
 def parse_record(text: str, path: str) -> RecordFile:
-    """Check the text of a file of knowledge; `path` is for the messages."""
+    """Check the text of a file of knowledge; `path` appears in messages."""
     given = parse_toml(text, path, UsageError, "see docs/knowledge.md for a file to start from")
     document = Document(path, key_lines(text))
     try:
@@ -109,7 +109,7 @@ def _checked(document: Document, given: Mapping[str, Any]) -> tuple[dict[str, An
 
 
 def _array(document: Document, given: Mapping[str, Any], name: str, keys: tuple[Key, ...]) -> Iterator[Table]:
-    """All tables [[name]], checked."""
+    """Check all tables [[name]]."""
     content = given.get(name, [])
     if not isinstance(content, list) or not all(isinstance(one, dict) for one in content):
         document.fail(f"{name!r} is not a list of tables", name, remedy=f"write [[{name}]] above each")
@@ -123,7 +123,7 @@ def _array(document: Document, given: Mapping[str, Any], name: str, keys: tuple[
 
 
 def _inner(document: Document, path: Path, given: Any, keys: tuple[Key, ...]) -> dict[str, dict[str, object]]:
-    """The tables in a table; a plain value stands for its first key."""
+    """Check the tables in a table; a plain value stands for its first key."""
     return {
         name: check_table(
             document,

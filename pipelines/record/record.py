@@ -1,4 +1,4 @@
-"""Files of knowledge into the database: all of them, or, if anything is wrong in any, none."""
+"""Recording of files of knowledge in the database."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -25,13 +25,13 @@ _CORRECTIONS = ("correction", "depth")
 
 @dataclass(frozen=True)
 class FileRecorded:
-    """What became of one file.
+    """Report on one file.
 
     Attributes
     ----------
     path : the file
-    tables : what became of its tables, by name of the array
-    entries : numbers of the acts of recording that it made; none if nothing in it was new
+    tables : outcome of its tables, by name of the array
+    entries : numbers of its acts of recording; empty if nothing in it was new
     recorded_before : number of the first entry of a file with the same contents; None if there was none
     """
 
@@ -42,21 +42,21 @@ class FileRecorded:
 
     @property
     def outcome(self) -> Outcome:
-        """What became of all its tables."""
+        """Outcome of all its tables."""
         return sum(self.tables.values(), NOTHING)
 
 
 @dataclass(frozen=True)
 class RecordReport:
-    """What became of all files.
+    """Report on all files.
 
     Attributes
     ----------
     url : of the database
-    dry_run : nothing was kept
-    files : each of them
-    related : number of the entry with which the relations of corrected stones were computed anew; None if they
-        are as they were
+    dry_run : whether nothing was kept
+    files : reports on each
+    related : number of the entry with which the relations of corrected stones were recomputed; None if they
+        did not change
     """
 
     url: str
@@ -68,19 +68,19 @@ class RecordReport:
 def record(
     paths: Sequence[str | Path], url: str, *, author: str | None = None, dry_run: bool = False
 ) -> RecordReport:
-    """Put files of knowledge into the database: all of them, or, if anything is wrong in any, none.
+    """Record files of knowledge: all of them or, if anything is wrong in any, none.
 
     Parameters
     ----------
     paths : files as in docs/knowledge.md
-    url : of the database, made if it does not exist
-    author : who says it; goes before what ``[record]`` says
-    dry_run : say what would happen, and change nothing
+    url : of the database, created if it does not exist
+    author : takes precedence over that of ``[record]``
+    dry_run : report what would happen, and change nothing
 
     Raises
     ------
     UsageError : at the line of a file that is wrong; the database is unchanged
-    SurveyError, GeometryError : a stone cannot be extruded to the depth that it is said to have
+    SurveyError, GeometryError : a stone cannot be extruded to its recorded depth
     """
     files = [read_record(path) for path in paths]
     if not files:
@@ -113,7 +113,7 @@ def _record_file(session: Session, file: RecordFile, author: str | None) -> File
 
 
 def _relate_corrected(session: Session, entries: Sequence[int]) -> int | None:
-    """What follows from kinds, courses and solids, for the stones that these entries corrected."""
+    """Recompute the relations of the stones that these entries corrected; return the number of the entry."""
     corrected = session.scalars(
         select(Correction.entity_id).where(Correction.entry_id.in_(entries)).distinct()
     ).all()
@@ -121,14 +121,14 @@ def _relate_corrected(session: Session, entries: Sequence[int]) -> int | None:
 
 
 class _Entries:
-    """The acts of recording of one file: one for each author and source, corrections apart."""
+    """Acts of recording of one file: one for each author and source, corrections apart."""
 
     def __init__(self, session: Session, file: RecordFile, author: str | None) -> None:
         self.session, self.file, self.author = session, file, author
         self.made: dict[tuple[str, str | None, str], Entry] = {}
 
     def of(self, table: Table) -> Entry:
-        """The entry that a table belongs to."""
+        """Return the entry of a table, and make it if necessary."""
         record, own = self.file.record, table.values
         with self.file.at(*table.path):
             author = checked_text("author", own["author"] or self.author or record["author"])
@@ -144,7 +144,7 @@ class _Entries:
         return self.made[key]
 
     def drop(self, numbers: Iterable[int]) -> None:
-        """Forget entries that nothing came with."""
+        """Delete entries that changed nothing."""
         unused = set(numbers)
         for entry in self.made.values():
             if entry.id in unused:

@@ -1,4 +1,4 @@
-"""Which stones a file of knowledge means: codes and expressions, asked of the database."""
+"""Stones that a file of knowledge names, by codes and expressions."""
 
 import re
 from collections.abc import Sequence
@@ -12,16 +12,16 @@ from pipelines.record.file import RecordFile, Table
 
 __all__ = ["named_stones", "named_subjects"]
 
-_CODE = re.compile(r"[\w.:/+-]+")  # a text without blanks or comparison is meant as a code
+_CODE = re.compile(r"[\w.:/+-]+")  # a text without blanks or comparison is a code
 
 
 def named_stones(session: Session, file: RecordFile, table: Table, key: str = "stones") -> dict[str, int]:
-    """Numbers by code of the stones that a key names, each once: as the list has them, then as the survey has.
+    """Find the numbers, by code, of the stones that a key names, each once, in the order of the list.
 
     Raises
     ------
     UsageError
-        at the key whose expression cannot be understood or that names no stone
+        at the key, if an expression cannot be parsed or names no stone
     """
     found: dict[str, int] = {}
     items: Sequence[str] = table.values[key]
@@ -40,12 +40,12 @@ def named_stones(session: Session, file: RecordFile, table: Table, key: str = "s
 
 
 def named_subjects(session: Session, file: RecordFile, table: Table) -> Subjects:
-    """The stones and structures of a table, at least one.
+    """Find the stones and structures of a table, at least one.
 
     Raises
     ------
     UsageError
-        at the key that names none
+        at the key, if it names none
     """
     stones = named_stones(session, file, table)
     with file.at(*table.path, "structures"):
@@ -54,5 +54,5 @@ def named_subjects(session: Session, file: RecordFile, table: Table) -> Subjects
     with file.at(*table.path):
         if not len(about):
             remedy = "give stones = […] or structures = […]"
-            raise UsageError(f"[[{table.name}]] is about nothing", remedy=remedy)
+            raise UsageError(f"[[{table.name}]] has no subject", remedy=remedy)
     return about

@@ -1,4 +1,4 @@
-"""Each table of a file of knowledge, put into the database."""
+"""Recording of each table of a file of knowledge."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -66,7 +66,7 @@ _NAMED: Mapping[str, type[Any]] = {
 
 @dataclass(frozen=True)
 class _Work:
-    """One table, and where it goes."""
+    """A table and its destination."""
 
     session: Session
     entry: Entry
@@ -77,7 +77,7 @@ class _Work:
         return self.table.values[key]
 
     def remark(self) -> Remark:
-        """What is said with every statement; observations are of the file's date if they do not say their own."""
+        """Return the evidence of a statement; an observation without a date has that of the file."""
         seen = self["date"]
         if seen is None and self.table.name == "observation":
             seen = self.file.record["date"]
@@ -85,12 +85,12 @@ class _Work:
 
 
 def record_table(session: Session, entry: Entry, file: RecordFile, table: Table) -> Outcome:
-    """Put one table into the database, within an entry.
+    """Record one table within an entry.
 
     Raises
     ------
     UsageError
-        at the line of the file that is wrong
+        at the line of the mistake
     """
     with file.at(*table.path):
         return _RECORDERS[table.name](_Work(session, entry, file, table))
@@ -160,7 +160,7 @@ def _depth(work: _Work) -> Outcome:
 
 
 def _statement(work: _Work) -> Outcome:
-    """A statement about stones and structures."""
+    """Record a statement about stones and structures."""
     session, entry, remark = work.session, work.entry, work.remark()
     about = named_subjects(session, work.file, work.table)
     match work.table.name:
@@ -182,7 +182,7 @@ def _statement(work: _Work) -> Outcome:
 def _correction(work: _Work) -> Outcome:
     values = {**work["set"], **dict.fromkeys(work["unset"])}
     if not values:
-        raise UsageError("a correction of nothing", remedy='give set = { kind = "quoin" }, say')
+        raise UsageError("empty correction", remedy='give set = { kind = "quoin" }, for example')
     outcome = NOTHING
     for code in named_stones(work.session, work.file, work.table):
         with work.file.at(*work.table.path, "set"):
@@ -197,7 +197,7 @@ def _withdraw(work: _Work) -> Outcome:
     if what == "relation":
         of, to = (named_stones(work.session, work.file, work.table, key) for key in ("stones", "to"))
         if work["kind"] is None:
-            raise UsageError("the relation has no kind", remedy='give kind = "beside", say')
+            raise UsageError("the relation has no kind", remedy='give kind = "beside", for example')
         return withdraw_relations(
             work.session, work.entry, work["kind"], list(of.values()), list(to.values())
         )
@@ -211,7 +211,7 @@ def _withdraw(work: _Work) -> Outcome:
 
 
 def _withdraw_named(work: _Work, what: str) -> Outcome:
-    """A material, one property of it, a phase, a document or a structure; once withdrawn, it stays so."""
+    """Withdraw a material, one of its properties, a phase, a document or a structure, permanently."""
     cls, name = _NAMED[what], work["name"]
     if name is None:
         raise UsageError(f"the {what} has no name", remedy="give name = …")
@@ -228,7 +228,9 @@ def _withdraw_named(work: _Work, what: str) -> Outcome:
         return withdraw(work.session, work.entry, row)
     column = cls.name if cls in (Material, Phase) else cls.code
     if work.session.scalar(select(cls.id).where(column == name).limit(1)) is None:
-        raise UsageError(f"there never was a {cls.__name__.lower()} {name[:40]!r}", remedy="check its name")
+        raise UsageError(
+            f"there has never been a {cls.__name__.lower()} {name[:40]!r}", remedy="check its name"
+        )
     return Outcome(unchanged=1)
 
 

@@ -1,1 +1,4 @@
-"""HTML reports."""
+"""HTML reports, filled from the templates in `templates`.
+
+Public: `write_report` (run); `write_page`, `picture` (html).
+"""

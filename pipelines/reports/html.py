@@ -1,106 +1,86 @@
-"""A report as one page that needs no other file."""
+"""Self-contained HTML pages, and the format of the numbers in them."""
 
 import base64
-import io
-from collections.abc import Iterable, Sequence
-from html import escape
+from functools import cache
 from pathlib import Path
 
 import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
 
 __all__ = [
-    "figure",
+    "Picture",
     "kilopascals",
     "megapascals",
     "millimetres",
-    "page",
     "percent",
+    "picture",
     "ratio",
     "scientific",
-    "table",
+    "write_page",
 ]
 
-_STYLE = """
-body { font: 16px/1.5 system-ui, sans-serif; color: #222; max-width: 60rem; }
-body { margin: 2rem auto; padding: 0 1rem; }
-h1 { margin-bottom: 0; } h2 { margin-top: 2.2rem; } .lead { font-size: 1.15rem; color: #444; }
-figure { margin: 1.5rem 0; } img, svg { max-width: 100%; height: auto; } figcaption { color: #555; }
-table { border-collapse: collapse; }
-th, td { padding: .3rem .9rem .3rem 0; text-align: left; vertical-align: top; }
-td.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
-.wide { overflow-x: auto; } .wide table { font-size: .85rem; }
-tr + tr { border-top: 1px solid #ddd; } .warning { background: #fff3d6; padding: .6rem 1rem; }
-"""
-
-
-def page(title: str, body: Iterable[str]) -> str:
-    """A whole HTML page around the elements of its body."""
-    head = [
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">',
-        f"<title>{escape(title)}</title><style>{_STYLE}</style></head><body>",
-    ]
-    return "\n".join([*head, *body, "</body></html>"]) + "\n"
-
-
-def figure(picture: Path, caption: str) -> str:
-    """A PNG with its caption, the picture itself in the page."""
-    content = base64.b64encode(picture.read_bytes()).decode("ascii")
-    return (
-        f'<figure><img alt="{escape(caption)}" src="data:image/png;base64,{content}">'
-        f"<figcaption>{escape(caption)}</figcaption></figure>"
-    )
-
+Picture = dict[str, str]
+"""Caption and base64 content of a PNG."""
 
 _LONGEST = 32  # characters of a number with its precision and unit; a longer cell is a sentence
 
 
-def table(rows: Iterable[Sequence[str]], head: Sequence[str] = ()) -> str:
-    """An HTML table; the first cell of each row is its heading, short cells that begin with a digit are numbers."""
-    out = io.StringIO()
-    out.write("<table>")
-    if head:
-        out.write("<tr>" + "".join(f"<th>{escape(name)}</th>" for name in head) + "</tr>")
-    for first, *rest in rows:
-        cells = "".join(
-            f'<td class="number">{escape(cell)}</td>' if _is_number(cell) else f"<td>{escape(cell)}</td>"
-            for cell in rest
-        )
-        out.write(f"<tr><th>{escape(first)}</th>{cells}</tr>")
-    out.write("</table>")
-    return out.getvalue()
+def write_page(path: Path, template: str, **values: object) -> None:
+    """Fill a template of `pipelines/reports/templates` with plain values; escape every text among them."""
+    path.write_text(_templates().get_template(template).render(values), encoding="utf-8")
 
 
-def _is_number(cell: str) -> bool:
+def picture(path: Path, caption: str) -> Picture:
+    """Read a PNG for embedding in a page."""
+    return {"caption": caption, "content": base64.b64encode(path.read_bytes()).decode("ascii")}
+
+
+@cache
+def _templates() -> Environment:
+    environment = Environment(
+        autoescape=True,
+        keep_trailing_newline=True,
+        loader=PackageLoader("pipelines.reports"),
+        lstrip_blocks=True,
+        trim_blocks=True,
+        undefined=StrictUndefined,
+    )
+    environment.tests["quantity"] = _is_quantity
+    return environment
+
+
+def _is_quantity(cell: str) -> bool:
+    """Return True for a short cell that begins with a digit."""
     return cell.lstrip("+-")[:1].isdigit() and len(cell) <= _LONGEST
 
 
 def megapascals(pascals: float | None) -> str:
-    """A stress."""
+    """Format a stress given in pascals."""
     return "–" if pascals is None else f"{pascals / 1e6:.4f} MPa"
 
 
 def kilopascals(pascals: float) -> str:
-    """A pressure."""
+    """Format a pressure given in pascals."""
     return f"{pascals / 1e3:.4g} kPa"
 
 
 def millimetres(metres: float) -> str:
-    """A length."""
+    """Format a length given in metres."""
     return f"{metres * 1e3:.4g} mm"
 
 
 def percent(part: float) -> str:
-    """A part of a whole."""
+    """Format a fraction."""
     return f"{100.0 * part:.1f} %"
 
 
 def ratio(value: float | None) -> str:
-    """A ratio that may not be known."""
+    """Format a ratio; a dash if it is not known."""
     return "–" if value is None or not np.isfinite(value) else f"{value:.3g}"
 
 
 def scientific(value: float | int | None) -> str:
-    """A small number, or a count."""
+    """Format a small number, or a count."""
     if value is None or not np.isfinite(value):
         return "not known"
     return str(value) if isinstance(value, int) else f"{value:.1e}"

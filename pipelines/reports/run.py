@@ -1,21 +1,32 @@
-"""report.html: one page that explains a run to whoever was not there; it needs no other file."""
+"""report.html: one self-contained page that explains a run to readers who were not there."""
 
 from collections.abc import Callable, Mapping, Sequence
-from html import escape
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from archmodel.store.run_record import StoneResult
 from mechanics.results.result import Result
+from pipelines.arrays import Array
 from pipelines.draw.history_plot import history_svg
-from pipelines.reports.html import figure, megapascals, millimetres, page, percent, ratio, scientific, table
-from pipelines.reports.joints import joint_sections
+from pipelines.reports.html import (
+    kilopascals,
+    megapascals,
+    millimetres,
+    percent,
+    picture,
+    ratio,
+    scientific,
+    write_page,
+)
 
 __all__ = ["write_report"]
 
 _OUTCOMES = {
     "equilibrium": "It stands: every stone came to rest, in balance.",
-    "moving": "It was still moving when the simulated time was over: neither at rest nor collapsed.",
+    "moving": "It was still moving at the end of the simulated time: neither at rest nor collapsed.",
     "collapsed": "It falls: at least one stone moved too far to come back, and was still moving.",
 }
 
@@ -23,37 +34,63 @@ _ERRORS = (
     (
         "natural_map",
         "Contact law",
-        "How far the contact forces are from satisfying friction and non-penetration: the residual η of the "
-        "natural map, without unit. Below the solver's tolerance the step is solved.",
+        "Distance of the contact forces from satisfying friction and non-penetration: the residual η of the "
+        "natural map, dimensionless. Below the solver's tolerance the step is solved.",
     ),
-    ("penetration", "Overlap", "Deepest overlap of two stones, over the size of the smallest one."),
-    ("balance", "Balance of each stone", "Force that nothing holds, over the stone's weight; worst stone."),
-    ("reaction", "Balance of the whole", "Supports' reaction minus weight, over the weight."),
-    ("energy", "Energy", "Energy that no term of the balance explains, over the run's reference energy."),
+    ("penetration", "Overlap", "Deepest overlap of two stones over the size of the smallest one."),
+    ("balance", "Balance of each stone", "Unbalanced force over the stone's weight; worst stone."),
+    ("reaction", "Balance of the whole", "Reaction of the supports minus weight, over the weight."),
+    (
+        "energy",
+        "Energy",
+        "Energy that no term of the balance explains, over the reference energy of the run.",
+    ),
     ("unconverged_steps", "Unsolved steps", "Steps that the solver left above its tolerance."),
     (
         "stress",
         "Stress",
-        "Relative error of the stress of all stones that deform, estimated from its jumps between finite elements.",
+        "Relative error of the stress of all deformable stones, estimated from its jumps between finite elements.",
     ),
 )
 
-_GREY = "Grey stones are fixed or rigid, or their stress was not asked for."
+_GREY = "Grey stones are fixed or rigid, or their stress was not requested."
 _CAPTIONS = {
     "von_mises.png": "Von Mises stress on the stones' surface, in MPa. The scale ends at the stress that 1 % "
     f"of the volume exceeds, rounded up. {_GREY}",
-    "displacement.png": "How far each point has moved since the start; stones are drawn where they are now, "
-    "not exaggerated. Fixed stones are grey.",
+    "displacement.png": "Displacement of each point since the start; stones are drawn at their final position, "
+    "without exaggeration. Fixed stones are grey.",
     "principal_tension.png": f"Largest principal stress, where it is tension. {_GREY}",
     "principal_compression.png": f"Smallest principal stress, where it is compression. {_GREY}",
     "utilisation.png": f"Stress over strength, the larger of tension and compression: at 1 a stone fails. {_GREY}",
     "error.png": "Estimated error of the stress of each stone (Zienkiewicz and Zhu): where it is large, the mesh is "
     f"too coarse for its stress. {_GREY}",
-    "pressure.png": "Mean pressure of each joint that is pressed; the stones are drawn as glass.",
-    "resultants.png": "The resultant of each joint, drawn through the point where it meets the joint, as long as it is "
-    "large. Blue: within the kern, so that a linear pressure presses everywhere. Red: outside, so that part of the "
-    "joint bears nothing.",
+    "pressure.png": "Mean pressure of each compressed joint; the stones are transparent.",
+    "resultants.png": "The resultant of each joint, drawn through the point where it meets the joint, its length in "
+    "proportion. Blue: within the kern, so that a linear pressure acts everywhere. Red: outside, so that part of the "
+    "joint is unloaded.",
 }
+
+
+_KERN = (
+    "The resultant of a joint lies within its kern, up to 1 here, if a linear pressure compresses the whole "
+    "joint; beyond, part of the joint is unloaded. Where it reaches the edge, at 1 in the next column, a hinge forms."
+)
+_STRESS_ERROR = (
+    "Estimated from the jumps of the stress between finite elements; a finer mesh makes it smaller."
+)
+
+_MOST = 10  # stones and joints of a table
+_SEEN = 1e-6  # over the width of a joint: a smaller movement is rounding
+
+
+@dataclass(frozen=True)
+class _Section:
+    """Table under a heading; left out of the page where it has no rows."""
+
+    title: str
+    head: tuple[str, ...]
+    rows: Sequence[tuple[str, ...]]
+    note: str = ""
 
 
 def write_report(
@@ -63,39 +100,31 @@ def write_report(
     stones: Sequence[StoneResult],
     warnings: Sequence[str],
 ) -> None:
-    """Write the page, with the pictures that lie in its folder inside it.
+    """Write the page and embed the pictures of its folder.
 
     Parameters
     ----------
     path : report.html
     summary : as in summary.json
     stones : one per stone
-    warnings : what went less well than asked
+    warnings : shown at the top
     """
-    pictures = [name for name in _CAPTIONS if (path.parent / name).is_file()]
-    body = [
-        f"<h1>{escape(result.scene.name)}</h1>",
-        f'<p class="lead">{_OUTCOMES[str(result.outcome)]}</p>',
-        *(f'<p class="warning">{escape(warning)}</p>' for warning in warnings),
-        *(figure(path.parent / name, _CAPTIONS[name]) for name in pictures),
-        "<h2>Summary</h2>",
-        table(_summary_rows(summary)),
-        "<h2>How far it can be trusted</h2>",
-        table((name, scientific(summary["errors"][key]), words) for key, name, words in _ERRORS),
-        *_profile(summary["profile"]),
-        *_stressed(stones),
-        *_pulled(stones),
-        *_uncertain(stones),
-        *joint_sections(result),
-        "<h2>History</h2>",
-        f"<figure>{history_svg(result.history)}<figcaption>Step by step: speed of the fastest point, "
-        "unbalanced force of the worst stone over its weight, and residual of the contact law.</figcaption>"
-        "</figure>",
-        "<h2>Time spent</h2>",
-        table((stage, f"{seconds:.2f} s") for stage, seconds in summary["time"]["by_stage"].items()),
-        f"<p>Made by MOMA {escape(str(summary['version']))}.</p>",
-    ]
-    path.write_text(page(result.scene.name, body), encoding="utf-8")
+    pictures = [path.parent / name for name in _CAPTIONS]
+    write_page(
+        path,
+        "run.html",
+        name=result.scene.name,
+        lead=_OUTCOMES[str(result.outcome)],
+        warnings=warnings,
+        pictures=[picture(one, _CAPTIONS[one.name]) for one in pictures if one.is_file()],
+        summary=_summary_rows(summary),
+        errors=[(name, scientific(summary["errors"][key]), words) for key, name, words in _ERRORS],
+        profile=_profile(summary["profile"]),
+        sections=[_stressed(stones), _pulled(stones), _uncertain(stones), *_joints(result)],
+        history=history_svg(result.history),
+        stages=[(stage, f"{seconds:.2f} s") for stage, seconds in summary["time"]["by_stage"].items()],
+        version=summary["version"],
+    )
 
 
 def _summary_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -127,31 +156,23 @@ def _summary_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     return rows
 
 
-def _profile(profile: Mapping[str, Any] | None) -> list[str]:
-    """The settings that a profile gave the run, and the errors to expect of it; nothing without one."""
+def _profile(profile: Mapping[str, Any] | None) -> dict[str, Any] | None:
+    """Format the settings that a profile gave the run and the errors to expect of it."""
     if profile is None:
-        return []
-    settings = ", ".join(f"{name} {value}" for name, value in profile["settings"].items())
-    words = (
-        f"<h2>Profile: {escape(profile['name'])}</h2>"
-        f"<p>{escape(profile['about'].capitalize())}. Its settings went before those of the scene: "
-        f"{escape(settings)}.</p>"
-    )
-    if not profile["expected"]:
-        return [words, "<p>What error to expect was measured on scenes at rest only.</p>"]
-    rows = [
-        (one["of"].capitalize(), f"{'up to ' if one['bound'] else ''}{percent(one['value'])}")
-        for one in profile["expected"].values()
-    ]
-    note = (
-        "<p>Errors to expect against a much finer model, from what was measured on other scenes and this run's own "
-        "estimates. The largest Von Mises stress has none: at the edges of joints it grows with every finer mesh.</p>"
-    )
-    return [words, note, table(rows, ("Quantity", "Error to expect"))]
+        return None
+    return {
+        "name": profile["name"],
+        "about": profile["about"],
+        "settings": ", ".join(f"{name} {value}" for name, value in profile["settings"].items()),
+        "expected": [
+            (one["of"].capitalize(), f"{'up to ' if one['bound'] else ''}{percent(one['value'])}")
+            for one in profile["expected"].values()
+        ],
+    }
 
 
-def _stressed(stones: Sequence[StoneResult]) -> list[str]:
-    """The ten stones with the largest stress; nothing where no stone deforms."""
+def _stressed(stones: Sequence[StoneResult]) -> _Section:
+    """List the stones with the largest stress."""
     rows = [
         (
             stone.code,
@@ -162,11 +183,11 @@ def _stressed(stones: Sequence[StoneResult]) -> list[str]:
         for stone in _worst(stones, lambda stone: stone.von_mises_max)
     ]
     head = ("Stone", "Von Mises, largest", "Von Mises, mean", "Largest displacement")
-    return ["<h2>Most stressed stones</h2>", table(rows, head)] if rows else []
+    return _Section("Most stressed stones", head, rows)
 
 
-def _pulled(stones: Sequence[StoneResult]) -> list[str]:
-    """The ten stones that are nearest to their strength, or, where no strength is known, with the largest tension."""
+def _pulled(stones: Sequence[StoneResult]) -> _Section:
+    """List the stones nearest to their strength or, where no strength is known, with the largest tension."""
     used = _worst(stones, lambda stone: stone.values.get("utilisation"))
     rows = [
         (
@@ -184,22 +205,62 @@ def _pulled(stones: Sequence[StoneResult]) -> list[str]:
         "Pressure, mean",
     )  # fmt: skip
     title = "Stones nearest to their strength" if used else "Stones with the largest tension"
-    return [f"<h2>{title}</h2>", table(rows, head)] if rows else []
+    return _Section(title, head, rows)
 
 
-def _uncertain(stones: Sequence[StoneResult]) -> list[str]:
-    """The ten stones whose stress is least certain."""
+def _uncertain(stones: Sequence[StoneResult]) -> _Section:
+    """List the stones whose stress is least certain."""
     rows = [
         (stone.code, percent(stone.values["stress_error"]), megapascals(stone.von_mises_max))
         for stone in _worst(stones, lambda stone: stone.values.get("stress_error"))
     ]
-    words = "<p>Estimated from the jumps of the stress between finite elements; a finer mesh makes it smaller.</p>"
     head = ("Stone", "Error of the stress", "Von Mises, largest")
-    return ["<h2>Stones with the least certain stress</h2>", words, table(rows, head)] if rows else []
+    return _Section("Stones with the least certain stress", head, rows, _STRESS_ERROR)
 
 
 def _worst(stones: Sequence[StoneResult], value: Callable[[StoneResult], float | None]) -> list[StoneResult]:
-    """The ten stones with the largest values, of those that have one."""
+    """Return the stones with the largest values, of those that have one."""
     known = [(found, stone) for stone in stones if (found := value(stone)) is not None]
     known.sort(key=lambda pair: pair[0], reverse=True)
-    return [stone for _, stone in known[:10]]
+    return [stone for _, stone in known[:_MOST]]
+
+
+def _joints(result: Result) -> list[_Section]:
+    """List the joints with the most eccentric resultants, and those that slid or opened most."""
+    joints = result.joints
+    seen = _SEEN * np.sqrt(joints.area)
+    eccentric = np.where(joints.pressed, joints.kern, -np.inf)
+    slid = np.where(joints.sliding > seen, joints.sliding, -np.inf)
+    opened = np.where(joints.opening > seen, joints.opening, -np.inf)
+    head = (
+        "Joint",
+        "Over the kern",
+        "Over the edge",
+        "Pressure, mean",
+        "Opening",
+        "Sliding",
+        "Friction used",
+    )
+    return [
+        _Section("Joints with the most eccentric resultants", head, _joint_rows(result, eccentric), _KERN),
+        _Section("Joints that slid most", head, _joint_rows(result, slid)),
+        _Section("Joints that opened most", head, _joint_rows(result, opened)),
+    ]
+
+
+def _joint_rows(result: Result, order: Array) -> list[tuple[str, ...]]:
+    """Describe the joints with the largest finite values of `order`."""
+    joints, codes = result.joints, [body.code for body in result.bodies]
+    return [
+        (
+            " – ".join(codes[body] for body in joints.bodies[number]),
+            ratio(float(joints.kern[number])),
+            ratio(float(joints.edge[number])),
+            kilopascals(float(joints.pressure_mean[number])),
+            millimetres(float(joints.opening[number])),
+            millimetres(float(joints.sliding[number])),
+            ratio(float(joints.friction_use[number])),
+        )
+        for number in np.argsort(-order, kind="stable")[:_MOST].tolist()
+        if np.isfinite(order[number])
+    ]

@@ -1,1 +1,5 @@
-"""Result files: VTK, CSV and the folder that holds them."""
+"""Result files: VTK, CSV and the folder that holds them.
+
+Public: `write_frames` (vtk); `write_joints` (joints_csv); `Grid`, `Cells`, `write_vtu`, `write_pvd` (vtu); `replacing`,
+`check_replaceable` (folder).
+"""

@@ -1,4 +1,4 @@
-"""A folder of results appears whole or not at all, and takes the place of earlier results only."""
+"""Atomic replacement of result folders: all files appear or none, and only earlier results are replaced."""
 
 import json
 import os
@@ -12,16 +12,16 @@ from moma.errors import UsageError
 
 __all__ = ["check_replaceable", "replacing"]
 
-_INDEX = "summary.json"  # its "files" are those that a run wrote
+_INDEX = "summary.json"  # its "files" lists the files that a run wrote
 
 
 def check_replaceable(folder: Path, index: str = _INDEX) -> None:
-    """Refuse a place that results must not take: a file, or a folder that holds anything but earlier results.
+    """Refuse to replace a file, or a folder that holds anything other than earlier results.
 
     Parameters
     ----------
     folder : the place
-    index : name of the JSON file among the results whose "files" names all of them
+    index : name of the JSON file whose "files" lists all results
 
     Raises
     ------
@@ -35,12 +35,12 @@ def check_replaceable(folder: Path, index: str = _INDEX) -> None:
     foreign = sorted({entry.name for entry in folder.iterdir()} - _own_files(folder, index))
     if foreign:
         shown = ", ".join(foreign[:3]) + (", …" if len(foreign) > 3 else "")
-        raise UsageError(f"holds what no run of MOMA wrote ({shown})", where=place, remedy=remedy)
+        raise UsageError(f"holds files that no run of MOMA wrote ({shown})", where=place, remedy=remedy)
 
 
 @contextmanager
 def replacing(folder: Path, index: str = _INDEX) -> Iterator[Path]:
-    """A fresh folder to write into; it takes the place of `folder` when the block ends without an error.
+    """Yield a fresh folder, which replaces `folder` when the block ends without an error.
 
     If the block fails or is interrupted, `folder` stays as it was.
     """
@@ -65,7 +65,7 @@ def replacing(folder: Path, index: str = _INDEX) -> Iterator[Path]:
 
 
 def _own_files(folder: Path, index: str) -> set[str]:
-    """Names of the files that the run whose index lies there wrote."""
+    """List the files that the index in a folder names."""
     try:
         files = json.loads((folder / index).read_text(encoding="utf-8"))["files"]
     except (OSError, ValueError, LookupError, TypeError):

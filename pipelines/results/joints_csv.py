@@ -34,7 +34,7 @@ JOINT_COLUMNS: Mapping[str, str] = {
     "friction_use": "shear over what friction and cohesion can bear; empty where that is nothing [-]",
     "parted": "1: it was closed at the start and is now wide open",
 }
-"""Columns, and what they hold."""
+"""Columns and their meaning."""
 
 
 def write_joints(path: Path, result: Result, origin: Array) -> None:
@@ -57,7 +57,7 @@ def write_joints(path: Path, result: Result, origin: Array) -> None:
 
 
 def normal_and_shear(joints: JointResult) -> tuple[Array, Array]:
-    """Resultants across the joints (nj,), compression positive, and the size of what acts along them (nj,) [N]."""
+    """Split the resultants into components normal to the joints, compression positive, and shear; (nj,) each [N]."""
     n = joints.frame[:, 0]
     normal = np.einsum("ji,ji->j", joints.force, n)
     return normal, np.linalg.norm(joints.force - normal[:, None] * n, axis=1)

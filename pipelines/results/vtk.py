@@ -1,4 +1,4 @@
-"""Results as files for ParaView: stones and contact points as time series, the joints at the end."""
+"""Results for ParaView: stones and contact points as time series, joints at the end of the run."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -39,13 +39,13 @@ UNITS: Mapping[str, str] = {
     "moment": "N m",
     "area": "m²",
 }
-"""Units of the arrays; what is not here is a ratio, a direction or a number."""
+"""Units of the arrays; all others are ratios, directions or numbers."""
 
 
 def write_frames(result: Result, folder: Path) -> None:
     """Write every frame of stones and contacts with their indices `results.pvd` and `contacts.pvd`, and `joints.vtu`.
 
-    What is not computed is NaN: stresses of rigid stones.
+    Values that are not computed, such as stresses of rigid stones, are NaN.
     """
     cells, digits = body_cells(result), max(4, len(str(len(result.frames) - 1)))
     series: dict[str, list[tuple[float, str]]] = {"results": [], "contacts": []}
@@ -63,7 +63,7 @@ def write_frames(result: Result, folder: Path) -> None:
 
 
 def body_cells(result: Result) -> Cells:
-    """The finite elements of deformable stones, one polyhedron for each other one."""
+    """Gather the finite elements of deformable stones and one polyhedron for each other stone."""
     connectivity, sizes, types, streams, ends = [], [], [], [], []
     offset, end = 0, 0
     for body in result.bodies:
@@ -92,7 +92,7 @@ def body_cells(result: Result) -> Cells:
 
 
 def _stream(body: BodyResult, offset: int) -> Iterator[int]:
-    """A polyhedron's faces as VTK lists them."""
+    """Yield the faces of a polyhedron in VTK's order."""
     yield len(body.faces)
     for face in body.faces:
         yield len(face)
@@ -100,7 +100,7 @@ def _stream(body: BodyResult, offset: int) -> Iterator[int]:
 
 
 def body_grid(result: Result, frame: Frame, cells: Cells) -> Grid:
-    """All stones in one frame; fields with seven digits, which halves the files.
+    """Make the grid of all stones in one frame, in single precision, which halves the files.
 
     Point data: displacement [m], velocity [m/s]; stress (xx, yy, zz, xy, yz, zx), von_mises, principal (σ1 ≥ σ2 ≥ σ3),
     mean_pressure [Pa]; principal_direction_1, principal_direction_3; utilisation [-].
@@ -132,7 +132,7 @@ def body_grid(result: Result, frame: Frame, cells: Cells) -> Grid:
 
 
 def _stresses(result: Result, frame: Frame) -> dict[str, Array]:
-    """What follows from the stress of the points; NaN where there is none."""
+    """Compute the fields derived from the stress of the points; NaN where there is no stress."""
     stress = np.concatenate(
         [
             np.full((len(place), 6), np.nan) if one is None else one
@@ -159,20 +159,14 @@ def _stresses(result: Result, frame: Frame) -> dict[str, Array]:
 
 
 def contact_grid(contacts: ContactResult) -> Grid:
-    """Contact points: force [N], pressure [Pa], normal, gap, opening, slide [m], area [m²], status, bodies, joint."""
+    """Make the grid of contact points: force [N], pressure [Pa], lengths [m], area [m²], status, bodies, joint."""
     count = len(contacts.gap)
     status = np.array([STATUSES.index(str(one)) for one in contacts.status], dtype=np.int64)
     return Grid(
         points=contacts.point,
         cells=cells_of(VERTEX, [[index] for index in range(count)]),
         point_data={
-            "force": contacts.force,
-            "pressure": contacts.pressure,
-            "normal": contacts.normal,
-            "gap": contacts.gap,
-            "opening": contacts.opening,
-            "slide": contacts.slide,
-            "area": contacts.area,
+            **{name: getattr(contacts, name) for name in _CONTACT_ARRAYS},
             "status": status,
             "bodies": contacts.bodies.astype(np.int64),
             "joint": contacts.joint.astype(np.int64),
@@ -183,8 +177,8 @@ def contact_grid(contacts: ContactResult) -> Grid:
 
 
 def joint_grid(joints: JointResult) -> Grid:
-    """The polygons of the joints, with what `JointResult` says of each."""
-    # where faces no longer overlap, a point stands for the polygon
+    """Make the grid of the joints' polygons, with the values of `JointResult`."""
+    # where faces no longer overlap, the polygon shrinks to a point
     polygons = [
         one if len(one) > 2 else np.tile(centre, (3, 1))
         for one, centre in zip(joints.polygon, joints.centroid, strict=True)
@@ -206,20 +200,8 @@ def joint_grid(joints: JointResult) -> Grid:
     )
 
 
+_CONTACT_ARRAYS = ("force", "pressure", "normal", "gap", "opening", "slide", "area")
 _JOINT_ARRAYS = (
-    "area",
-    "force",
-    "moment",
-    "centre_of_pressure",
-    "eccentricity",
-    "kern",
-    "edge",
-    "pressure_mean",
-    "pressure_max",
-    "gap",
-    "opening",
-    "sliding",
-    "slipping",
-    "open",
-    "friction_use",
-)
+    "area", "force", "moment", "centre_of_pressure", "eccentricity", "kern", "edge", "pressure_mean", "pressure_max",
+    "gap", "opening", "sliding", "slipping", "open", "friction_use",
+)  # fmt: skip

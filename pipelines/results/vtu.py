@@ -1,4 +1,4 @@
-"""VTK XML files (.vtu, .pvd) with numpy alone: results are written even where VTK itself cannot load."""
+"""VTK XML files (.vtu, .pvd) written with numpy alone, so that results do not depend on loading VTK."""
 
 import base64
 import struct
@@ -37,21 +37,21 @@ CELL_TYPES: Mapping[Element, int] = {
 }
 
 Arrays = Mapping[str, NDArray[np.generic]]
-_LEVEL = 1  # of compression: more takes long and saves little
+_LEVEL = 1  # of compression: higher levels take long and save little
 _NAMES = {"f8": "Float64", "f4": "Float32", "i8": "Int64", "i4": "Int32", "u1": "UInt8"}
 
 
 @dataclass(frozen=True)
 class Cells:
-    """The cells of a grid.
+    """Cells of a grid.
 
     Attributes
     ----------
-    connectivity : node indices of all cells, one cell after the other
-    offsets : (nc,) where each cell ends in it
+    connectivity : node indices of all cells, cell by cell
+    offsets : (nc,) end of each cell in `connectivity`
     types : (nc,) VTK cell types
-    faces : of polyhedra: number of faces, then for each its number of nodes and the nodes
-    face_offsets : (nc,) where each polyhedron ends in it; -1 for other cells; empty if there are no polyhedra
+    faces : for each polyhedron its number of faces, then for each face its number of nodes and the nodes
+    face_offsets : (nc,) end of each polyhedron in `faces`; -1 for other cells; empty without polyhedra
     """
 
     connectivity: Ints
@@ -63,14 +63,14 @@ class Cells:
 
 @dataclass(frozen=True)
 class Grid:
-    """An unstructured grid.
+    """Unstructured grid.
 
     Attributes
     ----------
     points : (n, 3) [m]
     cells : on these points
     point_data, cell_data : named arrays of n or nc rows
-    units : of the arrays, by name; none for what is a ratio or a number
+    units : by name of the array; ratios and numbers have none
     """
 
     points: Array
@@ -81,7 +81,7 @@ class Grid:
 
 
 def cells_of(kind: int, rows: Sequence[Sequence[int]]) -> Cells:
-    """Cells of one type, not polyhedra."""
+    """Make cells of one type other than polyhedra."""
     return Cells(
         connectivity=np.fromiter((node for row in rows for node in row), dtype=np.int64),
         offsets=np.cumsum([len(row) for row in rows], dtype=np.int64),
@@ -117,7 +117,7 @@ def write_vtu(path: Path, grid: Grid) -> None:
 
 
 def write_pvd(path: Path, datasets: Sequence[tuple[float, str]]) -> None:
-    """Write the collection of (time [s], file name) that ParaView plays as one animation."""
+    """Write a collection of (time [s], file name), which ParaView plays as one animation."""
     lines = [
         '<?xml version="1.0"?>',
         '<VTKFile type="Collection" version="1.0" byte_order="LittleEndian">',
@@ -144,7 +144,7 @@ def _cells(cells: Cells) -> list[str]:
 
 
 def _array(name: str, values: NDArray[np.generic], unit: str | None = None) -> str:
-    """One compressed array, with its unit where VTK looks for it.
+    """Encode one array, compressed, with its unit where VTK expects it.
 
     Base64 of the numbers of blocks, of bytes in a block, of bytes in a last one that is shorter, and of bytes
     compressed; then base64 of the one block.

@@ -12,7 +12,7 @@ from mechanics.scene.scene import Fidelity, Scene
 from mechanics.stones.meshing.report import MeshReport
 from moma.errors import GeometryError, MeshError
 from pipelines.draw.closing_pictures import draw_closing
-from pipelines.draw.elevations.closing_shapes import ClosingShapes, closing_shapes
+from pipelines.draw.elevations.closing_shapes import ClosingShapes, Stages, closing_shapes
 from pipelines.results.folder import check_replaceable, replacing
 from pipelines.results.summary import as_json
 from pipelines.run.assemble import Assembly, assemble_stones, wishes_of
@@ -105,9 +105,13 @@ def _shapes(scene: str, assembly: Assembly) -> ClosingShapes:
     records = [model.record for model in assembly.models]
     return closing_shapes(
         scene,
-        surveyed=[Solid(one.code, one.solid_vertices - assembly.origin, one.solid_faces) for one in records],
-        simple=[one.solid for one in assembly.simplified],
-        closed=[Solid(one.code, one.vertices, one.faces) for one in assembly.scene.blocks],
+        Stages(
+            surveyed=[
+                Solid(one.code, one.solid_vertices - assembly.origin, one.solid_faces) for one in records
+            ],
+            simple=[one.solid for one in assembly.simplified],
+            closed=[Solid(one.code, one.vertices, one.faces) for one in assembly.scene.blocks],
+        ),
         simplified={one.code: one.report.displacement for one in assembly.simplified},
         closing=assembly.closing,
         faces=[one.outline - assembly.origin for one in records],

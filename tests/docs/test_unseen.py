@@ -78,7 +78,7 @@ def test_the_tolerances_are_those_of_the_program():
     assert f"wider than a joint ({100 * missing.max_joint:.0f} cm)" in PAGE
     assert f"above over {missing.covered:.0%}".replace("%", " %") in PAGE
     assert (missing.max_courses, missing.max_stones) == (2, 3)
-    assert "more than two\n  courses high; what would take more than three stones" in PAGE
-    assert f"no more than {infill.max_thickness} m apart" in PAGE
+    assert "more than two\n  courses high; gaps for more than three stones" in PAGE
+    assert f"at most {infill.max_thickness} m\napart" in PAGE
     assert f"nearer than\n{100 * infill.merge:.0f} cm" in PAGE
     assert f"one depth (within {100 * infill.level:.0f} cm)" in PAGE

@@ -6,15 +6,7 @@ import numpy as np
 
 from mechanics.results.contact_result import ContactResult, JointResult
 from mechanics.results.postprocess import surface_polygons
-from mechanics.results.result import (
-    BodyResult,
-    Energies,
-    Errors,
-    Frame,
-    History,
-    Outcome,
-    Result,
-)
+from mechanics.results.result import BodyResult, Energies, Errors, Frame, History, Outcome, Result
 from mechanics.results.stress_values import stress_values
 from mechanics.scene.scene import Block, Fidelity, Scene
 from mechanics.stones.elasticity import node_volumes, principal

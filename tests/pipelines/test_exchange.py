@@ -108,7 +108,9 @@ def test_a_database_that_somebody_else_made_meanwhile_is_left_alone(
         return real(path, database)  # type: ignore[arg-type]
 
     monkeypatch.setattr(exchange, "import_building", slow)
-    with pytest.raises(ExchangeError, match=r"new\.db: another program has made this database meanwhile"):
+    with pytest.raises(
+        ExchangeError, match=r"new\.db: another process has created this database in the meantime"
+    ):
         import_database(document, f"sqlite:///{theirs}")
     assert theirs.read_text() == "theirs"
     assert [one.name for one in folder.iterdir()] == ["new.db"]

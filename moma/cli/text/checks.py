@@ -1,7 +1,9 @@
-"""What `moma check` found, in lines for a person."""
+"""Findings of `moma check` as text."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
+
+from moma.cli.text.formats import shorten
 
 if TYPE_CHECKING:
     from pipelines.run.check_report import CheckReport, MeshQualityReport
@@ -10,7 +12,7 @@ if TYPE_CHECKING:
 __all__ = ["check_lines", "duration"]
 
 _SHOWN = 5
-"""Stones and places that are named if no more is asked for."""
+"""Number of stones and places listed without -v."""
 
 _NAMES = {
     "hexahedron": ("hexahedron", "hexahedra"),
@@ -18,14 +20,14 @@ _NAMES = {
     "prism": ("prism", "prisms"),
     "polyhedron": ("general polyhedron", "general polyhedra"),
 }
-"""Of one shape, and of several."""
+"""Singular and plural of each shape."""
 
 _NOTHING = 5e-5
-"""Movements below are rounding [m]."""
+"""Smaller movements are rounding [m]."""
 
 
 def check_lines(report: "CheckReport", verbose: bool, explain: bool = False) -> list[str]:
-    """The plan of a scene, what becomes of its stones and joints, and its problems; `explain`: each stone's model."""
+    """Describe a scene: plan, stones, joints, cost and problems; with `explain`, the model of each stone."""
     lines = [
         f"{report.scene}: {sum(report.kinds.values())} stones "
         f"({', '.join(f'{count} {kind}' for kind, count in report.kinds.items())})",
@@ -63,7 +65,7 @@ def check_lines(report: "CheckReport", verbose: bool, explain: bool = False) -> 
 
 
 def _stress_lines(report: "CheckReport") -> list[str]:
-    """Of how many stones the stress is computed, where not all that move deform."""
+    """Count the stones whose stress is computed, if only some of the moving stones deform."""
     asked = sum(one.stress for one in report.stones)
     if not report.bodies["deformable"] or (not report.bodies["rigid"] and not report.ring):
         return []
@@ -72,7 +74,7 @@ def _stress_lines(report: "CheckReport") -> list[str]:
 
 
 def _explanation(report: "CheckReport") -> list[str]:
-    """Each stone's model and its reason, in columns."""
+    """List each stone's model and the reason for it, in columns."""
     wide = max(len(one.code) for one in report.stones)
     return [f"    {one.code:{wide}}  {one.fidelity:10}  {one.reason}" for one in report.stones]
 
@@ -87,89 +89,87 @@ def _mesh_lines(quality: "MeshQualityReport") -> list[str]:
     return lines + [f"  stone {code}: {'; '.join(failures)}" for code, failures in quality.retried.items()]
 
 
-def _simplification_lines(told: "SimplificationReport", verbose: bool) -> list[str]:
-    """What the stones were made, and which of them the survey does not bear out."""
-    shapes = ", ".join(f"{count} {_NAMES[shape][count != 1]}" for shape, count in told.shapes.items())
+def _simplification_lines(report: "SimplificationReport", verbose: bool) -> list[str]:
+    """Describe the simplified stones, and list those outside the survey's tolerance."""
+    shapes = ", ".join(f"{count} {_NAMES[shape][count != 1]}" for shape, count in report.shapes.items())
     line = f"  simplified: {shapes}"
-    if told.max_displacement > _NOTHING:
-        line += f"; corners moved by {_mm(told.max_displacement)} at most (stone {told.worst_stone})"
-    if told.blockiness < 1.0 - _NOTHING:
-        line += f"; least blocky {told.least_blocky} ({told.blockiness:.2f})"
+    if report.max_displacement > _NOTHING:
+        line += f"; corners moved by {_mm(report.max_displacement)} at most (stone {report.worst_stone})"
+    if report.blockiness < 1.0 - _NOTHING:
+        line += f"; least blocky {report.least_blocky} ({report.blockiness:.2f})"
     lines = [line]
     outside = [
         f"    {one.code}: moved by {_mm(one.displacement)}, the survey is good to {_mm(one.tolerance)}; {one.reason}"
-        for one in told.outside
+        for one in report.outside
     ]
     if outside:
-        lines.append(f"  {_count(len(outside), 'stone')} outside of the survey's tolerance:")
+        lines.append(f"  {_count(len(outside), 'stone')} outside the survey's tolerance:")
         lines += _shortened(outside, verbose)
-    general = [f"    {code}: {reason}" for code, reason in told.general.items()]
+    general = [f"    {code}: {reason}" for code, reason in report.general.items()]
     if general:
         lines.append(f"  {_count(len(general), 'stone')} of general shape:")
         lines += _shortened(general, verbose)
     if verbose:
-        moved = {code: distance for code, distance in told.displacement.items() if distance > _NOTHING}
+        moved = {code: distance for code, distance in report.displacement.items() if distance > _NOTHING}
         lines += [f"    {code} simplified by {_mm(distance)}" for code, distance in moved.items()]
     return lines
 
 
-def _joint_lines(told: "JointsReport", verbose: bool) -> list[str]:
-    """What became of the joints, and where stones do not meet or lie in each other."""
-    left, as_surveyed = sum(told.left_open.values()), told.mode == "as-surveyed"
+def _joint_lines(report: "JointsReport", verbose: bool) -> list[str]:
+    """Describe the joints, and list gaps and overlaps."""
+    left, as_surveyed = sum(report.left_open.values()), report.mode == "as-surveyed"
     lines = [
-        f"  joints ({told.mode}): {left} left as they are, {_mm(told.mean_width)} wide on average"
+        f"  joints ({report.mode}): {left} left as they are, {_mm(report.mean_width)} wide on average"
         if as_surveyed
-        else f"  joints ({told.mode}): {told.count} closed on {told.planes} planes, {told.area:.2f} m² in all; "
-        f"{_mm(told.mean_width)} wide on average as surveyed; {left} left open"
+        else f"  joints ({report.mode}): {report.count} closed on {report.planes} planes, {report.area:.2f} m² in all; "
+        f"{_mm(report.mean_width)} wide on average as surveyed; {left} left open"
     ]
-    if told.count and told.worst_stone is not None:
+    if report.count and report.worst_stone is not None:
         lines.append(
-            f"  closing moved corners by {_mm(told.max_displacement)} at most (stone {told.worst_stone}), "
-            f"and changed volumes by {100 * told.max_volume_change:.1f} % at most"
+            f"  closing moved corners by {_mm(report.max_displacement)} at most (stone {report.worst_stone}), "
+            f"and changed volumes by {100 * report.max_volume_change:.1f} % at most"
         )
     into = [
         f"    {' and '.join(one.stones)} were measured {_mm(-one.width)} into each other at {_place(one.place)}"
-        for one in told.measured_overlaps
+        for one in report.measured_overlaps
     ]
     if into:
         many = _count(len(into), "joint")
-        lines += [f"  {many} closed half-way between stones that overlap; look at their corners:"]
+        lines += [f"  {many} closed half-way between overlapping stones; check their corners:"]
         lines += _shortened(into, verbose)
     overlaps = [
         f"    {' and '.join(one.stones)} lie {_mm(one.depth)} in each other ({one.volume * 1e6:.3g} cm³) "
         f"at {_place(one.place)}"
-        for one in told.overlaps
+        for one in report.overlaps
     ]
     if overlaps:
         lines += [f"  {_count(len(overlaps), 'overlap')} left:", *_shortened(overlaps, verbose)]
     gaps = [
         f"    {' and '.join(one.stones)} open by {_mm(one.width)} over {one.area:.3f} m² at {_place(one.place)}"
         + ("" if as_surveyed else f": {one.reason}")
-        for one in told.gaps
+        for one in report.gaps
     ]
     if gaps:
         left_by = ", the largest first:" if len(gaps) > 1 else ":"
-        in_part = sum(one.reason not in told.left_open for one in told.gaps)
+        in_part = sum(one.reason not in report.left_open for one in report.gaps)
         these = f" ({in_part} in joints that are closed on less than half of their area)" if in_part else ""
         lines += [f"  {_count(len(gaps), 'gap')} left{these}{left_by}", *_shortened(gaps, verbose)]
-    if told.alone:
-        some = ", ".join(told.alone[:_SHOWN]) + (", …" if len(told.alone) > _SHOWN else "")
-        lines.append(f"  {_count(len(told.alone), 'stone')} without any joint: {some}")
+    if report.alone:
+        some = ", ".join(report.alone[:_SHOWN]) + (", …" if len(report.alone) > _SHOWN else "")
+        lines.append(f"  {_count(len(report.alone), 'stone')} without any joint: {some}")
     if verbose:
-        moved = {code: distance for code, distance in told.displacement.items() if distance > _NOTHING}
+        moved = {code: distance for code, distance in report.displacement.items() if distance > _NOTHING}
         lines += [f"    {code} moved by {_mm(distance)}" for code, distance in moved.items()]
     return lines
 
 
 def _shortened(lines: Sequence[str], verbose: bool) -> list[str]:
-    """The first lines, and how many more there are."""
-    if verbose or len(lines) <= _SHOWN:
-        return list(lines)
-    return [*lines[:_SHOWN], f"    and {len(lines) - _SHOWN} more, with -v"]
+    """Return the first lines, and the number of the others."""
+    return list(lines) if verbose else shorten(lines, _SHOWN, "    ", ", with -v")
 
 
 def duration(seconds: float) -> str:
-    """A time in the unit in which one thinks of it, to two digits."""
+    """Format a time in its natural unit, to two digits."""
     value, unit = seconds, "s"
     for step, longer in ((60.0, "min"), (60.0, "h"), (24.0, "days")):
         if value < 2.0 * step:

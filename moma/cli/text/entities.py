@@ -1,4 +1,4 @@
-"""One entity or structure, and its history, in lines for a person."""
+"""Entities, structures and their history as text."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -11,10 +11,10 @@ Values = Mapping[str, Any]
 
 
 def entity_lines(description: Values) -> str:
-    """A description as `describe` gives it, as indented lines; what is not known is left out."""
+    """Format the result of `describe` as indented lines, without unknown values."""
     shown = dict(description)
     shown["knowledge"] = {
-        name: _named(content) if isinstance(content, Mapping) else [_said(one) for one in content or ()]
+        name: _named(content) if isinstance(content, Mapping) else [_statement(one) for one in content or ()]
         for name, content in description["knowledge"].items()
     }
     shown["knowledge"] = {name: one for name, one in shown["knowledge"].items() if one}
@@ -25,14 +25,14 @@ def entity_lines(description: Values) -> str:
         name: [_neighbour(one) for one in ones] for name, ones in description.get("relations", {}).items()
     }
     if not shown.get("hypothesis"):
-        shown.pop("hypothesis", None)  # it was surveyed, as nearly all are
+        shown.pop("hypothesis", None)  # nearly all entities were surveyed
     for name in ("recorded", "withdrawn"):
         shown[name] = _by(description[name]) if description.get(name) else None
     return as_lines({name: _listed(one) for name, one in shown.items()})
 
 
 def history_lines(code: str, events: Sequence[Values]) -> str:
-    """Everything that was said, entry by entry."""
+    """Format a history, entry by entry."""
     lines, last = [f"history of {code}"], None
     for event in events:
         if event["entry"] != last:
@@ -43,7 +43,7 @@ def history_lines(code: str, events: Sequence[Values]) -> str:
 
 
 def _change(event: Values) -> str:
-    """What an event says, and what was held before."""
+    """Format the values of an event, and those before it."""
     says, before = event["says"], event["before"]
     if event["event"] == "corrected":
         return f"{_value(before.get('value'))} → {_value(says.get('value'))}"
@@ -53,7 +53,7 @@ def _change(event: Values) -> str:
 
 
 def _listed(content: Any) -> Any:
-    """Texts of a list one below the other."""
+    """Number the texts of a list, so that they appear one below the other."""
     if isinstance(content, Mapping):
         return {name: _listed(one) for name, one in content.items()}
     if isinstance(content, list) and content and all(isinstance(one, str) for one in content):
@@ -63,24 +63,24 @@ def _listed(content: Any) -> Any:
 
 
 def _named(one: Values) -> dict[str, Any]:
-    """A material with its properties, or a phase with its years."""
-    told: dict[str, Any] = {"name": one["name"], "description": one["description"]}
+    """Describe a material with its properties, or a phase with its years."""
+    shown: dict[str, Any] = {"name": one["name"], "description": one["description"]}
     if "begins" in one:
         years = [str(one[end]) if one[end] is not None else "?" for end in ("begins", "ends")]
-        told["years"] = None if years == ["?", "?"] else "–".join(years)
+        shown["years"] = None if years == ["?", "?"] else "–".join(years)
     for name, value in one.get("properties", {}).items():
         sigma = "" if value["sigma"] is None else f" ± {value['sigma']:.4g}"
         unit = "" if value["unit"] == "-" else f" {value['unit']}"
-        told[name] = f"{value['value']:.4g}{sigma}{unit} ({value['source']})"
-    return told | {"evidence": _cited(one), "said": _by(one)}
+        shown[name] = f"{value['value']:.4g}{sigma}{unit} ({value['source']})"
+    return shown | {"evidence": _cited(one), "recorded": _by(one)}
 
 
-def _said(one: Values) -> str:
-    """A statement in one line."""
+def _statement(one: Values) -> str:
+    """Format a statement in one line."""
     own = {
         name: value
         for name, value in one.items()
-        if name not in (*_PROVENANCE, "text", "document", "locator", "observed_on", "phase_or_material_of")
+        if name not in (*_PROVENANCE, "text", "document", "locator", "observed_on", "said_of")
     }
     parts = [_values(own), _cited(one)]
     return f"{', '.join(part for part in parts if part)} [{_by(one)}]"
@@ -90,13 +90,13 @@ _PROVENANCE = ("entry", "action", "author", "source", "recorded_at")
 
 
 def _cited(one: Values) -> str:
-    """Text, document and date of a statement, and what it is about if that is not the thing itself."""
+    """Format text, document, date and, if it is inherited, the subject of a statement."""
     where = one.get("document", "")
     parts = [
         one.get("text"),
         f"{where} {one['locator']}" if where and "locator" in one else where,
         f"seen {one['observed_on']}" if "observed_on" in one else None,
-        f"said of {one['phase_or_material_of']}" if "phase_or_material_of" in one else None,
+        f"inherited from {one['said_of']}" if "said_of" in one else None,
     ]
     return ", ".join(part for part in parts if part)
 

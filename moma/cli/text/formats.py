@@ -1,4 +1,4 @@
-"""Rows and entities as text: tables for people, CSV and JSON for programs."""
+"""Formats of rows and entities: tables for people, CSV and JSON for programs."""
 
 import csv
 import io
@@ -8,41 +8,34 @@ from typing import Any
 
 from archmodel.store.run_record import STONE_VALUES
 
-__all__ = ["USUAL_COLUMNS", "as_csv", "as_geojson", "as_json", "as_lines", "as_table", "shown_columns"]
+__all__ = [
+    "USUAL_COLUMNS",
+    "as_csv",
+    "as_geojson",
+    "as_json",
+    "as_lines",
+    "as_table",
+    "shorten",
+    "shown_columns",
+    "some",
+]
 
 USUAL_COLUMNS = (
-    "code",
-    "kind",
-    "course",
-    "depth",
-    "length",
-    "height",
-    "volume",
-    "rms",
-    "rejected",
-    "fidelity",
-    "von_mises_max",
+    "code", "kind", "course", "depth", "length", "height", "volume", "rms", "rejected", "fidelity", "von_mises_max",
     "displacement_max",
-)
-"""What a table shows besides what is asked for; CSV and JSON give every attribute."""
+)  # fmt: skip
+"""Columns of a table beside requested ones; CSV and JSON have every attribute."""
 
 _UNITS = {
-    "length": "m",
-    "height": "m",
+    **dict.fromkeys(("length", "height", "centroid", "value", "sigma", "offset", "height_sigma", "rms"), "m"),
     "area": "m²",
     "volume": "m³",
-    "centroid": "m",
-    "value": "m",
-    "sigma": "m",
-    "offset": "m",
-    "height_sigma": "m",
+    "mass": "kg",
     "tilt_sigma": "rad",
-    "rms": "m",
+    "displacement_max": "m",
     "von_mises_max": "Pa",
     "von_mises_mean": "Pa",
-    "displacement_max": "m",
     "contact_force_max": "N",
-    "mass": "kg",
     **{name: unit for name, (unit, _) in STONE_VALUES.items() if unit != "-"},
 }
 
@@ -52,13 +45,13 @@ _PLACES = frozenset({"x", "y", "z", "centroid", "offset"})
 def shown_columns(
     names: Iterable[str], rows: Sequence[Mapping[str, object]], asked: Iterable[str] = ()
 ) -> list[str]:
-    """Columns of a table: of the usual ones those in which any row has a value, and those that are asked for."""
+    """Choose the columns of a table: those in which any row has a value, and those in `asked`."""
     wanted = {"code", *asked}
     return [name for name in names if name in wanted or any(row[name] is not None for row in rows)]
 
 
 def as_table(columns: Mapping[str, str | None], rows: Sequence[Mapping[str, object]]) -> str:
-    """Aligned text; `columns` gives the unit of each column, None or "-" for none."""
+    """Format rows as an aligned table; `columns` gives the unit of each column, None or "-" for none."""
     heads = [name if unit in (None, "-") else f"{name} [{unit}]" for name, unit in columns.items()]
     cells = [[_cell(row[name], name) for name in columns] for row in rows]
     numeric = [
@@ -79,7 +72,7 @@ def as_table(columns: Mapping[str, str | None], rows: Sequence[Mapping[str, obje
 
 
 def as_csv(columns: Iterable[str], rows: Iterable[Mapping[str, object]]) -> str:
-    """CSV with a header line; nothing where a value is not known."""
+    """Format rows as CSV with a header line; unknown values are empty."""
     out = io.StringIO()
     writer = csv.DictWriter(out, list(columns), lineterminator="\n")
     writer.writeheader()
@@ -87,19 +80,30 @@ def as_csv(columns: Iterable[str], rows: Iterable[Mapping[str, object]]) -> str:
     return out.getvalue().rstrip("\n")
 
 
+def shorten(lines: Sequence[str], shown: int, margin: str = "", hint: str = "") -> list[str]:
+    """Keep the first lines, and count the others."""
+    rest = len(lines) - shown
+    return [*lines[:shown], f"{margin}and {rest} more{hint}"] if rest > 0 else list(lines)
+
+
+def some(names: Sequence[str], shown: int = 6) -> str:
+    """List the first names in one line, and count the others."""
+    return ", ".join(names[:shown]) + (f" and {len(names) - shown} more" if len(names) > shown else "")
+
+
 def as_json(value: object) -> str:
-    """JSON, indented."""
+    """Format a value as indented JSON."""
     return json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False)
 
 
 def as_geojson(collection: Mapping[str, Any]) -> str:
-    """A FeatureCollection with one feature on each line."""
+    """Format a FeatureCollection with one feature on each line."""
     features = (json.dumps(one, ensure_ascii=False, allow_nan=False) for one in collection["features"])
     return '{"type": "FeatureCollection", "features": [\n' + ",\n".join(features) + "\n]}"
 
 
 def as_lines(value: Mapping[str, Any], indent: int = 0) -> str:
-    """A nested mapping as indented lines; what is empty or not known is left out."""
+    """Format a nested mapping as indented lines, without empty or unknown values."""
     lines = []
     margin = "  " * indent
     for name, content in value.items():

@@ -1,4 +1,4 @@
-"""What recording knowledge has done, in a few lines for a person."""
+"""Outcome of `moma record` as text."""
 
 from typing import TYPE_CHECKING
 
@@ -10,7 +10,7 @@ __all__ = ["record_lines"]
 
 
 def record_lines(report: "RecordReport", verbose: bool) -> list[str]:
-    """What became of each file; with `verbose`, of each of its arrays of tables."""
+    """Describe the outcome of each file; with `verbose`, of each of its arrays of tables."""
     lines = []
     would = " (dry run: nothing was kept)" if report.dry_run else ""
     for file in report.files:
@@ -26,12 +26,12 @@ def record_lines(report: "RecordReport", verbose: bool) -> list[str]:
         if verbose or report.dry_run:
             lines += [f"  {name}: {_counts(outcome)}" for name, outcome in file.tables.items()]
     if report.related is not None:
-        lines.append(f"relations of the corrected stones computed anew, as entry {report.related}")
+        lines.append(f"relations of the corrected stones recomputed, as entry {report.related}")
     return lines
 
 
 def _counts(outcome: "Outcome") -> str:
-    """The counts that are not zero."""
+    """Format the counts that are not zero."""
     counts = {
         "new": outcome.new,
         "replaced": outcome.replaced,

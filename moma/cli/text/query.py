@@ -1,4 +1,4 @@
-"""The answer to ``moma query``, in each of its formats."""
+"""Answers of ``moma query`` in each of its formats."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,16 +17,16 @@ __all__ = ["Question", "answer"]
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked of a database.
+    """Query of a database.
 
     Attributes
     ----------
     kind : of the entities, with its subkinds
     where : expressions, all of which hold
-    run : whose results are meant where no run is named; None: each stone's latest
-    columns : attributes to show; None: what the format usually gives
-    everything : a table of every attribute
-    flat : faces in the plane of the wall
+    run : run whose results count where an attribute names none; None: each stone's latest
+    columns : attributes to show; None: those usual in the format
+    everything : whether a table has every attribute
+    flat : whether faces are given in the plane of the wall
     """
 
     kind: str
@@ -38,7 +38,7 @@ class Question:
 
 
 def answer(session: "Session", question: Question, format: str) -> tuple[str, str]:
-    """The list in a format (table, csv, json, geojson), and a note for the person at the terminal."""
+    """Answer a query in a format (table, csv, json, geojson), with a note for the person at the terminal."""
     known = {one.name: one for one in attributes(session, question.kind)}
     names = _names(session, question, known, format)
     asked = (question.kind, question.where, question.run, names)
@@ -59,7 +59,7 @@ def answer(session: "Session", question: Question, format: str) -> tuple[str, st
 
 
 def _names(session: "Session", question: Question, known: Mapping[str, Attribute], format: str) -> list[str]:
-    """The columns that are asked of the database: no more, since some take a search of their own."""
+    """Choose the columns to read from the database: no more than shown, since some need a search of their own."""
     if question.columns is not None:
         return list(dict.fromkeys(question.columns))
     if format != "table" or question.everything:

@@ -1,6 +1,8 @@
-"""What a command has done, in a few lines for a person."""
+"""Reports of `moma ingest`, `run` and `survey-report` as text."""
 
 from typing import TYPE_CHECKING, Any
+
+from moma.cli.text.formats import shorten, some
 
 if TYPE_CHECKING:
     from pipelines.ingest.report import IngestReport, SolidsReport
@@ -9,17 +11,17 @@ if TYPE_CHECKING:
 
 __all__ = ["ingest_lines", "profile_lines", "run_lines", "survey_report_lines"]
 
-_SHOWN = 20  # lines of a list; the report has them all
+_SHOWN = 20  # lines of a list; the report has all
 
 
 def ingest_lines(report: "IngestReport", verbose: bool) -> list[str]:
-    """What each survey file held, and what was left out of it."""
+    """Describe the contents of each survey file, and what was left out."""
     lines = []
     for file in report.files:
         kinds = ", ".join(f"{count} {kind}" for kind, count in file.stones.items())
         lines.append(f"{file.path}: {sum(file.stones.values())} stones of survey {file.survey!r} ({kinds})")
         if file.again:
-            lines.append(f"  {file.again} of them were there already and are measured again")
+            lines.append(f"  {file.again} of them were in the database and have a new measurement")
         if file.worst:
             lines.append(
                 f"  {sum(file.rejected.values())} points left out as blunders on {len(file.rejected)} stones; "
@@ -28,23 +30,21 @@ def ingest_lines(report: "IngestReport", verbose: bool) -> list[str]:
         if file.frame is not None:
             lines.append(f"  {_frame_line(file.frame)}")
         if file.shapes:
-            lines.append(f"  {len(file.shapes)} faces are not one plane: {_some(list(file.shapes))}")
+            lines.append(f"  {len(file.shapes)} faces are not one plane: {some(list(file.shapes))}")
         if verbose:
             lines += [f"  {code}: {count} left out" for code, count in file.rejected.items()]
             lines += [f"  {code}: {text}" for code, text in file.shapes.items()]
         if file.solids is not None:
             lines += _solid_lines(file.solids, verbose)
         if file.refused:
-            lines.append(f"  {len(file.refused)} stones not taken in, to be corrected in {file.rejects}:")
-            shown = file.refused if verbose else file.refused[:5]
-            lines += [f"    {one.reason}" for one in shown]
-            if len(shown) < len(file.refused):
-                lines.append(f"    and {len(file.refused) - len(shown)} more")
+            lines.append(f"  {len(file.refused)} stones rejected, to be corrected in {file.rejects}:")
+            reasons = [f"    {one.reason}" for one in file.refused]
+            lines += reasons if verbose else shorten(reasons, 5, "    ")
     return lines
 
 
 def _solid_lines(solids: "SolidsReport", verbose: bool) -> list[str]:
-    """Whether solids are convex, what was settled of them, and what snapping did."""
+    """Describe the solids of a file: convexity, remarks, and changes by snapping."""
     lines = [f"  {solids.convex} convex, {len(solids.not_convex)} not"]
     if verbose and solids.not_convex:
         lines.append(f"  not convex: {', '.join(solids.not_convex)}")
@@ -53,12 +53,10 @@ def _solid_lines(solids: "SolidsReport", verbose: bool) -> list[str]:
             f"  {snapping.contacts} contacts brought into {snapping.planes} planes within "
             f"{snapping.tolerance:g} m; corners moved by up to {snapping.largest_movement:.2g} m"
         )
-        shown = snapping.left_open if verbose else snapping.left_open[:5]
         if snapping.left_open:
             lines.append(f"  {len(snapping.left_open)} contacts left as they are:")
-        lines += [f"    {' and '.join(one.stones)}: {one.reason}" for one in shown]
-        if len(shown) < len(snapping.left_open):
-            lines.append(f"    and {len(snapping.left_open) - len(shown)} more, with -v")
+        left = [f"    {' and '.join(one.stones)}: {one.reason}" for one in snapping.left_open]
+        lines += left if verbose else shorten(left, 5, "    ", ", with -v")
     elif solids.decimals is not None:
         lines.append(
             f"  coordinates have {solids.decimals} decimals: if they are rounded, --snap "
@@ -72,7 +70,7 @@ def _solid_lines(solids: "SolidsReport", verbose: bool) -> list[str]:
 
 
 def _frame_line(frame: dict[str, Any]) -> str:
-    """How well the control points tie the survey to the site."""
+    """Describe how well the control points tie the survey to the site."""
     left_out = [point["name"] for point in frame["control"] if point["rejected"]]
     residuals = [
         sum(value**2 for value in point["residual"]) ** 0.5
@@ -87,12 +85,8 @@ def _frame_line(frame: dict[str, Any]) -> str:
     )
 
 
-def _some(names: list[str]) -> str:
-    return ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")
-
-
 def run_lines(report: "RunReport", verbose: bool) -> list[str]:
-    """How a run ended, and where its results lie."""
+    """Describe the outcome of a run, and list its files."""
     summary = report.summary
     bodies, reaction, stress = summary["bodies"], summary["reaction"], summary["von_mises"]
     lines = [
@@ -117,8 +111,8 @@ def run_lines(report: "RunReport", verbose: bool) -> list[str]:
     joints = summary["joints"]
     if joints["count"]:
         lines.append(
-            f"  {joints['count']} joints: {joints['out_of_kern']} of {joints['pressed']} pressed ones bear outside "
-            f"their kern, largest opening {joints['largest_opening'] * 1e3:.3g} mm, "
+            f"  {joints['count']} joints: {joints['out_of_kern']} of {joints['pressed']} compressed ones have their "
+            f"resultant outside the kern, largest opening {joints['largest_opening'] * 1e3:.3g} mm, "
             f"largest sliding {joints['largest_sliding'] * 1e3:.3g} mm"
         )
     lines += _profile_lines(summary["profile"])
@@ -133,7 +127,7 @@ def run_lines(report: "RunReport", verbose: bool) -> list[str]:
 
 
 def profile_lines(name: str) -> list[str]:
-    """What a profile is, and the errors it had on the reference scenes."""
+    """Describe a profile, with its errors on the reference scenes."""
     from pipelines.tuning.measured_errors import ERRORS
     from pipelines.tuning.profiles import PROFILES
 
@@ -147,17 +141,17 @@ def profile_lines(name: str) -> list[str]:
 
 
 def _profile_lines(profile: dict[str, Any] | None) -> list[str]:
-    """Which profile has run, and what error it is to be expected to have; nothing without one."""
+    """Describe the profile of a run, with the errors to expect; nothing without one."""
     if profile is None:
         return []
     lines = [f"  profile {profile['name']}: {profile['about']}"]
     if profile["expected"]:
-        told = (
+        expected = (
             f"{name} {'up to ' if one['bound'] else ''}{_part(one['value'])}"
             for name, one in profile["expected"].items()
         )
-        return [*lines, "  expected errors, as measured on other scenes: " + ", ".join(told)]
-    return [*lines, "  what error to expect was measured on scenes at rest only"]
+        return [*lines, "  expected errors, as measured on other scenes: " + ", ".join(expected)]
+    return [*lines, "  errors to expect are known for scenes at rest only"]
 
 
 def _part(value: float) -> str:
@@ -165,7 +159,7 @@ def _part(value: float) -> str:
 
 
 def survey_report_lines(report: "SurveyReport", verbose: bool) -> list[str]:
-    """How well a survey was measured, what to measure again, and where the report lies."""
+    """Describe the precision of a survey and what to measure again, and list the files of the report."""
     study, quality = report.study, report.study.quality
     files = ", ".join(one.head.path for one in study.files)
     lines = [
@@ -178,8 +172,8 @@ def survey_report_lines(report: "SurveyReport", verbose: bool) -> list[str]:
         lines.append(f"  {known}{quality.verdict}")
     if without := quality.depths.get("none"):
         lines.append(
-            f"  {without} stones without a depth, which ingest will want: measure it, or give a rule in the "
-            "head of the survey"
+            f"  {without} stones without a depth, which ingest requires: measure it, or give a rule in the header "
+            "of the survey"
         )
     for file in study.files:
         if (fit := file.transform) is not None:
@@ -194,16 +188,14 @@ def survey_report_lines(report: "SurveyReport", verbose: bool) -> list[str]:
     ]
     lines += _course_lines(report, verbose)
     lines += [f"  {one.code} is called a {one.kind}, but {one.text}" for one in study.contradictions[:_SHOWN]]
-    again = study.remeasures if verbose else study.remeasures[:_SHOWN]
+    again = [f"  {one.code or '(no code)'}: {one.reason}; {one.action}" for one in study.remeasures]
     lines.append("measure again:" if again else "nothing needs to be measured again")
-    lines += [f"  {one.code or '(no code)'}: {one.reason}; {one.action}" for one in again]
-    if len(again) < len(study.remeasures):
-        lines.append(f"  and {len(study.remeasures) - len(again)} more, with -v")
+    lines += again if verbose else shorten(again, _SHOWN, "  ", ", with -v")
     return [*lines, *(f"  {report.folder / name}" for name in report.content["files"])]
 
 
 def _course_lines(report: "SurveyReport", verbose: bool) -> list[str]:
-    """Courses that are not level and straight; with -v, all of them."""
+    """List the courses that are not level and straight; with -v, all of them."""
     from survey.quality.courses import SIGNIFICANT
 
     courses = report.study.courses

@@ -1,4 +1,4 @@
-"""``moma schema`` as text: a tree of kinds with their attributes, then structures and relations."""
+"""Text of ``moma schema``: a tree of kinds with their attributes, then structures and relations."""
 
 import sys
 from collections.abc import Iterator, Mapping
@@ -28,7 +28,7 @@ def print_schema(schema: Branch) -> None:
 
 
 def schema_lines(schema: Branch) -> Iterator[str]:
-    """The lines, without colours."""
+    """Yield the lines, without colours."""
     for root in schema["kinds"]:
         yield from _kind_lines(root, "", "")
     for title, key, name in (("Structures", "structures", "kind"), ("Relations", "relations", "relation")):
@@ -44,7 +44,7 @@ def schema_lines(schema: Branch) -> Iterator[str]:
 
 
 def _kind_lines(branch: Branch, first: str, rest: str) -> Iterator[str]:
-    """A kind, its attributes and its subkinds; `first` and `rest` lead the first line and those below."""
+    """Yield a kind, its attributes and subkinds; `first` and `rest` begin the first line and those below."""
     origin = "registered: " if branch["registered"] else ""
     yield f"{first}{branch['kind']}  {origin}{branch['definition']}"
     below = rest + ("│   " if branch["kinds"] else "    ")

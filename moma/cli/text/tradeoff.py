@@ -1,4 +1,4 @@
-"""What a study of speed against accuracy has found, in a table and a few lines for a person."""
+"""Findings of `moma trade` as text."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -21,7 +21,7 @@ _COLUMNS = (
 
 
 def trade_lines(report: "TradeReport", verbose: bool) -> list[str]:
-    """The table, what the reference is, what is recommended, and where the files lie."""
+    """Describe a study: table, reference, recommendation and files."""
     record = report.record
     rows = record["rows"]
     done = [row for row in rows if row["status"] == "done"]
@@ -42,7 +42,7 @@ def trade_lines(report: "TradeReport", verbose: bool) -> list[str]:
 
 
 def _table(record: Mapping[str, Any], done: Sequence[Mapping[str, Any]]) -> str:
-    """Costs and errors of the runs that are done; those on the front are marked, the reference's are estimates."""
+    """Tabulate costs and errors of the completed runs; mark the Pareto front; estimate the reference's errors."""
     asked = dict.fromkeys([record["quantity"], *_COLUMNS])
     shown = [name for name in asked if any(row["errors"][name] is not None for row in done)]
     columns = {"": None, "setting": None, "CPU": "s", "wall": "s", "memory": "MiB", "nodes": None}
@@ -88,7 +88,7 @@ def _advice_lines(record: Mapping[str, Any]) -> list[str]:
     quantity = record["quantity"]
     if advice is None:
         return [
-            f"no recommendation: the error of {quantity} is known of no run; look at --of, or allow more --budget"
+            f"no recommendation: no run has a known error of {quantity}; try another --of, or allow more --budget"
         ]
     bound = f"{_percent(advice['error']):g} %"
     if advice["holds"]:
@@ -102,16 +102,16 @@ def _advice_lines(record: Mapping[str, Any]) -> list[str]:
             f"{advice['setting']}; allow more --budget for a finer reference"
         ]
     if not advice["lines"]:
-        return [*lines, "  nothing has to be changed in the scene"]
+        return [*lines, "  the scene needs no change"]
     return [*lines, "  in the scene:", *(f"    {line}".rstrip() for line in advice["lines"].splitlines())]
 
 
 def _other_lines(rows: Sequence[Mapping[str, Any]], verbose: bool) -> list[str]:
-    """Settings without a result, each with its reason; without -v only those that were begun."""
-    told = [row for row in rows if verbose or row["status"] != "not begun"]
-    lines = [f"{row['status']}: {row['setting']}: {row['reason']}" for row in told]
-    if rest := len(rows) - len(told):
-        lines.append(f"{rest} more settings were not begun; -v says why")
+    """List the settings without a result, with reasons; without -v only those that were begun."""
+    shown = [row for row in rows if verbose or row["status"] != "not begun"]
+    lines = [f"{row['status']}: {row['setting']}: {row['reason']}" for row in shown]
+    if rest := len(rows) - len(shown):
+        lines.append(f"{rest} more settings were not begun; -v gives the reasons")
     return lines
 
 

@@ -1,4 +1,4 @@
-"""The picture of bed lines, their deviations made larger."""
+"""Elevation of bed lines with exaggerated deviations."""
 
 import math
 from collections.abc import Sequence
@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 __all__ = ["draw_courses"]
 
 
-_LARGEST = 0.45  # the largest deviation of a bed is drawn so large, in distances between courses
+_LARGEST = 0.45  # the largest deviation as drawn, over the distance between courses [-]
 
 
 def draw_courses(path: Path, lines: Sequence[CourseLine]) -> None:
-    """Draw the bed lines of one facade at their heights, what they differ from level made larger.
+    """Draw the bed lines of one facade at their heights, with exaggerated deviations from level.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def _draw_bed(axes: "Axes", line: CourseLine, factor: float, colour: str, small:
 
 
 def _fitted(line: CourseLine, along: Array) -> Array:
-    """The straight line of a course, or, where it sags or hogs beyond chance, its parabola [m]."""
+    """Evaluate the straight line of a course or, where it sags or hogs significantly, its parabola [m]."""
     half = line.span / 2.0
     bulge = float((((line.along - line.middle) / half) ** 2).mean()) - ((along - line.middle) / half) ** 2
     fitted: Array = line.level + (line.slope or 0.0) * (along - line.middle) + _curvature(line) * bulge
@@ -92,13 +92,13 @@ def _fitted(line: CourseLine, along: Array) -> Array:
 
 
 def _curvature(line: CourseLine) -> float:
-    """The sag, if it is beyond chance [m]."""
+    """Return the sag if it is significant, otherwise 0 [m]."""
     found = line.sag_probability is not None and line.sag_probability < SIGNIFICANT
     return line.sag if found and line.sag is not None else 0.0
 
 
 def _stones(line: CourseLine) -> list[tuple[int, int]]:
-    """First and last corner of each stone of a course that has two."""
+    """List the first and last corner of each stone that has at least two in the course."""
     found: dict[str, list[int]] = {}
     for i, code in enumerate(line.codes):
         found.setdefault(code, []).append(i)
@@ -121,7 +121,7 @@ def _label(line: CourseLine) -> str:
 
 
 def _exaggeration(lines: Sequence[CourseLine], levels: Array) -> float:
-    """A round factor by which the deviations fill a good part of the room between courses."""
+    """Choose a round factor by which the deviations fill a good part of the space between courses."""
     gaps = np.diff(np.unique(np.round(levels, 3)))
     room = float(np.median(gaps)) if len(gaps) else 0.3
     largest = max(float((np.abs(line.height - line.level) + line.sigma).max()) for line in lines)

@@ -1,4 +1,4 @@
-"""Elevations of stones that were simplified and whose joints were closed: how far each corner was moved."""
+"""Elevations of the distance by which simplifying, or closing the joints, moved each corner."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,16 +13,16 @@ from pipelines.draw.elevations.sheet import (
     CODES,
     INK,
     PALE,
-    elevated,
     extent,
     frame_elevation,
     new_sheet,
     palette,
+    project,
     save_sheet,
     sheet_size,
     write_codes,
 )
-from pipelines.draw.offscreen.parts import nice_ceiling
+from pipelines.draw.offscreen.parts import robust_ceiling
 from survey.geometry.solids import Solid, area_vector
 from survey.geometry.watertight import triangulate
 from survey.quality.facades import Facade
@@ -31,19 +31,15 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["SeenFace", "back_to_front", "draw_moved", "guess_key", "hatch", "name_stones", "seen"]
+__all__ = ["VisibleFace", "back_to_front", "draw_moved", "guess_key", "hatch", "name_stones", "visible_faces"]
 
-SeenFace = tuple[Array, tuple[int, ...]]
+VisibleFace = tuple[Array, tuple[int, ...]]
 
 _UNKNOWN = "#dcd9d4"
-_SEEN = np.cos(np.radians(60.0))  # a face that is turned farther away is not seen in an elevation
-_ROBUST = 98.0  # per cent of the corners that the colour scale reaches
-_FINEST = 0.1  # the colour scale ends here at least: what moved less is not worth a colour [mm]
+_SEEN = np.cos(np.radians(60.0))  # faces turned farther away are not drawn
+_FINEST = 0.1  # shortest colour scale: smaller movements are not worth a colour [mm]
 _DASHES = (0.0, (4.0, 2.0))
-_LABELS = {
-    "simplified": "moved by simplifying the stone [mm]",
-    "moved": "moved by closing the joints [mm]",
-}
+_LABELS = {"simplified": "moved by simplifying the stone [mm]", "moved": "moved by closing the joints [mm]"}
 
 
 def draw_moved(path: Path, shapes: ClosingShapes, facade: Facade, step: str) -> None:
@@ -52,18 +48,18 @@ def draw_moved(path: Path, shapes: ClosingShapes, facade: Facade, step: str) -> 
     Parameters
     ----------
     path : PNG
-    shapes : what there is to draw
-    facade : which of the stones, and the frame to draw them in
+    shapes : stones and joints to draw
+    facade : its stones are drawn, in its frame
     step : "simplified": on the stones as surveyed, with lines about those that became others; "moved": in closing the
         joints, on the stones as simplified, with lines about all as simulated
     """
     own = back_to_front(shapes.stones, facade)
     simplified = step == "simplified"
     values = [1e3 * (stone.simplified if simplified else stone.moved) for stone in own]
-    faces = [seen(stone.surveyed if simplified else stone.simple, facade) for stone in own]
+    faces = [visible_faces(stone.surveyed if simplified else stone.simple, facade) for stone in own]
     known = np.concatenate(values)
     known = known[np.isfinite(known)]
-    end, _ = nice_ceiling(max(float(np.percentile(known, _ROBUST)) if len(known) else 0.0, _FINEST))
+    end, _ = robust_ceiling(known, _FINEST)
     low, high = extent([corners for one in faces for corners, _ in one])
     figure = new_sheet(sheet_size(high - low))
     axes = figure.subplots()
@@ -73,7 +69,7 @@ def draw_moved(path: Path, shapes: ClosingShapes, facade: Facade, step: str) -> 
         (one.simple if simplified else one.closed, one.simplified if simplified else one.moved) for one in own
     ]
     changed = [solid for solid, moved in after if np.nanmax(moved, initial=0.0) > 1e-3 * _FINEST]
-    _outline(axes, [corners for solid in changed for corners, _ in seen(solid, facade)])
+    _outline(axes, [corners for solid in changed for corners, _ in visible_faces(solid, facade)])
     shade = [float(np.nanmean(moved)) / end if np.isfinite(moved).any() else np.nan for moved in values]
     name_stones(axes, own, faces, shade)
     frame_elevation(axes, facade, low, high, _title(shapes.scene, facade, step, own, values))
@@ -85,23 +81,23 @@ def draw_moved(path: Path, shapes: ClosingShapes, facade: Facade, step: str) -> 
 
 
 def back_to_front(stones: Sequence[DrawnStone], facade: Facade) -> list[DrawnStone]:
-    """The facade's stones, the farthest from the viewer first, so that nearer ones are drawn over them."""
+    """Sort the facade's stones, the farthest from the viewer first, so that nearer ones are drawn over them."""
     out = facade.frame.axes[2]
     return sorted((stones[i] for i in facade.members.tolist()), key=lambda one: float(one.centroid @ out))
 
 
-def seen(solid: Solid, facade: Facade) -> list[SeenFace]:
-    """Faces of a solid that look to the viewer: corners (k, 2) in the elevation, and which corners they are."""
+def visible_faces(solid: Solid, facade: Facade) -> list[VisibleFace]:
+    """List the faces of a solid that look to the viewer: corners (k, 2) in the elevation, and their indices."""
     found = []
     for face in solid.faces:
         area = area_vector(solid.vertices[list(face)])
         if area @ facade.frame.axes[2] > _SEEN * float(np.linalg.norm(area)):
-            found.append((elevated(solid.vertices[list(face)], facade), face))
+            found.append((project(solid.vertices[list(face)], facade), face))
     return found
 
 
-def hatch(axes: "Axes", stones: Sequence[DrawnStone], faces: Sequence[Sequence[SeenFace]]) -> None:
-    """Hatch the stones that nobody has seen."""
+def hatch(axes: "Axes", stones: Sequence[DrawnStone], faces: Sequence[Sequence[VisibleFace]]) -> None:
+    """Hatch hypothetical stones."""
     from matplotlib.collections import PolyCollection
 
     guessed = [
@@ -114,9 +110,9 @@ def hatch(axes: "Axes", stones: Sequence[DrawnStone], faces: Sequence[Sequence[S
 
 
 def name_stones(
-    axes: "Axes", stones: Sequence[DrawnStone], faces: Sequence[Sequence[SeenFace]], shade: Sequence[float]
+    axes: "Axes", stones: Sequence[DrawnStone], faces: Sequence[Sequence[VisibleFace]], shade: Sequence[float]
 ) -> None:
-    """Write the codes of the stones, where there are not too many, each on its largest face.
+    """Write the code of each stone on its largest face, unless there are too many stones.
 
     Parameters
     ----------
@@ -133,33 +129,35 @@ def name_stones(
 
 
 def guess_key() -> Any:
-    """What the hatching means, for a legend."""
+    """Make the legend entry of the hatching."""
     from matplotlib.patches import Patch
 
     return Patch(
-        facecolor="none", edgecolor=INK, hatch="///", alpha=0.5, label="hypothesis: nobody has seen it"
+        facecolor="none", edgecolor=INK, hatch="///", alpha=0.5, label="hypothetical stone, not surveyed"
     )
 
 
-def _shade_all(axes: "Axes", faces: Sequence[Sequence[SeenFace]], values: Sequence[Array], end: float) -> Any:
-    """Colour all faces by the values at their corners; what the scale is of, None if nothing is known."""
+def _shade_all(
+    axes: "Axes", faces: Sequence[Sequence[VisibleFace]], values: Sequence[Array], end: float
+) -> Any:
+    """Colour all faces by the values at their corners; return the mappable of the scale, None without any value."""
     from matplotlib.collections import PolyCollection
 
-    told = [
+    coloured = [
         (corners, moved[list(indices)])
         for one, moved in zip(faces, values, strict=True)
         for corners, indices in one
     ]
-    unknown = [corners for corners, moved in told if not np.isfinite(moved).all()]
+    unknown = [corners for corners, moved in coloured if not np.isfinite(moved).all()]
     axes.add_collection(PolyCollection(unknown, facecolors=_UNKNOWN, edgecolors="none"))
-    fans = [_fan(corners, moved) for corners, moved in told if np.isfinite(moved).all()]
+    fans = [_fan(corners, moved) for corners, moved in coloured if np.isfinite(moved).all()]
     shading = None
     if fans:
         points, heights, triangles = zip(*fans, strict=True)
         starts = np.cumsum([0, *map(len, points)])[:-1]
         x, y = np.concatenate(points).T
         rows = np.concatenate([one + start for one, start in zip(triangles, starts, strict=True)])
-        # triangles are drawn in their order, so that nearer stones cover those behind
+        # triangles are drawn in order, so that nearer stones cover those behind
         shading = axes.tripcolor(
             x,
             y,
@@ -169,13 +167,13 @@ def _shade_all(axes: "Axes", faces: Sequence[Sequence[SeenFace]], values: Sequen
             cmap=palette(_UNKNOWN),
             clim=(0.0, end),
         )
-    outlines = [corners for corners, _ in told]
+    outlines = [corners for corners, _ in coloured]
     axes.add_collection(PolyCollection(outlines, facecolors="none", edgecolors=PALE, linewidths=0.9))
     return shading
 
 
 def _fan(corners: Array, values: Array) -> tuple[Array, Array, NDArray[np.intp]]:
-    """Triangles about the middle of a polygon, or, where they would turn over, cut from its corners."""
+    """Divide a polygon into triangles about its middle or, where these would turn over, from its corners."""
     count = len(corners)
     middle = corners.mean(axis=0)
     turns = corners - middle

@@ -1,7 +1,8 @@
-"""What pictures show of how surveyed stones became solids that touch: stones, joints and what is wrong with them."""
+"""Shapes for the pictures of closed joints: stones before and after, joints, gaps and overlaps."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,12 +11,12 @@ from pipelines.draw.elevations.joint_polygons import joint_polygon
 from survey.geometry.solids import Solid, area_vector
 from survey.joints.report import ClosingReport, Joint
 
-__all__ = ["ClosingShapes", "DrawnJoint", "DrawnStone", "Place", "closing_shapes", "places"]
+__all__ = ["ClosingShapes", "DrawnJoint", "DrawnStone", "Place", "Stages", "closing_shapes", "places"]
 
 
 @dataclass(frozen=True)
 class DrawnStone:
-    """One stone, as surveyed and as it is simulated.
+    """One stone, as surveyed and as simulated.
 
     Attributes
     ----------
@@ -25,8 +26,8 @@ class DrawnStone:
     normal : (3,) of its visible face, outwards [-]
     centroid : (3,) of its visible face [m]
     area : of its visible face [m²]
-    hypothesis : nobody has seen it
-    core : it lies behind the stones of a facing
+    hypothesis : whether it is hypothetical
+    core : whether it lies behind the stones of a facing
     """
 
     surveyed: Solid
@@ -42,7 +43,7 @@ class DrawnStone:
 
     @property
     def code(self) -> str:
-        """Of the stone."""
+        """Code of the stone."""
         return self.closed.code
 
 
@@ -62,14 +63,14 @@ class DrawnJoint:
 
 @dataclass(frozen=True)
 class Place:
-    """Something that is not as it should be, to be found on the wall.
+    """Defect of a joint, with its position on the wall.
 
     Attributes
     ----------
-    kind : gap or overlap
+    kind : "gap" or "overlap"
     stones : codes of the two
     centroid : (3,) [m]
-    text : what it is, in words, with numbers
+    text : description with its measure
     """
 
     kind: str
@@ -80,7 +81,7 @@ class Place:
 
 @dataclass(frozen=True)
 class ClosingShapes:
-    """All that the pictures show.
+    """Everything that the pictures show.
 
     Attributes
     ----------
@@ -95,28 +96,34 @@ class ClosingShapes:
     places: tuple[Place, ...]
 
 
+class Stages(NamedTuple):
+    """Solids of all stones, in one order, at three stages: as surveyed, as simplified, as simulated."""
+
+    surveyed: Sequence[Solid]
+    simple: Sequence[Solid]
+    closed: Sequence[Solid]
+
+
 def closing_shapes(
     scene: str,
-    surveyed: Sequence[Solid],
-    simple: Sequence[Solid],
-    closed: Sequence[Solid],
+    solids: Stages,
     simplified: Mapping[str, Array],
     closing: ClosingReport,
     faces: Sequence[Array],
     hypotheses: frozenset[str],
     core: frozenset[str] = frozenset(),
 ) -> ClosingShapes:
-    """What to draw of stones and of the report on their joints.
+    """Gather the shapes of stones and of the report on their joints.
 
     Parameters
     ----------
     scene : its name
-    surveyed, simple, closed : solids of the stones as in DrawnStone, in the same order
-    simplified : by code, how far each corner of the surveyed solid was moved [m]
-    closing : what closing the joints changed
+    solids : of the stones
+    simplified : by code, the movement of each corner of the surveyed solid [m]
+    closing : changes by closing the joints
     faces : (nv, 3) outline of each stone's visible face, counter-clockwise seen from outside [m]
-    hypotheses : codes of stones that nobody has seen
-    core : codes of what lies behind the stones of a facing
+    hypotheses : codes of hypothetical stones
+    core : codes of those that lie behind the stones of a facing
     """
     stones = tuple(
         DrawnStone(
@@ -131,18 +138,18 @@ def closing_shapes(
             hypothesis=after.code in hypotheses,
             core=after.code in core,
         )
-        for before, between, after, face in zip(surveyed, simple, closed, faces, strict=True)
+        for before, between, after, face in zip(*solids, faces, strict=True)
     )
-    solids = {one.code: one for one in closed}
+    closed = {one.code: one for one in solids.closed}
     joints = tuple(
-        DrawnJoint(one, joint_polygon(solids[one.stones[0]], solids[one.stones[1]], one.normal, one.centroid))
+        DrawnJoint(one, joint_polygon(closed[one.stones[0]], closed[one.stones[1]], one.normal, one.centroid))
         for one in closing.joints
     )
     return ClosingShapes(scene, stones, joints, places(closing))
 
 
 def places(closing: ClosingReport) -> tuple[Place, ...]:
-    """Overlaps, then gaps, the largest first, in words."""
+    """List overlaps, then gaps, the largest of each first."""
     overlaps = [
         Place(
             "overlap",
@@ -169,7 +176,7 @@ def _pair(stones: tuple[str, str]) -> str:
 
 
 def _of_corners(values: Array | None, solid: Solid) -> Array:
-    """A value for each corner of a solid; the largest for all where they are of other corners."""
+    """Return a value for each corner of a solid; the largest for all where `values` belong to other corners."""
     count = len(solid.vertices)
     if values is None or not len(values):
         return np.full(count, np.nan)

@@ -1,4 +1,4 @@
-"""The area over which two stones face each other, as a polygon in space: what pictures show of a joint."""
+"""Common area of two stones as a polygon in space, by which pictures show a joint."""
 
 from collections.abc import Sequence
 
@@ -10,14 +10,14 @@ from survey.geometry.solids import Solid, area_vector
 __all__ = ["joint_polygon"]
 
 
-_FACING = np.cos(np.radians(45.0))  # a face that is turned farther from the joint is not a side of it
-_NOTHING = 1e-10  # areas below are none [m²]
+_FACING = np.cos(np.radians(45.0))  # faces turned farther from the joint are not sides of it
+_NOTHING = 1e-10  # smaller areas are rounding [m²]
 
 
 def joint_polygon(first: Solid, second: Solid, normal: Array, centroid: Array) -> Array | None:
-    """What a face of one stone and a face of the other have in common, seen square to their joint.
+    """Intersect a face of one stone with a face of the other, projected onto their joint.
 
-    Of several pairs of faces, the one with most in common. Faces that are not convex are taken as if they were.
+    Of several pairs of faces, the one with the largest intersection counts. Faces are taken for convex.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def joint_polygon(first: Solid, second: Solid, normal: Array, centroid: Array) -
 
 
 def _sides(solid: Solid, towards: Array, axes: Array, centroid: Array) -> list[Array]:
-    """Faces (k, 2) of a stone that look in a direction, seen square to the joint, all counter-clockwise."""
+    """Project the faces of a stone that look in a direction onto the joint: (k, 2) each, counter-clockwise."""
     found = []
     for face in solid.faces:
         polygon = solid.vertices[list(face)]
@@ -55,7 +55,7 @@ def _sides(solid: Solid, towards: Array, axes: Array, centroid: Array) -> list[A
 
 
 def _clipped(subject: Array, window: Array) -> Array:
-    """The part of a polygon within a convex one, both counter-clockwise, (k, 2) (Sutherland and Hodgman 1974)."""
+    """Clip a polygon by a convex one, both counter-clockwise, (k, 2) (Sutherland and Hodgman 1974)."""
     corners: Sequence[Array] = list(subject)
     for start, end in zip(window, np.roll(window, -1, axis=0), strict=True):
         edge = end - start
@@ -74,7 +74,7 @@ def _clipped(subject: Array, window: Array) -> Array:
 
 
 def _area(polygon: Array) -> float:
-    """Area of a polygon (k, 2), positive if it is counter-clockwise [m²]."""
+    """Return the area of a polygon (k, 2), positive if it is counter-clockwise [m²]."""
     if len(polygon) < 3:
         return 0.0
     x, y = (polygon - polygon[0]).T

@@ -1,4 +1,4 @@
-"""Elevations of joints: how wide they were surveyed, which were left open, and where stones overlap."""
+"""Elevations of joints: surveyed width, joints left open, and overlaps."""
 
 import textwrap
 from collections.abc import Sequence
@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pipelines.arrays import Array
-from pipelines.draw.elevations.closing import back_to_front, guess_key, hatch, name_stones, seen
+from pipelines.draw.elevations.closing import back_to_front, guess_key, hatch, name_stones, visible_faces
 from pipelines.draw.elevations.closing_shapes import ClosingShapes, DrawnJoint, Place
 from pipelines.draw.elevations.sheet import (
     FLAG,
     PALE,
-    elevated,
     extent,
     frame_elevation,
     new_sheet,
+    project,
     save_sheet,
     sheet_size,
 )
-from pipelines.draw.offscreen.parts import nice_ceiling
+from pipelines.draw.offscreen.parts import robust_ceiling
 from survey.quality.facades import Facade
 
 if TYPE_CHECKING:
@@ -31,28 +31,27 @@ __all__ = ["draw_joints"]
 
 
 _STONE, _OVERLAP, _NEGATIVE = "#efede9", "#000000", "#cc79a7"
-_EDGE_ON = np.sin(np.radians(50.0))  # a joint that is turned farther to the viewer lies behind the faces
-_ROBUST = 98.0  # per cent of the joints that the colour scale reaches
-_FINEST = 0.1  # the colour scale ends here at least [mm]
-_TOLD = 12  # places that are numbered
-_WIDE = 125  # letters in a line below the picture
+_EDGE_ON = np.sin(np.radians(50.0))  # joints turned farther to the viewer lie behind the faces
+_FINEST = 0.1  # shortest colour scale [mm]
+_NUMBERED = 12  # gaps and overlaps
+_WIDE = 125  # characters of a line below the picture
 _LINE = 0.185  # height of such a line [in]
 
 
 def draw_joints(path: Path, shapes: ClosingShapes, facade: Facade) -> None:
-    """Draw the joints of a facade, coloured by how wide they were surveyed; what is left open or overlaps is marked.
+    """Draw the joints of a facade, coloured by their surveyed width, with marks at gaps and overlaps.
 
     Parameters
     ----------
     path : PNG
-    shapes : what there is to draw
-    facade : which of the stones, and the frame to draw them in
+    shapes : stones and joints to draw
+    facade : its stones are drawn, in its frame
     """
     from matplotlib.collections import PolyCollection
 
     own = back_to_front(shapes.stones, facade)
     codes = {stone.code for stone in own}
-    faces = [seen(stone.closed, facade) for stone in own]
+    faces = [visible_faces(stone.closed, facade) for stone in own]
     flat = [corners for one in faces for corners, _ in one]
     low, high = extent(flat)
     shown = [one for one in shapes.joints if _is_seen(one, facade, codes)]
@@ -79,13 +78,13 @@ def draw_joints(path: Path, shapes: ClosingShapes, facade: Facade) -> None:
 def _add_closed(
     figure: "Figure", axes: "Axes", joints: Sequence[DrawnJoint], facade: Facade, stroke: float
 ) -> None:
-    """Lines in the colours of their widths, and the scale of these."""
+    """Draw closed joints as lines in the colours of their widths, with a colour scale."""
     from matplotlib.collections import LineCollection
 
     if not joints:
         return
     width = np.array([1e3 * one.joint.width for one in joints])
-    end, _ = nice_ceiling(max(float(np.percentile(width, _ROBUST)), _FINEST))
+    end, _ = robust_ceiling(width, _FINEST)
     lines = LineCollection(
         [_trace(one, facade) for one in joints],
         array=width,
@@ -102,7 +101,7 @@ def _add_closed(
 
 
 def _add_open(axes: "Axes", joints: Sequence[DrawnJoint], facade: Facade, stroke: float) -> None:
-    """Double lines where stones do not meet."""
+    """Draw open joints as double lines."""
     from matplotlib.collections import LineCollection
 
     traces = [_trace(one, facade) for one in joints]
@@ -111,27 +110,27 @@ def _add_open(axes: "Axes", joints: Sequence[DrawnJoint], facade: Facade, stroke
 
 
 def _is_seen(one: DrawnJoint, facade: Facade, codes: set[str]) -> bool:
-    """Whether a joint is one of the facade's, seen edge on."""
+    """Return True for a joint of the facade's stones that is seen edge on."""
     return bool(
         codes & {*one.joint.stones} and abs(float(one.joint.normal @ facade.frame.axes[2])) < _EDGE_ON
     )
 
 
 def _trace(one: DrawnJoint, facade: Facade) -> Array:
-    """Where a joint comes to the face of the wall: ends (2, 2) of a line in the elevation."""
+    """Find the line where a joint meets the face of the wall: its ends (2, 2) in the elevation."""
     if one.polygon is None:
         along = np.cross(one.joint.normal, facade.frame.axes[2])
         reach = 0.5 * np.sqrt(max(one.joint.area, 0.0)) * along / max(float(np.linalg.norm(along)), 1e-9)
-        return elevated(np.array([one.joint.centroid - reach, one.joint.centroid + reach]), facade)
+        return project(np.array([one.joint.centroid - reach, one.joint.centroid + reach]), facade)
     out = one.polygon @ facade.frame.axes[2]
     front = one.polygon[out >= 0.5 * (out.min() + out.max())]
     along = np.cross(one.joint.normal, facade.frame.axes[2])
     place = front @ along
-    return elevated(front[[int(place.argmin()), int(place.argmax())]], facade)
+    return project(front[[int(place.argmin()), int(place.argmax())]], facade)
 
 
 def _width_colours() -> Any:
-    """From yellow-green to violet: no part of it is the vermilion of what is open."""
+    """Return a colour map from yellow-green to violet, distinct from the vermilion of open joints."""
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
 
@@ -139,13 +138,13 @@ def _width_colours() -> Any:
 
 
 def _mark(axes: "Axes", marked: Sequence[Place], facade: Facade) -> None:
-    """A sign at each gap and overlap, the first of them numbered."""
+    """Mark each gap and overlap, and number the first of them."""
     for number, place in enumerate(marked, start=1):
-        x, y = elevated(place.centroid, facade)
+        x, y = project(place.centroid, facade)
         marker, colour = ("D", _OVERLAP) if place.kind == "overlap" else ("o", FLAG)
-        size = 12.0 if number <= _TOLD else 5.0
+        size = 12.0 if number <= _NUMBERED else 5.0
         axes.plot([x], [y], marker, color=colour, markersize=size, markeredgecolor="white", zorder=5)
-        if number <= _TOLD:
+        if number <= _NUMBERED:
             axes.annotate(
                 str(number),
                 (x, y),
@@ -167,7 +166,7 @@ def _title(scene: str, facade: Facade, closed: Sequence[DrawnJoint], left: Seque
 
 
 def _keys(shown: Sequence[DrawnJoint], marked: Sequence[Place], places: int, guessed: bool) -> list[Any]:
-    """What the signs mean, and each numbered place in a line."""
+    """Make the legend: the signs, and one line for each numbered place."""
     from matplotlib.lines import Line2D
 
     keys: list[Any] = [guess_key()] if guessed else []
@@ -183,7 +182,7 @@ def _keys(shown: Sequence[DrawnJoint], marked: Sequence[Place], places: int, gue
         keys.append(Line2D([], [], color=_NEGATIVE, linewidth=3.0, label="the faces overlapped as surveyed"))
     lines = [
         textwrap.shorten(f"{number}: {place.text}", _WIDE, placeholder=" …")
-        for number, place in enumerate(marked[:_TOLD], start=1)
+        for number, place in enumerate(marked[:_NUMBERED], start=1)
     ]
     if places > len(lines):
         elsewhere = " (some on other sides)" if places > len(marked) else ""

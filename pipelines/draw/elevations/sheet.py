@@ -1,4 +1,4 @@
-"""What elevations have in common: the plane that they are drawn in, the sheet, the axes, the codes of the stones."""
+"""Common parts of elevations: projection, sheet, axes, stone codes."""
 
 import logging
 import math
@@ -18,11 +18,11 @@ __all__ = [
     "INK",
     "PALE",
     "PLAIN",
-    "elevated",
     "extent",
     "frame_elevation",
     "new_sheet",
     "palette",
+    "project",
     "save_sheet",
     "sheet_size",
     "write_codes",
@@ -31,20 +31,22 @@ __all__ = [
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.colors import Colormap
+    from matplotlib.figure import Figure
 
 
+_DPI = 150
+INK, PALE = "#222222", "#a9a59e"
+FLAG, PLAIN = "#d55e00", "#0072b2"  # vermilion and blue of Okabe and Ito, safe for colour-blind readers
 CODES = 250
-"""Stones that can be named on an elevation."""
+"""Largest number of stones named on an elevation."""
 
-_PALETTE = (
-    "YlGnBu"  # from light to dark: the order is seen in print too, and by those who do not see all colours
-)
-_LIGHTER = 0.8  # part of it that is used: on its darkest part codes and outlines cannot be seen
-_DARK = 0.7  # part of the scale beyond which a code is written in white
+_PALETTE = "YlGnBu"  # from light to dark: legible in print and to colour-blind readers
+_LIGHTER = 0.8  # part of it that is used [-]: codes and outlines cannot be read on the darkest part
+_DARK = 0.7  # part of the scale beyond which codes are written in white [-]
 
 
-def elevated(points: Array, facade: Facade) -> Array:
-    """Points (…, 3) in the elevation, (…, 2): along the facade, and up; z at the origin of a standing one [m]."""
+def project(points: Array, facade: Facade) -> Array:
+    """Project points (…, 3) onto the elevation, (…, 2): along the facade, and up (z, if the facade stands) [m]."""
     flat = facade.frame.flatten(points)
     if facade.azimuth is not None:
         flat[..., 1] += facade.frame.origin[2]
@@ -52,21 +54,21 @@ def elevated(points: Array, facade: Facade) -> Array:
 
 
 def extent(polygons: Sequence[Array]) -> tuple[Array, Array]:
-    """Lowest and highest coordinates (2,) of polygons."""
+    """Return the lowest and highest coordinates (2,) of polygons."""
     low = np.min([polygon.min(axis=0) for polygon in polygons], axis=0)
     high = np.max([polygon.max(axis=0) for polygon in polygons], axis=0)
     return low, high
 
 
 def sheet_size(size: Array) -> tuple[float, float]:
-    """Size of the sheet [in] that shows a facade with room for the scale, neither thin nor flat."""
+    """Return the size of a sheet [in] for a facade and its scale, neither too tall nor too wide."""
     width, height = np.maximum(size, 1e-3)
     shape = float(np.clip(height / width, 0.25, 2.0))
     return (11.0, 11.0 * 0.82 * shape + 1.4) if shape <= 1.0 else (10.0 / shape + 2.6, 11.0)
 
 
 def write_codes(axes: "Axes", codes: Sequence[str], polygons: Sequence[Array], shade: Array) -> None:
-    """Each stone's name in its middle, as large as its width allows, light on dark and dark on light.
+    """Write each stone's code in its middle, as large as it allows, light on dark and dark on light.
 
     Parameters
     ----------
@@ -88,7 +90,7 @@ def write_codes(axes: "Axes", codes: Sequence[str], polygons: Sequence[Array], s
 
 
 def frame_elevation(axes: "Axes", facade: Facade, low: Array, high: Array, title: str) -> None:
-    """Axes in metres about what lies between two corners."""
+    """Set axes in metres around the box between two corners."""
     margin = 0.02 * float((high - low).max())
     axes.set_xlim(low[0] - margin, high[0] + margin)
     axes.set_ylim(low[1] - margin, high[1] + margin)
@@ -100,25 +102,16 @@ def frame_elevation(axes: "Axes", facade: Facade, low: Array, high: Array, title
 
 
 def palette(unknown: str) -> "Colormap":
-    """The lighter part of the colour map, on which codes and outlines are still seen."""
+    """Return the lighter part of the colour map, on which codes and outlines can be read."""
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
 
     return ListedColormap(colormaps[_PALETTE](np.linspace(0.0, _LIGHTER, 256))).with_extremes(bad=unknown)
 
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-
-_DPI = 150
-INK, PALE = "#222222", "#a9a59e"
-FLAG, PLAIN = "#d55e00", "#0072b2"  # vermilion and blue of Okabe and Ito: told apart by everybody
-
-
 def new_sheet(size: tuple[float, float]) -> "Figure":
-    """An empty figure of so many inches, without a window."""
-    # matplotlib tells on stderr that it builds its font cache, once per machine
+    """Make an empty figure of a size in inches, without a window."""
+    # matplotlib reports on stderr that it builds its font cache, once per machine
     logging.getLogger("matplotlib.font_manager").setLevel(logging.ERROR)
     from matplotlib.figure import Figure
 
@@ -128,7 +121,5 @@ def new_sheet(size: tuple[float, float]) -> "Figure":
 def save_sheet(figure: "Figure", path: Path) -> None:
     """Write a figure as PNG."""
     with warnings.catch_warnings():
-        warnings.filterwarnings(
-            "ignore", "Glyph"
-        )  # codes in scripts that the font does not have show as boxes
+        warnings.filterwarnings("ignore", "Glyph")  # codes in scripts missing from the font show as boxes
         figure.savefig(path, dpi=_DPI)

@@ -1,4 +1,4 @@
-"""The pictures of a survey report: elevations and residuals."""
+"""Pictures of a survey report: elevations and residuals."""
 
 import math
 from collections.abc import Sequence
@@ -12,16 +12,16 @@ from pipelines.draw.elevations.sheet import (
     FLAG,
     INK,
     PALE,
-    elevated,
     extent,
     frame_elevation,
     new_sheet,
     palette,
+    project,
     save_sheet,
     sheet_size,
     write_codes,
 )
-from pipelines.draw.offscreen.parts import nice_ceiling
+from pipelines.draw.offscreen.parts import robust_ceiling
 from survey.quality.facades import Facade
 from survey.quality.precision import Histogram, StoneQuality
 
@@ -32,31 +32,28 @@ __all__ = ["draw_elevation", "draw_residuals"]
 
 
 _UNKNOWN = "#dcd9d4"
-_ROBUST = 98.0  # per cent of the stones that the colour scale reaches
-_FINEST = 0.01  # the colour scale ends here at least: smaller residuals are not worth a colour [mm]
+_FINEST = 0.01  # shortest colour scale: smaller residuals are not worth a colour [mm]
 
 
 def draw_elevation(path: Path, facade: Facade, stones: Sequence[StoneQuality], flagged: set[str]) -> None:
-    """Draw the stones of a facade, coloured by how well their planes fit; those to measure again are outlined.
+    """Draw the stones of a facade, coloured by the misfit of their planes; outline those to measure again.
 
     Parameters
     ----------
     path : PNG
-    facade : which stones, and the frame to draw them in
+    facade : its stones are drawn, in its frame
     stones : all stones of the survey
     flagged : codes of stones to measure again
     """
     from matplotlib.collections import PolyCollection
 
     own = [stones[i] for i in facade.members.tolist()]
-    polygons = [elevated(one.outline, facade) for one in own]
+    polygons = [project(one.outline, facade) for one in own]
     low, high = extent(polygons)
     figure = new_sheet(sheet_size(high - low))
     axes = figure.subplots()
     rms = np.array([one.rms * 1e3 if one.measured and one.redundancy else np.nan for one in own])
-    end, _ = nice_ceiling(
-        max(float(np.nanpercentile(rms, _ROBUST)), _FINEST) if np.isfinite(rms).any() else 1.0
-    )
+    end, _ = robust_ceiling(rms, _FINEST if np.isfinite(rms).any() else 1.0)
     fine = 0.9 if len(own) <= 2000 else 0.15
     faces = PolyCollection(
         polygons, array=rms, cmap=palette(_UNKNOWN), clim=(0.0, end), edgecolors=PALE, linewidths=fine
@@ -79,7 +76,7 @@ def draw_elevation(path: Path, facade: Facade, stones: Sequence[StoneQuality], f
 
 
 def draw_residuals(path: Path, residuals: Histogram, verdict: str) -> None:
-    """Draw how often standardised residuals fall where, beside the normal distribution."""
+    """Draw the histogram of standardised residuals beside the normal distribution."""
     figure = new_sheet((8.0, 4.2))
     axes = figure.subplots()
     middles, width = (residuals.edges[:-1] + residuals.edges[1:]) / 2.0, np.diff(residuals.edges)

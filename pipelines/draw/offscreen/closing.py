@@ -1,19 +1,14 @@
-"""Pictures of closed joints in space, drawn off screen by PyVista.
+"""Pictures of closed joints in space, drawn off screen by PyVista (``python -m`` this module ``JOB.json``)."""
 
-Like `pipelines.draw.offscreen.result`, this runs in a process of its own: ``python -m
-pipelines.draw.offscreen.closing JOB.json``.
-"""
-
-import json
 import sys
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pipelines.arrays import Array, Ints
+from pipelines.draw.offscreen.jobs import run_job
 from pipelines.draw.offscreen.parts import (
     LIGHT,
     PLAIN,
@@ -22,18 +17,20 @@ from pipelines.draw.offscreen.parts import (
     add_edges,
     mesh_of,
     new_plotter,
-    nice_ceiling,
     place_camera,
+    robust_ceiling,
     save_picture,
 )
 
-__all__ = ["ClosingSurface", "draw", "load_surface", "save_surface"]
+__all__ = ["ClosingSurface", "draw"]
 
 
-_GAP, _OVERLAP, _BALL = "#d55e00", "#000000", 26.0  # colours, and the size of a sign [px]
-_MOVED, _WIDTH = ("YlGnBu", 0.9), ("viridis_r", 1.0)
-_ROBUST = 98.0  # per cent of the values that a colour scale reaches
-_FINEST = 0.1  # a colour scale ends here at least [mm]
+_GAP = "#d55e00"
+_OVERLAP = "#000000"
+_BALL = 26.0  # diameter of a sign [px]
+_MOVED = ("YlGnBu", 0.9)  # colour map, and the part of it that is used
+_WIDTH = ("viridis_r", 1.0)
+_FINEST = 0.1  # shortest colour scale [mm]
 
 
 @dataclass(frozen=True)
@@ -44,7 +41,7 @@ class ClosingSurface:
     ----------
     points : (n, 3) corners of the stones [m]
     triangles, edges : (nt, 3) and (ne, 2) of the stones
-    moved : (n,) how far each corner was moved [m]; NaN where that is not known
+    moved : (n,) distance by which each corner was moved [m]; NaN if unknown
     joint_points : (m, 3) corners of closed joints [m]
     joint_triangles : (k, 3)
     joint_width : (k,) of the joint of each triangle, as surveyed [m]
@@ -64,17 +61,6 @@ class ClosingSurface:
     gap_triangles: Ints
     gaps: Array
     overlaps: Array
-
-
-def save_surface(path: Path, surface: ClosingSurface) -> None:
-    """Write a surface as .npz."""
-    np.savez(path, **{one.name: getattr(surface, one.name) for one in fields(surface)})
-
-
-def load_surface(path: Path) -> ClosingSurface:
-    """Read what `save_surface` wrote."""
-    with np.load(path, allow_pickle=False) as arrays:
-        return ClosingSurface(**{one.name: arrays[one.name] for one in fields(ClosingSurface)})
 
 
 def draw(surface: ClosingSurface, path: Path, job: dict[str, Any]) -> None:
@@ -120,7 +106,7 @@ def _add_joints(pyvista: Any, plotter: Any, surface: ClosingSurface, label: str)
 
 
 def _add_places(pyvista: Any, plotter: Any, surface: ClosingSurface) -> None:
-    """Balls at gaps and overlaps, a good way before the stones, so that none is hidden."""
+    """Add balls at gaps and overlaps, well in front of the stones, so that none is hidden."""
     toward = np.array(plotter.camera.position) - np.array(plotter.camera.focal_point)
     for places, colour in ((surface.gaps, _GAP), (surface.overlaps, _OVERLAP)):
         if len(places):
@@ -132,24 +118,10 @@ def _add_places(pyvista: Any, plotter: Any, surface: ClosingSurface) -> None:
 
 def _colouring(values: Array, label: str, palette: tuple[str, float]) -> Colouring:
     known = values[np.isfinite(values)]
-    end, intervals = nice_ceiling(max(float(np.percentile(known, _ROBUST)), _FINEST))
+    end, intervals = robust_ceiling(values, _FINEST)
     saturated = bool(known.max() > end)
     return Colouring(values, label, end, intervals, saturated, palette)
 
 
-def _main(arguments: Sequence[str]) -> int:
-    """Draw what a job file asks for; exit code 3 if a library cannot be loaded, its message on stdout."""
-    job = json.loads(Path(arguments[1]).read_text(encoding="utf-8"))
-    try:
-        import pyvista  # noqa: F401
-    except ImportError as error:
-        print(error)
-        return 3
-    surface = load_surface(Path(job["surface"]))
-    for picture in job["pictures"]:
-        draw(surface, Path(picture["path"]), picture)
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(_main(sys.argv))
+    sys.exit(run_job(sys.argv, ClosingSurface, draw))

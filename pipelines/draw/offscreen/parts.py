@@ -1,5 +1,6 @@
-"""Parts that all pictures drawn by PyVista are made of: the sheet, the viewer, edges, colours and their scale."""
+"""Common parts of the pictures drawn by PyVista: jobs, sheet, camera, edges, colours and their scale."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, floor, log10
 from pathlib import Path
@@ -18,10 +19,12 @@ __all__ = [
     "add_coloured",
     "add_edges",
     "add_glass",
+    "fan_polygons",
     "mesh_of",
     "new_plotter",
     "nice_ceiling",
     "place_camera",
+    "robust_ceiling",
     "save_picture",
 ]
 
@@ -31,23 +34,24 @@ _EDGE = "#3a3733"
 PLAIN, INK = "#c9c6c0", "#222222"
 LIGHT: dict[str, Any] = {"ambient": 0.55, "diffuse": 0.5, "specular": 0.0}
 _ROUND = {1.0: 5, 1.2: 6, 1.5: 5, 2.0: 4, 2.5: 5, 3.0: 6, 4.0: 4, 5.0: 5, 6.0: 6, 8.0: 4}  # end: intervals
+_ROBUST = 98.0  # percentile of the values at which a colour scale ends
 _AZIMUTH = np.deg2rad(-24.0)
 OBLIQUELY = np.deg2rad(14.0)
-"""How far from above a wall is looked at, so that depth is seen [rad]."""
+"""Elevation of the viewer above a wall, so that its depth can be seen [rad]."""
 
 
 @dataclass(frozen=True)
 class Colouring:
-    """How a quantity is shown.
+    """Values of a quantity with their colour scale.
 
     Attributes
     ----------
     values : (n,) in the unit of the scalar bar; NaN is drawn grey
     title : of the scalar bar, with unit
     top : end of the scale
-    intervals : how many the scalar bar has between its labels, so that these are round numbers
+    intervals : number of intervals of the scalar bar, so that its labels are round numbers
     saturated : whether some values lie above the end
-    palette : name of a matplotlib colour map, and how much of it is used
+    palette : name of a matplotlib colour map, and the part of it that is used
     """
 
     values: Array
@@ -59,7 +63,7 @@ class Colouring:
 
 
 def nice_ceiling(value: float) -> tuple[float, int]:
-    """A round number that reaches a positive value, and how many round intervals divide it."""
+    """Round a positive value up; return the round number, and the count of round intervals that divide it."""
     decade = 10.0 ** floor(log10(value))
     for step, intervals in _ROUND.items():
         if value <= step * decade * (1.0 + 1e-9):
@@ -67,15 +71,21 @@ def nice_ceiling(value: float) -> tuple[float, int]:
     return 10.0 * decade, _ROUND[1.0]
 
 
+def robust_ceiling(values: Array, finest: float) -> tuple[float, int]:
+    """Round up the 98th percentile of the finite values, at least `finest`, like `nice_ceiling`."""
+    known = values[np.isfinite(values)]
+    return nice_ceiling(max(float(np.percentile(known, _ROBUST)) if len(known) else 0.0, finest))
+
+
 def new_plotter(pyvista: Any) -> Any:
-    """An empty picture, without a window."""
+    """Make an empty picture, without a window."""
     plotter = pyvista.Plotter(off_screen=True, window_size=list(_SIZE), lighting="none")
     plotter.set_background("white")
     return plotter
 
 
 def save_picture(plotter: Any, path: Path, title: str, note: str) -> None:
-    """Write a picture as PNG, with a title above and perhaps a note below."""
+    """Write a picture as PNG, with a title above and an optional note below."""
     plotter.add_text("\n" + title, position="upper_edge", font_size=15, color=INK)
     if note:
         plotter.add_text(note + "\n", position="lower_edge", font_size=13, color=INK)
@@ -85,7 +95,7 @@ def save_picture(plotter: Any, path: Path, title: str, note: str) -> None:
 
 
 def add_coloured(plotter: Any, mesh: Any, colours: Colouring, *, lit: bool = True) -> None:
-    """A mesh in the colours of its "value", and their scale; not lit, it has just these colours."""
+    """Add a mesh in the colours of its "value", with their scale; without light the colours are exact."""
     light = LIGHT if lit else {"lighting": False}
     plotter.add_mesh(
         mesh,
@@ -99,12 +109,12 @@ def add_coloured(plotter: Any, mesh: Any, colours: Colouring, *, lit: bool = Tru
 
 
 def add_glass(pyvista: Any, plotter: Any, points: Array, triangles: Ints) -> None:
-    """The stones, so that one sees what is in their joints."""
+    """Add the stones as glass, so that their joints can be seen."""
     plotter.add_mesh(mesh_of(pyvista, points, triangles), color=PLAIN, opacity=0.15, lighting=False)
 
 
 def add_edges(pyvista: Any, plotter: Any, points: Array, edges: Ints) -> None:
-    """Edges of the stones, a hair before their faces so that they are not drawn half hidden."""
+    """Add the edges of the stones, slightly in front of their faces so that they are not half hidden."""
     toward = plotter.camera.position - np.array(plotter.camera.focal_point)
     lines = pyvista.PolyData()
     lines.points = points + 1e-4 * toward
@@ -113,7 +123,7 @@ def add_edges(pyvista: Any, plotter: Any, points: Array, edges: Ints) -> None:
 
 
 def _palette(name: str, part: float) -> Any:
-    """The lighter part of a colour map: on its darkest part the edges of the stones cannot be seen."""
+    """Return the lighter part of a colour map: the edges of stones cannot be seen on its darkest part."""
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
 
@@ -121,8 +131,22 @@ def _palette(name: str, part: float) -> Any:
 
 
 def mesh_of(pyvista: Any, points: Array, triangles: Ints) -> Any:
-    """Triangles on points, as PyVista has them."""
+    """Make a PyVista mesh of triangles."""
     return pyvista.PolyData(points, faces=np.column_stack([np.full(len(triangles), 3), triangles]).ravel())
+
+
+def fan_polygons(polygons: Sequence[Array]) -> tuple[Array, Ints, Ints]:
+    """Divide convex polygons, (k, 3) each, into triangles; return corners, triangles and the polygon of each."""
+    starts = np.cumsum([0, *map(len, polygons)]).tolist()
+    fans = [
+        [(start, start + k, start + k + 1) for k in range(1, len(polygon) - 1)]
+        for start, polygon in zip(starts, polygons, strict=False)
+    ]
+    return (
+        np.concatenate([*polygons, np.zeros((0, 3))]),
+        np.array([triangle for fan in fans for triangle in fan], dtype=np.int64).reshape(-1, 3),
+        np.repeat(np.arange(len(fans)), [len(fan) for fan in fans]),
+    )
 
 
 def _add_scalar_bar(plotter: Any, colours: Colouring) -> None:

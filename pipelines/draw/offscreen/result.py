@@ -1,10 +1,5 @@
-"""Pictures of a wall, drawn off screen by PyVista.
+"""Pictures of a result, drawn off screen by PyVista (``python -m`` this module ``JOB.json``)."""
 
-This module runs in a process of its own (``python -m pipelines.draw.offscreen.result JOB.json``): a graphics library
-that is missing or broken may end the process that uses it, and must not take the results along.
-"""
-
-import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -12,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from pipelines.draw.offscreen.jobs import run_job
 from pipelines.draw.offscreen.parts import (
     LIGHT,
     PLAIN,
@@ -25,7 +21,7 @@ from pipelines.draw.offscreen.parts import (
     place_camera,
     save_picture,
 )
-from pipelines.draw.offscreen.surfaces import WallSurface, load_surface
+from pipelines.draw.offscreen.surfaces import WallSurface
 
 __all__ = ["colouring", "draw"]
 
@@ -36,7 +32,7 @@ _LONGEST = 0.12  # the longest stroke of a resultant, over the wall's diagonal
 
 
 def colouring(surface: WallSurface, quantity: str, top: float | None) -> Colouring:
-    """Values, scale and palette of one of FIELDS, or of the `pressure` of the joints' triangles.
+    """Choose values, scale and palette of one of FIELDS, or of the `pressure` of the joints' triangles.
 
     The scale ends at `top`, rounded up; without it, at the largest value.
     """
@@ -56,7 +52,7 @@ def colouring(surface: WallSurface, quantity: str, top: float | None) -> Colouri
 
 
 def draw(surface: WallSurface, path: Path, job: dict[str, Any]) -> None:
-    """Draw one picture as PNG; `job` has quantity, top, title, towards (to the viewer), up, and maybe a note."""
+    """Draw one picture as PNG; `job` has quantity, top, title, towards (to the viewer), up and optionally note."""
     import pyvista
 
     plotter = new_plotter(pyvista)
@@ -79,30 +75,22 @@ def _length_unit(largest: float) -> tuple[float, str]:
     return (1e3, "mm") if largest >= 1e-4 else (1e6, "µm")
 
 
-def _megapascals(_: float) -> tuple[float, str]:
-    return 1e-6, "MPa"
-
-
 def _pascals(largest: float) -> tuple[float, str]:
     return (1e-6, "MPa") if largest >= 1e5 else (1e-3, "kPa")
 
 
-def _percent(_: float) -> tuple[float, str]:
-    return 100.0, "%"
-
-
-def _ratio(_: float) -> tuple[float, str]:
-    return 1.0, ""
+def _always(factor: float, unit: str) -> Callable[[float], tuple[float, str]]:
+    return lambda _: (factor, unit)
 
 
 # of each quantity: title, factor and unit by the end of the scale, palette
 _LOOKS: dict[str, tuple[str, Callable[[float], tuple[float, str]], tuple[str, float]]] = {
-    "von_mises": ("Von Mises stress", _megapascals, ("inferno_r", 0.85)),
+    "von_mises": ("Von Mises stress", _always(1e-6, "MPa"), ("inferno_r", 0.85)),
     "displacement": ("Displacement", _length_unit, ("viridis_r", 1.0)),
     "principal_tension": ("Largest principal stress, tension", _pascals, ("Reds", 1.0)),
     "principal_compression": ("Smallest principal stress, compression", _pascals, ("Blues", 1.0)),
-    "utilisation": ("Stress over strength", _ratio, ("YlOrRd", 1.0)),
-    "error": ("Estimated error of the stress", _percent, ("Purples", 1.0)),
+    "utilisation": ("Stress over strength", _always(1.0, ""), ("YlOrRd", 1.0)),
+    "error": ("Estimated error of the stress", _always(100.0, "%"), ("Purples", 1.0)),
     "pressure": ("Mean pressure of the joints", _pascals, ("inferno_r", 0.85)),
 }
 
@@ -126,7 +114,7 @@ def _add_joints(pyvista: Any, plotter: Any, surface: WallSurface, colours: Colou
 
 
 def _add_resultants(pyvista: Any, plotter: Any, surface: WallSurface) -> None:
-    """A stroke through each joint, along the resultant and as long as it is large."""
+    """Add a stroke through each joint, along its resultant and proportional to it."""
     force = np.linalg.norm(surface.resultants, axis=1)
     reach = _LONGEST * float(np.linalg.norm(np.ptp(surface.points, axis=0)))
     half = 0.5 * reach * surface.resultants / force.max(initial=1e-300)
@@ -143,19 +131,5 @@ def _add_resultants(pyvista: Any, plotter: Any, surface: WallSurface) -> None:
         plotter.add_mesh(heads, color=colour, point_size=11.0, render_points_as_spheres=True, lighting=False)
 
 
-def _main(job_path: str) -> int:
-    """Draw what a job file asks for; exit code 3 if a library cannot be loaded, its message on stdout."""
-    job = json.loads(Path(job_path).read_text(encoding="utf-8"))
-    try:
-        import pyvista  # noqa: F401
-    except ImportError as error:
-        print(error)
-        return 3
-    surface = load_surface(Path(job["surface"]))
-    for picture in job["pictures"]:
-        draw(surface, Path(picture["path"]), picture)
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(_main(sys.argv[1]))
+    sys.exit(run_job(sys.argv, WallSurface, draw))

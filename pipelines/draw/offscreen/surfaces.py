@@ -1,24 +1,23 @@
-"""What pictures show of a result: faces, edges and fields of the stones, joints and resultants; in one .npz file."""
+"""Surfaces for the pictures of a result: faces, edges and fields of the stones, joints and resultants."""
 
-from dataclasses import dataclass, fields
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.results.contact_result import JointResult
 from mechanics.results.result import BodyResult, Result
 from mechanics.results.stress_values import utilisation
 from mechanics.scene.scene import Fidelity
 from mechanics.stones.materials import Material
 from pipelines.arrays import Array, Bools, Ints
+from pipelines.draw.offscreen.parts import fan_polygons
 
-__all__ = ["FIELDS", "WallSurface", "load_surface", "save_surface", "stone_fields", "wall_surface"]
+__all__ = ["FIELDS", "WallSurface", "stone_fields", "wall_surface"]
 
 
 FIELDS = ("von_mises", "displacement", "principal_tension", "principal_compression", "utilisation", "error")
 """Columns of `WallSurface.fields`."""
 
-_EDGE_ANGLE = np.deg2rad(20.0)  # faces that meet at less than this are one face of the stone
+_EDGE_ANGLE = np.deg2rad(20.0)  # triangles that meet at a smaller angle belong to one face
 
 
 @dataclass(frozen=True)
@@ -56,19 +55,19 @@ class WallSurface:
     in_kern: Bools
 
     def field(self, name: str) -> Array:
-        """(n,) one of FIELDS."""
+        """Return one of FIELDS, (n,)."""
         column: Array = self.fields[:, FIELDS.index(name)]
         return column
 
 
 def wall_surface(result: Result) -> WallSurface:
-    """Surface of all stones of a result."""
+    """Gather the surface of all stones of a result."""
     sizes = [len(body.reference) for body in result.bodies]
     offsets = np.concatenate([[0], np.cumsum(sizes)[:-1]])
     triangles = [_fans(body.faces) for body in result.bodies]
     counts = [len(one) for one in triangles]
     pressed = np.flatnonzero(result.joints.pressed)
-    corners, of_joints, pressure = _joints(result.joints, pressed)
+    corners, of_joints, owners = fan_polygons([result.joints.polygon[number] for number in pressed])
     return WallSurface(
         points=np.concatenate([body.position for body in result.bodies]),
         triangles=np.concatenate([one + offset for one, offset in zip(triangles, offsets, strict=True)]),
@@ -88,7 +87,7 @@ def wall_surface(result: Result) -> WallSurface:
         ),
         joint_points=corners,
         joint_triangles=of_joints,
-        joint_pressure=pressure,
+        joint_pressure=result.joints.pressure_mean[pressed][owners],
         resultant_points=result.joints.centre_of_pressure[pressed],
         resultants=result.joints.force[pressed],
         in_kern=result.joints.in_kern[pressed],
@@ -96,7 +95,7 @@ def wall_surface(result: Result) -> WallSurface:
 
 
 def stone_fields(body: BodyResult, material: Material) -> Array:
-    """FIELDS of the points of one stone (n, len(FIELDS)), as in `WallSurface`."""
+    """Compute the FIELDS of the points of one stone, (n, len(FIELDS)), as in `WallSurface`."""
     fields_ = np.full((len(body.reference), len(FIELDS)), np.nan)
     fields_[:, 1] = np.linalg.norm(body.displacement, axis=1)
     if body.von_mises is not None and body.principal is not None and body.values is not None:
@@ -108,40 +107,15 @@ def stone_fields(body: BodyResult, material: Material) -> Array:
     return fields_
 
 
-def _joints(joints: JointResult, chosen: Ints) -> tuple[Array, Ints, Array]:
-    """Corners, triangles and pressures of some joints."""
-    polygons = [joints.polygon[number] for number in chosen]
-    starts = np.cumsum([0, *map(len, polygons)])
-    fans = [
-        _fans((tuple(range(len(one))),)) + start for one, start in zip(polygons, starts[:-1], strict=True)
-    ]
-    return (
-        np.concatenate([*polygons, np.zeros((0, 3))]),
-        np.concatenate([*fans, np.zeros((0, 3), dtype=np.int64)]),
-        np.repeat(joints.pressure_mean[chosen], [len(one) for one in fans]),
-    )
-
-
-def save_surface(path: Path, surface: WallSurface) -> None:
-    """Write a surface as .npz."""
-    np.savez(path, **{one.name: getattr(surface, one.name) for one in fields(surface)})
-
-
-def load_surface(path: Path) -> WallSurface:
-    """Read what `save_surface` wrote."""
-    with np.load(path, allow_pickle=False) as arrays:
-        return WallSurface(**{one.name: arrays[one.name] for one in fields(WallSurface)})
-
-
 def _fans(faces: tuple[tuple[int, ...], ...]) -> Ints:
-    """(nt, 3) triangles of convex polygons."""
+    """Fan convex polygons into triangles (nt, 3)."""
     return np.array(
         [(face[0], face[k], face[k + 1]) for face in faces for k in range(1, len(face) - 1)], dtype=np.int64
     ).reshape(-1, 3)
 
 
 def _stone_edges(body: BodyResult, triangles: Ints) -> Ints:
-    """(ne, 2) edges where two triangles meet at an angle; those inside a flat face are left out."""
+    """List the edges (ne, 2) where two triangles meet at an angle; those inside a flat face are left out."""
     a, b, c = body.reference[triangles].transpose(1, 0, 2)
     normals = np.cross(b - a, c - a)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)

@@ -1,4 +1,4 @@
-"""survey.json: what a survey report says, for programs."""
+"""survey.json: the survey report for programs."""
 
 import json
 import math
@@ -17,7 +17,7 @@ __all__ = ["survey_json", "write_survey_json"]
 
 
 def survey_json(study: SurveyStudy, version: str) -> dict[str, Any]:
-    """What is said of the survey as a whole: metres, degrees where a name says so, null where not known."""
+    """Describe the survey as a whole: metres, degrees where a name says so, null where unknown."""
     content = {
         "survey": study.name,
         "version": version,
@@ -32,13 +32,13 @@ def survey_json(study: SurveyStudy, version: str) -> dict[str, Any]:
 
 
 def write_survey_json(path: Path, study: SurveyStudy, content: Mapping[str, Any]) -> None:
-    """Write survey.json: the survey as a whole, then its parts one per line, so that many need little memory.
+    """Write survey.json: the survey as a whole, then its parts one per line, which keeps memory low.
 
     Parameters
     ----------
     path : survey.json
     study : with the parts
-    content : what `survey_json` gives, and more if wanted
+    content : result of `survey_json`, with additions if wanted
     """
     parts: dict[str, Iterable[dict[str, Any]]] = {
         "courses": map(_course, study.courses),
@@ -146,7 +146,7 @@ def _stone(stone: StoneQuality, facade: str | None, deviation: Any, reasons: lis
 
 
 def _record(value: Any) -> dict[str, Any]:
-    """Fields of a frozen dataclass; not those of values in it."""
+    """Return the fields of a frozen dataclass; nested dataclasses stay as they are."""
     return {name: getattr(value, name) for name in value.__dataclass_fields__}
 
 
@@ -155,7 +155,7 @@ def _line(spans: tuple[range, ...]) -> int | None:
 
 
 def _plain(value: Any) -> Any:
-    """Numbers and lists as JSON has them; null for what is no number."""
+    """Convert values to those of JSON; NaN and infinities become null."""
     if isinstance(value, Mapping):
         return {key: _plain(one) for key, one in value.items()}
     if isinstance(value, np.ndarray) and value.dtype.kind == "f" and np.isfinite(value).all():

@@ -1,74 +1,68 @@
-"""report.html of a survey: one page for the surveyor, who decides by it what to measure again."""
+"""report.html of a survey: one page by which the surveyor decides what to measure again."""
 
 import math
-from collections.abc import Iterable, Mapping
-from html import escape
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any, TypeVar
 
-from pipelines.reports.html import figure, page, table
+from pipelines.reports.html import picture, write_page
 from pipelines.reports.survey.study import SurveyFile, SurveyStudy
 from survey.quality.canon import Deviation
+from survey.quality.contradictions import Contradiction
 from survey.quality.courses import CourseHeight, CourseLine
 from survey.quality.precision import StoneQuality
+from survey.quality.remeasure import Remeasure
 
 __all__ = ["write_survey_page"]
 
 _MOST = 300  # rows of a table; survey.json has them all
 
-_HEADS = {
-    "remeasure": ("Stone", "Why", "What to do", "Line"),
-    "stones": (
-        "Stone", "Kind", "Course", "Facade", "rms", "σ₀", "Redundancy", "Left out", "Face", "Tilt σ",
-        "Length × height", "Off the usual", "Depth", "Evidence for the depth",
-    ),
-    "courses": (
-        "Course", "Stones", "Bed at", "Slope (chance)", "Mid-span over chord (chance)", "rms", "Farthest corner",
-        "Beds scatter by", "Height to next bed", "Finding",
-    ),
-    "kinds": ("Kind", "Length", "Height", "Evidence", "Stones beyond 3 σ"),
-    "control": ("Control point", "Residual in x", "y", "z", "Test", "Limit", ""),
-}  # fmt: skip
+T = TypeVar("T")
+Row = tuple[str, ...]
 
 
 def write_survey_page(path: Path, study: SurveyStudy, pictures: Mapping[str, str], version: str) -> None:
-    """Write the page, with the pictures that lie in its folder inside it.
+    """Write the page and embed the pictures of its folder.
 
     Parameters
     ----------
     path : report.html
-    study : what was found
-    pictures : file name of each picture and its caption, in order
+    study : findings
+    pictures : caption of each picture by its file name, in order
     version : of the program
     """
-    inside = {name: figure(path.parent / name, caption) for name, caption in pictures.items()}
-    elevations = [text for name, text in inside.items() if name.startswith("elevation")]
-    beds = [text for name, text in inside.items() if name.startswith("courses")]
-    body = [
-        f"<h1>{escape(study.name)}</h1>",
-        f'<p class="lead">{_lead(study)}</p>',
-        *(f'<p class="warning">{escape(warning)}</p>' for warning in study.warnings),
-        *elevations,
-        *(
-            [f"<p>Pictures of the {len(elevations)} largest of {len(study.facades)} facades.</p>"]
-            if len(elevations) < len(study.facades)
-            else []
+    inside = {name: picture(path.parent / name, caption) for name, caption in pictures.items()}
+    facade_of = {i: facade.name for facade in study.facades for i in facade.members.tolist()}
+    deviation_of = {one.code: one for one in study.deviations}
+    write_page(
+        path,
+        "survey.html",
+        name=study.name,
+        lead=_lead(study),
+        warnings=study.warnings,
+        elevations=[one for name, one in inside.items() if name.startswith("elevation")],
+        beds=[one for name, one in inside.items() if name.startswith("courses")],
+        residuals=[one for name, one in inside.items() if name == "residuals.png"],
+        facades=len(study.facades),
+        remeasures=_first(study.remeasures, _remeasure_row),
+        quality=_overall(study),
+        control=list(_control(study.files)),
+        courses=list(_courses(study)),
+        kinds=_kinds(study),
+        contradictions=_first(study.contradictions, _contradiction_row),
+        stones=_first(
+            _by_urgency(study),
+            lambda i: _stone_row(
+                study.stones[i], facade_of.get(i, "–"), deviation_of.get(study.stones[i].code)
+            ),
         ),
-        "<h2>What to measure again</h2>",
-        *_remeasures(study),
-        "<h2>How precise the points are</h2>",
-        *(text for name, text in inside.items() if name == "residuals.png"),
-        table(_overall(study)),
-        *_control(study.files),
-        "<h2>Courses</h2>",
-        *beds,
-        *_courses(study),
-        "<h2>Kinds: theory and measurement</h2>",
-        *_kinds(study),
-        "<h2>Stones</h2>",
-        *_stones(study),
-        f"<p>Made by MOMA {escape(version)}.</p>",
-    ]
-    path.write_text(page(f"{study.name}: survey report", body), encoding="utf-8")
+        version=version,
+    )
+
+
+def _first(items: Sequence[T], row: Callable[[T], Row]) -> dict[str, Any]:
+    """Describe the first items by a row each, and count all of them."""
+    return {"rows": [row(one) for one in items[:_MOST]], "count": len(items)}
 
 
 def _lead(study: SurveyStudy) -> str:
@@ -76,23 +70,16 @@ def _lead(study: SurveyStudy) -> str:
     made = f"{len(study.stones)} stones"
     if study.rejects:
         made += f", and {len(study.rejects)} that could not be made"
-    return escape(
-        f"{made}; {again} to measure again. {study.quality.verdict[:1].upper()}{study.quality.verdict[1:]}."
-    )
+    verdict = study.quality.verdict
+    return f"{made}; {again} to measure again. {verdict[:1].upper()}{verdict[1:]}."
 
 
-def _remeasures(study: SurveyStudy) -> list[str]:
-    if not study.remeasures:
-        return ["<p>Nothing: every face is checked by more points than it needs, and they agree.</p>"]
-    rows = [
-        (one.code or "(no code)", one.reason, one.action, str(one.line) if one.line else "–")
-        for one in study.remeasures[:_MOST]
-    ]
-    return [
-        "<p>Most urgent first.</p>",
-        _wide(table(rows, _HEADS["remeasure"])),
-        *_more(len(study.remeasures)),
-    ]
+def _remeasure_row(one: Remeasure) -> Row:
+    return (one.code or "(no code)", one.reason, one.action, str(one.line) if one.line else "–")
+
+
+def _contradiction_row(one: Contradiction) -> Row:
+    return (one.code, one.kind, one.text, f"{one.significance:.1f} σ")
 
 
 def _overall(study: SurveyStudy) -> list[tuple[str, str]]:
@@ -113,9 +100,8 @@ def _overall(study: SurveyStudy) -> list[tuple[str, str]]:
     ]
 
 
-def _control(files: Iterable[SurveyFile]) -> list[str]:
-    """Residuals of the control points of each file that has any."""
-    out = []
+def _control(files: Iterable[SurveyFile]) -> Iterator[dict[str, Any]]:
+    """Yield the fit and the residuals of the control points of each file that has any."""
     for file in files:
         if (fit := file.transform) is None:
             continue
@@ -131,42 +117,30 @@ def _control(files: Iterable[SurveyFile]) -> list[str]:
                 fit.names, fit.residuals.tolist(), fit.standardised.tolist(), fit.limits.tolist(), strict=True
             )
         ]
-        scale = f"{(fit.scale - 1.0) * 1e6:+.0f} ± {1e6 * math.sqrt(fit.covariance[6, 6]):.0f} mm per km"
-        words = (
-            f"{len(rows)} control points tie {file.head.path} to the site: σ₀ {fit.sigma0:.2f} with redundancy "
-            f"{fit.redundancy}. The scale differs from 1 by {scale}, "
-            f"{'more than chance would have it' if fit.scale_differs else 'no more than chance'}. Residuals are site "
-            "minus transformed coordinates; the test is their length in standard deviations, which a sound point "
-            "keeps below the limit."
-        )
-        out += [f"<p>{escape(words)}</p>", table(rows, _HEADS["control"])]
-    return out
+        yield {
+            "path": file.head.path,
+            "sigma0": f"{fit.sigma0:.2f}",
+            "redundancy": fit.redundancy,
+            "scale": f"{(fit.scale - 1.0) * 1e6:+.0f} ± {1e6 * math.sqrt(fit.covariance[6, 6]):.0f} mm per km",
+            "scale_differs": fit.scale_differs,
+            "rows": rows,
+        }
 
 
-def _courses(study: SurveyStudy) -> list[str]:
-    if not study.courses:
-        return ["<p>No stone of a standing wall has the number of a course.</p>"]
+def _courses(study: SurveyStudy) -> Iterator[dict[str, Any]]:
+    """Yield the bed lines of each facade."""
     heights = {(one.facade, one.zone, one.course): one for one in study.course_heights}
-    out = [
-        "<p>Of the lower corners of each course: how the straight line through them rises to the right of the "
-        "viewer, and how high the best parabola stands over its chord at mid-span, negative where it sags. The "
-        "chance is that of so much in a level, straight course whose beds scatter as these do; below 1 % it "
-        "is called a finding. Corners off their plane are left out. Where a wall is round, distances are those on "
-        "the mean plane of the facade.</p>"
-    ]
     for facade in dict.fromkeys(line.facade for line in study.courses):
         lines = [line for line in study.courses if line.facade == facade]
         tilted = lines[0].frame_sigma
-        words = f"Control points hold the frame level to ± {tilted * 1e3:.2f} mm/m along it, which is part of each ±."
-        out += [f"<h3>{escape(facade)}</h3>", f"<p>{words}</p>" if tilted else ""]
-        rows = [_course_row(line, heights) for line in lines[:_MOST]]
-        out += [_wide(table(rows, _HEADS["courses"])), *_more(len(lines))]
-    return out
+        yield {
+            "name": facade,
+            "tilt": f"{tilted * 1e3:.2f}" if tilted else None,
+            "lines": _first(lines, lambda line: _course_row(line, heights)),
+        }
 
 
-def _course_row(
-    line: CourseLine, heights: Mapping[tuple[str, str | None, int], CourseHeight]
-) -> tuple[str, ...]:
+def _course_row(line: CourseLine, heights: Mapping[tuple[str, str | None, int], CourseHeight]) -> Row:
     code, farthest = line.worst
     height = heights.get((line.facade, line.zone, line.course))
     return (
@@ -183,8 +157,8 @@ def _course_row(
     )
 
 
-def _kinds(study: SurveyStudy) -> list[str]:
-    rows = [
+def _kinds(study: SurveyStudy) -> list[Row]:
+    return [
         (
             one.kind,
             f"{one.length:.3f} ± {one.length_scatter:.3f} m",
@@ -199,38 +173,17 @@ def _kinds(study: SurveyStudy) -> list[str]:
         )
         for one in study.usual.values()
     ]
-    words = "The usual face of each kind ± how much stones differ from it, and the stones that differ by far more."
-    odd = [
-        (one.code, one.kind, f"{one.text}", f"{one.significance:.1f} σ")
-        for one in study.contradictions[:_MOST]
-    ]
-    told = (
-        [table(odd, ("Stone", "Called", "But", "Significance")), *_more(len(study.contradictions))]
-        if odd
-        else ["<p>No stone's measured proportions contradict its kind.</p>"]
-    )
-    return [f"<p>{words}</p>", table(rows, _HEADS["kinds"]) if rows else "", *told]
 
 
-def _stones(study: SurveyStudy) -> list[str]:
-    """Those to measure again first, then those whose points scatter most."""
+def _by_urgency(study: SurveyStudy) -> list[int]:
+    """Return the stones to measure again first, then the others by the scatter of their points."""
     flagged = {one.code for one in study.remeasures}
-    facade_of = {i: facade.name for facade in study.facades for i in facade.members.tolist()}
-    order = sorted(
+    return sorted(
         range(len(study.stones)), key=lambda i: (study.stones[i].code not in flagged, -study.stones[i].rms)
     )
-    off = {one.code: one for one in study.deviations}
-    rows = [
-        _stone_row(study.stones[i], facade_of.get(i, "–"), off.get(study.stones[i].code))
-        for i in order[:_MOST]
-    ]
-    if not rows:
-        return ["<p>None.</p>"]
-    words = "Those to measure again first, then those whose points scatter most."
-    return [f"<p>{words}</p>", _wide(table(rows, _HEADS["stones"])), *_more(len(order))]
 
 
-def _stone_row(stone: StoneQuality, facade: str, off: Deviation | None) -> tuple[str, ...]:
+def _stone_row(stone: StoneQuality, facade: str, off: Deviation | None) -> Row:
     return (
         stone.code,
         stone.kind,
@@ -254,14 +207,6 @@ def _depth(stone: StoneQuality) -> str:
     if stone.depth is None:
         return "–"
     return f"{stone.depth:.3f}" + (" m" if stone.depth_sigma is None else f" ± {stone.depth_sigma:.3f} m")
-
-
-def _more(count: int) -> list[str]:
-    return [f"<p>The first {_MOST} of {count}; survey.json has them all.</p>"] if count > _MOST else []
-
-
-def _wide(text: str) -> str:
-    return f'<div class="wide">{text}</div>'
 
 
 def _counts(counts: Mapping[str, int]) -> str:

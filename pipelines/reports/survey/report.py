@@ -1,4 +1,4 @@
-"""A survey report: survey files in, a folder with numbers, a page and pictures out; no database."""
+"""Survey report: from survey files to a folder with numbers, a page and pictures, without a database."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,20 +18,20 @@ from survey.formats.options import ReadingOptions
 __all__ = ["INDEX", "SurveyReport", "report_surveys", "write_survey_report"]
 
 INDEX = "survey.json"
-"""The file of a report that names all of its files."""
+"""Name of the file that lists all files of a report."""
 
-_FACADES = 8  # facades of which pictures are drawn: those of the largest area
+_FACADES = 8  # number of facades drawn, the largest first
 
 
 @dataclass(frozen=True)
 class SurveyReport:
-    """What a survey report left behind.
+    """A written survey report.
 
     Attributes
     ----------
-    folder : where it lies
-    study : what was found
-    content : what survey.json says of the survey as a whole
+    folder : its place
+    study : findings
+    content : survey.json without its parts: the survey as a whole
     """
 
     folder: Path
@@ -46,15 +46,15 @@ def report_surveys(
     options: ReadingOptions | None = None,
     progress: Listener = silent,
 ) -> SurveyReport:
-    """Judge survey files and write the report; stones that cannot be made are part of it.
+    """Judge survey files and write the report, which includes the stones that could not be made.
 
     Parameters
     ----------
     paths : survey files, of one format; together they are one survey
-    folder : of the report; an earlier report there is replaced when the new one is complete
+    folder : place of the report; an earlier report there is replaced once the new one is complete
     format : name of their format
-    options : what the files may leave unsaid
-    progress : told of every stage
+    options : defaults for what the files leave out
+    progress : called at every stage
 
     Raises
     ------
@@ -70,7 +70,7 @@ def report_surveys(
 
 
 def write_survey_report(study: SurveyStudy, folder: Path, progress: Listener = silent) -> dict[str, Any]:
-    """Write all files of a report into an empty folder; what survey.json says of the survey as a whole."""
+    """Write all files of a report into an empty folder; return survey.json without its parts."""
     release = version("moma-masonry")
     progress(Progress("write", 0, 3, "pictures"))
     pictures = _draw(study, folder)
@@ -85,7 +85,7 @@ def write_survey_report(study: SurveyStudy, folder: Path, progress: Listener = s
 
 
 def _draw(study: SurveyStudy, folder: Path) -> dict[str, str]:
-    """Draw the pictures; their file names with captions. The first facade's have no number."""
+    """Draw the pictures; return captions by file name. Those of the first facade have no number."""
     captions = {}
     flagged = {one.code for one in study.remeasures if one.code is not None}
     for number, facade in enumerate(study.facades[:_FACADES], start=1):
@@ -93,8 +93,8 @@ def _draw(study: SurveyStudy, folder: Path) -> dict[str, str]:
         name = f"elevation{ending}"
         draw_elevation(folder / name, facade, study.stones, flagged)
         captions[name] = (
-            f"{facade.name[:1].upper()}{facade.name[1:]}, seen from outside, coloured by how far the points of each "
-            "stone lie from its plane. Stones with an orange outline are to be measured again."
+            f"{facade.name[:1].upper()}{facade.name[1:]}, seen from outside, coloured by the distance of the points of "
+            "each stone from its plane. Stones with an orange outline are to be measured again."
         )
         lines = [line for line in study.courses if line.facade == facade.name]
         if lines:
@@ -106,7 +106,7 @@ def _draw(study: SurveyStudy, folder: Path) -> dict[str, str]:
     if study.quality.residuals.counts.any():
         draw_residuals(folder / "residuals.png", study.quality.residuals, study.quality.verdict)
         captions["residuals.png"] = (
-            "Residuals of the accepted points and corners, each over its own standard deviation. A wider heap than "
-            "the curve: the points are less precise than stated. Long tails: blunders that were not found."
+            "Residuals of the accepted points and corners, each over its own standard deviation. A histogram wider "
+            "than the curve: the points are less precise than stated. Long tails: blunders that were not detected."
         )
     return captions

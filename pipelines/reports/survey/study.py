@@ -1,4 +1,4 @@
-"""Everything that a survey report says, computed: files in, findings out."""
+"""Findings of a survey report, computed from survey files."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -25,8 +25,8 @@ from survey.stones import survey_stones
 
 __all__ = ["SurveyFile", "SurveyStudy", "study_surveys"]
 
-_SOME_DEPTH = DepthRule(None, 0.3, None, "\0")  # a source that no file can say
-_TOLD = 200  # stones between two words on progress
+_SOME_DEPTH = DepthRule(None, 0.3, None, "\0")  # no file can give this source
+_INTERVAL = 200  # stones between two reports of progress
 
 
 @dataclass(frozen=True)
@@ -35,9 +35,9 @@ class SurveyFile:
 
     Attributes
     ----------
-    head : what it says of all its stones
+    head : what holds for all its stones
     transform : into the frame of the site; None if it has no control points
-    stones, rejects : how many were made, how many not
+    stones, rejects : number of stones that could be made, and could not
     """
 
     head: SurveyHead
@@ -48,23 +48,23 @@ class SurveyFile:
 
 @dataclass(frozen=True)
 class SurveyStudy:
-    """What was found of a survey.
+    """Findings about a survey.
 
     Attributes
     ----------
     name : of the first file
-    files : the files that it lies in
+    files : files of the survey
     stones : all stones that could be made, in the order of the files
     rejects : those that could not, with reasons
     quality : all stones together
     facades : stones that face one way
     usual : the usual face of each kind
-    deviations : of the stones from it
-    contradictions : stones that are not what their kind means
+    deviations : differences of the stones from it
+    contradictions : stones whose proportions contradict their kind
     courses : bed lines
     course_heights : from bed to bed
     remeasures : what to measure again, most urgent first
-    warnings : what stands in the way of taking the survey into the database
+    warnings : reasons why the database would refuse the survey
     """
 
     name: str
@@ -91,8 +91,8 @@ def study_surveys(
     ----------
     paths : survey files, of one format; together they are one survey
     format : its name
-    options : what the files may leave unsaid
-    progress : told now and then
+    options : defaults for what the files leave out
+    progress : called now and then
 
     Raises
     ------
@@ -127,14 +127,14 @@ def _read(
             rejects.append(one)
         else:
             stones.append(_appraised(one))
-        if number % _TOLD == 0:
-            progress(Progress(f"fit {path.name}", number, number + _TOLD))
+        if number % _INTERVAL == 0:
+            progress(Progress(f"fit {path.name}", number, number + _INTERVAL))
     head = replace(survey.head, depth_rules=stream.head.depth_rules)
     return SurveyFile(head, survey.transform, 0, 0)
 
 
 def _with_some_depth(head: SurveyHead) -> SurveyHead:
-    """The head with a depth for stones of which none is known: their faces can be judged without one."""
+    """Add a depth for stones without one, since faces can be judged whatever their depth."""
     if any(rule.kind is None for rule in head.depth_rules):
         return head
     return replace(head, depth_rules=(*head.depth_rules, _SOME_DEPTH))
@@ -178,7 +178,7 @@ def _judge(
 
 
 def _canons(files: Sequence[SurveyFile]) -> list[Canon]:
-    """The canons of all files; of two for one kind the first holds."""
+    """Gather the canons of all files; of two for one kind the first holds."""
     found: dict[str, Canon] = {}
     for file in files:
         for canon in file.head.canons:
@@ -187,7 +187,7 @@ def _canons(files: Sequence[SurveyFile]) -> list[Canon]:
 
 
 def _unknown_kinds(kinds: Mapping[str, int]) -> Iterator[str]:
-    """Kinds that are mistyped, or that nobody has declared; `moma ingest` does not take them."""
+    """Yield a warning for each kind that is mistyped or undeclared, and would be refused by `moma ingest`."""
     for kind, count in kinds.items():
         try:
             kind_named(kind)

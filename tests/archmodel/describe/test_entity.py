@@ -65,33 +65,33 @@ def test_the_nearest_statement_goes_first_and_says_of_what_it_is(filled: Databas
     said = told["knowledge"]
     by = {"entry": number, "action": "declaration", "author": "T", "source": "a test"}
     assert by.items() <= said["material"].items()  # type: ignore[index]
-    material = {key: said["material"][key] for key in ("name", "description", "phase_or_material_of", "text")}  # type: ignore[index]
+    material = {key: said["material"][key] for key in ("name", "description", "said_of", "text")}  # type: ignore[index]
     assert material == {
         "name": "tuff",
         "description": "soft",
-        "phase_or_material_of": "ARCH",
+        "said_of": "ARCH",
         "text": "by colour",
     }
     assert said["material"]["properties"] == {  # type: ignore[index]
         "density": {"value": 1900.0, "sigma": 50.0, "unit": "kg/m³", "source": "a test"}
     }
     assert said["phase"]["name"] == "2"  # type: ignore[index]
-    assert "phase_or_material_of" not in said["phase"]  # type: ignore[index]
-    assert other["knowledge"]["phase"]["phase_or_material_of"] == "WALL"  # type: ignore[index]
+    assert "said_of" not in said["phase"]  # type: ignore[index]
+    assert other["knowledge"]["phase"]["said_of"] == "WALL"  # type: ignore[index]
     lists = {
         name: [{key: one.get(key) for key in keys} for one in said[name]]  # type: ignore[index]
         for name, keys in {
             "marks": ("sign", "place"),
-            "observations": ("type", "severity", "phase_or_material_of"),
-            "documents": ("document", "locator", "phase_or_material_of"),
+            "observations": ("type", "severity", "said_of"),
+            "documents": ("document", "locator", "said_of"),
             "depth_evidence": ("value", "sigma"),
             "notes": ("key", "text"),
         }.items()
     }
     assert lists == {
         "marks": [{"sign": "star", "place": "left"}],
-        "observations": [{"type": "crack", "severity": 2, "phase_or_material_of": "ARCH"}],
-        "documents": [{"document": "P1", "locator": "top", "phase_or_material_of": "WALL"}],
+        "observations": [{"type": "crack", "severity": 2, "said_of": "ARCH"}],
+        "documents": [{"document": "P1", "locator": "top", "said_of": "WALL"}],
         "depth_evidence": [{"value": 0.42, "sigma": 0.01}],
         "notes": [{"key": "tooling", "text": "fine"}],
     }

@@ -8,9 +8,9 @@ import pytest
 
 from mechanics.dynamics.observers.energy import EnergyBalance, elastic_energy, kinetic_energy
 from mechanics.dynamics.observers.equilibrium import displacement, imbalance, speed, support_reaction
+from mechanics.dynamics.outcome import Outcome
 from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
-from mechanics.results.result import Outcome
 from mechanics.scene.scene import Fidelity, SolverSettings
 from mechanics.simulate import simulate
 from tests.mechanics.shapes import TURN, brick, ground, moved, pile, scene

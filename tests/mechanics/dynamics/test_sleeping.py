@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from mechanics.dynamics.observers.equilibrium import imbalance, support_reaction
+from mechanics.dynamics.outcome import Outcome
 from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
-from mechanics.results.result import Outcome
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.loads.forces import StoneForce
 from mechanics.scene.loads.gravity import TiltingTable

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mechanics.contact.contacts import gaps, material_points
+from mechanics.dynamics.outcome import Outcome
 from mechanics.model.model import build_model
-from mechanics.results.result import Outcome
 from mechanics.scene.scene import Fidelity, Part
 from mechanics.simulate import simulate
 from mechanics.stones.meshing.elements import Element

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from mechanics.dynamics.outcome import Outcome
 from mechanics.planar.scene import Disk, PlanarScene, PlanarTime, Wall
 from mechanics.planar.simulate import simulate_planar
-from mechanics.results.result import Outcome
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import Method, SolverSettings
 from tests.mechanics.planar.shapes import G

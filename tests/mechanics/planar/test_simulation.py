@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from mechanics.dynamics.clock import Clock
+from mechanics.dynamics.outcome import Outcome
 from mechanics.planar.contacts import PlanarDetector
 from mechanics.planar.model import build_planar_model
 from mechanics.planar.scene import Disk, PlanarScene, PlanarTime, Wall
 from mechanics.planar.simulate import simulate_planar
 from mechanics.planar.simulation import PlanarSimulation
-from mechanics.results.result import Outcome
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.loads.forces import StoneForce
 from mechanics.scene.loads.gravity import GravityRamp, TiltingTable

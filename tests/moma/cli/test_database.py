@@ -5,18 +5,13 @@ from collections.abc import Callable
 
 import pytest
 from sqlalchemy import insert
-from typer.testing import CliRunner, Result
 
 from archmodel.database.session import open_database
 from archmodel.store.stones import store_survey
-from moma.cli import app
 from tests.archmodel.migrations import second_version
 from tests.archmodel.migrations.second_version import connected, rows_of
 from tests.archmodel.stones import SHA, box_stone
-
-
-def moma(*arguments: str) -> Result:
-    return CliRunner().invoke(app, list(arguments))
+from tests.moma.commands import invoke
 
 
 @pytest.fixture
@@ -30,27 +25,27 @@ def old(new_url: Callable[[], str], monkeypatch: pytest.MonkeyPatch) -> str:
 
 
 def test_an_old_database_is_refused_with_the_command_that_helps(old: str) -> None:
-    refused = moma("query", "header", "--db", old)
+    refused = invoke("query", "header", "--db", old)
     assert refused.exit_code == 1
     command = refused.stderr.partition("; moma ")[2].split()
-    done = moma(*command)
+    done = invoke(*command)
     assert done.exit_code == 0, done.stderr
     assert "from version 1 to 2" in done.stdout
-    assert "W01-01" in moma("query", "header", "--db", old).stdout
-    assert "has version 2 already" in moma(*command).stdout
+    assert "W01-01" in invoke("query", "header", "--db", old).stdout
+    assert "has version 2 already" in invoke(*command).stdout
 
 
 def test_going_down_asks_for_consent_where_something_is_lost(old: str) -> None:
-    assert moma("migrate", "--db", old).exit_code == 0
+    assert invoke("migrate", "--db", old).exit_code == 0
     with connected(old) as connection:
         connection.execute(insert(second_version.metadata.tables["photograph"]).values(entity_id=1, path="1"))
     before = rows_of(old, 2)
-    refused = moma("migrate", "--db", old, "--to", "1")
+    refused = invoke("migrate", "--db", old, "--to", "1")
     assert refused.exit_code == 2
     assert "cannot hold: photographs (1); " in refused.stderr
     assert "give --yes" in refused.stderr
     assert rows_of(old, 2) == before
-    done = moma("migrate", "--db", old, "--to", "1", "--yes", "--json")
+    done = invoke("migrate", "--db", old, "--to", "1", "--yes", "--json")
     assert done.exit_code == 0
     told = json.loads(done.stdout)
     assert (told["before"], told["after"], told["lost"]) == (2, 1, ["photographs (1)"])
@@ -70,7 +65,7 @@ def test_wrong_use_is_one_line(
     arguments: list[str], code: int, said: str, monkeypatch: pytest.MonkeyPatch, tmp_path: object
 ) -> None:
     monkeypatch.chdir(str(tmp_path))
-    refused = moma("migrate", *arguments)
+    refused = invoke("migrate", *arguments)
     assert refused.exit_code == code
     assert said in refused.stderr
     assert refused.stderr.count("\n") == 1

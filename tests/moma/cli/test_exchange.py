@@ -1,21 +1,14 @@
 """moma export and moma import: what they print, and one line for every mistake."""
 
 import gzip
-import json
 from pathlib import Path
 from random import Random
 
 import pytest
-from click.testing import Result
-from typer.testing import CliRunner
 
 from archmodel.database.session import open_database
-from moma.cli import app
 from tests.archmodel.random_databases import fill, tables
-
-
-def invoke(*arguments: object) -> Result:
-    return CliRunner().invoke(app, [str(one) for one in arguments])
+from tests.moma.commands import answer, fails, invoke, prints
 
 
 @pytest.fixture
@@ -27,23 +20,20 @@ def url(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 
 
 def test_both_print_how_many_rows_they_carried(url: str):
-    done = invoke("export", "castle.json", "--db", url)
-    assert done.exit_code == 0, done.output
-    first, *rest = done.stdout.splitlines()
+    first, *rest = prints("export", "castle.json", "--db", url).splitlines()
     assert first.startswith(f"castle.json: {3 * len(tables())} rows from sqlite:///castle.db (0.")
     assert "         3 contact_point" in rest
     assert len(rest) == len(tables())
-    done = invoke("import", "castle.json", "--db", "sqlite:///copy.db")
-    assert done.exit_code == 0, done.output
-    assert done.stdout.startswith(f"castle.json: {3 * len(tables())} rows into sqlite:///copy.db (0.")
+    text = prints("import", "castle.json", "--db", "sqlite:///copy.db")
+    assert text.startswith(f"castle.json: {3 * len(tables())} rows into sqlite:///copy.db (0.")
 
 
 def test_json_tells_counts_by_section(url: str):
-    told = json.loads(invoke("export", "castle.json", "--db", url, "--json").stdout)
+    told = answer("export", "castle.json", "--db", url)
     size = Path("castle.json").stat().st_size
     rows = {table.name: 3 for table in tables()}
     assert told == {"path": "castle.json", "database": url, "bytes": size, "rows": rows}
-    told = json.loads(invoke("import", "castle.json", "--db", "sqlite:///copy.db", "--json").stdout)
+    told = answer("import", "castle.json", "--db", "sqlite:///copy.db")
     assert told == {"path": "castle.json", "database": "sqlite:///copy.db", "bytes": size, "rows": rows}
 
 
@@ -70,17 +60,12 @@ def test_standard_output_gets_the_document_alone(url: str):
 def test_mistakes_are_one_line_and_leave_nothing(arguments: list[str], said: str, url: str):
     if "--db" not in arguments and arguments[0] == "export":
         arguments = [*arguments, "--db", url]
-    done = invoke(*arguments)
-    assert done.exit_code == 1
-    assert done.stdout == ""
-    assert done.stderr.startswith(f"moma: error: {said}")
-    assert done.stderr.count("\n") == 1
+    assert fails(1, *arguments).startswith(f"moma: error: {said}")
     assert [one.name for one in Path().iterdir()] == ["castle.db"]
 
 
 def test_a_filled_database_is_refused(url: str):
     invoke("export", "castle.json", "--db", url)
-    done = invoke("import", "castle.json", "--db", url)
-    assert done.exit_code == 1
-    assert done.stderr.startswith(f"moma: error: {url}: it is not empty, its table entry has rows; ")
-    assert "--db" in done.stderr
+    message = fails(1, "import", "castle.json", "--db", url)
+    assert message.startswith(f"moma: error: {url}: it is not empty, its table entry has rows; ")
+    assert "--db" in message

@@ -3,9 +3,8 @@
 import json
 
 import pytest
-from typer.testing import CliRunner
 
-from moma.cli import app
+from tests.moma.commands import fails, invoke, prints
 
 FACES = ((1, 4, 3, 2), (5, 6, 7, 8), (1, 2, 6, 5), (2, 3, 7, 6), (3, 4, 8, 7), (4, 1, 5, 8))
 CORNERS = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
@@ -68,10 +67,6 @@ def stack(path, size):
     )
 
 
-def moma(*words):
-    return CliRunner().invoke(app, [*map(str, words)])
-
-
 @pytest.fixture
 def run(tmp_path):
     """A function that runs a scene on stones of an OBJ file, and what came of it."""
@@ -79,11 +74,10 @@ def run(tmp_path):
     def running(make, more="", **changes):
         url = f"sqlite:///{tmp_path / 'moma.db'}"
         make(tmp_path / "stones.obj")
-        taken = moma("ingest", tmp_path / "stones.obj", "--format", "solids", "--db", url)
-        assert taken.exit_code == 0, taken.output
+        prints("ingest", tmp_path / "stones.obj", "--format", "solids", "--db", url)
         scene = tmp_path / "scene.toml"
         scene.write_text(SCENE.format(**USUAL | changes) + more)
-        return moma("run", scene, "--out", tmp_path / "out", "--db", url, "--json")
+        return invoke("run", scene, "--out", tmp_path / "out", "--db", url, "--json")
 
     return running
 
@@ -149,9 +143,7 @@ def test_values_that_make_no_sense_are_refused_at_their_line(tmp_path, key, valu
     scene = tmp_path / "scene.toml"
     scene.write_text(SCENE.format(**USUAL | {key: value}))
     line = next(n for n, text in enumerate(scene.read_text().splitlines(), 1) if text.endswith(f"= {value}"))
-    done = moma("run", scene, "--out", tmp_path / "out", "--db", f"sqlite:///{tmp_path / 'moma.db'}")
-    assert done.exit_code == 2, done.output
-    (told,) = done.stderr.splitlines()
+    told = fails(2, "run", scene, "--out", tmp_path / "out", "--db", f"sqlite:///{tmp_path / 'moma.db'}")
     assert f"scene.toml:{line}: " in told
     assert "; give " in told
     assert not (tmp_path / "out").exists()
@@ -160,11 +152,8 @@ def test_values_that_make_no_sense_are_refused_at_their_line(tmp_path, key, valu
 def test_stones_of_a_millimetre_are_no_stones_of_a_building(tmp_path):
     """Corners nearer than what a survey can tell apart are one: refused with the stone's name, exit code 1."""
     stack(tmp_path / "tiny.obj", 0.001)
-    done = moma(
-        "ingest", tmp_path / "tiny.obj", "--format", "solids", "--db", f"sqlite:///{tmp_path / 'moma.db'}"
-    )
-    assert done.exit_code == 1
-    (told,) = done.stderr.splitlines()
+    url = f"sqlite:///{tmp_path / 'moma.db'}"
+    told = fails(1, "ingest", tmp_path / "tiny.obj", "--format", "solids", "--db", url)
     assert "stone base" in told
     assert "distinct corners" in told
 
@@ -174,10 +163,7 @@ def test_a_survey_with_what_is_no_number_is_refused_at_its_line(tmp_path):
     text = (tmp_path / "stones.obj").read_text().replace("v 0 0 0", "v 0 nan 0", 1)
     assert "nan" in text
     (tmp_path / "stones.obj").write_text(text)
-    done = moma(
-        "ingest", tmp_path / "stones.obj", "--format", "solids", "--db", f"sqlite:///{tmp_path / 'moma.db'}"
-    )
-    assert done.exit_code == 1, done.output
-    (told,) = done.stderr.splitlines()
+    url = f"sqlite:///{tmp_path / 'moma.db'}"
+    told = fails(1, "ingest", tmp_path / "stones.obj", "--format", "solids", "--db", url)
     assert "stones.obj" in told
     assert not (tmp_path / "moma.db").exists()

@@ -1,15 +1,13 @@
 """`moma record` and `moma show`: what a person and a program are told."""
 
-import json
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner, Result
 
 from archmodel.database.session import open_database
 from archmodel.store.stones import store_survey
-from moma.cli import app
 from tests.archmodel.stones import SHA, box_stone
+from tests.moma.commands import answer, fails, invoke
 
 KNOWLEDGE = """
 [record]
@@ -70,10 +68,6 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     Path("wall.toml").write_text(KNOWLEDGE, encoding="utf-8")
 
 
-def invoke(*arguments: str) -> Result:
-    return CliRunner().invoke(app, list(arguments))
-
-
 def test_record_says_what_was_new_and_what_was_known() -> None:
     tried = invoke("record", "wall.toml", "--dry-run").stdout
     assert tried.startswith("wall.toml: 11 new, 1 replaced, as entries 2, 3 (dry run: nothing was kept)\n")
@@ -84,7 +78,7 @@ def test_record_says_what_was_new_and_what_was_known() -> None:
     assert again == "wall.toml: recorded before, as entry 2; nothing changed\n"
     Path("more.toml").write_text(KNOWLEDGE + "\n", encoding="utf-8")
     assert invoke("record", "more.toml").stdout == "more.toml: all of it was known; nothing changed\n"
-    (file,) = json.loads(invoke("record", "more.toml", "--json").stdout)["files"]
+    (file,) = answer("record", "more.toml")["files"]
     assert file["tables"]["kind"] == {"new": 0, "replaced": 0, "unchanged": 1, "withdrawn": 0}
 
 
@@ -92,11 +86,10 @@ def test_record_fails_with_the_line() -> None:
     Path("wrong.toml").write_text(
         KNOWLEDGE.replace('"tuff"\nstructures', '"tuf"\nstructures'), encoding="utf-8"
     )
-    done = invoke("record", "wrong.toml")
-    assert done.exit_code == 2
+    message = fails(2, "record", "wrong.toml")
     line = KNOWLEDGE[: KNOWLEDGE.index("[[made_of]]")].count("\n") + 1
-    assert done.stderr == f"moma: error: wrong.toml:{line}: there is no material 'tuf'; did you mean tuff?\n"
-    assert json.loads(invoke("show", "V1", "--json").stdout)["kind"] == "voussoir"
+    assert message == f"moma: error: wrong.toml:{line}: there is no material 'tuf'; did you mean tuff?"
+    assert answer("show", "V1")["kind"] == "voussoir"
 
 
 def test_show_tells_what_is_known_and_of_what_it_is_said() -> None:
@@ -108,7 +101,7 @@ def test_show_tells_what_is_known_and_of_what_it_is_said() -> None:
         "  1                  wall WALL",
         "    density            1900 ± 50 kg/m³ (cores)",
         "    poisson            0.2 (by eye)",
-        "    evidence           said of WALL",
+        "    evidence           inherited from WALL",
         "    years              1240–?",
         "    1                  type crack, severity 3, place left, at (1, 2, 3.5), seen 2024-05-14 "
         "[entry 2, B, by eye]",
@@ -122,12 +115,12 @@ def test_show_tells_what_is_known_and_of_what_it_is_said() -> None:
 
 def test_show_goes_back_in_time() -> None:
     invoke("record", "wall.toml")
-    assert json.loads(invoke("show", "V1", "--at", "1", "--json").stdout)["kind"] == "voussoir"
+    assert answer("show", "V1", "--at", "1")["kind"] == "voussoir"
     history = invoke("show", "V1", "--history").stdout
     assert history.startswith("history of V1\nentry 1, ")
     assert "\n  corrected kind: voussoir → merlon\n" in history
     assert "\n  said membership: structure WALL\n" in history
-    events = json.loads(invoke("show", "V1", "--history", "--json").stdout)
+    events = answer("show", "V1", "--history")
     assert [one["entry"] for one in events] == sorted(one["entry"] for one in events)
     assert {"recorded", "measured", "corrected", "said"} == {one["event"] for one in events}
 
@@ -137,15 +130,13 @@ def test_show_goes_back_in_time() -> None:
     [
         (("show", "WALLL"), "there is no stone 'WALLL' in the database; did you mean WALL?"),
         (("show", "V1", "--at", "99"), "there is no entry 99"),
-        (("show", "V1", "--at", "1", "--history"), "--history and --at ask for two things"),
+        (("show", "V1", "--at", "1", "--history"), "--history and --at exclude each other"),
         (("record", "none.toml"), "none.toml: no such file"),
     ],
 )
 def test_wrong_use_ends_in_one_line(arguments: tuple[str, ...], message: str) -> None:
     invoke("record", "wall.toml")
-    done = invoke(*arguments)
-    assert done.exit_code == 2
-    assert message in done.stderr
+    assert message in fails(2, *arguments)
 
 
 @pytest.mark.parametrize("command", ["record", "show"])

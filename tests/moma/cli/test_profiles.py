@@ -3,11 +3,10 @@
 import json
 
 import pytest
-from typer.testing import CliRunner
 
-from moma.cli import app
 from pipelines.ingest.ingest import ingest
 from pipelines.tuning.measured_errors import ERRORS
+from tests.moma.commands import answer, invoke, prints
 from tests.paths import ROOT
 
 SURVEY = ROOT / "data/samples/window/window.moma"
@@ -41,15 +40,13 @@ def place(tmp_path_factory):
     return folder
 
 
-def invoke(command, place, *words):
-    url = f"sqlite:///{place / 'moma.db'}"
-    return CliRunner().invoke(app, [command, str(place / "scene.toml"), "--db", url, *map(str, words)])
+def scene_in(place):
+    """The scene and the database of a folder, as words of a command."""
+    return place / "scene.toml", "--db", f"sqlite:///{place / 'moma.db'}"
 
 
 def test_a_run_at_a_profile_tells_what_error_to_expect_and_what_was_reached(place):
-    done = invoke("run", place, "--profile", "fast", "--out", place / "fast")
-    assert done.exit_code == 0, done.output
-    lines = done.stdout.splitlines()
+    lines = prints("run", *scene_in(place), "--profile", "fast", "--out", place / "fast").splitlines()
     said = [number for number, line in enumerate(lines) if line.startswith("  profile fast: does it stand")]
     assert len(said) == 1
     assert lines[said[0] + 1].startswith("  expected errors, as measured on other scenes: ")
@@ -74,19 +71,14 @@ def test_a_run_at_a_profile_tells_what_error_to_expect_and_what_was_reached(plac
 
 
 def test_without_a_profile_a_scene_runs_as_it_is_written(place):
-    done = invoke("run", place, "--out", place / "plain", "--json")
-    assert done.exit_code == 0, done.output
-    summary = json.loads(done.stdout)
+    summary = answer("run", *scene_in(place), "--out", place / "plain")
     assert summary["profile"] is None
     assert summary["time"]["simulated"] == pytest.approx(0.05 * summary["steps"])
     assert "Profile" not in (place / "plain/report.html").read_text(encoding="utf-8")
 
 
 def test_check_counts_what_the_profile_needs(place):
-    plain, accurate = (
-        json.loads(invoke("check", place, *words, "--json").stdout)
-        for words in ((), ("--profile", "accurate"))
-    )
+    plain, accurate = (answer("check", *scene_in(place), *words) for words in ((), ("--profile", "accurate")))
     assert plain["bodies"]["deformable"] == 1
     assert accurate["bodies"]["rigid"] == 0
     assert accurate["cost"]["unknowns"] > 3 * plain["cost"]["unknowns"]
@@ -94,16 +86,15 @@ def test_check_counts_what_the_profile_needs(place):
 
 
 def test_check_says_how_a_profile_was_measured(place):
-    done = invoke("check", place, "--profile", "balanced")
-    assert done.exit_code == 0, done.output
-    (line,) = (one for one in done.stdout.splitlines() if one.startswith("  its errors on the scenes"))
+    text = prints("check", *scene_in(place), "--profile", "balanced")
+    (line,) = (one for one in text.splitlines() if one.startswith("  its errors on the scenes"))
     _, low, high = ERRORS["balanced"]["stone_von_mises_p99"]
     assert f"stone_von_mises_p99 {100 * low:.1f} % to {100 * high:.0f} %" in line
-    assert "profile" not in invoke("check", place).stdout
+    assert "profile" not in invoke("check", *scene_in(place)).stdout
 
 
 def test_a_wrong_name_is_told_with_the_right_ones(place):
     for command in ("run", "check"):
-        done = invoke(command, place, "--profile", "quick")
+        done = invoke(command, *scene_in(place), "--profile", "quick")
         assert done.exit_code == 2
         assert all(name in done.output for name in ("fast", "balanced", "accurate"))

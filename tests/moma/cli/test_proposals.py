@@ -1,25 +1,13 @@
 """`moma propose`: what it prints, records and refuses."""
 
-import json
 from dataclasses import replace
 
 import pytest
-from typer.testing import CliRunner
 
-from moma.cli import app
 from survey.formats.native.writer import write_moma
 from survey.synthetic.buildings.facings import two_facings
 from survey.synthetic.window_bay.sample import make_sample
-
-
-def invoke(*arguments):
-    return CliRunner().invoke(app, [str(one) for one in arguments])
-
-
-def ran(*arguments):
-    done = invoke(*arguments)
-    assert done.exit_code == 0, done.output
-    return done
+from tests.moma.commands import answer, fails, invoke, prints
 
 
 @pytest.fixture
@@ -29,7 +17,7 @@ def holes(tmp_path):
     kept = tuple(one for one in survey.blocks if one.code not in {"W05-02", "W10-05"})
     write_moma(replace(survey, blocks=kept), tmp_path / "holes.moma")
     url = f"sqlite:///{tmp_path / 'holes.db'}"
-    ran("ingest", tmp_path / "holes.moma", "--db", url)
+    prints("ingest", tmp_path / "holes.moma", "--db", url)
     return url
 
 
@@ -39,17 +27,17 @@ def facings(tmp_path_factory):
     place = tmp_path_factory.mktemp("facings")
     write_moma(two_facings(3.0, 4, 2).building.survey, place / "two.moma")
     url = f"sqlite:///{place / 'two.db'}"
-    ran("ingest", place / "two.moma", "--db", url)
+    prints("ingest", place / "two.moma", "--db", url)
     return url
 
 
 def proposals(*arguments):
-    return json.loads(ran("propose", *arguments, "--json").stdout)
+    return answer("propose", *arguments)
 
 
 def entries(url):
     """Numbers of entries that the history of a stone tells."""
-    return len(json.loads(ran("query", "entity", "--db", url, "--json").stdout))
+    return len(answer("query", "entity", "--db", url))
 
 
 def test_missing_stones_are_proposed_and_nothing_is_recorded(holes):
@@ -57,7 +45,7 @@ def test_missing_stones_are_proposed_and_nothing_is_recorded(holes):
     assert [one["code"] for one in report["proposals"]] == ["H-W05-02", "H-W10-05"]
     assert report["entry"] is None
     assert entries(holes) == 96
-    again = ran("propose", "missing", "--db", holes)
+    again = invoke("propose", "missing", "--db", holes)
     assert "nothing is recorded: give --record" in again.stderr
 
 
@@ -68,14 +56,14 @@ def test_proposals_are_recorded_once_and_related(holes):
     assert report["entry"] is not None
     assert report["related"] == report["entry"] + 1
     assert entries(holes) == 98
-    shown = json.loads(ran("show", "H-W05-02", "--db", holes, "--json").stdout)
+    shown = answer("show", "H-W05-02", "--db", holes)
     assert shown["hypothesis"] is True
     assert set(shown["relations"]) >= {"rests_on", "supports", "beside"}
-    history = ran("show", "H-W05-02", "--history", "--db", holes).stdout
+    history = prints("show", "H-W05-02", "--history", "--db", holes)
     assert "A. Mason, photographs" in history
     second = proposals("missing", "--db", holes, "--record")
     assert (second["proposals"], second["entry"]) == ([], None)
-    assert "nothing to propose" in ran("propose", "missing", "--db", holes).stderr
+    assert "nothing to propose" in invoke("propose", "missing", "--db", holes).stderr
 
 
 def test_where_limits_what_is_proposed_not_what_is_known(holes):
@@ -86,19 +74,18 @@ def test_where_limits_what_is_proposed_not_what_is_known(holes):
 
 def test_hypotheses_are_withdrawn_by_a_record(holes, tmp_path):
     proposals("missing", "--db", holes, "--record")
-    before = json.loads(ran("show", "W05-01", "--db", holes, "--json").stdout)["relations"]
+    before = answer("show", "W05-01", "--db", holes)["relations"]
     text = '[[withdraw]]\nwhat = "hypothesis"\nstones = ["H-W05-02"]\nsource = "a flue"\n'
     (tmp_path / "flue.toml").write_text(text, encoding="utf-8")
-    assert "1 withdrawn" in ran("record", tmp_path / "flue.toml", "--db", holes).stdout
+    assert "1 withdrawn" in prints("record", tmp_path / "flue.toml", "--db", holes)
     assert entries(holes) == 97
-    after = json.loads(ran("show", "W05-01", "--db", holes, "--json").stdout)["relations"]
+    after = answer("show", "W05-01", "--db", holes)["relations"]
     assert sum(map(len, after.values())) == sum(map(len, before.values())) - 1
     (tmp_path / "again.toml").write_text(text.replace("flue", "pipe"), encoding="utf-8")
-    assert "nothing changed" in ran("record", tmp_path / "again.toml", "--db", holes).stdout
+    assert "nothing changed" in prints("record", tmp_path / "again.toml", "--db", holes)
     (tmp_path / "seen.toml").write_text(text.replace("H-W05-02", "W05-01"), encoding="utf-8")
-    refused = invoke("record", tmp_path / "seen.toml", "--db", holes)
-    assert refused.exit_code == 2
-    assert "W05-01 is no hypothesis: it was surveyed" in refused.stderr
+    refused = fails(2, "record", tmp_path / "seen.toml", "--db", holes)
+    assert "W05-01 is no hypothesis: it was surveyed" in refused
     # the hole is there as before
     assert [one["code"] for one in proposals("missing", "--db", holes)["proposals"]] == ["H-W05-01+1"]
 
@@ -119,7 +106,7 @@ def test_the_core_as_blocks_or_storeys(facings):
 def test_the_core_is_recorded_once(tmp_path):
     write_moma(two_facings(2.5, 3, 3).building.survey, tmp_path / "two.moma")
     url = f"sqlite:///{tmp_path / 'two.db'}"
-    ran("ingest", tmp_path / "two.moma", "--db", url)
+    prints("ingest", tmp_path / "two.moma", "--db", url)
     first = proposals("infill", "--db", url, "--record")
     assert first["entry"] is not None
     second = proposals("infill", "--db", url, "--record")
@@ -141,7 +128,4 @@ def test_the_core_is_recorded_once(tmp_path):
     ],
 )
 def test_what_is_wrong_is_said_in_one_line(facings, arguments, said):
-    done = invoke("propose", *arguments, "--db", facings)
-    assert done.exit_code == 2, done.output
-    assert said in done.stderr
-    assert len(done.stderr.splitlines()) == 1
+    assert said in fails(2, "propose", *arguments, "--db", facings)

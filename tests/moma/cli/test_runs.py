@@ -1,15 +1,12 @@
 """`moma runs`: what it prints, as tables and as JSON, and its errors."""
 
-import json
-
 import pytest
-from typer.testing import CliRunner
 
 from archmodel.database.session import open_database
 from archmodel.store.runs import store_run
 from archmodel.store.stones import store_survey
-from moma.cli import app
 from tests.archmodel.stones import SHA, box_stone, run_record
+from tests.moma.commands import answer, fails, invoke, prints
 
 
 @pytest.fixture
@@ -22,39 +19,32 @@ def url(tmp_path):
     return url
 
 
-def invoke(*words):
-    return CliRunner().invoke(app, ["runs", *map(str, words)])
-
-
 def test_all_runs_are_listed(url):
-    done = invoke("--db", url)
-    assert done.exit_code == 0, done.output
-    lines = done.stdout.splitlines()
+    text = prints("runs", "--db", url)
+    lines = text.splitlines()
     assert len(lines) == 4
     assert lines[0].split()[:4] == ["run", "scene", "stored_at", "outcome"]
     assert [line.split()[1] for line in lines[2:]] == ["window", "again"]
-    told = json.loads(invoke("--db", url, "--json").stdout)
+    told = answer("runs", "--db", url)
     assert [(one["run"], one["stones"]) for one in told] == [(1, 2), (2, 2)]
 
 
 def test_one_run_is_told_in_full(url):
-    done = invoke(1, "--db", url)
-    assert done.exit_code == 0, done.output
-    assert "largest Von Mises stresses" in done.stdout
-    assert "scene file" not in done.stdout
-    assert "joints" not in done.stdout  # none are kept of it
-    assert 'name = "window"' in invoke(1, "--db", url, "-v").stdout
-    told = json.loads(invoke(1, "--db", url, "--json").stdout)
+    text = prints("runs", 1, "--db", url)
+    assert "largest Von Mises stresses" in text
+    assert "scene file" not in text
+    assert "joints" not in text  # none are kept of it
+    assert 'name = "window"' in invoke("runs", 1, "--db", url, "-v").stdout
+    told = answer("runs", 1, "--db", url)
     assert [row["code"] for row in told["largest_stresses"]] == ["B", "A"]
     assert told["versions"] == {"moma": "0.1.0"}
 
 
 def test_two_runs_are_compared(url):
-    done = invoke(2, "--against", 1, "--db", url)
-    assert done.exit_code == 0, done.output
-    assert "largest changes of Von Mises stress" in done.stdout
-    assert "displacement" not in done.stdout  # they are equal
-    told = json.loads(invoke(2, "--against", 1, "--db", url, "--json").stdout)
+    text = prints("runs", 2, "--against", 1, "--db", url)
+    assert "largest changes of Von Mises stress" in text
+    assert "displacement" not in text  # they are equal
+    told = answer("runs", 2, "--against", 1, "--db", url)
     assert told["stresses"] == [{"code": "A", "run": 4e5, "against": 1e5, "change": 3e5}]
 
 
@@ -68,8 +58,4 @@ def test_two_runs_are_compared(url):
     ],
 )
 def test_a_wrong_number_is_one_line(url, words, said):
-    done = invoke(*words, "--db", url)
-    assert done.exit_code == 2
-    assert done.stdout == ""
-    assert done.stderr.splitlines() == [done.stderr.strip()]
-    assert said in done.stderr
+    assert said in fails(2, "runs", *words, "--db", url)

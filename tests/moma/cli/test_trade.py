@@ -11,15 +11,14 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
 from mechanics.stones.meshing.elements import Element
-from moma.cli import app
 from pipelines.ingest.ingest import ingest
 from pipelines.results.quantities import QUANTITIES
 from pipelines.tradeoff import study as trade_module
 from pipelines.tradeoff.grid import Setting, grid
 from pipelines.tuning.overlay import Overlay
+from tests.moma.commands import invoke
 from tests.paths import ROOT
 
 SCENE = """
@@ -50,10 +49,6 @@ PATIENCE = 120.0
 JOBS = min(2, os.cpu_count() or 1)
 
 
-def invoke(*arguments):
-    return CliRunner().invoke(app, ["trade", *map(str, arguments)])
-
-
 def few_settings(scene, blocks, width, stress=False):
     """Two of the usual settings, and one that no memory holds."""
     chosen = [one for one in grid(scene, blocks, width, stress) if one.name in TRIED]
@@ -77,7 +72,16 @@ def study(place):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(trade_module, "grid", few_settings)
         done = invoke(
-            *arguments, "--error", "0.5", "--budget", "20", "--of", "support_reactions", "--jobs", JOBS
+            "trade",
+            *arguments,
+            "--error",
+            "0.5",
+            "--budget",
+            "20",
+            "--of",
+            "support_reactions",
+            "--jobs",
+            JOBS,
         )
     assert done.exit_code == 0, done.output
     return arguments, done
@@ -130,11 +134,13 @@ def test_a_study_that_is_done_is_printed_again_and_nothing_runs(study, monkeypat
     monkeypatch.setattr(trade_module, "grid", few_settings)
     monkeypatch.setattr(subprocess, "Popen", None)  # no process can be begun
     again = invoke(
-        *arguments, "--error", "0.5", "--budget", "20", "--of", "support_reactions", "--jobs", JOBS
+        "trade", *arguments, "--error", "0.5", "--budget", "20", "--of", "support_reactions", "--jobs", JOBS
     )
     assert again.exit_code == 0, again.output
     assert again.stdout == first.stdout
-    told = json.loads(invoke(*arguments, "--budget", "20", "--of", "support_reactions", "--json").stdout)
+    told = json.loads(
+        invoke("trade", *arguments, "--budget", "20", "--of", "support_reactions", "--json").stdout
+    )
     assert told["asked_error"] == 0.05
     assert {row["setting"] for row in told["rows"]} == {*TRIED, TOO_FINE}
 
@@ -145,7 +151,7 @@ def test_another_scene_in_the_same_folder_is_another_study(study, place, monkeyp
     monkeypatch.setattr(trade_module, "grid", few_settings)
     other.write_text(SCENE.replace("young = 12e9", "young = 13e9"), encoding="utf-8")
     try:
-        done = invoke(*arguments, "--budget", "1e-6", "--json")
+        done = invoke("trade", *arguments, "--budget", "1e-6", "--json")
     finally:
         other.write_text(SCENE, encoding="utf-8")
     assert done.exit_code == 1  # nothing is known of it, and there was no time
@@ -172,7 +178,7 @@ def test_what_is_recommended_can_be_pasted(study, place):
     ],
 )
 def test_wrong_use_ends_in_2_before_anything_runs(place, arguments, said):
-    done = invoke(place / "corner.toml", *arguments)
+    done = invoke("trade", place / "corner.toml", *arguments)
     assert done.exit_code == 2, done.output
     assert said in done.stderr
     assert done.stdout == ""
@@ -181,24 +187,24 @@ def test_wrong_use_ends_in_2_before_anything_runs(place, arguments, said):
 def test_a_folder_with_other_things_is_left_alone(place, tmp_path):
     (tmp_path / "letter.txt").write_text("dear", encoding="utf-8")
     url = f"sqlite:///{place / 'window.db'}"
-    done = invoke(place / "corner.toml", "--db", url, "--out", tmp_path)
+    done = invoke("trade", place / "corner.toml", "--db", url, "--out", tmp_path)
     assert done.exit_code == 2
     assert "holds what no study of MOMA wrote" in done.stderr
-    done = invoke(place / "corner.toml", "--db", url, "--out", tmp_path / "letter.txt")
+    done = invoke("trade", place / "corner.toml", "--db", url, "--out", tmp_path / "letter.txt")
     assert done.exit_code == 2
     assert [one.name for one in tmp_path.iterdir()] == ["letter.txt"]
 
 
 def test_tradeoff_is_another_name_that_help_does_not_list(place):
     arguments = (str(place / "none.toml"), "--out", str(place / "none"))
-    results = [CliRunner().invoke(app, [name, *arguments]) for name in ("trade", "tradeoff")]
+    results = [invoke(name, *arguments) for name in ("trade", "tradeoff")]
     assert [one.exit_code for one in results] == [2, 2]
     assert results[0].output == results[1].output
-    assert "tradeoff" not in CliRunner().invoke(app, ["--help"]).output
+    assert "tradeoff" not in invoke("--help").output
 
 
 def test_a_scene_that_is_not_there_is_wrong_use(place):
-    assert invoke(place / "none.toml", "--db", f"sqlite:///{place / 'window.db'}").exit_code == 2
+    assert invoke("trade", place / "none.toml", "--db", f"sqlite:///{place / 'window.db'}").exit_code == 2
 
 
 def children(pid):
@@ -242,7 +248,7 @@ def test_whatever_ends_the_study_ends_its_runs(place, tmp_path, ending):
     process.send_signal(ending)
     _, complaint = process.communicate(timeout=PATIENCE)
     assert process.returncode == (1 if ending is signal.SIGINT else -ending)
-    assert (b"the same command goes on from there" in complaint) == (ending is signal.SIGINT)
+    assert (b"the same command resumes from there" in complaint) == (ending is signal.SIGINT)
     awaited(lambda: not Path(f"/proc/{child}").exists() or "Z" in state_of(child))
     for file in (tmp_path / "study").rglob("*"):
         assert file.is_dir() or file.suffix == ".json"

@@ -13,9 +13,10 @@ from pipelines.draw.closing_pictures import (
     flat_facades,
     viewpoint,
 )
-from pipelines.draw.elevations.closing_shapes import closing_shapes, places
+from pipelines.draw.elevations.closing_shapes import Stages, closing_shapes, places
 from pipelines.draw.elevations.sheet import FLAG
-from pipelines.draw.offscreen.closing import load_surface, save_surface
+from pipelines.draw.offscreen.closing import ClosingSurface
+from pipelines.draw.offscreen.jobs import load_surface, save_surface
 from survey.geometry.solids import Solid, area_vector
 from survey.joints.report import ClosingReport, Gap, Joint, Overlap
 from survey.joints.settings import JointMode
@@ -76,7 +77,7 @@ def shapes_of(stones, simplified=None, hypotheses=(), **given):
     faces = [face_of(one) for one in stones]
     moved = {one.code: np.zeros(8) for one in stones} if simplified is None else simplified
     return closing_shapes(
-        "A wall", stones, stones, stones, moved, report(stones, **given), faces, frozenset(hypotheses)
+        "A wall", Stages(stones, stones, stones), moved, report(stones, **given), faces, frozenset(hypotheses)
     )
 
 
@@ -132,7 +133,7 @@ def test_the_surface_has_all_faces_and_joints(tmp_path):
     assert area(surface.gap_points, surface.gap_triangles) == pytest.approx(0.24)
     np.testing.assert_array_equal(surface.joint_width, 0.012)
     save_surface(tmp_path / "surface.npz", surface)
-    again = load_surface(tmp_path / "surface.npz")
+    again = load_surface(tmp_path / "surface.npz", ClosingSurface)
     np.testing.assert_array_equal(again.triangles, surface.triangles)
 
 
@@ -141,7 +142,7 @@ def test_a_wall_has_one_elevation_a_corner_two_and_a_vault_none():
         blocks = building.blocks()
         solids = [one.solid for one in blocks]
         faces = [one.face.outline for one in blocks]
-        return closing_shapes("x", solids, solids, solids, {}, report([]), faces, frozenset())
+        return closing_shapes("x", Stages(solids, solids, solids), {}, report([]), faces, frozenset())
 
     assert len(flat_facades(shapes_of(wall()))) == 1
     assert len(flat_facades(of(corner(4)))) == 2

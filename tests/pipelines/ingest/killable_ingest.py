@@ -21,7 +21,7 @@ PATIENCE = 60.0  # [s] for what takes a second on an idle machine
 
 
 def wall_survey(path: Path, prefix: str, stones: int, at: float = 0.0) -> Path:
-    """A survey file of a wall, twenty stones a course, each with its corners and four points."""
+    """Write a survey file of a wall, twenty stones a course, each with its corners and four points."""
     lines = ["moma-survey 1", f"name wall {prefix}", "observer 4 -20 1", "sigma 0.003"]
     lines.append("depth * 0.4 source thickness of the wall")
     for number in range(stones):
@@ -38,7 +38,7 @@ def wall_survey(path: Path, prefix: str, stones: int, at: float = 0.0) -> Path:
 
 
 def _take_in(survey: str, url: str, told: Connection) -> None:
-    """What the process does: say when it starts, when it writes its first stone, and how it ends."""
+    """Run an ingest; print when it starts, when it writes its first stone, and how it ends."""
     writing = False
 
     def listen(progress: Progress) -> None:
@@ -79,7 +79,7 @@ class Ingest:
         theirs.close()
 
     def wait_until(self, wanted: Callable[[str], bool]) -> bool:
-        """Whether the process came to say what is wanted before it ended."""
+        """Return True if the process printed the word before it ended."""
         deadline = time.monotonic() + PATIENCE
         while time.monotonic() < deadline:
             if self.said and wanted(self.said[-1]):
@@ -91,12 +91,12 @@ class Ingest:
         raise TimeoutError(f"nothing since {self.said}")
 
     def kill(self) -> None:
-        """SIGKILL."""
+        """Send SIGKILL."""
         self._process.kill()
         self.end()
 
     def end(self) -> str:
-        """How it ended: the last thing it said."""
+        """Return the last word that it printed."""
         self.wait_until(lambda said: False)
         self._process.join(PATIENCE)
         self._process.close()

@@ -25,14 +25,14 @@ NewUrl = Callable[[], str]
 
 @pytest.fixture(scope="module")
 def surveys(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    """What is in the database before, and what is taken in."""
+    """Write the survey in the database and the one to ingest."""
     folder = tmp_path_factory.mktemp("surveys")
     return wall_survey(folder / "old.moma", "A", 20), wall_survey(folder / "new.moma", "B", STONES, at=50.0)
 
 
 @pytest.fixture(scope="module")
 def usual(surveys: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> tuple[float, float]:
-    """How long an ingest takes that nobody disturbs: until it writes, and from then on [s]."""
+    """Time an undisturbed ingest: until it writes, and from then on [s]."""
     url = f"sqlite:///{tmp_path_factory.mktemp('usual') / 'moma.db'}"
     for _ in range(2):  # the first time, the process that all others start from is started too
         Path(url.removeprefix("sqlite:///")).unlink(missing_ok=True)
@@ -60,7 +60,7 @@ def kill_somewhere(process: Ingest, draw: random.Random, usual: tuple[float, flo
 
 
 def known(url: str) -> tuple[int, int, int]:
-    """How many surveys, entities and measurements there are."""
+    """Count surveys, entities and measurements."""
     with open_database(url) as database, database.session(read_only=True) as session:
         counted = [
             session.scalar(select(func.count(table.id))) or 0 for table in (Survey, Entity, Measurement)
@@ -69,7 +69,7 @@ def known(url: str) -> tuple[int, int, int]:
 
 
 def judge(url: str, survey: Path, before: str, said: list[str]) -> str:
-    """Where a killed ingest was; the database must be as it was, or complete; and the next ingest must work."""
+    """Return the stage of a killed ingest; check the database, which must be whole, and the next ingest."""
     with open_database(url) as database:
         found = contents(database)
     if found == before:

@@ -6,15 +6,14 @@ import math
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from archmodel.database.session import open_database
 from archmodel.query.api import find
 from archmodel.store.stones import load_stones
-from moma.cli import app
 from moma.errors import DatabaseError, GeometryError, SurveyError, UsageError
 from pipelines.ingest.ingest import ingest
 from pipelines.ingest.reading_options import reading_options
+from tests.moma.commands import invoke, prints
 
 HEAD = """\
 moma-survey 1
@@ -34,7 +33,7 @@ control C4 12 1 1 site 652012 6862001 41
 
 
 def corners(k):
-    """Of stone k of a wall in the plane y = 0, counter-clockwise for the observer in front of it."""
+    """Return the corners of stone k of a wall in the plane y = 0, counter-clockwise for an observer in front of it."""
     x = 10.0 + 0.7 * k
     return [(x, 0.0, 0.5), (x + 0.6, 0.0, 0.5), (x + 0.6, 0.0, 0.8), (x, 0.0, 0.8)]
 
@@ -111,12 +110,10 @@ class Desk:
             return {one.code: one for one in load_stones(session, find(session, "entity", []))}
 
     def show(self, code, *more, name="wall"):
-        done = CliRunner().invoke(app, ["show", code, "--db", self.url(name), *more])
-        assert done.exit_code == 0, done.output
-        return done.stdout
+        return prints("show", code, "--db", self.url(name), *more)
 
     def left(self):
-        """What is there beside the files that were put there."""
+        """List the files beside those of the test."""
         return {path.name for path in self.folder.iterdir()} - self.files
 
 
@@ -284,7 +281,7 @@ def test_a_face_that_cannot_be_is_a_reject_with_its_place(desk):
 
 def test_a_survey_of_nothing_but_wrong_stones_is_a_failure(desk):
     path = desk.write(HEAD + moma(0, "heder") + moma(1, "heder"), "wall.moma")
-    with pytest.raises(SurveyError, match=r"none of its 2 stones can be taken in; the first: .*heder"):
+    with pytest.raises(SurveyError, match=r"none of its 2 stones can be ingested; the first: .*heder"):
         desk.ingest(path, "moma", keep_going=True)
     assert desk.left() == set()
 
@@ -317,21 +314,21 @@ def test_rejects_never_replace_the_survey_itself_or_each_other(desk):
     for survey in (path, rejects):
         before = survey.read_bytes()
         with pytest.raises(UsageError, match="is the survey file itself"):
-            desk.ingest(survey, "moma", keep_going=True, rejects=survey)
+            desk.ingest(survey, "moma", keep_going=survey)
         assert survey.read_bytes() == before
     solids = [desk.write(obj(0), "wall.obj"), desk.write(obj(1), "wall.stl")]
     with pytest.raises(UsageError, match=r"rejects of .*wall\.obj and of .*wall\.stl"):
         ingest(solids, desk.url(), "solids", keep_going=True)
     with pytest.raises(UsageError, match="is a folder"):
-        desk.ingest(path, "moma", keep_going=True, rejects=desk.folder)
+        desk.ingest(path, "moma", keep_going=desk.folder)
     with pytest.raises(UsageError, match="one file of rejects for 2"):
-        ingest([path, rejects], desk.url(), keep_going=True, rejects=desk.folder / "r.moma")
+        ingest([path, rejects], desk.url(), keep_going=desk.folder / "r.moma")
 
 
 def test_nothing_is_left_behind_where_the_rejects_cannot_be_written(desk):
     path = desk.write(HEAD + moma(0) + moma(1, "heder"), "wall.moma")
     with pytest.raises(UsageError, match="rejects cannot be written"):
-        desk.ingest(path, "moma", keep_going=True, rejects=desk.folder / "none" / "r.moma")
+        desk.ingest(path, "moma", keep_going=desk.folder / "none" / "r.moma")
     assert desk.left() == set()
 
 
@@ -348,7 +345,7 @@ def test_nothing_is_left_behind_where_the_database_refuses(desk):
     twin = desk.write(HEAD.replace("bay 3", "bay 4") + moma(0), "twin.moma")
     words = r"twin\.moma:8: the code W0 is taken by the stone at .*first\.moma:8"
     for pair, error, said in (
-        ([first, first], UsageError, "named twice"),
+        ([first, first], UsageError, "given twice"),
         ([first, twin], SurveyError, words),
     ):
         with pytest.raises(error, match=said):
@@ -370,10 +367,6 @@ def test_two_files_are_taken_in_together_or_not_at_all(desk):
     assert [file.stones for file in report.files] == [{"header": 1}, {"header": 1}]
     assert [file.rejects for file in report.files] == [str(desk.folder / "bad.rejects.moma"), None]
     same_wall(desk.stones(), ["W0", "W1"])
-
-
-def invoke(*words):
-    return CliRunner().invoke(app, [str(word) for word in words])
 
 
 def finite_only(text):
@@ -404,7 +397,7 @@ def test_the_command_says_what_became_of_the_stones(desk, format):
     assert done.exit_code == 0, done.output
     said = done.stdout
     assert "4 stones of survey" in said
-    assert "1 stones not taken in, to be corrected in" in said
+    assert "1 stones rejected, to be corrected in" in said
     assert "unknown kind 'heder'" in said
     assert "nan" not in said.split()
     assert ("worst plane: W" in said) == (format != "solids")

@@ -104,7 +104,7 @@ def test_kinds_that_there_are_not_and_other_formats_are_refused_before_anything_
     url = f"sqlite:///{tmp_path / 'stones.db'}"
     with pytest.raises(UsageError, match="--kind-where: unknown kind 'vousoir'; did you mean voussoir"):
         ingest([path], url, "solids", rules=kind_rules(["vousoir: z > 0"]))
-    with pytest.raises(UsageError, match="--support: a rule for solids, and format csv"):
+    with pytest.raises(UsageError, match="--support: a rule for solids with format csv"):
         ingest([path], url, "csv", rules=kind_rules(supports=["z < 0"]))
     assert not (tmp_path / "stones.db").exists()
 

@@ -1,4 +1,4 @@
-"""How stones stand to one another, from solids in a database to relations in it: on SQLite and PostgreSQL."""
+"""Relations of stones, from solids in a database to relations in it: on SQLite and PostgreSQL."""
 
 from collections import Counter
 from dataclasses import asdict, replace

@@ -84,7 +84,7 @@ def test_a_stone_without_a_measured_face_has_no_solid_to_follow(url: str) -> Non
         entry = new_entry(session, "correction", "drill hole")
         session.add(Entity(kind="infill", code="CORE", entry_id=entry.id))
         session.flush()
-        with pytest.raises(UsageError, match="CORE was not measured; take in a survey of its face first"):
+        with pytest.raises(UsageError, match="CORE was not measured; ingest a survey of its face first"):
             record_depth(session, entry, ["CORE"], 0.3)
 
 

@@ -80,7 +80,7 @@ Write = Callable[[str], Path]
 
 
 def counts(url: str) -> dict[str, int]:
-    """How many rows there are of each."""
+    """Count the rows of each table."""
     with open_database(url) as database, database.session(read_only=True) as session:
         tables = (Entry, Material, Structure, Statement, Correction, Relation, Phase)
         return {cls.__name__: session.scalar(select(func.count()).select_from(cls)) or 0 for cls in tables}
@@ -95,7 +95,7 @@ def test_a_file_is_recorded_with_who_says_so(url: str, write: Write) -> None:
         assert (entry.author, entry.source, (entry.id,)) == ("A", "by eye", file.entries)
         told = describe(session, "W01-01")["knowledge"]
         assert told["material"]["name"] == "tuff"  # type: ignore[index]
-        assert told["material"]["phase_or_material_of"] == "WALL"  # type: ignore[index]
+        assert told["material"]["said_of"] == "WALL"  # type: ignore[index]
         (seen,) = session.scalars(select(Observation))
         assert str(seen.observed_on) == "2024-05-14"
         assert [one.code for one in find(session, "entity", ["member_of(WALL)"])] == [
@@ -228,7 +228,7 @@ name = "WALL"
         ("x = \n", 1, "not TOML"),
         ("[[mark]]\nsing = 'x'\n", 2, "unknown key 'sing' in ..mark..; did you mean 'sign'"),
         ("[[mark]]\nstones = ['V1']\n", 1, "..mark.. has no 'sign'"),
-        ("[[mark]]\nsign = 'x'\n", 1, "..mark.. is about nothing"),
+        ("[[mark]]\nsign = 'x'\n", 1, "..mark.. has no subject"),
         ("\n[[mark]]\nsign = 'x'\nstones = ['V2']\n", 4, "no stone 'V2' in the database; did you mean V1"),
         (
             "[[mark]]\nsign = 'x'\nstones = ['detph > 1']\n",
@@ -256,7 +256,7 @@ name = "WALL"
             "did you mean 'value'",
         ),
         ("[[material]]\nname = 'x'\n[material.properties]\nyoung = -1\n", 3, "young is -1.0"),
-        ("[[correction]]\nstones = ['V1']\n", 1, "a correction of nothing"),
+        ("[[correction]]\nstones = ['V1']\n", 1, "empty correction"),
         ("[[correction]]\nstones = ['V1']\nset = { knid = 'x' }\n", 3, "did you mean kind"),
         ("[[correction]]\nstones = ['V1']\nset = { depth = 1.0 }\n", 3, "record it as a depth"),
         ("[[kind]]\nname = 'x'\nparent = 'y'\ndefinition = 'z'\n", 1, "unknown kind 'y'"),
@@ -267,7 +267,7 @@ name = "WALL"
         ),
         ("[[withdraw]]\nwhat = 'mark'\nstones = ['V1']\n", 1, "there is no such mason_mark to withdraw"),
         ("[[withdraw]]\nwhat = 'phase'\n", 1, "the phase has no name"),
-        ("[[withdraw]]\nwhat = 'phase'\nname = 'x'\n", 1, "there never was a phase 'x'"),
+        ("[[withdraw]]\nwhat = 'phase'\nname = 'x'\n", 1, "there has never been a phase 'x'"),
         (
             "[[withdraw]]\nwhat = 'relation'\nstones = ['V1']\nto = ['W01-01']\n",
             1,

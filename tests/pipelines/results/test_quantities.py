@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mechanics.results.result import Outcome
+from mechanics.dynamics.outcome import Outcome
 from mechanics.scene.scene import Fidelity
 from pipelines.results.quantities import QUANTITIES, Quantities, differences, quantities, quantities_from
 from tests.pipelines.results_by_hand import deformable_body, result_of, rigid_body

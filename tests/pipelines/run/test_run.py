@@ -10,7 +10,7 @@ from archmodel.database.session import open_database
 from archmodel.describe.entity import describe
 from archmodel.query.api import find_rows
 from archmodel.store.run_record import STONE_VALUES
-from mechanics.results.result import Outcome
+from mechanics.dynamics.outcome import Outcome
 from mechanics.scene.scene import Fidelity
 from moma.errors import MissingLibraryError, UsageError
 from pipelines.ingest.records import surveyed_block

@@ -10,7 +10,7 @@ No stone rests on a strip of 3 cm or less: of that, noise and open joints leave 
 import numpy as np
 import pytest
 
-from mechanics.results.result import Outcome
+from mechanics.dynamics.outcome import Outcome
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene, SolverSettings, Start, TimeSettings
 from mechanics.simulate import simulate

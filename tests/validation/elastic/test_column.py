@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mechanics.results.result import Outcome
+from mechanics.dynamics.outcome import Outcome
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
 from tests.validation.elastic.elastic_blocks import (

@@ -11,10 +11,10 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from mechanics.contact.contacts import material_points
+from mechanics.dynamics.outcome import Outcome
 from mechanics.dynamics.simulation import Simulation
 from mechanics.model.balls import ball
 from mechanics.model.model import build_model
-from mechanics.results.result import Outcome
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import ImposedMotion

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mechanics.results.result import Outcome
+from mechanics.dynamics.outcome import Outcome
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.mortar import MortarJoint
 from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene, SolverSettings, Start, TimeSettings

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from mechanics.results.result import Outcome
+from mechanics.dynamics.outcome import Outcome
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import ContactSettings, Method, Scene, SolverSettings, TimeSettings
 from mechanics.simulate import simulate

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from mechanics.dynamics.outcome import Outcome
 from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
-from mechanics.results.result import Outcome
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.loads.accelerogram import Accelerogram
 from mechanics.scene.loads.forces import StoneForce

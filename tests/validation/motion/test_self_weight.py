@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mechanics.results.result import Outcome
+from mechanics.dynamics.outcome import Outcome
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import ContactSettings, Fidelity, Method, Scene, SolverSettings, TimeSettings
 from mechanics.simulate import simulate

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from mechanics.results.result import Outcome
+from mechanics.dynamics.outcome import Outcome
 from mechanics.scene.scene import Block, Method
 from mechanics.simulate import simulate
 from tests.validation.scenes import STONE, G, box, dynamic, follow, ground, moved, rotation, tilted_gravity

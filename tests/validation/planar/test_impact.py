@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from mechanics.dynamics.outcome import Outcome
 from mechanics.planar.scene import Disk
-from mechanics.results.result import Outcome
 from mechanics.scene.laws.dry_joint import DryJoint
 from tests.validation.planar.scenes import G, ball, run, start, steps_of
 

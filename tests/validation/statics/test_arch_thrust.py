@@ -7,7 +7,7 @@ Contact points: sharp corners. Thrust is what the springers push with, over the 
 import numpy as np
 import pytest
 
-from mechanics.results.result import Outcome
+from mechanics.dynamics.outcome import Outcome
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import spreading

@@ -8,7 +8,7 @@ Allowed are 1 % (3 % for Tet4) in the stress at every node and in the pressure o
 import numpy as np
 import pytest
 
-from mechanics.results.result import Outcome
+from mechanics.dynamics.outcome import Outcome
 from mechanics.scene.scene import Block, Fidelity
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from archmodel.database.session import open_database
-from mechanics.results.result import Outcome
+from mechanics.dynamics.outcome import Outcome
 from mechanics.scene.scene import Fidelity, Method, SolverSettings, TimeSettings
 from mechanics.simulate import simulate
 from pipelines.ingest.ingest import ingest

@@ -16,7 +16,7 @@ all contact forces is less than a twentieth of the force that some stone lacks f
 
 import numpy as np
 
-from mechanics.results.result import Outcome
+from mechanics.dynamics.outcome import Outcome
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import ContactSettings, Fidelity, Method, Scene, SolverSettings, TimeSettings
 from mechanics.simulate import simulate

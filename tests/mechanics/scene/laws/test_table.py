@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mechanics.dynamics.outcome import Outcome
 from mechanics.model.model import build_model
-from mechanics.results.result import Outcome
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.law import SLIDING, STATE
 from mechanics.scene.laws.mortar import MortarJoint

@@ -1,4 +1,4 @@
-"""What two stones have in common at their joint, against half-planes that are intersected otherwise."""
+"""Common areas of two stones at their joint, against an independent intersection of half-planes."""
 
 import numpy as np
 import pytest

@@ -3,20 +3,23 @@
 import json
 import subprocess
 import sys
-from html.parser import HTMLParser
+from copy import copy
+from dataclasses import fields, is_dataclass
+from enum import Enum
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from moma.cli import app
 from moma.cli.text.runs_and_surveys import survey_report_lines
 from moma.errors import SurveyError, UsageError
 from pipelines.ingest.reading_options import reading_options
 from pipelines.reports.survey import report as survey_report
+from pipelines.reports.survey.page import write_survey_page
 from pipelines.reports.survey.report import report_surveys
 from pipelines.reports.survey.study import study_surveys
+from tests.moma.commands import answer, fails, prints
 from tests.paths import ROOT
+from tests.pipelines.reports.page import Page
 
 SAMPLE = ROOT / "data/samples/window/window.moma"
 WALL = ROOT / "docs/howto/survey"
@@ -45,25 +48,6 @@ def survey_file(folder, text, name="wall (x)"):
 
 def contents(report):
     return json.loads((report.folder / "survey.json").read_text(encoding="utf-8"))
-
-
-class Page(HTMLParser):
-    """Elements that were opened and not closed, and what the page asks other files for."""
-
-    def __init__(self):
-        super().__init__()
-        self.open, self.sources, self.text = [], [], []
-
-    def handle_starttag(self, tag, attributes):
-        if tag not in ("meta", "img"):
-            self.open.append(tag)
-        self.sources += [value for name, value in attributes if name in ("src", "href")]
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        self.text.append(data)
 
 
 def test_the_folder_holds_what_its_index_names(window):
@@ -113,9 +97,7 @@ def test_the_true_beds_of_the_sample_are_level_and_found_so(window):
 
 def test_the_report_is_one_page_that_needs_nothing_else(window, wall):
     for report in (window, wall):
-        page = Page()
-        page.feed((report.folder / "report.html").read_text(encoding="utf-8"))
-        assert page.open == []
+        page = Page(report.folder / "report.html")
         assert all(source.startswith("data:image/png;base64,") for source in page.sources)
         assert len(page.sources) == 3
         text = " ".join(page.text)
@@ -262,11 +244,39 @@ def test_a_report_takes_the_place_of_an_earlier_one_only_when_it_is_complete(tmp
 
 def test_names_are_escaped(tmp_path):
     text = f"stone A header course 1\n  depth 0.4 source <script>alert(1)</script> & more\n{SQUARE}end\n"
+    text += f"stone <script>B</script> header\n{SQUARE}end\n"
     report = report_surveys([survey_file(tmp_path, text, name="<b>wall & tower")], tmp_path / "out")
-    page = (report.folder / "report.html").read_text(encoding="utf-8")
-    assert "<script>" not in page
-    assert "<b>" not in page
-    assert "&lt;b&gt;wall &amp; tower" in page
+    page = Page(report.folder / "report.html")
+    assert not page.tags & {"script", "b"}
+    for words in ("<script>alert(1)</script> & more", "<script>B</script>", "<b>wall & tower"):
+        assert any(words in one for one in page.text)
+    assert "&lt;b&gt;wall &amp; tower" in (report.folder / "report.html").read_text(encoding="utf-8")
+
+
+def marked(value):
+    """A copy of frozen dataclasses and what they hold, in which every text begins like a script."""
+    if isinstance(value, str) and not isinstance(value, Enum):
+        return f"<script>{value}"
+    if isinstance(value, dict):
+        return {marked(name): marked(one) for name, one in value.items()}
+    if isinstance(value, tuple | list):
+        return type(value)(map(marked, value))
+    if not is_dataclass(value):
+        return value
+    copied = copy(value)
+    for one in fields(value):
+        object.__setattr__(copied, one.name, marked(getattr(value, one.name)))
+    return copied
+
+
+def test_no_text_of_a_survey_becomes_markup(wall, tmp_path):
+    """Codes, kinds, zones, reasons, control points: whatever the page shows."""
+    write_survey_page(tmp_path / "report.html", marked(wall.study), {}, "<script>")
+    page = Page(tmp_path / "report.html")
+    assert "script" not in page.tags
+    assert sum("<script>" in one for one in page.text) > 5 * len(wall.study.stones)
+    for code in ("G03-02", "C4", "G05-03"):
+        assert any(f"<script>{code}" in one for one in page.text)
 
 
 def test_several_files_are_one_survey_with_a_picture_per_facade(tmp_path):
@@ -345,25 +355,18 @@ def place(tmp_path, monkeypatch):
     return tmp_path
 
 
-def invoke(*arguments):
-    return CliRunner().invoke(app, ["survey-report", *map(str, arguments)])
-
-
 def test_the_command_needs_no_database_and_says_where_its_report_lies(place):
-    done = invoke(SAMPLE)
-    assert done.exit_code == 0, done.output
-    assert "out/survey-window/report.html" in done.stdout
-    assert "98 stones" in done.stdout
+    text = prints("survey-report", SAMPLE)
+    assert "out/survey-window/report.html" in text
+    assert "98 stones" in text
     assert [entry.name for entry in place.iterdir()] == ["out"]
 
 
 def test_the_command_prints_json_for_programs_and_takes_the_options_of_readers(place):
-    done = invoke(
-        WALL / "points.txt", "--format", "pnezd", "--codes", CODES, "--header", WALL / "head.moma",
-        "--sigma", "0.004", "--out", "wall", "--json",
+    content = answer(
+        "survey-report", WALL / "points.txt", "--format", "pnezd", "--codes", CODES,
+        "--header", WALL / "head.moma", "--sigma", "0.004", "--out", "wall",
     )  # fmt: skip
-    assert done.exit_code == 0, done.output
-    content = json.loads(done.stdout)
     assert content == json.loads((place / "wall/survey.json").read_text(encoding="utf-8"))
     assert "sigma is too large" in content["quality"]["verdict"]  # 2 mm are right, 4 were stated
     assert content["quality"]["sigma"] == pytest.approx(0.004, rel=1e-3)
@@ -375,14 +378,11 @@ def test_the_command_prints_json_for_programs_and_takes_the_options_of_readers(p
         (("none.moma",), "no such file"),
         ((SAMPLE, "--sigma", "0"), "--sigma"),
         ((SAMPLE, "--header", "none"), "--header"),
-        ((SAMPLE, "--out", ROOT), "holds what no run of MOMA wrote"),
+        ((SAMPLE, "--out", ROOT), "holds files that no run of MOMA wrote"),
     ],
 )
 def test_wrong_use_is_told_in_one_line(place, arguments, words):
-    done = invoke(*arguments)
-    assert done.exit_code == 2
-    assert words in done.stderr
-    assert len(done.stderr.splitlines()) == 1
+    assert words in fails(2, "survey-report", *arguments)
     assert list(place.iterdir()) == []
 
 

@@ -1,0 +1,60 @@
+"""Jobs of a drawing process: one surface as .npz, and its pictures as JSON.
+
+The modules that draw run in a process of their own (``python -m pipelines.draw.offscreen.result JOB.json``): a graphics
+library that is missing or broken may end the process that uses it, and must not take the results along.
+"""
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+__all__ = ["load_surface", "run_job", "save_job", "save_surface"]
+
+Surface = TypeVar("Surface")
+
+
+def save_job(folder: Path, surface: Any, pictures: Sequence[Mapping[str, Any]]) -> Path:
+    """Write a job into a folder; return its file.
+
+    Parameters
+    ----------
+    surface : dataclass of arrays
+    pictures : their paths, and what the drawing module reads of each
+    """
+    save_surface(folder / "surface.npz", surface)
+    job = folder / "job.json"
+    job.write_text(
+        json.dumps({"surface": str(folder / "surface.npz"), "pictures": pictures}), encoding="utf-8"
+    )
+    return job
+
+
+def run_job(
+    arguments: Sequence[str], kind: type[Surface], draw: Callable[[Surface, Path, dict[str, Any]], None]
+) -> int:
+    """Draw the pictures of a job file; return 3 if a library cannot be loaded, with its message on stdout."""
+    job = json.loads(Path(arguments[1]).read_text(encoding="utf-8"))
+    try:
+        import pyvista  # noqa: F401
+    except ImportError as error:
+        print(error)
+        return 3
+    surface = load_surface(Path(job["surface"]), kind)
+    for picture in job["pictures"]:
+        draw(surface, Path(picture["path"]), picture)
+    return 0
+
+
+def save_surface(path: Path, surface: Any) -> None:
+    """Write a dataclass of arrays as .npz."""
+    np.savez(path, **{one.name: getattr(surface, one.name) for one in fields(surface)})
+
+
+def load_surface(path: Path, kind: type[Surface]) -> Surface:
+    """Read a dataclass of arrays that `save_surface` wrote."""
+    with np.load(path, allow_pickle=False) as arrays:
+        return kind(**dict(arrays))

@@ -1,0 +1,37 @@
+"""The command line, run within the process of a test."""
+
+import json
+from typing import Any
+
+from typer.testing import CliRunner, Result
+
+from moma.cli import app
+
+__all__ = ["answer", "fails", "invoke", "prints"]
+
+
+def invoke(*words: object) -> Result:
+    """Run a command, however it ends."""
+    return CliRunner().invoke(app, [str(word) for word in words])
+
+
+def prints(*words: object) -> str:
+    """Run a command that must succeed; return its standard output."""
+    done = invoke(*words)
+    assert done.exit_code == 0, done.output
+    return done.stdout
+
+
+def answer(*words: object) -> Any:
+    """Run a command that must succeed; return what it answers to programs."""
+    return json.loads(prints(*words, "--json"))
+
+
+def fails(code: int, *words: object) -> str:
+    """Run a command that must fail with one line and nothing else; return the line."""
+    done = invoke(*words)
+    assert done.exit_code == code, done.output
+    assert done.stdout == ""
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("moma: error: ")
+    return line
