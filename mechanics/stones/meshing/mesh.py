@@ -10,7 +10,7 @@ from mechanics.stones.meshing.shape_functions import integration, jacobians
 from mechanics.stones.polyhedra import face_plane, face_planes, mass_properties
 from moma.errors import MeshError
 
-__all__ = ["SolidMesh", "boundary_facets", "solid_mesh", "tet_mesh"]
+__all__ = ["SolidMesh", "VolumeMesh", "boundary_facets", "solid_mesh", "tet_mesh"]
 
 Faces = tuple[tuple[int, ...], ...]
 
@@ -21,21 +21,31 @@ _SAME_VOLUME = 1e-6
 
 
 @dataclass(frozen=True)
-class SolidMesh:
-    """The finite elements of one stone, and the facets of its boundary; edges are straight, with nodes at their middle.
+class VolumeMesh:
+    """The finite elements of one stone; edges are straight, with nodes at their middle.
 
     Attributes
     ----------
     element : kind of all cells
     nodes : (n, 3) [m]
     cells : (nc, element.cell_nodes) node indices in VTK's order, positive volume
-    facets : (ns, element.facet_nodes) boundary node indices in VTK's order, corners counter-clockwise seen from outside
-    facet_face : (ns,) the stone's face that each boundary facet lies on
     """
 
     element: Element
     nodes: Array
     cells: Ints
+
+
+@dataclass(frozen=True)
+class SolidMesh(VolumeMesh):
+    """The finite elements of one stone, and the facets of its boundary.
+
+    Attributes
+    ----------
+    facets : (ns, element.facet_nodes) boundary node indices in VTK's order, corners counter-clockwise seen from outside
+    facet_face : (ns,) the stone's face that each boundary facet lies on
+    """
+
     facets: Ints
     facet_face: Ints
 
