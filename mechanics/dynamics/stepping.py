@@ -11,7 +11,7 @@ from mechanics.contact.contacts import Contacts
 from mechanics.delassus.assembly import world_impulse
 from mechanics.delassus.mixed import MixedDelassus
 from mechanics.delassus.rigid import RigidDelassus
-from mechanics.model._kernels import deform, rigid_part
+from mechanics.model._kernels import Frames, deform, rigid_part
 from mechanics.model.deformable import Compliance
 from mechanics.model.model import Model
 from mechanics.model.rigid import free_flight, inverse_inertia_world
@@ -70,8 +70,8 @@ def predict(model: Model, start: State, state: State, duration: float) -> State:
     node, node_velocity = state.node, state.node_velocity
     if elastic.groups:
         node, node_velocity = deform(
-            elastic.start, elastic.reference, state.centre, state.rotation, state.node, rate, duration,
-            centre, rotation, velocity,
+            elastic.start, elastic.reference, Frames(state.centre, state.rotation), state.node, rate, duration,
+            Frames(centre, rotation), velocity,
         )  # fmt: skip
         velocity = np.where(model.elastic[:, None], 0.0, velocity)
     return State(time, centre, rotation, velocity, node, node_velocity)

@@ -1,17 +1,25 @@
-"""Numba kernel of free rigid rotation."""
+"""Numba kernels of free flight: rigid rotation, and the deformation of elastic bodies in their frames."""
+
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
-__all__ = ["deform", "fly", "rigid_part"]
+__all__ = ["Frames", "deform", "fly", "rigid_part"]
 
-# largest angle of one substep [rad]: the attitude is accurate to the second order in it
-_SUBSTEP = 0.1
+_SUBSTEP = 0.1  # largest angle of one substep [rad]: the attitude is accurate to the second order in it
+
+
+class Frames(NamedTuple):
+    """Frames of bodies: centres (nb, 3) float64 [m] and rotations (nb, 3, 3) float64."""
+
+    centre: Any
+    rotation: Any
 
 
 @njit(cache=True)
 def _series(x, y, z):
-    """sin(a)/a and (1 - cos(a))/a² of a rotation vector of length a (Rodrigues)."""
+    """Return sin(a)/a and (1 - cos(a))/a² of a rotation vector of length a (Rodrigues)."""
     angle = np.sqrt(x * x + y * y + z * z)
     if angle < 1e-8:
         return 1.0 - angle * angle / 6.0, 0.5 - angle * angle / 24.0
@@ -20,15 +28,21 @@ def _series(x, y, z):
 
 
 @njit(cache=True)
+def _cross(a, b, c, x, y, z):
+    return b * z - c * y, c * x - a * z, a * y - b * x
+
+
+@njit(cache=True)
 def _row_turned(a, b, c, x, y, z, s, v):
-    """The row (a, b, c) times the exponential of a rotation vector, given its series."""
-    p, q, r = b * z - c * y, c * x - a * z, a * y - b * x
-    return a + s * p + v * (q * z - r * y), b + s * q + v * (r * x - p * z), c + s * r + v * (p * y - q * x)
+    """Return the row (a, b, c) times the exponential of a rotation vector, given its series."""
+    p, q, r = _cross(a, b, c, x, y, z)
+    i, j, k = _cross(p, q, r, x, y, z)
+    return a + s * p + v * i, b + s * q + v * j, c + s * r + v * k
 
 
 @njit(cache=True)
 def _turn(rotation, x, y, z):
-    """rotation · exp(vector) in place; the vector is given in body axes [rad]."""
+    """Multiply a rotation by exp(vector), in place; the vector is in body axes [rad]."""
     s, v = _series(x, y, z)
     for i in range(3):
         rotation[i, 0], rotation[i, 1], rotation[i, 2] = _row_turned(
@@ -37,15 +51,16 @@ def _turn(rotation, x, y, z):
 
 
 @njit(cache=True)
+def _dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(cache=True)
 def _straighten(rotation):
     """Take rounding out of a rotation, in place: one step of Newton's towards the nearest, R (3 - Rᵀ R)/2."""
     a, b, c = rotation[:, 0], rotation[:, 1], rotation[:, 2]
-    aa = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
-    ab = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-    ac = a[0] * c[0] + a[1] * c[1] + a[2] * c[2]
-    bb = b[0] * b[0] + b[1] * b[1] + b[2] * b[2]
-    bc = b[0] * c[0] + b[1] * c[1] + b[2] * c[2]
-    cc = c[0] * c[0] + c[1] * c[1] + c[2] * c[2]
+    aa, ab, ac = _dot(a, a), _dot(a, b), _dot(a, c)
+    bb, bc, cc = _dot(b, b), _dot(b, c), _dot(c, c)
     for i in range(3):
         x, y, z = a[i], b[i], c[i]
         a[i] += 0.5 * (x - x * aa - y * ab - z * ac)
@@ -55,6 +70,7 @@ def _straighten(rotation):
 
 @njit(cache=True)
 def _product(m, x, y, z):
+    """Return m (x, y, z)."""
     return (
         m[0, 0] * x + m[0, 1] * y + m[0, 2] * z,
         m[1, 0] * x + m[1, 1] * y + m[1, 2] * z,
@@ -64,6 +80,7 @@ def _product(m, x, y, z):
 
 @njit(cache=True)
 def _transposed(m, x, y, z):
+    """Return mᵀ (x, y, z)."""
     return (
         m[0, 0] * x + m[1, 0] * y + m[2, 0] * z,
         m[0, 1] * x + m[1, 1] * y + m[2, 1] * z,
@@ -73,11 +90,24 @@ def _transposed(m, x, y, z):
 
 @njit(cache=True)
 def fly(rotation, omega, inertia, inverse, moving, duration):  # pragma: no cover - compiled
-    """Free rotation of rigid bodies: new rotations (nb, 3, 3) and angular velocities (nb, 3), world axes.
+    """Rotate rigid bodies freely.
 
     With Π the angular momentum in body axes, each substep turns the body by exp(τ Ω), Ω = I⁻¹ (Π + Π')/2, and
     Π' = exp(-τ Ω) Π. So R Π, the momentum in space, stays, and ½ Π I⁻¹ Π as well, since Π' - Π is normal to Ω: the
     midpoint rule keeps quadratic invariants (Cooper 1987), here with the exponential map.
+
+    Inputs
+    ------
+    rotation : (nb, 3, 3) float64
+    omega : (nb, 3) float64 world axes [rad/s]
+    inertia, inverse : (nb, 3, 3) float64 body axes [kg m²], [1/(kg m²)]
+    moving : (nb,) bool
+    duration : [s]
+
+    Outputs
+    -------
+    rotation : (nb, 3, 3) float64
+    omega : (nb, 3) float64 world axes [rad/s]
     """
     new, spin = rotation.copy(), omega.copy()
     for b in range(rotation.shape[0]):
@@ -91,7 +121,7 @@ def fly(rotation, omega, inertia, inverse, moving, duration):  # pragma: no cove
         steps = min(int(angle / _SUBSTEP) + 1, 1000)
         tau = duration / steps
         o0, o1, o2 = _transposed(r, w0, w1, w2)
-        # R is a rotation but for rounding: what R Rᵀ ω lacks of ω would add up over the steps
+        # R is a rotation only to rounding: the difference of R Rᵀ ω from ω would add up over the steps
         d0, d1, d2 = _product(r, o0, o1, o2)
         d0, d1, d2 = _transposed(r, w0 - d0, w1 - d1, w2 - d2)
         o0, o1, o2 = o0 + d0, o1 + d1, o2 + d2
@@ -124,18 +154,18 @@ def fly(rotation, omega, inertia, inverse, moving, duration):  # pragma: no cove
 def rigid_part(start, reference, projector, rotation, node_velocity):  # pragma: no cover - compiled
     """Split the motion of elastic bodies into that of their frames and deformation rates.
 
-    Parameters
-    ----------
-    start : (nb+1,) first node of each body; bodies without nodes are left out
-    reference : (nn, 3) undeformed places, body axes [m]
-    projector : (nn, 6, 3) (Rᵀ M R)⁻¹ Rᵀ M, column by column: rigid velocities from nodal ones, body axes
-    rotation : (nb, 3, 3) of the frames
-    node_velocity : (nn, 3) world axes [m/s]
+    Inputs
+    ------
+    start : (nb+1,) int64 first node of each body; bodies without nodes are left out
+    reference : (nn, 3) float64 undeformed places, body axes [m]
+    projector : (nn, 6, 3) float64 (Rᵀ M R)⁻¹ Rᵀ M, column by column: rigid velocities from nodal ones, body axes
+    rotation : (nb, 3, 3) float64 of the frames
+    node_velocity : (nn, 3) float64 world axes [m/s]
 
-    Returns
+    Outputs
     -------
-    motion : (nb, 6) velocities of the frames [m/s, rad/s], world axes
-    rate : (nn, 3) what is left, body axes; it has no part in any rigid motion [m/s]
+    motion : (nb, 6) float64 velocities of the frames [m/s, rad/s], world axes
+    rate : (nn, 3) float64 remainder, body axes; it has no part in any rigid motion [m/s]
     """
     bodies = start.shape[0] - 1
     motion, rate = np.zeros((bodies, 6)), np.empty_like(node_velocity)
@@ -168,18 +198,27 @@ def rigid_part(start, reference, projector, rotation, node_velocity):  # pragma:
 
 
 @njit(cache=True)
-def deform(
-    start, reference, centre, rotation, node, rate, duration, new_centre, new_rotation, motion
-):  # pragma: no cover - compiled
-    """Nodes and their velocities (nn, 3) after a flight in which the frames have moved and d has grown at its rate.
+def deform(start, reference, before, node, rate, duration, after, motion):  # pragma: no cover - compiled
+    """Move the nodes of elastic bodies in a flight during which their frames move and d grows at its rate.
 
-    `centre`, `rotation` of the frames before the flight, `new_centre`, `new_rotation` and `motion` (nb, 6) after it;
-    `rate` as `rigid_part` gives it.
+    Inputs
+    ------
+    start, reference : as those of `rigid_part`
+    before, after : Frames at the start and at the end of the flight
+    node : (nn, 3) float64 places at the start, world axes [m]
+    rate : (nn, 3) float64 of deformation, as `rigid_part` gives it [m/s]
+    duration : [s]
+    motion : (nb, 6) float64 velocities of the frames at the end, world axes [m/s, rad/s]
+
+    Outputs
+    -------
+    place, velocity : (nn, 3) float64 of the nodes at the end, world axes [m], [m/s]
     """
+    centre = before.centre
     place, velocity = np.empty_like(node), np.empty_like(node)
     local, arm = np.empty(3), np.empty(3)
     for b in range(start.shape[0] - 1):
-        old, new = rotation[b], new_rotation[b]
+        old, new = before.rotation[b], after.rotation[b]
         w0, w1, w2 = motion[b, 3], motion[b, 4], motion[b, 5]
         for i in range(start[b], start[b + 1]):
             x, y, z = node[i, 0] - centre[b, 0], node[i, 1] - centre[b, 1], node[i, 2] - centre[b, 2]
@@ -189,9 +228,9 @@ def deform(
                 local[k] = reference[i, k] + (d + duration * rate[i, k])
             for k in range(3):
                 place[i, k] = (
-                    new_centre[b, k] + new[k, 0] * local[0] + new[k, 1] * local[1] + new[k, 2] * local[2]
+                    after.centre[b, k] + new[k, 0] * local[0] + new[k, 1] * local[1] + new[k, 2] * local[2]
                 )
-                # the spin acts on the undeformed arms, as it was read off them
+                # the spin acts on the undeformed arms, from which rigid_part took it
                 arm[k] = (
                     new[k, 0] * reference[i, 0] + new[k, 1] * reference[i, 1] + new[k, 2] * reference[i, 2]
                 )

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from mechanics.dynamics.observers.energy import elastic_energy, kinetic_energy
 from mechanics.dynamics.simulation import Clock, Simulation
 from mechanics.dynamics.stepping import predict
-from mechanics.model._kernels import deform, rigid_part
+from mechanics.model._kernels import Frames, deform, rigid_part
 from mechanics.model.model import build_model
 from mechanics.scene.scene import Fidelity
 from mechanics.stones.meshing.elements import Element
@@ -138,8 +138,8 @@ def test_deformed_places_are_those_of_the_slow_twin(duration):
     centre = start.centre + rng.normal(size=start.centre.shape)
     own = model.elastic_stones
     fast = deform(
-        own.start, own.reference, state.centre, state.rotation, state.node, rate, duration, centre,
-        other.rotation, motion,
+        own.start, own.reference, Frames(state.centre, state.rotation), state.node, rate, duration,
+        Frames(centre, other.rotation), motion,
     )  # fmt: skip
     slow = deform_twin(
         model, state.centre, state.rotation, state.node, rate, duration, centre, other.rotation, motion

@@ -12,7 +12,7 @@ from scipy.spatial import Delaunay, QhullError
 
 from mechanics.arrays import Array, Bools, Ints
 from mechanics.stones.meshing.mesh import SolidMesh, tet_mesh
-from mechanics.stones.meshing.meshers._kernels.sampling import lay_points
+from mechanics.stones.meshing.meshers._kernels.sampling import Polyhedron, Sizes, lay_points
 from mechanics.stones.meshing.meshers._kernels.shaping import relax
 from mechanics.stones.meshing.shaping import improve_cells
 from mechanics.stones.meshing.sizes import SizeField, as_field
@@ -102,10 +102,9 @@ def _cloud(corners: Array, faces: Faces, planes: Array, field: SizeField) -> _Cl
     edges = np.array(sorted(sides), dtype=np.int64)
     loops = np.concatenate([np.array(face, dtype=np.int64) for face in faces])
     start = np.cumsum([0, *map(len, faces)]).astype(np.int64)
-    points, ends, owner = lay_points(
-        corners, edges, loops, start, planes, _axes(planes),
-        field.size, field.fine, field.growth, field.normals, field.offsets,
-    )  # fmt: skip
+    stone = Polyhedron(corners, edges, loops, start, planes, _axes(planes))
+    sizes = Sizes(float(field.size), float(field.fine), float(field.growth), field.normals, field.offsets)
+    points, ends, owner = lay_points(stone, sizes)
     own_edge, own_face = owner[ends[0] : ends[1]], owner[ends[1] : ends[2]]
     on_plane = np.zeros((len(points), len(faces)), dtype=bool)
     on_plane[loops, np.repeat(np.arange(len(faces)), np.diff(start))] = True
