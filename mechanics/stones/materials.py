@@ -14,8 +14,7 @@ __all__ = ["Material", "Orthotropy", "fourth_order"]
 
 # tensor components of the six stresses and strains, in the order xx, yy, zz, xy, yz, zx
 _FIRST, _SECOND = (0, 1, 2, 0, 1, 2), (0, 1, 2, 1, 2, 0)
-# by this much a product of axes may differ from 0 or 1
-_ORTHONORMAL = 1e-6
+_ORTHONORMAL = 1e-6  # largest difference of a product of axes from 0 or 1
 _WORLD_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -46,9 +45,9 @@ class Material:
     name : as in the scene
     density : ρ [kg/m³]
     young : Young's modulus E [Pa]; not used by rigid blocks
-    poisson : Poisson's ratio ν [-], 0 ≤ ν < 0.5; linear elements are too stiff above about 0.4, take quadratic ones
+    poisson : Poisson's ratio ν [-], 0 ≤ ν < 0.5; above about 0.4 linear elements are too stiff: use quadratic ones
     mass_damping, stiffness_damping : α [1/s] and β [s] of Rayleigh's damping V = α M + β K
-    tensile_strength, compressive_strength : both positive [Pa]; None: not known
+    tensile_strength, compressive_strength : both positive [Pa]; None: unknown
     orthotropy : replaces young and poisson; None: isotropic
     """
 
@@ -109,7 +108,7 @@ def _isotropic(young: float, poisson: float) -> Array:
 
 
 def _compliance(orthotropy: Orthotropy) -> Array:
-    """C⁻¹ (6, 6) in the axes of the material [1/Pa] (Ting 1996, §2.4)."""
+    """Return C⁻¹ (6, 6) in the axes of the material [1/Pa] (Ting 1996, §2.4)."""
     young, poisson = orthotropy.young, orthotropy.poisson
     compliance = np.diag([1.0 / modulus for modulus in (*young, *orthotropy.shear)])
     for i, j, ratio, modulus in zip((0, 1, 2), (1, 2, 0), poisson, young, strict=True):
@@ -118,14 +117,14 @@ def _compliance(orthotropy: Orthotropy) -> Array:
 
 
 def fourth_order(stiffness: Array) -> Array:
-    """The tensor c_ijkl (3, 3, 3, 3) of a matrix C (6, 6), order xx, yy, zz, xy, yz, zx."""
+    """Return the tensor c_ijkl (3, 3, 3, 3) of a matrix C (6, 6), order xx, yy, zz, xy, yz, zx."""
     number = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
     tensor: Array = stiffness[number[:, :, None, None], number]
     return tensor
 
 
 def _turned(stiffness: Array, axes: Array) -> Array:
-    """The matrix C in the axes in which the rows of `axes` are given."""
+    """Return the matrix C in the axes in which the rows of `axes` are given."""
     turned = np.einsum("ijkl,ia,jb,kc,ld->abcd", fourth_order(stiffness), axes, axes, axes, axes)
     voigt = turned[_FIRST, _SECOND][:, _FIRST, _SECOND]
     result: Array = 0.5 * (voigt + voigt.T)

@@ -18,8 +18,9 @@ from mechanics.results.result import (
 from mechanics.results.stress_values import stress_values
 from mechanics.scene.scene import Block, Fidelity, Scene
 from mechanics.scene.shapes import BOX_FACES, box_corners
-from mechanics.stones.elasticity import node_volumes, principal
-from mechanics.stones.elasticity import von_mises as equivalent_stress
+from mechanics.stones.elasticity.operators import node_volumes
+from mechanics.stones.elasticity.tensors import principal
+from mechanics.stones.elasticity.tensors import von_mises as equivalent_stress
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import SolidMesh

@@ -12,7 +12,7 @@ from mechanics.dynamics.simulation import detector
 from mechanics.model.model import Model, build_model
 from mechanics.results.forecast.workload import Amounts, amounts
 from mechanics.scene.scene import Fidelity, Scene
-from mechanics.stones.meshing.report import MeshReport
+from mechanics.stones.meshing.quality import MeshReport
 
 __all__ = ["Plan", "plan"]
 

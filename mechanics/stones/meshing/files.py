@@ -32,10 +32,9 @@ _NAMED_BY_MESHIO = {
     Element.HEX27: "hexahedron27",
 }
 _ELEMENTS = {name: element for element, name in _NAMED_BY_MESHIO.items()}
-# the geometry that MED knows each kind of cell by
+# MED's number of each kind of cell
 _MED_GEOMETRY = {"TE4": 304, "T10": 310, "HE8": 308, "H20": 320}
-# entries that Abaqus reads from one line
-_ABAQUS_LINE = 16
+_ABAQUS_LINE = 16  # entries that Abaqus reads from one line
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,7 @@ class _Format:
 
     Attributes
     ----------
-    writer : meshio's name of what writes it; MSH 2.2, as Gmsh does not read meshio's 4.1
+    writer : meshio's name of the writer; MSH 2.2 because Gmsh does not read meshio's 4.1
     elements : kinds of cells that it holds
     code : regular expression of the stone codes that it can hold as names; None: it holds numbers alone
     number : cell data with the number of each cell's stone, from 1 on
@@ -273,7 +272,7 @@ def _name_geometry(path: Path) -> None:
 
 
 def _for_abaqus(line: str) -> str:
-    """A line as Abaqus wants it: plain displacement elements, not hybrid ones, and no more entries than it reads."""
+    """Adapt a line for Abaqus: plain displacement elements, not hybrid ones, and no more entries than it reads."""
     entries = re.sub(r"^(\*ELEMENT, TYPE=C3D\d+)\w*", r"\1", line).split(",")
     parts = (entries[:_ABAQUS_LINE], entries[_ABAQUS_LINE:])
     return ",\n".join(",".join(part) for part in parts if part) + "\n"
@@ -290,7 +289,7 @@ def _turned(element: Element) -> list[int]:
 
 
 def _sets(found: Any, form: _Format, path: Path) -> dict[str, list[Ints]]:
-    """By code the cells of each block that belong to a stone."""
+    """Return by code the cells of each block that belong to a stone."""
     if form.writer == "abaqus":
         return {
             code: [np.asarray(one, dtype=np.int64) for one in members]

@@ -7,13 +7,12 @@ from typing import Protocol
 
 from mechanics.arrays import Array
 from mechanics.stones.meshing.elements import Element
-from mechanics.stones.meshing.mesh import SolidMesh
+from mechanics.stones.meshing.mesh import SolidMesh, with_middle_nodes
 from mechanics.stones.meshing.meshers.choice import Mesher
 from mechanics.stones.meshing.meshers.corner_hexahedra import mesh_at_corners
 from mechanics.stones.meshing.meshers.delaunay import mesh_with_delaunay
 from mechanics.stones.meshing.meshers.gmsh import Algorithm, mesh_with_gmsh
 from mechanics.stones.meshing.meshers.hexahedral import mesh_with_hexahedra
-from mechanics.stones.meshing.quadratic import with_middle_nodes
 from mechanics.stones.meshing.quality import mesh_quality
 from mechanics.stones.meshing.sizes import SizeField, as_field, graded
 from mechanics.stones.meshing.soundness import check_meshable, is_convex

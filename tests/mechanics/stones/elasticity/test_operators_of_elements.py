@@ -10,14 +10,10 @@ from scipy.spatial.transform import Rotation
 from skfem.helpers import ddot, dot, sym_grad
 
 from mechanics.scene.scene import Block, Fidelity
-from mechanics.stones.elasticity import (
-    elastic_operators,
-    node_volumes,
-    recovery,
-    sampled_stress,
-    stress_error,
-    to_voigt,
-)
+from mechanics.stones.elasticity.operators import elastic_operators, node_volumes
+from mechanics.stones.elasticity.recovery import recovery
+from mechanics.stones.elasticity.stress import sampled_stress, stress_error
+from mechanics.stones.elasticity.tensors import to_voigt
 from mechanics.stones.materials import Material, Orthotropy, fourth_order
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import boundary_facets

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 
 from mechanics.scene.scene import Block, Fidelity
-from mechanics.stones.elasticity import recovery
+from mechanics.stones.elasticity.recovery import recovery
 from mechanics.stones.elasticity.stress import SAMPLE_ORDER
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.meshers.mesher import mesh_block

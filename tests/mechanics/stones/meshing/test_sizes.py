@@ -13,8 +13,8 @@ from mechanics.stones.meshing.meshers._kernels.shaping import relax, shape
 from mechanics.stones.meshing.meshers.delaunay import mesh_with_delaunay
 from mechanics.stones.meshing.meshers.gmsh import mesh_with_gmsh
 from mechanics.stones.meshing.meshers.hexahedral import mesh_with_hexahedra
+from mechanics.stones.meshing.meshers.slivers import improved
 from mechanics.stones.meshing.quality import cell_quality, mesh_quality
-from mechanics.stones.meshing.shaping import improved
 from mechanics.stones.meshing.sizes import as_field, graded
 from mechanics.stones.polyhedra import face_plane
 from tests.mechanics.shapes import TURN, brick, ground, moved, scene, transformed

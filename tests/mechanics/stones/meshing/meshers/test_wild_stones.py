@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 
 from mechanics.scene.scene import Block, Fidelity
 from mechanics.stones.meshing.elements import Element
+from mechanics.stones.meshing.mesh import with_middle_nodes
 from mechanics.stones.meshing.meshers.corner_hexahedra import mesh_at_corners
 from mechanics.stones.meshing.meshers.delaunay import mesh_with_delaunay
 from mechanics.stones.meshing.meshers.gmsh import mesh_with_gmsh
 from mechanics.stones.meshing.meshers.hexahedral import mesh_with_hexahedra
 from mechanics.stones.meshing.meshers.mesher import mesh_block
-from mechanics.stones.meshing.quadratic import with_middle_nodes
 from moma.errors import MeshError
 from tests.mechanics.shapes import LIMESTONE, profile
 from tests.mechanics.stones.meshing.wild_stones import (
