@@ -40,6 +40,10 @@ class Orthotropy:
 class Material:
     """A linear elastic material.
 
+    >>> limestone = Material("limestone", density=2350.0, young=12e9, poisson=0.2)
+    >>> round(float(limestone.stiffness[3, 3]) / 1e9, 12)  # the shear modulus [GPa]
+    5.0
+
     Attributes
     ----------
     name : as in the scene

@@ -51,6 +51,13 @@ def mass_properties(vertices: Array, faces: Faces, where: str | None = None) -> 
     Raises
     ------
     GeometryError : if the faces are not closed, or their orientation gives no positive volume
+
+    Examples
+    --------
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> tetrahedron = mass_properties(corners, [(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)])
+    >>> round(tetrahedron.volume, 4), tetrahedron.centroid.round(4).tolist()
+    (0.1667, [0.25, 0.25, 0.25])
     """
     edges = [(f[i - 1], f[i]) for f in faces for i in range(len(f))]
     distinct = set(edges)

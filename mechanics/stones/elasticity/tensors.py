@@ -8,7 +8,11 @@ __all__ = ["from_voigt", "principal", "to_voigt", "von_mises"]
 
 
 def von_mises(stress: Array) -> Array:
-    """Return σ_vm = sqrt(½[(σxx-σyy)²+(σyy-σzz)²+(σzz-σxx)²] + 3(σxy²+σyz²+σzx²)) of stress (…, 6) [Pa]."""
+    """Return σ_vm = sqrt(½[(σxx-σyy)²+(σyy-σzz)²+(σzz-σxx)²] + 3(σxy²+σyz²+σzx²)) of stress (…, 6) [Pa].
+
+    >>> von_mises(np.array([[5e6, 0, 0, 0, 0, 0], [2e6, 2e6, 2e6, 0, 0, 0]])).tolist()
+    [5000000.0, 0.0]
+    """
     xx, yy, zz, xy, yz, zx = np.moveaxis(stress, -1, 0)
     result: Array = np.sqrt(
         0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3.0 * (xy**2 + yz**2 + zx**2)

@@ -74,7 +74,13 @@ class _Attempt:
 
 
 def mesh_block(block: Meshable, contact: tuple[int, ...] = ()) -> SolidMesh:
-    """Return the mesh of `meshed_block` alone."""
+    """Return the mesh of `meshed_block` alone.
+
+    >>> from mechanics.scene.shapes import box
+    >>> ashlar = box("A1", (0, 0, 0), (0.6, 0.4, 0.2), mesh_size=0.1, element=Element.HEX8)
+    >>> len(mesh_block(ashlar).cells)
+    48
+    """
     return meshed_block(block, contact).mesh
 
 
