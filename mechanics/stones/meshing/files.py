@@ -1,7 +1,7 @@
 """Volume meshes as files of finite-element programs, written and read by meshio: a named set of cells for each stone.
 
-Gmsh, Abaqus and MED files hold the codes of the stones as physical volumes, element sets and groups. VTK, Nastran and
-Medit files hold whole numbers alone; a file `FILE.stones.json` beside them lists the codes in the order of the numbers.
+Gmsh, Abaqus and MED files hold the codes of the stones as physical volumes, element sets and groups. VTK and Medit
+files hold whole numbers alone; a file `FILE.stones.json` beside them lists the codes in the order of the numbers.
 """
 
 import json
@@ -55,7 +55,6 @@ class _Format:
     number: str = "stone"
 
 
-_NASTRAN = _Format("nastran", _ALL - {Element.HEX27}, number="nastran:ref")
 _FORMATS: Mapping[str, _Format] = {
     ".msh": _Format("gmsh22", _ALL, r'[^"\\\n]{1,127}', "gmsh:physical"),
     ".inp": _Format("abaqus", _ALL - {Element.HEX27}, r"[A-Za-z][A-Za-z0-9_.-]{0,79}"),
@@ -63,8 +62,6 @@ _FORMATS: Mapping[str, _Format] = {
     ".med": _Format("med", _ALL - {Element.HEX27}, r"[!-.0-~][ -.0-~]{0,23}", "cell_tags"),
     ".vtu": _Format("vtu", _ALL),
     ".vtk": _Format("vtk", _ALL),
-    ".bdf": _NASTRAN,
-    ".nas": _NASTRAN,
     ".mesh": _Format("medit", frozenset({Element.TET4, Element.HEX8}), number="medit:ref"),
 }
 
@@ -301,7 +298,8 @@ def _sets(found: Any, form: _Format, path: Path) -> dict[str, list[Ints]]:
             int(number): code for code, (number, dimension) in found.field_data.items() if dimension == 3
         }
     elif form.writer == "med":
-        codes = {number: names[0] for number, names in found.cell_tags.items()}
+        # the file has them in the order of their names
+        codes = {number: names[0] for number, names in sorted(found.cell_tags.items(), reverse=True)}
     else:
         codes = dict(enumerate(_codes(_codes_file(path)), 1))
     return {code: [np.flatnonzero(own == number) for own in numbers] for number, code in codes.items()}

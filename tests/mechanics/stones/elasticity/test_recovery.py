@@ -55,7 +55,7 @@ def test_constants_are_reproduced_by_the_coarsest_meshes(element, size):
 
 @EACH
 def test_a_row_of_cells_carries_what_varies_along_it(element):
-    # one cell wide: nothing can be said of changes across, for elements of the first order
+    # one cell wide: changes across are unknown to elements of the first order
     mesh = stone(element, 0.25, sides=(2.0, 0.25, 0.25))
     along = TURN[:, 0]
     np.testing.assert_allclose(recovery(mesh) @ (samples(mesh) @ along), mesh.nodes @ along, rtol=1e-9)

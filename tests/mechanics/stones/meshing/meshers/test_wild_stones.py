@@ -59,7 +59,7 @@ def hex8_jacobians(corners):
 
 
 def assert_sound(mesh, corners, faces):
-    """Of both orders: positive Jacobians, the true volume, facets on the faces that they are said to lie on."""
+    """Of both orders: positive Jacobians, the true volume, facets on the faces that facet_face names."""
     quadratic = with_middle_nodes(mesh, SECOND[mesh.element])
     if mesh.element is Element.TET4:
         jacobian = tet10_jacobians(quadratic.nodes[quadratic.cells])
@@ -123,11 +123,11 @@ def test_hexahedra_fill_most_polyhedra_and_refuse_the_others(seed):
     try:
         mesh = mesh_at_corners(corners, faces, fine(corners, 30.0), "S1")
     except MeshError as error:
-        said = str(error)
+        message = str(error)
     else:
         assert_sound(mesh, corners, faces)
-        said = "flat or turned inside out"
-    assert "flat or turned inside out" in said
+        message = "flat or turned inside out"
+    assert "flat or turned inside out" in message
 
 
 @settings(max_examples=15, deadline=None)
