@@ -11,11 +11,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from benchmarks.masonry import courses, running_bond, semicircular_arch
 from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
 from mechanics.dynamics.outcome import Outcome
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene, TimeSettings
+from mechanics.scene.shapes import bond, semicircular_arch, wall
 from mechanics.simulate import simulate
 from pipelines.tuning.overlay import overlaid_scene
 from pipelines.tuning.profiles import PROFILES, Profile
@@ -84,7 +84,7 @@ class Found:
 
 def _wall(name: str, rows: int, associative: float, published: float) -> Case:
     """Band: 0.97 of the lowest load without dilatancy, 1.01 of the associative one (contact at sharp corners)."""
-    stones = running_bond(courses(5, rows), 0.4, 0.175, 0.175)
+    stones = wall(bond(5, rows, halves_first=True), 0.4, 0.175, 0.175)
     return Case(
         name,
         "Ferris & Tin-Loi 2001, Gilbert et al. 2006",

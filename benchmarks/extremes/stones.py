@@ -10,6 +10,7 @@ import numpy as np
 from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
+from mechanics.scene import shapes
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.law import Law
 from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene, TimeSettings
@@ -32,10 +33,6 @@ __all__ = [
 
 
 G = 9.81
-_FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
-_CORNERS = np.array(
-    [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], dtype=float
-)
 
 
 def box(
@@ -48,9 +45,8 @@ def box(
     mesh_size: float | None = None,
 ) -> Block:
     """An axis-parallel stone from corner `low` (3,) to corner `high` (3,) [m]."""
-    first, last = np.array(low, dtype=float), np.array(high, dtype=float)
     material = Material(f"{code}'s", density, young, 0.2)
-    return Block(code, first + _CORNERS * (last - first), _FACES, material, fidelity, mesh_size, Element.HEX8)
+    return shapes.box(code, low, high, material, fidelity=fidelity, mesh_size=mesh_size, element=Element.HEX8)
 
 
 def ground(half: float = 5.0, depth: float = 1.0) -> Block:

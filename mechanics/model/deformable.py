@@ -19,14 +19,10 @@ from scipy.sparse.linalg import splu
 
 from mechanics.arrays import Array, Ints
 from mechanics.model.dissection import dissection
-from mechanics.stones.elasticity import (
-    ElasticOperators,
-    elastic_operators,
-    from_voigt,
-    recovery,
-    sampled_stress,
-    to_voigt,
-)
+from mechanics.stones.elasticity.operators import ElasticOperators, elastic_operators
+from mechanics.stones.elasticity.recovery import recovery
+from mechanics.stones.elasticity.stress import sampled_stress
+from mechanics.stones.elasticity.tensors import from_voigt, to_voigt
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.mesh import SolidMesh
 

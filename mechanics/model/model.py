@@ -20,7 +20,7 @@ from mechanics.scene.loads.load import Force, Motion
 from mechanics.scene.scene import Block, Fidelity, LawRule, Part, Scene
 from mechanics.scene.state import State
 from mechanics.stones.meshing.mesh import SolidMesh
-from mechanics.stones.meshing.report import MeshReport
+from mechanics.stones.meshing.quality import MeshReport
 from mechanics.stones.polyhedra import MassProperties, mass_properties, united
 from moma.errors import GeometryError, SceneError
 

@@ -15,8 +15,7 @@ from mechanics.scene.scene import Block, Fidelity
 from mechanics.stones.meshing.congruence import Motion, classes, motion, translation
 from mechanics.stones.meshing.mesh import SolidMesh
 from mechanics.stones.meshing.meshers.mesher import Meshed, meshed_block
-from mechanics.stones.meshing.quality import MeshQuality, mesh_quality
-from mechanics.stones.meshing.report import MeshReport, StoneMesh
+from mechanics.stones.meshing.quality import MeshQuality, MeshReport, StoneMesh, mesh_quality
 
 __all__ = ["StoneWorkshop"]
 

@@ -17,14 +17,9 @@ from mechanics.results.result import BodyResult, Frame
 from mechanics.results.stress_values import stress_values
 from mechanics.scene.laws.status import contact_status
 from mechanics.scene.state import State
-from mechanics.stones.elasticity import (
-    from_voigt,
-    node_volumes,
-    principal,
-    stress_error,
-    to_voigt,
-    von_mises,
-)
+from mechanics.stones.elasticity.operators import node_volumes
+from mechanics.stones.elasticity.stress import stress_error
+from mechanics.stones.elasticity.tensors import from_voigt, principal, to_voigt, von_mises
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import SolidMesh
 

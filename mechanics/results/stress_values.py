@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.arrays import Array, Bools
-from mechanics.stones.elasticity import principal, von_mises
+from mechanics.stones.elasticity.tensors import principal, von_mises
 from mechanics.stones.materials import Material
 
 __all__ = ["StressValues", "stress_values", "utilisation", "volume_quantile"]

@@ -1,1 +1,4 @@
-"""One stone: material, solid, mesh and elasticity, without contact."""
+"""Single stones: material, solid, mesh and elasticity, without contact.
+
+Public: `Material`, `Orthotropy` (materials); `MassProperties`, `mass_properties` (polyhedra).
+"""

@@ -1,6 +1,6 @@
-"""Many convex plane polygons at once: their overlaps, areas and moments.
+"""Overlaps, areas and moments of many convex plane polygons at once.
 
-A polygon is a row of corners (m, 2), counter-clockwise, of which the first `count` are meant.
+A polygon is a row of corners (m, 2), counter-clockwise, of which the first `count` are valid.
 """
 
 import numpy as np
@@ -11,13 +11,13 @@ __all__ = ["following", "moments", "overlaps"]
 
 
 def following(count: Ints, most: int) -> Ints:
-    """Which corner comes after each one (n, most), of polygons with these counts of corners (n,)."""
+    """Return the corner after each one (n, most), for polygons with `count` (n,) corners."""
     place = np.arange(most)
     return np.where(place + 1 < count[:, None], place + 1, 0)
 
 
 def overlaps(first: Array, first_count: Ints, second: Array, second_count: Ints) -> tuple[Array, Ints]:
-    """Common parts of two rows of polygons, pair by pair (Sutherland & Hodgman 1974)."""
+    """Intersect two rows of polygons, pair by pair (Sutherland & Hodgman 1974)."""
     polygon, count = first, first_count
     rows = np.arange(len(second))
     for k in range(second.shape[1]):
@@ -28,7 +28,7 @@ def overlaps(first: Array, first_count: Ints, second: Array, second_count: Ints)
 
 
 def _clipped(polygon: Array, count: Ints, a: Array, b: Array, wanted: Bools) -> tuple[Array, Ints]:
-    """Keep what lies to the left of the lines a → b (n, 2), in those rows that are wanted."""
+    """Keep the parts to the left of the lines a → b (n, 2), in the wanted rows."""
     number, most = polygon.shape[:2]
     place = np.arange(most)
     meant = place < count[:, None]
@@ -49,7 +49,7 @@ def _clipped(polygon: Array, count: Ints, a: Array, b: Array, wanted: Bools) -> 
 
 
 def moments(polygon: Array, count: Ints) -> tuple[Array, Array, Array]:
-    """Area (n,), centroid (n, 2), and second moments ∫(x-c)(x-c)ᵀ (n, 2, 2) of each; zeros where nothing is left."""
+    """Return area (n,), centroid (n, 2) and second moments ∫(x-c)(x-c)ᵀ (n, 2, 2) of each; zeros for empty polygons."""
     rows, place = np.arange(len(polygon))[:, None], np.arange(polygon.shape[1])
     origin = polygon[:, :1]
     meant = (place < count[:, None])[..., None]

@@ -16,9 +16,8 @@ __all__ = ["Material", "Orthotropy", "fourth_order"]
 
 # tensor components of the six stresses and strains, in the order xx, yy, zz, xy, yz, zx
 _FIRST, _SECOND = (0, 1, 2, 0, 1, 2), (0, 1, 2, 1, 2, 0)
-# by this much a product of axes may differ from 0 or 1
-_ORTHONORMAL = 1e-6
 Triple = tuple[float, float, float]
+_ORTHONORMAL = 1e-6  # largest difference of a product of axes from 0 or 1
 _WORLD_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -46,6 +45,10 @@ class Orthotropy:
 @dataclass(frozen=True)
 class Material:
     """A linear elastic material.
+
+    >>> limestone = Material("limestone", density=2350.0, young=12e9, poisson=0.2)
+    >>> round(float(limestone.stiffness[3, 3]) / 1e9, 12)  # the shear modulus [GPa]
+    5.0
 
     Attributes
     ----------
@@ -110,7 +113,7 @@ def _isotropic(young: float, poisson: float) -> Array:
 
 
 def _compliance(orthotropy: Orthotropy) -> Array:
-    """C⁻¹ (6, 6) in the axes of the material [1/Pa] (Ting 1996, §2.4)."""
+    """Return C⁻¹ (6, 6) in the axes of the material [1/Pa] (Ting 1996, §2.4)."""
     young, poisson = orthotropy.young, orthotropy.poisson
     compliance = np.diag([1.0 / modulus for modulus in (*young, *orthotropy.shear)])
     for i, j, ratio, modulus in zip((0, 1, 2), (1, 2, 0), poisson, young, strict=True):
@@ -119,14 +122,14 @@ def _compliance(orthotropy: Orthotropy) -> Array:
 
 
 def fourth_order(stiffness: Array) -> Array:
-    """The tensor c_ijkl (3, 3, 3, 3) of a matrix C (6, 6), order xx, yy, zz, xy, yz, zx."""
+    """Return the tensor c_ijkl (3, 3, 3, 3) of a matrix C (6, 6), order xx, yy, zz, xy, yz, zx."""
     number = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
     tensor: Array = stiffness[number[:, :, None, None], number]
     return tensor
 
 
 def _turned(stiffness: Array, axes: Array) -> Array:
-    """The matrix C in the axes in which the rows of `axes` are given."""
+    """Return the matrix C in the axes in which the rows of `axes` are given."""
     turned = np.einsum("ijkl,ia,jb,kc,ld->abcd", fourth_order(stiffness), axes, axes, axes, axes)
     voigt = turned[_FIRST, _SECOND][:, _FIRST, _SECOND]
     result: Array = 0.5 * (voigt + voigt.T)

@@ -38,12 +38,12 @@ class MassProperties:
 
 
 def fan(faces: Faces) -> Ints:
-    """Triangles (nt, 3) of all faces, each face cut from its first corner."""
+    """Return triangles (nt, 3) of all faces, each face cut from its first corner."""
     return np.array([(f[0], f[i], f[i + 1]) for f in faces for i in range(1, len(f) - 1)], dtype=np.int64)
 
 
 def mass_properties(vertices: Array, faces: Faces, where: str | None = None) -> MassProperties:
-    """Volume, centroid and inertia by the divergence theorem.
+    """Compute volume, centroid and inertia by the divergence theorem.
 
     Each boundary triangle and the mean of the corners span a tetrahedron; for a tetrahedron with corners
     0, a, b, c the moments are ∫x = V (a+b+c)/4 and ∫x xᵀ = V/20 (Σ a aᵀ + s sᵀ), with s = a+b+c (Tonon 2004).
@@ -51,6 +51,13 @@ def mass_properties(vertices: Array, faces: Faces, where: str | None = None) -> 
     Raises
     ------
     GeometryError : if the faces are not closed, or their orientation gives no positive volume
+
+    Examples
+    --------
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> tetrahedron = mass_properties(corners, [(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)])
+    >>> round(tetrahedron.volume, 4), tetrahedron.centroid.round(4).tolist()
+    (0.1667, [0.25, 0.25, 0.25])
     """
     edges = [(f[i - 1], f[i]) for f in faces for i in range(len(f))]
     distinct = set(edges)
@@ -81,7 +88,7 @@ def mass_properties(vertices: Array, faces: Faces, where: str | None = None) -> 
 
 
 def united(parts: Sequence[MassProperties]) -> MassProperties:
-    """Mass properties of parts that do not overlap, taken together (Steiner's theorem)."""
+    """Unite the mass properties of parts that do not overlap (Steiner's theorem)."""
     if len(parts) == 1:
         return parts[0]
     volume = sum(part.volume for part in parts)
@@ -94,7 +101,7 @@ def united(parts: Sequence[MassProperties]) -> MassProperties:
 
 
 def face_plane(points: Array) -> tuple[Array, Array]:
-    """Unit normal by Newell's method and mean point of one polygon (n, 3), ordered counter-clockwise."""
+    """Return the unit normal by Newell's method and the mean point of one polygon (n, 3), ordered counter-clockwise."""
     centre = points.mean(axis=0)
     local = points - centre  # far from the origin the cross products would lose the small differences
     normal = np.cross(local, np.roll(local, -1, axis=0)).sum(axis=0)
@@ -102,7 +109,7 @@ def face_plane(points: Array) -> tuple[Array, Array]:
 
 
 def face_planes(vertices: Array, faces: Faces) -> tuple[Array, Array]:
-    """Unit normals and mean points (nf, 3) of all faces at once, as `face_plane` has those of one."""
+    """Return unit normals and mean points (nf, 3) of all faces at once, as `face_plane` does of one."""
     loops = np.concatenate([np.asarray(face, dtype=np.int64) for face in faces])
     counts = np.array([len(face) for face in faces])
     start = np.cumsum(counts) - counts
@@ -117,7 +124,7 @@ def face_planes(vertices: Array, faces: Faces) -> tuple[Array, Array]:
 
 
 def smallest_width(vertices: Array, faces: Faces) -> float:
-    """Smallest extent of a convex polyhedron along a face normal [m]."""
+    """Return the smallest extent of a convex polyhedron along a face normal [m]."""
     normals = np.array([face_plane(vertices[list(f)])[0] for f in faces])
     heights = vertices @ normals.T
     return float((heights.max(axis=0) - heights.min(axis=0)).min())

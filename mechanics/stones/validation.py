@@ -1,4 +1,4 @@
-"""Refusals of values that make no sense, where scenes are made: NaN, zero lengths, negative steps."""
+"""Validation of the values of a scene: NaN, zero lengths and negative steps are refused."""
 
 from collections.abc import Iterable
 
@@ -10,14 +10,15 @@ from moma.errors import SceneError
 
 __all__ = ["LARGEST", "SMALLEST", "Rule", "check_corners", "finite", "refuse_unless", "sane"]
 
-# numbers between these bounds, and their quotients, can still be squared and summed up
-LARGEST, SMALLEST = 1e75, 1e-75
-# widths of a stone whose moments of inertia, of the fifth order, are numbers as well [m]
-_WIDEST, _NARROWEST = 1e25, 1e-25
-# of its width: by so much rounding may move a stone's corners for being far from the origin
-_ROUNDED = 1e-6
+# numbers between these bounds, and their quotients, can still be squared and added
+LARGEST = 1e75
+SMALLEST = 1e-75
+# between these widths moments of inertia, of the fifth order, can be computed too
+_WIDEST = 1e25  # [m]
+_NARROWEST = 1e-25  # [m]
+_ROUNDED = 1e-6  # largest rounding of a corner far from the origin, over the stone's width
 
-# quantity, its value, whether that is right, remedy
+# quantity, its value, True if that is right, remedy
 Rule = tuple[str, object, bool, str]
 
 
@@ -34,12 +35,12 @@ def refuse_unless(where: str, rules: Iterable[Rule]) -> None:
 
 
 def sane(value: float) -> bool:
-    """Whether a number is greater than zero and can be computed with."""
+    """Return True if a number is greater than zero and can be computed with."""
     return bool(SMALLEST <= value <= LARGEST)
 
 
 def finite(values: ArrayLike, count: int) -> bool:
-    """Whether these are so many numbers that can be computed with."""
+    """Return True if these are `count` numbers that can be computed with."""
     return np.shape(values) == (count,) and bool((np.abs(values) <= LARGEST).all())
 
 

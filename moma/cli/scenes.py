@@ -56,6 +56,14 @@ def run(
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results; default: out/SCENE.")
     ] = None,
+    meshes: Annotated[
+        Path | None,
+        typer.Option(
+            "--meshes",
+            metavar="FILE",
+            help="Write the meshes of deformable stones for Gmsh, Code_Aster, Abaqus, …; see docs/runs.md.",
+        ),
+    ] = None,
     profile: Profile = None,
     db: Db = DEFAULT_DB,
     json: Json = False,
@@ -67,7 +75,7 @@ def run(
     from pipelines.run.run import run_scene
 
     with progress_bars() as listener:
-        done = run_scene(scene, db, out or Path("out") / scene.stem, listener, profile)
+        done = run_scene(scene, db, out or Path("out") / scene.stem, listener, profile, meshes)
     for warning in done.warnings:
         say(f"warning: {warning}")
     print(as_json(done.summary) if json else "\n".join(run_lines(done, verbose)))

@@ -10,7 +10,7 @@ from mechanics.results.result import BodyResult, Frame, Result
 from mechanics.results.stress_values import utilisation
 from mechanics.scene.laws.status import STATUSES
 from mechanics.scene.scene import Fidelity
-from mechanics.stones.elasticity import principal, von_mises
+from mechanics.stones.elasticity.tensors import principal, von_mises
 from pipelines.arrays import Array
 from pipelines.results.vtu import (
     CELL_TYPES,

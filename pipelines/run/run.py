@@ -14,7 +14,11 @@ from archmodel.store.runs import store_run
 from archmodel.tables.entries import latest_entry
 from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.results.result import Outcome, Result
+from mechanics.scene.scene import Fidelity
 from mechanics.simulate import simulate
+from mechanics.stones.meshing.elements import Element
+from mechanics.stones.meshing.files import check_mesh_file, write_meshes
+from mechanics.stones.meshing.mesh import VolumeMesh
 from moma.errors import DatabaseError, MissingLibraryError
 from pipelines.draw.pictures import draw_pictures, missing
 from pipelines.reports.run import write_report
@@ -59,6 +63,7 @@ def run_scene(
     folder: str | Path,
     progress: Listener = silent,
     profile: str | None = None,
+    meshes: str | Path | None = None,
 ) -> RunReport:
     """Run a scene file on the stones of a database, and write the results into a folder.
 
@@ -69,21 +74,26 @@ def run_scene(
     folder : of the results; earlier results there are replaced when the new ones are complete
     progress : called at every stage
     profile : name of the profile whose settings take precedence over the scene's; None: the scene as written
+    meshes : file for the volume meshes of the deformable stones; None: none
 
     Raises
     ------
-    UsageError : the folder holds other files, or there is no such profile
+    UsageError : the folder holds other files, there is no such profile, or the meshes cannot be written
     SceneError, GeometryError, MeshError, SolverError : see `assemble` and `mechanics.simulate`
     DatabaseError : the database cannot be read, or not written at the end; the folder is complete then
     """
     seconds: dict[str, float] = {}
     folder, scene = Path(folder), read_scene(path)
     check_replaceable(folder)
+    if meshes is not None:
+        check_mesh_file(meshes)
     with open_database(url, create=False) as database:
         with _timed(seconds, "blocks"), database.session(read_only=True) as session:
             as_of, models = latest_entry(session), select_stones(scene, session)
             scene = with_profile(scene, profile, models)
             assembly = assemble_stones(scene, models, select_groups(scene, session, models))
+        if meshes is not None:
+            check_mesh_file(meshes, _elements(assembly))
         result = simulate(assembly.scene, progress)
         seconds |= result.wall_time
         stones, reached = stone_results(result), profile_report(profile, scene, result)
@@ -91,6 +101,8 @@ def run_scene(
             summary, warnings = write_results(
                 result, stones, scene, assembly, fresh, seconds, progress, reached
             )
+        if meshes is not None:
+            write_meshes(meshes, _meshes(result, assembly))
         record = run_record(result, stones, scene, assembly, summary, as_of)
         try:
             with database.session() as session:
@@ -151,6 +163,21 @@ def write_results(
     (folder / "summary.json").write_text(as_json(summary), encoding="utf-8")
     progress(Progress("write", 3, 3))
     return summary, tuple(warnings)
+
+
+def _elements(assembly: Assembly) -> dict[str, Element]:
+    """Return the kind of finite elements of each deformable stone."""
+    blocks = (block for block in assembly.scene.blocks if block.fidelity is Fidelity.DEFORMABLE)
+    return {block.code: block.element for block in blocks}
+
+
+def _meshes(result: Result, assembly: Assembly) -> dict[str, VolumeMesh]:
+    """Return the undeformed mesh of each deformable stone, in the frame of the site."""
+    return {
+        body.code: VolumeMesh(body.element, body.reference + assembly.origin, body.cells)
+        for body in result.bodies
+        if body.element is not None
+    }
 
 
 def _pictures(scene: SceneFile, result: Result) -> tuple[tuple[str, ...], list[str]]:

@@ -5,12 +5,13 @@ import io
 import re
 
 import pytest
+from typer.testing import CliRunner
 
 from archmodel.database.session import open_database
 from archmodel.tables import runs, surveys
 from archmodel.tables.base import Base
+from moma.cli import app
 from pipelines.ingest.ingest import ingest
-from pipelines.run.run import run_scene
 from tests.paths import ROOT
 
 PAGE = (ROOT / "docs" / "runs.md").read_text(encoding="utf-8")
@@ -22,14 +23,21 @@ def names(tmp_path_factory):
     """Return the names of the examples: the imports of the page, and a session on the sample after its run."""
     folder = tmp_path_factory.mktemp("runs")
     (scene,) = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
-    (folder / "scene.toml").write_text(scene, encoding="utf-8")
+    (command,) = re.findall(r"^    moma (run \S+ --meshes .*)$", PAGE, re.MULTILINE)
+    (folder / command.split()[1]).write_text(scene, encoding="utf-8")
     url = f"sqlite:///{folder / 'moma.db'}"
     ingest([ROOT / "data/samples/window/window.moma"], url)
-    run_scene(folder / "scene.toml", url, folder / "out")
-    (imports,) = re.findall(r"```python\n(from .*?)\n\ndatabase = ", PAGE, re.DOTALL)
+    with contextlib.chdir(folder):
+        done = CliRunner().invoke(app, [*command.split(), "--db", url])
+    assert done.exit_code == 0, done.output
+    (imports,) = re.findall(r"```python\n(import .*?)\n\ndatabase = ", PAGE, re.DOTALL)
     names = {}
     exec(imports, names)
-    with open_database(url, create=False) as database, database.session(read_only=True) as session:
+    with (
+        contextlib.chdir(folder),
+        open_database(url, create=False) as database,
+        database.session(read_only=True) as session,
+    ):
         yield names | {"session": session}
 
 

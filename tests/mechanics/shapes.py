@@ -19,6 +19,7 @@ from mechanics.problem.problem import ContactProblem
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.law import STATE
 from mechanics.scene.scene import Block, ContactSettings, Fidelity, Part, Placement, Scene, TimeSettings
+from mechanics.scene.shapes import drum
 from mechanics.scene.state import State
 from mechanics.stones.materials import Material
 from tests.pipelines.results_by_hand import BOX_FACES, box
@@ -142,10 +143,8 @@ def hull(points):
 
 def prism(ring, bottom, top):
     """Corners and faces of an upright prism over a convex polygon (n, 2), counter-clockwise."""
-    n = len(ring)
-    walls = tuple((i, (i + 1) % n, n + (i + 1) % n, n + i) for i in range(n))
-    corners = np.vstack([np.column_stack([ring, np.full(n, z)]) for z in (bottom, top)])
-    return corners, (tuple(range(n))[::-1], tuple(range(n, 2 * n)), *walls)
+    stone = drum("prism", ring, ring, (bottom, top))
+    return stone.vertices, stone.faces
 
 
 def ellipse(sides, axes, turn=0.0, centre=(0.0, 0.0)):

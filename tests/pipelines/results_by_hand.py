@@ -9,21 +9,16 @@ from mechanics.results.postprocess import surface_polygons
 from mechanics.results.result import BodyResult, Energies, Errors, Frame, History, Outcome, Result
 from mechanics.results.stress_values import stress_values
 from mechanics.scene.scene import Block, Fidelity, Scene
-from mechanics.stones.elasticity import node_volumes, principal
-from mechanics.stones.elasticity import von_mises as equivalent_stress
+from mechanics.scene.shapes import BOX_FACES, box_corners
+from mechanics.stones.elasticity.operators import node_volumes
+from mechanics.stones.elasticity.tensors import principal
+from mechanics.stones.elasticity.tensors import von_mises as equivalent_stress
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import SolidMesh
 
 LIMESTONE = Material("limestone", density=2000.0, young=1e10, poisson=0.2)
-BOX_FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
-
-
-def box(low, high):
-    """(8, 3) corners of an axis-aligned box, bottom face then top face."""
-    (x0, y0, z0), (x1, y1, z1) = low, high
-    ring = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
-    return np.array([(x, y, z) for z in (z0, z1) for x, y in ring], dtype=float)
+box = box_corners
 
 
 def box_mesh(low, high, size):

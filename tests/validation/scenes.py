@@ -9,9 +9,9 @@ from mechanics.arrays import Array
 from mechanics.dynamics.simulation import Simulation
 from mechanics.dynamics.step import Step
 from mechanics.model.model import Model, build_model
+from mechanics.scene import shapes
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import (
-    Block,
     ContactSettings,
     Fidelity,
     Method,
@@ -19,20 +19,17 @@ from mechanics.scene.scene import (
     SolverSettings,
     TimeSettings,
 )
+from mechanics.scene.shapes import BOX_FACES, box_corners
 from mechanics.stones.materials import Material
 
-FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
-CORNERS = np.array(
-    [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], dtype=float
-)
+FACES, CORNERS = BOX_FACES, box_corners((0, 0, 0), (1, 1, 1))
 STONE = Material("stone", density=2400.0, young=10e9, poisson=0.2)
 G = 9.81
 
 
 def box(code, low, high, material=STONE, fidelity=Fidelity.RIGID, mesh_size=None, velocity=(0.0,) * 6):
     """An axis-parallel block from corner `low` to corner `high` [m]."""
-    low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
-    return Block(code, low + CORNERS * (high - low), FACES, material, fidelity, mesh_size, velocity=velocity)
+    return shapes.box(code, low, high, material, fidelity=fidelity, mesh_size=mesh_size, velocity=velocity)
 
 
 def ground(half=5.0, depth=1.0):

@@ -12,7 +12,7 @@ from mechanics.delassus.multifrontal import fronts
 from mechanics.dynamics.contact_search import detector
 from mechanics.model.model import Model, build_model
 from mechanics.scene.scene import Fidelity, Scene
-from mechanics.stones.meshing.report import MeshReport
+from mechanics.stones.meshing.quality import MeshReport
 
 __all__ = ["Amounts", "Plan", "plan"]
 

@@ -16,7 +16,7 @@ from mechanics.stones.meshing.shape_functions import Integration, integration
 __all__ = ["MASS_ORDER", "STIFFNESS_ORDER", "ElasticOperators", "elastic_operators", "node_volumes"]
 
 
-# Polynomial order of what is integrated. The Jacobian is constant in a tetrahedron, of order 2 in each direction in a
+# Polynomial order of the integrand. The Jacobian is constant in a tetrahedron, of order 2 in each direction in a
 # hexahedron. M and the forces of the patch test, Jacobian times shape function gradients, are exact.
 STIFFNESS_ORDER = {
     Element.TET4: 1,
@@ -26,8 +26,7 @@ STIFFNESS_ORDER = {
     Element.HEX27: 5,
 }
 MASS_ORDER = {Element.TET4: 2, Element.TET10: 4, Element.HEX8: 5, Element.HEX20: 7, Element.HEX27: 7}
-# the blocks of so many pairs of nodes take some hundred megabytes at once
-_PAIRS_AT_ONCE = 1_000_000
+_PAIRS_AT_ONCE = 1_000_000  # pairs of nodes whose blocks are computed at once, some hundred megabytes
 
 
 @dataclass(frozen=True)
@@ -38,8 +37,8 @@ class ElasticOperators:
     ----------
     mass : M, (3n, 3n), consistent or diagonal [kg]
     stiffness : K, (3n, 3n) [N/m]
-    nodal_mass : (n,) ∫ρ N_i, the weight of the body force of each node [kg]; corners of quadratic elements may have
-        less than nothing
+    nodal_mass : (n,) ∫ρ N_i, the share of each node in a uniform body force [kg]; negative at some corners of quadratic
+        elements
     """
 
     mass: "csc_array[np.float64]"
@@ -49,6 +48,8 @@ class ElasticOperators:
 
 def elastic_operators(mesh: SolidMesh, material: Material, lumped: bool = False) -> ElasticOperators:
     """Assemble M and K of the weak form ∫ρ v̇·w + ∫σ(u):ε(w) (Zienkiewicz & Taylor, vol. 1).
+
+    docs/decisions/029 compares with assembly by scikit-fem.
 
     Parameters
     ----------
@@ -68,9 +69,9 @@ def elastic_operators(mesh: SolidMesh, material: Material, lumped: bool = False)
 
 
 def node_volumes(mesh: SolidMesh) -> Array:
-    """Part of the stone that belongs to each node (n,) [m³]: positive, with the volume of the stone as sum.
+    """Return the part of the stone that belongs to each node (n,) [m³].
 
-    Shared out as the lumped mass is.
+    All parts are positive, in the proportions of the lumped mass; their sum is the volume of the stone.
     """
     rule = integration(mesh.element, mesh.nodes, mesh.cells, MASS_ORDER[mesh.element])
     k = mesh.element.cell_nodes
@@ -78,7 +79,7 @@ def node_volumes(mesh: SolidMesh) -> Array:
 
 
 def _stiffness(mesh: SolidMesh, material: Material) -> "csc_array[np.float64]":
-    """K_{ai,bj} = c_{ikjl} ∫ ∂_k N_a ∂_l N_b."""
+    """Assemble K_{ai,bj} = c_{ikjl} ∫ ∂_k N_a ∂_l N_b."""
     tensor = fourth_order(material.stiffness).transpose(1, 3, 0, 2).reshape(9, 9)  # as [k, l, i, j]
     k, parts = mesh.element.cell_nodes, []
     at_once = _PAIRS_AT_ONCE // k**2
@@ -93,26 +94,26 @@ def _stiffness(mesh: SolidMesh, material: Material) -> "csc_array[np.float64]":
 
 
 def _gradient_products(rule: Integration) -> Array:
-    """(nc, 3k, 3k) of ∫ ∂_k N_a ∂_l N_b."""
+    """Return ∫ ∂_k N_a ∂_l N_b over each cell (nc, 3k, 3k)."""
     gradient = rule.gradient.reshape(*rule.volume.shape, -1)
     products: Array = gradient.transpose(0, 2, 1) @ (rule.volume[:, :, None] * gradient)
     return products
 
 
 def _products(value: Array) -> Array:
-    """(nq, k²) of N_a N_b."""
+    """Return the products N_a N_b (nq, k²) at the points."""
     return (value[:, :, None] * value[:, None, :]).reshape(len(value), -1)
 
 
 def _on_diagonal(consistent: Array) -> Array:
-    """(nc, k) what each node gets of the whole of its element, in proportion to the diagonal."""
+    """Share the sum of each element matrix between its nodes (nc, k), in proportion to the diagonal."""
     diagonal = np.einsum("caa->ca", consistent)
     shares: Array = diagonal * (consistent.sum(axis=(1, 2)) / diagonal.sum(axis=1))[:, None]
     return shares
 
 
 def _gather(mesh: SolidMesh, values: Array) -> Array:
-    """Sum per node (n,) of the values (nc, k) of the nodes of the cells."""
+    """Sum the values (nc, k) of the nodes of the cells at each node (n,)."""
     sums: Array = np.bincount(mesh.cells.ravel(), weights=values.ravel(), minlength=len(mesh.nodes)).astype(
         float
     )
@@ -120,10 +121,12 @@ def _gather(mesh: SolidMesh, values: Array) -> Array:
 
 
 def _assembled(cells: Ints, size: int, blocks: Array) -> "csc_array[np.float64]":
-    """Sum the blocks (nc, k, k, b, b) of pairs of nodes; symmetric to the last bit, if those of the cells are."""
+    """Sum the blocks (nc, k, k, b, b) of pairs of nodes; symmetric to the last bit if the blocks of the cells are."""
     k, width = cells.shape[1], blocks.shape[-1]
     pair = (np.repeat(cells, k, axis=1) * size + np.tile(cells, (1, k))).ravel()
-    order = np.argsort(pair, kind="stable")  # so both sums of a symmetric pair have the order of the cells
+    order = np.argsort(
+        pair, kind="stable"
+    )  # stable: both sums of a symmetric pair have the order of the cells
     pair = pair[order]
     first = np.flatnonzero(np.concatenate([[True], pair[1:] != pair[:-1]]))
     sums = np.add.reduceat(blocks.reshape(-1, width, width)[order], first, axis=0)
@@ -134,7 +137,7 @@ def _assembled(cells: Ints, size: int, blocks: Array) -> "csc_array[np.float64]"
 
 
 def _in_three_directions(scalar: "csc_array[np.float64]") -> "csc_array[np.float64]":
-    """The Kronecker product with the unit matrix of three rows."""
+    """Return the Kronecker product with the unit matrix of three rows."""
     whole = scalar.tocoo()
     axis = np.arange(3)
     rows, columns = (3 * whole.coords[k][:, None] + axis for k in (0, 1))

@@ -1,4 +1,4 @@
-"""Stress at the nodes from that at the sampling points (superconvergent patch recovery)."""
+"""Recovery of nodal stress from the stress at the sampling points (superconvergent patch recovery)."""
 
 from dataclasses import dataclass
 
@@ -14,26 +14,26 @@ from mechanics.stones.meshing.shape_functions import integration
 __all__ = ["recovery"]
 
 
-# directions, and quadratic terms, that a patch sees with less than this part of the largest variance are left out
-_UNSEEN = 0.03
-# a polynomial whose value is a sum of so much more than the sampled values is not trusted
-_AMPLIFIED = 6.0
+_UNSEEN = (
+    0.03  # variance of a direction or quadratic term, over the largest, below which a patch leaves it out
+)
+_AMPLIFIED = 6.0  # sum of the absolute weights of a value above which a quadratic fit is not trusted
 # weights (_FLAT + d²/d̄²)^-power fall with the distance d from the patch's corner, d̄² its mean square
-_FLAT, _POWER = 0.1, {1: 1.0, 2: 1.5}
-# on the surface a patch takes in the cells that share so many corners with its own; one where nothing is said
+_FLAT = 0.1
+_POWER = {1: 1.0, 2: 1.5}  # by the order of the element
+# corners that a cell shares with one of a surface patch to join it; one for elements that are not listed
 _SHARED = {Element.HEX20: 4, Element.HEX27: 4}
-# so many patches are fitted at once
-_AT_ONCE = 64
+_AT_ONCE = 64  # patches fitted at once
 
 
 def recovery(mesh: SolidMesh) -> "csr_array[np.float64]":
-    """Weights (n, nq) that give nodal values from those of `sampled_stress` (Zienkiewicz & Zhu 1992).
+    """Return weights (n, nq) that take the values of `sampled_stress` to the nodes (Zienkiewicz & Zhu 1992).
 
     Around each corner of the cells a polynomial of the element's order is fitted by weighted least squares to the
     values at the sampling points of the cells that touch it; around a corner on the surface, also to those of the cells
-    beside these, as a patch on one side of a point says little of its value. Terms that a patch does not see are
-    left out, the quadratic ones first: constants are always exact. A middle node has the mean of the values that the
-    polynomials of its corners give there.
+    beside these, as a patch on one side of a point determines its value poorly. Terms that a patch does not determine
+    are left out, the quadratic ones first: constants are always exact. A middle node has the mean of the values of the
+    polynomials of its corners.
     """
     patches = _patches(mesh)
     rule = integration(mesh.element, mesh.nodes, mesh.cells, SAMPLE_ORDER[mesh.element])
@@ -42,7 +42,7 @@ def recovery(mesh: SolidMesh) -> "csr_array[np.float64]":
     wider = _widened(patches.cells, _SHARED.get(mesh.element, 1))
     parts = []
     for chosen, cells in ((np.flatnonzero(~outside), patches.cells), (np.flatnonzero(outside), wider)):
-        # those of about the same size together
+        # patches of about the same size together
         chosen = chosen[np.argsort(np.diff(cells.indptr)[chosen], kind="stable")]
         parts += [
             _weights(mesh, rule.point, spread, patches, cells, chosen[start : start + _AT_ONCE])
@@ -61,10 +61,10 @@ class _Patches:
 
     Attributes
     ----------
-    corner : (np,) the node that each belongs to
+    corner : (np,) node of each patch
     cells : a row per patch, a column per cell that touches the corner
     target : (nt,) nodes that get a value from a patch
-    targets : a row per patch, a column per one of these
+    targets : a row per patch, a column per target
     """
 
     corner: Ints
@@ -93,7 +93,7 @@ def _patches(mesh: SolidMesh) -> _Patches:
 
 
 def _widened(cells: "csr_array[np.float64]", shared: int) -> "csr_array[np.float64]":
-    """The patches with all cells that have so many corners in common with one of theirs."""
+    """Extend the patches by all cells that share a number of corners with one of theirs."""
     neighbours = csr_array(cells.T @ cells)
     neighbours.data = (neighbours.data > shared - 0.5).astype(float)
     neighbours.eliminate_zeros()
@@ -110,7 +110,7 @@ def _weights(
     cells: "csr_array[np.float64]",
     chosen: Ints,
 ) -> tuple[Ints, Ints, Array]:
-    """Node, sampling point and weight of all that some patches give, fitted to points (nc, s, 3) of their cells."""
+    """Return node, sampling point and weight of some patches, fitted to the points (nc, s, 3) of their cells."""
     samples = points.shape[1]
     cell, held = _rows(cells, chosen)
     number = (samples * cell[:, :, None] + np.arange(samples)).reshape(len(chosen), -1)
@@ -129,7 +129,7 @@ def _weights(
 
 
 def _spread(mesh: SolidMesh) -> Array:
-    """Mean square distances (nc, 9) of the corners of each cell from their mean."""
+    """Return the mean square distances (nc, 9) of the corners of each cell from their mean."""
     corners = mesh.nodes[mesh.cells[:, : mesh.element.corners]]
     local = corners - corners.mean(axis=1, keepdims=True)
     spread: Array = (local.transpose(0, 2, 1) @ local).reshape(-1, 9) / mesh.element.corners
@@ -137,7 +137,7 @@ def _spread(mesh: SolidMesh) -> Array:
 
 
 def _rows(matrix: "csr_array[np.float64]", rows: Ints) -> tuple[Ints, Bools]:
-    """Columns (nr, m) of some rows, filled up with the first of each, and which of them are the row's own."""
+    """Return the columns (nr, m) of some rows, padded with the first of each, and a mask of the row's own."""
     start, count = matrix.indptr[rows], np.diff(matrix.indptr)[rows]
     place = np.arange(count.max())
     held = place < count[:, None]
@@ -145,11 +145,11 @@ def _rows(matrix: "csr_array[np.float64]", rows: Ints) -> tuple[Ints, Bools]:
 
 
 def _fit(points: Array, held: Bools, size: Array, corner: Array, target: Array, order: int) -> Array:
-    """Weights (np, nt, m) of the values at points (np, m, 3) of patches for targets (np, nt, 3).
+    """Return weights (np, nt, m) of the values at points (np, m, 3) of patches for targets (np, nt, 3).
 
     Coordinates are turned and stretched so that the points of each patch have unit variance along each axis: the
-    fit does not know how slender the cells are. An axis is not seen where the points vary little beside the size of the
-    cells, its mean square (np, 3, 3), as in a single layer of cells with one point each.
+    fit does not depend on the slenderness of the cells. An axis is left out where the points vary little beside the
+    size of the cells, its mean square (np, 3, 3), as in a single layer of cells with one point each.
     """
     distance = ((points - corner[:, None]) ** 2).sum(axis=2)
     mean_square = (distance * held).sum(axis=1, keepdims=True) / held.sum(axis=1, keepdims=True)
@@ -163,7 +163,7 @@ def _fit(points: Array, held: Bools, size: Array, corner: Array, target: Array, 
     y, z = local @ stretch, (target - mean) @ stretch
     fitted, wanted = [part, part * y], [np.ones((*z.shape[:2], 1)), z]
     if order == 2:
-        # what the squares and products have beyond the constant and linear polynomials
+        # the part of squares and products that constant and linear polynomials do not span
         squares, aim = _squares(y), _squares(z)
         level, slope = (part * squares).sum(axis=1, keepdims=True), fitted[1].transpose(0, 2, 1) @ squares
         rest, aim = squares - level - y @ slope, aim - level - z @ slope
@@ -180,11 +180,12 @@ def _fit(points: Array, held: Bools, size: Array, corner: Array, target: Array, 
 
 
 def _squares(y: Array) -> Array:
+    """Return the six squares and products of coordinates (…, 3)."""
     return y[..., [0, 1, 2, 0, 1, 2]] * y[..., [0, 1, 2, 1, 2, 0]]
 
 
 def _inverse_root(variance: Array, unseen: float) -> Array:
-    """Columns that bring (np, k, k) to the unit matrix; zero for the directions of hardly any variance."""
+    """Return columns that bring (np, k, k) to the unit matrix; zero for directions of hardly any variance."""
     values, vectors = np.linalg.eigh(variance)
     seen = values > unseen * np.maximum(values[:, -1:], np.finfo(float).tiny)
     scale = np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)

@@ -1,4 +1,4 @@
-"""Stress of one stone from the displacement of its nodes, and how far it can be trusted."""
+"""Stress of one stone from the displacement of its nodes, and its estimated error."""
 
 import numpy as np
 
@@ -12,12 +12,12 @@ from mechanics.stones.meshing.shape_functions import Integration, integration
 __all__ = ["SAMPLE_ORDER", "sampled_stress", "stress_error"]
 
 
-# the rule whose points have the best stress: the centroid, four points of a tetrahedron, 2 × 2 × 2 (Barlow 1976)
+# order of the rule with the best stress at its points: centroid, four points of a tetrahedron, 2 × 2 × 2 (Barlow 1976)
 SAMPLE_ORDER = {Element.TET4: 1, Element.TET10: 2, Element.HEX8: 1, Element.HEX20: 3, Element.HEX27: 3}
 
 
 def sampled_stress(mesh: SolidMesh, material: Material, displacement: Array) -> Array:
-    """Stress (nq, 6) at the superconvergent points of all cells, one cell after the other [Pa].
+    """Return the stress (nq, 6) at the superconvergent points of all cells, one cell after the other [Pa].
 
     Order xx, yy, zz, xy, yz, zx; from nodal displacement (n, 3) [m]. Linear and quadratic tetrahedra have 1 and 4
     points, linear and quadratic hexahedra 1 and 8.
@@ -27,10 +27,10 @@ def sampled_stress(mesh: SolidMesh, material: Material, displacement: Array) -> 
 
 
 def stress_error(mesh: SolidMesh, material: Material, displacement: Array, nodal_stress: Array) -> float:
-    """Relative error of the stress in the energy norm, as estimated by Zienkiewicz & Zhu (1987) [-].
+    """Estimate the relative error of the stress in the energy norm (Zienkiewicz & Zhu 1987) [-].
 
     η = ‖e‖ / √(‖u‖² + ‖e‖²), ‖e‖² = ∫ (σ* - σ):C⁻¹(σ* - σ), ‖u‖² = ∫ σ:C⁻¹σ, with σ the stress of the elements and
-    σ* that interpolated from the recovered stress of the nodes (n, 6), both in the axes of the mesh. Zero without
+    σ* the one interpolated from the recovered stress of the nodes (n, 6), both in the axes of the mesh. Zero without
     stress.
     """
     rule = integration(mesh.element, mesh.nodes, mesh.cells, MASS_ORDER[mesh.element])
@@ -45,9 +45,9 @@ def stress_error(mesh: SolidMesh, material: Material, displacement: Array, nodal
 
 
 def _stress(rule: Integration, mesh: SolidMesh, material: Material, displacement: Array) -> Array:
-    """(nc, nq, 6) at the points of a rule [Pa]."""
+    """Return the stress (nc, nq, 6) at the points of a rule [Pa]."""
     cell = displacement[mesh.cells]
-    # (cell, point, ∂_k, u_i); relative to the first node, as a far shift would lose digits
+    # (cell, point, ∂_k, u_i); relative to the first node, because a far shift would lose digits
     slope = rule.gradient.transpose(0, 1, 3, 2) @ (cell - cell[:, :1])[:, None]
     sheared = slope + slope.transpose(0, 1, 3, 2)
     strain = np.stack(

@@ -1,6 +1,6 @@
-"""Stones of the same shape: which rigid motion takes one to the other.
+"""Stones of the same shape, and the rigid motion that takes one to another.
 
-Mirror images are other shapes: a motion takes outward normals to outward normals, and turns without reflecting.
+Mirror images are different shapes: a motion takes outward normals to outward normals, and turns without reflecting.
 """
 
 from bisect import bisect_left, insort
@@ -15,10 +15,10 @@ __all__ = ["Motion", "classes", "motion", "translation"]
 
 Faces = tuple[tuple[int, ...], ...]
 
-# corners that differ by less than this part of a stone's size are the same
-_EQUAL = 1e-11
-# coordinates have so many digits: far from the origin this is what differs
-_ROUNDING = 16.0 * np.finfo(float).eps
+_EQUAL = 1e-11  # distance of two corners that are the same, over the stone's size
+_ROUNDING = (
+    16.0 * np.finfo(float).eps
+)  # the same over the coordinates: far from the origin rounding exceeds _EQUAL
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Motion:
     ----------
     turn : (3, 3) rotation
     origin, target : (3,) [m]
-    face : (nf,) the second stone's face that each face of the first comes to lie on
+    face : (nf,) for each face of the first stone, the face of the second that it comes to lie on
     """
 
     turn: Array
@@ -38,25 +38,25 @@ class Motion:
     face: Ints
 
     def __call__(self, points: Array) -> Array:
-        """Points (n, 3) where the motion takes them [m]."""
+        """Move points (n, 3) [m]."""
         moved: Array = (points - self.origin) @ self.turn.T + self.target
         return moved
 
 
 def classes(keys: Sequence[Hashable], shapes: Sequence[Array], same: Callable[[int, int], bool]) -> list[int]:
-    """For each shape the first one that is the same.
+    """Return for each shape the first one that is the same.
 
     Parameters
     ----------
     keys : shapes with different keys are never the same
     shapes : (nv, 3) corners of each [m]
-    same : whether the first of two shapes is the second
+    same : True for two shapes if they are the same
     """
     found: dict[Hashable, list[tuple[float, int]]] = {}
     own = []
     for index, shape in enumerate(shapes):
         local = shape - shape.mean(axis=0)
-        spread = float(np.linalg.norm(local, axis=1).sum())  # whichever way it is turned
+        spread = float(np.linalg.norm(local, axis=1).sum())  # does not depend on rotation
         slack = len(local) * _tolerance(shape)
         known = found.setdefault(keys[index], [])
         near = known[bisect_left(known, (spread - slack, -1)) : bisect_left(known, (spread + slack, -1))]
@@ -67,7 +67,7 @@ def classes(keys: Sequence[Hashable], shapes: Sequence[Array], same: Callable[[i
 
 
 def translation(first: Array, second: Array) -> bool:
-    """Corners (nv, 3) differ by a translation alone."""
+    """Return True if corners (nv, 3) differ by a translation alone."""
     if first.shape != second.shape:
         return False
     off = (first - first.mean(axis=0)) - (second - second.mean(axis=0))
@@ -82,9 +82,9 @@ def motion(
     marked: Collection[int] = (),
     second_marked: Collection[int] = (),
 ) -> Motion | None:
-    """The rigid motion that takes a stone to another one, faces onto faces and marked ones onto marked ones.
+    """Find the rigid motion that takes a stone to another, faces onto faces and marked faces onto marked ones.
 
-    Of several motions the one that does not turn comes first, if it is among them; None if there is no motion.
+    Of several motions a pure translation is preferred; None if there is no motion.
     """
     if first.shape != second.shape or sorted(map(len, faces)) != sorted(map(len, second_faces)):
         return None
@@ -98,7 +98,7 @@ def motion(
         corner = _matched(a @ turn.T, b, 1e-6 * size)
         if corner is None:
             continue
-        # what moves without a turn, to rounding, has none; other turns are taken from all corners
+        # a motion that is a translation to rounding keeps the exact identity; other rotations are fitted to all corners
         straight = turn is still and _off(a, b[corner], turn) <= tolerance
         fine = turn if straight else _fitted(a, b[corner])
         if _off(a, b[corner], fine) > tolerance:
@@ -119,7 +119,7 @@ def _off(a: Array, b: Array, turn: Array) -> float:
 
 
 def _fitted(a: Array, b: Array) -> Array:
-    """The rotation that takes points a (n, 3) best to points b, both about their means (Kabsch 1976)."""
+    """Return the rotation that takes points a (n, 3) best to points b, both about their means (Kabsch 1976)."""
     u, _, vt = np.linalg.svd(b.T @ a)
     u[:, 2] *= np.sign(np.linalg.det(u @ vt))
     rotation: Array = u @ vt
@@ -127,7 +127,7 @@ def _fitted(a: Array, b: Array) -> Array:
 
 
 def _frame(corners: Array, face: tuple[int, ...], place: int) -> Array:
-    """Columns: along an edge of a face, into the face, and out of the stone."""
+    """Return columns along an edge of a face, into the face, and out of the stone."""
     a, b = corners[face[place]], corners[face[(place + 1) % len(face)]]
     loop = corners[list(face)] - a
     out = np.cross(loop, np.roll(loop, -1, axis=0)).sum(axis=0)
@@ -136,7 +136,7 @@ def _frame(corners: Array, face: tuple[int, ...], place: int) -> Array:
 
 
 def _turns(start: Array, face: tuple[int, ...], corners: Array, faces: Faces) -> list[Array]:
-    """Rotations that take the first edge of a face to any edge of any face with as many corners."""
+    """Return the rotations that take the first edge of a face to any edge of any face with as many corners."""
     return [
         _frame(corners, other, place) @ start.T
         for other in faces
@@ -146,7 +146,7 @@ def _turns(start: Array, face: tuple[int, ...], corners: Array, faces: Faces) ->
 
 
 def _matched(a: Array, b: Array, within: float) -> Ints | None:
-    """The point of b (n, 3) at each point of a; None if there is not one for each."""
+    """Return the point of b (n, 3) at each point of a; None unless each has one of its own."""
     distance = np.abs(a[:, None] - b).max(axis=-1)
     corner: Ints = distance.argmin(axis=1).astype(np.int64)
     if distance[np.arange(len(a)), corner].max() > within or len(set(corner.tolist())) < len(a):
@@ -161,6 +161,6 @@ def _faces_onto(faces: Faces, second: Faces, corner: Ints) -> Ints | None:
 
 
 def _cycle(face: tuple[int, ...]) -> tuple[int, ...]:
-    """The same loop of corners, beginning at its least one."""
+    """Return the same loop of corners, beginning at its least one."""
     first = face.index(min(face))
     return face[first:] + face[:first]

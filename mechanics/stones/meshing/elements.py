@@ -1,4 +1,4 @@
-"""Kinds of finite elements; nodes of a cell and of its facets in the order of VTK."""
+"""Kinds of finite elements, with the nodes of a cell and of its facets in VTK's order."""
 
 from enum import StrEnum
 from functools import cache
@@ -21,9 +21,9 @@ class Element(StrEnum):
     Attributes
     ----------
     cell_nodes : nodes of a cell
-    corners : how many of them are corners; they come first
+    corners : number of corners among them; they come first
     facet_nodes : nodes of a facet
-    facet_corners : how many of these are corners; they come first, counter-clockwise seen from outside
+    facet_corners : number of corners among them; they come first, counter-clockwise seen from outside
     order : of the displacement along an edge
     """
 
@@ -65,7 +65,7 @@ class Element(StrEnum):
 
     @property
     def node_corners(self) -> tuple[tuple[int, ...], ...]:
-        """For each node of a cell the corners of the cell whose mean it is; a corner is its own."""
+        """For each node of a cell, the corners of the cell of which it is the mean; a corner is its own."""
         return _node_corners(self)
 
     @property

@@ -1,6 +1,6 @@
 """The mesh of one stone, and its boundary."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,38 +10,46 @@ from mechanics.stones.meshing.shape_functions import integration, jacobians
 from mechanics.stones.polyhedra import face_plane, face_planes, mass_properties
 from moma.errors import MeshError
 
-__all__ = ["SolidMesh", "boundary_facets", "solid_mesh", "tet_mesh"]
+__all__ = ["SolidMesh", "VolumeMesh", "boundary_facets", "solid_mesh", "tet_mesh", "with_middle_nodes"]
 
 Faces = tuple[tuple[int, ...], ...]
 
-# a boundary facet may lie off the stone's face by this fraction of the stone's size
-_OFF_FACE = 1e-6
-# the mesh may differ from the stone by this fraction of its volume
-_SAME_VOLUME = 1e-6
+_OFF_FACE = 1e-6  # largest distance of a boundary facet from the stone's face, over the stone's size
+_SAME_VOLUME = 1e-6  # largest difference of the volumes of mesh and stone, over the stone's
 
 
 @dataclass(frozen=True)
-class SolidMesh:
-    """The finite elements of one stone, and the facets of its boundary; edges are straight, with nodes at their middle.
+class VolumeMesh:
+    """The finite elements of one stone; edges are straight, with nodes at their middle.
 
     Attributes
     ----------
     element : kind of all cells
     nodes : (n, 3) [m]
     cells : (nc, element.cell_nodes) node indices in VTK's order, positive volume
-    facets : (ns, element.facet_nodes) boundary node indices in VTK's order, corners counter-clockwise seen from outside
-    facet_face : (ns,) the stone's face that each boundary facet lies on
     """
 
     element: Element
     nodes: Array
     cells: Ints
+
+
+@dataclass(frozen=True)
+class SolidMesh(VolumeMesh):
+    """The finite elements of one stone, and the facets of its boundary.
+
+    Attributes
+    ----------
+    facets : (ns, element.facet_nodes) boundary node indices in VTK's order, corners counter-clockwise seen from outside
+    facet_face : (ns,) the stone's face that each boundary facet lies on
+    """
+
     facets: Ints
     facet_face: Ints
 
 
 def boundary_facets(element: Element, cells: Ints) -> Ints:
-    """Facets (ns, element.facet_nodes) that belong to one cell alone, oriented outwards."""
+    """Return the facets (ns, element.facet_nodes) of a single cell, oriented outwards."""
     facets = cells[:, element.cell_facets].reshape(-1, element.facet_nodes)
     _, first, count = np.unique(_names(facets, element), return_index=True, return_counts=True)
     boundary: Ints = facets[np.sort(first[count == 1])]
@@ -49,10 +57,10 @@ def boundary_facets(element: Element, cells: Ints) -> Ints:
 
 
 def _names(facets: Ints, element: Element) -> Ints:
-    """One number for each facet (ns, kf), the same for facets with the same corners."""
+    """Return one number for each facet (ns, kf), the same for facets with the same corners."""
     corners = np.sort(facets[:, : element.facet_corners], axis=1)
     nodes = int(corners.max()) + 1
-    if nodes**element.facet_corners < 2**63:  # digits in a system with as many figures as there are nodes
+    if nodes**element.facet_corners < 2**63:  # digits in a number system whose base is the number of nodes
         powers = [nodes**k for k in range(element.facet_corners)]
         names: Ints = corners @ np.array(powers, dtype=np.int64)
         return names
@@ -73,7 +81,7 @@ def tet_mesh(nodes: Array, tetrahedra: Ints, vertices: Array, faces: Faces, code
 def solid_mesh(
     element: Element, nodes: Array, cells: Ints, vertices: Array, faces: Faces, code: str
 ) -> SolidMesh:
-    """Tell which face of the stone each boundary facet lies on, and check that the cells fill the stone.
+    """Find the face of the stone that each boundary facet lies on, and check that the cells fill the stone.
 
     Parameters
     ----------
@@ -84,7 +92,7 @@ def solid_mesh(
 
     Raises
     ------
-    MeshError : if a cell is turned inside out, a boundary facet lies on no face, or the volume is another
+    MeshError : if a cell is inside out, a boundary facet lies on no face, or the volumes differ
     """
     where = f"stone {code}"
     volume = _volumes(element, nodes, cells, where)
@@ -101,7 +109,7 @@ def solid_mesh(
 
 
 def _volumes(element: Element, nodes: Array, cells: Ints, where: str) -> float:
-    """Volume of all cells [m³]; each must have a positive Jacobian all over."""
+    """Return the volume of all cells [m³]; the Jacobian of each must be positive everywhere."""
     determinant = jacobians(element, nodes, cells)
     worst = int(determinant.min(axis=1).argmin())
     if not determinant[worst].min() > 0:
@@ -116,7 +124,7 @@ def _volumes(element: Element, nodes: Array, cells: Ints, where: str) -> float:
 
 
 def _faces_of(facets: Array, vertices: Array, faces: Faces, where: str) -> Ints:
-    """The face (ns,) that each facet (ns, kf, 3) lies on."""
+    """Return the face (ns,) that each facet (ns, kf, 3) lies on."""
     size = float(np.ptp(vertices, axis=0).max())
     normals, origins = face_planes(vertices, faces)
     about = vertices.mean(axis=0)  # far from the origin the products would lose digits
@@ -141,9 +149,36 @@ def _faces_of(facets: Array, vertices: Array, faces: Faces, where: str) -> Ints:
 
 
 def _winding(point: Array, polygon: Array) -> float:
-    """Angle [rad] by which a polygon turns around a point in its plane: 2π if it lies inside, else zero."""
+    """Return the angle [rad] by which a polygon turns round a point of its plane: 2π inside, 0 outside."""
     normal, _ = face_plane(polygon)
     rays = polygon - point
     following = np.roll(rays, -1, axis=0)
     sines, cosines = np.cross(rays, following) @ normal, np.einsum("ij,ij->i", rays, following)
     return float(np.arctan2(sines, cosines).sum())
+
+
+def with_middle_nodes(mesh: SolidMesh, element: Element) -> SolidMesh:
+    """Add middle nodes at the mean of their corners to a mesh of linear cells, shared by neighbouring cells.
+
+    The corners keep their numbers, the middle nodes follow: of the edges, of the sides, of the cells.
+    """
+    nodes, columns = [mesh.nodes], [mesh.cells]
+    count = len(mesh.nodes)
+    for size in (2, 4, 8):
+        groups = [list(corners) for corners in element.node_corners if len(corners) == size]
+        if not groups:
+            continue
+        ends = np.sort(mesh.cells[:, groups], axis=-1).reshape(-1, size)
+        distinct, number = np.unique(ends, axis=0, return_inverse=True)
+        nodes.append(mesh.nodes[distinct].mean(axis=1))
+        columns.append(count + number.reshape(len(mesh.cells), -1))
+        count += len(distinct)
+    cells = np.hstack(columns)
+    # boundary facets come in the order of the cells, so they keep their order and their faces
+    return replace(
+        mesh,
+        element=element,
+        nodes=np.vstack(nodes),
+        cells=cells,
+        facets=boundary_facets(element, cells),
+    )

@@ -1,6 +1,7 @@
-"""How well cells are shaped: their smallest dihedral angle, and their smallest scaled Jacobian."""
+"""Quality of meshes by the smallest dihedral angle and scaled Jacobian of their cells, and its report for a scene."""
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -10,24 +11,23 @@ from mechanics.arrays import Array, Ints
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import SolidMesh
 
-__all__ = ["MeshQuality", "cell_quality", "mesh_quality"]
+__all__ = ["MeshQuality", "MeshReport", "StoneMesh", "cell_quality", "mesh_quality"]
 
 
-# cells that are computed in one go: some 30 MB for each of a few arrays
-_BATCH = 100_000
+_BATCH = 100_000  # cells computed at once: some 30 MB for each of a few arrays
 
 
 @dataclass(frozen=True)
 class MeshQuality:
-    """How large a mesh is, and how well its worst cells are shaped.
+    """Size of a mesh, and quality of its worst cells.
 
     Attributes
     ----------
-    nodes, cells : how many
+    nodes, cells : counts
     min_dihedral : smallest angle between two sides of a cell [degrees]; 70.5 in a regular tetrahedron, 90 in a cube
     min_scaled_jacobian : smallest over the corners of all cells (and the middle of hexahedra) of the determinant of the
         edges that meet there, over the product of their lengths, times √2 in tetrahedra: 1 in regular tetrahedra and
-        cubes, 0 in flat cells, negative in those turned inside out [-] (Verdict 2007, "scaled Jacobian")
+        cubes, 0 in flat cells, negative in cells inside out [-] (Verdict 2007, "scaled Jacobian")
     """
 
     nodes: int
@@ -37,7 +37,7 @@ class MeshQuality:
 
 
 def mesh_quality(meshes: Sequence[SolidMesh]) -> tuple[MeshQuality, ...]:
-    """The quality of each mesh; many meshes of a kind are computed in one go."""
+    """Return the quality of each mesh; many meshes of a kind are computed at once."""
     found: dict[int, MeshQuality] = {}
     for element in sorted({mesh.element.linear for mesh in meshes}):
         own = [k for k, mesh in enumerate(meshes) if mesh.element.linear is element]
@@ -62,7 +62,7 @@ def _batch_quality(
 
 
 def cell_quality(element: Element, corners: Array) -> tuple[Array, Array]:
-    """Smallest dihedral angle [degrees] and scaled Jacobian (nc,) of each cell, from its corners (nc, k, 3)."""
+    """Return the smallest dihedral angle [degrees] and scaled Jacobian (nc,) of cells with corners (nc, k, 3)."""
     neighbours = _neighbours(element.linear)
     edges = corners[:, neighbours] - corners[:, :, None]  # (nc, k, 3, 3), three from each corner
     lengths = np.linalg.norm(edges, axis=-1)
@@ -85,7 +85,7 @@ def _triple(edges: Array) -> Array:
 
 
 def _middle(corners: Array) -> Array:
-    """Scaled Jacobian (nc,) in the middle of hexahedra, of the lines that join the middles of opposite sides."""
+    """Return the scaled Jacobian (nc,) in the middle of hexahedra, of the lines between middles of opposite sides."""
     sides = ((1, 2, 5, 6), (0, 3, 4, 7)), ((2, 3, 6, 7), (0, 1, 4, 5)), ((4, 5, 6, 7), (0, 1, 2, 3))
     axes = np.stack([corners[:, b].sum(axis=1) - corners[:, a].sum(axis=1) for b, a in sides], axis=1)
     scaled: Array = _triple(axes) / np.linalg.norm(axes, axis=-1).prod(axis=-1)
@@ -94,9 +94,71 @@ def _middle(corners: Array) -> Array:
 
 @cache
 def _neighbours(element: Element) -> Ints:
-    """For each corner of a cell (k, 3) the corners that edges lead to, in the order of a right-handed triple."""
+    """Return for each corner of a cell the corners (k, 3) that edges lead to, as a right-handed triple."""
     if element is Element.TET4:
         return np.array([(1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)])
     lower = [((k + 1) % 4, (k - 1) % 4, k + 4) for k in range(4)]
     upper = [(4 + (k - 1) % 4, 4 + (k + 1) % 4, k) for k in range(4)]
     return np.array(lower + upper)
+
+
+@dataclass(frozen=True)
+class StoneMesh:
+    """Meshing of one stone.
+
+    Attributes
+    ----------
+    code : the stone
+    how : the mesher that made its mesh
+    failures : meshers tried before, each with the reason of its failure
+    like : the stone of the same shape whose mesh it shares, moved and turned; its own code if it was meshed itself
+    quality : of its mesh
+    """
+
+    code: str
+    how: str
+    failures: tuple[str, ...]
+    like: str
+    quality: MeshQuality
+
+
+@dataclass(frozen=True)
+class MeshReport:
+    """Meshing of all deformable stones of a scene, in the order of its blocks."""
+
+    stones: tuple[StoneMesh, ...] = ()
+
+    @property
+    def nodes(self) -> int:
+        """Number of nodes of all stones."""
+        return sum(stone.quality.nodes for stone in self.stones)
+
+    @property
+    def cells(self) -> int:
+        """Number of cells of all stones."""
+        return sum(stone.quality.cells for stone in self.stones)
+
+    @property
+    def distinct(self) -> int:
+        """Number of meshes that were made."""
+        return sum(stone.like == stone.code for stone in self.stones)
+
+    @property
+    def how(self) -> Mapping[str, int]:
+        """Number of stones by mesher."""
+        return dict(sorted(Counter(stone.how for stone in self.stones).items()))
+
+    @property
+    def sharpest(self) -> StoneMesh | None:
+        """The first stone with the smallest dihedral angle; None without deformable stones."""
+        return min(self.stones, key=lambda stone: stone.quality.min_dihedral, default=None)
+
+    @property
+    def worst(self) -> StoneMesh | None:
+        """The first stone with the smallest scaled Jacobian; None without deformable stones."""
+        return min(self.stones, key=lambda stone: stone.quality.min_scaled_jacobian, default=None)
+
+    @property
+    def retried(self) -> tuple[StoneMesh, ...]:
+        """Stones at which a mesher failed before another succeeded."""
+        return tuple(stone for stone in self.stones if stone.failures and stone.like == stone.code)

@@ -1,7 +1,7 @@
-"""Shape functions of the finite elements, taken from scikit-fem and put into VTK's order of nodes.
+"""Shape functions of the finite elements, from scikit-fem, with nodes in VTK's order.
 
-Every cell of a kind has the same reference cell, so a kind is tabulated once; all cells of a mesh are then one array
-operation away, where a basis of scikit-fem costs several milliseconds for each stone.
+All cells of a kind share one reference cell, so a kind is tabulated once, and all cells of a mesh are evaluated in one
+array operation; a basis of scikit-fem costs several milliseconds for each stone.
 """
 
 from dataclasses import dataclass
@@ -81,7 +81,7 @@ def integration(element: Element, nodes: Array, cells: Ints, order: int) -> Inte
 
 
 def jacobians(element: Element, nodes: Array, cells: Ints) -> Array:
-    """Determinants of ∂x/∂ξ (nc, 1 or 27) [m³], which must be positive all over.
+    """Return determinants of ∂x/∂ξ (nc, 1 or 27) [m³]; a sound cell has positive ones only.
 
     In a hexahedron the determinant is of the second order in each direction; it is given at corners, and at the
     middle of edges, sides and cell.
@@ -93,7 +93,7 @@ def jacobians(element: Element, nodes: Array, cells: Ints) -> Array:
 
 
 def _jacobian(slope: Array, corners: Array) -> Array:
-    """∂x/∂ξ (nc, np, x, ξ) of cells with corners (nc, k, 3), from the slopes (np, k, 3) of the linear element."""
+    """Return ∂x/∂ξ (nc, np, x, ξ) of cells with corners (nc, k, 3), from slopes (np, k, 3) of the linear element."""
     local = corners - corners[:, :1]  # far from the origin the differences would lose digits
     return local.transpose(0, 2, 1)[:, None] @ slope
 
@@ -102,7 +102,7 @@ def _jacobian(slope: Array, corners: Array) -> Array:
 def tabulated(element: Element, order: int) -> Tabulated:
     """Tabulate an element at the points of scikit-fem's rule of an order.
 
-    Its rules for tetrahedra are exact up to order 4; those of 5 to 9 are so to one order less (scikit-fem 12).
+    Its rules for tetrahedra are exact up to order 4; those of order 5 to 9 are exact to one less (scikit-fem 12).
     """
     if order == 1:  # the centroid, for which scikit-fem has no rule in hexahedra
         centre = reference_points(element)[: element.corners].mean(axis=0)
@@ -116,14 +116,14 @@ def tabulated(element: Element, order: int) -> Tabulated:
 
 @cache
 def reference_points(element: Element) -> Array:
-    """Coordinates (k, 3) of the nodes in the reference cell, VTK's order."""
+    """Return coordinates (k, 3) of the nodes in the reference cell, in VTK's order."""
     corners = np.array(_TET_CORNERS if element.is_tetrahedron else _HEX_CORNERS, dtype=float)
     points: Array = np.array([corners[list(of)].mean(axis=0) for of in element.node_corners])
     return points
 
 
 def _evaluate(element: Element, points: Array) -> tuple[Array, Array]:
-    """Values (nq, k) and derivatives (nq, k, 3) at reference points (3, nq), nodes in VTK's order."""
+    """Return values (nq, k) and derivatives (nq, k, 3) at reference points (3, nq), nodes in VTK's order."""
     one = _SKFEM[element]()
     place = {tuple(point): number for number, point in enumerate(one.doflocs.tolist())}
     values, slopes = [], []

@@ -1,4 +1,4 @@
-"""How long edges of a mesh should be, from place to place: fine at the faces in contact, coarser away from them."""
+"""Target edge lengths of a mesh from place to place: fine at the faces in contact, coarser away from them."""
 
 from dataclasses import dataclass, field
 
@@ -20,8 +20,8 @@ class SizeField:
     ----------
     size : away from the planes [m]
     fine : at the planes [m]
-    growth : by how much edges get longer per metre away from the planes [-]
-    normals, offsets : (k, 3) unit normals and (k,) n·x of the planes [m]; none: the size is the same all over
+    growth : of the edge length per metre away from the planes [-]
+    normals, offsets : (k, 3) unit normals and (k,) n·x of the planes [m]; none: the size is uniform
     """
 
     size: float
@@ -31,7 +31,7 @@ class SizeField:
     offsets: Array = field(default_factory=lambda: np.zeros(0))
 
     def __call__(self, points: Array) -> Array:
-        """Sizes (n,) at points (n, 3) [m]."""
+        """Return sizes (n,) at points (n, 3) [m]."""
         if self.uniform:
             return np.full(len(points), self.size)
         distance = np.abs(points @ self.normals.T - self.offsets).min(axis=1)
@@ -40,30 +40,30 @@ class SizeField:
 
     @property
     def uniform(self) -> bool:
-        """The size is the same all over."""
+        """True if the size is the same everywhere."""
         return not len(self.offsets)
 
     def scaled(self, factor: float) -> "SizeField":
-        """The same field with all sizes times a factor."""
+        """Return the field with all sizes times a factor."""
         return SizeField(
             factor * self.size, factor * self.fine, factor * self.growth, self.normals, self.offsets
         )
 
     def local(self, origin: Array, scale: float) -> "SizeField":
-        """The field in coordinates (x - origin) / scale."""
+        """Return the field in coordinates (x - origin) / scale."""
         offsets = (self.offsets - self.normals @ origin) / scale
         return SizeField(self.size / scale, self.fine / scale, self.growth, self.normals, offsets)
 
 
 def as_field(size: SizeField | float) -> SizeField:
-    """A number is a size that is the same all over [m]."""
+    """Return a field; a number is a uniform size [m]."""
     return size if isinstance(size, SizeField) else SizeField(size, size)
 
 
 def graded(
     size: float, fine: float, growth: float, vertices: Array, faces: Faces, contact: tuple[int, ...]
 ) -> SizeField:
-    """The field of a stone that is meshed with edges of length `fine` at the faces numbered in `contact`."""
+    """Return the field of a stone whose edges have length `fine` at the faces numbered in `contact` [m]."""
     if fine >= size or not contact:
         return as_field(size)
     planes = [face_plane(vertices[list(faces[k])]) for k in contact]

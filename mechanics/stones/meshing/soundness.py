@@ -1,4 +1,4 @@
-"""What makes a stone impossible to mesh, said before anything is tried."""
+"""Checks of a stone before it is meshed."""
 
 import numpy as np
 
@@ -10,12 +10,11 @@ __all__ = ["CONVEX", "check_meshable", "is_convex"]
 
 Faces = tuple[tuple[int, ...], ...]
 
-# fractions of a stone's size: corners off their face's plane, corners in one place, the thickness of a flat stone
-_PLANAR = 1e-6
-_DISTINCT = 1e-8
-_THIN = 1e-5
-# corners of a convex stone lie behind all faces to within this fraction of its size
-CONVEX = 1e-9
+# fractions of a stone's size
+_PLANAR = 1e-6  # largest distance of a corner from its face's plane
+_DISTINCT = 1e-8  # distance of two corners in one place
+_THIN = 1e-5  # thickness of a flat stone
+CONVEX = 1e-9  # largest distance of a corner of a convex stone in front of a face
 
 
 def check_meshable(vertices: Array, faces: Faces, code: str) -> None:
@@ -43,7 +42,7 @@ def check_meshable(vertices: Array, faces: Faces, code: str) -> None:
 
 
 def is_convex(vertices: Array, faces: Faces) -> bool:
-    """All corners lie behind the planes of all faces."""
+    """Return True if all corners lie behind the planes of all faces."""
     size = float(np.ptp(vertices, axis=0).max())
     normals, origins = face_planes(vertices, faces)
     about = vertices.mean(axis=0)
@@ -92,7 +91,7 @@ def _check_planar(vertices: Array, faces: Faces, size: float, where: str) -> Non
 
 
 def _check_crossings(vertices: Array, faces: Faces, where: str) -> None:
-    """No edge may pass through a face, nor through another edge of a face."""
+    """Refuse an edge that passes through a face, and a face whose edges cross."""
     triangles = vertices[fan(faces)]
     owner = np.repeat(np.arange(len(faces)), [len(face) - 2 for face in faces])
     edges = sorted({(min(a, b), max(a, b)) for f in faces for a, b in zip(f, (*f[1:], f[0]), strict=True)})
@@ -116,7 +115,7 @@ def _check_crossings(vertices: Array, faces: Faces, where: str) -> None:
 
 
 def _pierced(a: Array, b: Array, triangles: Array) -> Bools:
-    """Triangles whose plane a line from a to b passes through, strictly."""
+    """Return a mask of the triangles whose plane a line from a to b crosses."""
     normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     start, end = (((point - triangles[:, 0]) * normal).sum(axis=1) for point in (a, b))
     crossed: Bools = start * end < 0
@@ -134,7 +133,7 @@ def _pierces(a: Array, b: Array, polygon: Array) -> bool:
 
 
 def _inside(place: Array, polygon: Array, normal: Array) -> bool:
-    """The polygon turns once round a point of its plane that it holds, and not round others."""
+    """Return True if a point of its plane lies in the polygon, which then turns once round it."""
     rays = polygon - place
     after = np.roll(rays, -1, axis=0)
     turn = np.arctan2(np.cross(rays, after) @ normal, (rays * after).sum(axis=1)).sum()

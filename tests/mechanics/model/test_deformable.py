@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from mechanics.model.deformable import Compliance, deformable
 from mechanics.model.dissection import dissection
-from mechanics.stones.elasticity import from_voigt, von_mises
+from mechanics.stones.elasticity.tensors import from_voigt, von_mises
 from mechanics.stones.meshing.meshers.gmsh import mesh_with_gmsh
 from tests.mechanics.shapes import LIMESTONE, TURN
 from tests.pipelines.results_by_hand import BOX_FACES, box

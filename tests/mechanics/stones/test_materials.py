@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mechanics.stones.elasticity import from_voigt, to_voigt
+from mechanics.stones.elasticity.tensors import from_voigt, to_voigt
 from mechanics.stones.materials import Material, Orthotropy
 from moma.errors import SceneError
 

@@ -193,6 +193,21 @@ def test_a_place_that_is_taken_is_refused_before_anything_runs(tmp_path, url, mo
         run_scene(tmp_path / "low.toml", url, tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("name", "deformable", "said"),
+    [("wall.stl", True, "no format of meshes"), ("wall.msh", False, "no stone is deformable")],
+)
+def test_meshes_that_cannot_be_written_are_refused_before_anything_runs(
+    tmp_path, url, monkeypatch, name, deformable, said
+):
+    monkeypatch.setattr(run_module, "simulate", None)  # must not be reached
+    text = LOW if deformable else LOW.replace('deformable = ["W02-02"]\n', "")
+    (tmp_path / "low.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(UsageError, match=said):
+        run_scene(tmp_path / "low.toml", url, tmp_path / "out", meshes=tmp_path / name)
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_static_start_is_told_and_a_warning_where_there_is_none(own_url, tmp_path):
     text = LOW + 'start = "equilibrium"\n[output]\npictures = []\n'
     (tmp_path / "low.toml").write_text(text, encoding="utf-8")

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.masonry import column, courses, running_bond, semicircular_arch
+from mechanics.scene import shapes
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import ContactSettings, Fidelity, Scene, Start, TimeSettings
 from mechanics.simulate import simulate
@@ -111,7 +111,7 @@ def test_profiles_become_finer_one_by_one():
 def wall():
     return Scene(
         "wall",
-        running_bond(courses(2, 3), 0.5, 0.25, 0.4, grounded=True),
+        shapes.wall(shapes.bond(2, 3, halves_first=True), 0.5, 0.25, 0.4, slab=False),
         contact=ContactSettings(DryJoint(0.6)),
         time=TimeSettings(start=Start.EQUILIBRIUM),
     )
@@ -135,8 +135,8 @@ def test_an_assembled_scene_is_overlaid_like_its_file():
 @pytest.mark.parametrize(
     ("blocks", "free"),
     [
-        (column(3), 0.0),  # three joints, three drums
-        (semicircular_arch(7, 0.4), 1 / 8),  # eight joints, seven voussoirs
+        (shapes.column(3, 0.8, 0.5, top=0.6), 0.0),  # three joints, three drums
+        (shapes.semicircular_arch(7, 0.4), 1 / 8),  # eight joints, seven voussoirs
     ],
 )
 def test_the_free_part_of_the_joints_is_that_of_statics(blocks, free):

@@ -10,20 +10,20 @@ from mechanics.dynamics.step import Step
 from mechanics.model.model import Model, build_model
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.law import Law
-from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene, SolverSettings, TimeSettings
+from mechanics.scene.scene import ContactSettings, Fidelity, Scene, SolverSettings, TimeSettings
+from mechanics.scene.shapes import box
 from mechanics.simulate import simulate
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
-from tests.validation.scenes import CORNERS, FACES, G
+from tests.validation.scenes import G
 
 ELEMENTS = [*Element]
 
 
 def elastic_box(code, low, high, material, size, element=Element.HEX8, velocity=(0.0,) * 6):
     """An axis-parallel deformable block from corner `low` to corner `high` [m]."""
-    low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
-    vertices = low + CORNERS * (high - low)
-    return Block(code, vertices, FACES, material, Fidelity.DEFORMABLE, size, element, velocity)
+    more = {"mesh_size": size, "element": element, "velocity": velocity}
+    return box(code, low, high, material, fidelity=Fidelity.DEFORMABLE, **more)
 
 
 def resting(

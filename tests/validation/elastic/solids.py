@@ -7,10 +7,9 @@ import skfem
 from scipy.sparse.linalg import splu
 from skfem.quadrature import get_quadrature
 
-from mechanics.stones.elasticity import elastic_operators
+from mechanics.stones.elasticity.operators import elastic_operators
 from mechanics.stones.meshing.elements import Element
-from mechanics.stones.meshing.mesh import SolidMesh, boundary_facets
-from mechanics.stones.meshing.quadratic import with_middle_nodes
+from mechanics.stones.meshing.mesh import SolidMesh, boundary_facets, with_middle_nodes
 from mechanics.stones.meshing.shape_functions import integration
 
 ELEMENTS = tuple(Element)

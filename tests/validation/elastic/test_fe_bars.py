@@ -8,7 +8,8 @@ in the middle of the loaded edge in plane stress.
 import numpy as np
 import pytest
 
-from mechanics.stones.elasticity import recovery, sampled_stress
+from mechanics.stones.elasticity.recovery import recovery
+from mechanics.stones.elasticity.stress import sampled_stress
 from mechanics.stones.materials import Material, Orthotropy
 from mechanics.stones.meshing.elements import Element
 from tests.validation.elastic.solids import body_forces, facets_at, grid, norm, solve, strain, traction_forces

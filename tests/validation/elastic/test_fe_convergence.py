@@ -12,7 +12,8 @@ import functools
 import numpy as np
 import pytest
 
-from mechanics.stones.elasticity import recovery, sampled_stress, stress_error
+from mechanics.stones.elasticity.recovery import recovery
+from mechanics.stones.elasticity.stress import sampled_stress, stress_error
 from mechanics.stones.materials import Material, Orthotropy
 from mechanics.stones.meshing.elements import Element
 from tests.validation.elastic.solids import ELEMENTS, Waves, body_forces, distorted, grid, norm, solve, strain

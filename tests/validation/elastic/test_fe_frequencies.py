@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import eigsh
 
-from mechanics.stones.elasticity import elastic_operators
+from mechanics.stones.elasticity.operators import elastic_operators
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
 from tests.validation.elastic.solids import grid

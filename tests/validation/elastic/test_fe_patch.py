@@ -9,7 +9,10 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from mechanics.stones.elasticity import elastic_operators, recovery, sampled_stress, stress_error, von_mises
+from mechanics.stones.elasticity.operators import elastic_operators
+from mechanics.stones.elasticity.recovery import recovery
+from mechanics.stones.elasticity.stress import sampled_stress, stress_error
+from mechanics.stones.elasticity.tensors import von_mises
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.shape_functions import integration
 from tests.validation.elastic.solids import ELEMENTS, facets_at, grid, shaken, solid, solve, traction_forces

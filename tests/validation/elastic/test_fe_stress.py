@@ -7,7 +7,9 @@ as load; F18: invariants of one tensor. Curved edges are polygons, as edges of e
 import numpy as np
 import pytest
 
-from mechanics.stones.elasticity import principal, recovery, sampled_stress, von_mises
+from mechanics.stones.elasticity.recovery import recovery
+from mechanics.stones.elasticity.stress import sampled_stress
+from mechanics.stones.elasticity.tensors import principal, von_mises
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
 from tests.validation.elastic.solids import facets_at, grid, solve, traction_forces

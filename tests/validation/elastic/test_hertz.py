@@ -31,9 +31,8 @@ from mechanics.scene.scene import (
 from mechanics.simulate import simulate
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
-from mechanics.stones.meshing.mesh import solid_mesh
+from mechanics.stones.meshing.mesh import solid_mesh, with_middle_nodes
 from mechanics.stones.meshing.meshers.mesher import Meshed
-from mechanics.stones.meshing.quadratic import with_middle_nodes
 from tests.validation.scenes import CORNERS, FACES, G, box
 
 YOUNG, RADIUS, FORCE = 1e9, 1.0, 1e6

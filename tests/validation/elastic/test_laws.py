@@ -201,7 +201,7 @@ def test_a_strong_bond_is_as_exact_as_a_weak_one(strength):
 @pytest.mark.parametrize("law", ["mortar", "cohesive zone"])
 @pytest.mark.parametrize(("part", "holds"), [(0.97, True), (1.03, False)])
 def test_a_bond_is_sheared_off_at_its_strength(law, part, holds):
-    """A rigid plate on an elastic stone, pushed in the plane of the joint: T = (c_t + μ σ) A tells them apart by 3 %.
+    """A rigid plate on an elastic stone, pushed in the plane of the joint: T = (c_t + μ σ) A distinguishes them by 3 %.
 
     c_t = 20 kPa, μ = 0.5, the plate's weight gives σ = 9.81 kPa; A = 0.04 m². Closed form.
     """

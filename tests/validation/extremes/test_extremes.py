@@ -9,9 +9,10 @@ import pytest
 from mechanics.dynamics.outcome import Outcome
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import ContactSettings, Method, Scene, SolverSettings, TimeSettings
+from mechanics.scene.shapes import bond
 from mechanics.simulate import simulate
 from mechanics.stones.materials import Material
-from tests.validation.masonry import bond, running_bond
+from tests.validation.masonry import running_bond
 from tests.validation.scenes import G, box, dynamic, follow, ground, moved, rotation, tilted_gravity
 
 

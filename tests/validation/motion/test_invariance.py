@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from mechanics.scene.scene import Method
-from tests.validation.masonry import bond, running_bond, semicircular_arch
+from mechanics.scene.shapes import bond
+from tests.validation.masonry import running_bond, semicircular_arch
 from tests.validation.scenes import G, dynamic, follow, moved, rotation
 
 TOLERANCE = 1e-6

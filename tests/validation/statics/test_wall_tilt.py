@@ -8,7 +8,8 @@ inset where it says so.
 
 import pytest
 
-from tests.validation.masonry import bond, running_bond
+from mechanics.scene.shapes import bond
+from tests.validation.masonry import running_bond
 from tests.validation.statics.limit_analysis import joints, multiplier, without_dilatancy
 from tests.validation.statics.verdict import falls, hold, report, stands
 

@@ -1,4 +1,4 @@
-"""Which program cuts a stone into tetrahedra."""
+"""Choice of the program that cuts stones into tetrahedra."""
 
 from enum import StrEnum
 
@@ -6,7 +6,7 @@ __all__ = ["Mesher"]
 
 
 class Mesher(StrEnum):
-    """Auto: Delaunay for convex stones, gmsh for all others; the other two are the first choice for all stones."""
+    """Mesher of tetrahedra: Delaunay for convex stones and gmsh for others, or one to try first for all stones."""
 
     AUTO = "auto"
     GMSH = "gmsh"

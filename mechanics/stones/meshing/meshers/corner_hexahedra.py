@@ -24,10 +24,10 @@ def mesh_at_corners(vertices: Array, faces: Faces, size: SizeField | float, code
 
     Raises
     ------
-    MeshError : if a corner joins more than three faces, or cells would be turned inside out
+    MeshError : if a corner joins more than three faces, or cells would be inside out
     """
     blocks, members = _blocks(vertices, faces, code)
-    # every point is the mean of some corners: of one, of an edge's, of a face's, of all
+    # every point is a mean of corners: of one, of an edge, of a face, or of all
     base = np.array([vertices[list(own)].mean(axis=0) for own in members])
     lengths = np.linalg.norm(base[blocks[:, [1, 3, 4]]] - base[blocks[:, :1]], axis=-1)
     n = max(1, round(float((lengths / as_field(size)(base[blocks[:, 0]])[:, None]).mean())))
@@ -36,7 +36,7 @@ def mesh_at_corners(vertices: Array, faces: Faces, size: SizeField | float, code
 
 
 def _blocks(vertices: Array, faces: Faces, code: str) -> tuple[Ints, list[tuple[int, ...]]]:
-    """Hexahedra (nv, 8), one for each corner, between points that are the means of some corners of the stone."""
+    """Return one hexahedron for each corner (nv, 8), between points that are means of the stone's corners."""
     used = sorted({corner for face in faces for corner in face})
     members: list[tuple[int, ...]] = [(corner,) for corner in used]
     number: dict[tuple[int, ...], int] = {own: k for k, own in enumerate(members)}
@@ -77,7 +77,7 @@ def _blocks(vertices: Array, faces: Faces, code: str) -> tuple[Ints, list[tuple[
 
 
 def _refined(blocks: Ints, points: int, n: int) -> tuple[Ints, Ints]:
-    """Cells (nc, 8), and the whole-numbered weights (nodes, points) that make each node, n³ times it."""
+    """Return cells (nc, 8), and whole-numbered weights (nodes, points) of the points that make n³ times each node."""
     lattice = np.stack(np.meshgrid(*[np.arange(n + 1)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
     share = np.where(_CORNERS, lattice[:, None], n - lattice[:, None]).prod(
         axis=-1

@@ -1,8 +1,8 @@
 """Tetrahedra by scipy's Delaunay triangulation, for convex stones.
 
 Points are laid on edges, faces and inside, as far apart as the size field asks for; triangulated, moved to the middle
-of their tetrahedra and triangulated again; at last the nodes of badly shaped tetrahedra are moved to better places. All
-moves keep to the faces that a point lies on, so the mesh fills the stone exactly.
+of their tetrahedra and triangulated again; then the nodes of badly shaped tetrahedra are moved to better places. Points
+stay on the faces that they lie on, so the mesh fills the stone exactly.
 """
 
 from dataclasses import dataclass
@@ -12,9 +12,9 @@ from scipy.spatial import Delaunay, QhullError
 
 from mechanics.arrays import Array, Bools, Ints
 from mechanics.stones.meshing.mesh import SolidMesh, tet_mesh
-from mechanics.stones.meshing.meshers._kernels.sampling import lay_points
+from mechanics.stones.meshing.meshers._kernels.sampling import Polyhedron, Sizes, lay_points
 from mechanics.stones.meshing.meshers._kernels.shaping import relax
-from mechanics.stones.meshing.shaping import improve_cells
+from mechanics.stones.meshing.meshers.slivers import improve_cells
 from mechanics.stones.meshing.sizes import SizeField, as_field
 from mechanics.stones.meshing.soundness import CONVEX
 from mechanics.stones.polyhedra import face_planes
@@ -24,11 +24,9 @@ __all__ = ["mesh_with_delaunay"]
 
 Faces = tuple[tuple[int, ...], ...]
 
-# points on a regular lattice lie by fours on a plane and by fives on a sphere, where Delaunay makes flat tetrahedra:
-# each is moved by up to this part of the size
-_JITTER = 0.06
-# how often points are moved to the middle of their tetrahedra and triangulated anew
-_RELAXATIONS = 1
+# on a regular lattice four points lie on a plane and five on a sphere, where Delaunay makes flat tetrahedra
+_JITTER = 0.06  # largest shift of a point off the lattice, over the size
+_RELAXATIONS = 1  # rounds in which points move to the middle of their tetrahedra and are triangulated again
 
 
 @dataclass(frozen=True)
@@ -38,7 +36,7 @@ class _Cloud:
     Attributes
     ----------
     points : (n, 3)
-    on_plane : (n, m) which planes each lies on: corners on three or more, points on edges on two
+    on_plane : (n, m) True for the planes of each: three or more for corners, two for points on edges
     free : (n, 3, 3) projectors on the directions in which they may move
     """
 
@@ -70,10 +68,10 @@ def mesh_with_delaunay(vertices: Array, faces: Faces, size: SizeField | float, c
 
 
 def _filled(cloud: _Cloud, planes: Array, field: SizeField, code: str, loose: bool) -> tuple[Array, Ints]:
-    """Nodes (n, 3), and tetrahedra between them.
+    """Return nodes (n, 3), and tetrahedra between them.
 
-    Nodes on edges stay at equal parts where they can, so that neighbours meet node on node; they are loose where four
-    of them, on two parallel edges, would make a flat tetrahedron.
+    Nodes on edges stay at equal parts where possible, so that neighbours meet node on node; with `loose` they move, as
+    four of them on two parallel edges may make a flat tetrahedron.
     """
     free = cloud.free.copy()
     if not loose:
@@ -89,7 +87,7 @@ def _filled(cloud: _Cloud, planes: Array, field: SizeField, code: str, loose: bo
 
 
 def _planes(corners: Array, faces: Faces) -> Array:
-    """Rows (n, d) of the faces, with n·x ≤ d inside."""
+    """Return rows (n, d) of the faces, with n·x ≤ d inside."""
     normals, origins = face_planes(corners, faces)
     return np.column_stack([normals, (normals * origins).sum(axis=1)])
 
@@ -102,10 +100,9 @@ def _cloud(corners: Array, faces: Faces, planes: Array, field: SizeField) -> _Cl
     edges = np.array(sorted(sides), dtype=np.int64)
     loops = np.concatenate([np.array(face, dtype=np.int64) for face in faces])
     start = np.cumsum([0, *map(len, faces)]).astype(np.int64)
-    points, ends, owner = lay_points(
-        corners, edges, loops, start, planes, _axes(planes),
-        field.size, field.fine, field.growth, field.normals, field.offsets,
-    )  # fmt: skip
+    stone = Polyhedron(corners, edges, loops, start, planes, _axes(planes))
+    sizes = Sizes(float(field.size), float(field.fine), float(field.growth), field.normals, field.offsets)
+    points, ends, owner = lay_points(stone, sizes)
     own_edge, own_face = owner[ends[0] : ends[1]], owner[ends[1] : ends[2]]
     on_plane = np.zeros((len(points), len(faces)), dtype=bool)
     on_plane[loops, np.repeat(np.arange(len(faces)), np.diff(start))] = True
@@ -124,18 +121,18 @@ def _cloud(corners: Array, faces: Faces, planes: Array, field: SizeField) -> _Cl
 
 
 def _axes(planes: Array) -> Array:
-    """Rows: directions of the lattice, along the first face and across it."""
+    """Return rows: directions of the lattice, along the first face and across it."""
     z = planes[0, :3]
     away = planes[1:, :3] - np.outer(planes[1:, :3] @ z, z)
     lengths = np.linalg.norm(away, axis=1)
-    # of equal ones the first, whatever rounding has done to them
+    # the first of equal ones, independent of rounding
     first = int((lengths > (1.0 - CONVEX) * lengths.max()).argmax())
     x = away[first] / lengths[first]
     return np.array([x, np.cross(z, x), z])
 
 
 def _jittered(cloud: Array, free: Array, planes: Array, on_plane: Bools, field: SizeField) -> Array:
-    """The points, each moved a little, always in the same way; none nearer to a face than it was by half."""
+    """Move each point a little, always in the same way; none loses more than half of its distance from a face."""
     depth = np.where(on_plane, np.inf, np.abs(planes[:, 3] - cloud @ planes[:, :3].T)).min(axis=1)
     room = _JITTER * np.minimum(field(cloud), depth)
     golden = np.array([0.8191725134, 0.6710436067, 0.5497004779])  # evenly spread, and the same everywhere

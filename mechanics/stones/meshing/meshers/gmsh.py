@@ -7,7 +7,7 @@ import numpy as np
 
 from mechanics.arrays import Array, Ints
 from mechanics.stones.meshing.mesh import SolidMesh, tet_mesh
-from mechanics.stones.meshing.shaping import improved
+from mechanics.stones.meshing.meshers.slivers import improved
 from mechanics.stones.meshing.sizes import SizeField, as_field
 from moma.errors import MeshError, MissingLibraryError
 
@@ -15,10 +15,10 @@ __all__ = ["Algorithm", "mesh_with_gmsh"]
 
 Faces = tuple[tuple[int, ...], ...]
 
-# what gmsh's wheel needs from a bare Debian or Ubuntu
+# needed by gmsh's wheel on a bare Debian or Ubuntu
 _SYSTEM_PACKAGES = "libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1"
-# options are global: all that matter are set before every mesh, whatever was set before. Gmsh improves tetrahedra that
-# are shaped worse than a threshold; its own of 0.3 leaves dihedral angles of 12 degrees where 0.5 leaves 16
+# options are global, so all that matter are set before every mesh. Gmsh improves tetrahedra whose shape is below a
+# threshold; its default of 0.3 leaves dihedral angles of 12 degrees where 0.5 leaves 16
 _OPTIONS = {
     "General.Terminal": 0,
     "General.NumThreads": 1,
@@ -99,7 +99,7 @@ def _build(geo: Any, vertices: Array, faces: Faces, size: float) -> None:
 
 
 def _set_sizes(gmsh: Any, field: SizeField) -> None:
-    """A background field for sizes that differ from place to place; else those of the corners hold."""
+    """Set a background field for sizes that vary; uniform sizes are those of the corners."""
     by_points = 1 if field.uniform else 0
     gmsh.option.setNumber("Mesh.MeshSizeFromPoints", by_points)
     gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", by_points)

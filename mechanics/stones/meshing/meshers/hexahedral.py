@@ -12,8 +12,7 @@ __all__ = ["mesh_with_hexahedra"]
 
 Faces = tuple[tuple[int, ...], ...]
 
-# so many parts a direction is measured in where the size changes
-_STATIONS = 64
+_STATIONS = 64  # parts in which a direction is measured where the size changes
 # the corners at the start and at the end of the four edges along each direction of a hexahedron, VTK's order
 _EDGES = (((0, 3, 4, 7), (1, 2, 5, 6)), ((0, 1, 4, 5), (3, 2, 7, 6)), ((0, 1, 2, 3), (4, 5, 6, 7)))
 
@@ -26,7 +25,7 @@ def mesh_with_hexahedra(vertices: Array, faces: Faces, size: SizeField | float, 
 
     Raises
     ------
-    MeshError : if the stone has not the corners, edges and faces of a cube, or its cells would be turned inside out
+    MeshError : if the stone lacks the corners, edges and faces of a cube, or its cells would be inside out
     """
     corners = vertices[_corners(faces, len(vertices), code)]
     cuts = [_cuts(corners[list(a)], corners[list(b)], as_field(size)) for a, b in _EDGES]
@@ -44,7 +43,7 @@ def mesh_with_hexahedra(vertices: Array, faces: Faces, size: SizeField | float, 
 
 
 def _corners(faces: Faces, count: int, code: str) -> list[int]:
-    """The stone's corners in VTK's order of a hexahedron whose bottom is the first face."""
+    """Return the stone's corners in VTK's order of a hexahedron whose bottom is the first face."""
     neighbours: dict[int, set[int]] = {corner: set() for corner in range(count)}
     for face in faces:
         for a, b in zip(face, (*face[1:], face[0]), strict=True):
@@ -64,7 +63,7 @@ def _corners(faces: Faces, count: int, code: str) -> list[int]:
 
 
 def _cuts(start: Array, end: Array, size: SizeField) -> Array:
-    """Places (n + 1,) from 0 to 1 between opposite sides, given the ends (4, 3) of the edges that join them."""
+    """Return places (n + 1,) from 0 to 1 between opposite sides, given the ends (4, 3) of the edges that join them."""
     length = float(np.linalg.norm(end - start, axis=1).mean())
     if size.uniform:
         n = max(1, round(length / size.size))
@@ -78,7 +77,7 @@ def _cuts(start: Array, end: Array, size: SizeField) -> Array:
 
 
 def _trilinear(grid: Array) -> Array:
-    """Weights (n, 8) of the corners at places (n, 3) of the unit cube."""
+    """Return weights (n, 8) of the corners at places (n, 3) of the unit cube."""
     (x, y, z), (u, v, w) = grid.T, 1.0 - grid.T
     return np.column_stack(
         [u * v * w, x * v * w, x * y * w, u * y * w, u * v * z, x * v * z, x * y * z, u * y * z]

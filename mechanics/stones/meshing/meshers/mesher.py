@@ -1,42 +1,64 @@
-"""Mesh a block with its kind of element: one mesher after the other, until one succeeds."""
+"""Meshing of one stone with its kind of element, by one mesher after the other until one succeeds."""
 
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Protocol
 
-from mechanics.scene.scene import Block
-from mechanics.stones.meshing.mesh import SolidMesh
+from mechanics.arrays import Array
+from mechanics.stones.meshing.elements import Element
+from mechanics.stones.meshing.mesh import SolidMesh, with_middle_nodes
 from mechanics.stones.meshing.meshers.choice import Mesher
 from mechanics.stones.meshing.meshers.corner_hexahedra import mesh_at_corners
 from mechanics.stones.meshing.meshers.delaunay import mesh_with_delaunay
 from mechanics.stones.meshing.meshers.gmsh import Algorithm, mesh_with_gmsh
 from mechanics.stones.meshing.meshers.hexahedral import mesh_with_hexahedra
-from mechanics.stones.meshing.quadratic import with_middle_nodes
 from mechanics.stones.meshing.quality import mesh_quality
 from mechanics.stones.meshing.sizes import SizeField, as_field, graded
 from mechanics.stones.meshing.soundness import check_meshable, is_convex
 from mechanics.stones.polyhedra import mass_properties
 from moma.errors import MeshError, MissingLibraryError
 
-__all__ = ["Meshed", "mesh_block", "meshed_block"]
+__all__ = ["Meshable", "Meshed", "mesh_block", "meshed_block"]
 
-# tetrahedra with a smaller scaled Jacobian are slivers: another mesher may do better
+# scaled Jacobian below which a tetrahedron is a sliver, and another mesher is tried
 _POOR = 0.005
-# a second attempt is that much finer
+# size of a second attempt over that of the first
 _FINER = 0.7
-# cells in one stone: more than can be solved, and more than memory holds
+# cells in one stone: more can be neither solved nor held in memory
 _MOST_CELLS = 1e6
+
+
+class Meshable(Protocol):
+    """A stone to be meshed, such as a deformable `mechanics.scene.scene.Block`; fields as there."""
+
+    @property
+    def code(self) -> str: ...  # noqa: D102 - see the class
+    @property
+    def vertices(self) -> Array: ...  # noqa: D102
+    @property
+    def faces(self) -> tuple[tuple[int, ...], ...]: ...  # noqa: D102
+    @property
+    def element(self) -> Element: ...  # noqa: D102
+    @property
+    def mesh_size(self) -> float | None: ...  # noqa: D102
+    @property
+    def contact_size(self) -> float | None: ...  # noqa: D102
+    @property
+    def growth(self) -> float: ...  # noqa: D102
+    @property
+    def mesher(self) -> Mesher: ...  # noqa: D102
 
 
 @dataclass(frozen=True)
 class Meshed:
-    """The mesh of a stone, and how it was made.
+    """The mesh of a stone, and its making.
 
     Attributes
     ----------
     mesh : the finite elements
     how : the mesher that made it
-    failures : the meshers that were tried before, each with its reason
+    failures : meshers tried before, each with the reason of its failure
     """
 
     mesh: SolidMesh
@@ -51,16 +73,22 @@ class _Attempt:
     factor: float = 1.0
 
 
-def mesh_block(block: Block, contact: tuple[int, ...] = ()) -> SolidMesh:
-    """The mesh of `meshed_block` alone."""
+def mesh_block(block: Meshable, contact: tuple[int, ...] = ()) -> SolidMesh:
+    """Return the mesh of `meshed_block` alone.
+
+    >>> from mechanics.scene.shapes import box
+    >>> ashlar = box("A1", (0, 0, 0), (0.6, 0.4, 0.2), mesh_size=0.1, element=Element.HEX8)
+    >>> len(mesh_block(ashlar).cells)
+    48
+    """
     return meshed_block(block, contact).mesh
 
 
-def meshed_block(block: Block, contact: tuple[int, ...] = ()) -> Meshed:
-    """Finite elements of one deformable block, of edge length about its mesh size.
+def meshed_block(block: Meshable, contact: tuple[int, ...] = ()) -> Meshed:
+    """Mesh one deformable block with edges of about its mesh size.
 
-    Hexahedra in a regular grid, or at each corner in stones that are no boxes. Tetrahedra by the mesher that the block
-    asks for; if it fails, or leaves slivers, by the others, and finer: the best of them is taken.
+    Hexahedra form a regular grid in boxes, and a grid at each corner in other stones. Tetrahedra are made by the mesher
+    that the block asks for; if it fails or leaves slivers, by the others, then finer, and the best mesh is taken.
 
     Parameters
     ----------
@@ -95,8 +123,8 @@ def meshed_block(block: Block, contact: tuple[int, ...] = ()) -> Meshed:
     return replace(made, mesh=with_middle_nodes(made.mesh, block.element))
 
 
-def _attempts(block: Block) -> tuple[_Attempt, ...]:
-    """The meshers that may mesh a block, in the order in which they are tried."""
+def _attempts(block: Meshable) -> tuple[_Attempt, ...]:
+    """Return the meshers for a block, in the order in which they are tried."""
 
     def using(mesher: Callable[..., SolidMesh], **options: object) -> Callable[[SizeField], SolidMesh]:
         return lambda size: mesher(block.vertices, block.faces, size, block.code, **options)

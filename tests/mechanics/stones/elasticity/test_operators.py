@@ -6,14 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from mechanics.stones.elasticity import (
-    elastic_operators,
-    from_voigt,
-    recovery,
-    sampled_stress,
-    to_voigt,
-    von_mises,
-)
+from mechanics.stones.elasticity.operators import elastic_operators
+from mechanics.stones.elasticity.recovery import recovery
+from mechanics.stones.elasticity.stress import sampled_stress
+from mechanics.stones.elasticity.tensors import from_voigt, to_voigt, von_mises
 from mechanics.stones.meshing.mesh import tet_mesh
 from mechanics.stones.meshing.meshers.gmsh import mesh_with_gmsh
 from tests.mechanics.shapes import LIMESTONE, TETRAHEDRON_FACES, TURN

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 
 from mechanics.scene.scene import Block, Fidelity
-from mechanics.stones.elasticity import recovery
+from mechanics.stones.elasticity.recovery import recovery
 from mechanics.stones.elasticity.stress import SAMPLE_ORDER
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.meshers.mesher import mesh_block
@@ -55,7 +55,7 @@ def test_constants_are_reproduced_by_the_coarsest_meshes(element, size):
 
 @EACH
 def test_a_row_of_cells_carries_what_varies_along_it(element):
-    # one cell wide: nothing can be said of changes across, for elements of the first order
+    # one cell wide: changes across are unknown to elements of the first order
     mesh = stone(element, 0.25, sides=(2.0, 0.25, 0.25))
     along = TURN[:, 0]
     np.testing.assert_allclose(recovery(mesh) @ (samples(mesh) @ along), mesh.nodes @ along, rtol=1e-9)

@@ -10,10 +10,9 @@ from hypothesis import strategies as st
 
 from mechanics.scene.scene import Block, Fidelity
 from mechanics.stones.meshing.elements import Element
-from mechanics.stones.meshing.mesh import boundary_facets, solid_mesh
+from mechanics.stones.meshing.mesh import boundary_facets, solid_mesh, with_middle_nodes
 from mechanics.stones.meshing.meshers.delaunay import mesh_with_delaunay
 from mechanics.stones.meshing.meshers.mesher import mesh_block
-from mechanics.stones.meshing.quadratic import with_middle_nodes
 from mechanics.stones.meshing.shape_functions import integration, jacobians, reference_points, tabulated
 from mechanics.stones.polyhedra import face_plane, mass_properties
 from moma.errors import MeshError, SceneError

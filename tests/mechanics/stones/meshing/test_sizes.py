@@ -8,13 +8,13 @@ from mechanics.model.model import build_model
 from mechanics.scene.scene import Fidelity
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import tet_mesh
-from mechanics.stones.meshing.meshers._kernels.sampling import lay_points, size_at
+from mechanics.stones.meshing.meshers._kernels.sampling import Polyhedron, Sizes, lay_points, size_at
 from mechanics.stones.meshing.meshers._kernels.shaping import relax, shape
 from mechanics.stones.meshing.meshers.delaunay import mesh_with_delaunay
 from mechanics.stones.meshing.meshers.gmsh import mesh_with_gmsh
 from mechanics.stones.meshing.meshers.hexahedral import mesh_with_hexahedra
+from mechanics.stones.meshing.meshers.slivers import improved
 from mechanics.stones.meshing.quality import cell_quality, mesh_quality
-from mechanics.stones.meshing.shaping import improved
 from mechanics.stones.meshing.sizes import as_field, graded
 from mechanics.stones.polyhedra import face_plane
 from tests.mechanics.shapes import TURN, brick, ground, moved, scene, transformed
@@ -79,8 +79,8 @@ def test_growth_is_scaled_with_the_sizes_and_fields_move_with_coordinates():
     np.testing.assert_allclose(field.scaled(0.5)(points), 0.5 * field(points))
     origin = np.array([1.0, 2.0, 3.0])
     np.testing.assert_allclose(field.local(origin, 4.0)((points - origin) / 4.0), field(points) / 4.0)
-    normals, offsets = field.normals, field.offsets
-    twin = [size_at(*x, field.size, field.fine, field.growth, normals, offsets) for x in points]
+    sizes = Sizes(field.size, field.fine, field.growth, field.normals, field.offsets)
+    twin = [size_at(*x, sizes) for x in points]
     np.testing.assert_allclose(twin, field(points), rtol=1e-13)
 
 
@@ -96,9 +96,9 @@ def test_points_lie_where_they_belong_and_not_too_near(seed):
     loops, start = np.concatenate(BOX_FACES).astype(np.int64), np.arange(0, 25, 4)
     field = as_field(0.15) if seed % 2 else graded(0.2, 0.08, 0.5, corners, BOX_FACES, (BED,))
     points, ends, owner = lay_points(
-        corners, edges, loops, start, planes, np.eye(3),
-        field.size, field.fine, field.growth, field.normals, field.offsets,
-    )  # fmt: skip
+        Polyhedron(corners, edges, loops, start, planes, np.eye(3)),
+        Sizes(field.size, field.fine, field.growth, field.normals, field.offsets),
+    )
     depth = planes[:, 3] - points @ planes[:, :3].T
     on = np.abs(depth) < 1e-9
     assert depth.min() > -1e-12

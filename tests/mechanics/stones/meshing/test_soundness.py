@@ -45,10 +45,10 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("mesher", list(Mesher))
-@pytest.mark.parametrize(("vertices", "faces", "said"), REFUSED.values(), ids=REFUSED)
-def test_a_stone_is_refused_with_its_name_the_reason_and_a_remedy(mesher, vertices, faces, said):
+@pytest.mark.parametrize(("vertices", "faces", "message"), REFUSED.values(), ids=REFUSED)
+def test_a_stone_is_refused_with_its_name_the_reason_and_a_remedy(mesher, vertices, faces, message):
     block = Block("A7", vertices, faces, LIMESTONE, SOFT, 0.4, mesher=mesher)
-    with pytest.raises(MeshError, match=f"^stone A7: .*({said})") as caught:
+    with pytest.raises(MeshError, match=f"^stone A7: .*({message})") as caught:
         meshed_block(block)
     assert caught.value.remedy
 
@@ -120,8 +120,8 @@ def test_where_gmsh_fails_delaunay_follows(monkeypatch):
 def test_a_stone_at_which_all_fail_is_named_with_all_reasons(monkeypatch):
     monkeypatch.setattr(mesher_module, "mesh_with_gmsh", broken)
     monkeypatch.setattr(mesher_module, "mesh_with_delaunay", broken)
-    said = "stone A1: delaunay: it slipped; gmsh: it slipped; gmsh, finer and by HXT: it slipped; delaunay, finer"
-    with pytest.raises(MeshError, match=said):
+    message = "stone A1: delaunay: it slipped; gmsh: it slipped; gmsh, finer and by HXT: it slipped; delaunay, finer"
+    with pytest.raises(MeshError, match=message):
         meshed_block(soft())
 
 

@@ -1,55 +1,80 @@
 """Numba kernels that lay points on and in a convex polyhedron, as far apart as a size field asks for."""
 
 from math import ceil, log2, sqrt
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
-__all__ = ["lay_points", "size_at"]
+__all__ = ["Polyhedron", "Sizes", "lay_points", "size_at"]
 
-# a point keeps this many times the size from all others, and from the boundary of what it fills
-_APART = 0.65
-_INSIDE = 0.4
-# step of the cubic lattice, over the size: tetrahedra then have edges of about that length
-_STEP = 0.97
-# points lie on a plane within this part of the stone's size; what is nearly too near is not, so that rounding matters
-# to few stones
-_ON_PLANE = 1e-9
-# so many parts an edge is measured in where its size changes
-_STATIONS = 64
-# no part of an edge is longer than the size, but for this part of it (gmsh's rule)
-_SHORT = 0.01
+_APART = 0.65  # distance from all other points, over the size
+_INSIDE = 0.4  # distance from the boundary of the face or stone that a point fills, over the size
+_STEP = 0.97  # of the cubic lattice, over the size: tetrahedra then have edges of about that length
+_ON_PLANE = (
+    1e-9  # distance from a plane at which points lie on it, over the stone's size; slack of all comparisons
+)
+_STATIONS = 64  # parts in which an edge is measured where its size changes
+_SHORT = 0.01  # by which a part of an edge may exceed the size, over the size (gmsh's rule)
+
+
+class Sizes(NamedTuple):
+    """A `mechanics.stones.meshing.sizes.SizeField`, with the same fields."""
+
+    size: float
+    fine: float
+    growth: float
+    normals: Any  # (k, 3) float64
+    offsets: Any  # (k,) float64
+
+
+class Polyhedron(NamedTuple):
+    """A convex polyhedron of unit size.
+
+    Attributes
+    ----------
+    corners : (nv, 3) float64
+    edges : (ne, 2) int64 corners that an edge joins
+    loops, start : int64; corners of face k are loops[start[k]:start[k + 1]], counter-clockwise seen from outside
+    planes : (nf, 4) float64 rows (n, d) with n·x ≤ d inside
+    axes : (3, 3) float64 rows: directions of the lattice inside
+    """
+
+    corners: Any
+    edges: Any
+    loops: Any
+    start: Any
+    planes: Any
+    axes: Any
 
 
 @njit(cache=True)
-def size_at(x, y, z, size, fine, growth, normals, offsets):
-    """H(x) of mechanics.meshing.sizes.SizeField."""
-    h = size
-    for k in range(len(offsets)):
-        away = abs(normals[k, 0] * x + normals[k, 1] * y + normals[k, 2] * z - offsets[k])
-        h = min(h, fine + growth * away)
+def size_at(x, y, z, sizes):
+    """Evaluate the size field h at a point."""
+    h = sizes.size
+    for k in range(len(sizes.offsets)):
+        n = sizes.normals[k]
+        away = abs(n[0] * x + n[1] * y + n[2] * z - sizes.offsets[k])
+        h = min(h, sizes.fine + sizes.growth * away)
     return h
 
 
 @njit(cache=True)
-def lay_points(corners, edges, loops, start, planes, axes, size, fine, growth, normals, offsets):
-    """Corners, then points on edges, on faces and inside.
+def lay_points(stone, sizes):
+    """Lay points at the corners, then on edges, on faces and inside.
 
-    Parameters
-    ----------
-    corners : (nv, 3)
-    edges : (ne, 2) corners that an edge joins
-    loops, start : corners of face k are loops[start[k]:start[k + 1]], counter-clockwise seen from outside
-    planes : (nf, 4) rows (n, d) with n·x ≤ d inside
-    axes : (3, 3) rows: directions of the lattice inside
-    size, fine, growth, normals, offsets : the size field
+    Inputs
+    ------
+    stone : Polyhedron
+    sizes : Sizes
 
-    Returns
+    Outputs
     -------
-    points : (n, 3)
-    ends : (4,) how many points there are after the corners, the edges, the faces, all
-    owner : (n,) which corner, edge or face a point lies on; -1 inside
+    points : (n, 3) float64
+    ends : (4,) int64 number of points after the corners, the edges, the faces, all
+    owner : (n,) int64 corner, edge or face that a point lies on; -1 inside
     """
+    corners, edges = stone.corners, stone.edges
     points = np.empty((512, 3))
     owner = np.empty(512, dtype=np.int64)
     ends = np.empty(4, dtype=np.int64)
@@ -59,21 +84,16 @@ def lay_points(corners, edges, loops, start, planes, axes, size, fine, growth, n
     ends[0] = count
     for k in range(len(edges)):
         a, b = corners[edges[k, 0]], corners[edges[k, 1]]
-        for t in _cuts(a, b, size, fine, growth, normals, offsets):
+        for t in _cuts(a, b, sizes):
             x, y, z = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])
             points, owner, count = _add(points, owner, count, x, y, z, k)
     ends[1] = count
-    for k in range(len(planes)):
-        loop = loops[start[k] : start[k + 1]]
-        points, owner, count = _on_face(
-            points, owner, count, corners, loop, planes[k], k, size, fine, growth, normals, offsets
-        )
+    for k in range(len(stone.planes)):
+        points, owner, count = _on_face(points, owner, count, stone, k, sizes)
     ends[2] = count
-    points, owner, count = _inside(
-        points, owner, count, corners, planes, axes, size, fine, growth, normals, offsets
-    )
+    points, owner, count = _inside(points, owner, count, stone, sizes)
     if count == len(corners):
-        # not an edge is cut: a point in the middle lets the stone deform at all
+        # no edge is cut: only a point in the middle lets the stone deform
         middle = np.zeros(3)
         for k in range(len(corners)):
             middle += corners[k] / len(corners)
@@ -84,7 +104,7 @@ def lay_points(corners, edges, loops, start, planes, axes, size, fine, growth, n
 
 @njit(cache=True)
 def _add(points, owner, count, x, y, z, of):
-    """Append a point, in twice the room if there is none left."""
+    """Append a point; arrays that are full double."""
     if count == len(points):
         more = np.empty((2 * count, 3))
         more[:count] = points
@@ -97,17 +117,17 @@ def _add(points, owner, count, x, y, z, of):
 
 
 @njit(cache=True)
-def _cuts(a, b, size, fine, growth, normals, offsets):
-    """Places t (n,) in (0, 1) that cut the edge from a to b into parts no longer than the field asks for."""
+def _cuts(a, b, sizes):
+    """Return places t (n,) in (0, 1) that cut the edge from a to b into parts no longer than the field asks for."""
     length = sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
-    if len(offsets) == 0:
-        count = max(1, ceil(length / size - _SHORT))
+    if len(sizes.offsets) == 0:
+        count = max(1, ceil(length / sizes.size - _SHORT))
         return np.arange(1, count) / count
     parts = np.zeros(_STATIONS + 1)
     for s in range(_STATIONS):
         t = (s + 0.5) / _STATIONS
         x, y, z = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])
-        parts[s + 1] = parts[s] + length / _STATIONS / size_at(x, y, z, size, fine, growth, normals, offsets)
+        parts[s + 1] = parts[s] + length / _STATIONS / size_at(x, y, z, sizes)
     count = max(1, ceil(parts[-1] - _SHORT))
     places = np.empty(count - 1)
     s = 0
@@ -120,9 +140,10 @@ def _cuts(a, b, size, fine, growth, normals, offsets):
 
 
 @njit(cache=True)
-def _steps(size, fine, offsets):
-    """Steps (n,) of the lattices, from the largest size to the smallest, each at least half of the one before."""
-    if len(offsets) == 0 or fine >= size:
+def _steps(sizes):
+    """Return steps (n,) of the lattices, from the largest size down, each at least half of the one before."""
+    size, fine = sizes.size, sizes.fine
+    if len(sizes.offsets) == 0 or fine >= size:
         return np.array([size])
     levels = ceil(log2(size / fine) - 1e-9)
     return size * (fine / size) ** (np.arange(levels + 1) / levels)
@@ -130,6 +151,7 @@ def _steps(size, fine, offsets):
 
 @njit(cache=True)
 def _free(points, first, last, x, y, z, apart):
+    """Return True if none of the points from `first` to `last` is nearer than `apart`."""
     least = (apart - _ON_PLANE) ** 2
     for j in range(first, last):
         if (points[j, 0] - x) ** 2 + (points[j, 1] - y) ** 2 + (points[j, 2] - z) ** 2 < least:
@@ -139,13 +161,19 @@ def _free(points, first, last, x, y, z, apart):
 
 @njit(cache=True)
 def _flat_face(corners, loop, plane):
-    """A face in its plane.
+    """Describe a face in its plane.
 
-    Returns
+    Inputs
+    ------
+    corners : (nv, 3) float64
+    loop : (m,) int64 corners of the face
+    plane : (4,) float64
+
+    Outputs
     -------
-    origin, u, v : its mean corner, and unit vectors along its longest side and across
-    walls : (m, 3) rows (p, q, d) of its sides, p s + q t ≤ d inside, at origin + s u + t v
-    far_u, far_v : how far it reaches from the origin along u and v
+    origin, u, v : (3,) float64 mean corner, and unit vectors along its longest side and across
+    walls : (m, 3) float64 rows (p, q, d) of its sides, p s + q t ≤ d inside, at origin + s u + t v
+    far_u, far_v : reach from the origin along u and v
     """
     m = len(loop)
     origin, along = np.zeros(3), np.zeros(3)
@@ -171,21 +199,22 @@ def _flat_face(corners, loop, plane):
 
 
 @njit(cache=True)
-def _on_face(points, owner, count, corners, loop, plane, face, size, fine, growth, normals, offsets):
+def _on_face(points, owner, count, stone, face, sizes):
     """Add points of triangular lattices inside a face.
 
     Lattices follow each other, each finer than the one before: coarse regions are filled first, and evenly.
     """
-    origin, u, v, walls, far_u, far_v = _flat_face(corners, loop, plane)
+    loop, plane = stone.loops[stone.start[face] : stone.start[face + 1]], stone.planes[face]
+    origin, u, v, walls, far_u, far_v = _flat_face(stone.corners, loop, plane)
     m = len(walls)
-    # the points on its edges; those on the other side of a thin stone are no matter
+    # the points on its edges; those on the other side of a thin stone do not count
     near, there = np.empty((count, 3)), 0
     for j in range(count):
         if abs(plane[:3] @ points[j] - plane[3]) < _ON_PLANE:
             near[there] = points[j]
             there += 1
     first = count
-    for step in _steps(size, fine, offsets):
+    for step in _steps(sizes):
         rows = int(far_v / (0.5 * sqrt(3.0) * step)) + 1
         across = int(far_u / step) + 2
         for row in range(-rows, rows + 1):
@@ -195,8 +224,8 @@ def _on_face(points, owner, count, corners, loop, plane, face, size, fine, growt
                 x = origin[0] + s * u[0] + t * v[0]
                 y = origin[1] + s * u[1] + t * v[1]
                 z = origin[2] + s * u[2] + t * v[2]
-                h = size_at(x, y, z, size, fine, growth, normals, offsets)
-                inside = h <= 2.0 * step  # else a coarser lattice has filled the place
+                h = size_at(x, y, z, sizes)
+                inside = h <= 2.0 * step  # a coarser lattice has filled larger sizes
                 for w in range(m):
                     if not inside:
                         break
@@ -208,8 +237,9 @@ def _on_face(points, owner, count, corners, loop, plane, face, size, fine, growt
 
 
 @njit(cache=True)
-def _inside(points, owner, count, corners, planes, axes, size, fine, growth, normals, offsets):
+def _inside(points, owner, count, stone, sizes):
     """Add points of body-centred cubic lattices, as `_on_face` does those of triangular ones."""
+    corners, planes, axes = stone.corners, stone.planes, stone.axes
     origin = np.zeros(3)
     for k in range(len(corners)):
         origin += corners[k] / len(corners)
@@ -217,7 +247,7 @@ def _inside(points, owner, count, corners, planes, axes, size, fine, growth, nor
     for j in range(len(corners)):
         for k in range(3):
             extent[k] = max(extent[k], abs(axes[k] @ (corners[j] - origin)))
-    for step in _STEP * _steps(size, fine, offsets):
+    for step in _STEP * _steps(sizes):
         across = int(extent[0] / step) + 1
         rows = int(extent[1] / step) + 1
         layers = int(extent[2] / step) + 1
@@ -228,7 +258,7 @@ def _inside(points, owner, count, corners, planes, axes, size, fine, growth, nor
                     x = origin[0] + a * axes[0, 0] + b * axes[1, 0] + c * axes[2, 0]
                     y = origin[1] + a * axes[0, 1] + b * axes[1, 1] + c * axes[2, 1]
                     z = origin[2] + a * axes[0, 2] + b * axes[1, 2] + c * axes[2, 2]
-                    h = size_at(x, y, z, size, fine, growth, normals, offsets)
+                    h = size_at(x, y, z, sizes)
                     inside = h <= 2.0 * step
                     for w in range(len(planes)):
                         if not inside:

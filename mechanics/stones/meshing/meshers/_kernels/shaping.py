@@ -7,16 +7,14 @@ from numba import njit
 
 __all__ = ["improve", "relax", "shape"]
 
-# a node is tried at this part of its shortest edge from where it is, and at this part of that where nothing is better
-_REACH = 0.4
-# so many times
-_STEPS = 4
-# nodes whose projector has no larger entry than this on its diagonal are fixed
-_FIXED = 1e-12
+_REACH = 0.4  # first trial step of a node over its shortest edge; each further step over the one before
+_STEPS = 4  # trial steps of a node
+_FIXED = 1e-12  # largest diagonal entry of the projector of a node that is fixed
 
 
 @njit(cache=True)
 def _six_volumes(nodes, a, b, c, d):
+    """Return six times the volume of a tetrahedron, positive if it is not inside out."""
     ux, uy, uz = nodes[b, 0] - nodes[a, 0], nodes[b, 1] - nodes[a, 1], nodes[b, 2] - nodes[a, 2]
     vx, vy, vz = nodes[c, 0] - nodes[a, 0], nodes[c, 1] - nodes[a, 1], nodes[c, 2] - nodes[a, 2]
     wx, wy, wz = nodes[d, 0] - nodes[a, 0], nodes[d, 1] - nodes[a, 1], nodes[d, 2] - nodes[a, 2]
@@ -25,6 +23,7 @@ def _six_volumes(nodes, a, b, c, d):
 
 @njit(cache=True)
 def _square(nodes, a, b):
+    """Return the square of the distance between two nodes."""
     return (
         (nodes[a, 0] - nodes[b, 0]) ** 2 + (nodes[a, 1] - nodes[b, 1]) ** 2 + (nodes[a, 2] - nodes[b, 2]) ** 2
     )
@@ -32,7 +31,7 @@ def _square(nodes, a, b):
 
 @njit(cache=True)
 def shape(nodes, a, b, c, d):
-    """6 √2 V over the cube of the root mean square edge: 1 in a regular tetrahedron, ≤ 0 if it is turned inside out."""
+    """Return 6 √2 V over the cube of the root mean square edge: 1 for a regular tetrahedron, ≤ 0 for one inside out."""
     squares = (
         _square(nodes, a, b) + _square(nodes, a, c) + _square(nodes, a, d)
         + _square(nodes, b, c) + _square(nodes, b, d) + _square(nodes, c, d)
@@ -44,10 +43,18 @@ def shape(nodes, a, b, c, d):
 
 @njit(cache=True)
 def relax(nodes, cells, free, planes, on_plane, weight):
-    """Move each node to the mean of the centres of its tetrahedra, weighted by volume over `weight` (n,) of its nodes.
+    """Move each node, in place, to the mean of the centres of its tetrahedra, weighted by volume over nodal weight.
 
-    Moves keep to free (n, 3, 3), the projector on the faces that a node lies on; a node keeps at least half of its
-    distance from the planes (m, 4) that it does not lie on, as on_plane (n, m) says.
+    A node keeps at least half of its distance from the planes that it does not lie on.
+
+    Inputs
+    ------
+    nodes : (n, 3) float64, changed
+    cells : (nc, 4) int64
+    free : (n, 3, 3) float64 projectors on the faces that a node lies on
+    planes : (m, 4) float64 rows (n, d) with n·x ≤ d inside
+    on_plane : (n, m) bool
+    weight : (n,) float64
     """
     count = len(nodes)
     total = np.zeros(count)
@@ -85,7 +92,7 @@ def relax(nodes, cells, free, planes, on_plane, weight):
 
 @njit(cache=True)
 def _worst(nodes, cells, around, start, n, enough):
-    """The shape of the worst tetrahedron around a node; any smaller number if that is not better than `enough`."""
+    """Return the shape of the worst tetrahedron around a node, or of the first one no better than `enough`."""
     least = 2.0
     for j in range(start[n], start[n + 1]):
         t = around[j]
@@ -97,7 +104,7 @@ def _worst(nodes, cells, around, start, n, enough):
 
 @njit(cache=True)
 def _mark_bad(nodes, cells, good, marked):
-    """Mark the nodes of tetrahedra shaped worse than `good`; whether there are any."""
+    """Mark the nodes of tetrahedra shaped worse than `good`; return True if there are any."""
     marked[:] = False
     any_bad = False
     for t in range(len(cells)):
@@ -110,7 +117,7 @@ def _mark_bad(nodes, cells, good, marked):
 
 @njit(cache=True)
 def _shortest(nodes, cells, around, start, n):
-    """Length of the shortest edge at a node."""
+    """Return the length of the shortest edge at a node."""
     least = 1e300
     for j in range(start[n], start[n + 1]):
         for one in cells[around[j]]:
@@ -121,7 +128,7 @@ def _shortest(nodes, cells, around, start, n):
 
 @njit(cache=True)
 def _improve_node(nodes, cells, free, around, start, tries, n, least):
-    """Move one node to where the worst tetrahedron around it, shaped as `least`, is better; whether it was moved."""
+    """Move one node so that the worst tetrahedron around it, of shape `least`, gets better; return True if it moved."""
     reach = _REACH * _shortest(nodes, cells, around, start, n)
     place = np.zeros(3)
     moved = False
@@ -150,12 +157,17 @@ def _improve_node(nodes, cells, free, around, start, tries, n, least):
 
 @njit(cache=True)
 def improve(nodes, cells, free, around, start, tries, good, rounds):
-    """Move the nodes of badly shaped tetrahedra, as far as this makes the worst tetrahedron around a node better.
+    """Move the nodes of badly shaped tetrahedra, in place, where this makes the worst tetrahedron around a node better.
 
-    around, start : the tetrahedra of node n are around[start[n]:start[n + 1]]
-    free : (n, 3, 3) projectors on the directions in which a node may move
-    tries : (k, 3) directions in which a node is moved
-    good : tetrahedra shaped as well as this are left alone
+    Inputs
+    ------
+    nodes : (n, 3) float64, changed
+    cells : (nc, 4) int64
+    free : (n, 3, 3) float64 projectors on the directions in which a node may move
+    around, start : int64; the tetrahedra of node n are around[start[n]:start[n + 1]]
+    tries : (k, 3) float64 directions in which a node is moved
+    good : shape of tetrahedra that are left alone
+    rounds : at most
     """
     marked = np.zeros(len(nodes), dtype=np.bool_)
     for _ in range(rounds):

@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 
 from mechanics.scene.scene import Block, Fidelity
 from mechanics.stones.meshing.elements import Element
+from mechanics.stones.meshing.mesh import with_middle_nodes
 from mechanics.stones.meshing.meshers.corner_hexahedra import mesh_at_corners
 from mechanics.stones.meshing.meshers.delaunay import mesh_with_delaunay
 from mechanics.stones.meshing.meshers.gmsh import mesh_with_gmsh
 from mechanics.stones.meshing.meshers.hexahedral import mesh_with_hexahedra
 from mechanics.stones.meshing.meshers.mesher import mesh_block
-from mechanics.stones.meshing.quadratic import with_middle_nodes
 from moma.errors import MeshError
 from tests.mechanics.shapes import LIMESTONE, profile
 from tests.mechanics.stones.meshing.wild_stones import (
@@ -59,7 +59,7 @@ def hex8_jacobians(corners):
 
 
 def assert_sound(mesh, corners, faces):
-    """Of both orders: positive Jacobians, the true volume, facets on the faces that they are said to lie on."""
+    """Of both orders: positive Jacobians, the true volume, facets on the faces that facet_face names."""
     quadratic = with_middle_nodes(mesh, SECOND[mesh.element])
     if mesh.element is Element.TET4:
         jacobian = tet10_jacobians(quadratic.nodes[quadratic.cells])
@@ -123,11 +123,11 @@ def test_hexahedra_fill_most_polyhedra_and_refuse_the_others(seed):
     try:
         mesh = mesh_at_corners(corners, faces, fine(corners, 30.0), "S1")
     except MeshError as error:
-        said = str(error)
+        message = str(error)
     else:
         assert_sound(mesh, corners, faces)
-        said = "flat or turned inside out"
-    assert "flat or turned inside out" in said
+        message = "flat or turned inside out"
+    assert "flat or turned inside out" in message
 
 
 @settings(max_examples=15, deadline=None)

@@ -1,4 +1,4 @@
-"""Better tetrahedra between the same nodes: slivers get volume as nodes move, those on the surface along it."""
+"""Removal of slivers: nodes move so that flat tetrahedra get volume, surface nodes along the surface."""
 
 from dataclasses import replace
 
@@ -13,17 +13,16 @@ __all__ = ["improve_cells", "improved"]
 
 Faces = tuple[tuple[int, ...], ...]
 
-# tetrahedra shaped worse than this (1: regular, 0: flat) are improved, in at most so many rounds
-_GOOD, _ROUNDS = 0.4, 4
-# sine of the angle between two faces below which the edge between them has no sure direction
-_COPLANAR = 1e-3
+_GOOD = 0.4  # shape of tetrahedra that are left alone (1: regular, 0: flat)
+_ROUNDS = 4  # of improvement, at most
+_COPLANAR = 1e-3  # sine of the angle between two faces below which their edge has no certain direction
 # the 26 directions to the neighbours in a cubic lattice
 _TRIES = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if x or y or z])
 _DIRECTIONS = _TRIES / np.linalg.norm(_TRIES, axis=1)[:, None]
 
 
 def improve_cells(nodes: Array, cells: Ints, free: Array) -> None:
-    """Move nodes (n, 3), in place, so that badly shaped tetrahedra (nc, 4) become better, and none worse than those.
+    """Move nodes (n, 3), in place, so that badly shaped tetrahedra (nc, 4) get better, and no other as bad as they.
 
     free : (n, 3, 3) projectors on the directions in which a node may move
     """
@@ -34,14 +33,14 @@ def improve_cells(nodes: Array, cells: Ints, free: Array) -> None:
 
 
 def improved(mesh: SolidMesh, vertices: Array, faces: Faces) -> SolidMesh:
-    """The mesh of linear tetrahedra with its worst ones improved; the stone's corners, edges and faces stay."""
+    """Improve the worst cells of a mesh of linear tetrahedra; the stone's corners, edges and faces stay."""
     nodes = mesh.nodes.copy()
     improve_cells(nodes, mesh.cells, _freedom(mesh, vertices, faces))
     return replace(mesh, nodes=nodes)
 
 
 def _freedom(mesh: SolidMesh, vertices: Array, faces: Faces) -> Array:
-    """Projectors (n, 3, 3): on a face, on an edge, or on nothing at a corner."""
+    """Return projectors (n, 3, 3) on a face or an edge; zero at a corner."""
     normals, _ = face_planes(vertices, faces)
     on_face = np.zeros((len(mesh.nodes), len(faces)), dtype=bool)
     on_face[mesh.facets, mesh.facet_face[:, None]] = True
