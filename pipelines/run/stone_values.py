@@ -68,7 +68,7 @@ def stone_results(result: Result) -> tuple[StoneResult, ...]:
 
 
 def _values(body: BodyResult, of_joints: Mapping[str, float]) -> dict[str, float]:
-    """The named values of a stone, those that are known; archmodel.run_records.STONE_VALUES says what they are."""
+    """The named values of a stone, those that are known; archmodel.store.run_record.STONE_VALUES says what they are."""
     values: dict[str, float | None] = {"volume": body.volume, "mass": body.mass, **of_joints}
     if body.values is not None:
         values |= _stresses(body.values)
