@@ -238,7 +238,7 @@ def test_what_is_no_longer_found_is_superseded_and_can_be_read_back(database):
     first = related(database)
     before = relations(database)
     with database.session() as session:
-        held = session.scalar(select(Measurement).join(Measurement.entity).where(Entity.code == "2-1"))
+        held = session.scalar(select(Measurement).join(Entity).where(Entity.code == "2-1"))
         held.solid_vertices = held.solid_vertices + np.array([0.0, 0.0, 5.0])  # it was never there
     second = related(database)
     gone = {one for one in before if "2-1" in one[1:]}

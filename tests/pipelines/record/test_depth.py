@@ -92,7 +92,7 @@ def test_the_depth_of_a_surveyed_solid_stays(url: str) -> None:
     with open_database(url) as database, database.session() as session:
         entry = new_entry(session, "correction", "drill hole")
         held = session.scalars(
-            select(Measurement).join(Measurement.entity).where(Entity.code == CODE, held_at(Measurement))
+            select(Measurement).join(Entity).where(Entity.code == CODE, held_at(Measurement))
         ).one()
         held.provenance = "solid"
         session.flush()
