@@ -11,6 +11,7 @@ from mechanics.problem.residual import residual
 from mechanics.solvers.first_order.admm import ADMM
 from mechanics.solvers.first_order.nsgs import NSGS
 from mechanics.solvers.second_order.interior_point import InteriorPoint
+from mechanics.solvers.second_order.newton import Newton
 from mechanics.solvers.second_order.proximal_newton import ProximalNewton
 from mechanics.solvers.second_order.scaling import equilibrated
 
@@ -29,6 +30,9 @@ _NEWTON_STEPS = 20
 # where contacts open and slide: a larger penalty, balanced, and a shift that is held; so many iterations cost what the
 # interior point takes in all
 _MOVING_PENALTY, _MOVING_HOLD, _MOVING_ITERATIONS = 0.03, 10, 400
+# Newton's steps from where the interior point stood: where many contacts are at the edge between stick and slip, as in a
+# leaning column that slides as one, η is small long before the light stones between heavy ones follow
+_ENDING_STEPS = 60
 # iterations of the interior point, and of ADMM from where that stood, with a penalty that is right for what still moves
 _INTERIOR, _LAST_PENALTY, _LAST_ITERATIONS = 60, 0.3, 300
 
@@ -93,7 +97,11 @@ class Alternating:
             later = [("admm, balanced penalty", self._moving, False)]
             if isinstance(problem.delassus, RigidDelassus):
                 yield "Newton", self._newton, False
-                interior = [("interior point", self._interior, False), ("admm", self._last, True)]
+                interior = [
+                    ("interior point", self._interior, False),
+                    ("Newton on the natural map", self._ending, True),
+                    ("admm", self._last, True),
+                ]
                 later = later + interior if warm else interior + later
             yield from later
         yield "sweeps", lambda most: NSGS(*limits, most, _LOOK, _DEPTH), True
@@ -135,6 +143,9 @@ class Alternating:
         solver = InteriorPoint(self.tolerance, self.velocity_tolerance, min(_INTERIOR, most))
         # its Newton's method has had its try
         return lambda p, s: solver(p, ContactStart(np.zeros_like(s.impulse), s.velocity))
+
+    def _ending(self, most: int) -> _Solver:
+        return _even(Newton(*self._tight, min(_ENDING_STEPS, most)))
 
     def _last(self, most: int) -> _Solver:
         return _even(ADMM(*self._tight, min(_LAST_ITERATIONS, most), _LAST_PENALTY))
