@@ -1,6 +1,5 @@
 """From contacts and their laws to the contact problem of one step: a shift, a cone, and W."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +11,7 @@ from mechanics.delassus.mixed import MixedDelassus
 from mechanics.delassus.rigid import RigidDelassus
 from mechanics.dynamics.stepping import Kick
 from mechanics.model.model import Model
-from mechanics.problem.problem import ContactProblem, ContactStart, Form
+from mechanics.problem.problem import ContactProblem, ContactStart
 from mechanics.scene.laws.law import Approach, Terms
 from mechanics.scene.state import State
 from mechanics.stones.validation import SMALLEST
@@ -63,7 +62,6 @@ def state_laws(
     gap: Array,
     law: Ints,
     operator: RigidDelassus | MixedDelassus,
-    sparse: Callable[[], Form] | None,
     free: Kick,
     memory: Array,
     first: bool,
@@ -95,7 +93,5 @@ def state_laws(
     if max(float(np.abs(one).max(initial=0.0)) for one in (u_free, terms.bias)) < SMALLEST:
         # what is left of a motion that has died out, and could not be squared
         u_free, terms = np.zeros_like(u_free), replace(terms, bias=np.zeros_like(terms.bias))
-    problem = ContactProblem(
-        operator, u_free, terms.bias, terms.friction, terms.cohesion, sparse, terms.adhesion
-    )
+    problem = ContactProblem(operator, u_free, terms.bias, terms.friction, terms.cohesion, terms.adhesion)
     return Statement(problem, law, approach, terms)

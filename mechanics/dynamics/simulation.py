@@ -1,7 +1,7 @@
 """The loop of docs/theory.md: predict, detect, state the problem, solve, advance."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -27,7 +27,7 @@ from mechanics.dynamics.sleeping import RINGS, Sleep, held_model
 from mechanics.dynamics.stepping import Kick, advance, compliances, free_kick, kicked, predict
 from mechanics.dynamics.warm_start import Memory
 from mechanics.model.model import Model
-from mechanics.problem.problem import ContactSolution, Form
+from mechanics.problem.problem import ContactSolution
 from mechanics.scene.laws.law import Terms
 from mechanics.scene.state import State
 from mechanics.solvers.choice import Solver, choose_solver
@@ -139,7 +139,6 @@ class _Touching:
     place: Array
     law: Ints
     operator: RigidDelassus | MixedDelassus
-    sparse: Callable[[], Form]
     configuration: State
 
 
@@ -252,7 +251,7 @@ class Simulation:
                 free = replace(free, velocity=np.where(self._sleep.asleep[:, None], 0.0, free.velocity))
             statement = state_laws(
                 model, predicted, contacts, gaps(contacts, predicted), touching.law,
-                operator, touching.sparse, free, internal, self._first,
+                operator, free, internal, self._first,
             )  # fmt: skip
         with self.clock("solve"):
             solution = self._solve(statement.problem, start=statement.started(remembered))
@@ -381,20 +380,17 @@ class Simulation:
             contacts = self._detector(predicted, self._step * speed(model, predicted))
         with self.clock("assemble"):
             operator: RigidDelassus | MixedDelassus
-            sparse: Callable[[], Form]
             if model.rigid_only:
                 plan = schedule(contacts.bodies, model.inertia.moving)
                 contacts = take(contacts, plan.order)
-                rigid = rigid_delassus(model, predicted, contacts, plan)
-                operator, sparse = rigid, lambda: rigid.sparse
+                operator = rigid_delassus(model, predicted, contacts, plan)
             else:
-                mixed = mixed_delassus(model, predicted, contacts, self._compliance, self._elastic_scale)
-                operator, sparse = mixed, lambda: mixed.sparse
+                operator = mixed_delassus(model, predicted, contacts, self._compliance, self._elastic_scale)
         # in the axes of one of the two bodies, the same whichever is the candidate
         side = contacts.bodies.argmin(axis=1)
         place = contacts.arm[np.arange(len(side)), side]
         law = model.laws.of(contacts.bodies)
-        self._touching = _Touching(contacts, place, law, operator, sparse, predicted)
+        self._touching = _Touching(contacts, place, law, operator, predicted)
         return self._touching
 
     def _stale(self, known: _Touching, predicted: State) -> bool:

@@ -6,7 +6,7 @@ import numpy as np
 
 from mechanics.arrays import Array
 from mechanics.problem._kernels import natural_errors
-from mechanics.problem.problem import ContactProblem, scale_of
+from mechanics.problem.problem import ContactProblem
 
 __all__ = ["Residual", "natural_map", "project_on_cone", "residual"]
 
@@ -50,7 +50,7 @@ def residual(problem: ContactProblem, impulse: Array) -> Residual:
     """
     if len(impulse) == 0:
         return Residual(0.0, 0.0, np.zeros(0), np.zeros_like(impulse))
-    rho = 1.0 / scale_of(problem.delassus)
+    rho = 1.0 / problem.delassus.scale
     u = problem.delassus.apply(impulse)
     u += problem.u_free
     # writes û into u

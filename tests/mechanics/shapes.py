@@ -230,14 +230,12 @@ def posed(one, step=2e-3, theta=1.0):
         plan = schedule(contacts.bodies, model.inertia.moving)
         contacts = take(contacts, plan.order)
         operator = rigid_delassus(model, state, contacts, plan)
-        sparse = operator.sparse
     else:
         operator = mixed_delassus(model, state, contacts, compliance)
-        sparse = operator.sparse
     free = free_kick(model, state, state, compliance, step, theta)
     statement = state_laws(
         model, state, contacts, gaps(contacts, state), model.laws.of(contacts.bodies),
-        operator, lambda: sparse, free, np.zeros((len(contacts), STATE)), True,
+        operator, free, np.zeros((len(contacts), STATE)), True,
     )  # fmt: skip
     return Posed(model, state, contacts, operator, compliance, statement.problem)
 

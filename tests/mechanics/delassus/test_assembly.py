@@ -13,7 +13,6 @@ from mechanics.delassus.mixed import ELASTIC, NONE, RIGID
 from mechanics.dynamics.contact_laws import state_laws
 from mechanics.dynamics.stepping import advance, compliances, free_kick, kicked, predict
 from mechanics.model.model import build_model
-from mechanics.problem.problem import scale_of
 from mechanics.scene.laws.law import STATE
 from mechanics.scene.scene import Fidelity
 from tests.mechanics.shapes import TURN, brick, dense_operator, ground, moved, scene
@@ -53,7 +52,7 @@ class Assembled:
         find = Detector(self.model.surfaces, self.model.fixed, 0.05)
         self.contacts = find(self.state, np.zeros(len(one.blocks)))
         self.operator = mixed_delassus(self.model, self.state, self.contacts, self.compliance)
-        self.form = self.operator.sparse
+        self.form = self.operator.form
         self.w_hat, self.transpose = dense_operator(self.model, self.state, self.contacts, self.compliance)
         self.dense = self.transpose @ self.w_hat @ self.transpose.T
 
@@ -97,7 +96,7 @@ def test_diagonal_blocks_are_those_of_w(step):
 
 @pytest.mark.parametrize("penalty", [1e-3, 0.1, 10.0])
 def test_condensed_form_solves_with_w_and_a_penalty(step, penalty):
-    sigma = penalty * scale_of(step.operator)
+    sigma = penalty * step.operator.scale
     right = np.random.default_rng(0).normal(size=len(step.dense))
     expected = np.linalg.solve(step.dense / sigma + np.eye(len(step.dense)), right)
     found = step.form.relaxed(sigma)(right)
@@ -119,7 +118,7 @@ def test_velocity_after_a_step_is_w_r_plus_u_free(step):
     free = step.free(state)
     problem = state_laws(
         step.model, state, contacts, gaps(contacts, state), step.model.laws.of(contacts.bodies),
-        step.operator, lambda: step.form, free, np.zeros((len(contacts), STATE)), True,
+        step.operator, free, np.zeros((len(contacts), STATE)), True,
     ).problem  # fmt: skip
     r = np.random.default_rng(2).normal(size=(len(contacts), 3))
     kick = step.kick(free, r)

@@ -29,7 +29,7 @@ def stated(one, memory=None, first=True, velocity=None):
     memory = np.zeros((len(contacts), STATE)) if memory is None else memory
     law = model.laws.of(contacts.bodies)
     gap = gaps(contacts, state)
-    statement = state_laws(model, state, contacts, gap, law, there.operator, None, free, memory, first)
+    statement = state_laws(model, state, contacts, gap, law, there.operator, free, memory, first)
     return statement, there
 
 
