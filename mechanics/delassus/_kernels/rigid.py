@@ -67,9 +67,8 @@ def _pushed(v, inertia, a, x):
 
 
 @njit(cache=True)
-def _apart(p, q, g):
-    """Return the velocity of the candidate's contact point relative to the antagonist's, of velocities p and q (6)."""
-    a, b = arm(g, 0), arm(g, 1)
+def _apart(p, q, a, b):
+    """Return the relative velocity of two contact points, of velocities p and q (6) and arms a and b of the bodies."""
     return (
         p[0] + p[4] * a[2] - p[5] * a[1] - q[0] - q[4] * b[2] + q[5] * b[1],
         p[1] + p[5] * a[0] - p[3] * a[2] - q[1] - q[5] * b[0] + q[3] * b[2],
@@ -185,7 +184,7 @@ def relative_velocity(v, contacts):  # pragma: no cover - compiled
     u = np.empty((nc, 3))
     for c in range(nc):
         g = contacts.geometry[c]
-        x = _apart(v[contacts.body[c, 0]], v[contacts.body[c, 1]], g)
+        x = _apart(v[contacts.body[c, 0]], v[contacts.body[c, 1]], arm(g, 0), arm(g, 1))
         for k in range(3):
             u[c, k] = dot((g[3 * k], g[3 * k + 1], g[3 * k + 2]), x)
     return u
@@ -197,18 +196,9 @@ def apply(r, contacts):  # pragma: no cover - compiled
     return relative_velocity(velocity_change(r, contacts), contacts)
 
 
-@njit(cache=True)
-def _solve_contact(f, u, r, mu, k):
-    """Return the impulse of one contact with factors f (13,), from its velocity u at the impulse r."""
-    bn = less_dot(u[0], (f[6], f[7], f[8]), r)
-    if bn >= 0.0 and k == 0.0:
-        return 0.0, 0.0, 0.0
-    s0 = less_dot(r[0], (f[0], f[1], f[2]), u)
-    s1 = less_dot(r[1], (f[1], f[3], f[4]), u)
-    s2 = less_dot(r[2], (f[2], f[4], f[5]), u)
-    limit = mu * s0 + k
-    if not (s0 < 0.0 or s1 * s1 + s2 * s2 > limit * limit):
-        return s0, s1, s2
+@njit(cache=True, inline="always")
+def _slide(f, u, bn, r, mu, k):
+    """Return the impulse of a contact that slips, from its velocity u at the impulse r; bn is b_N."""
     w = LocalCompliance(f[6], f[7], f[8], f[9], f[10], f[11], f[12])
     co, si = w.cos, w.sin
     h0, h1 = co * co * w.first + si * si * w.second, co * si * (w.first - w.second)
@@ -237,38 +227,49 @@ def _solve_group(first, last, running, laws, contacts):
 
     Returns how much the velocities of the two bodies, at the first contact, have changed.
     """
-    r, v = running.impulse, running.velocity
+    r, v, geometry = running.impulse, running.velocity, contacts.geometry
+    shift, friction, cohesion, factors = laws
     i, j = contacts.body[first, 0], contacts.body[first, 1]
     p = v[i, 0], v[i, 1], v[i, 2], v[i, 3], v[i, 4], v[i, 5]
     q = v[j, 0], v[j, 1], v[j, 2], v[j, 3], v[j, 4], v[j, 5]
-    m, n = contacts.inertia[i], contacts.inertia[j]
+    inertia_i, inertia_j = contacts.inertia[i], contacts.inertia[j]
     changed = False
     for c in range(first, last):
-        g, shift, old = contacts.geometry[c], laws.shift[c], row(r, c)
-        x = _apart(p, q, g)
-        u = (
-            add_dot(shift[0], (g[0], g[1], g[2]), x),
-            add_dot(shift[1], (g[3], g[4], g[5]), x),
-            add_dot(shift[2], (g[6], g[7], g[8]), x),
-        )
-        new = _solve_contact(laws.factors[c], u, old, laws.friction[c], laws.cohesion[c])
+        g, f, old, k = geometry[c], factors[c], row(r, c), cohesion[c]
+        # read before r is written, so that they stay in registers
+        n, t, s = (g[0], g[1], g[2]), (g[3], g[4], g[5]), (g[6], g[7], g[8])
+        a, b = arm(g, 0), arm(g, 1)
+        x = _apart(p, q, a, b)
+        u = add_dot(shift[c, 0], n, x), add_dot(shift[c, 1], t, x), add_dot(shift[c, 2], s, x)
+        bn = less_dot(u[0], (f[6], f[7], f[8]), old)
+        if bn >= 0.0 and k == 0.0:
+            new = 0.0, 0.0, 0.0
+        else:
+            new = (
+                less_dot(old[0], (f[0], f[1], f[2]), u),
+                less_dot(old[1], (f[1], f[3], f[4]), u),
+                less_dot(old[2], (f[2], f[4], f[5]), u),
+            )
+            limit = friction[c] * new[0] + k
+            if new[0] < 0.0 or new[1] * new[1] + new[2] * new[2] > limit * limit:
+                new = _slide(f, u, bn, old, friction[c], k)
         step = minus(new, old)
         if step[0] == 0.0 and step[1] == 0.0 and step[2] == 0.0:
             continue
         changed = True
         write_row(r, c, new)
-        x = to_world(g, step)
-        p = _pushed(p, m, arm(g, 0), x)
-        q = _pushed(q, n, arm(g, 1), negative(x))
+        x = dot((n[0], t[0], s[0]), step), dot((n[1], t[1], s[1]), step), dot((n[2], t[2], s[2]), step)
+        p = _pushed(p, inertia_i, a, x)
+        q = _pushed(q, inertia_j, b, negative(x))
     if not changed:
         return 0.0, 0.0
-    g = contacts.geometry[first]
+    g = geometry[first]
     moved_i = moved_j = 0.0
     # bodies that do not move are shared between groups of one colour: they are only read
-    if m[0] > 0.0:
+    if inertia_i[0] > 0.0:
         moved_i = _moved(v[i], p, arm(g, 0))
         v[i, 0], v[i, 1], v[i, 2], v[i, 3], v[i, 4], v[i, 5] = p
-    if n[0] > 0.0:
+    if inertia_j[0] > 0.0:
         moved_j = _moved(v[j], q, arm(g, 1))
         v[j, 0], v[j, 1], v[j, 2], v[j, 3], v[j, 4], v[j, 5] = q
     return moved_i, moved_j
