@@ -67,7 +67,7 @@ class MixedDelassus:
 
     @cached_property
     def cliques(self) -> Cliques:
-        """W as a sum of blocks, one for each body that moves, between its contacts."""
+        """W as a sum of dense blocks, one for each body that moves, between its contacts."""
         contacts, blocks = [], []
         bodies = self.body.ravel()
         order = np.argsort(bodies, kind="stable")

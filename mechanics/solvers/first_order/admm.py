@@ -45,7 +45,7 @@ class ADMM:
     penalty : σ over the mean diagonal of W; where all that touches stays in touch, the smaller the faster; larger
         values bear with contacts that open and slide [-]
     check_every : iterations between two looks at η
-    patience : give up after a look that finds η less than this many times smaller than two looks before; 0: never
+    patience : stop after a look that finds η less than this many times smaller than two looks before; 0: never
     hold : iterations for which the de Saxcé shift is held; held longer, it is steadier where much slides
     balanced : let the penalty follow the ratio of dual and primal residual (He, Yang & Wang 2000)
     over_relaxation : by how much r overshoots; 1: not at all, where a small penalty finds r nearly at once and an
@@ -98,7 +98,7 @@ class ADMM:
 
 
 class _Run:
-    """The iterates of one solution."""
+    """Iterates of one solution."""
 
     def __init__(self, problem: ContactProblem, form: Form, start: ContactStart, settings: ADMM) -> None:
         self._problem, self._form, self._settings = problem, form, settings
@@ -129,7 +129,7 @@ class _Run:
             self.iterations += 1
 
     def balance(self) -> None:
-        """Let σ follow the ratio of the residuals."""
+        """Adapt σ to the ratio of the residuals."""
         tiny, sigma = 1e-300, self._sigma
         primal = _norm(self._r - self.z) / max(_norm(self.z), tiny)
         dual = sigma * _norm(self.z - self._last) / max(sigma * _norm(self._y), _norm(self._shift), tiny)

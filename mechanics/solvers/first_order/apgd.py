@@ -70,7 +70,7 @@ class APGD:
 
 
 class _Run:
-    """The iterates of one solution."""
+    """Iterates of one solution."""
 
     def __init__(self, problem: ContactProblem, start: ContactStart) -> None:
         self._problem = problem

@@ -44,12 +44,12 @@ _SHORTEST = 1e-3
 
 @dataclass(frozen=True)
 class ProximalNewton:
-    """Solves the problems of rigid bodies to high accuracy, from whatever start.
+    """Proximal Newton method for rigid bodies: high accuracy from any start.
 
     Attributes
     ----------
     tolerance, velocity_tolerance : as in `NSGS`
-    max_iterations : steps, with a factorisation each, after which it is given up
+    max_iterations : limit of the steps, with a factorisation each
     """
 
     tolerance: float = 1e-6
@@ -57,7 +57,7 @@ class ProximalNewton:
     max_iterations: int = 100
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
-        """Solve from the impulses of `start`; the best of all iterates is given back.
+        """Solve from the impulses of `start`; return the best of all iterates.
 
         Raises
         ------
@@ -82,12 +82,12 @@ class ProximalNewton:
 
 
 class _Run:
-    """The iterates of one solution.
+    """Iterates of one solution.
 
     Attributes
     ----------
     r : (nc, 3) impulses [N s]
-    left : what they leave unsolved
+    left : their residual
     iterations : steps so far
     """
 
@@ -114,9 +114,9 @@ class _Run:
         return _System(self._delassus.rigid)
 
     def hold(self) -> None:
-        """Begin as if every contact held whatever it has to.
+        """Begin as if every contact held.
 
-        At rest without impulses, no contact but the lowest is seen to be pressed, and each step would find one more.
+        At rest without impulses only the lowest contact is seen to be pressed, and each step would find one more.
         """
         problem = self._problem
         self._first[:], self._second[:] = 0.0, np.eye(3)
@@ -129,7 +129,7 @@ class _Run:
         self._take(held, residual(problem, held))
 
     def step(self) -> bool:
-        """One step of Newton's method; whether there was one."""
+        """Make one step of Newton's method; return whether there was one."""
         alpha = max(self._share * min(self.left.natural_map, 1.0), _LEAST) * self._scale
         step = self._system.step(self._first, self._second, self._error, alpha)
         if step is None:
@@ -160,7 +160,7 @@ class _Run:
 
 
 class _System:
-    """The equations of the bodies' velocities: pattern, matrix, factors."""
+    """Equations of the bodies' velocities: pattern, matrix, factors."""
 
     def __init__(self, contacts: RigidContacts) -> None:
         self._contacts, inertia = contacts, contacts.inertia
