@@ -9,7 +9,7 @@ VENV := .venv
 MOMA := $(VENV)/bin/moma
 SAMPLE := data/samples/window
 OUT := out
-KERNELS := $(shell find survey mechanics -path "*/_kernels*" -name "*.py")
+KERNELS := $(shell find survey mechanics benchmarks -path "*/_kernels*" -name "*.py")
 
 .DEFAULT_GOAL := help
 .PHONY: help demo test clean
@@ -43,7 +43,7 @@ $(VENV)/.tests: pyproject.toml | $(VENV)/bin/python
 
 # numba keeps compiled kernels, and does not see that one in another file which they call has changed.
 $(VENV)/.kernels: $(KERNELS) | $(VENV)/bin/python
-	@find survey mechanics -name '*.nb[ic]' -delete
+	@find survey mechanics benchmarks -name '*.nb[ic]' -delete
 	@touch $@
 
 $(VENV)/bin/python:

@@ -13,19 +13,19 @@ import numpy as np
 
 from benchmarks.reference import Siconos
 from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
+from benchmarks.stored.operator import StoredDelassus
+from benchmarks.stored.portfolio import StoredAuto
 from mechanics.arrays import Array
-from mechanics.delassus.stored import StoredDelassus
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.problem.residual import project_on_cone
 from mechanics.solvers.first_order.admm import ADMM
 from mechanics.solvers.first_order.nsgs import NSGS
-from mechanics.solvers.strategies.auto import Auto
 from moma.errors import UsageError
 
 __all__ = ["main", "read_problem", "siconos_error"]
 
 
-_SOLVERS = {"auto": Auto, "nsgs": NSGS, "admm": ADMM}
+_SOLVERS = {"auto": StoredAuto, "nsgs": NSGS, "admm": ADMM}
 # η begins at this, or at the tolerance times that, and goes down by this factor, to rounding at most
 _LOOSEST, _LOOSER, _TIGHTER, _SMALLEST = 1e-2, 1e5, 10.0, 1e-14
 # solves between an η that suffices and one that does not
@@ -114,7 +114,7 @@ def read_problem(path: Path) -> ContactProblem:
             remedy = "see benchmarks/README.md for what a problem holds"
             raise UsageError(str(missing.args[0]), where=str(path), remedy=remedy) from None
     none = np.zeros(len(mu))
-    return ContactProblem(operator, q, none, mu, none, operator.sparse)
+    return ContactProblem(operator, q, none, mu, none)
 
 
 def siconos_error(problem: ContactProblem, impulse: Array) -> float:
@@ -193,7 +193,7 @@ def _warm_up(solver: str) -> None:
     block[[0, 3]] *= 10.0
     operator = StoredDelassus(block, np.array([0, 1, 0, 1]), np.array([0, 2, 4]))
     u_free, none = np.array([[-1.0, 2.0, 3.0], [-1.0, 0.1, 0.0]]), np.zeros(2)
-    problem = ContactProblem(operator, u_free, none, np.array([0.3, 0.3]), none, operator.sparse)
+    problem = ContactProblem(operator, u_free, none, np.array([0.3, 0.3]), none)
     _solve(problem, argparse.Namespace(solver=solver, max_iterations=200), 1e-10)
 
 

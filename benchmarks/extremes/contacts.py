@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks.extremes.stones import G
+from benchmarks.stored.operator import StoredDelassus
 from mechanics.arrays import Array
 from mechanics.delassus.rigid import RigidDelassus, schedule
-from mechanics.delassus.stored import StoredDelassus
 from mechanics.problem.problem import ContactProblem
 
 __all__ = [
@@ -96,7 +96,7 @@ def _inverse_inertia(one: Box) -> Array:
 
 def _problem(operator: RigidDelassus, free: Array, friction: Array) -> ContactProblem:
     none = np.zeros(len(free))
-    return ContactProblem(operator, free, none, friction, none, lambda: operator.sparse)
+    return ContactProblem(operator, free, none, friction, none)
 
 
 def squeezed(friction: float, give: float = -1.0) -> ContactProblem:
@@ -120,9 +120,7 @@ def stored(block: Array, free: Sequence[float], friction: float, cohesion: float
     """One contact with a given W (3, 3)."""
     operator = StoredDelassus(np.asarray(block, dtype=float)[None], np.array([0]), np.array([0, 1]))
     none = np.zeros(1)
-    return ContactProblem(
-        operator, np.array([free], dtype=float), none, none + friction, none + cohesion, operator.sparse
-    )
+    return ContactProblem(operator, np.array([free], dtype=float), none, none + friction, none + cohesion)
 
 
 def with_last(problem: ContactProblem, **values: float) -> ContactProblem:
@@ -140,7 +138,7 @@ def one_between_fixed(problem: ContactProblem) -> ContactProblem:
     bodies = operator.body.copy()
     bodies[-1] = [0, 0]
     other = replace(operator, body=bodies, schedule=schedule(bodies, np.array([False, True])))
-    return replace(problem, delassus=other, sparse=lambda: other.sparse)
+    return replace(problem, delassus=other)
 
 
 def sums(*expected: float) -> Truth:

@@ -7,10 +7,10 @@ time other equations; what it breaks is the least that one of these states leave
 
 import numpy as np
 
+from benchmarks.stored.operator import StoredDelassus
 from mechanics.arrays import Array
 from mechanics.delassus.rigid import RigidDelassus
-from mechanics.delassus.stored import StoredDelassus
-from mechanics.problem.problem import ContactProblem, scale_of
+from mechanics.problem.problem import ContactProblem
 
 __all__ = ["broken", "judge", "velocity_of"]
 
@@ -33,7 +33,7 @@ def judge(problem: ContactProblem, impulse: Array, tolerance: float, velocity_to
         return 0.0
     if not np.isfinite(impulse).all():
         return np.inf
-    rho = 1.0 / scale_of(problem.delassus)
+    rho = 1.0 / problem.delassus.scale
     pace = float(np.abs(problem.u_free).max() or np.abs(problem.bias).max())
     u, terms = velocity_of(problem, impulse)
     real = impulse.copy()

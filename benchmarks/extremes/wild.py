@@ -42,7 +42,6 @@ def wild_problem(seed: int, decades: float) -> ContactProblem:
         np.where(draw.random(count) < 0.3, draw.normal(size=count) * spread(count), none),
         np.where(draw.random(count) < 0.8, 0.5 * np.minimum(spread(count), 20.0), none),
         np.where(draw.random(count) < 0.2, spread(count), none),
-        lambda: operator.sparse,
     )
 
 

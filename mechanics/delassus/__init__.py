@@ -1,1 +1,6 @@
-"""The Delassus operator in its forms: rigid bodies in space and plane, rigid with deformable, stored."""
+"""Delassus operators: rigid bodies in space, rigid with deformable ones, and their forms for factorisation.
+
+Public: `RigidDelassus`, `Schedule`, `schedule` (rigid); `MixedDelassus` (mixed); `rigid_delassus`, `mixed_delassus`,
+`local_velocity`, `world_impulse` (assembly); `BodyForm` (body_space); `CondensedForm` (condensed); `Cliques`, `fronts`
+(multifrontal); `greedy_colours` (colouring).
+"""

@@ -1,4 +1,4 @@
-"""From contact points to the Delassus operator: the Jacobians of rigid sides, the compliance between elastic ones."""
+"""Assembly of Delassus operators: Jacobians of rigid sides, compliance between elastic ones."""
 
 from collections.abc import Sequence
 
@@ -18,7 +18,7 @@ __all__ = ["local_velocity", "mixed_delassus", "rigid_delassus", "world_impulse"
 
 
 def rigid_delassus(model: Model, state: State, contacts: Contacts, schedule: Schedule) -> RigidDelassus:
-    """W of contacts between rigid bodies, already in the order of the schedule.
+    """Return W of contacts between rigid bodies, already in the order of the schedule.
 
     Both bodies meet in one common point, half-way between their material points, so that equal and opposite
     impulses leave the angular momentum of the scene as it is, whatever the gap.
@@ -42,7 +42,7 @@ def mixed_delassus(
     compliance: Sequence[Compliance],
     elastic_scale: bool = False,
 ) -> MixedDelassus:
-    """W of the contacts at the configuration of `state`: condense each deformable body on its contact sides.
+    """Return W of the contacts at the configuration of `state`; condense each deformable body on its contact sides.
 
     With `elastic_scale`, r and u are measured against the elastic part of W alone. In steps so long that nothing but
     friction holds a stone back, W is nearly all rigid motion, and forces inside the joints would not count.
@@ -70,7 +70,7 @@ def mixed_delassus(
 
 
 def _rigid_share(model: Model, state: State, contacts: Contacts, kind: Ints) -> Array:
-    """The part of W_αα (nc, 3, 3) that is the motion of elastic stones as a whole, where a side is elastic."""
+    """Return the part of W_αα (nc, 3, 3) that is the motion of elastic stones as a whole, where a side is elastic."""
     point = (contacts.weights @ state.node).reshape(-1, 2, 3)
     jacobian, response = _rigid_sides(model.flight, state, contacts, point - state.centre[contacts.bodies])
     share: Array = np.where((kind == ELASTIC)[..., None, None], jacobian @ response, 0.0).sum(axis=1)
@@ -78,7 +78,7 @@ def _rigid_share(model: Model, state: State, contacts: Contacts, kind: Ints) -> 
 
 
 def _rigid_sides(inertia: RigidInertia, state: State, contacts: Contacts, arm: Array) -> tuple[Array, Array]:
-    """Jacobians (nc, 2, 3, 6) and responses (nc, 2, 6, 3) of sides by rigid motion; without inverse mass, none.
+    """Return Jacobians (nc, 2, 3, 6) and responses (nc, 2, 6, 3) of rigid sides; zero responses without inverse mass.
 
     `arm` (nc, 2, 3) from the centres of mass, world axes [m].
     """
@@ -92,7 +92,7 @@ def _rigid_sides(inertia: RigidInertia, state: State, contacts: Contacts, arm: A
 
 
 def _slots(body: Ints, kind: Ints, bodies: int) -> tuple[Ints, Ints, Ints]:
-    """How many elastic sides each body has, the place of each side among them, and the sides body by body."""
+    """Return the number of elastic sides of each body, the place of each side among them, and the sides by body."""
     flat_body, elastic = body.ravel(), kind.ravel() == ELASTIC
     count = np.bincount(flat_body[elastic], minlength=bodies)
     order = np.flatnonzero(elastic)[np.argsort(flat_body[elastic], kind="stable")]
@@ -105,7 +105,7 @@ def _slots(body: Ints, kind: Ints, bodies: int) -> tuple[Ints, Ints, Ints]:
 def _compliance_block(
     model: Model, state: State, contacts: Contacts, b: int, sides: Ints, compliance: Compliance
 ) -> Array:
-    """T C Tᵀ of one body: C between the nodes that its contact sides touch, T their weights in local frames."""
+    """Return T C Tᵀ of one body: C between the nodes that its contact sides touch, T their weights in local frames."""
     weights = contacts.weights[sides]
     nodes, column = np.unique(weights.indices, return_inverse=True)
     turn = contacts.frame[sides // 2] @ state.rotation[b]
@@ -125,7 +125,7 @@ def _compliance_block(
 def local_velocity(
     contacts: Contacts, operator: RigidDelassus | MixedDelassus, velocity: Array, node_velocity: Array
 ) -> Array:
-    """Relative velocity u = Hᵀ v (nc, 3) of the contacts, local frame [m/s]."""
+    """Return the relative velocity u = Hᵀ v (nc, 3) of the contacts, local frame [m/s]."""
     if isinstance(operator, RigidDelassus):
         return operator.relative_velocity(velocity)
     rigid = np.einsum("csij,csj->csi", operator.jacobian, velocity[contacts.bodies])
@@ -136,6 +136,6 @@ def local_velocity(
 
 
 def world_impulse(contacts: Contacts, impulse: Array) -> Array:
-    """Impulses (nc, 3) on the candidates, world axes [N s]."""
+    """Return impulses (nc, 3) on the candidates, world axes [N s]."""
     world: Array = np.einsum("cij,ci->cj", contacts.frame, impulse)
     return world

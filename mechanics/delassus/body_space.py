@@ -1,54 +1,35 @@
-"""W between rigid bodies, ready to be factorised: six velocities for each body that moves."""
+"""Form of W between rigid bodies for methods that factorise: six velocities for each body that moves."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import block_diag, coo_array, csc_array, csr_array
 from scipy.sparse.linalg import SuperLU, splu
 
 from mechanics.arrays import Array, Ints
 from mechanics.delassus._kernels import bodies as kernel
-from mechanics.problem.problem import SparseForm
+from mechanics.delassus._kernels.rigid import apply
+from mechanics.problem.forms import SparseForm
+from mechanics.problem.problem import RigidContacts
 from moma.errors import SolverError
 
 __all__ = ["BodyForm", "scaled_frames"]
 
 
-# rounds of refinement, and the change of velocities, of what they are, that is rounding alone
-_ROUNDS, _ROUNDING = 2, 1e-14
-# a pivot this much smaller than the largest of its column is still taken: the order of elimination stays
+# rounds of refinement, at most
+_ROUNDS = 2
+# change of velocities, over their size, that is rounding alone [-]
+_ROUNDING = 1e-14
+# smallest pivot over the largest of its column that is still taken, so that the order of elimination stays [-]
 _THRESHOLD = 0.01
-
-
-@dataclass(frozen=True)
-class _Pattern:
-    """Where the 6 × 6 blocks of M + H Θ⁻¹ Hᵀ are, bodies in the order of their elimination.
-
-    Attributes
-    ----------
-    mass : (nm, 6, 6) M [kg], [kg m²]
-    side : (nc, 2) place of each contact's bodies in that order, -1: does not move
-    indptr, indices : of the matrix by columns
-    own : (nm,) the block of each body on the diagonal
-    block : (nc, 2, 2) the blocks of each contact
-    start, stride : of each block, where it begins among the values and how far apart its columns are
-    """
-
-    mass: Array
-    side: Ints
-    indptr: NDArray[np.int32]
-    indices: NDArray[np.int32]
-    own: Ints
-    block: Ints
-    start: Ints
-    stride: Ints
+# largest part of the right side that a solution may leave [-]
+_LOST = 1e-9
 
 
 class BodyForm(SparseForm):
-    """W as Hᵀ M⁻¹ H. With (W + Θ) r = b,
+    """Elimination on bodies for W = Hᵀ M⁻¹ H. With (W + Θ) r = b,
 
         (M + H Θ⁻¹ Hᵀ) v = H Θ⁻¹ b,     r = Θ⁻¹ (b - Hᵀ v)
 
@@ -58,28 +39,24 @@ class BodyForm(SparseForm):
 
     Parameters
     ----------
-    body : (nc, 2) candidate and antagonist
-    geometry : (nc, 15) frames and lever arms, as in `RigidDelassus`
-    inertia : (nb, 7) inverse mass and inverse inertia, as there
+    contacts : frames, lever arms and inverse inertias
     """
 
-    def __init__(self, body: Ints, geometry: Array, inertia: Array) -> None:
-        self._body, self._geometry = body, np.ascontiguousarray(geometry)
+    def __init__(self, contacts: RigidContacts) -> None:
+        self._contacts = contacts._replace(geometry=np.ascontiguousarray(contacts.geometry))
+        inertia = contacts.inertia
         self._moving = np.flatnonzero(inertia[:, 0] > 0)
         upper = inertia[self._moving][:, [1, 2, 3, 2, 4, 5, 3, 5, 6]].reshape(-1, 3, 3)
         self._mass = np.zeros((len(self._moving), 6, 6))
         self._mass[:, [0, 1, 2], [0, 1, 2]] = 1.0 / inertia[self._moving, :1]
         self._mass[:, 3:, 3:] = np.linalg.inv(upper)
-        self._bodies = len(inertia)
-        self._factors = {}
         self._relaxed: dict[float, Callable[[Array], Array]] = {}
 
     def scaled(self, unit: Array) -> "BodyForm":
-        """D W D with the units (nc,) on the diagonal of D; the pattern is shared."""
+        """Return D W D with the units (nc,) on the diagonal of D; the pattern is shared."""
         other = BodyForm.__new__(BodyForm)
-        other._body, other._geometry = self._body, scaled_frames(self._geometry, unit)
-        other._moving, other._mass, other._bodies = self._moving, self._mass, self._bodies
-        other._factors, other._relaxed = {}, {}
+        other._contacts = self._contacts._replace(geometry=scaled_frames(self._contacts.geometry, unit))
+        other._moving, other._mass, other._relaxed = self._moving, self._mass, {}
         other.__dict__["_pattern"] = self._pattern
         return other
 
@@ -91,9 +68,9 @@ class BodyForm(SparseForm):
     @cached_property
     def across(self) -> "csr_array[np.float64]":
         """Hᵀ (3 nc, 6 nm)."""
-        place = self._places(self._moving)[self._body]
-        frame = self._geometry[:, None, :9].reshape(-1, 1, 3, 3)
-        arm = self._geometry[:, 9:].reshape(-1, 2, 1, 3)
+        place = self._places(self._moving)[self._contacts.body]
+        frame = self._contacts.geometry[:, None, :9].reshape(-1, 1, 3, 3)
+        arm = self._contacts.geometry[:, 9:].reshape(-1, 2, 1, 3)
         # row · (ω × arm) = (arm × row) · ω
         rows = np.concatenate([np.broadcast_to(frame, (*arm.shape[:2], 3, 3)), np.cross(arm, frame)], axis=-1)
         rows[:, 1] *= -1.0
@@ -109,17 +86,17 @@ class BodyForm(SparseForm):
         return csc_array(self.across.T)
 
     def _places(self, order: Ints) -> Ints:
-        place = np.full(self._bodies, -1)
+        place = np.full(len(self._contacts.inertia), -1)
         place[order] = np.arange(len(order))
         return place
 
     @cached_property
-    def _pattern(self) -> _Pattern:
-        own = self._places(self._moving)[self._body]
+    def _pattern(self) -> kernel.Pattern:
+        own = self._places(self._moving)[self._contacts.body]
         pairs = own[(own >= 0).all(axis=1)]
         rank = _least_degree(pairs, len(self._moving))
         order = self._moving[np.argsort(rank)]
-        side, count = np.ascontiguousarray(self._places(order)[self._body]), len(order)
+        side, count = np.ascontiguousarray(self._places(order)[self._contacts.body]), len(order)
         row = np.concatenate([np.arange(count), rank[pairs[:, 0]], rank[pairs[:, 1]]])
         column = np.concatenate([np.arange(count), rank[pairs[:, 1]], rank[pairs[:, 0]]])
         key = np.unique(column * count + row)
@@ -134,7 +111,7 @@ class BodyForm(SparseForm):
         inside = np.arange(indptr[-1]) - np.repeat(indptr[:-1], lengths)
         indices = rows[np.repeat(spread.ravel(), lengths) + inside]
         both = side[:, None, :] * count + side[:, :, None]
-        return _Pattern(
+        return kernel.Pattern(
             self._mass[np.argsort(rank)],
             side,
             indptr.astype(np.int32),
@@ -145,28 +122,40 @@ class BodyForm(SparseForm):
             6 * height[column],
         )
 
-    def shifted(self, theta: Array) -> Callable[[Array], Array]:
-        """(W + Θ)⁻¹ as a function of b (3 nc,); `theta` (nc, 3, 3), invertible, not always symmetric [1/kg].
+    def shifted(self, theta: Array, exact: bool = True) -> Callable[[Array], Array]:
+        """Return (W + Θ)⁻¹ as a function of b (3 nc,); `theta` (nc, 3, 3), invertible, not always symmetric [1/kg].
+
+        Elimination on bodies loses accuracy where parts of Θ are next to nothing beside others; `exact` checks each
+        solution, and where it lacks more than rounding takes that of the larger system of velocities and impulses.
 
         Raises
         ------
         SolverError : if Θ or the whole is singular
         """
-        return self._factorised(theta, _THRESHOLD).refined
+        quick = self._factorised(theta, _THRESHOLD).refined
+        if not exact:
+            return quick
+
+        def solve(b: Array) -> Array:
+            x = quick(b)
+            r = x.reshape(theta.shape[:2])
+            left = b - (apply(r, self._contacts) + np.einsum("cij,cj->ci", theta, r)).ravel()
+            if np.linalg.norm(left) <= _LOST * np.linalg.norm(b):
+                return x
+            return super(BodyForm, self).shifted(theta)(b)
+
+        return solve
 
     def relaxed(self, sigma: float) -> Callable[[Array], Array]:
-        """(W/σ + 1)⁻¹ as a function of b (3 nc,); its factors are kept for the next call."""
+        """Return (W/σ + 1)⁻¹ as a function of b (3 nc,); its factors are kept for the next call."""
         if sigma not in self._relaxed:
-            factors = self._factorised(np.tile(sigma * np.eye(3), (len(self._body), 1, 1)), 0.0)
+            factors = self._factorised(np.tile(sigma * np.eye(3), (len(self._contacts.body), 1, 1)), 0.0)
             self._relaxed[sigma] = lambda b: factors.once(sigma * b.reshape(-1, 3))[1].ravel()
         return self._relaxed[sigma]
 
     def _factorised(self, theta: Array, threshold: float) -> "_Factors":
         pattern, soft = self._pattern, kernel.inverses(theta)
-        values = kernel.assemble(
-            pattern.side, self._geometry, soft, pattern.mass, pattern.own, pattern.block,
-            pattern.start, pattern.stride, len(pattern.indices),
-        )  # fmt: skip
+        values = kernel.assemble(pattern, self._contacts.geometry, soft)
         if not np.isfinite(values).all():
             raise SolverError("Θ is singular", where="solver", remedy="use another method")
         size = 6 * len(pattern.mass)
@@ -180,28 +169,28 @@ class BodyForm(SparseForm):
             )
         except RuntimeError as error:
             raise SolverError("W + Θ is singular", where="solver", remedy="use another method") from error
-        return _Factors(pattern, self._geometry, theta, soft, lu)
+        return _Factors(pattern, self._contacts.geometry, theta, soft, lu)
 
 
 @dataclass(frozen=True)
 class _Factors:
-    """Factors of M + H Θ⁻¹ Hᵀ, and what W + Θ is made of."""
+    """Factors of M + H Θ⁻¹ Hᵀ, and the parts of W + Θ."""
 
-    pattern: _Pattern
+    pattern: kernel.Pattern
     geometry: Array
     theta: Array
     soft: Array
     lu: SuperLU
 
     def once(self, b: Array) -> tuple[Array, Array]:
-        """v (nm, 6) and r (nc, 3) for one b (nc, 3), as the factors give them."""
+        """Return v (nm, 6) and r (nc, 3) for one b (nc, 3), as the factors give them."""
         side = self.pattern.side
         load = kernel.pushed(self.soft, b, side, self.geometry, len(self.pattern.mass))
         v = self.lu.solve(load.ravel()).reshape(-1, 6)
         return v, kernel.softened(self.soft, b, v, side, self.geometry)
 
     def refined(self, b: Array) -> Array:
-        """(W + Θ)⁻¹ b (3 nc,)."""
+        """Return (W + Θ)⁻¹ b (3 nc,)."""
         side, mass, wanted = self.pattern.side, self.pattern.mass, b.reshape(-1, 3)
         v, r = self.once(wanted)
         for _ in range(_ROUNDS):
@@ -217,19 +206,19 @@ class _Factors:
 
 
 def scaled_frames(geometry: Array, unit: Array) -> Array:
-    """Geometry (nc, 15) with each frame in a unit (nc,) of its own: W becomes D W D."""
+    """Return the geometry (nc, 15) with each frame in a unit (nc,) of its own: W becomes D W D."""
     scaled = geometry.copy()
     scaled[:, :9] *= unit[:, None]
     return scaled
 
 
 def _least_degree(pairs: Ints, count: int) -> Ints:
-    """Rank (count,) of each body when those with the fewest neighbours left are eliminated first (SuperLU's order)."""
+    """Return the rank (count,) of each body in SuperLU's order of least degree: fewest neighbours left, first out."""
     ones, each = np.ones(len(pairs)), np.arange(count)
     row, column = np.concatenate([pairs[:, 0], each]), np.concatenate([pairs[:, 1], each])
     graph = coo_array((np.concatenate([ones, np.zeros(count)]), (row, column)), shape=(count, count)).tocsc()
     graph = graph + graph.T
-    # dominant, so that nothing is exchanged
+    # diagonally dominant, so that no rows are exchanged
     graph.setdiag(graph.sum(axis=0) + 1.0)
     lu = splu(
         csc_array(graph), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}

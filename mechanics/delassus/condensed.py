@@ -1,9 +1,10 @@
-"""W between contacts, ready to be factorised: bodies are condensed on their contacts."""
+"""Form of W between contacts for methods that factorise: bodies are condensed on their contacts."""
 
 from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse import coo_array, csc_array
 
 from mechanics.arrays import Array, Ints
 from mechanics.delassus.multifrontal import Cliques, Fronts, fronts
@@ -14,35 +15,43 @@ __all__ = ["CondensedForm"]
 class CondensedForm:
     """W + Θ, factorised by stones; where stones have more nodes than contacts, far smaller than a system of nodes.
 
-    Attributes
-    ----------
-    cliques : W as a sum of blocks
-
     Parameters
     ----------
     bodies : (nc, 2) of each contact
-    cliques : as above
+    cliques : W as a sum of blocks
     """
 
     def __init__(self, bodies: Ints, cliques: Cliques) -> None:
-        self._bodies, self.cliques = bodies, cliques
+        self._bodies, self._cliques = bodies, cliques
         self._relaxed: dict[float, Callable[[Array], Array]] = {}
+
+    @property
+    def matrix(self) -> "csc_array[np.float64]":
+        """W (3 nc, 3 nc) [1/kg]."""
+        row, column, value = [], [], []
+        for contacts, block in zip(self._cliques.contacts, self._cliques.blocks, strict=True):
+            place = (3 * contacts[:, None] + np.arange(3)).ravel()
+            row.append(np.repeat(place, len(place)))
+            column.append(np.tile(place, len(place)))
+            value.append(block.ravel())
+        index, size = (np.concatenate(row), np.concatenate(column)), 3 * len(self._bodies)
+        return csc_array(coo_array((np.concatenate(value), index), shape=(size, size)))
 
     @cached_property
     def _fronts(self) -> Fronts:
-        return fronts(self._bodies, self.cliques.contacts)
+        return fronts(self._bodies, self._cliques.contacts)
 
-    def shifted(self, theta: Array) -> Callable[[Array], Array]:
-        """(W + Θ)⁻¹ as a function of b (3 nc,); `theta` (nc, 3, 3), not always symmetric [1/kg].
+    def shifted(self, theta: Array, exact: bool = True) -> Callable[[Array], Array]:
+        """Return (W + Θ)⁻¹ as a function of b (3 nc,); `theta` (nc, 3, 3), not always symmetric [1/kg].
 
         Raises
         ------
         SolverError : if W + Θ is singular
         """
-        return self._fronts.factorise(self.cliques, theta).solve
+        return self._fronts.factorise(self._cliques, theta).solve
 
     def relaxed(self, sigma: float) -> Callable[[Array], Array]:
-        """(W/σ + 1)⁻¹ as a function of b (3 nc,); its factors are kept for the next call."""
+        """Return (W/σ + 1)⁻¹ as a function of b (3 nc,); its factors are kept for the next call."""
         if sigma not in self._relaxed:
             solve = self.shifted(np.tile(sigma * np.eye(3), (len(self._bodies), 1, 1)))
             self._relaxed[sigma] = lambda b: solve(sigma * b)

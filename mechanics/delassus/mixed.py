@@ -1,22 +1,18 @@
-"""W of rigid and deformable bodies together: rigid sides by their Jacobians, deformable ones by dense blocks."""
+"""Delassus operator of rigid and deformable bodies: rigid sides by Jacobians, deformable ones by dense blocks."""
 
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechanics.arrays import Array, Ints
-from mechanics.delassus._kernels.mixed import apply_delassus, sweep
+from mechanics.delassus._kernels.mixed import ELASTIC, NONE, RIGID, Sides, apply_delassus, sweep
 from mechanics.delassus.condensed import CondensedForm
 from mechanics.delassus.multifrontal import Cliques
-from mechanics.problem._kernels import local_factors
-from mechanics.problem.problem import GaussSeidel
+from mechanics.problem._kernels import Laws, local_factors
+from mechanics.problem.problem import GaussSeidel, ScaledDelassus
 
 __all__ = ["ELASTIC", "NONE", "RIGID", "MixedDelassus"]
-
-
-NONE, RIGID, ELASTIC = 0, 1, 2
 
 
 @dataclass(frozen=True)
@@ -37,7 +33,7 @@ class MixedDelassus:
     bptr : (nb+1,) where each body's compliance block begins
     block : flat symmetric compliance blocks of the elastic bodies, between their contact sides [1/kg]
     diagonal : (nc, 3, 3) W_αα [1/kg]
-    scale : what u over r is measured against [1/kg]
+    scale : reference against which u is measured over r [1/kg]
     """
 
     body: Ints
@@ -51,23 +47,27 @@ class MixedDelassus:
     diagonal: Array
     scale: float
 
-    @property
-    def _arrays(self) -> tuple[NDArray[np.generic], ...]:
-        return self.body, self.kind, self.jacobian, self.response, self.slot, self.yptr, self.bptr, self.block
+    rigid = None
+
+    @cached_property
+    def _sides(self) -> Sides:
+        return Sides(
+            self.body, self.kind, self.jacobian, self.response, self.slot, self.yptr, self.bptr, self.block
+        )
 
     def apply(self, impulse: Array) -> Array:
-        """W r (nc, 3) [m/s]."""
-        velocity: Array = apply_delassus(impulse, *self._arrays)[0]
+        """Return W r (nc, 3) [m/s]."""
+        velocity: Array = apply_delassus(impulse, self._sides)[0]
         return velocity
 
     def rigid_change(self, impulse: Array) -> Array:
-        """Velocities (nb, 6) that the impulses give to the rigid bodies [m/s, rad/s]."""
-        change: Array = apply_delassus(impulse, *self._arrays)[1]
+        """Return the velocities (nb, 6) that the impulses give to the rigid bodies [m/s, rad/s]."""
+        change: Array = apply_delassus(impulse, self._sides)[1]
         return change
 
     @cached_property
     def cliques(self) -> Cliques:
-        """W as a sum of blocks, one for each body that moves, between its contacts."""
+        """W as a sum of dense blocks, one for each body that moves, between its contacts."""
         contacts, blocks = [], []
         bodies = self.body.ravel()
         order = np.argsort(bodies, kind="stable")
@@ -88,18 +88,20 @@ class MixedDelassus:
         return Cliques(tuple(contacts), tuple(blocks))
 
     @cached_property
-    def sparse(self) -> CondensedForm:
+    def form(self) -> CondensedForm:
         """W for methods that factorise."""
         return CondensedForm(self.body, self.cliques)
 
+    def scaled(self, unit: Array) -> ScaledDelassus:
+        """Return D W D with the units (nc,) of the contacts on the diagonal of D."""
+        return ScaledDelassus(self, unit)
+
     def gauss_seidel(self, shift: Array, friction: Array, cohesion: Array) -> GaussSeidel:
-        """Sweeps forth and back; running velocities are made anew on each call, so that rounding cannot pile up."""
-        factors = local_factors(self.diagonal)
+        """Return sweeps forth and back; running velocities are computed afresh on each call, against rounding."""
+        laws = Laws(shift, friction, cohesion, local_factors(self.diagonal))
 
         def sweeps(impulse: Array, count: int) -> None:
-            _, v, y = apply_delassus(impulse, *self._arrays)
-            sweep(
-                count, True, impulse, v, y, shift, friction, cohesion, factors, self.diagonal, *self._arrays
-            )
+            _, v, y = apply_delassus(impulse, self._sides)
+            sweep(count, impulse, v, y, laws, self.diagonal, self._sides)
 
         return sweeps

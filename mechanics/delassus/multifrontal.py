@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dgetrf, dgetrs
 
 from mechanics.arrays import Array, Ints
-from mechanics.delassus._kernels.fronts import add_into, solve
+from mechanics.delassus._kernels.fronts import Layout, add_into, solve
 from moma.errors import SolverError
 
 __all__ = ["Cliques", "Factors", "Fronts", "fronts"]
@@ -36,48 +36,41 @@ class Cliques:
 
 @dataclass(frozen=True)
 class Fronts:
-    """In which order to eliminate, and what meets in each front; the same for all matrices of one pattern.
+    """Order of elimination and contents of each front; the same for all matrices of one pattern.
 
     Attributes
     ----------
-    order : (nf,) groups of contacts as they are eliminated
-    width : (nf,) pivots of each front, three for each contact of its group
-    dptr, dof : unknowns of each front, pivots first, the others in the order of their elimination
-    fptr, pptr : (nf+1,) where the factors and the row exchanges of each front begin
+    layout : order, unknowns of each front, and places of its factors
     cliques : of each front, the cliques that are assembled there, and where their unknowns lie in the front
     children : of each front, the fronts whose updates it takes in, and where their unknowns lie in it
     """
 
-    order: Ints
-    width: Ints
-    dptr: Ints
-    dof: Ints
-    fptr: Ints
-    pptr: Ints
+    layout: Layout
     cliques: tuple[tuple[tuple[int, Ints, Ints], ...], ...]
     children: tuple[tuple[tuple[int, Ints], ...], ...]
 
     @property
     def size(self) -> int:
-        """Numbers in the factors."""
-        return int(self.fptr[-1])
+        """Number of entries of the factors."""
+        return int(self.layout.fptr[-1])
 
     def factorise(self, cliques: Cliques, theta: Array) -> "Factors":
-        """Factors of W + Θ; `theta` (nc, 3, 3) blocks on its diagonal.
+        """Factorise W + Θ; `theta` (nc, 3, 3) blocks on its diagonal.
 
         Raises
         ------
         SolverError : if W + Θ is singular
         """
-        factor, pivots = np.empty(self.size), np.empty(int(self.pptr[-1]), dtype=np.int32)
+        layout = self.layout
+        factor, pivots = np.empty(self.size), np.empty(int(layout.pptr[-1]), dtype=np.int32)
         updates: dict[int, Array] = {}
-        for f in self.order:
-            front, k = self._assembled(int(f), cliques, theta, updates), int(self.width[f])
-            m, at = len(front) - k, int(self.fptr[f])
+        for f in layout.order:
+            front, k = self._assembled(int(f), cliques, theta, updates), int(layout.width[f])
+            m, at = len(front) - k, int(layout.fptr[f])
             lu, exchanged, failed = dgetrf(front[:k, :k])
             if failed:
                 raise SolverError("W + Θ is singular", where="solver", remedy="use another method")
-            pivots[self.pptr[f] : self.pptr[f + 1]] = exchanged
+            pivots[layout.pptr[f] : layout.pptr[f + 1]] = exchanged
             factor[at : at + k * k] = lu.T.ravel()
             if m:
                 across, _ = dgetrs(lu, exchanged, front[:k, k:])
@@ -88,14 +81,15 @@ class Fronts:
         return Factors(self, factor, pivots)
 
     def _assembled(self, f: int, cliques: Cliques, theta: Array, updates: dict[int, Array]) -> Array:
-        unknown = self.dof[self.dptr[f] : self.dptr[f + 1]]
+        layout = self.layout
+        unknown = layout.dof[layout.dptr[f] : layout.dptr[f + 1]]
         front = np.zeros((len(unknown), len(unknown)), order="F")
         for clique, own, place in self.cliques[f]:
             add_into(front, place, own, cliques.blocks[clique])
         for child, place in self.children[f]:
             update = updates.pop(child)
             add_into(front, place, np.arange(len(update)), update)
-        diagonal = theta[unknown[: self.width[f] : 3] // 3]
+        diagonal = theta[unknown[: layout.width[f] : 3] // 3]
         first = 3 * np.arange(len(diagonal))
         for i in range(3):
             for j in range(3):
@@ -112,9 +106,9 @@ class Factors:
     pivots: NDArray[np.int32]
 
     def solve(self, b: Array) -> Array:
-        """(W + Θ)⁻¹ b for one right-hand side (3 nc,)."""
-        own, x = self.fronts, b.copy()
-        solve(x, own.order, own.width, own.dptr, own.dof, own.fptr, own.pptr, self.pivots, self.factor)
+        """Return (W + Θ)⁻¹ b for one right-hand side (3 nc,)."""
+        x = b.copy()
+        solve(x, self.fronts.layout, self.pivots, self.factor)
         return x
 
 
@@ -143,16 +137,15 @@ def fronts(pairs: Ints, cliques: Sequence[Ints]) -> Fronts:
             parent = later[f][0]
             children[parent].append((int(f), _places(unknowns[parent], unknowns[f][3 * size[f] :])))
     lengths = np.array([len(u) for u in unknowns], dtype=np.int64)
-    return Fronts(
+    layout = Layout(
         order=order,
         width=3 * size,
         dptr=np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64),
         dof=np.concatenate([np.zeros(0, dtype=np.int64), *unknowns]),
         fptr=np.concatenate([[0], np.cumsum(3 * size * (2 * lengths - 3 * size))]).astype(np.int64),
         pptr=np.concatenate([[0], np.cumsum(3 * size)]).astype(np.int64),
-        cliques=tuple(map(tuple, own)),
-        children=tuple(map(tuple, children)),
     )
+    return Fronts(layout, tuple(map(tuple, own)), tuple(map(tuple, children)))
 
 
 def _unknowns(members: Sequence[Ints]) -> Ints:
@@ -162,14 +155,14 @@ def _unknowns(members: Sequence[Ints]) -> Ints:
 
 
 def _places(front: Ints, unknowns: Ints) -> Ints:
-    """Where each of the unknowns lies in a front."""
+    """Return the place of each of the unknowns in a front."""
     order = np.argsort(front)
     places: Ints = order[np.searchsorted(front, unknowns, sorter=order)]
     return places
 
 
 def _least_degree(count: int, size: Ints, around: Sequence[Ints]) -> tuple[Ints, list[list[int]]]:
-    """Elimination order of least external degree, counted in contacts, and the groups left in each front, in order."""
+    """Return the order of least external degree, counted in contacts, and the groups left in each front, in order."""
     adjacent: list[set[int]] = [set() for _ in range(count)]
     for groups in around:
         for g in groups.tolist():

@@ -1,4 +1,4 @@
-"""W between rigid bodies, matrix-free: 15 numbers for each contact, 7 for each body."""
+"""Delassus operator between rigid bodies, matrix-free: 15 numbers for each contact, 7 for each body."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -9,21 +9,22 @@ import numpy as np
 from mechanics.arrays import Array, Bools, Ints
 from mechanics.delassus._kernels import rigid as kernel
 from mechanics.delassus.body_space import BodyForm, scaled_frames
-from mechanics.problem.problem import GaussSeidel
-from mechanics.solvers.first_order.colouring import greedy_colours
+from mechanics.delassus.colouring import greedy_colours
+from mechanics.problem._kernels import Laws
+from mechanics.problem.problem import GaussSeidel, RigidContacts, mean_diagonal
 
 __all__ = ["RigidDelassus", "Schedule", "schedule"]
 
 
-# fewer contacts than this are swept in their own order by one thread: there is nothing to win from more
+# fewer contacts are swept in their own order by one thread: more threads would gain nothing
 _WORTH_COLOURS = 2000
-# of the largest shift: contacts between bodies whose velocities change less than this sleep until they change more
+# change of a body's velocity, over the largest shift, below which its contacts sleep [-]
 _CALM = 1e-9
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """In which order contacts are swept; it depends on the contacts alone, never on the number of threads.
+    """Order of the sweeps; it depends on the contacts alone, never on the number of threads.
 
     Attributes
     ----------
@@ -71,12 +72,9 @@ class RigidDelassus:
 
     Attributes
     ----------
-    body : (nc, 2) candidate and antagonist
-    geometry : (nc, 15) rows n, t1, t2 of the frame, then the lever arms from the two centres of mass [m], world axes
-    inertia : (nb, 7) inverse mass [1/kg], upper triangle of the inverse inertia [1/(kg m²)], world axes; zero for
-        bodies that no impulse moves
+    body, geometry, inertia : as in `RigidContacts`
     schedule : order of the sweeps
-    threads : that may sweep at once, at most; the result is the same to the last bit
+    threads : largest number of threads that sweep at once; the result is the same to the last bit
     """
 
     body: Ints
@@ -86,10 +84,20 @@ class RigidDelassus:
     threads: int = 1
 
     @cached_property
+    def rigid(self) -> RigidContacts:
+        """Contacts in terms of rigid bodies."""
+        return RigidContacts(self.body, self.geometry, self.inertia)
+
+    @cached_property
     def diagonal(self) -> Array:
         """W_αα (nc, 3, 3) [1/kg]."""
-        blocks: Array = kernel.diagonals(self.body, self.geometry, self.inertia)
+        blocks: Array = kernel.diagonals(self.rigid)
         return blocks
+
+    @cached_property
+    def scale(self) -> float:
+        """Mean diagonal of W [1/kg]."""
+        return mean_diagonal(self.diagonal)
 
     @cached_property
     def _factors(self) -> Array:
@@ -97,52 +105,51 @@ class RigidDelassus:
         return factors
 
     def apply(self, impulse: Array) -> Array:
-        """W r (nc, 3) [m/s]."""
-        velocity: Array = kernel.apply(impulse, self.body, self.geometry, self.inertia)
+        """Return W r (nc, 3) [m/s]."""
+        velocity: Array = kernel.apply(impulse, self.rigid)
         return velocity
 
     def rigid_change(self, impulse: Array) -> Array:
-        """Velocities (nb, 6) that the impulses give to the bodies [m/s, rad/s]."""
-        change: Array = kernel.velocity_change(impulse, self.body, self.geometry, self.inertia)
+        """Return the velocities (nb, 6) that the impulses give to the bodies [m/s, rad/s]."""
+        change: Array = kernel.velocity_change(impulse, self.rigid)
         return change
 
     def relative_velocity(self, velocity: Array) -> Array:
-        """u (nc, 3) of the bodies' velocities (nb, 6) [m/s]."""
-        relative: Array = kernel.relative_velocity(velocity, self.body, self.geometry)
+        """Return u (nc, 3) of the bodies' velocities (nb, 6) [m/s]."""
+        relative: Array = kernel.relative_velocity(velocity, self.rigid)
         return relative
 
     @cached_property
-    def sparse(self) -> BodyForm:
-        """The same W for methods that factorise: six velocities for each body that moves, world axes."""
-        return BodyForm(self.body, self.geometry, self.inertia)
+    def form(self) -> BodyForm:
+        """W for methods that factorise: six velocities for each body that moves, world axes."""
+        return BodyForm(self.rigid)
 
     def scaled(self, unit: Array) -> "RigidDelassus":
-        """D W D with the units (nc,) of the contacts on the diagonal of D; what is known for factors is shared."""
+        """Return D W D with the units (nc,) of the contacts on the diagonal of D; the pattern of factors is shared."""
         other = replace(self, geometry=scaled_frames(self.geometry, unit))
-        # the kernel for the diagonal takes frames for what they are: of length one
+        # the kernel of the diagonal takes frames to be of length one
         other.__dict__["diagonal"] = self.diagonal * (unit**2)[:, None, None]
-        other.__dict__["sparse"] = self.sparse.scaled(unit)
+        other.__dict__["form"] = self.form.scaled(unit)
         return other
 
     def gauss_seidel(self, shift: Array, friction: Array, cohesion: Array) -> GaussSeidel:
-        """Sweeps in the order of the schedule; the same bits for any number of threads.
+        """Return sweeps in the order of the schedule; the same bits for any number of threads.
 
         Each call visits every contact at least once; those whose bodies hardly change then sleep until these do. The
-        running velocities are made anew on each call, so that rounding cannot pile up.
+        running velocities are computed afresh on each call, so that rounding cannot accumulate.
         """
-        # what opens needs no impulse, however fast
+        # contacts that open need no impulse, however fast
         calm = _CALM * max(float(np.abs(shift[:, 1:]).max(initial=0.0)), float(-shift[:, 0].min(initial=0.0)))
         threads = min(self.threads, numba.config.NUMBA_NUM_THREADS)
-        parallel = len(self.schedule.colour) > 2 and threads > 1
+        laws, plan = Laws(shift, friction, cohesion, self._factors), self.schedule
 
         def sweeps(impulse: Array, count: int) -> None:
-            change = self.rigid_change(impulse)
-            data = (count, calm, impulse, change, shift, friction, cohesion, self._factors, self.body)
-            more = (self.geometry, self.inertia, self.schedule.group)
-            if parallel:
+            path, seen = np.zeros(len(self.inertia)), np.full((len(plan.group) - 1, 2), -np.inf)
+            running = kernel.Running(impulse, self.rigid_change(impulse), path, seen)
+            if len(plan.colour) > 2 and threads > 1:
                 numba.set_num_threads(threads)
-                kernel.sweep_parallel(*data, *more, self.schedule.colour)
+                kernel.sweep_parallel(count, calm, running, laws, self.rigid, plan.group, plan.colour)
             else:
-                kernel.sweep(*data, *more)
+                kernel.sweep(count, calm, running, laws, self.rigid, plan.group)
 
         return sweeps

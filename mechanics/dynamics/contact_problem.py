@@ -66,9 +66,7 @@ def contact_problem(
     if max(float(np.abs(one).max(initial=0.0)) for one in (u_free, terms.bias)) < SMALLEST:
         # a motion that has died out is too slow for its squares to be numbers
         u_free, terms = np.zeros_like(u_free), replace(terms, bias=np.zeros_like(terms.bias))
-    problem = ContactProblem(
-        operator, u_free, terms.bias, terms.friction, terms.cohesion, lambda: operator.sparse, terms.adhesion
-    )
+    problem = ContactProblem(operator, u_free, terms.bias, terms.friction, terms.cohesion, terms.adhesion)
     return problem, approach
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 
 from mechanics.arrays import Array, Ints
+from mechanics.delassus.colouring import greedy_colours
 from mechanics.planar._kernels.sweep import (
     apply,
     diagonals,
@@ -17,8 +18,8 @@ from mechanics.planar._kernels.sweep import (
     sweep,
     velocity_change,
 )
-from mechanics.problem.problem import SparseForm
-from mechanics.solvers.first_order.colouring import greedy_colours
+from mechanics.problem.forms import SparseForm
+from mechanics.problem.problem import ScaledDelassus, mean_diagonal
 
 __all__ = ["PlanarDelassus", "PlanarGaussSeidel"]
 
@@ -46,6 +47,7 @@ class PlanarDelassus:
     lever: Array
     inertia: Array
     threads: int = 1
+    rigid = None
 
     @cached_property
     def diagonal(self) -> Array:
@@ -75,7 +77,17 @@ class PlanarDelassus:
         start = np.concatenate([[0], np.cumsum(np.bincount(colour))]).astype(np.int64)
         return np.argsort(colour, kind="stable"), start
 
-    def sparse(self) -> SparseForm:
+    @cached_property
+    def scale(self) -> float:
+        """Mean diagonal of W [1/kg]."""
+        return mean_diagonal(self.diagonal)
+
+    def scaled(self, unit: Array) -> ScaledDelassus:
+        """Return D W D with the units (nc,) of the contacts on the diagonal of D."""
+        return ScaledDelassus(self, unit)
+
+    @cached_property
+    def form(self) -> SparseForm:
         """The same W with sparse matrices: three velocities for each body that moves."""
         moving = np.flatnonzero(self.inertia[:, 0] > 0)
         place = np.full(len(self.inertia), -1)

@@ -195,7 +195,7 @@ class PlanarSimulation:
         acting = np.isfinite(terms.bias)
         # those that do not act are left out of what is solved
         bias = np.where(acting, terms.bias, 0.0)
-        problem = ContactProblem(operator, u_free, bias, terms.friction, terms.cohesion, operator.sparse)
+        problem = ContactProblem(operator, u_free, bias, terms.friction, terms.cohesion)
         return _Stated(problem, acting, approach, terms, law)
 
     def _operator(self, contacts: PlanarContacts) -> PlanarDelassus:
@@ -233,7 +233,6 @@ class PlanarSimulation:
             problem.bias[acting],
             problem.friction[acting],
             problem.cohesion[acting],
-            part_of.sparse,
         )
         part = self._solver(some, start=ContactStart(shifted[acting], start.velocity[acting]))
         impulse, velocity = np.zeros_like(shifted), np.zeros_like(shifted)

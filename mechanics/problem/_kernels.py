@@ -1,9 +1,14 @@
 """Numba kernels that every solver uses: the exact solution of one contact, and the natural map of all."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 __all__ = [
+    "Laws",
+    "LocalCompliance",
     "admm_right_side",
     "admm_update",
     "local_factors",
@@ -15,10 +20,52 @@ __all__ = [
 ]
 
 
+class Laws(NamedTuple):
+    """Laws of all contacts, as Gauss–Seidel sweeps need them.
+
+    Attributes
+    ----------
+    shift : (nc, 3) float64, u_free with the bias in its normal part [m/s]
+    friction, cohesion : (nc,) float64, μ [-] and k [N s]
+    factors : (nc, 16) float64 of `local_factors`, or (nc, 13) of rigid bodies
+    """
+
+    shift: NDArray[np.float64]
+    friction: NDArray[np.float64]
+    cohesion: NDArray[np.float64]
+    factors: NDArray[np.float64]
+
+
+class LocalCompliance(NamedTuple):
+    """W_αα of one contact for the search of its slip; A = W_TT - W_TN W_NT / W_NN [1/kg].
+
+    Attributes
+    ----------
+    nn, n1, n2 : W_NN and W_NT
+    cos, sin : rotation to the axes of A
+    first, second : eigenvalues of A
+    """
+
+    nn: float
+    n1: float
+    n2: float
+    cos: float
+    sin: float
+    first: float
+    second: float
+
+
 @njit(cache=True)
 def local_factors(diagonal):  # pragma: no cover - compiled
-    """Per contact what its local solve needs: W⁻¹ (9), W_NN, W_NT (2), and, of A = W_TT - W_TN W_NT / W_NN, the
-    rotation (cos, sin) to its axes and its eigenvalues. (nc, 16)
+    """Return the factors of the local solves: W⁻¹ (9), W_NN, W_NT (2), and rotation and eigenvalues of A.
+
+    Inputs
+    ------
+    diagonal : (nc, 3, 3) float64, W_αα [1/kg]
+
+    Outputs
+    -------
+    (nc, 16) float64, from the tenth on a `LocalCompliance`
     """
     nc = diagonal.shape[0]
     factors = np.empty((nc, 16))
@@ -36,7 +83,7 @@ def local_factors(diagonal):  # pragma: no cover - compiled
 
 @njit(cache=True)
 def plane_axes(a, b, d):  # pragma: no cover - compiled
-    """Rotation (cos, sin) to the axes of [[a, b], [b, d]], and its eigenvalues."""
+    """Return the rotation (cos, sin) to the axes of [[a, b], [b, d]], and its eigenvalues."""
     angle = 0.5 * np.arctan2(2.0 * b, a - d)
     co, si = np.cos(angle), np.sin(angle)
     return (
@@ -48,41 +95,54 @@ def plane_axes(a, b, d):  # pragma: no cover - compiled
 
 
 @njit(cache=True)
-def slip(nn, n1, n2, co, si, l1, l2, b0, b1, b2, mu, k, guess):  # pragma: no cover - compiled
-    """The impulse of one contact that neither sticks nor is without any load: r_N ≥ 0 and ‖r_T‖ = μ r_N + k.
+def slip(w, b, mu, k, guess):  # pragma: no cover - compiled
+    """Return the impulse of a contact that neither sticks nor is without any load: r_N ≥ 0 and ‖r_T‖ = μ r_N + k.
 
     Slip means u_T = -λ r_T with λ > 0, so r_T(λ) = -(A + λ)⁻¹ c and r_N(λ) = -(b_N + W_NT r_T)/W_NN. The value
     ‖r_T‖ - μ r_N⁺ - k changes its sign on (0, ∞), so the root is bracketed and Newton's method, kept inside the
     bracket, finds it, beginning at λ = `guess` if that is positive. Where it has no r_N > 0 there, cohesion is spent
     without pressure: r_N = 0 and ‖r_T‖ ≤ k.
+
+    Inputs
+    ------
+    w : LocalCompliance
+    b : three float64, u of the contact without its own impulse [m/s]
+    mu, k : float64, friction [-] and cohesion [N s]
+    guess : float64, λ [1/kg]
+
+    Outputs
+    -------
+    three float64, r [N s]
     """
-    if b0 < 0.0 or k > 0.0:
-        r0, r1, r2 = _slip_pressed(nn, n1, n2, co, si, l1, l2, b0, b1, b2, mu, k, guess)
-        if r0 > 0.0 or k == 0.0:
-            return r0, r1, r2
-    return _slip_unpressed(nn, n1, n2, co, si, l1, l2, b1, b2, k)
+    if b[0] < 0.0 or k > 0.0:
+        r = _slip_pressed(w, b, mu, k, guess)
+        if r[0] > 0.0 or k == 0.0:
+            return r
+    return _slip_unpressed(w, b, k)
 
 
 @njit(cache=True)
-def _slip_pressed(nn, n1, n2, co, si, l1, l2, b0, b1, b2, mu, k, guess):
+def _slip_pressed(w, b, mu, k, guess):
+    """Return the impulse of a contact that slips under pressure; zero where it would have to be pulled."""
     if mu == 0.0 and k == 0.0:
-        return -b0 / nn, 0.0, 0.0
-    c1, c2 = b1 - n1 * b0 / nn, b2 - n2 * b0 / nn
+        return -b[0] / w.nn, 0.0, 0.0
+    c1, c2 = b[1] - w.n1 * b[0] / w.nn, b[2] - w.n2 * b[0] / w.nn
+    co, si = w.cos, w.sin
     # in the axes of A
     x1, x2 = co * c1 + si * c2, -si * c1 + co * c2
-    m1, m2 = co * n1 + si * n2, -si * n1 + co * n2
-    t1, t2 = -x1 / l1, -x2 / l2
-    n = -(b0 + m1 * t1 + m2 * t2) / nn
+    m1, m2 = co * w.n1 + si * w.n2, -si * w.n1 + co * w.n2
+    t1, t2 = -x1 / w.first, -x2 / w.second
+    n = -(b[0] + m1 * t1 + m2 * t2) / w.nn
     if n <= 0.0 and t1 * t1 + t2 * t2 <= k * k:
         # even stuck it would have to be pulled
         return 0.0, 0.0, 0.0
     low, high = 0.0, -1.0
     lam = guess
     if not lam > 0.0:
-        lam = np.sqrt(x1 * x1 + x2 * x2) * nn / (mu * max(-b0, 0.0) + k * nn) * 0.5
+        lam = np.sqrt(x1 * x1 + x2 * x2) * w.nn / (mu * max(-b[0], 0.0) + k * w.nn) * 0.5
     for _ in range(100):
-        t1, t2 = -x1 / (l1 + lam), -x2 / (l2 + lam)
-        n = -(b0 + m1 * t1 + m2 * t2) / nn
+        t1, t2 = -x1 / (w.first + lam), -x2 / (w.second + lam)
+        n = -(b[0] + m1 * t1 + m2 * t2) / w.nn
         size = np.sqrt(t1 * t1 + t2 * t2)
         value = size - mu * max(n, 0.0) - k
         if value > 0.0:
@@ -91,10 +151,10 @@ def _slip_pressed(nn, n1, n2, co, si, l1, l2, b0, b1, b2, mu, k, guess):
             high = lam
         if abs(value) <= 1e-14 * (size + mu * abs(n) + k):
             break
-        d1, d2 = -t1 / (l1 + lam), -t2 / (l2 + lam)
+        d1, d2 = -t1 / (w.first + lam), -t2 / (w.second + lam)
         slope = (t1 * d1 + t2 * d2) / size
         if n > 0.0:
-            slope += mu * (m1 * d1 + m2 * d2) / nn
+            slope += mu * (m1 * d1 + m2 * d2) / w.nn
         trial = lam - value / slope if slope < 0.0 else -1.0
         if high < 0.0:
             lam = trial if trial > low else 4.0 * lam
@@ -110,16 +170,17 @@ def _slip_pressed(nn, n1, n2, co, si, l1, l2, b0, b1, b2, mu, k, guess):
 
 
 @njit(cache=True)
-def _slip_unpressed(nn, n1, n2, co, si, l1, l2, b1, b2, k):
-    """r_N = 0: stick tangentially, or slide against ‖r_T‖ = k."""
-    a = co * co * l1 + si * si * l2 + n1 * n1 / nn
-    b = co * si * (l1 - l2) + n1 * n2 / nn
-    d = si * si * l1 + co * co * l2 + n2 * n2 / nn
-    low, high, lam = 0.0, np.sqrt(b1 * b1 + b2 * b2) / k, 0.0
+def _slip_unpressed(w, b, k):
+    """Return the impulse at r_N = 0: stick tangentially, or slide against ‖r_T‖ = k."""
+    co, si = w.cos, w.sin
+    m11 = co * co * w.first + si * si * w.second + w.n1 * w.n1 / w.nn
+    m12 = co * si * (w.first - w.second) + w.n1 * w.n2 / w.nn
+    m22 = si * si * w.first + co * co * w.second + w.n2 * w.n2 / w.nn
+    low, high, lam = 0.0, np.sqrt(b[1] * b[1] + b[2] * b[2]) / k, 0.0
     t1 = t2 = 0.0
     for _ in range(200):
-        det = (a + lam) * (d + lam) - b * b
-        t1, t2 = -((d + lam) * b1 - b * b2) / det, -((a + lam) * b2 - b * b1) / det
+        det = (m11 + lam) * (m22 + lam) - m12 * m12
+        t1, t2 = -((m22 + lam) * b[1] - m12 * b[2]) / det, -((m11 + lam) * b[2] - m12 * b[1]) / det
         size = np.sqrt(t1 * t1 + t2 * t2)
         if lam == 0.0 and size <= k:
             return 0.0, t1, t2
@@ -136,9 +197,19 @@ def _slip_unpressed(nn, n1, n2, co, si, l1, l2, b1, b2, k):
 
 @njit(cache=True)
 def solve_contact(f, b, mu, k, r):  # pragma: no cover - compiled
-    """Solve u = W r + b with Signorini's and Coulomb's laws at one contact, exactly; r (3,) is written.
+    """Solve u = W r + b with Signorini's and Coulomb's laws at one contact, exactly.
 
-    `f` is a row of `local_factors`. Open if b_N ≥ 0 and nothing holds it; stick if r = -W⁻¹ b is admissible; else slip.
+    Open if b_N ≥ 0 and nothing holds it; stick if r = -W⁻¹ b is admissible; otherwise slip.
+
+    Inputs
+    ------
+    f : (16,) float64, a row of `local_factors`
+    b : (3,) float64, u of the contact without its own impulse [m/s]
+    mu, k : float64, friction [-] and cohesion [N s]
+
+    Outputs
+    -------
+    r : (3,) float64, written [N s]
     """
     if b[0] >= 0.0 and k == 0.0:
         r[:] = 0.0
@@ -148,21 +219,29 @@ def solve_contact(f, b, mu, k, r):  # pragma: no cover - compiled
     limit = mu * r[0] + k
     if r[0] >= 0.0 and r[1] * r[1] + r[2] * r[2] <= limit * limit:
         return
-    r[0], r[1], r[2] = slip(f[9], f[10], f[11], f[12], f[13], f[14], f[15], b[0], b[1], b[2], mu, k, 0.0)
+    w = LocalCompliance(f[9], f[10], f[11], f[12], f[13], f[14], f[15])
+    r[0], r[1], r[2] = slip(w, (b[0], b[1], b[2]), mu, k, 0.0)
 
 
 @njit(cache=True)
 def natural_errors(r, u, bias, mu, k, rho):  # pragma: no cover - compiled
-    """e = r - P_K(r - ρ û) with û = u + (bias + μ‖u_T‖) n of every contact; u becomes û.
+    """Compute e = r - P_K(r - ρ û) with û = u + (bias + μ‖u_T‖) n of every contact; u becomes û.
 
     K is the part r_N ≥ 0 of the cone ‖r_T‖ ≤ μ r_N + k.
 
-    Returns
+    Inputs
+    ------
+    r : (nc, d) float64 [N s]
+    u : (nc, d) float64, overwritten by û [m/s]
+    bias, mu, k : (nc,) float64 [m/s], [-], [N s]
+    rho : float64 [kg]
+
+    Outputs
     -------
-    error : (nc,) ‖e‖
-    whole, largest : ‖e‖ over all contacts, and of the worst
-    size : ‖r‖ over all contacts
-    projected : ‖P_K(r - ρ û)‖ over all contacts
+    error : (nc,) float64, ‖e‖ [N s]
+    whole, largest : ‖e‖ over all contacts, and of the worst [N s]
+    size : ‖r‖ over all contacts [N s]
+    projected : ‖P_K(r - ρ û)‖ over all contacts [N s]
     """
     nc, d = r.shape
     error = np.empty(nc)
@@ -194,7 +273,19 @@ def natural_errors(r, u, bias, mu, k, rho):  # pragma: no cover - compiled
 
 @njit(cache=True)
 def admm_right_side(z, y, shift, lag, sigma, right):  # pragma: no cover - compiled
-    """z - y - (u_free + bias n)/σ - lag n into `right` (nc, d), with lag = μ‖u_T‖/σ of some earlier u_T."""
+    """Write z - y - (u_free + bias n)/σ - lag n into `right`.
+
+    Inputs
+    ------
+    z, y : (nc, d) float64 [N s]
+    shift : (nc, d) float64, u_free + bias n [m/s]
+    lag : (nc,) float64, μ‖u_T‖/σ of some earlier u_T [N s]
+    sigma : float64, σ [1/kg]
+
+    Outputs
+    -------
+    right : (nc, d) float64, written [N s]
+    """
     for c in range(z.shape[0]):
         for i in range(z.shape[1]):
             right[c, i] = z[c, i] - y[c, i] - shift[c, i] / sigma
@@ -203,7 +294,18 @@ def admm_right_side(z, y, shift, lag, sigma, right):  # pragma: no cover - compi
 
 @njit(cache=True)
 def admm_update(r, z, y, mu, k, over):  # pragma: no cover - compiled
-    """z ← P_K(r' + y), y ← y + r' - z, with r' = over r + (1 - over) z, in place."""
+    """Let z ← P_K(r' + y), y ← y + r' - z, with r' = over r + (1 - over) z.
+
+    Inputs
+    ------
+    r, z, y : (nc, d) float64 [N s]
+    mu, k : (nc,) float64, friction [-] and cohesion [N s]
+    over : float64, over-relaxation [-]
+
+    Outputs
+    -------
+    z, y : written
+    """
     for c in range(z.shape[0]):
         tangential = 0.0
         for i in range(z.shape[1]):
@@ -222,7 +324,7 @@ def admm_update(r, z, y, mu, k, over):  # pragma: no cover - compiled
 
 @njit(cache=True)
 def onto_cone(n, t, mu, k):  # pragma: no cover - compiled
-    """The point of {n ≥ 0, t ≤ μ n + k} that is nearest to (n, t), t ≥ 0."""
+    """Return the point of {n ≥ 0, t ≤ μ n + k} that is nearest to (n, t), t ≥ 0."""
     if n >= 0.0 and t <= mu * n + k:
         return n, t
     if n < 0.0 and t <= k:

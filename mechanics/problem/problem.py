@@ -1,32 +1,31 @@
-"""One step's frictional contact problem: pure algebra between physics and algorithm.
+"""Frictional contact problem of one step: pure algebra between physics and algorithm.
 
     find (u, r):  u = W r + u_free,   0 ≤ u_N + bias ⊥ r_N ≥ 0,   ‖r_T‖ ≤ μ r_N + k,  r_T opposes u_T at the limit
 
-W = Hᵀ ŵ H is behind the protocol `Delassus`; mechanics/operators holds its forms. Laws with adhesion state r shifted
+W = Hᵀ ŵ H is behind the protocol `Delassus`; mechanics/delassus holds its operators. Laws with adhesion state r shifted
 by the largest tension, so that r_N ≥ 0 (mechanics/scene/laws/law.py).
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from functools import cached_property
+from typing import NamedTuple, Protocol
 
 import numpy as np
-from scipy.sparse import csc_array
-from scipy.sparse.linalg import splu
 
-from mechanics.arrays import Array
+from mechanics.arrays import Array, Ints
+from mechanics.problem.forms import Form, ScaledForm
 from mechanics.problem.validation import check_problem
+from moma.errors import SolverError
 
 __all__ = [
     "ContactProblem",
     "ContactSolution",
     "ContactStart",
     "Delassus",
-    "Form",
     "GaussSeidel",
-    "ShiftedForm",
-    "SparseForm",
-    "scale_of",
+    "RigidContacts",
+    "ScaledDelassus",
+    "mean_diagonal",
 ]
 
 
@@ -37,23 +36,58 @@ class GaussSeidel(Protocol):
         """Sweep `impulse` (nc, d) in place, `count` times."""
 
 
+class RigidContacts(NamedTuple):
+    """Contacts between rigid bodies, from which W = Hᵀ M⁻¹ H follows; an argument of compiled loops.
+
+    Attributes
+    ----------
+    body : (nc, 2) int64, candidate and antagonist
+    geometry : (nc, 15) float64, rows n, t1, t2 of the frame [-], then the lever arms from the two centres of mass [m],
+        world axes
+    inertia : (nb, 7) float64, inverse mass [1/kg] and upper triangle of the inverse inertia [1/(kg m²)], world axes;
+        zero for bodies that no impulse moves
+    """
+
+    body: Ints
+    geometry: Array
+    inertia: Array
+
+
 class Delassus(Protocol):
     """W = Hᵀ ŵ H, the relative velocities that impulses cause; d is 3, or 2 in the plane.
+
+    Products, sweeps and the diagonal are known of every operator. `form` and `rigid` are capabilities that not every
+    operator has; solvers ask for them and never for a class.
 
     Attributes
     ----------
     diagonal : (nc, d, d) W_αα [1/kg]
+    scale : reference against which u is measured over r [1/kg]; as a rule the mean diagonal of W (`mean_diagonal`)
+    form : W ready to be factorised, made at the first use; None where W is known by its products alone
+    rigid : contacts in terms of bodies, where every body is rigid and in space; None for other operators
     """
 
     @property
     def diagonal(self) -> Array:
         """W_αα (nc, d, d) [1/kg]."""
 
+    @property
+    def scale(self) -> float:
+        """Reference against which u is measured over r [1/kg]."""
+
+    @property
+    def form(self) -> Form | None:
+        """W ready to be factorised, or None."""
+
+    @property
+    def rigid(self) -> RigidContacts | None:
+        """Contacts in terms of rigid bodies, or None."""
+
     def apply(self, impulse: Array) -> Array:
-        """W r (nc, d) [m/s]."""
+        """Return W r (nc, d) [m/s]."""
 
     def gauss_seidel(self, shift: Array, friction: Array, cohesion: Array) -> GaussSeidel:
-        """Sweeps that solve each contact exactly with its neighbours frozen.
+        """Return sweeps that solve each contact exactly with its neighbours frozen.
 
         Parameters
         ----------
@@ -61,72 +95,69 @@ class Delassus(Protocol):
         friction, cohesion : (nc,) μ [-] and k [N s]
         """
 
+    def scaled(self, unit: Array) -> "Delassus":
+        """Return D W D with the units (nc,) of the contacts on the diagonal of D, with the same capabilities."""
 
-def scale_of(delassus: Delassus) -> float:
-    """What u over r is measured against [1/kg]: the mean diagonal of W, if the operator does not say otherwise.
 
-    1 without contacts.
-    """
-    given = getattr(delassus, "scale", None)
-    if given is not None:
-        return float(given)
-    diagonal = delassus.diagonal
+def mean_diagonal(diagonal: Array) -> float:
+    """Return the mean of the diagonals of the blocks (nc, d, d) [1/kg]; 1 without contacts."""
     if len(diagonal) == 0:
         return 1.0
     return float(np.einsum("cii->", diagonal) / (len(diagonal) * diagonal.shape[1]))
 
 
-class _Factor(Protocol):
-    def solve(self, rhs: Array) -> Array:
-        """Solve for one right-hand side."""
-
-
-class Form(Protocol):
-    """W in a form that can be factorised."""
-
-    def relaxed(self, sigma: float) -> Callable[[Array], Array]:
-        """(W/σ + 1)⁻¹ as a function of b (d nc,); its factors are kept for the next call."""
-
-
-class ShiftedForm(Form, Protocol):
-    """W in a form to which a block can be added for each contact."""
-
-    def shifted(self, theta: Array) -> Callable[[Array], Array]:
-        """(W + Θ)⁻¹ as a function of b (3 nc,); `theta` (nc, 3, 3), not always symmetric [1/kg]."""
-
-
-class SparseForm:
-    """W as Hᵀ Â⁻¹ H with sparse matrices, for methods that factorise.
+@dataclass(frozen=True)
+class ScaledDelassus:
+    """D W D of any operator, by its own products and sweeps.
 
     Attributes
     ----------
-    inertia : Â = ŵ⁻¹, (nd, nd) over the velocities of all bodies that move [kg]
-    lift, across : H, (nd, 3 nc), local impulses → generalized impulses, and Hᵀ
+    inner : W
+    unit : (nc,) diagonal of D
     """
 
-    def __init__(self, inertia: "csc_array[np.float64]", lift: "csc_array[np.float64]") -> None:
-        self.inertia, self.lift, self.across = inertia, lift, lift.T.tocsr()
-        self._factors: dict[float, _Factor] = {}
+    inner: Delassus
+    unit: Array
+    rigid = None
+    # by the choice of D
+    scale = 1.0
 
-    def factor(self, sigma: float) -> _Factor:
-        """Sparse factors of Â + H Hᵀ/σ, kept for the next call."""
-        if sigma not in self._factors:
-            matrix = (self.inertia + self.lift @ self.across / sigma).tocsc()
-            # symmetric positive definite: order A + Aᵀ and do not pivot
-            self._factors[sigma] = splu(
-                matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-            )
-        return self._factors[sigma]
+    @cached_property
+    def diagonal(self) -> Array:
+        """D_α W_αα D_α (nc, d, d) [-]."""
+        blocks: Array = self.inner.diagonal * (self.unit**2)[:, None, None]
+        return blocks
 
-    def relaxed(self, sigma: float) -> Callable[[Array], Array]:
-        """(W/σ + 1)⁻¹ as a function of b (d nc,), by the Woodbury identity."""
-        factor = self.factor(sigma)
-        return lambda b: b - (self.across @ factor.solve(self.lift @ b)) / sigma
+    @cached_property
+    def form(self) -> ScaledForm | None:
+        """D W D ready to be factorised, where W is."""
+        inner = self.inner.form
+        return None if inner is None else ScaledForm(inner, self.unit, self.inner.diagonal.shape[1])
+
+    def apply(self, impulse: Array) -> Array:
+        """Return D W D r̂ (nc, d)."""
+        return self.unit[:, None] * self.inner.apply(self.unit[:, None] * impulse)
+
+    def gauss_seidel(self, shift: Array, friction: Array, cohesion: Array) -> GaussSeidel:
+        """Return sweeps of the operator itself: solving one contact exactly does not depend on its unit."""
+        unit = self.unit[:, None]
+        inner = self.inner.gauss_seidel(shift / unit, friction, cohesion * self.unit)
+
+        def sweeps(impulse: Array, count: int, /) -> None:
+            real = unit * impulse
+            inner(real, count)
+            impulse[:] = real / unit
+
+        return sweeps
+
+    def scaled(self, unit: Array) -> "ScaledDelassus":
+        """Return this operator in units (nc,) of these units."""
+        return ScaledDelassus(self.inner, self.unit * unit)
 
 
 @dataclass(frozen=True)
 class ContactProblem:
-    """What a solver sees.
+    """Statement of one step's contacts for a solver.
 
     Attributes
     ----------
@@ -135,8 +166,7 @@ class ContactProblem:
     bias : (nc,) shift of u_N in Signorini's condition [m/s]
     friction : (nc,) Coulomb's μ [-]
     cohesion : (nc,) k, the tangential impulse carried at r_N = 0 [N s]
-    sparse : gives W once more, for methods that factorise; None where it has no such form
-    adhesion : (nc,) by which r_N is shifted, r̃ = r + s n; None where nothing is [N s]
+    adhesion : (nc,) shift of r_N, r̃ = r + s n; None where no contact has one [N s]
 
     Raises
     ------
@@ -148,7 +178,6 @@ class ContactProblem:
     bias: Array
     friction: Array
     cohesion: Array
-    sparse: Callable[[], Form] | None = None
     adhesion: Array | None = None
 
     def __post_init__(self) -> None:
@@ -170,10 +199,22 @@ class ContactProblem:
         velocity[:, 0] += self.bias
         return velocity
 
+    def form(self, solver: str) -> Form:
+        """Return W ready to be factorised.
+
+        Raises
+        ------
+        SolverError : naming the solver that asks, if W is known by its products alone
+        """
+        form = self.delassus.form
+        if form is None:
+            raise SolverError("the problem has no sparse form", where=solver, remedy='use the method "nsgs"')
+        return form
+
 
 @dataclass(frozen=True)
 class ContactStart:
-    """Where a solver begins: what is remembered of the same contacts, zero for new ones.
+    """Initial guess of a solver: values remembered of the same contacts, zero for new ones.
 
     Attributes
     ----------
@@ -187,16 +228,16 @@ class ContactStart:
 
 @dataclass(frozen=True)
 class ContactSolution:
-    """What a solver gives back.
+    """Result of a solver.
 
     Attributes
     ----------
     impulse : (nc, d) r, on the candidate, local frame [N s]
     velocity : (nc, d) û, dual to r, as the solver knows it [m/s]
     iterations : Gauss–Seidel sweeps, or the iterations of another method
-    natural_map : η of `impulse`, as mechanics.residual computes it
-    converged : η, and the error of the velocities where a solver looks at it, are within their tolerances
-    why : which method found it, and why that one was chosen; empty where there was no choice
+    natural_map : η of `impulse`, as mechanics.problem.residual computes it
+    converged : η, and the velocity error where a solver checks it, are within their tolerances
+    why : method that found the solution and the reason for its choice; empty where there was no choice
     """
 
     impulse: Array

@@ -1,4 +1,4 @@
-"""How well a contact problem is solved: the natural map, computed outside the solvers."""
+"""Residual of a contact problem: the natural map, computed outside the solvers."""
 
 from dataclasses import dataclass
 
@@ -6,19 +6,19 @@ import numpy as np
 
 from mechanics.arrays import Array
 from mechanics.problem._kernels import natural_errors
-from mechanics.problem.problem import ContactProblem, scale_of
+from mechanics.problem.problem import ContactProblem
 
 __all__ = ["Residual", "natural_map", "project_on_cone", "residual"]
 
 
-# of the impulse that would stop the fastest contact: less than this is none
+# smallest impulse that counts, over the one that would stop the fastest contact [-]
 _NOTHING = 1e-8
 _EPSILON = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
 class Residual:
-    """What is left of a contact problem.
+    """Residual of a contact problem.
 
     Attributes
     ----------
@@ -35,22 +35,23 @@ class Residual:
     dual: Array
 
     def within(self, tolerance: float, velocity_tolerance: float) -> bool:
-        """Whether both measures are."""
+        """Return whether both measures are within their tolerances."""
         return self.natural_map <= tolerance and self.velocity <= velocity_tolerance
 
 
 def residual(problem: ContactProblem, impulse: Array) -> Residual:
-    """η = ‖e‖ / ‖r‖, e = r - P_K(r - ρ û), û = u + (bias + μ‖u_T‖) n and ρ = 1 / (mean diagonal of W).
+    """Compute η = ‖e‖ / ‖r‖, e = r - P_K(r - ρ û), û = u + (bias + μ‖u_T‖) n and ρ = 1 / (mean diagonal of W).
 
     The de Saxcé form of Signorini–Coulomb (de Saxcé & Feng 1991; docs/theory.md §4), whatever the units. With adhesion
     ‖r‖ is that of the real impulses, without the shift. Zero without contacts. Where no impulse is given but one is
     needed, the size of P_K(-ρ û) replaces ‖r‖, so η is 1; where none is needed, rounding counts against 10⁻⁸ of the
     impulse that would stop the fastest u_free. Where contacts contradict each other impulses grow without bound, and η
-    falls with them; then the velocities tell, and once W r is so large that its rounding is larger than they are, that.
+    falls with them; the velocity error then shows it, and where W r is so large that its rounding hides the velocities,
+    that rounding counts as their error.
     """
     if len(impulse) == 0:
         return Residual(0.0, 0.0, np.zeros(0), np.zeros_like(impulse))
-    rho = 1.0 / scale_of(problem.delassus)
+    rho = 1.0 / problem.delassus.scale
     u = problem.delassus.apply(impulse)
     u += problem.u_free
     # writes û into u
@@ -65,7 +66,7 @@ def residual(problem: ContactProblem, impulse: Array) -> Residual:
         )
     scale = max(size, projected, _NOTHING * rho * pace)
     return Residual(
-        # what is not a number is no solution
+        # NaN stays NaN, which is within no tolerance
         0.0 if scale == 0 else whole / scale,
         _broken_velocity(problem, impulse, largest / rho, pace),
         error,
@@ -74,7 +75,7 @@ def residual(problem: ContactProblem, impulse: Array) -> Residual:
 
 
 def _broken_velocity(problem: ContactProblem, impulse: Array, largest: float, pace: float) -> float:
-    """The largest velocity that breaks a law [m/s], or its rounding, over what there is to stop."""
+    """Return the largest velocity that breaks a law [m/s], or its rounding, over the velocity to be stopped."""
     bias = float(np.abs(problem.bias).max())
     slowest = pace or bias
     if slowest == 0:
@@ -82,19 +83,19 @@ def _broken_velocity(problem: ContactProblem, impulse: Array, largest: float, pa
     diagonal = problem.delassus.diagonal
     hidden = _EPSILON * float(diagonal.max()) * float(np.abs(impulse).max()) / max(pace, bias)
     if hidden > _NOTHING:
-        # that was the most of all contacts; no contact may feel both
+        # that product is of the largest of all contacts, which may be different ones
         own = np.einsum("cij,cj->ci", np.abs(diagonal), np.abs(impulse))
         hidden = _EPSILON * float(own.max()) / max(pace, bias)
     return max(largest / slowest, hidden)
 
 
 def natural_map(problem: ContactProblem, impulse: Array) -> float:
-    """η of `residual`."""
+    """Return η of `residual`."""
     return residual(problem, impulse).natural_map
 
 
 def project_on_cone(point: Array, friction: Array, cohesion: Array) -> Array:
-    """Nearest points (nc, d) of {r_N ≥ 0, ‖r_T‖ ≤ μ r_N + k}."""
+    """Return the nearest points (nc, d) of {r_N ≥ 0, ‖r_T‖ ≤ μ r_N + k}."""
     n, size = point[:, 0], np.linalg.norm(point[:, 1:], axis=1)
     foot = np.maximum((n + friction * (size - cohesion)) / (1.0 + friction**2), 0.0)
     inside = size <= friction * np.maximum(n, 0.0) + cohesion

@@ -1,4 +1,4 @@
-"""Refusals of contact problems that no solver can make sense of: NaN, no compliance, numbers too large to square."""
+"""Refusals of contact problems that no solver can solve: NaN, no compliance, numbers too large to square."""
 
 from collections.abc import Mapping
 
@@ -16,7 +16,7 @@ _UNITS = "take units in which they are nearer to 1"
 
 
 def require_finite(**given: Array) -> None:
-    """Refuse arrays with an entry that is no number, one row for each contact.
+    """Refuse arrays, one row for each contact, with an entry that is not finite.
 
     Raises
     ------
@@ -34,13 +34,13 @@ def require_finite(**given: Array) -> None:
 
 
 def check_problem(diagonal: Array, u_free: Array, **each: Array | None) -> None:
-    """Refuse what cannot be solved.
+    """Refuse problems that cannot be solved.
 
     Parameters
     ----------
     diagonal : (nc, d, d) W_αα [1/kg]
     u_free : (nc, d) [m/s]
-    each : (nc,) bias [m/s], friction [-], cohesion and adhesion [N s], by name; None: not there
+    each : (nc,) bias [m/s], friction [-], cohesion and adhesion [N s], by name; None where absent
 
     Raises
     ------
@@ -64,7 +64,7 @@ def check_problem(diagonal: Array, u_free: Array, **each: Array | None) -> None:
 
 
 def check_compliance(diagonal: Array) -> None:
-    """Refuse contacts that do not give way (nc, d, d), or by no number."""
+    """Refuse contacts without compliance (nc, d, d), or with one that is not finite."""
     sound = np.isfinite(diagonal).all(axis=(1, 2))
     if not sound.all():
         raise SolverError(

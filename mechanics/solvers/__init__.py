@@ -1,1 +1,4 @@
-"""Solvers of one step's frictional contact problem, and the residual that judges them all."""
+"""Solvers of contact problems: first order, second order, and strategies that combine them.
+
+Public: `Solver`, `choose_solver`, `choose_planar_solver` (choice).
+"""

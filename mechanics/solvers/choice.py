@@ -1,4 +1,4 @@
-"""Which solver a scene gets."""
+"""Solver registry."""
 
 from collections.abc import Callable, Mapping
 from typing import Protocol
@@ -19,13 +19,13 @@ __all__ = ["Solver", "choose_planar_solver", "choose_solver"]
 
 
 class Solver(Protocol):
-    """Solves contact problems."""
+    """Solver of contact problems."""
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from `start`."""
 
 
-# for which it makes no difference whether bodies are rigid; made of tolerance, velocity tolerance and iterations
+# methods for rigid and deformable bodies alike, by tolerance, velocity tolerance and iterations
 _EVERYWHERE: Mapping[Method, Callable[[float, float, int], Solver]] = {
     Method.NSGS: NSGS,
     Method.APGD: APGD,
@@ -36,7 +36,7 @@ _EVERYWHERE: Mapping[Method, Callable[[float, float, int], Solver]] = {
 
 
 def choose_solver(settings: SolverSettings, deformable: bool) -> Solver:
-    """The solver that the settings ask for."""
+    """Return the solver that the settings ask for."""
     limits = settings.tolerance, settings.velocity_tolerance, settings.max_iterations
     if settings.method in _EVERYWHERE:
         return _EVERYWHERE[settings.method](*limits)
@@ -46,10 +46,10 @@ def choose_solver(settings: SolverSettings, deformable: bool) -> Solver:
 
 
 def choose_planar_solver(settings: SolverSettings) -> Solver:
-    """The same for disks of the plane; *auto* sweeps.
+    """Return the solver for disks of the plane; *auto* sweeps.
 
     A sweep over disks costs a tenth of an iteration of ADMM, and of an extrapolation: where they flow, many plain
-    sweeps are the cheaper way.
+    sweeps are cheaper.
 
     Raises
     ------

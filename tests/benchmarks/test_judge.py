@@ -9,8 +9,8 @@ from benchmarks.judge import Judge
 from benchmarks.memory import arrays_bytes
 from benchmarks.scenes import read_scene, write_scene
 from benchmarks.trace import Touch, Trace
-from mechanics.delassus.stored import StoredDelassus
 from mechanics.problem.problem import ContactProblem
+from tests.mechanics.dense_operator import blocks_apart
 
 STEP, THETA = 1e-3, 0.5
 # one brick of 0.30 × 0.15 × 0.10 m on a slab
@@ -95,7 +95,7 @@ def test_the_error_of_siconos_without_impulses():
 
     P_K of (n, t) = (0.75, 0.5) beyond the cone: n' = (n + μ t) / (1 + μ²) = 0.8, t' = μ n'.
     """
-    w = StoredDelassus(np.eye(3)[None], np.array([0]), np.array([0, 1]))
+    w = blocks_apart(np.eye(3))
     q, none = np.array([[-1.0, 0.3, 0.4]]), np.zeros(1)
     problem = ContactProblem(w, q, none, np.array([0.5]), none)
     expected = np.hypot(0.8, 0.4) / np.linalg.norm(q)

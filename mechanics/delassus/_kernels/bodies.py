@@ -1,123 +1,139 @@
 """Numba kernels of W + Θ between rigid bodies, written with the velocities of the bodies.
 
-`side` (nc, 2) names the places of the two bodies of a contact in the order of elimination, -1 where one does not move;
-`geometry` (nc, 15) is that of `_kernels_rigid`: rows n, t1, t2 of the frame, then the two lever arms.
+`side` (nc, 2) int64 holds the places of the two bodies of a contact in the order of elimination, -1 for a body that
+does not move; `geometry` (nc, 15) float64 is that of `RigidContacts`. Velocities (nm, 6) are those of the nm bodies
+that move.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-__all__ = ["across", "assemble", "corrected", "inverses", "lift", "pushed", "softened"]
+from mechanics._kernels.vectors import cross, dot, minus, row, write_row
+from mechanics.delassus._kernels.sides import arm, inverse_columns, negative, side_jacobian, times, to_world
+
+__all__ = ["Pattern", "across", "assemble", "corrected", "inverses", "lift", "pushed", "softened"]
 
 
-@njit(cache=True)
-def _jacobian(j, g, s):
-    """The local velocity of one side by its body's velocity, into `j` (3, 6): the antagonist counts negative."""
-    at = 9 + 3 * s
-    sign = 1.0 if s == 0 else -1.0
-    a0, a1, a2 = g[at], g[at + 1], g[at + 2]
-    for k in range(3):
-        x, y, z = sign * g[3 * k], sign * g[3 * k + 1], sign * g[3 * k + 2]
-        j[k, 0], j[k, 1], j[k, 2] = x, y, z
-        j[k, 3], j[k, 4], j[k, 5] = a1 * z - a2 * y, a2 * x - a0 * z, a0 * y - a1 * x
+class Pattern(NamedTuple):
+    """Blocks (6, 6) of M + H Θ⁻¹ Hᵀ, bodies in the order of their elimination.
+
+    Attributes
+    ----------
+    mass : (nm, 6, 6) float64, M [kg], [kg m²]
+    side : (nc, 2) int64, place of each contact's bodies in that order, -1: does not move
+    indptr, indices : int32, of the matrix by columns
+    own : (nm,) int64, the block of each body on the diagonal
+    block : (nc, 2, 2) int64, the blocks of each contact
+    start, stride : int64, of each block, where it begins among the values and how far apart its columns are
+    """
+
+    mass: NDArray[np.float64]
+    side: NDArray[np.int64]
+    indptr: NDArray[np.int32]
+    indices: NDArray[np.int32]
+    own: NDArray[np.int64]
+    block: NDArray[np.int64]
+    start: NDArray[np.int64]
+    stride: NDArray[np.int64]
 
 
 @njit(cache=True)
 def inverses(blocks):  # pragma: no cover - compiled
-    """Inverses (nc, 3, 3) of blocks, not always symmetric."""
+    """Return the inverses of blocks.
+
+    Inputs
+    ------
+    blocks : (nc, 3, 3) float64, not always symmetric
+
+    Outputs
+    -------
+    (nc, 3, 3) float64, infinite where a block is singular
+    """
     result = np.empty_like(blocks)
     for c in range(blocks.shape[0]):
         b, r = blocks[c], result[c]
-        r[0, 0] = b[1, 1] * b[2, 2] - b[1, 2] * b[2, 1]
-        r[0, 1] = b[0, 2] * b[2, 1] - b[0, 1] * b[2, 2]
-        r[0, 2] = b[0, 1] * b[1, 2] - b[0, 2] * b[1, 1]
-        r[1, 0] = b[1, 2] * b[2, 0] - b[1, 0] * b[2, 2]
-        r[1, 1] = b[0, 0] * b[2, 2] - b[0, 2] * b[2, 0]
-        r[1, 2] = b[0, 2] * b[1, 0] - b[0, 0] * b[1, 2]
-        r[2, 0] = b[1, 0] * b[2, 1] - b[1, 1] * b[2, 0]
-        r[2, 1] = b[0, 1] * b[2, 0] - b[0, 0] * b[2, 1]
-        r[2, 2] = b[0, 0] * b[1, 1] - b[0, 1] * b[1, 0]
-        determinant = b[0, 0] * r[0, 0] + b[0, 1] * r[1, 0] + b[0, 2] * r[2, 0]
+        first, second, third, determinant = inverse_columns(row(b, 0), row(b, 1), row(b, 2))
         for i in range(3):
+            r[i, 0], r[i, 1], r[i, 2] = first[i], second[i], third[i]
             for k in range(3):
                 r[i, k] = r[i, k] / determinant if determinant != 0.0 else np.inf
     return result
 
 
 @njit(cache=True)
-def assemble(side, geometry, soft, mass, own, block, start, stride, size):  # pragma: no cover - compiled
-    """M + H Θ⁻¹ Hᵀ, the values (size,) of its columns.
+def assemble(pattern, geometry, soft):  # pragma: no cover - compiled
+    """Assemble M + H Θ⁻¹ Hᵀ.
 
-    `soft` (nc, 3, 3) Θ⁻¹; `mass` (nm, 6, 6); `own` (nm,) and `block` (nc, 2, 2) name the 6 × 6 blocks of bodies and
-    contacts, whose entry (a, b) is at start + stride b + a.
+    Inputs
+    ------
+    pattern : Pattern; entry (a, b) of a block is at start + stride b + a
+    geometry : (nc, 15) float64
+    soft : (nc, 3, 3) float64, Θ⁻¹ [kg]
+
+    Outputs
+    -------
+    float64, the values of the matrix by columns
     """
-    values = np.zeros(size)
-    for n in range(mass.shape[0]):
-        at, step = start[own[n]], stride[own[n]]
+    values = np.zeros(pattern.indices.shape[0])
+    for n in range(pattern.mass.shape[0]):
+        at, step = pattern.start[pattern.own[n]], pattern.stride[pattern.own[n]]
         for b in range(6):
             for a in range(6):
-                values[at + step * b + a] += mass[n, a, b]
+                values[at + step * b + a] += pattern.mass[n, a, b]
     j, p = np.empty((2, 3, 6)), np.empty((3, 6))
-    for c in range(side.shape[0]):
-        _jacobian(j[0], geometry[c], 0)
-        _jacobian(j[1], geometry[c], 1)
-        f = soft[c]
+    for c in range(pattern.side.shape[0]):
+        side_jacobian(geometry[c], 0, j[0])
+        side_jacobian(geometry[c], 1, j[1])
         for t in range(2):
-            if side[c, t] < 0:
+            if pattern.side[c, t] < 0:
                 continue
-            for k in range(3):
-                for b in range(6):
-                    p[k, b] = f[k, 0] * j[t, 0, b] + f[k, 1] * j[t, 1, b] + f[k, 2] * j[t, 2, b]
+            for b in range(6):
+                p[0, b], p[1, b], p[2, b] = times(soft[c], (j[t, 0, b], j[t, 1, b], j[t, 2, b]))
             for s in range(2):
-                if side[c, s] < 0:
+                if pattern.side[c, s] < 0:
                     continue
-                at, step = start[block[c, s, t]], stride[block[c, s, t]]
+                at, step = pattern.start[pattern.block[c, s, t]], pattern.stride[pattern.block[c, s, t]]
                 for b in range(6):
-                    p0, p1, p2 = p[0, b], p[1, b], p[2, b]
-                    to = at + step * b
+                    column, to = (p[0, b], p[1, b], p[2, b]), at + step * b
                     for a in range(6):
-                        values[to + a] += j[s, 0, a] * p0 + j[s, 1, a] * p1 + j[s, 2, a] * p2
+                        values[to + a] += dot((j[s, 0, a], j[s, 1, a], j[s, 2, a]), column)
     return values
 
 
 @njit(cache=True)
 def lift(r, side, geometry, bodies):  # pragma: no cover - compiled
-    """H r (nm, 6): what impulses (nc, 3) bring to the bodies."""
+    """Return H r (nm, 6): impulses and moments on `bodies` bodies, of impulses r (nc, 3) [N s]."""
     result = np.zeros((bodies, 6))
     for c in range(side.shape[0]):
         g = geometry[c]
-        x = g[0] * r[c, 0] + g[3] * r[c, 1] + g[6] * r[c, 2]
-        y = g[1] * r[c, 0] + g[4] * r[c, 1] + g[7] * r[c, 2]
-        z = g[2] * r[c, 0] + g[5] * r[c, 1] + g[8] * r[c, 2]
+        x = to_world(g, row(r, c))
         for s in range(2):
             n = side[c, s]
             if n < 0:
                 continue
-            if s == 1:
-                x, y, z = -x, -y, -z
-            a0, a1, a2 = g[9 + 3 * s], g[10 + 3 * s], g[11 + 3 * s]
-            result[n, 0] += x
-            result[n, 1] += y
-            result[n, 2] += z
-            result[n, 3] += a1 * z - a2 * y
-            result[n, 4] += a2 * x - a0 * z
-            result[n, 5] += a0 * y - a1 * x
+            push = x if s == 0 else negative(x)
+            moment = cross(arm(g, s), push)
+            for k in range(3):
+                result[n, k] += push[k]
+                result[n, 3 + k] += moment[k]
     return result
 
 
 @njit(cache=True)
 def pushed(soft, b, side, geometry, bodies):  # pragma: no cover - compiled
-    """H Θ⁻¹ b (nm, 6)."""
+    """Return H Θ⁻¹ b (nm, 6), of `soft` (nc, 3, 3) Θ⁻¹ [kg] and b (nc, 3) [m/s]."""
     r = np.empty_like(b)
     for c in range(side.shape[0]):
-        for k in range(3):
-            r[c, k] = soft[c, k, 0] * b[c, 0] + soft[c, k, 1] * b[c, 1] + soft[c, k, 2] * b[c, 2]
+        write_row(r, c, times(soft[c], row(b, c)))
     return lift(r, side, geometry, bodies)
 
 
 @njit(cache=True)
 def across(v, side, geometry):  # pragma: no cover - compiled
-    """Hᵀ v (nc, 3) of the bodies' velocities (nm, 6)."""
+    """Return Hᵀ v (nc, 3), relative velocities of the bodies' velocities (nm, 6) [m/s, rad/s]."""
     result = np.zeros((side.shape[0], 3))
     for c in range(side.shape[0]):
         g = geometry[c]
@@ -127,34 +143,46 @@ def across(v, side, geometry):  # pragma: no cover - compiled
             if n < 0:
                 continue
             sign = 1.0 if s == 0 else -1.0
-            a0, a1, a2 = g[9 + 3 * s], g[10 + 3 * s], g[11 + 3 * s]
-            x += sign * (v[n, 0] + v[n, 4] * a2 - v[n, 5] * a1)
-            y += sign * (v[n, 1] + v[n, 5] * a0 - v[n, 3] * a2)
-            z += sign * (v[n, 2] + v[n, 3] * a1 - v[n, 4] * a0)
+            a = arm(g, s)
+            x += sign * (v[n, 0] + v[n, 4] * a[2] - v[n, 5] * a[1])
+            y += sign * (v[n, 1] + v[n, 5] * a[0] - v[n, 3] * a[2])
+            z += sign * (v[n, 2] + v[n, 3] * a[1] - v[n, 4] * a[0])
         for k in range(3):
-            result[c, k] = g[3 * k] * x + g[3 * k + 1] * y + g[3 * k + 2] * z
+            result[c, k] = dot((g[3 * k], g[3 * k + 1], g[3 * k + 2]), (x, y, z))
     return result
 
 
 @njit(cache=True)
 def softened(soft, b, v, side, geometry):  # pragma: no cover - compiled
-    """Θ⁻¹ (b - Hᵀ v) (nc, 3)."""
+    """Return Θ⁻¹ (b - Hᵀ v) (nc, 3) [N s]; the inputs are those of `pushed` and `across`."""
     result = across(v, side, geometry)
     for c in range(side.shape[0]):
-        x, y, z = b[c, 0] - result[c, 0], b[c, 1] - result[c, 1], b[c, 2] - result[c, 2]
-        for k in range(3):
-            result[c, k] = soft[c, k, 0] * x + soft[c, k, 1] * y + soft[c, k, 2] * z
+        write_row(result, c, times(soft[c], minus(row(b, c), row(result, c))))
     return result
 
 
 @njit(cache=True)
 def corrected(theta, b, v, r, mass, side, geometry):  # pragma: no cover - compiled
-    """What is left of Hᵀ v + Θ r = b (nc, 3), and of M v - H r = 0 (nm, 6)."""
+    """Compute the residuals of Hᵀ v + Θ r = b and M v - H r = 0.
+
+    Inputs
+    ------
+    theta : (nc, 3, 3) float64, Θ [1/kg]
+    b, r : (nc, 3) float64 [m/s], [N s]
+    v : (nm, 6) float64 [m/s, rad/s]
+    mass : (nm, 6, 6) float64 [kg, kg m²]
+    side, geometry : as above
+
+    Outputs
+    -------
+    first : (nc, 3) float64 [m/s]
+    second : (nm, 6) float64 [N s, N m s]
+    """
     first = across(v, side, geometry)
     for c in range(side.shape[0]):
+        held = times(theta[c], row(r, c))
         for k in range(3):
-            held = theta[c, k, 0] * r[c, 0] + theta[c, k, 1] * r[c, 1] + theta[c, k, 2] * r[c, 2]
-            first[c, k] = b[c, k] - first[c, k] - held
+            first[c, k] = b[c, k] - first[c, k] - held[k]
     second = lift(r, side, geometry, mass.shape[0])
     for n in range(mass.shape[0]):
         for a in range(6):

@@ -1,14 +1,36 @@
 """Numba kernels of the multifrontal factors: assembly of fronts, and the solves forth and back."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-__all__ = ["add_into", "solve"]
+__all__ = ["Layout", "add_into", "solve"]
+
+
+class Layout(NamedTuple):
+    """Order of elimination and places of the factors; the same for all matrices of one pattern.
+
+    Attributes
+    ----------
+    order : (nf,) int64, fronts (groups of contacts) as they are eliminated
+    width : (nf,) int64, pivots of each front, three for each contact of its group
+    dptr, dof : int64, unknowns of each front, pivots first, the others in the order of their elimination
+    fptr, pptr : (nf+1,) int64, where the factors and the row exchanges of each front begin
+    """
+
+    order: NDArray[np.int64]
+    width: NDArray[np.int64]
+    dptr: NDArray[np.int64]
+    dof: NDArray[np.int64]
+    fptr: NDArray[np.int64]
+    pptr: NDArray[np.int64]
 
 
 @njit(cache=True)
 def add_into(front, place, own, block):  # pragma: no cover - compiled
-    """front[place, place] += block[own, own]; `place` and `own` (m,)."""
+    """Let front[place, place] += block[own, own]; `place` and `own` (m,) int64."""
     for j in range(place.shape[0]):
         column, source = place[j], own[j]
         for i in range(place.shape[0]):
@@ -16,13 +38,22 @@ def add_into(front, place, own, block):  # pragma: no cover - compiled
 
 
 @njit(cache=True)
-def solve(b, order, width, dptr, dof, fptr, pptr, pivots, factor):  # pragma: no cover - compiled
-    """Solve (W + Θ) x = b (n,) in place.
+def solve(b, layout, pivots, factor):  # pragma: no cover - compiled
+    """Solve (W + Θ) x = b.
 
-    `order` (nf,) fronts as they were eliminated; `width` (nf,) pivots of each; `dof[dptr[f]:dptr[f+1]]` its k + m
-    unknowns, pivots first; `factor[fptr[f]:]` the LU factors (k, k) of its pivot block, F11⁻¹ F12 (k, m) and
-    F21 (m, k), all by columns; `pivots[pptr[f]:]` the row exchanges.
+    Inputs
+    ------
+    b : (n,) float64, overwritten
+    layout : Layout
+    pivots : (n,) int32, row exchanges
+    factor : float64, of each front the LU factors (k, k) of its pivot block, F11⁻¹ F12 (k, m) and F21 (m, k), all by
+        columns
+
+    Outputs
+    -------
+    b : x
     """
+    order, width, dptr, dof, fptr, pptr = layout
     longest = 0
     for f in range(order.shape[0]):
         longest = max(longest, dptr[f + 1] - dptr[f])

@@ -1,121 +1,156 @@
-"""Numba kernels of W where rigid and deformable bodies meet: products, and Gauss–Seidel sweeps."""
+"""Numba kernels of W between rigid and deformable bodies: products and Gauss–Seidel sweeps."""
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
+from mechanics._kernels.vectors import dot, minus, row
+from mechanics.delassus._kernels.sides import less_dot, negative
 from mechanics.problem._kernels import solve_contact
 
-__all__ = ["apply_delassus", "sweep"]
+__all__ = ["ELASTIC", "NONE", "RIGID", "Sides", "apply_delassus", "sweep"]
 
 NONE, RIGID, ELASTIC = 0, 1, 2
 
 
+class Sides(NamedTuple):
+    """Sides of the contacts and their bodies' answers; candidates count positive, antagonists negative.
+
+    Attributes
+    ----------
+    body : (nc, 2) int64
+    kind : (nc, 2) int64, NONE, RIGID or ELASTIC
+    jacobian : (nc, 2, 3, 6) float64, local velocity of a rigid side by its body's velocity
+    response : (nc, 2, 6, 3) float64, body velocity by the local impulse
+    slot : (nc, 2) int64, place of an elastic side among those of its body
+    yptr, bptr : (nb+1,) int64, first elastic velocity and first compliance entry of each body
+    block : float64, flat symmetric compliance blocks [1/kg]
+    """
+
+    body: NDArray[np.int64]
+    kind: NDArray[np.int64]
+    jacobian: NDArray[np.float64]
+    response: NDArray[np.float64]
+    slot: NDArray[np.int64]
+    yptr: NDArray[np.int64]
+    bptr: NDArray[np.int64]
+    block: NDArray[np.float64]
+
+
 @njit(cache=True)
-def apply_delassus(r, body, kind, jacobian, response, slot, yptr, bptr, block):  # pragma: no cover - compiled
-    """What the impulses r (nc, 3) do: u = W r (nc, 3), rigid velocities (nb, 6), elastic side velocities."""
-    nc, nb = r.shape[0], yptr.shape[0] - 1
+def apply_delassus(r, sides):  # pragma: no cover - compiled
+    """Compute the effects of impulses.
+
+    Inputs
+    ------
+    r : (nc, 3) float64, impulses, local frames [N s]
+    sides : Sides
+
+    Outputs
+    -------
+    u : (nc, 3) float64, W r [m/s]
+    v : (nb, 6) float64, velocities of the rigid bodies [m/s, rad/s]
+    y : float64, velocities of the elastic sides, three for each [m/s]
+    """
+    nc, nb = r.shape[0], sides.yptr.shape[0] - 1
+    yptr, bptr, block = sides.yptr, sides.bptr, sides.block
     v = np.zeros((nb, 6))
     p, y = np.zeros(yptr[nb]), np.zeros(yptr[nb])
     for c in range(nc):
         sign = 1.0
         for s in range(2):
-            b = body[c, s]
-            if kind[c, s] == RIGID:
+            b = sides.body[c, s]
+            if sides.kind[c, s] == RIGID:
                 for i in range(6):
                     for k in range(3):
-                        v[b, i] += sign * response[c, s, i, k] * r[c, k]
-            elif kind[c, s] == ELASTIC:
-                start = yptr[b] + 3 * slot[c, s]
+                        v[b, i] += sign * sides.response[c, s, i, k] * r[c, k]
+            elif sides.kind[c, s] == ELASTIC:
+                start = yptr[b] + 3 * sides.slot[c, s]
                 for k in range(3):
                     p[start + k] += sign * r[c, k]
             sign = -1.0
     for b in range(nb):
         n = yptr[b + 1] - yptr[b]
-        for row in range(n):
-            start = bptr[b] + row * n
+        for i in range(n):
+            start = bptr[b] + i * n
             total = 0.0
-            for col in range(n):
-                total += block[start + col] * p[yptr[b] + col]
-            y[yptr[b] + row] = total
+            for k in range(n):
+                total += block[start + k] * p[yptr[b] + k]
+            y[yptr[b] + i] = total
     u = np.zeros((nc, 3))
     for c in range(nc):
-        _relative_velocity(c, u[c], v, y, body, kind, jacobian, slot, yptr)
+        _relative_velocity(c, u[c], v, y, sides)
     return u, v, y
 
 
 @njit(cache=True, inline="always")
-def _relative_velocity(c, u, v, y, body, kind, jacobian, slot, yptr):
+def _relative_velocity(c, u, v, y, sides):
     """Add to u (3,) the local relative velocity at contact c."""
     sign = 1.0
     for s in range(2):
-        b = body[c, s]
-        if kind[c, s] == RIGID:
+        b = sides.body[c, s]
+        if sides.kind[c, s] == RIGID:
             for k in range(3):
                 total = 0.0
                 for i in range(6):
-                    total += jacobian[c, s, k, i] * v[b, i]
+                    total += sides.jacobian[c, s, k, i] * v[b, i]
                 u[k] += sign * total
-        elif kind[c, s] == ELASTIC:
-            start = yptr[b] + 3 * slot[c, s]
+        elif sides.kind[c, s] == ELASTIC:
+            start = sides.yptr[b] + 3 * sides.slot[c, s]
             for k in range(3):
                 u[k] += sign * y[start + k]
         sign = -1.0
 
 
 @njit(cache=True)
-def sweep(
-    count,
-    backward,
-    r,
-    v,
-    y,
-    shift,
-    mu,
-    cohesion,
-    factors,
-    diagonal,
-    body,
-    kind,
-    jacobian,
-    response,
-    slot,
-    yptr,
-    bptr,
-    block,
-):  # pragma: no cover - compiled
-    """`count` passes of non-smooth Gauss–Seidel; r, v and y are kept up to date in place.
+def _give_way(c, step, v, y, sides):
+    """Add to v and y the effects of a change of the impulse (3) at contact c."""
+    yptr, block = sides.yptr, sides.block
+    for s in range(2):
+        a = sides.body[c, s]
+        if sides.kind[c, s] == RIGID:
+            for i in range(6):
+                v[a, i] += dot(row(sides.response[c, s], i), step)
+        elif sides.kind[c, s] == ELASTIC:
+            start, size = yptr[a], yptr[a + 1] - yptr[a]
+            # the block is symmetric: rows, which lie together in memory, serve as columns
+            at = sides.bptr[a] + 3 * sides.slot[c, s] * size
+            for k in range(size):
+                y[start + k] += dot((block[at + k], block[at + size + k], block[at + 2 * size + k]), step)
+        step = negative(step)
 
-    `shift` is u_free with the bias added to its normal part. With `backward`, every second pass runs the
-    other way round.
+
+@njit(cache=True)
+def sweep(count, r, v, y, laws, diagonal, sides):  # pragma: no cover - compiled
+    """Make `count` passes of non-smooth Gauss–Seidel, every second one backwards.
+
+    Inputs
+    ------
+    count : int64
+    r, v, y : as in `apply_delassus`, of the same impulses
+    laws : Laws
+    diagonal : (nc, 3, 3) float64, W_αα [1/kg]
+    sides : Sides
+
+    Outputs
+    -------
+    r, v, y : written
     """
     nc = r.shape[0]
     u, b, new = np.empty(3), np.empty(3), np.empty(3)
     for n in range(count):
         for position in range(nc):
-            c = nc - 1 - position if backward and n % 2 == 1 else position
-            u[:] = shift[c]
-            _relative_velocity(c, u, v, y, body, kind, jacobian, slot, yptr)
-            w = diagonal[c]
+            c = nc - 1 - position if n % 2 == 1 else position
+            u[:] = laws.shift[c]
+            _relative_velocity(c, u, v, y, sides)
+            old = row(r, c)
             for k in range(3):
-                b[k] = u[k] - w[k, 0] * r[c, 0] - w[k, 1] * r[c, 1] - w[k, 2] * r[c, 2]
-            solve_contact(factors[c], b, mu[c], cohesion[c], new)
-            d0, d1, d2 = new[0] - r[c, 0], new[1] - r[c, 1], new[2] - r[c, 2]
-            if d0 == 0.0 and d1 == 0.0 and d2 == 0.0:
+                b[k] = less_dot(u[k], row(diagonal[c], k), old)
+            solve_contact(laws.factors[c], b, laws.friction[c], laws.cohesion[c], new)
+            step = minus(new, old)
+            if step[0] == 0.0 and step[1] == 0.0 and step[2] == 0.0:
                 continue
             r[c] = new
-            for s in range(2):
-                a = body[c, s]
-                if kind[c, s] == RIGID:
-                    for i in range(6):
-                        v[a, i] += (
-                            response[c, s, i, 0] * d0 + response[c, s, i, 1] * d1 + response[c, s, i, 2] * d2
-                        )
-                elif kind[c, s] == ELASTIC:
-                    start, size = yptr[a], yptr[a + 1] - yptr[a]
-                    # the block is symmetric: rows, which lie together in memory, serve as columns
-                    row = bptr[a] + 3 * slot[c, s] * size
-                    for k in range(size):
-                        y[start + k] += (
-                            block[row + k] * d0 + block[row + size + k] * d1 + block[row + 2 * size + k] * d2
-                        )
-                d0, d1, d2 = -d0, -d1, -d2
+            _give_way(c, step, v, y, sides)

@@ -1,20 +1,26 @@
 """Numba kernels of W between rigid bodies: products, local factors and Gauss–Seidel sweeps, matrix-free.
 
-A contact keeps its frame and its two lever arms; a body its inverse mass and inverse inertia (world axes):
+A contact keeps its frame R and its two lever arms a and b; a body its inverse mass and inverse inertia (world axes):
 
     u = R [v_i + ω_i × a - v_j - ω_j × b],    Δv_i = Rᵀ Δr / m_i,    Δω_i = I_i⁻¹ (a × Rᵀ Δr)
 
-`geometry` (nc, 15) holds R in rows, then a, then b; `inertia` (nb, 7) the inverse mass and the upper triangle of I⁻¹;
-`factors` (nc, 13) the upper triangle of W_αα⁻¹, W_NN, W_NT (2), and axes and eigenvalues of the Schur complement.
-Contacts with the same candidate and antagonist form a group; groups of one colour share no moving body.
+`contacts` are `RigidContacts` (mechanics/problem/problem.py). `factors` (nc, 13) hold the upper triangle of W_αα⁻¹,
+W_NN, W_NT (2), and axes and eigenvalues of the Schur complement. Contacts with the same candidate and antagonist form a
+group; groups of one colour share no moving body.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit, prange
+from numpy.typing import NDArray
 
-from mechanics.problem._kernels import plane_axes, slip
+from mechanics._kernels.vectors import cross, dot, minus, row, write_row
+from mechanics.delassus._kernels.sides import add_dot, arm, less_dot, negative, to_world
+from mechanics.problem._kernels import LocalCompliance, plane_axes, slip
 
 __all__ = [
+    "Running",
     "apply",
     "diagonals",
     "factors_of",
@@ -25,38 +31,96 @@ __all__ = [
 ]
 
 
+class Running(NamedTuple):
+    """State of the sweeps, kept up to date in place.
+
+    Attributes
+    ----------
+    impulse : (nc, 3) float64, r [N s]
+    velocity : (nb, 6) float64, velocities that r gives to the bodies [m/s, rad/s]
+    path : (nb,) float64, changes of each body added up, 0 at first [m/s]
+    seen : (ng, 2) float64, path of a group's two bodies after its last solution, -∞ at first [m/s]
+    """
+
+    impulse: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    path: NDArray[np.float64]
+    seen: NDArray[np.float64]
+
+
 @njit(cache=True)
-def _add_block(w, g, a0, a1, a2, m, inertia):
+def _turned(inertia, moment):
+    """Return I⁻¹ times a moment, from a body's row (7,)."""
+    return (
+        dot((inertia[1], inertia[2], inertia[3]), moment),
+        dot((inertia[2], inertia[4], inertia[5]), moment),
+        dot((inertia[3], inertia[5], inertia[6]), moment),
+    )
+
+
+@njit(cache=True)
+def _pushed(v, inertia, a, x):
+    """Return the velocity v (6) of a body after an impulse x at the arm a."""
+    t = _turned(inertia, cross(a, x))
+    m = inertia[0]
+    return v[0] + m * x[0], v[1] + m * x[1], v[2] + m * x[2], v[3] + t[0], v[4] + t[1], v[5] + t[2]
+
+
+@njit(cache=True)
+def _apart(p, q, a, b):
+    """Return the relative velocity of two contact points, of velocities p and q (6) and arms a and b of the bodies."""
+    return (
+        p[0] + p[4] * a[2] - p[5] * a[1] - q[0] - q[4] * b[2] + q[5] * b[1],
+        p[1] + p[5] * a[0] - p[3] * a[2] - q[1] - q[5] * b[0] + q[3] * b[2],
+        p[2] + p[3] * a[1] - p[4] * a[0] - q[2] - q[3] * b[1] + q[4] * b[0],
+    )
+
+
+@njit(cache=True)
+def _add_block(w, g, s, inertia):
     """Add one side's part of W_αα: R (1/m + [a]ᵀ I⁻¹ [a]) Rᵀ."""
-    j = np.empty((3, 3))
+    a, j = arm(g, s), np.empty((3, 3))
     for k in range(3):
-        n0, n1, n2 = g[3 * k], g[3 * k + 1], g[3 * k + 2]
-        j[k, 0], j[k, 1], j[k, 2] = a1 * n2 - a2 * n1, a2 * n0 - a0 * n2, a0 * n1 - a1 * n0
-    i0, i1, i2, i3, i4, i5 = inertia[1], inertia[2], inertia[3], inertia[4], inertia[5], inertia[6]
+        write_row(j, k, cross(a, (g[3 * k], g[3 * k + 1], g[3 * k + 2])))
     for k in range(3):
-        x, y, z = j[k]
-        s0, s1, s2 = i0 * x + i1 * y + i2 * z, i1 * x + i3 * y + i4 * z, i2 * x + i4 * y + i5 * z
+        turned = _turned(inertia, row(j, k))
         for n in range(3):
-            w[n, k] += j[n, 0] * s0 + j[n, 1] * s1 + j[n, 2] * s2
-        w[k, k] += m
+            w[n, k] += dot(row(j, n), turned)
+        w[k, k] += inertia[0]
 
 
 @njit(cache=True)
-def diagonals(body, geometry, inertia):  # pragma: no cover - compiled
-    """W_αα (nc, 3, 3)."""
-    nc = body.shape[0]
+def diagonals(contacts):  # pragma: no cover - compiled
+    """Return W_αα.
+
+    Inputs
+    ------
+    contacts : RigidContacts
+
+    Outputs
+    -------
+    (nc, 3, 3) float64 [1/kg]
+    """
+    nc = contacts.body.shape[0]
     w = np.zeros((nc, 3, 3))
     for c in range(nc):
-        g = geometry[c]
-        i, j = body[c, 0], body[c, 1]
-        _add_block(w[c], g, g[9], g[10], g[11], inertia[i, 0], inertia[i])
-        _add_block(w[c], g, g[12], g[13], g[14], inertia[j, 0], inertia[j])
+        for s in range(2):
+            _add_block(w[c], contacts.geometry[c], s, contacts.inertia[contacts.body[c, s]])
     return w
 
 
 @njit(cache=True)
 def factors_of(diagonal):  # pragma: no cover - compiled
-    """What the local solves need (nc, 13)."""
+    """Return the factors of the local solves.
+
+    Inputs
+    ------
+    diagonal : (nc, 3, 3) float64, symmetric W_αα [1/kg]
+
+    Outputs
+    -------
+    (nc, 13) float64
+    """
     nc = diagonal.shape[0]
     f = np.empty((nc, 13))
     for c in range(nc):
@@ -72,158 +136,157 @@ def factors_of(diagonal):  # pragma: no cover - compiled
 
 
 @njit(cache=True)
-def velocity_change(r, body, geometry, inertia):  # pragma: no cover - compiled
-    """ŵ H r: what the impulses (nc, 3) do to the bodies (nb, 6)."""
-    nc, nb = r.shape[0], inertia.shape[0]
+def velocity_change(r, contacts):  # pragma: no cover - compiled
+    """Return ŵ H r.
+
+    Inputs
+    ------
+    r : (nc, 3) float64, impulses, local frames [N s]
+    contacts : RigidContacts
+
+    Outputs
+    -------
+    (nb, 6) float64, velocities that the impulses give to the bodies [m/s, rad/s]
+    """
+    nb = contacts.inertia.shape[0]
     p = np.zeros((nb, 6))
-    for c in range(nc):
-        g = geometry[c]
-        r0, r1, r2 = r[c, 0], r[c, 1], r[c, 2]
-        x = g[0] * r0 + g[3] * r1 + g[6] * r2
-        y = g[1] * r0 + g[4] * r1 + g[7] * r2
-        z = g[2] * r0 + g[5] * r1 + g[8] * r2
-        q = p[body[c, 0]]
-        q[0] += x
-        q[1] += y
-        q[2] += z
-        q[3] += g[10] * z - g[11] * y
-        q[4] += g[11] * x - g[9] * z
-        q[5] += g[9] * y - g[10] * x
-        q = p[body[c, 1]]
-        q[0] -= x
-        q[1] -= y
-        q[2] -= z
-        q[3] -= g[13] * z - g[14] * y
-        q[4] -= g[14] * x - g[12] * z
-        q[5] -= g[12] * y - g[13] * x
+    for c in range(r.shape[0]):
+        g = contacts.geometry[c]
+        x = to_world(g, row(r, c))
+        for s in range(2):
+            q, moment = p[contacts.body[c, s]], cross(arm(g, s), x)
+            for k in range(3):
+                q[k] += x[k]
+                q[3 + k] += moment[k]
+            x = negative(x)
     for b in range(nb):
-        m, q = inertia[b], p[b]
-        x, y, z = q[3], q[4], q[5]
-        q[0] *= m[0]
-        q[1] *= m[0]
-        q[2] *= m[0]
-        q[3] = m[1] * x + m[2] * y + m[3] * z
-        q[4] = m[2] * x + m[4] * y + m[5] * z
-        q[5] = m[3] * x + m[5] * y + m[6] * z
+        m, q = contacts.inertia[b], p[b]
+        for k in range(3):
+            q[k] *= m[0]
+        q[3], q[4], q[5] = _turned(m, (q[3], q[4], q[5]))
     return p
 
 
 @njit(cache=True)
-def relative_velocity(v, body, geometry):  # pragma: no cover - compiled
-    """Hᵀ v: local relative velocities (nc, 3) of the bodies' velocities (nb, 6)."""
-    nc = body.shape[0]
+def relative_velocity(v, contacts):  # pragma: no cover - compiled
+    """Return Hᵀ v.
+
+    Inputs
+    ------
+    v : (nb, 6) float64, velocities of the bodies [m/s, rad/s]
+    contacts : RigidContacts
+
+    Outputs
+    -------
+    (nc, 3) float64, relative velocities, local frames [m/s]
+    """
+    nc = contacts.body.shape[0]
     u = np.empty((nc, 3))
     for c in range(nc):
-        g, a, b = geometry[c], v[body[c, 0]], v[body[c, 1]]
-        x = a[0] + a[4] * g[11] - a[5] * g[10] - b[0] - b[4] * g[14] + b[5] * g[13]
-        y = a[1] + a[5] * g[9] - a[3] * g[11] - b[1] - b[5] * g[12] + b[3] * g[14]
-        z = a[2] + a[3] * g[10] - a[4] * g[9] - b[2] - b[3] * g[13] + b[4] * g[12]
-        u[c, 0] = g[0] * x + g[1] * y + g[2] * z
-        u[c, 1] = g[3] * x + g[4] * y + g[5] * z
-        u[c, 2] = g[6] * x + g[7] * y + g[8] * z
+        g = contacts.geometry[c]
+        x = _apart(v[contacts.body[c, 0]], v[contacts.body[c, 1]], arm(g, 0), arm(g, 1))
+        for k in range(3):
+            u[c, k] = dot((g[3 * k], g[3 * k + 1], g[3 * k + 2]), x)
     return u
 
 
 @njit(cache=True)
-def apply(r, body, geometry, inertia):  # pragma: no cover - compiled
-    """W r (nc, 3)."""
-    return relative_velocity(velocity_change(r, body, geometry, inertia), body, geometry)
+def apply(r, contacts):  # pragma: no cover - compiled
+    """Return W r (nc, 3) [m/s]; the inputs are those of `velocity_change`."""
+    return relative_velocity(velocity_change(r, contacts), contacts)
+
+
+@njit(cache=True, inline="always")
+def _slide(f, u, bn, r, mu, k):
+    """Return the impulse of a contact that slips, from its velocity u at the impulse r; bn is b_N."""
+    w = LocalCompliance(f[6], f[7], f[8], f[9], f[10], f[11], f[12])
+    co, si = w.cos, w.sin
+    h0, h1 = co * co * w.first + si * si * w.second, co * si * (w.first - w.second)
+    h2 = si * si * w.first + co * co * w.second
+    # b_T = u_T - W_TN r_N - W_TT r_T, with W_TT = A + W_TN W_NT / W_NN
+    along = r[0] + (w.n1 * r[1] + w.n2 * r[2]) / w.nn
+    t1 = u[1] - w.n1 * along - h0 * r[1] - h1 * r[2]
+    t2 = u[2] - w.n2 * along - h1 * r[1] - h2 * r[2]
+    held = r[1] * r[1] + r[2] * r[2]
+    # λ = ‖u_T‖/‖r_T‖ where it slid before
+    guess = np.sqrt((u[1] * u[1] + u[2] * u[2]) / held) if held > 0.0 else 0.0
+    return slip(w, (bn, t1, t2), mu, k, guess)
 
 
 @njit(cache=True)
-def _solve_group(first, last, r, v, shift, mu, cohesion, factors, body, geometry, inertia):
+def _moved(v, p, a):
+    """Return how much a body's velocity has changed from v (6,) to p (6), at the arm a [m/s]."""
+    moved = abs(p[0] - v[0]) + abs(p[1] - v[1]) + abs(p[2] - v[2])
+    size = abs(a[0]) + abs(a[1]) + abs(a[2])
+    return moved + size * (abs(p[3] - v[3]) + abs(p[4] - v[4]) + abs(p[5] - v[5]))
+
+
+@njit(cache=True)
+def _solve_group(first, last, running, laws, contacts):
     """Solve the contacts first:last, those of one pair of bodies, one after the other.
 
     Returns how much the velocities of the two bodies, at the first contact, have changed.
     """
-    i, j = body[first, 0], body[first, 1]
-    p0, p1, p2, p3, p4, p5 = v[i, 0], v[i, 1], v[i, 2], v[i, 3], v[i, 4], v[i, 5]
-    q0, q1, q2, q3, q4, q5 = v[j, 0], v[j, 1], v[j, 2], v[j, 3], v[j, 4], v[j, 5]
-    m, n = inertia[i], inertia[j]
+    r, v, geometry = running.impulse, running.velocity, contacts.geometry
+    shift, friction, cohesion, factors = laws
+    i, j = contacts.body[first, 0], contacts.body[first, 1]
+    p = v[i, 0], v[i, 1], v[i, 2], v[i, 3], v[i, 4], v[i, 5]
+    q = v[j, 0], v[j, 1], v[j, 2], v[j, 3], v[j, 4], v[j, 5]
+    inertia_i, inertia_j = contacts.inertia[i], contacts.inertia[j]
     changed = False
     for c in range(first, last):
-        g, f = geometry[c], factors[c]
-        g0, g1, g2, g3, g4, g5, g6, g7, g8 = g[0], g[1], g[2], g[3], g[4], g[5], g[6], g[7], g[8]
-        a0, a1, a2, b0, b1, b2 = g[9], g[10], g[11], g[12], g[13], g[14]
-        x = p0 + p4 * a2 - p5 * a1 - q0 - q4 * b2 + q5 * b1
-        y = p1 + p5 * a0 - p3 * a2 - q1 - q5 * b0 + q3 * b2
-        z = p2 + p3 * a1 - p4 * a0 - q2 - q3 * b1 + q4 * b0
-        un = shift[c, 0] + g0 * x + g1 * y + g2 * z
-        u1 = shift[c, 1] + g3 * x + g4 * y + g5 * z
-        u2 = shift[c, 2] + g6 * x + g7 * y + g8 * z
-        r0, r1, r2, k = r[c, 0], r[c, 1], r[c, 2], cohesion[c]
-        bn = un - f[6] * r0 - f[7] * r1 - f[8] * r2
+        g, f, old, k = geometry[c], factors[c], row(r, c), cohesion[c]
+        # read before r is written, so that they stay in registers
+        n, t, s = (g[0], g[1], g[2]), (g[3], g[4], g[5]), (g[6], g[7], g[8])
+        a, b = arm(g, 0), arm(g, 1)
+        x = _apart(p, q, a, b)
+        u = add_dot(shift[c, 0], n, x), add_dot(shift[c, 1], t, x), add_dot(shift[c, 2], s, x)
+        bn = less_dot(u[0], (f[6], f[7], f[8]), old)
         if bn >= 0.0 and k == 0.0:
-            s0 = s1 = s2 = 0.0
+            new = 0.0, 0.0, 0.0
         else:
-            s0 = r0 - f[0] * un - f[1] * u1 - f[2] * u2
-            s1 = r1 - f[1] * un - f[3] * u1 - f[4] * u2
-            s2 = r2 - f[2] * un - f[4] * u1 - f[5] * u2
-            limit = mu[c] * s0 + k
-            if s0 < 0.0 or s1 * s1 + s2 * s2 > limit * limit:
-                co, si, l1, l2 = f[9], f[10], f[11], f[12]
-                w, d, e = f[6], f[7], f[8]
-                h0, h1, h2 = co * co * l1 + si * si * l2, co * si * (l1 - l2), si * si * l1 + co * co * l2
-                # b_T = u_T - W_TN r_N - W_TT r_T, with W_TT = A + W_TN W_NT / W_NN
-                along = r0 + (d * r1 + e * r2) / w
-                t1 = u1 - d * along - h0 * r1 - h1 * r2
-                t2 = u2 - e * along - h1 * r1 - h2 * r2
-                held = r1 * r1 + r2 * r2
-                # λ = ‖u_T‖/‖r_T‖ where it slid before
-                guess = np.sqrt((u1 * u1 + u2 * u2) / held) if held > 0.0 else 0.0
-                s0, s1, s2 = slip(w, d, e, co, si, l1, l2, bn, t1, t2, mu[c], k, guess)
-        r0, r1, r2 = s0 - r0, s1 - r1, s2 - r2
-        if r0 == 0.0 and r1 == 0.0 and r2 == 0.0:
+            new = (
+                less_dot(old[0], (f[0], f[1], f[2]), u),
+                less_dot(old[1], (f[1], f[3], f[4]), u),
+                less_dot(old[2], (f[2], f[4], f[5]), u),
+            )
+            limit = friction[c] * new[0] + k
+            if new[0] < 0.0 or new[1] * new[1] + new[2] * new[2] > limit * limit:
+                new = _slide(f, u, bn, old, friction[c], k)
+        step = minus(new, old)
+        if step[0] == 0.0 and step[1] == 0.0 and step[2] == 0.0:
             continue
         changed = True
-        r[c, 0], r[c, 1], r[c, 2] = s0, s1, s2
-        x = g0 * r0 + g3 * r1 + g6 * r2
-        y = g1 * r0 + g4 * r1 + g7 * r2
-        z = g2 * r0 + g5 * r1 + g8 * r2
-        p0 += m[0] * x
-        p1 += m[0] * y
-        p2 += m[0] * z
-        t0, t1, t2 = a1 * z - a2 * y, a2 * x - a0 * z, a0 * y - a1 * x
-        p3 += m[1] * t0 + m[2] * t1 + m[3] * t2
-        p4 += m[2] * t0 + m[4] * t1 + m[5] * t2
-        p5 += m[3] * t0 + m[5] * t1 + m[6] * t2
-        q0 -= n[0] * x
-        q1 -= n[0] * y
-        q2 -= n[0] * z
-        t0, t1, t2 = b1 * z - b2 * y, b2 * x - b0 * z, b0 * y - b1 * x
-        q3 -= n[1] * t0 + n[2] * t1 + n[3] * t2
-        q4 -= n[2] * t0 + n[4] * t1 + n[5] * t2
-        q5 -= n[3] * t0 + n[5] * t1 + n[6] * t2
+        write_row(r, c, new)
+        x = dot((n[0], t[0], s[0]), step), dot((n[1], t[1], s[1]), step), dot((n[2], t[2], s[2]), step)
+        p = _pushed(p, inertia_i, a, x)
+        q = _pushed(q, inertia_j, b, negative(x))
     if not changed:
         return 0.0, 0.0
     g = geometry[first]
     moved_i = moved_j = 0.0
     # bodies that do not move are shared between groups of one colour: they are only read
-    if m[0] > 0.0:
-        moved_i = abs(p0 - v[i, 0]) + abs(p1 - v[i, 1]) + abs(p2 - v[i, 2])
-        size = abs(g[9]) + abs(g[10]) + abs(g[11])
-        moved_i += size * (abs(p3 - v[i, 3]) + abs(p4 - v[i, 4]) + abs(p5 - v[i, 5]))
-        v[i, 0], v[i, 1], v[i, 2], v[i, 3], v[i, 4], v[i, 5] = p0, p1, p2, p3, p4, p5
-    if n[0] > 0.0:
-        moved_j = abs(q0 - v[j, 0]) + abs(q1 - v[j, 1]) + abs(q2 - v[j, 2])
-        size = abs(g[12]) + abs(g[13]) + abs(g[14])
-        moved_j += size * (abs(q3 - v[j, 3]) + abs(q4 - v[j, 4]) + abs(q5 - v[j, 5]))
-        v[j, 0], v[j, 1], v[j, 2], v[j, 3], v[j, 4], v[j, 5] = q0, q1, q2, q3, q4, q5
+    if inertia_i[0] > 0.0:
+        moved_i = _moved(v[i], p, arm(g, 0))
+        v[i, 0], v[i, 1], v[i, 2], v[i, 3], v[i, 4], v[i, 5] = p
+    if inertia_j[0] > 0.0:
+        moved_j = _moved(v[j], q, arm(g, 1))
+        v[j, 0], v[j, 1], v[j, 2], v[j, 3], v[j, 4], v[j, 5] = q
     return moved_i, moved_j
 
 
 @njit(cache=True)
-def _visit(g, path, seen, calm, r, v, shift, mu, cohesion, factors, body, geometry, inertia, group):
+def _visit(g, calm, running, laws, contacts, group):
     """Solve a group unless it sleeps: its bodies have hardly changed since it was last solved.
 
-    `path` (nb,) adds up the changes of each body, `seen` (ng, 2) is where the paths were after the last solution. Any
-    change of a body beyond `calm` wakes all its groups.
+    Any change of a body beyond `calm` wakes all its groups.
     """
     start, stop = group[g], group[g + 1]
-    i, j = body[start, 0], body[start, 1]
+    path, seen = running.path, running.seen
+    i, j = contacts.body[start, 0], contacts.body[start, 1]
     if path[i] - seen[g, 0] + path[j] - seen[g, 1] <= calm:
         return
-    moved_i, moved_j = _solve_group(start, stop, r, v, shift, mu, cohesion, factors, body, geometry, inertia)
+    moved_i, moved_j = _solve_group(start, stop, running, laws, contacts)
     # bodies that do not move have no path: groups of one colour may share them
     if moved_i > 0.0:
         path[i] += moved_i
@@ -235,33 +298,44 @@ def _visit(g, path, seen, calm, r, v, shift, mu, cohesion, factors, body, geomet
 
 
 @njit(cache=True)
-def sweep(
-    count, calm, r, v, shift, mu, cohesion, factors, body, geometry, inertia, group
-):  # pragma: no cover - compiled
-    """`count` passes over all groups; r and v are kept up to date in place.
+def sweep(count, calm, running, laws, contacts, group):  # pragma: no cover - compiled
+    """Make `count` passes over all groups.
 
-    The first pass visits every group; in the others, groups sleep whose bodies changed by no more than `calm` [m/s].
+    The first pass visits every group; in the others, groups sleep whose bodies have hardly changed.
+
+    Inputs
+    ------
+    count : int64
+    calm : float64, change of velocity that lets a group sleep [m/s]
+    running : Running
+    laws : Laws
+    contacts : RigidContacts
+    group : (ng+1,) int64, where each group begins
+
+    Outputs
+    -------
+    `running`, written
     """
-    groups = group.shape[0] - 1
-    path, seen = np.zeros(inertia.shape[0]), np.full((groups, 2), -np.inf)
     for _ in range(count):
-        for g in range(groups):
-            _visit(g, path, seen, calm, r, v, shift, mu, cohesion, factors, body, geometry, inertia, group)
+        for g in range(group.shape[0] - 1):
+            _visit(g, calm, running, laws, contacts, group)
 
 
 @njit(cache=True, parallel=True)
-def sweep_parallel(
-    count, calm, r, v, shift, mu, cohesion, factors, body, geometry, inertia, group, colour
-):  # pragma: no cover - compiled
-    """As `sweep`, with the groups of each colour (`colour` points into the groups) in parallel.
+def sweep_parallel(count, calm, running, laws, contacts, group, colour):  # pragma: no cover - compiled
+    """Make the passes of `sweep`, with the groups of each colour in parallel.
 
     Groups of one colour share no moving body, so the result has the same bits as that of `sweep`.
+
+    Inputs
+    ------
+    colour : (k+1,) int64, where each colour begins among the groups; the others as in `sweep`
+
+    Outputs
+    -------
+    `running`, written
     """
-    groups, colours = group.shape[0] - 1, colour.shape[0] - 1
-    path, seen = np.zeros(inertia.shape[0]), np.full((groups, 2), -np.inf)
     for _ in range(count):
-        for k in range(colours):
+        for k in range(colour.shape[0] - 1):
             for g in prange(colour[k], colour[k + 1]):
-                _visit(
-                    g, path, seen, calm, r, v, shift, mu, cohesion, factors, body, geometry, inertia, group
-                )
+                _visit(g, calm, running, laws, contacts, group)

@@ -141,7 +141,7 @@ def _factors(model: Model, bodies: Ints) -> tuple[int, float, float]:
     ends = np.cumsum(np.bincount(bodies.ravel(), minlength=len(model.mass)))[:-1]
     sides = [own for own, fixed in zip(np.split(order, ends), model.fixed, strict=True) if not fixed]
     pattern = fronts(bodies, [own // 2 for own in sides if len(own)])
-    pivots = pattern.width.astype(float)
-    others = np.diff(pattern.dptr) - pivots
+    pivots = pattern.layout.width.astype(float)
+    others = np.diff(pattern.layout.dptr) - pivots
     flops = 2.0 / 3.0 * pivots**3 + 2.0 * pivots**2 * others + 2.0 * pivots * others**2
     return len(pivots), float(pattern.size), float(flops.sum())

@@ -3,18 +3,54 @@
 Rows with the same columns, as contacts of one pair of bodies have, or translation and rotation of one body, are one
 group. Groups are eliminated in the order of least degree; each has a dense front, of its own unknowns and of those
 that are still to come and couple with it (the multifrontal method, Duff & Reid 1983). Pivots are sought within a group
-alone, which suits matrices that are positive definite but for the derivatives of contact laws.
+alone, which suits matrices that are positive definite except for the derivatives of contact laws.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-__all__ = ["analyse", "factorise", "solve"]
+__all__ = ["Plan", "analyse", "factorise", "solve"]
+
+
+class Plan(NamedTuple):
+    """Pattern of the factors; groups are numbered in the order of their elimination.
+
+    Attributes
+    ----------
+    width, whole : (ng,) int64, unknowns of a group, and of its front
+    aptr : (ng+1,) int64, where the fronts begin in the factors, which hold them one after the other
+    fptr : (ng+1,) int64, where the groups of a front begin in `front`
+    front, offset : int64, groups of the fronts, its own first, and where their unknowns begin in it
+    place : int64, as `front`: where its groups begin in the parent's front
+    parent : (ng,) int64, the front that takes what a front leaves; -1 for a root
+    mptr, member : int64, the contacts of each group
+    eptr, entry, row, column : int64, blocks of the matrix that a front begins with, and where they go
+    work : multiplications of a factorisation
+    """
+
+    width: NDArray[np.int64]
+    whole: NDArray[np.int64]
+    aptr: NDArray[np.int64]
+    fptr: NDArray[np.int64]
+    front: NDArray[np.int64]
+    offset: NDArray[np.int64]
+    place: NDArray[np.int64]
+    parent: NDArray[np.int64]
+    mptr: NDArray[np.int64]
+    member: NDArray[np.int64]
+    eptr: NDArray[np.int64]
+    entry: NDArray[np.int64]
+    row: NDArray[np.int64]
+    column: NDArray[np.int64]
+    work: float
 
 
 @njit(cache=True)
 def _mix(x):
-    """A number that looks random for each contact: patterns are compared by their sums."""
+    """Return a number that looks random for each contact: patterns are compared by their sums."""
     z = np.uint64(x) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(0x632BE59BD9B4E019)
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
@@ -23,7 +59,7 @@ def _mix(x):
 
 @njit(cache=True)
 def _groups(indices, indptr):
-    """The group of each contact: those of one group have the same columns; and how many there are."""
+    """Return the group of each contact, those of one group having the same columns, and the number of groups."""
     nc = len(indptr) - 1
     signature = np.empty(nc, dtype=np.uint64)
     for c in range(nc):
@@ -55,7 +91,7 @@ def _groups(indices, indptr):
 
 @njit(cache=True)
 def _neighbours(group, count, indices, indptr):
-    """Bit sets (count, words): which groups couple, either way round."""
+    """Return bit sets (count, words) of the groups that couple, either way round."""
     words = (count + 63) // 64
     bits = np.zeros((count, words), dtype=np.uint64)
     one = np.uint64(1)
@@ -72,7 +108,7 @@ def _neighbours(group, count, indices, indptr):
 
 @njit(cache=True)
 def _members(row, found):
-    """The set bits of a row, written into `found`; their number."""
+    """Write the set bits of a row into `found`; return their number."""
     number = 0
     one, zero = np.uint64(1), np.uint64(0)
     for w in range(len(row)):
@@ -93,7 +129,7 @@ def _members(row, found):
 
 @njit(cache=True)
 def _eliminate(bits, size):
-    """Order of least degree; `bits` ends as the groups that are left in the front of each."""
+    """Return the order of least degree; `bits` ends as the groups that are left in the front of each."""
     count, words = bits.shape
     order = np.empty(count, dtype=np.int64)
     done = np.zeros(count, dtype=np.bool_)
@@ -126,19 +162,16 @@ def _eliminate(bits, size):
 
 @njit(cache=True)
 def analyse(indices, indptr):  # pragma: no cover - compiled
-    """The pattern of the factors, and how many multiplications they take.
+    """Analyse the pattern of a matrix of 3 × 3 blocks.
 
-    Returns
+    Inputs
+    ------
+    indices : (nnz,) int64, columns of the blocks, row by row
+    indptr : (nc+1,) int64, where each row begins
+
+    Outputs
     -------
-    order : (ng,) groups as they are eliminated; everything below is in this order
-    width, whole : (ng,) unknowns of a group, and of its front
-    fptr : (ng+1,) where the groups of a front begin in `front`
-    front, offset : groups of the fronts, its own first, and where their unknowns begin in it
-    mptr, member : the contacts of each group
-    eptr, entry, row, column : blocks of the matrix that a front begins with, and where they go
-    parent : (ng,) the front that takes what a front leaves; -1: none
-    place : as `front`: where its groups begin in the parent's front
-    work : multiplications of a factorisation
+    Plan
     """
     nc = len(indptr) - 1
     group, count = _groups(indices, indptr)
@@ -192,28 +225,17 @@ def analyse(indices, indptr):  # pragma: no cover - compiled
             for k in range(fptr[f] + 1, fptr[f + 1]):
                 place[k] = spot[front[k]]
     eptr, entry, row, column = _entries(indices, indptr, group, rank, within, fptr, front, offset)
-    return (
-        order,
-        width,
-        whole,
-        fptr,
-        front,
-        offset,
-        mptr,
-        member,
-        eptr,
-        entry,
-        row,
-        column,
-        parent,
-        place,
-        work,
+    aptr = np.zeros(count + 1, dtype=np.int64)
+    for f in range(count):
+        aptr[f + 1] = aptr[f] + whole[f] * whole[f]
+    return Plan(
+        width, whole, aptr, fptr, front, offset, place, parent, mptr, member, eptr, entry, row, column, work
     )
 
 
 @njit(cache=True)
 def _entries(indices, indptr, group, rank, within, fptr, front, offset):
-    """Each block of W belongs to the front of the first of its two groups."""
+    """Assign each block of the matrix to the front of the first of its two groups."""
     count = len(fptr) - 1
     eptr = np.zeros(count + 1, dtype=np.int64)
     nc = len(indptr) - 1
@@ -292,32 +314,23 @@ def _partial_lu(a, w, pivot, symmetric):
 
 
 @njit(cache=True, fastmath={"contract"})
-def factorise(
-    value,
-    symmetric,
-    width,
-    whole,
-    fptr,
-    front,
-    offset,
-    eptr,
-    entry,
-    row,
-    column,
-    parent,
-    place,
-    aptr,
-    factor,
-    pivot,
-):  # pragma: no cover - compiled
-    """Factors of the matrix with the blocks `value` (nnz, 3, 3) in the pattern's order; whether there are any.
+def factorise(value, symmetric, plan, factor, pivot):  # pragma: no cover - compiled
+    """Factorise a matrix; return whether it is regular.
 
-    Parameters
-    ----------
-    symmetric : the matrix is, which halves the work
-    aptr : (ng+1,) where the fronts begin in `factor`, which holds them one after the other
-    factor, pivot : written; as many pivots as unknowns
+    Inputs
+    ------
+    value : (nnz, 3, 3) float64, blocks in the order of the pattern
+    symmetric : bool, whether the matrix is symmetric, which halves the work
+    plan : Plan
+
+    Outputs
+    -------
+    factor : (aptr[-1],) float64, written
+    pivot : (3 nc,) int64, written
     """
+    width, whole, aptr, fptr = plan.width, plan.whole, plan.aptr, plan.fptr
+    offset, place, parent = plan.offset, plan.place, plan.parent
+    eptr, entry, row, column = plan.eptr, plan.entry, plan.row, plan.column
     count = len(width)
     factor[: aptr[-1]] = 0.0
     at = 0
@@ -354,10 +367,21 @@ def factorise(
 
 
 @njit(cache=True, fastmath={"contract", "reassoc"})
-def solve(
-    x, width, whole, fptr, front, offset, mptr, member, aptr, factor, pivot, work
-):  # fmt: skip  # pragma: no cover - compiled
-    """The solution for a right side x (nc, 3), in place; `work` as long as the largest front."""
+def solve(x, plan, factor, pivot, work):  # pragma: no cover - compiled
+    """Solve for one right side.
+
+    Inputs
+    ------
+    x : (nc, 3) float64, overwritten
+    plan, factor, pivot : as in `factorise`
+    work : (largest `whole`,) float64, overwritten
+
+    Outputs
+    -------
+    x : the solution
+    """
+    width, whole, aptr, fptr, front = plan.width, plan.whole, plan.aptr, plan.fptr, plan.front
+    offset, mptr, member = plan.offset, plan.mptr, plan.member
     count = len(width)
     at = 0
     for f in range(count):

@@ -1,1 +1,4 @@
-"""First-order solvers: NSGS, ADMM and APGD."""
+"""First-order solvers: sweeps, splitting and projected gradients.
+
+Public: `NSGS` (nsgs); `ADMM` (admm); `APGD` (apgd); `Anderson` (anderson).
+"""

@@ -1,4 +1,4 @@
-"""ADMM on the sparse system (Boyd et al. 2011; Tasora et al. 2021; Acary, Brémond & Huber 2018).
+"""ADMM on the sparse system of bodies (Boyd et al. 2011; Tasora et al. 2021; Acary, Brémond & Huber 2018).
 
 Splits r = z: r minimises the quadratic part, z lies in the Coulomb cone. With the scaled dual y and penalty σ,
 
@@ -16,30 +16,36 @@ import numpy as np
 
 from mechanics.arrays import Array
 from mechanics.problem._kernels import admm_right_side, admm_update
-from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, scale_of
+from mechanics.problem.forms import Form
+from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.problem.residual import project_on_cone, residual
-from moma.errors import SolverError
 
 __all__ = ["ADMM"]
 
 
-# looks between two balances of the penalty, by how much it may change at a time, and its bounds over W
-_BALANCE_LOOKS, _LEAST_CHANGE, _MOST_CHANGE, _BOUNDS = 2, 2.0, 5.0, (1e-4, 1.0)
+# looks between two balances of the penalty
+_BALANCE_LOOKS = 2
+# factor below which a change of the penalty does not pay for another factorisation
+_LEAST_CHANGE = 2.0
+# largest change of the penalty at a time
+_MOST_CHANGE = 5.0
+# bounds of the penalty over the scale of W [-]
+_BOUNDS = (1e-4, 1.0)
 
 
 @dataclass(frozen=True)
 class ADMM:
-    """Iterates until η ≤ tolerance.
+    """Alternating directions until η ≤ tolerance.
 
     Attributes
     ----------
     tolerance : natural map η at which the problem counts as solved [-]
     velocity_tolerance : and the largest velocity by which a contact may break its law, over that of u_free [-]
-    max_iterations : iterations after which it is given up
+    max_iterations : limit of the iterations
     penalty : σ over the mean diagonal of W; where all that touches stays in touch, the smaller the faster; larger
         values bear with contacts that open and slide [-]
     check_every : iterations between two looks at η
-    patience : give up after a look that finds η less than this many times smaller than two looks before; 0: never
+    patience : stop after a look that finds η less than this many times smaller than two looks before; 0: never
     hold : iterations for which the de Saxcé shift is held; held longer, it is steadier where much slides
     balanced : let the penalty follow the ratio of dual and primal residual (He, Yang & Wang 2000)
     over_relaxation : by how much r overshoots; 1: not at all, where a small penalty finds r nearly at once and an
@@ -57,26 +63,23 @@ class ADMM:
     over_relaxation: float = 1.6
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
-        """Solve from `start`; its velocity, û = -σ y, lets the iteration go on where it stopped.
+        """Solve from `start`, whose velocity û = -σ y lets the iteration continue where it stopped.
 
-        The best of all looks is given back.
+        Returns the best of all looks.
 
         Raises
         ------
-        SolverError : if the problem carries no sparse form
+        SolverError : if W is known by its products alone
         """
-        if problem.sparse is None:
-            raise SolverError("the problem has no sparse form", where="ADMM", remedy='use the method "nsgs"')
         if len(start.impulse) == 0:
             return ContactSolution(start.impulse, start.velocity, 0, 0.0, True)
         limits = self.tolerance, self.velocity_tolerance
         impulse = project_on_cone(start.impulse, problem.friction, problem.cohesion)
         left, looks = residual(problem, impulse), [np.inf, np.inf]
         if left.within(*limits):
-            # where nothing is left to do, nothing is factorised
+            # a solution costs no factorisation
             return ContactSolution(impulse, start.velocity, 0, left.natural_map, True)
-        sigma = self.penalty * scale_of(problem.delassus)
-        run = _Run(problem, start, sigma, self.hold, self.over_relaxation)
+        run = _Run(problem, problem.form("ADMM"), start, self)
         best = left, run.z.copy(), run.velocity
         while not left.within(*limits) and run.iterations < self.max_iterations:
             if looks[-2] < self.patience * left.natural_map:
@@ -95,16 +98,13 @@ class ADMM:
 
 
 class _Run:
-    """The iterates of one solution."""
+    """Iterates of one solution."""
 
-    def __init__(
-        self, problem: ContactProblem, start: ContactStart, sigma: float, hold: int, over: float
-    ) -> None:
-        assert problem.sparse is not None
-        self._problem, self._form, self._hold = problem, problem.sparse(), hold
-        self._scale, self._over = scale_of(problem.delassus), over
-        self._shift = problem.biased
-        self._sigma, self._relaxed = sigma, self._form.relaxed(sigma)
+    def __init__(self, problem: ContactProblem, form: Form, start: ContactStart, settings: ADMM) -> None:
+        self._problem, self._form, self._settings = problem, form, settings
+        self._shift, self._scale = problem.biased, problem.delassus.scale
+        self._sigma = sigma = settings.penalty * self._scale
+        self._relaxed = form.relaxed(sigma)
         self.z = project_on_cone(start.impulse, problem.friction, problem.cohesion)
         self._y = -start.velocity / sigma
         self._lag = np.zeros(len(self.z))
@@ -117,19 +117,19 @@ class _Run:
         return -self._sigma * self._y
 
     def iterate(self, count: int) -> None:
-        """So many times r, z and y."""
-        problem, sigma = self._problem, self._sigma
+        """Update r, z and y `count` times."""
+        problem, sigma, over = self._problem, self._sigma, self._settings.over_relaxation
         for _ in range(count):
-            if self.iterations % self._hold == 0:
+            if self.iterations % self._settings.hold == 0:
                 self._lag = problem.friction * np.sqrt((self._y[:, 1:] ** 2).sum(axis=1))
             admm_right_side(self.z, self._y, self._shift, self._lag, sigma, self._right)
             self._r = self._relaxed(self._right.ravel()).reshape(self._right.shape)
             self._last = self.z.copy()
-            admm_update(self._r, self.z, self._y, problem.friction, problem.cohesion, self._over)
+            admm_update(self._r, self.z, self._y, problem.friction, problem.cohesion, over)
             self.iterations += 1
 
     def balance(self) -> None:
-        """Let σ follow the ratio of the residuals."""
+        """Adapt σ to the ratio of the residuals."""
         tiny, sigma = 1e-300, self._sigma
         primal = _norm(self._r - self.z) / max(_norm(self.z), tiny)
         dual = sigma * _norm(self.z - self._last) / max(sigma * _norm(self._y), _norm(self._shift), tiny)

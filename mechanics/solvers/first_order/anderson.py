@@ -7,16 +7,16 @@ from mechanics.arrays import Array
 __all__ = ["Anderson"]
 
 
-# of the trace of the Gram matrix: keeps the small least-squares problem solvable
+# regularisation of the small least-squares problem over the trace of its Gram matrix [-]
 _REGULAR = 1e-12
 
 
 class Anderson:
-    """Extrapolates from the last iterates of x ← G(x).
+    """Extrapolation from the last iterates of x ← G(x).
 
     Parameters
     ----------
-    depth : how many differences of iterates are used
+    depth : number of differences of iterates
     """
 
     def __init__(self, depth: int) -> None:
@@ -25,7 +25,7 @@ class Anderson:
         self._steps: list[Array] = []
 
     def __call__(self, x: Array, image: Array) -> Array | None:
-        """The extrapolated iterate, given x and G(x); None as long as too little is known."""
+        """Return the extrapolated iterate, given x and G(x); None as long as too little is known."""
         self._images.append(image.ravel().copy())
         self._steps.append((image - x).ravel())
         del self._images[: -self._depth - 1], self._steps[: -self._depth - 1]
@@ -42,5 +42,5 @@ class Anderson:
         return extrapolated
 
     def forget(self) -> None:
-        """Begin anew: after a bad extrapolation the old iterates mislead."""
+        """Start over: after a bad extrapolation the old iterates mislead."""
         del self._images[:-1], self._steps[:-1]

@@ -7,7 +7,7 @@ One product with W makes one iteration,
 
 with D the mean of each contact's own diagonal, L found by trial (Rayleigh's quotient of W along the step says at once
 whether it was large enough), β after Nesterov, and a new start where the step turns against the gradient. The shift is
-renewed in each iteration: held until the inner programme is solved it takes three to ten times as many.
+renewed in each iteration: held until the inner programme is solved, it would take three to ten times as many.
 """
 
 from dataclasses import dataclass
@@ -15,30 +15,32 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.arrays import Array
-from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, scale_of
+from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.problem.residual import project_on_cone, residual
-from mechanics.solvers._kernels.apgd import curvature, momentum, project_step
+from mechanics.solvers._kernels.apgd import Pair, Terms, curvature, momentum, project_step
 
 __all__ = ["APGD"]
 
 
-# by how much L grows where it was too small, at least, and by how much it forgets in each iteration
-_GROWTH, _FORGETTING = 2.0, 0.97
-# by how much rounding may pass L
+# smallest growth of L where it was too small [-]
+_GROWTH = 2.0
+# decay of L in each iteration [-]
+_FORGETTING = 0.97
+# curvature over L that rounding alone explains [-]
 _SLACK = 1.0 + 1e-9
-# of the mean diagonal of W: the smallest metric of a contact, so that one that nothing moves is left alone
+# smallest metric of a contact over the scale of W, so that a contact that nothing moves stays as it is [-]
 _LEAST = 1e-12
 
 
 @dataclass(frozen=True)
 class APGD:
-    """Iterates until η ≤ tolerance; needs nothing of W but its products, its diagonal blocks and its own memory.
+    """Accelerated projected gradients until η ≤ tolerance; W is needed by its products and diagonal blocks alone.
 
     Attributes
     ----------
     tolerance : natural map η at which the problem counts as solved [-]
     velocity_tolerance : and the largest velocity by which a contact may break its law, over that of u_free [-]
-    max_iterations : iterations, each of one product with W and now and then one more, after which it is given up
+    max_iterations : iterations, each of one product with W and now and then one more, at most
     check_every : iterations between two looks at η
     """
 
@@ -48,7 +50,7 @@ class APGD:
     check_every: int = 10
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
-        """Solve from the impulses of `start`; the best of all looks is given back."""
+        """Solve from the impulses of `start`; return the best of all looks."""
         limits = self.tolerance, self.velocity_tolerance
         left = residual(problem, start.impulse)
         if left.within(*limits):
@@ -68,50 +70,42 @@ class APGD:
 
 
 class _Run:
-    """The iterates of one solution."""
+    """Iterates of one solution."""
 
     def __init__(self, problem: ContactProblem, start: ContactStart) -> None:
         self._problem = problem
-        self._shift = problem.biased
         own = problem.delassus.diagonal
         mean = np.einsum("cii->c", own) / own.shape[1]
-        self._weight = np.maximum(mean, _LEAST * scale_of(problem.delassus))
+        self._weight = np.maximum(mean, _LEAST * problem.delassus.scale)
         self._r = project_on_cone(start.impulse, problem.friction, problem.cohesion)
-        self._wr = problem.delassus.apply(self._r)
-        self._y, self._wy = self._r.copy(), self._wr.copy()
+        wr = problem.delassus.apply(self._r)
+        self._last, self._ahead = Pair(self._r, wr), Pair(self._r.copy(), wr.copy())
         self._new = np.empty_like(self._r)
-        tangential = self._wr[:, 1:] + problem.u_free[:, 1:]
+        tangential = wr[:, 1:] + problem.u_free[:, 1:]
         self._slide = problem.friction * np.sqrt((tangential**2).sum(axis=1))
+        self._terms = Terms(problem.biased, problem.u_free, problem.friction, problem.cohesion, self._weight)
         self._steepness, self._theta = 1.0, 1.0
 
     @property
     def impulse(self) -> Array:
         """r (nc, d), in its cones [N s]; overwritten by the next iterations."""
-        return self._r
+        return self._last.impulse
 
     def iterate(self, count: int) -> None:
-        """So many steps."""
-        problem, weight = self._problem, self._weight
+        """Make `count` steps."""
         for _ in range(count):
-            product = self._step()
-            self._theta = momentum(
-                self._new, self._r, product, self._wr, self._y, self._wy,
-                problem.u_free, problem.friction, weight, self._theta, self._slide,
-            )  # fmt: skip
-            self._r, self._new, self._wr = self._new, self._r, product
+            new = self._step()
+            self._theta = momentum(new, self._last, self._ahead, self._terms, self._theta, self._slide)
+            self._new, self._last = self._last.impulse, new
             self._steepness *= _FORGETTING
 
-    def _step(self) -> Array:
-        """Take `new` from y by a step that is short enough; W new is given back."""
-        problem, weight = self._problem, self._weight
+    def _step(self) -> Pair:
+        """Return the next iterate, from y by a step that is short enough."""
         while True:
-            project_step(
-                self._y, self._wy, self._shift, self._slide, problem.friction, problem.cohesion,
-                weight, 1.0 / self._steepness, self._new,
-            )  # fmt: skip
-            product = problem.delassus.apply(self._new)
-            seen = float(curvature(self._new, self._y, product, self._wy, weight))
+            project_step(self._ahead, self._slide, 1.0 / self._steepness, self._terms, self._new)
+            new = Pair(self._new, self._problem.delassus.apply(self._new))
+            seen = float(curvature(new, self._ahead, self._weight))
             # what is not a number is left to the residual
             if not seen > self._steepness * _SLACK:
-                return product
+                return new
             self._steepness = max(_GROWTH * self._steepness, seen)

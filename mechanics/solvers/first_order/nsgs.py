@@ -10,22 +10,35 @@ from mechanics.solvers.first_order.anderson import Anderson
 __all__ = ["NSGS"]
 
 
-# an extrapolation this many times worse than the sweeps alone is not kept, and the old iterates are worthless
+# η of an extrapolation over that of the sweeps from which it is dropped, with the old iterates [-]
 _BAD = 10.0
 
 
 @dataclass(frozen=True)
 class NSGS:
-    """Sweeps the contacts, solving each exactly with its neighbours frozen, until η ≤ tolerance.
+    """Sweeps over the contacts, each solved exactly with its neighbours frozen, until η ≤ tolerance.
+
+    A block of 250 kg on a floor: in a step of 2 ms its contact impulses add up to m g h.
+
+    >>> import numpy as np
+    >>> from mechanics.delassus.rigid import RigidDelassus, schedule
+    >>> body, arm = np.tile([1, 0], (4, 1)), [[x, y, -0.25] for x in (-0.25, 0.25) for y in (-0.25, 0.25)]
+    >>> geometry = [[0, 0, 1, 1, 0, 0, 0, 1, 0, *a, *a] for a in arm]
+    >>> inertia = np.array([[0.0] * 7, [1 / 250, 0.096, 0, 0, 0.096, 0, 0.096]])
+    >>> w = RigidDelassus(body, np.array(geometry), inertia, schedule(body, np.array([False, True])))
+    >>> zero, fall = np.zeros((4, 3)), np.tile([-9.81 * 2e-3, 0.0, 0.0], (4, 1))
+    >>> problem = ContactProblem(w, fall, zero[:, 0], np.full(4, 0.6), zero[:, 0])
+    >>> round(float(NSGS()(problem, ContactStart(zero, zero)).impulse[:, 0].sum()), 4)
+    4.905
 
     Attributes
     ----------
     tolerance : natural map η at which the problem counts as solved [-]
-    velocity_tolerance : and the largest velocity by which a contact may break its law, over that of u_free [-]
-    max_iterations : sweeps after which it is given up
+    velocity_tolerance : largest velocity by which a contact may break its law, over that of u_free [-]
+    max_iterations : limit of the sweeps
     check_every : sweeps between two looks at η
     depth : past iterates from which Anderson's method extrapolates at each look; an extrapolation is kept unless its
-        η is ten times that of the sweeps alone: what looks worse at first mostly leads on. 0: plain sweeps
+        η is ten times that of the sweeps alone: one that looks worse at first mostly leads on. 0: plain sweeps
     """
 
     tolerance: float = 1e-6
@@ -35,7 +48,7 @@ class NSGS:
     depth: int = 20
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
-        """Solve from the impulses of `start`; the best of all looks is given back."""
+        """Solve from the impulses of `start`; return the best of all looks."""
         impulse = start.impulse.copy()
         left = residual(problem, impulse)
         best, sweeps = (impulse, left), 0
@@ -56,7 +69,7 @@ class NSGS:
 
 
 class _Look:
-    """Some sweeps, a look at what is left, and maybe an extrapolation."""
+    """Some sweeps, a look at the residual, and maybe an extrapolation."""
 
     def __init__(
         self, problem: ContactProblem, sweep: GaussSeidel, depth: int, limits: tuple[float, float]
@@ -65,7 +78,7 @@ class _Look:
         self._anderson = Anderson(depth) if depth else None
 
     def __call__(self, impulse: Array, count: int) -> tuple[Array, Residual]:
-        """The next iterate and its residual; `impulse` may be overwritten."""
+        """Return the next iterate and its residual; `impulse` may be overwritten."""
         if self._anderson is None:
             self._sweep(impulse, count)
             return impulse, residual(self._problem, impulse)

@@ -1,1 +1,5 @@
-"""Second-order solvers: Newton, interior point and cone programs."""
+"""Second-order solvers: Newton's methods, the interior point and cone programmes.
+
+Public: `Newton` (newton); `ProximalNewton` (proximal_newton); `InteriorPoint` (interior_point); `ConeProgram`
+(cone_program); `equilibrated` (scaling).
+"""

@@ -14,12 +14,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.sparse import block_array, block_diag, coo_array, csc_array, diags_array, eye_array, triu, vstack
+from scipy.sparse import block_array, block_diag, csc_array, diags_array, eye_array, triu, vstack
 
 from mechanics.arrays import Array, Bools, Ints
-from mechanics.delassus.condensed import CondensedForm
-from mechanics.delassus.stored import StoredForm
-from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, SparseForm, scale_of
+from mechanics.problem.forms import SparseForm
+from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.problem.residual import Residual, residual
 from mechanics.solvers.first_order.anderson import Anderson
 from mechanics.solvers.second_order.newton import Newton
@@ -29,24 +28,29 @@ __all__ = ["ConeProgram"]
 
 
 _NAME = "cone programme"
-# gap and feasibility that Clarabel is asked for: what it can just reach; η is about the root of it
-_GAP, _KAPPA = 1e-12, 1e-14
-# of the fastest velocity: opening at more counts as at this; where that were wrong, η would tell
+# gap and infeasibility asked of Clarabel, which it can just reach; η is about the root of it [-]
+_GAP = 1e-12
+# κ/τ asked of Clarabel [-]
+_KAPPA = 1e-14
+# largest opening velocity over the fastest closing one; faster ones count as this, and η would show an error [-]
 _FAR = 100.0
-# and the slowest that velocities are measured against, of the fastest
+# smallest unit of velocity over the largest velocity [-]
 _LEAST = 1e-3
 # past shifts from which the next one is extrapolated
 _DEPTH = 5
-# η at which Newton's method may end it, and how much smaller it must have become before that is tried again
-_NEAR, _NEARER = 0.1, 0.7
+# η at which Newton's method may end it [-]
+_NEAR = 0.1
+# η over that of the last try from which Newton's method is tried again [-]
+_NEARER = 0.7
+# Newton's steps in one try
 _NEWTON_STEPS = 40
-# programmes in a row that gain nothing, after which rounding has won
+# programmes in a row without a gain, after which rounding has won
 _IN_VAIN = 30
 
 
 @dataclass(frozen=True)
 class ConeProgram:
-    """The reference: slow, and as accurate as double precision allows.
+    """Reference solver: slow, and as accurate as double precision allows.
 
     Interior points are exact to some 1e-5 where contacts are at the edge between two states, so Newton's method
     on the natural map ends it from there (`polish`).
@@ -55,7 +59,7 @@ class ConeProgram:
     ----------
     tolerance, velocity_tolerance : as in `NSGS`
     max_iterations : interior-point iterations of all programmes, and Newton's steps, together
-    polish : let Newton's method end it; otherwise what the programmes alone give
+    polish : whether Newton's method ends it; False: the result of the programmes alone
     """
 
     tolerance: float = 1e-10
@@ -64,7 +68,7 @@ class ConeProgram:
     polish: bool = True
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
-        """Solve; of the start its shift alone is used. The best of all iterates is given back.
+        """Solve; of the start its shift alone is used. Returns the best of all iterates.
 
         Raises
         ------
@@ -105,14 +109,14 @@ class ConeProgram:
 
 
 def _shift(problem: ContactProblem, impulse: Array) -> Array:
-    """μ‖u_T‖ (nc,) that some impulses cause."""
+    """Return μ‖u_T‖ (nc,) of some impulses."""
     u = problem.delassus.apply(impulse) + problem.u_free
     size: Array = problem.friction * np.sqrt((u[:, 1:] ** 2).sum(axis=1))
     return size
 
 
 class _Programme:
-    """The programme of one problem, for one shift after the other; the pattern is analysed once.
+    """Programme of one problem, for one shift after the other; the pattern is analysed once.
 
     Unknowns are y and r in units in which the largest closing velocity and the mean diagonal of W are 1. A contact
     without friction has r_N only.
@@ -122,9 +126,9 @@ class _Programme:
         clarabel = _clarabel()
         self._problem, self.iterations = problem, 0
         pushed = -(problem.u_free[:, 0] + problem.bias)
-        # what opens may slide far faster than what has to be stopped
+        # contacts that open may slide far faster than those that have to be stopped
         self._pace = float(max(pushed.max(), _LEAST * np.abs(problem.u_free).max(), 1e-300))
-        self._scale = scale_of(problem.delassus)
+        self._scale = problem.delassus.scale
         rough = (problem.friction > 0) | (problem.cohesion > 0)
         d = problem.u_free.shape[1]
         self._kept = np.flatnonzero(np.column_stack([np.ones(len(rough), bool), *[rough] * (d - 1)]).ravel())
@@ -148,10 +152,10 @@ class _Programme:
         self._most = int(self._settings.max_iter)
 
     def __call__(self, shift: Array, most: int) -> Array:
-        """The impulses r (nc, d) of the programme with one shift (nc,), within so many iterations."""
+        """Return the impulses r (nc, d) of the programme with one shift (nc,), within `most` iterations."""
         problem = self._problem
         free = problem.u_free.copy()
-        # what is far from closing is as good as a little nearer, and far numbers would hide the near ones
+        # contacts far from closing count as a little nearer: large numbers would hide the small ones
         free[:, 0] = np.minimum(free[:, 0] + problem.bias, _FAR * self._pace) + shift
         linear = np.concatenate([np.zeros(self._extra), free.ravel()[self._kept] / self._pace])
         self._settings.max_iter = min(most, self._most)
@@ -172,37 +176,24 @@ def _settings(clarabel: Any) -> Any:
 
 
 def _energy(problem: ContactProblem, kept: Ints, scale: float) -> tuple[Any, "csc_array[np.float64] | None"]:
-    """Quadratic part over (y, r) or r alone, in units of `scale`, and Â y - H r = 0, if y is there."""
-    form = None if problem.sparse is None else problem.sparse()
-    if isinstance(form, StoredForm):
-        whole = csc_array(form.across)[kept][:, kept]
-        return 0.5 / scale * (whole + whole.T), None
-    if isinstance(form, CondensedForm):
-        return _sum_of_cliques(form, problem.u_free.size)[kept][:, kept] / scale, None
+    """Return the quadratic part over (y, r) or r alone, in units of `scale`, and Â y - H r = 0 where y is there."""
+    form = problem.delassus.form
     if isinstance(form, SparseForm):
         # each velocity in the unit in which its mass is 1
         unit = diags_array(1.0 / np.sqrt(form.inertia.diagonal()))
         inertia, lift = unit @ form.inertia @ unit, (unit @ form.lift)[:, kept] / np.sqrt(scale)
         none = csc_array((len(kept), len(kept)))
         return block_diag([inertia, none]), csc_array(block_array([[inertia, -lift]]))
-    raise SolverError("W is not known as a matrix", where=_NAME, remedy='use the method "nsgs"')
-
-
-def _sum_of_cliques(form: CondensedForm, size: int) -> "csc_array[np.float64]":
-    row, column, value = [], [], []
-    for contacts, block in zip(form.cliques.contacts, form.cliques.blocks, strict=True):
-        place = (3 * contacts[:, None] + np.arange(3)).ravel()
-        row.append(np.repeat(place, len(place)))
-        column.append(np.tile(place, len(place)))
-        value.append(block.ravel())
-    index = np.concatenate(row), np.concatenate(column)
-    return csc_array(coo_array((np.concatenate(value), index), shape=(size, size)))
+    matrix = None if form is None else form.matrix
+    if matrix is None:
+        raise SolverError("W is not known as a matrix", where=_NAME, remedy='use the method "nsgs"')
+    return matrix[kept][:, kept] / scale, None
 
 
 def _cones(
     problem: ContactProblem, rough: Bools, kept: Ints, unit: float, clarabel: Any
 ) -> tuple[Any, Array, list[Any]]:
-    """Rows, right side and kinds of: (μ r_N + k, r_T) in a second-order cone, r_N ≥ 0."""
+    """Return rows, right side and kinds of: (μ r_N + k, r_T) in a second-order cone, r_N ≥ 0."""
     d, k = problem.u_free.shape[1], problem.cohesion
     # without cohesion r_N ≥ 0 follows from the cone
     side = np.flatnonzero(~rough | (k > 0))

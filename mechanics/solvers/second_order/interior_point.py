@@ -13,52 +13,57 @@ one.
 """
 
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
 from mechanics.arrays import Array, Ints
-from mechanics.delassus.rigid import RigidDelassus
-from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, scale_of
+from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.problem.residual import residual
 from mechanics.solvers.second_order.newton import Newton
 from mechanics.solvers.second_order.proximal_newton import ProximalNewton
 from mechanics.solvers.second_order.scaling import equilibrated
 from mechanics.solvers.second_order.second_order_cones import Scaling, divide, product, reach, scaling
-from mechanics.solvers.second_order.shifted_systems import ShiftedSystem, shifted_system
 from moma.errors import SolverError
 
 __all__ = ["InteriorPoint"]
 
 
 _NAME = "interior point"
-# below this friction a contact has no cone, only a side
+# friction below which a contact has no cone, only a side [-]
 _SMOOTH = 1e-9
-# what holds the tangential impulse of contacts without friction at zero, over the scale of W
+# compliance that holds the tangential impulse of contacts without friction at zero, over the scale of W [-]
 _RIGID = 1e9
-# how far to go towards the boundary, and the shortest step that counts as one
-_BACK_OFF, _SHORT = 0.98, 0.1
-# how far inside the cones it begins, over typical impulses and the velocities that they cause: nearer, the first steps
-# are short (measured: 13 iterations instead of 19)
+# part of the way to the boundary that a step goes [-]
+_BACK_OFF = 0.98
+# part of a step below which it counts as short [-]
+_SHORT = 0.1
+# distance of the start from the cones, over typical impulses and the velocities that they cause: nearer, the first
+# steps are short (measured: 13 iterations instead of 19) [-]
 _INSIDE = 10.0
 # complementarities, relative to where it began, at which Newton's method on the natural map tries to end it
 _TRIES = (1e-7, 1e-9, 1e-11)
-# steps of Newton's in a try
-_LAST_STEPS = 12
-# short steps in a row, once η and velocities in even units are this small, after which it gets nowhere, and iterations
-# after the last try that gain less than this: Newton's method has the last word
-_STUCK, _NEARLY, _IDLE, _GAIN = 5, (1e-3, 1e-3), 3, 0.9
+# short steps in a row after which the path has stalled, and Newton's method is tried
+_STUCK = 5
+# η and velocity error in even units from which short steps count [-]
+_NEARLY = (1e-3, 1e-3)
+# iterations after the last try that may gain nothing
+_IDLE = 3
+# η over the best so far that counts as a gain [-]
+_GAIN = 0.9
 # impulses, in even units, that only contradictions cause
 _WORTHLESS = 1e30
-# Newton's steps in one try, and how much further than asked for it goes at last, since even units weigh light stones
-# less
-_NEWTON, _FURTHER = 12, (1.0, 1e-3)
-# what holds the impulses that have no effect on any velocity, over the scale of W: without it they wander
+# Newton's steps in one try
+_NEWTON = 12
+# tolerances of the tries over those asked for, since even units weigh light stones less [-]
+_FURTHER = (1.0, 1e-3)
+# compliance of the impulses that have no effect on any velocity, over the scale of W: without it they wander [-]
 _GIVE = 1e-10
 
 
 @dataclass(frozen=True)
 class InteriorPoint:
-    """Follows the central path until the laws hold or Newton's method on the natural map takes over.
+    """Central path, followed until the laws hold or Newton's method takes over.
 
     Both factorise W + Θ in each iteration, in units in which all contacts yield alike (`equilibrated`): masses may
     differ by any factor. W may be singular, as between rigid stones that touch in more points than they need. A start
@@ -67,7 +72,7 @@ class InteriorPoint:
     Attributes
     ----------
     tolerance, velocity_tolerance : as in `NSGS`
-    max_iterations : iterations of both together after which it is given up
+    max_iterations : limit of the iterations of both together
     """
 
     tolerance: float = 1e-6
@@ -75,13 +80,13 @@ class InteriorPoint:
     max_iterations: int = 100
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
-        """Solve; the best iterate is given back.
+        """Solve; return the best iterate.
 
         Raises
         ------
-        SolverError : if the problem has no form that can be factorised with a block for each contact
+        SolverError : if W is known by its products alone
         """
-        shifted_system(problem, _NAME)
+        problem.form(_NAME)
         if len(start.impulse) == 0:
             return ContactSolution(start.impulse, start.velocity, 0, 0.0, True)
         end = _End(problem, self.tolerance, self.velocity_tolerance)
@@ -134,20 +139,20 @@ class _End:
         self.even, self.unit = equilibrated(problem)
 
     def looked(self, impulse: Array, iterations: int) -> ContactSolution:
-        """What is left with these impulses (nc, d)."""
+        """Return these impulses (nc, d) as a solution, judged in the problem's own units."""
         left = residual(self.problem, impulse)
         return ContactSolution(impulse, left.dual, iterations, left.natural_map, left.within(*self.limits))
 
     def ended(self, impulse: Array, most: int) -> ContactSolution:
-        """From these impulses on, ever further while that converges, until the problem itself is solved."""
+        """Continue from these impulses to ever smaller tolerances, until the problem itself is solved."""
         unit, count = self.unit[:, None], 0
         found = self.looked(impulse, 0)
         for further in _FURTHER:
             if count >= most or found.converged:
                 break
             limits = further * self.limits[0], further * self.limits[1]
-            rigid = isinstance(self.even.delassus, RigidDelassus)
-            newton = ProximalNewton(*limits, _NEWTON) if rigid else Newton(*limits, _NEWTON)
+            method = Newton if self.even.delassus.rigid is None else ProximalNewton
+            newton = method(*limits, _NEWTON)
             even = newton(self.even, ContactStart(found.impulse / unit, found.velocity))
             count += even.iterations
             found = min(found, self.looked(even.impulse * unit, 0), key=_left)
@@ -180,32 +185,27 @@ class _Cone:
         self.diagonal = np.column_stack([self.friction, np.ones((len(self.rows), 2))])
 
     def transpose(self) -> Array:
-        """Aᵀ - n ∂(μ‖z_T‖)/∂z (n, 3, 3): what a change of z does to the balance of velocities."""
+        """Return Aᵀ - n ∂(μ‖z_T‖)/∂z (n, 3, 3), the derivative of the balance of velocities by z."""
         matrix = self.diagonal[:, :, None] * np.eye(3)
         size = np.sqrt((self.dual[:, 1:] ** 2).sum(axis=1))
         matrix[:, 0, 1:] -= (self.friction / np.maximum(size, 1e-300))[:, None] * self.dual[:, 1:]
         return matrix
 
     def velocity(self) -> Array:
-        """Aᵀ z - μ‖z_T‖ n, which u is to be."""
+        """Return Aᵀ z - μ‖z_T‖ n, the velocity u that the dual asks for."""
         u = self.diagonal * self.dual
         u[:, 0] -= self.friction * np.sqrt((self.dual[:, 1:] ** 2).sum(axis=1))
         return u
 
 
-def _unchecked(problem: ContactProblem) -> ShiftedSystem:
-    """(W + Θ)⁻¹ as the form itself gives it: a direction a little wrong costs less than another factorisation."""
-    form = None if problem.sparse is None else problem.sparse()
-    own: ShiftedSystem | None = getattr(form, "shifted", None)
-    return own or shifted_system(problem, _NAME)
-
-
 class _Path:
-    """The iterates, on their way along the central path."""
+    """Iterates along the central path."""
 
     def __init__(self, problem: ContactProblem) -> None:
-        self._problem, self._system = problem, _unchecked(problem)
-        scale = scale_of(problem.delassus)
+        self._problem, form = problem, problem.form(_NAME)
+        # a direction a little wrong costs less than another factorisation
+        self._system = partial(form.shifted, exact=False)
+        scale = problem.delassus.scale
         self._free = problem.biased
         mu, k = problem.friction, problem.cohesion
         cone, side = np.flatnonzero((mu > _SMOOTH) | (k > 0)), np.flatnonzero((mu <= _SMOOTH) | (k > 0))
@@ -231,7 +231,7 @@ class _Path:
 
     @property
     def impulse(self) -> Array:
-        """r (nc, 3); inside the cones but for what the slacks still lack."""
+        """r (nc, 3), inside the cones except for what the slacks still lack [N s]."""
         r = self._r.copy()
         r[self._smooth, 1:] = 0.0
         return r
@@ -243,11 +243,11 @@ class _Path:
         return total / (len(cone.rows) + len(side.rows))
 
     def advance(self) -> float:
-        """One iteration: predictor, corrector, and a step of the length that is given back."""
+        """Make one iteration of predictor and corrector; return the length of its step."""
         newton = _Newton(self)
         step = newton.direction(newton.towards_boundary(), 1.0)
         length = min(1.0, self._reach(step))
-        # how much the predictor would gain says how much centring is needed (Mehrotra 1992)
+        # the gain of the predictor decides how much centring is needed (Mehrotra 1992)
         centring = (1.0 - length) ** 3
         step = newton.direction(newton.corrected(step, centring * self._gap), 1.0 - centring)
         length = min(1.0, _BACK_OFF * self._reach(step))
@@ -293,23 +293,23 @@ class _Newton:
         self._scaling: Scaling = scaling(cone.slack, cone.dual)
         self._lambda = self._scaling(cone.dual)
         self._square, self._back = self._scaling.inverse_squared, cone.transpose()
-        theta = path._hold + _GIVE * scale_of(problem.delassus) * np.eye(3)
+        theta = path._hold + _GIVE * problem.delassus.scale * np.eye(3)
         theta[cone.rows] += self._back @ self._square * cone.diagonal[:, None, :]
         theta[side.rows, 0, 0] += side.dual / side.slack
         self._solve = path._system(theta)
 
     def towards_boundary(self) -> tuple[Array, Array]:
-        """The right side of the predictor: s ∘ z = 0."""
+        """Return the right side of the predictor: s ∘ z = 0."""
         return -self._lambda, -self._side.slack
 
     def centred(self, level: float) -> tuple[Array, Array]:
-        """That of a step to s ∘ z = level e, without a corrector."""
+        """Return the right side of a step to s ∘ z = level e, without a corrector."""
         square = -product(self._lambda, self._lambda)
         square[:, 0] += level
         return divide(self._lambda, square), (level - self._side.slack * self._side.dual) / self._side.dual
 
     def corrected(self, predictor: tuple[Array, ...], level: float) -> tuple[Array, Array]:
-        """That of the corrector, from the predictor's step."""
+        """Return the right side of the corrector, from the predictor's step."""
         _, slack, dual, slack_n, dual_n = predictor
         square = -product(self._lambda, self._lambda)
         square -= product(self._scaling.inverse(slack), self._scaling(dual))
@@ -319,7 +319,7 @@ class _Newton:
         return divide(self._lambda, square), own / side.dual
 
     def direction(self, right: tuple[Array, Array], share: float) -> tuple[Array, ...]:
-        """Changes of r, of slack and dual of the cones, and of the sides, for a share of the residuals."""
+        """Return the changes of r, of slack and dual of the cones, and of the sides, for a share of the residuals."""
         cone, side = self._cone, self._side
         in_cone, in_side = self._scaling(right[0]) + share * self._loose, right[1] + share * self._loose_n
         load = -share * self._balance

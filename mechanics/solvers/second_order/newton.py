@@ -6,35 +6,47 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.arrays import Array
-from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, scale_of
+from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.problem.residual import Residual, project_on_cone, residual
-from mechanics.solvers.second_order.shifted_systems import shifted_system
 from moma.errors import SolverError
 
 __all__ = ["Newton", "projection_derivative"]
 
 
-# keeps D invertible where a contact is open, and 1 - D where it sticks, as between rigid stones W is singular
-_SOFT, _GIVE = 1e-7, 1e-9
-# the proximal term α over η and the mean diagonal of W; and the η below which it shrinks no more
-_PROXIMAL, _FLOOR = 0.3, 1e-6
-# shortest fraction of a step; what a step must gain; on how many of the last iterates, the worst of them counts
-_SHORTEST, _GAIN, _MEMORY = 0.005, 1e-4, 5
-# how many steps that gain nothing are taken all the same, and how many iterates may bring no η that is this much better
-_DARING, _PATIENCE, _BETTER = 10, 40, 0.7
-# of the mean diagonal of W: the smallest that a contact's own counts for
+# part of 1 in D, which keeps it invertible where a contact is open [-]
+_SOFT = 1e-7
+# part of 1 in 1 - D, which keeps it invertible where a contact sticks, as W between rigid stones is singular [-]
+_GIVE = 1e-9
+# proximal term α over η and the scale of W [-]
+_PROXIMAL = 0.3
+# η below which α shrinks no more [-]
+_FLOOR = 1e-6
+# shortest part of a step [-]
+_SHORTEST = 0.005
+# gain that a step must bring, over what it promises [-]
+_GAIN = 1e-4
+# last iterates of which the worst is the one to beat
+_MEMORY = 5
+# steps without a gain that are taken all the same
+_DARING = 10
+# iterates in a row without a better η, after which it stops
+_PATIENCE = 40
+# η over the best so far that counts as better [-]
+_BETTER = 0.7
+# smallest diagonal of a contact over the scale of W [-]
 _LEAST = 1e-12
 
 
 @dataclass(frozen=True)
 class Newton:
-    """Solves Φ(r) = r - P_K(r - ρ û(r)) = 0, with ρ = 1/(mean of the contact's own diagonal).
+    """Newton's method for Φ(r) = r - P_K(r - ρ û(r)) = 0, with
+    ρ = 1/(mean of the contact's own diagonal).
 
     With D the derivative of the projection P_K and S that of û by u, each step solves
 
         [ W + Θ + α ] Δr = -(ρ D S)⁻¹ Φ,     Θ = (ρ D S)⁻¹ (1 - D)
 
-    so contacts that stick, slip or are open are told apart by themselves, and once they are right it converges within a
+    so contacts that stick, slip or are open sort themselves out, and once they are right it converges within a
     few steps to rounding. The proximal term α = 0.3 max(η, 10⁻⁶) W̄ (Levenberg 1944; Rockafellar 1976) makes the matrix
     regular where W is not, as between rigid stones with more contacts than freedoms; it shrinks with η, so
     convergence is all but quadratic. The line search wants less of Φ than the worst of the last five iterates had
@@ -44,7 +56,7 @@ class Newton:
     Attributes
     ----------
     tolerance, velocity_tolerance : as in `NSGS`
-    max_iterations : steps, each of one factorisation, after which it is given up
+    max_iterations : limit of the steps, each of one factorisation
     """
 
     tolerance: float = 1e-6
@@ -56,13 +68,13 @@ class Newton:
 
         Raises
         ------
-        SolverError : if the problem has no form that can be factorised
+        SolverError : if W is known by its products alone
         """
-        system, limits = shifted_system(problem, "Newton"), (self.tolerance, self.velocity_tolerance)
+        system, limits = problem.form("Newton").shifted, (self.tolerance, self.velocity_tolerance)
         if len(start.impulse) == 0:
             return ContactSolution(start.impulse, start.velocity, 0, 0.0, True)
         natural, daring, count, since = _Map(problem), 0, 0, 0
-        # not put on the cones first: that would break the balance, by which they are told apart
+        # the start is not projected on the cones: that would break the balance, which tells the states apart
         here, left = natural(start.impulse), residual(problem, start.impulse)
         best, merits = (left, start.impulse), deque([here.size], _MEMORY)
         while not left.within(*limits) and count < self.max_iterations and since < _PATIENCE:
@@ -117,13 +129,13 @@ class _Map:
     """Φ and its derivative."""
 
     def __init__(self, problem: ContactProblem) -> None:
-        self._problem, self._scale = problem, scale_of(problem.delassus)
+        self._problem, self._scale = problem, problem.delassus.scale
         own = problem.delassus.diagonal
         mean = np.einsum("cii->c", own) / max(own.shape[1], 1)
         self._own = np.maximum(mean, _LEAST * self._scale)
 
     def __call__(self, impulse: Array) -> _Point:
-        """Φ at some impulses."""
+        """Return Φ at some impulses."""
         problem = self._problem
         u = problem.delassus.apply(impulse) + problem.u_free
         dual = u.copy()
@@ -134,7 +146,7 @@ class _Map:
         return _Point(impulse, error, u, point, size)
 
     def linear(self, here: _Point, eta: float) -> tuple[Array, Array]:
-        """Θ + α (nc, d, d) and the right side (d nc,) of a step."""
+        """Return Θ + α (nc, d, d) and the right side (d nc,) of a step."""
         friction, unit = self._problem.friction, np.eye(here.u.shape[1])
         derivative = projection_derivative(here.point, friction, self._problem.cohesion)
         derivative = (1.0 - _SOFT - _GIVE) * derivative + _SOFT * unit
@@ -147,7 +159,7 @@ class _Map:
 
 
 def _search(natural: _Map, here: _Point, step: Array, worst: float) -> _Point | None:
-    """The first of ever shorter parts of a step that gains on the worst of the last; None if none does."""
+    """Return the first of ever shorter parts of a step that gains on the worst of the last; None if none does."""
     length = 1.0
     while length > _SHORTEST:
         found = natural(here.impulse + length * step)
@@ -158,7 +170,7 @@ def _search(natural: _Map, here: _Point, step: Array, worst: float) -> _Point | 
 
 
 def projection_derivative(point: Array, friction: Array, cohesion: Array) -> Array:
-    """An element (nc, d, d) of the derivative of the projection on {r_N ≥ 0, ‖r_T‖ ≤ μ r_N + k}."""
+    """Return an element (nc, d, d) of the derivative of the projection on {r_N ≥ 0, ‖r_T‖ ≤ μ r_N + k}."""
     n, size, d = point[:, 0], np.sqrt((point[:, 1:] ** 2).sum(axis=1)), point.shape[1]
     along = point[:, 1:] / np.maximum(size, 1e-300)[:, None]
     across = np.eye(along.shape[1]) - along[:, :, None] * along[:, None, :]

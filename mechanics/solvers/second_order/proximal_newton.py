@@ -4,7 +4,7 @@ W of rigid bodies is singular: four contacts hold a stone in place three times o
 derivative of the non-smooth Newton method of Alart & Curnier (1991), with α as small as η, as in the method of
 Levenberg and Marquardt (Fan & Yuan 2005): the steps stay near to where they began, and near the solution nothing is
 lost. A line search keeps them from going astray; where it has to shorten steps, α grows. The equations of each step are
-those of the bodies (_kernels_body_newton.py).
+those of the bodies (mechanics/solvers/_kernels/body_newton.py).
 """
 
 from dataclasses import dataclass
@@ -13,33 +13,43 @@ from functools import cached_property
 import numpy as np
 
 from mechanics.arrays import Array, Ints
-from mechanics.delassus.rigid import RigidDelassus
-from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, scale_of
+from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, RigidContacts
 from mechanics.problem.residual import Residual, project_on_cone, residual
 from mechanics.solvers._kernels import block_fronts as fronts
 from mechanics.solvers._kernels import body_newton as bodies
-from mechanics.solvers._kernels.stored_portfolio import alart_curnier
 from moma.errors import SolverError
 
 __all__ = ["ProximalNewton"]
 
 
-# α over η and the scale of W; from where a cold start is held, and the least, below which rounding would win
-_SHARE, _HOLD, _LEAST = 0.1, 1e-4, 1e-11
-# steps that short say that α is too small; by how much it then grows, and falls again after whole steps
-_SHORT, _ADAPT, _MOST = 0.2, 4.0, 1e6
-# looks back of the line search, what a step must gain over what it promises, and the shortest
-_MEMORY, _GAIN, _SHORTEST = 5, 1e-4, 1e-3
+# α over η and the scale of W, at first and at least [-]
+_SHARE = 0.1
+# α over the scale of W while a cold start holds every contact [-]
+_HOLD = 1e-4
+# smallest α over the scale of W; below it rounding would win [-]
+_LEAST = 1e-11
+# part of a step below which α counts as too small [-]
+_SHORT = 0.2
+# factor by which α then grows, and falls again after whole steps
+_ADAPT = 4.0
+# largest α over η and the scale of W [-]
+_MOST = 1e6
+# iterates to which the line search looks back
+_MEMORY = 5
+# gain that a step must bring, over what it promises [-]
+_GAIN = 1e-4
+# shortest part of a step [-]
+_SHORTEST = 1e-3
 
 
 @dataclass(frozen=True)
 class ProximalNewton:
-    """Solves the problems of rigid bodies to high accuracy, from whatever start.
+    """Proximal Newton method for rigid bodies: high accuracy from any start.
 
     Attributes
     ----------
     tolerance, velocity_tolerance : as in `NSGS`
-    max_iterations : steps, with a factorisation each, after which it is given up
+    max_iterations : limit of the steps, with a factorisation each
     """
 
     tolerance: float = 1e-6
@@ -47,13 +57,13 @@ class ProximalNewton:
     max_iterations: int = 100
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
-        """Solve from the impulses of `start`; the best of all iterates is given back.
+        """Solve from the impulses of `start`; return the best of all iterates.
 
         Raises
         ------
         SolverError : if W is not that of rigid bodies
         """
-        if not isinstance(problem.delassus, RigidDelassus):
+        if problem.delassus.rigid is None:
             raise SolverError(
                 "bodies are not all rigid", where="proximal Newton", remedy='use the method "interior-point"'
             )
@@ -72,20 +82,19 @@ class ProximalNewton:
 
 
 class _Run:
-    """The iterates of one solution.
+    """Iterates of one solution.
 
     Attributes
     ----------
     r : (nc, 3) impulses [N s]
-    left : what they leave unsolved
+    left : their residual
     iterations : steps so far
     """
 
     def __init__(self, problem: ContactProblem, impulse: Array) -> None:
-        assert isinstance(problem.delassus, RigidDelassus)
         self._problem, self._delassus = problem, problem.delassus
         self._free = problem.biased
-        self._scale = scale_of(problem.delassus)
+        self._scale = problem.delassus.scale
         diagonal = problem.delassus.diagonal
         self._rho = np.column_stack([1.0 / diagonal[:, 0, 0], 2.0 / (diagonal[:, 1, 1] + diagonal[:, 2, 2])])
         self._first, self._second = np.zeros((2, len(impulse), 3, 3))
@@ -101,12 +110,13 @@ class _Run:
 
     @cached_property
     def _system(self) -> "_System":
-        return _System(self._delassus)
+        assert self._delassus.rigid is not None
+        return _System(self._delassus.rigid)
 
     def hold(self) -> None:
-        """Begin as if every contact held whatever it has to.
+        """Begin as if every contact held.
 
-        At rest without impulses, no contact but the lowest is seen to be pressed, and each step would find one more.
+        At rest without impulses only the lowest contact is seen to be pressed, and each step would find one more.
         """
         problem = self._problem
         self._first[:], self._second[:] = 0.0, np.eye(3)
@@ -119,7 +129,7 @@ class _Run:
         self._take(held, residual(problem, held))
 
     def step(self) -> bool:
-        """One step of Newton's method; whether there was one."""
+        """Make one step of Newton's method; return whether there was one."""
         alpha = max(self._share * min(self.left.natural_map, 1.0), _LEAST) * self._scale
         step = self._system.step(self._first, self._second, self._error, alpha)
         if step is None:
@@ -143,84 +153,68 @@ class _Run:
 
     def _look(self, r: Array, u: Array, error: Array) -> float:
         problem = self._problem
-        merit: float = alart_curnier(
+        merit: float = bodies.alart_curnier(
             r, u, problem.friction, problem.cohesion, self._rho, error, self._first, self._second
         )
         return merit
 
 
 class _System:
-    """The equations of the bodies' velocities: pattern, matrix, factors."""
+    """Equations of the bodies' velocities: pattern, matrix, factors."""
 
-    def __init__(self, delassus: RigidDelassus) -> None:
-        self._body, self._geometry = delassus.body, delassus.geometry
-        moving = np.flatnonzero(delassus.inertia[:, 0] > 0)
-        self._place = np.full(len(delassus.inertia), -1)
-        self._place[moving] = np.arange(len(moving))
-        self._own = np.zeros((len(moving), 2, 3, 3))
-        self._own[:, 0] = np.eye(3) / delassus.inertia[moving, 0, None, None]
-        upper = delassus.inertia[moving][:, [1, 2, 3, 2, 4, 5, 3, 5, 6]].reshape(-1, 3, 3)
-        self._own[:, 1] = np.linalg.inv(upper)
-        indices, indptr = self._pattern(len(moving))
+    def __init__(self, contacts: RigidContacts) -> None:
+        self._contacts, inertia = contacts, contacts.inertia
+        moving = np.flatnonzero(inertia[:, 0] > 0)
+        place = np.full(len(inertia), -1)
+        place[moving] = np.arange(len(moving))
+        own = np.zeros((len(moving), 2, 3, 3))
+        own[:, 0] = np.eye(3) / inertia[moving, 0][:, None, None]
+        upper = inertia[moving][:, [1, 2, 3, 2, 4, 5, 3, 5, 6]].reshape(-1, 3, 3)
+        own[:, 1] = np.linalg.inv(upper)
+        blocks, width, indices, indptr = _pattern(place[contacts.body], len(moving))
+        self._blocks = bodies.BodyBlocks(place, blocks, own, width)
         self._plan = fronts.analyse(indices, indptr)
-        whole = self._plan[2]
-        self._aptr = np.concatenate([[0], np.cumsum(whole * whole)]).astype(np.int64)
-        nc, blocks = len(self._body), len(indices)
+        nc = len(contacts.body)
         self._inverse, self._gain = np.empty((2, nc, 3, 3))
-        self._value, self._factor = np.empty((blocks, 3, 3)), np.empty(self._aptr[-1])
-        self._pivot, self._work = np.empty(6 * len(moving), dtype=np.int64), np.empty(int(whole.max()))
-
-    def _pattern(self, count: int) -> tuple[Ints, Ints]:
-        """Block rows of translation and rotation of each body; where the blocks of each contact begin."""
-        side = self._place[self._body]
-        s, t = np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])
-        row, column = side[:, s], side[:, t]
-        known = (row >= 0) & (column >= 0)
-        own = np.arange(count) * (count + 1)
-        keys, where = np.unique(np.concatenate([own, (row * count + column)[known]]), return_inverse=True)
-        degree = np.bincount(keys // count, minlength=count)
-        before = np.concatenate([[0], np.cumsum(degree)[:-1]]).astype(np.int64)
-        within = np.arange(len(keys)) - before[keys // count]
-        at = 4 * before[keys // count] + 2 * within
-        self._blocks = np.full((len(side), 4), -1)
-        self._blocks[known] = at[where[count:]]
-        self._width = np.column_stack([2 * degree, at[where[:count]]]).astype(np.int64)
-        columns = 2 * (keys % count)
-        both = np.column_stack([columns, columns + 1]).ravel()
-        parts = np.split(both, 2 * before[1:])
-        indices = np.concatenate([part for part in parts for _ in range(2)]).astype(np.int64)
-        indptr = np.concatenate([[0], np.cumsum(np.repeat(2 * degree, 2))]).astype(np.int64)
-        return indices, indptr
+        self._value, self._factor = np.empty((len(indices), 3, 3)), np.empty(self._plan.aptr[-1])
+        self._pivot = np.empty(6 * len(moving), dtype=np.int64)
+        self._work = np.empty(int(self._plan.whole.max()))
 
     def step(self, first: Array, second: Array, error: Array, alpha: float) -> Array | None:
-        """Δr (nc, 3); None if the equations are singular."""
+        """Return Δr (nc, 3); None if the equations are singular."""
+        contacts, place = self._contacts, self._blocks.place
         if not bodies.inverse_blocks(first, second, alpha, self._inverse, self._gain):
             return None
-        bodies.body_matrix(
-            self._body,
-            self._geometry,
-            self._gain,
-            self._place,
-            self._blocks,
-            self._own,
-            self._width,
-            self._value,
-        )
-        _, width, whole, fptr, front, offset, mptr, member, eptr, entry, row, column, parent, place, _ = (
-            self._plan
-        )
-        if not fronts.factorise(
-            self._value, False, width, whole, fptr, front, offset, eptr, entry, row, column, parent, place,
-            self._aptr, self._factor, self._pivot,
-        ):  # fmt: skip
+        bodies.body_matrix(contacts, self._gain, self._blocks, self._value)
+        if not fronts.factorise(self._value, False, self._plan, self._factor, self._pivot):
             return None
-        velocity = np.empty((2 * len(self._own), 3))
-        bodies.body_load(self._body, self._geometry, self._inverse, error, self._place, velocity)
-        fronts.solve(
-            velocity, width, whole, fptr, front, offset, mptr, member, self._aptr, self._factor, self._pivot, self._work
-        )  # fmt: skip
-        step = np.empty_like(error)
-        bodies.contact_step(
-            self._body, self._geometry, self._inverse, second, error, self._place, velocity, step
-        )
+        velocity, step = np.empty((2 * len(self._blocks.own), 3)), np.empty_like(error)
+        bodies.body_load(contacts, self._inverse, error, place, velocity)
+        fronts.solve(velocity, self._plan, self._factor, self._pivot, self._work)
+        bodies.contact_step(contacts, self._inverse, second, error, place, velocity, step)
         return step
+
+
+def _pattern(side: Ints, count: int) -> tuple[Ints, Ints, Ints, Ints]:
+    """Return `blocks` and `width` of `BodyBlocks`, and the block rows (indices, indptr) of all bodies.
+
+    `side` (nc, 2) are the places of the bodies of each contact among the `count` that move.
+    """
+    s, t = np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])
+    row, column = side[:, s], side[:, t]
+    known = (row >= 0) & (column >= 0)
+    own = np.arange(count) * (count + 1)
+    keys, where = np.unique(np.concatenate([own, (row * count + column)[known]]), return_inverse=True)
+    degree = np.bincount(keys // count, minlength=count)
+    before = np.concatenate([[0], np.cumsum(degree)[:-1]]).astype(np.int64)
+    within = np.arange(len(keys)) - before[keys // count]
+    at = 4 * before[keys // count] + 2 * within
+    blocks = np.full((len(side), 4), -1)
+    blocks[known] = at[where[count:]]
+    width = np.column_stack([2 * degree, at[where[:count]]]).astype(np.int64)
+    columns = 2 * (keys % count)
+    both = np.column_stack([columns, columns + 1]).ravel()
+    parts = np.split(both, 2 * before[1:])
+    indices = np.concatenate([part for part in parts for _ in range(2)]).astype(np.int64)
+    indptr = np.concatenate([[0], np.cumsum(np.repeat(2 * degree, 2))]).astype(np.int64)
+    return blocks, width, indices, indptr

@@ -14,18 +14,18 @@ _MIRROR = np.array([1.0, -1.0, -1.0])
 
 
 def product(x: Array, y: Array) -> Array:
-    """Jordan's product x ∘ y = (x·y, x₀ y_T + y₀ x_T)."""
+    """Return Jordan's product x ∘ y = (x·y, x₀ y_T + y₀ x_T)."""
     return np.column_stack([(x * y).sum(axis=1), x[:, :1] * y[:, 1:] + y[:, :1] * x[:, 1:]])
 
 
 def divide(x: Array, y: Array) -> Array:
-    """The z with x ∘ z = y, for x inside its cone."""
+    """Return the z with x ∘ z = y, for x inside its cone."""
     first = (x[:, 0] * y[:, 0] - (x[:, 1:] * y[:, 1:]).sum(axis=1)) / _determinant(x)
     return np.column_stack([first, (y[:, 1:] - first[:, None] * x[:, 1:]) / x[:, :1]])
 
 
 def reach(x: Array, step: Array) -> float:
-    """Largest a with x + a · step in all cones, for x inside them; infinite if there is none."""
+    """Return the largest a with x + a · step in all cones, for x inside them; infinite if there is none."""
     a = step[:, 0] ** 2 - (step[:, 1:] ** 2).sum(axis=1)
     b = 2.0 * (x[:, 0] * step[:, 0] - (x[:, 1:] * step[:, 1:]).sum(axis=1))
     c = _determinant(x)
@@ -45,7 +45,7 @@ def _determinant(x: Array) -> Array:
 
 @dataclass(frozen=True)
 class Scaling:
-    """The matrices T with T z = T⁻¹ s, symmetric, that keep the cones (Nesterov & Todd 1997).
+    """Matrices T with T z = T⁻¹ s, symmetric, that keep the cones (Nesterov & Todd 1997).
 
     Attributes
     ----------
@@ -57,11 +57,11 @@ class Scaling:
     size: Array
 
     def __call__(self, x: Array) -> Array:
-        """T x."""
+        """Return T x."""
         return self._apply(self.axis, x) * self.size[:, None]
 
     def inverse(self, x: Array) -> Array:
-        """T⁻¹ x."""
+        """Return T⁻¹ x."""
         return self._apply(self.axis * _MIRROR, x) / self.size[:, None]
 
     @property
@@ -80,7 +80,7 @@ class Scaling:
 
 
 def scaling(s: Array, z: Array) -> Scaling:
-    """The scaling of s and z (nc, 3), both inside their cones.
+    """Return the scaling of s and z (nc, 3), both inside their cones.
 
     Raises
     ------

@@ -1,1 +1,4 @@
-"""Automatic choice among solvers."""
+"""Strategies: automatic choice among solvers, by the bodies and the observed convergence.
+
+Public: `Auto` (auto); `Alternating`, `moving_admm` (rigid); `Elastic` (elastic).
+"""

@@ -1,4 +1,4 @@
-"""ADMM, and where that is slow the interior-point method: for scenes with deformable stones."""
+"""Strategy for scenes with deformable stones: ADMM, and where that is slow the interior-point method."""
 
 from dataclasses import dataclass, replace
 
@@ -31,7 +31,7 @@ class Elastic:
     max_iterations: int = 2000
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
-        """Solve from `start`; `why` says which of the two did."""
+        """Solve from `start`; `why` names the method of the two that solved it."""
         limits = self.tolerance, self.velocity_tolerance
         warm = "warm start" if start.impulse.any() else f"cold start, {len(start.impulse):,} contacts"
         first = ADMM(*limits, min(_ADMM, self.max_iterations))(problem, start)

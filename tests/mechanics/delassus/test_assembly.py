@@ -14,7 +14,6 @@ from mechanics.dynamics.contact_problem import contact_problem
 from mechanics.dynamics.contact_search import detection
 from mechanics.dynamics.stepping import advance, compliances, free_kick, kicked, predict
 from mechanics.model.model import build_model
-from mechanics.problem.problem import scale_of
 from mechanics.scene.laws.law import STATE
 from mechanics.scene.scene import Fidelity
 from tests.mechanics.shapes import TURN, brick, dense_operator, ground, moved, scene
@@ -55,7 +54,7 @@ class Assembled:
         self.contacts = find(self.state, np.zeros(len(one.blocks)))
         self.found = detection(self.model, self.state, self.contacts, self.compliance)
         self.operator = self.found.operator
-        self.form = self.operator.sparse
+        self.form = self.operator.form
         self.w_hat, self.transpose = dense_operator(self.model, self.state, self.contacts, self.compliance)
         self.dense = self.transpose @ self.w_hat @ self.transpose.T
 
@@ -98,7 +97,7 @@ def test_diagonal_blocks_are_those_of_w(step):
 
 @pytest.mark.parametrize("penalty", [1e-3, 0.1, 10.0])
 def test_condensed_form_solves_with_w_and_a_penalty(step, penalty):
-    sigma = penalty * scale_of(step.operator)
+    sigma = penalty * step.operator.scale
     right = np.random.default_rng(0).normal(size=len(step.dense))
     expected = np.linalg.solve(step.dense / sigma + np.eye(len(step.dense)), right)
     found = step.form.relaxed(sigma)(right)

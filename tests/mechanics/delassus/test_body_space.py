@@ -54,7 +54,7 @@ def test_w_plus_theta_is_solved_for_unsymmetric_blocks_of_any_size(pile, spread)
     theta *= w.diagonal().mean() * 10.0 ** rng.uniform(-spread, spread, size=(nc, 1, 1))
     # from where forces come: velocities that the bodies can have, as W has nothing else to answer with
     b = w @ rng.normal(size=3 * nc)
-    r = pile.operator.sparse.shifted(theta)(b)
+    r = pile.operator.form.shifted(theta)(b)
     matrix = w + blocks(theta)
     assert np.abs(matrix @ r - b).max() < 1e-12 * np.abs(b).max()
 
@@ -64,7 +64,7 @@ def test_relaxed_is_the_inverse_of_w_over_sigma_plus_one(pile):
     nc, w = len(pile.contacts), dense(pile.operator)
     for sigma in (1e-4 * w.diagonal().mean(), w.diagonal().mean()):
         b = rng.normal(size=3 * nc)
-        found = pile.operator.sparse.relaxed(sigma)(b)
+        found = pile.operator.form.relaxed(sigma)(b)
         np.testing.assert_allclose(
             found, np.linalg.solve(w / sigma + np.eye(3 * nc), b), atol=1e-9 * np.abs(b).max()
         )
@@ -72,7 +72,7 @@ def test_relaxed_is_the_inverse_of_w_over_sigma_plus_one(pile):
 
 def test_a_singular_theta_is_refused(pile):
     with pytest.raises(SolverError, match="singular"):
-        pile.operator.sparse.shifted(np.zeros((len(pile.contacts), 3, 3)))
+        pile.operator.form.shifted(np.zeros((len(pile.contacts), 3, 3)))
 
 
 def test_inverses_are_those_of_numpy():

@@ -138,16 +138,18 @@ def test_a_column_fills_nothing_in(stones, joint):
 def test_each_unknown_is_a_pivot_exactly_once_and_fronts_hold_what_comes_later(seed):
     _, pairs, cliques, _ = case(seed, 9, 60)
     own = fronts(pairs, cliques.contacts)
-    fronts_of = [own.dof[own.dptr[f] : own.dptr[f + 1]] for f in range(len(own.width))]
-    pivots = [unknown[:width] for unknown, width in zip(fronts_of, own.width, strict=True)]
+    fronts_of = [
+        own.layout.dof[own.layout.dptr[f] : own.layout.dptr[f + 1]] for f in range(len(own.layout.width))
+    ]
+    pivots = [unknown[:width] for unknown, width in zip(fronts_of, own.layout.width, strict=True)]
     np.testing.assert_array_equal(np.sort(np.concatenate(pivots)), np.arange(3 * len(pairs)))
-    np.testing.assert_array_equal(np.sort(own.order), np.arange(len(own.width)))
+    np.testing.assert_array_equal(np.sort(own.layout.order), np.arange(len(own.layout.width)))
     when = np.empty(3 * len(pairs), dtype=int)
-    for rank, f in enumerate(own.order):
+    for rank, f in enumerate(own.layout.order):
         when[pivots[f]] = rank
     for f, unknown in enumerate(fronts_of):
         assert len(np.unique(unknown)) == len(unknown)
-        later = when[unknown[own.width[f] :]]
+        later = when[unknown[own.layout.width[f] :]]
         assert (np.diff(later) >= 0).all()
         assert (later > when[pivots[f][0]]).all()
     # contacts of the same two stones go together
@@ -215,7 +217,7 @@ def test_w_of_stones_is_the_sum_of_its_cliques():
     rng = np.random.default_rng(0)
     theta = np.abs(expected).max() * (rng.normal(size=(count, 3, 3)) + 6.0 * np.eye(3))
     b = rng.normal(size=3 * count)
-    x = one.operator.sparse.shifted(theta)(b)
+    x = one.operator.form.shifted(theta)(b)
     matrix = dense(count, one.operator.cliques, theta)
     np.testing.assert_allclose(x, np.linalg.solve(matrix, b), atol=1e-9 * np.abs(x).max())
 
@@ -235,17 +237,17 @@ def solve_twin(b, own, factors):
     """Front by front with dense LU: eliminate, then substitute back."""
     x = b.copy()
     parts = {}
-    for f in own.order:
-        unknown, k = own.dof[own.dptr[f] : own.dptr[f + 1]], int(own.width[f])
-        m, numbers = len(unknown) - k, factors.factor[own.fptr[f] : own.fptr[f + 1]]
+    for f in own.layout.order:
+        unknown, k = own.layout.dof[own.layout.dptr[f] : own.layout.dptr[f + 1]], int(own.layout.width[f])
+        m, numbers = len(unknown) - k, factors.factor[own.layout.fptr[f] : own.layout.fptr[f + 1]]
         lu = numbers[: k * k].reshape(k, k).T
         across = numbers[k * k : k * (k + m)].reshape(m, k).T
         below = numbers[k * (k + m) :].reshape(k, m).T
-        pivots = factors.pivots[own.pptr[f] : own.pptr[f + 1]]
+        pivots = factors.pivots[own.layout.pptr[f] : own.layout.pptr[f + 1]]
         parts[f] = unknown[:k], unknown[k:], across
         x[unknown[:k]] = lu_solve((lu, pivots), x[unknown[:k]])
         x[unknown[k:]] -= below @ x[unknown[:k]]
-    for f in own.order[::-1]:
+    for f in own.layout.order[::-1]:
         pivot, later, across = parts[f]
         x[pivot] -= across @ x[later]
     return x
@@ -267,5 +269,5 @@ def test_substitution_is_that_of_the_slow_twin(seed):
     own = fronts(pairs, cliques.contacts)
     factors, b = own.factorise(cliques, theta), rng.normal(size=120)
     x = b.copy()
-    solve(x, own.order, own.width, own.dptr, own.dof, own.fptr, own.pptr, factors.pivots, factors.factor)
+    solve(x, own.layout, factors.pivots, factors.factor)
     np.testing.assert_allclose(x, solve_twin(b, own, factors), atol=1e-11 * np.abs(x).max())

@@ -56,7 +56,7 @@ def test_diagonal_blocks_are_those_of_the_dense_matrix(case):
 def test_the_sparse_form_is_the_same_w(case):
     one, w_hat, transpose = case
     dense = transpose @ w_hat @ transpose.T
-    inertia, lift = one.operator.sparse.inertia.toarray(), one.operator.sparse.lift.toarray()
+    inertia, lift = one.operator.form.inertia.toarray(), one.operator.form.lift.toarray()
     np.testing.assert_allclose(
         lift.T @ np.linalg.solve(inertia, lift), dense, atol=1e-11 * np.abs(dense).max()
     )

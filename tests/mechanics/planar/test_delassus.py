@@ -38,7 +38,7 @@ def test_products_are_those_of_the_dense_matrices(seed):
 def test_the_sparse_form_is_the_same_w(seed):
     arrays = random_problem(seed)
     ht, compliance = dense(*arrays)
-    form = PlanarDelassus(*arrays).sparse()
+    form = PlanarDelassus(*arrays).form
     inertia, lift = form.inertia.toarray(), form.lift.toarray()
     np.testing.assert_allclose(lift.T @ np.linalg.inv(inertia) @ lift, ht @ compliance @ ht.T, atol=1e-12)
     np.testing.assert_array_equal(form.across.toarray(), lift.T)

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from mechanics.delassus._kernels.rigid import factors_of
 from mechanics.problem._kernels import (
+    LocalCompliance,
     local_factors,
     natural_errors,
     onto_cone,
@@ -180,7 +181,7 @@ def test_an_impulse_that_slips_lies_on_its_cone(contact):
     f = local_factors(w[None])[0]
     stick = -np.linalg.solve(w, b)
     assume(stick[0] < 0 or np.linalg.norm(stick[1:]) > mu * stick[0] * (1 + 1e-9))
-    r = slip(*f[9:], *b, mu, 0.0, 0.0)
+    r = slip(LocalCompliance(*f[9:]), tuple(b), mu, 0.0, 0.0)
     assert np.hypot(*r[1:]) == pytest.approx(mu * r[0], rel=1e-12, abs=1e-300)
     assert abs(w[0] @ r + b[0]) < 1e-11 * np.linalg.norm(b) * np.linalg.cond(w)
 

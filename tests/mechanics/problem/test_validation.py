@@ -5,17 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mechanics.delassus.stored import StoredDelassus
 from mechanics.problem.problem import ContactProblem
 from mechanics.stones.validation import LARGEST, SMALLEST
 from moma.errors import SolverError
+from tests.mechanics.dense_operator import blocks_apart
 
 
 def problem(count=3, w=1.0, **given):
     """Contacts that do not feel each other, W = w."""
-    operator = StoredDelassus(np.tile(w * np.eye(3), (count, 1, 1)), np.arange(count), np.arange(count + 1))
     each = {"bias": np.zeros(count), "friction": np.full(count, 0.5), "cohesion": np.zeros(count)} | given
-    return ContactProblem(operator, np.tile([-1.0, 0.5, 0.0], (count, 1)), sparse=operator.sparse, **each)
+    return ContactProblem(
+        blocks_apart(*[w * np.eye(3)] * count), np.tile([-1.0, 0.5, 0.0], (count, 1)), **each
+    )
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
@@ -64,11 +65,3 @@ def test_none_of_this_is_refused():
     problem(friction=np.zeros(3), cohesion=np.ones(3))
     for factor in (0.1 * LARGEST, 10 * SMALLEST):
         replace(problem(w=factor), u_free=factor * problem().u_free)
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_a_stored_w_with_what_is_no_number_is_refused(value):
-    block = np.tile(np.eye(3), (2, 1, 1))
-    block[1, 0, 2] = value
-    with pytest.raises(SolverError, match="block 1, in the column of contact 1, is not finite"):
-        StoredDelassus(block, np.arange(2), np.arange(3))

@@ -21,6 +21,7 @@ from mechanics.solvers.second_order.newton import Newton
 from mechanics.solvers.strategies.auto import Auto
 from mechanics.solvers.strategies.rigid import Alternating
 from moma.errors import SolverError
+from tests.mechanics.dense_operator import products_alone
 from tests.mechanics.shapes import brick, ground, posed, scene
 
 HARD, SOFT = Fidelity.RIGID, Fidelity.DEFORMABLE
@@ -173,13 +174,13 @@ def test_both_tolerances_count():
 
 
 def test_admm_without_a_sparse_form_says_what_to_do():
-    problem = replace(posed(small(HARD)).problem, sparse=None)
+    problem = products_alone(posed(small(HARD)).problem)
     with pytest.raises(SolverError, match='ADMM: the problem has no sparse form; use the method "nsgs"'):
         ADMM()(problem, cold(problem))
 
 
 def test_solving_in_turn_does_without_a_sparse_form():
-    problem = replace(posed(small(HARD)).problem, sparse=None)
+    problem = products_alone(posed(small(HARD)).problem)
     assert Alternating(1e-9, 1.0, 20000)(problem, cold(problem)).converged
 
 

@@ -228,7 +228,6 @@ def planar_problem(along, up, friction, bias, cohesion, adhesion):
         np.full(2, bias),
         np.full(2, friction),
         np.full(2, cohesion),
-        operator.sparse,
         np.full(2, adhesion),
     )
 

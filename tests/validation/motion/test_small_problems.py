@@ -7,14 +7,13 @@ slightly asymmetric; its solution is that of another Gauss–Seidel code, truste
 
 import numpy as np
 import pytest
-from scipy.sparse import bsr_array
 
-from mechanics.delassus.stored import StoredDelassus
 from mechanics.problem.problem import ContactProblem, ContactStart
 from mechanics.problem.residual import natural_map
 from mechanics.solvers.first_order.admm import ADMM
 from mechanics.solvers.first_order.nsgs import NSGS
 from mechanics.solvers.strategies.rigid import Alternating
+from tests.mechanics.dense_operator import DenseDelassus
 
 SOLVERS = {"nsgs": NSGS, "admm": ADMM, "auto": Alternating}
 
@@ -33,10 +32,8 @@ ROVER4396_R = np.array([[11.7276808, 1.6905629, -8.0334215], [188.578354, 54.814
 
 
 def problem(w, q, mu):
-    rows = bsr_array(w, blocksize=(3, 3))
-    operator = StoredDelassus(rows.data, rows.indices, rows.indptr)
     none = np.zeros(len(q))
-    return ContactProblem(operator, q, none, np.full(len(q), mu), none, operator.sparse)
+    return ContactProblem(DenseDelassus(w), q, none, np.full(len(q), mu), none)
 
 
 def solve(name, posed):

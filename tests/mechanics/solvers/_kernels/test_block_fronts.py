@@ -31,19 +31,13 @@ def dense(value, indices, indptr):
 def factors(value, indices, indptr, symmetric):
     """Analyse, factorise, and give a function that solves; None if there are no factors."""
     plan = fronts.analyse(indices, indptr)
-    _, width, whole, fptr, front, offset, mptr, member, eptr, entry, row, column, parent, place, _ = plan
-    aptr = np.concatenate([[0], np.cumsum(whole**2)]).astype(np.int64)
-    factor, pivot = np.empty(aptr[-1]), np.empty(3 * (len(indptr) - 1), dtype=np.int64)
-    if not fronts.factorise(
-        value, symmetric, width, whole, fptr, front, offset, eptr, entry, row, column, parent, place, aptr, factor,
-        pivot,
-    ):  # fmt: skip
+    factor, pivot = np.empty(plan.aptr[-1]), np.empty(3 * (len(indptr) - 1), dtype=np.int64)
+    if not fronts.factorise(value, symmetric, plan, factor, pivot):
         return None
 
     def solve(right):
         x = right.copy()
-        work = np.empty(whole.max())
-        fronts.solve(x, width, whole, fptr, front, offset, mptr, member, aptr, factor, pivot, work)
+        fronts.solve(x, plan, factor, pivot, np.empty(plan.whole.max()))
         return x
 
     return solve
@@ -92,7 +86,7 @@ def test_contacts_of_one_pair_are_one_group():
     # a stack: four contacts in each of six joints; fill-in is none but that of the next joint
     bodies = np.repeat(np.column_stack([np.arange(6), np.arange(1, 7)]), 4, axis=0)
     indices, indptr = pattern_of(bodies, 7)
-    order, width, whole, *_ = fronts.analyse(indices, indptr)
-    assert len(order) == 6
-    assert (width == 12).all()
-    assert whole.max() == 24
+    plan = fronts.analyse(indices, indptr)
+    assert len(plan.width) == 6
+    assert (plan.width == 12).all()
+    assert plan.whole.max() == 24

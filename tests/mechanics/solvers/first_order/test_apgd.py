@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from mechanics.problem.problem import ContactStart
 from mechanics.problem.residual import natural_map, project_on_cone
-from mechanics.solvers._kernels.apgd import curvature, momentum, project_step
+from mechanics.solvers._kernels.apgd import Pair, Terms, curvature, momentum, project_step
 from mechanics.solvers.first_order.apgd import APGD
 from tests.mechanics.shapes import brick, ground, posed, scene
 
@@ -32,7 +32,7 @@ def test_a_step_is_the_projected_gradient(seed, d):
     y, wy, shift = rng.normal(size=(3, 20, d))
     slide, mu, k, weight = rng.random((4, 20))
     new = np.empty_like(y)
-    project_step(y, wy, shift, slide, mu, k, weight + 0.1, 0.7, new)
+    project_step(Pair(y, wy), slide, 0.7, Terms(shift, shift, mu, k, weight + 0.1), new)
     gradient = wy + shift
     gradient[:, 0] += slide
     exact = project_on_cone(y - 0.7 / (weight + 0.1)[:, None] * gradient, mu, k)
@@ -50,8 +50,9 @@ def test_curvature_is_the_quotient_of_rayleigh(seed, d):
     step = (new - y).ravel()
     exact = step @ w @ step / (step @ (np.repeat(weight, d) * step))
     wide = [(w @ x.ravel()).reshape(8, d) for x in (new, y)]
-    assert curvature(new, y, *wide, weight) == pytest.approx(exact, rel=1e-10)
-    assert curvature(y, y, wide[1], wide[1], weight) == 0.0
+    ahead = Pair(y, wide[1])
+    assert curvature(Pair(new, wide[0]), ahead, weight) == pytest.approx(exact, rel=1e-10)
+    assert curvature(ahead, ahead, weight) == 0.0
 
 
 @seeds
@@ -62,7 +63,8 @@ def test_momentum_is_that_of_nesterov_unless_it_leads_astray(seed, d):
     mu, weight = rng.random((2, 9))
     theta, before = rng.uniform(0.05, 1.0), y.copy()
     slide = np.empty(9)
-    after = momentum(new, r, wnew, wr, y, wy, u_free, mu, weight, theta, slide)
+    terms = Terms(u_free, u_free, mu, mu, weight)
+    after = momentum(Pair(new, wnew), Pair(r, wr), Pair(y, wy), terms, theta, slide)
     if (weight[:, None] * (before - new) * (new - r)).sum() > 0:
         expected, beta = 1.0, 0.0
     else:

@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mechanics.delassus.stored import StoredDelassus
 from mechanics.problem.problem import ContactProblem, ContactStart
 from mechanics.problem.residual import natural_map
 from mechanics.scene.scene import Fidelity
 from mechanics.solvers.second_order.cone_program import ConeProgram
 from moma.errors import SolverError
+from tests.mechanics.dense_operator import blocks_apart, products_alone
 from tests.mechanics.shapes import brick, ground, posed, scene
 
 
@@ -22,11 +22,9 @@ def cold(problem):
 
 def alone(count=3, **given):
     """Contacts that do not see one another, W = 1, each driven down at 1 and sideways at (1, 3), μ = 0.1."""
-    block = np.tile(np.eye(3), (count, 1, 1))
-    operator = StoredDelassus(block, np.arange(count), np.arange(count + 1))
     parts = {"friction": np.full(count, 0.1), "cohesion": np.zeros(count), "bias": np.zeros(count)} | given
     u_free = np.tile([-1.0, 1.0, 3.0], (count, 1))
-    return ContactProblem(operator, u_free, sparse=operator.sparse, **parts)
+    return ContactProblem(blocks_apart(*[np.eye(3)] * count), u_free, **parts)
 
 
 BOTH = pytest.mark.parametrize("polish", [True, False], ids=["polished", "programmes alone"])
@@ -107,7 +105,7 @@ def test_iterations_are_limited_and_the_residual_is_true():
 
 
 def test_a_problem_whose_w_is_known_by_products_alone_is_refused():
-    problem = replace(alone(), sparse=None)
+    problem = products_alone(alone())
     with pytest.raises(SolverError, match="cone programme: W is not known as a matrix"):
         ConeProgram()(problem, cold(problem))
 

@@ -15,6 +15,7 @@ from mechanics.solvers.first_order.nsgs import NSGS
 from mechanics.solvers.second_order import interior_point
 from mechanics.solvers.second_order.interior_point import InteriorPoint, _Path
 from moma.errors import SolverError
+from tests.mechanics.dense_operator import products_alone
 from tests.mechanics.shapes import TURN, brick, dense_operator, ground, moved, posed, scene
 
 HARD, SOFT = Fidelity.RIGID, Fidelity.DEFORMABLE
@@ -177,7 +178,7 @@ def test_long_steps_are_solved(lower, friction):
     settings = stack(lower, SOFT, friction=friction, step=1.0, theta=1.0, relaxation=True)
     one = posed(settings, step=1.0, theta=1.0)
     operator = mixed_delassus(one.model, one.state, one.contacts, one.compliance, elastic_scale=True)
-    problem = replace(one.problem, delassus=operator, sparse=lambda: operator.sparse)
+    problem = replace(one.problem, delassus=operator)
     assert operator.scale < one.operator.scale
     answer = InteriorPoint(1e-8, 1e-6)(problem, cold(problem))
     assert answer.converged
@@ -234,7 +235,6 @@ def test_it_does_not_depend_on_units(name):
             u_free=problem.u_free * speed,
             bias=problem.bias * speed,
             cohesion=problem.cohesion * mass * speed,
-            sparse=lambda w=w: w.sparse,
         )
         answer = InteriorPoint(1e-8, 1e-6)(other, cold(other))
         assert answer.converged
@@ -311,6 +311,6 @@ def test_stones_that_nothing_presses_are_left_alone():
 
 
 def test_a_problem_that_cannot_be_factorised_is_refused():
-    problem = replace(problem_of("sliding"), sparse=None)
+    problem = products_alone(problem_of("sliding"))
     with pytest.raises(SolverError, match="interior point: the problem has no sparse form"):
         InteriorPoint()(problem, cold(problem))

@@ -16,6 +16,7 @@ from mechanics.scene.scene import ContactSettings, Fidelity
 from mechanics.solvers.first_order.nsgs import NSGS
 from mechanics.solvers.second_order.newton import Newton, projection_derivative
 from moma.errors import SolverError
+from tests.mechanics.dense_operator import products_alone
 from tests.mechanics.shapes import brick, ground, posed, scene
 
 SOFT = Fidelity.DEFORMABLE
@@ -182,7 +183,7 @@ def test_no_contacts_are_no_work():
 
 def test_a_problem_that_cannot_be_factorised_is_refused():
     with pytest.raises(SolverError, match="Newton: the problem has no sparse form"):
-        Newton()(replace(pushed(), sparse=None), cold(pushed()))
+        Newton()(products_alone(pushed()), cold(pushed()))
 
 
 def test_rigid_stones_on_more_contacts_than_they_have_freedoms():

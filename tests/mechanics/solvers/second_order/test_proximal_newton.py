@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from mechanics.delassus.stored import StoredDelassus
 from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
 from mechanics.problem.problem import ContactProblem, ContactStart
@@ -13,6 +14,7 @@ from mechanics.solvers.first_order.nsgs import NSGS
 from mechanics.solvers.second_order.proximal_newton import ProximalNewton, _System
 from mechanics.stones.materials import Material
 from moma.errors import SolverError
+from tests.mechanics.dense_operator import blocks_apart
 from tests.mechanics.shapes import brick, ground
 
 
@@ -50,7 +52,7 @@ def nothing(problem):
 
 
 def dense_lift(problem):
-    form = problem.delassus.sparse
+    form = problem.delassus.form
     return form.inertia.toarray(), form.lift.toarray()
 
 
@@ -59,7 +61,7 @@ def test_equations_of_the_bodies_are_those_of_the_contacts():
     rng, nc = np.random.default_rng(1), len(problem.friction)
     first, second = rng.normal(size=(2, nc, 3, 3)) + 3.0 * np.eye(3)
     error, alpha = rng.normal(size=(nc, 3)), 0.7
-    step = _System(problem.delassus).step(first, second, error, alpha)
+    step = _System(problem.delassus.rigid).step(first, second, error, alpha)
     inertia, lift = dense_lift(problem)
     compliance = lift.T @ np.linalg.solve(inertia, lift) + alpha * np.eye(3 * nc)
     big_first, big_second = np.zeros((2, nc, 3, nc, 3))
@@ -104,8 +106,37 @@ def test_a_mass_ratio_of_a_million_is_solved_to_rounding(heavy):
 
 
 def test_other_operators_are_refused():
-    operator = StoredDelassus(np.eye(3)[None], np.arange(1), np.arange(2))
     none = np.zeros(1)
-    problem = ContactProblem(operator, np.array([[-1.0, 0.0, 0.0]]), none, none, none, operator.sparse)
+    problem = ContactProblem(blocks_apart(np.eye(3)), np.array([[-1.0, 0.0, 0.0]]), none, none, none)
     with pytest.raises(SolverError, match="not all rigid"):
         ProximalNewton()(problem, nothing(problem))
+
+
+def projected_form(r, u, mu, k, rho):
+    """Alart and Curnier's F, as it is written."""
+    pressed = np.maximum(r[0] - rho[0] * u[0], 0.0)
+    point, radius = r[1:] - rho[1] * u[1:], mu * pressed + k
+    size = np.linalg.norm(point)
+    return r - np.append(pressed, point if size <= radius else radius * point / size)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.4, 5.0]), st.sampled_from([0.0, 0.7]))
+def test_derivatives_of_alart_and_curniers_function(seed, mu, k):
+    rng = np.random.default_rng(seed)
+    r, u, rho = rng.normal(size=(1, 3)), rng.normal(size=(1, 3)), rng.uniform(0.5, 2.0, (1, 2))
+    error, first, second = np.empty((1, 3)), np.empty((1, 3, 3)), np.empty((1, 3, 3))
+    merit = bodies.alart_curnier(r, u, np.array([mu]), np.array([k]), rho, error, first, second)
+    wanted = projected_form(r[0], u[0], mu, k, rho[0])
+    assert error[0] == pytest.approx(wanted, abs=1e-14)
+    assert merit == pytest.approx(0.5 * (wanted**2).sum())
+    tiny = 1e-7
+    for matrix, by_r in ((first[0], True), (second[0], False)):
+        for j in range(3):
+            step = np.zeros(3)
+            step[j] = tiny
+            change = (step, 0.0 * step) if by_r else (0.0 * step, step)
+            ahead = projected_form(r[0] + change[0], u[0] + change[1], mu, k, rho[0])
+            behind = projected_form(r[0] - change[0], u[0] - change[1], mu, k, rho[0])
+            # kinks are met by chance alone
+            assert matrix[:, j] == pytest.approx((ahead - behind) / (2 * tiny), abs=1e-5)

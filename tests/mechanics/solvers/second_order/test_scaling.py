@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from mechanics.problem.problem import scale_of
 from mechanics.problem.residual import residual
 from mechanics.scene.scene import Fidelity
 from mechanics.solvers.second_order.scaling import equilibrated
@@ -37,13 +36,13 @@ def test_products_sweeps_and_factors_are_those_of_d_w_d(fidelity):
     own = scaled.reshape(nc, 3, nc, 3)[np.arange(nc), :, np.arange(nc)]
     np.testing.assert_allclose(even.delassus.diagonal, own, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(np.trace(own, axis1=1, axis2=2), 3.0, rtol=1e-12)
-    assert scale_of(even.delassus) == pytest.approx(1.0)
+    assert even.delassus.scale == pytest.approx(1.0)
     theta = np.tile(0.1 * np.eye(3), (nc, 1, 1)) + 0.02 * rng.normal(size=(nc, 3, 3))
     matrix = scaled.copy()
     for c in range(nc):
         matrix[3 * c : 3 * c + 3, 3 * c : 3 * c + 3] += theta[c]
     b = rng.normal(size=3 * nc)
-    form = even.sparse()
+    form = even.delassus.form
     np.testing.assert_allclose(matrix @ form.shifted(theta)(b), b, atol=1e-9)
     relaxed = form.relaxed(0.3)(b)
     np.testing.assert_allclose(scaled @ relaxed / 0.3 + relaxed, b, atol=1e-9)

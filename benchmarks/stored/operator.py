@@ -1,17 +1,19 @@
-"""W stored in blocks, for contact problems that come from elsewhere."""
+"""Delassus operator stored in blocks, for contact problems of other programs."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import bsr_array, csr_array, eye_array
+from scipy.sparse import bsr_array, csc_array, csr_array, eye_array
 from scipy.sparse.linalg import SuperLU, splu
 
+from benchmarks.stored._kernels.sweeps import Blocks, apply, sweep
 from mechanics.arrays import Array
-from mechanics.delassus._kernels.stored import apply, sweep
-from mechanics.problem._kernels import local_factors
-from mechanics.problem.problem import GaussSeidel, SparseForm
+from mechanics.problem._kernels import Laws, local_factors
+from mechanics.problem.forms import block_diagonal
+from mechanics.problem.problem import GaussSeidel, ScaledDelassus, mean_diagonal
 from moma.errors import SolverError
 
 __all__ = ["StoredDelassus", "StoredForm"]
@@ -21,7 +23,7 @@ __all__ = ["StoredDelassus", "StoredForm"]
 class StoredDelassus:
     """W in block-sparse rows (BSR) of 3 × 3 blocks, local axes (n, t1, t2) at each contact.
 
-    W is taken as it is given. Some that other programs have written are slightly asymmetric; then `apply` uses every
+    W is taken as it is given. Matrices written by other programs may be slightly asymmetric; then `apply` uses every
     entry, and so do the sweeps: each contact is solved exactly with the symmetric part of its own block, the rest of
     its row is frozen, and where the sweeps come to rest the laws hold for W itself.
 
@@ -39,6 +41,7 @@ class StoredDelassus:
     block: Array
     indices: NDArray[np.integer]
     indptr: NDArray[np.integer]
+    rigid = None
 
     def __post_init__(self) -> None:
         nc, entries = len(self.indptr) - 1, len(self.indices)
@@ -79,38 +82,35 @@ class StoredDelassus:
         diagonal[row[own]] = self.block[own]
         return diagonal
 
+    @cached_property
+    def blocks(self) -> Blocks:
+        """W for compiled loops."""
+        indices = self.indices.astype(np.int64, copy=False)
+        return Blocks(self.block, indices, self.indptr.astype(np.int64, copy=False))
+
+    @cached_property
+    def scale(self) -> float:
+        """Mean diagonal of W [1/kg]."""
+        return mean_diagonal(self.diagonal)
+
     def apply(self, impulse: Array) -> Array:
-        """W r (nc, 3) [m/s]."""
-        velocity: Array = apply(impulse, self.block, self.indices, self.indptr)
+        """Return W r (nc, 3) [m/s]."""
+        velocity: Array = apply(impulse, self.blocks)
         return velocity
 
     def gauss_seidel(self, shift: Array, friction: Array, cohesion: Array) -> GaussSeidel:
-        """Sweeps in the order of the contacts: on most problems forth and back takes twice as many."""
+        """Return sweeps in the order of the contacts: on most problems forth and back takes twice as many."""
         local = self._local()
-        factors = local_factors(local)
+        laws = Laws(shift, friction, cohesion, local_factors(local))
+        return lambda impulse, count, /: sweep(count, impulse, laws, local, self.blocks)
 
-        def sweeps(impulse: Array, count: int, /) -> None:
-            sweep(
-                count,
-                impulse,
-                shift,
-                friction,
-                cohesion,
-                factors,
-                local,
-                self.block,
-                self.indices,
-                self.indptr,
-            )
-
-        return sweeps
-
-    def sparse(self) -> "StoredForm":
-        """W for methods that factorise; its factors are kept as long as this operator is."""
-        return self._form
+    def scaled(self, unit: Array) -> ScaledDelassus:
+        """Return D W D with the units (nc,) of the contacts on the diagonal of D."""
+        return ScaledDelassus(self, unit)
 
     @cached_property
-    def _form(self) -> "StoredForm":
+    def form(self) -> "StoredForm":
+        """W for methods that factorise; its factors are kept as long as this operator is."""
         size = 3 * (len(self.indptr) - 1)
         return StoredForm(bsr_array((self.block, self.indices, self.indptr), shape=(size, size)).tocsr())
 
@@ -120,21 +120,43 @@ class StoredDelassus:
         return symmetric
 
 
-class StoredForm(SparseForm):
-    """A stored W in the place of Hᵀ Â⁻¹ H.
+class StoredForm:
+    """Assembled W, which need not be symmetric.
 
-    Solvers find (W + σ)⁻¹ b as (b - Hᵀ (Â + H Hᵀ/σ)⁻¹ H b/σ) / σ. That is right as well with `lift` 1, `across` W, and
-    W/σ + 1 for what is factorised, since (W + σ)⁻¹ = (1 - W (W + σ)⁻¹) / σ. W need not be symmetric.
+    (W/σ + 1)⁻¹ b is b - W (W/σ + 1)⁻¹ b/σ, which keeps the digits of W r.
     """
 
     def __init__(self, matrix: "csr_array[np.float64]") -> None:
-        identity = eye_array(matrix.shape[0], format="csc")
-        super().__init__(identity, identity)
-        self.across = matrix
+        self._matrix = matrix
         self._lu: dict[float, SuperLU] = {}
 
+    @property
+    def matrix(self) -> "csc_array[np.float64]":
+        """Symmetric part of W (3 nc, 3 nc) [1/kg]."""
+        return csc_array(0.5 * (self._matrix + self._matrix.T))
+
     def factor(self, sigma: float) -> SuperLU:
-        """Sparse factors of W/σ + 1, kept for the next call."""
+        """Return sparse factors of W/σ + 1, kept for the next call."""
         if sigma not in self._lu:
-            self._lu[sigma] = splu((self.across / sigma + self.lift).tocsc())
+            identity = eye_array(self._matrix.shape[0], format="csc")
+            self._lu[sigma] = splu((self._matrix / sigma + identity).tocsc())
         return self._lu[sigma]
+
+    def relaxed(self, sigma: float) -> Callable[[Array], Array]:
+        """Return (W/σ + 1)⁻¹ as a function of b (3 nc,)."""
+        factor = self.factor(sigma)
+        return lambda b: b - (self._matrix @ factor.solve(b)) / sigma
+
+    def shifted(self, theta: Array, exact: bool = True) -> Callable[[Array], Array]:
+        """Return (W + Θ)⁻¹ as a function of b (3 nc,).
+
+        Raises
+        ------
+        SolverError : if W + Θ is singular
+        """
+        try:
+            factor = splu(csc_array(self._matrix + block_diagonal(theta)))
+        except RuntimeError as error:
+            raise SolverError("W + Θ is singular", where="solver", remedy="use another method") from error
+        solve: Callable[[Array], Array] = factor.solve
+        return solve

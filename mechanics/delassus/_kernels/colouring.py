@@ -11,11 +11,20 @@ _ONE = np.uint64(1)
 
 @njit(cache=True)
 def first_fit(bodies, moving):  # pragma: no cover - compiled
-    """Give each contact, in order, the smallest colour that no earlier contact of its moving bodies has: (nc,).
+    """Give each contact, in order, the smallest colour that no earlier contact of its moving bodies has.
 
     The colours a body has used are bits of its own row of words. A contact never needs a colour beyond the number
     of the other contacts of its two bodies, which bounds the rows; the first word of a row with a bit left is
     remembered, so that a body with very many contacts costs no more for each of them.
+
+    Inputs
+    ------
+    bodies : (nc, 2) int64
+    moving : (nb,) bool
+
+    Outputs
+    -------
+    (nc,) int64
     """
     nc, nb = bodies.shape[0], moving.shape[0]
     degree = np.zeros(nb, dtype=np.int64)

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mechanics.solvers.first_order.colouring import greedy_colours
+from mechanics.delassus.colouring import greedy_colours
 
 
 def first_fit_twin(bodies, moving):

@@ -1,15 +1,15 @@
-"""Colours of contacts: two contacts of one colour share no body that moves, so a colour may be swept in parallel."""
+"""Colouring of contacts: two contacts of one colour share no body that moves, so a colour may be swept in parallel."""
 
 import numpy as np
 
 from mechanics.arrays import Bools, Ints
-from mechanics.solvers._kernels.colouring import first_fit
+from mechanics.delassus._kernels.colouring import first_fit
 
 __all__ = ["greedy_colours"]
 
 
 def greedy_colours(bodies: Ints, moving: Bools) -> Ints:
-    """The smallest colour, from 0, that no earlier contact of its moving bodies has.
+    """Return for each contact the smallest colour, from 0, that no earlier contact of its moving bodies has.
 
     Low colours are large, high ones small; there are at most as many as the contacts of two bodies that touch.
     A body that does not move (fixed, driven) takes no part, however many contacts it has. The same contacts in the

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy.sparse import bsr_array
 
-from mechanics.delassus.stored import StoredDelassus
-from mechanics.problem._kernels import local_factors, solve_contact
+from benchmarks.stored.operator import StoredDelassus
 from mechanics.problem.problem import ContactProblem, ContactStart
 from mechanics.problem.residual import natural_map
 from mechanics.solvers.first_order.admm import ADMM
 from mechanics.solvers.first_order.nsgs import NSGS
 from moma.errors import SolverError
+from tests.mechanics.dense_operator import slow_sweep
 
 
 def dense_problem(nc=7, skew=0.0, seed=3):
@@ -28,15 +28,6 @@ def dense_problem(nc=7, skew=0.0, seed=3):
 def stored(w):
     rows = bsr_array(w, blocksize=(3, 3))
     return StoredDelassus(rows.data, rows.indices, rows.indptr)
-
-
-def slow_sweep(w, r, shift, mu, cohesion):
-    """One pass, contact by contact, with dense rows."""
-    for c in range(len(r)):
-        rows = slice(3 * c, 3 * c + 3)
-        local = 0.5 * (w[rows, rows] + w[rows, rows].T)
-        b = shift[c] + w[rows] @ r.ravel() - local @ r[c]
-        solve_contact(local_factors(local[None])[0], b, mu[c], cohesion[c], r[c])
 
 
 @pytest.mark.parametrize("skew", [0.0, 0.01])
@@ -91,9 +82,8 @@ def test_a_contact_without_its_own_block_is_refused():
 def test_factors_solve_the_dense_system(skew):
     """r = (W + σ)⁻¹ b, in the form in which ADMM asks for it."""
     w, b, _, _ = dense_problem(skew=skew)
-    sigma, form = 0.3, stored(w).sparse()
-    inner = form.factor(sigma).solve(form.lift @ (b.ravel() / sigma))
-    found = (b.ravel() - form.across @ inner) / sigma
+    sigma = 0.3
+    found = stored(w).form.relaxed(sigma)(b.ravel()) / sigma
     np.testing.assert_allclose(found, np.linalg.solve(w + sigma * np.eye(len(w)), b.ravel()), rtol=1e-10)
 
 
@@ -102,10 +92,18 @@ def test_admm_and_the_sweeps_find_one_solution(skew):
     """Two methods that share no code; with W positive definite and little friction the solution is unique."""
     w, u_free, mu, cohesion = dense_problem(skew=skew)
     operator = stored(w)
-    problem = ContactProblem(operator, u_free, np.zeros(len(u_free)), 0.3 * mu, cohesion, operator.sparse)
+    problem = ContactProblem(operator, u_free, np.zeros(len(u_free)), 0.3 * mu, cohesion)
     none = ContactStart(np.zeros_like(u_free), np.zeros_like(u_free))
     swept = NSGS(tolerance=1e-12, velocity_tolerance=np.inf)(problem, none)
     split = ADMM(tolerance=1e-12, velocity_tolerance=np.inf, max_iterations=20000)(problem, none)
     assert swept.converged
     assert split.converged
     np.testing.assert_allclose(split.impulse, swept.impulse, atol=1e-9)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_stored_w_with_what_is_no_number_is_refused(value):
+    block = np.tile(np.eye(3), (2, 1, 1))
+    block[1, 0, 2] = value
+    with pytest.raises(SolverError, match="block 1, in the column of contact 1, is not finite"):
+        StoredDelassus(block, np.arange(2), np.arange(3))

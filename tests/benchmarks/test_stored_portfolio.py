@@ -1,15 +1,14 @@
-"""The solver that chooses, on stored problems: solved, and for a reason that it gives."""
+"""The portfolio for stored problems: solved, and for a reason that it gives."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mechanics.delassus.stored import StoredDelassus
+from benchmarks.stored.operator import StoredDelassus
+from benchmarks.stored.portfolio import StoredAuto
 from mechanics.problem.problem import ContactProblem, ContactStart
 from mechanics.problem.residual import residual
-from mechanics.solvers._kernels import stored_portfolio as portfolio
-from mechanics.solvers.strategies.auto import Auto
 
 
 def problem_of(seed, bodies, contacts, friction=0.6, cohesion=0.0, bias=0.0):
@@ -40,9 +39,7 @@ def problem_of(seed, bodies, contacts, friction=0.6, cohesion=0.0, bias=0.0):
     velocity[0] = 0.0
     u_free = np.einsum("cibk,bk->ci", lift, velocity)
     every = np.ones(contacts)
-    return ContactProblem(
-        operator, u_free, bias * rng.random(contacts), friction * every, cohesion * every, operator.sparse
-    )
+    return ContactProblem(operator, u_free, bias * rng.random(contacts), friction * every, cohesion * every)
 
 
 def nothing(problem):
@@ -78,7 +75,7 @@ def assert_laws_hold(problem, impulse, tolerance):
 )
 def test_what_it_calls_solved_is(seed, bodies, contacts, friction, cohesion, bias):
     problem = problem_of(seed, bodies, contacts, friction, cohesion, bias)
-    solution = Auto(1e-10, 1e-8, 20_000)(problem, nothing(problem))
+    solution = StoredAuto(1e-10, 1e-8, 20_000)(problem, nothing(problem))
     if solution.converged:
         assert_laws_hold(problem, solution.impulse, 1e-6)
         assert residual(problem, solution.impulse).within(1e-10, 1e-8)
@@ -90,7 +87,7 @@ def test_most_random_problems_are_solved():
     solved = 0
     for seed in range(60):
         problem = problem_of(seed, 6, 12)
-        solved += Auto(1e-9, 1e-7, 5_000)(problem, nothing(problem)).converged
+        solved += StoredAuto(1e-9, 1e-7, 5_000)(problem, nothing(problem)).converged
     assert solved >= 54
 
 
@@ -98,8 +95,8 @@ def test_three_spheres_of_the_examples():
     # Siconos' FC3D_Example1, closed form: r = (1, -0.0316227766, -0.0948683298) at each contact
     operator = StoredDelassus(np.tile(np.eye(3), (3, 1, 1)), np.arange(3), np.arange(4))
     u_free, mu = np.tile([-1.0, 1.0, 3.0], (3, 1)), np.full(3, 0.1)
-    problem = ContactProblem(operator, u_free, np.zeros(3), mu, np.zeros(3), operator.sparse)
-    solution = Auto(1e-12, 1e-9)(problem, nothing(problem))
+    problem = ContactProblem(operator, u_free, np.zeros(3), mu, np.zeros(3))
+    solution = StoredAuto(1e-12, 1e-9)(problem, nothing(problem))
     assert solution.converged
     assert solution.impulse == pytest.approx(
         np.tile([1.0, -0.1 / 10**0.5, -0.3 / 10**0.5], (3, 1)), abs=1e-12
@@ -131,13 +128,13 @@ def stack(count, sides=4):
     velocity[1:, 2] = -9.81e-3
     u_free = np.einsum("cibk,bk->ci", lift, velocity)
     none = np.zeros(len(u_free))
-    return ContactProblem(operator, u_free, none, none + 0.5, none, operator.sparse)
+    return ContactProblem(operator, u_free, none, none + 0.5, none)
 
 
 def test_a_tall_stack_at_rest_needs_a_few_iterations():
     # plain sweeps would take (2n/π)² ln(1/ε), some 25,000
     problem = stack(40)
-    solution = Auto(1e-9, 1e-7)(problem, nothing(problem))
+    solution = StoredAuto(1e-9, 1e-7)(problem, nothing(problem))
     assert solution.converged
     assert solution.iterations <= 60
     assert solution.why.startswith("static ADMM")
@@ -148,8 +145,8 @@ def test_a_tall_stack_at_rest_needs_a_few_iterations():
 
 def test_a_start_that_is_a_solution_costs_a_look():
     problem = stack(5)
-    first = Auto(1e-10, 1e-8)(problem, nothing(problem))
-    again = Auto(1e-9, 1e-7)(problem, ContactStart(first.impulse, first.velocity))
+    first = StoredAuto(1e-10, 1e-8)(problem, nothing(problem))
+    again = StoredAuto(1e-9, 1e-7)(problem, ContactStart(first.impulse, first.velocity))
     assert again.iterations == 0
     assert again.why.startswith("nothing")
     assert again.impulse == pytest.approx(first.impulse)
@@ -158,41 +155,11 @@ def test_a_start_that_is_a_solution_costs_a_look():
 def test_no_contacts_are_solved():
     operator = StoredDelassus(np.zeros((0, 3, 3)), np.zeros(0, dtype=np.int64), np.zeros(1, dtype=np.int64))
     none = np.zeros(0)
-    problem = ContactProblem(operator, np.zeros((0, 3)), none, none, none, operator.sparse)
-    assert Auto()(problem, nothing(problem)).converged
+    problem = ContactProblem(operator, np.zeros((0, 3)), none, none, none)
+    assert StoredAuto()(problem, nothing(problem)).converged
 
 
 def test_iterations_are_no_more_than_allowed():
     problem = problem_of(5, 8, 30)
     for most in (1, 7, 12, 31):
-        assert Auto(1e-14, 1e-12, most)(problem, nothing(problem)).iterations <= most
-
-
-def projected_form(r, u, mu, k, rho):
-    """Alart and Curnier's F, as it is written."""
-    pressed = np.maximum(r[0] - rho[0] * u[0], 0.0)
-    point, radius = r[1:] - rho[1] * u[1:], mu * pressed + k
-    size = np.linalg.norm(point)
-    return r - np.append(pressed, point if size <= radius else radius * point / size)
-
-
-@settings(max_examples=60, deadline=None)
-@given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.4, 5.0]), st.sampled_from([0.0, 0.7]))
-def test_derivatives_of_alart_and_curniers_function(seed, mu, k):
-    rng = np.random.default_rng(seed)
-    r, u, rho = rng.normal(size=(1, 3)), rng.normal(size=(1, 3)), rng.uniform(0.5, 2.0, (1, 2))
-    error, first, second = np.empty((1, 3)), np.empty((1, 3, 3)), np.empty((1, 3, 3))
-    merit = portfolio.alart_curnier(r, u, np.array([mu]), np.array([k]), rho, error, first, second)
-    wanted = projected_form(r[0], u[0], mu, k, rho[0])
-    assert error[0] == pytest.approx(wanted, abs=1e-14)
-    assert merit == pytest.approx(0.5 * (wanted**2).sum())
-    tiny = 1e-7
-    for matrix, by_r in ((first[0], True), (second[0], False)):
-        for j in range(3):
-            step = np.zeros(3)
-            step[j] = tiny
-            change = (step, 0.0 * step) if by_r else (0.0 * step, step)
-            ahead = projected_form(r[0] + change[0], u[0] + change[1], mu, k, rho[0])
-            behind = projected_form(r[0] - change[0], u[0] - change[1], mu, k, rho[0])
-            # kinks are met by chance alone
-            assert matrix[:, j] == pytest.approx((ahead - behind) / (2 * tiny), abs=1e-5)
+        assert StoredAuto(1e-14, 1e-12, most)(problem, nothing(problem)).iterations <= most
