@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import csr_array, vstack
 
 from mechanics.arrays import Array, Bools, Ints
-from mechanics.contact._kernels.mortar import mortar_rows
+from mechanics.contact._kernels.mortar import Bodies, Interfaces, mortar_rows
 from mechanics.contact.contacts import Contacts
 from mechanics.contact.surfaces import Placed, Surfaces
 from mechanics.scene.state import State
@@ -47,20 +47,29 @@ def face_cells(surfaces: Surfaces, nodes: int) -> FaceCells:
     """The test functions of all meshed faces, as the mortar method integrates them over each face as a whole."""
     meshes = surfaces.meshes
     face = np.flatnonzero(meshes.of_face >= 0)
-    origin = surfaces.vertex[surfaces.corner[surfaces.cptr[face]]]
-    edge = surfaces.vertex[surfaces.corner[surfaces.cptr[face] + 1]] - origin
-    n = surfaces.normal[face]
+    origin = surfaces.shapes.vertex[surfaces.shapes.corner[surfaces.shapes.cptr[face]]]
+    edge = surfaces.shapes.vertex[surfaces.shapes.corner[surfaces.shapes.cptr[face] + 1]] - origin
+    n = surfaces.shapes.normal[face]
     t1 = edge - np.einsum("fi,fi->f", edge, n)[:, None] * n
     t1 = t1 / np.linalg.norm(t1, axis=1)[:, None]
     frame = np.stack([n, t1, np.cross(n, t1)], axis=1)
-    both = np.column_stack([face, face])
     size = np.diff(meshes.node_ptr)[meshes.of_face[face]]
+    still = Interfaces(
+        np.column_stack([meshes.of_face[face], np.full(len(face), -1)]),
+        np.column_stack([face, face]),
+        np.zeros((len(face), 2), dtype=np.int64),
+        frame,
+        origin,
+        np.zeros(len(face)),
+    )
     row, node, area, middle, pointer, column, value = mortar_rows(
-        np.concatenate([[0], np.cumsum(size)]), np.ones(int(size.sum()), dtype=bool),
-        np.column_stack([meshes.of_face[face], np.full(len(face), -1)]), both, np.zeros_like(both), frame, origin,
-        np.zeros(len(face)), np.zeros((1, 3)), np.eye(3)[None], meshes.node_ptr, meshes.node, meshes.reference,
-        meshes.facet_ptr, meshes.facet, meshes.kind, meshes.cut, surfaces.vertex, surfaces.cptr, surfaces.corner,
-    )  # fmt: skip
+        np.concatenate([[0], np.cumsum(size)]),
+        np.ones(int(size.sum()), dtype=bool),
+        still,
+        Bodies(np.zeros((1, 3)), np.eye(3)[None]),
+        meshes,
+        surfaces.shapes,
+    )
     count = np.bincount(face[row], minlength=len(meshes.of_face))
     return FaceCells(
         np.concatenate([[0], np.cumsum(count)]).astype(np.int64),
@@ -113,9 +122,9 @@ def ball_contacts(
 
 def _face_rows(surfaces: Surfaces, placed: Placed, cells: FaceCells, ball: int, other: int) -> slice:
     """The cells of the face over which the centre of a ball lies highest."""
-    faces = slice(surfaces.fptr[other], surfaces.fptr[other + 1])
-    corner = placed.vertex[surfaces.corner[surfaces.cptr[faces]]]
-    height = np.einsum("fi,fi->f", placed.centre[surfaces.body[ball]] - corner, placed.normal[faces])
+    faces = slice(surfaces.shapes.fptr[other], surfaces.shapes.fptr[other + 1])
+    corner = placed.shapes.vertex[surfaces.shapes.corner[surfaces.shapes.cptr[faces]]]
+    height = np.einsum("fi,fi->f", placed.centre[surfaces.body[ball]] - corner, placed.shapes.normal[faces])
     face = int(faces.start + height.argmax())
     return slice(int(cells.pointer[face]), int(cells.pointer[face + 1]))
 
@@ -145,10 +154,12 @@ def _pair(
     gap, n = _gaps(middle, cells.spread[rows], centre, radius)
     # t1 along an axis of the block that lies in the face, so that the frame turns with it
     face = int(np.searchsorted(cells.pointer, rows.start, side="right") - 1)
-    corners = placed.vertex[surfaces.corner[surfaces.cptr[face] : surfaces.cptr[face] + 2]]
+    corners = placed.shapes.vertex[
+        surfaces.shapes.corner[surfaces.shapes.cptr[face] : surfaces.shapes.cptr[face] + 2]
+    ]
     edge = corners[1] - corners[0]
     t1 = edge - (n @ edge)[:, None] * n
-    keep = np.flatnonzero((gap <= limit) & (n @ placed.normal[face] < -_WIDEST))
+    keep = np.flatnonzero((gap <= limit) & (n @ placed.shapes.normal[face] < -_WIDEST))
     t1 = t1[keep] / np.linalg.norm(t1[keep], axis=1)[:, None]
     n, gap = n[keep], gap[keep]
     frame = np.stack([n, t1, np.cross(n, t1)], axis=1)
