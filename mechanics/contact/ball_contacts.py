@@ -14,16 +14,15 @@ from mechanics.scene.state import State
 __all__ = ["FaceCells", "ball_contacts", "face_cells"]
 
 
-# of the radius: where a ball would sink deeper than this before the nodes see it, or rises by more than this over what
-# a node stands for, the mesh is too coarse
+# part of the radius: where a ball would sink deeper before the nodes see it, or rises by more over the area of a node,
+# the mesh is too coarse
 _UNSEEN = 1e-3
-# cosine of the widest angle between the normals of ball and face
-_WIDEST = 0.1
+_WIDEST = 0.1  # cosine of the widest angle between the normals of ball and face
 
 
 @dataclass(frozen=True)
 class FaceCells:
-    """What each corner node of the meshed faces stands for: its test function ψ over the whole face.
+    """Test functions ψ of the corner nodes of the meshed faces, integrated over whole faces.
 
     Attributes
     ----------
@@ -44,7 +43,7 @@ class FaceCells:
 
 
 def face_cells(surfaces: Surfaces, nodes: int) -> FaceCells:
-    """The test functions of all meshed faces, as the mortar method integrates them over each face as a whole."""
+    """Integrate the test functions of all meshed faces, over each face as a whole, as the mortar method does."""
     meshes = surfaces.meshes
     face = np.flatnonzero(meshes.of_face >= 0)
     origin = surfaces.shapes.vertex[surfaces.shapes.corner[surfaces.shapes.cptr[face]]]
@@ -91,7 +90,7 @@ def ball_contacts(
     limit: Array,
     gap: Array,
 ) -> tuple[list[Contacts], Bools]:
-    """Weighted contacts of pairs (np, 2) of a ball and a deformable shape, and which pairs are seen by their mesh.
+    """Make weighted contacts of pairs (np, 2) of a ball and a deformable shape; return the pairs that have them too.
 
     Of the face that lies farthest under the ball, every node within reach makes a contact; the meshed face is the
     candidate. Over its ψ the distance to the ball's centre has the mean |x̄ - c| + s²/2|x̄ - c| with s² the spread of
@@ -121,7 +120,7 @@ def ball_contacts(
 
 
 def _face_rows(surfaces: Surfaces, placed: Placed, cells: FaceCells, ball: int, other: int) -> slice:
-    """The cells of the face over which the centre of a ball lies highest."""
+    """Return the cells of the face over which the centre of a ball lies highest."""
     faces = slice(surfaces.shapes.fptr[other], surfaces.shapes.fptr[other + 1])
     corner = placed.shapes.vertex[surfaces.shapes.corner[surfaces.shapes.cptr[faces]]]
     height = np.einsum("fi,fi->f", placed.centre[surfaces.body[ball]] - corner, placed.shapes.normal[faces])
@@ -130,7 +129,7 @@ def _face_rows(surfaces: Surfaces, placed: Placed, cells: FaceCells, ball: int, 
 
 
 def _gaps(middle: Array, spread: Array, centre: Array, radius: float) -> tuple[Array, Array]:
-    """Mean gaps (n,) of cells to a ball, and unit vectors (n, 3) from its centre to them."""
+    """Return mean gaps (n,) of cells to a ball, and unit vectors (n, 3) from its centre to them."""
     away = middle - centre
     distance = np.linalg.norm(away, axis=1)
     return distance + spread / (2.0 * distance) - radius, away / distance[:, None]
@@ -146,7 +145,7 @@ def _pair(
     key: int,
     limit: float,
 ) -> Contacts:
-    """The contacts of one ball and one shape."""
+    """Make the contacts of one ball and one shape."""
     ball, block = surfaces.body[pair[0]], surfaces.body[pair[1]]
     centre, radius = placed.centre[ball], surfaces.radius[pair[0]]
     weights = cells.weights[rows]

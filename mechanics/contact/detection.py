@@ -33,10 +33,8 @@ from mechanics.scene.state import State
 __all__ = ["FLAT", "THIN", "Detector"]
 
 
-# faces whose normals differ by less than 5° lie flat on one another
-FLAT = float(np.cos(np.radians(5.0)))
-# flat faces that overlap by less than this part of the smaller one do not touch
-THIN = 1e-6
+FLAT = float(np.cos(np.radians(5.0)))  # cosine of the angle within which faces lie flat on one another
+THIN = 1e-6  # flat faces that overlap by less than this part of the smaller one do not touch
 
 
 @dataclass(frozen=True)
@@ -49,20 +47,20 @@ class _Singles:
     area: Array
 
     def without(self, rows: Ints) -> "_Singles":
-        """All points but some."""
+        """Return all points except some."""
         keep = np.delete(np.arange(len(self.place)), rows)
         return _Singles(self.place[keep], self.frame[keep], self.nearest[keep], self.area[keep])
 
 
 @dataclass
 class _Hints:
-    """The faces that kept pairs apart when last looked at: they spare time, and never change a result."""
+    """Faces that kept pairs apart in the last detection: they save time, and never change a result."""
 
     key: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     face: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def of(self, key: Ints) -> Ints:
-        """Face of each pair key, sorted; -1 where none is known."""
+        """Return the face of each pair key, sorted; -1 where none is known."""
         if len(self.key) == 0:
             return np.full(len(key), -1)
         at = np.minimum(np.searchsorted(self.key, key), len(self.key) - 1)
@@ -71,7 +69,7 @@ class _Hints:
 
 @dataclass(frozen=True)
 class Detector:
-    """Finds the contacts of a configuration.
+    """Contact detection in a configuration.
 
     Attributes
     ----------
@@ -92,7 +90,7 @@ class Detector:
     _cells: list[FaceCells] = field(default_factory=list, repr=False)
 
     def __call__(self, state: State, reach: Array) -> Contacts:
-        """Contacts at the configuration of `state`; `reach` (nb,) is how far each body may move in the step [m]."""
+        """Find the contacts at the configuration of `state`, given the `reach` (nb,) of each body in the step [m]."""
         surfaces, placed = self.surfaces, _place(self.surfaces, state)
         pairs = self._touching(placed, reach[surfaces.body])
         flat = self._flat_and_meshed(pairs, placed)
@@ -115,7 +113,7 @@ class Detector:
         return joined([points, *curved, take(contacts, np.flatnonzero(gaps(contacts, state) <= limit))])
 
     def _touching(self, placed: Placed, reach: Array) -> Pairs:
-        """Pairs of shapes nearer than their alert distance."""
+        """Find the pairs of shapes nearer than their alert distance."""
         own = self.surfaces
         margin = np.maximum(self.alert * own.shapes.size, self.distance) + reach
         low, high = boxes(own.shapes.vptr, placed.shapes.vertex, margin)
@@ -135,7 +133,7 @@ class Detector:
         return Pairs(shapes, limit, balls, kind, feature, axis)
 
     def _flat_and_meshed(self, pairs: Pairs, placed: Placed) -> Bools:
-        """Pairs of flat faces of which one has finite elements."""
+        """Choose the pairs of flat faces of which one has finite elements."""
         meshed = self.surfaces.meshes.of_face >= 0
         faces = (pairs.kind > 0) & (pairs.kind != EDGES)
         chosen: Bools = faces & meshed[np.where(faces[:, None], pairs.feature, 0)].any(axis=1)
@@ -144,12 +142,12 @@ class Detector:
         return chosen
 
     def _points(
-        self, pairs: Pairs, but: Bools, balls: _Singles | None, placed: Placed, nodes: int
+        self, pairs: Pairs, weighted: Bools, balls: _Singles | None, placed: Placed, nodes: int
     ) -> Contacts:
-        """Contacts in single points: of polyhedra, of all pairs but some, and those of balls."""
+        """Make contacts in single points: those of polyhedra, except the `weighted` pairs, and those of balls."""
         own = self.surfaces
         found, frame, nearest, area = interface_points(
-            pairs._replace(kind=np.where(but, SEPARATED, pairs.kind)),
+            pairs._replace(kind=np.where(weighted, SEPARATED, pairs.kind)),
             self.points, self.placement == Placement.INERTIA, FLAT, THIN, placed.shapes,
         )  # fmt: skip
         # the antagonist owns the reference face; edges lie on the faces that look along the axis
@@ -173,7 +171,7 @@ class Detector:
         return Contacts(body, key, frame, area, arm, weights)
 
     def _balls(self, pairs: Pairs, placed: Placed) -> _Singles:
-        """Single points of the pairs in which a ball takes part."""
+        """Find the single points of the pairs in which a ball takes part."""
         own, balls = self.surfaces, np.flatnonzero(pairs.balls)
         place, frame, nearest, area = ball_points(
             pairs.shapes[balls],
@@ -187,7 +185,7 @@ class Detector:
         return _Singles(place, frame, nearest, area)
 
     def _curved(self, pairs: Pairs, placed: Placed, state: State) -> tuple[list[Contacts], _Singles | None]:
-        """Weighted contacts of balls with meshes that see them, and single points of all other balls."""
+        """Return weighted contacts of balls with meshes that see them, and single points of all other balls."""
         if not pairs.balls.any():
             return [], None
         own, points = self.surfaces, self._balls(pairs, placed)

@@ -12,18 +12,18 @@ from mechanics.contact.surfaces import Placed, Surfaces
 __all__ = ["mortar_contacts", "surface_weights"]
 
 
-# two faces as fine, or as large, up to this fraction are the same
-_ALIKE = 1e-6
-# none of the directions in which faces of stones are likely to look
+_ALIKE = 1e-6  # relative difference up to which two faces are equally fine or large
+# a direction in which faces of stones are unlikely to look
 _ASKEW = np.array([0.3015113446, 0.5381, 0.7870])
-# of a shape's width: a point farther from all finite elements lies on a face between the parts of a stone
-_BESIDE = 1e-3
+_BESIDE = (
+    1e-3  # of a shape's width: a point farther from all finite elements lies between the parts of a stone
+)
 
 
 def surface_weights(
     surfaces: Surfaces, placed: Placed, sides: Ints, face: Ints, normal: Array, arm: Array, nodes: int
 ) -> "tuple[csr_array[np.float64], Bools]":
-    """Weights (2 nc, nodes) of the nodes of deformable bodies at single contact points: their shape functions there.
+    """Find the weights (2 nc, nodes) of the nodes of deformable bodies at single contact points: their shape functions.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def mortar_contacts(
     plane = surfaces.plane[face[:, 0]]
     several = np.flatnonzero(np.bincount(plane)[plane] > 1)
     pointer, share = mortar_shares(
-        Interfaces(*(array[several] for array in interfaces)), bodies, meshes, placed.shapes
+        Interfaces._make(array[several] for array in interfaces), bodies, meshes, placed.shapes
     )
     kept = _kept(surfaces, face[:, 0], several, pointer, share)
     interface, node, area, middle, pointer, column, value = mortar_rows(
@@ -112,10 +112,10 @@ def mortar_contacts(
 
 
 def _first_is_candidate(surfaces: Surfaces, placed: Placed, shapes: Ints, faces: Ints) -> Bools:
-    """Whether the first face of each pair (np, 2) carries the contacts; the same whichever comes first in the scene.
+    """Decide whether the first face of each pair (np, 2) carries the contacts, whatever the order in the scene.
 
-    The finer mesh does, else the smaller face, else that of the smaller part, else the face that looked more against
-    some askew direction when the run began, or does now if both looked the same way.
+    The finer mesh does; of equally fine ones the smaller face, then that of the smaller part, then the face that looked
+    more against an askew direction when the run began, or does now if both looked the same way.
     """
     count = len(surfaces.body)
     # the smaller number wins
@@ -136,10 +136,10 @@ def _first_is_candidate(surfaces: Surfaces, placed: Placed, shapes: Ints, faces:
 
 
 def _kept(surfaces: Surfaces, face: Ints, several: Ints, start: Ints, share: Array) -> tuple[Ints, Bools]:
-    """In which interfaces each node of candidate faces (ni,) has a contact: where its share is the largest.
+    """Keep the contact of each node of candidate faces (ni,) in the interfaces where its share is the largest.
 
-    Else a node beside the seam of two antagonists would have one with each, more contacts than nodes, whose forces are
-    not unique. Faces of parts in one plane count as one face. Shares are those of all nodes of each candidate in
+    Otherwise a node beside the seam of two antagonists would have one with each: more contacts than nodes, whose forces
+    are not unique. Faces of parts in one plane count as one face. Shares are those of all nodes of each candidate in
     `several` interfaces, which begin at `start`.
     """
     meshes = surfaces.meshes
@@ -160,7 +160,7 @@ def _kept(surfaces: Surfaces, face: Ints, several: Ints, start: Ints, share: Arr
 
 
 def _frames(surfaces: Surfaces, placed: Placed, face: Ints) -> tuple[Array, Array]:
-    """Rows n, t1, t2 (np, 3, 3) and origins (np, 3) of interfaces of candidate and antagonist faces (np, 2).
+    """Return rows n, t1, t2 (np, 3, 3) and origins (np, 3) of interfaces of candidate and antagonist faces (np, 2).
 
     n is half-way between both normals; t1 runs along the first edge of the antagonist, so that the frame turns with
     the stones.
@@ -176,7 +176,7 @@ def _frames(surfaces: Surfaces, placed: Placed, face: Ints) -> tuple[Array, Arra
 
 
 def _foot(origin: Array, frame: Array, normal: Array, middle: Array) -> Array:
-    """The points of plane faces through `origin` above which plane coordinates `middle` (nc, 2) lie along n."""
+    """Return the points of plane faces through `origin` above which plane coordinates `middle` (nc, 2) lie along n."""
     across = np.einsum("cd,cdi->ci", middle, frame[:, 1:])
     rise = np.einsum("ci,ci->c", across, normal) / np.einsum("ci,ci->c", frame[:, 0], normal)
     foot: Array = origin + across - rise[:, None] * frame[:, 0]

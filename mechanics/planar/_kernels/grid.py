@@ -25,7 +25,7 @@ class Grid(NamedTuple):
     ----------
     origin : (2,) float64, corner of cell (0, 0) of all classes [m]
     width : (nl,) float64, cells of each class [m]
-    low, count : (nl, 2) int64, first cell in use and number of cells along x and y
+    low, cells : (nl, 2) int64, first cell in use and number of cells along x and y
     base, buckets : (nl,) int64, first bucket and number of buckets
     start : (nbuckets+1,) int64, disks order[start[b]:start[b+1]] of each bucket
     order : (nd,) int64
@@ -36,7 +36,7 @@ class Grid(NamedTuple):
     origin: Array
     width: Array
     low: Ints
-    count: Ints
+    cells: Ints
     base: Ints
     buckets: Ints
     start: Ints

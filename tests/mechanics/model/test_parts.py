@@ -82,7 +82,9 @@ def test_the_facets_of_a_deformable_stone_lie_on_the_faces_of_its_parts(turn):
     for mesh in own.face_mesh:
         x = mesh.reference[mesh.facet]
         area.append(0.5 * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1).sum())
-    middle = np.array([own.shapes.vertex[c].mean(axis=0) for c in np.split(own.shapes.corner, own.shapes.cptr[1:-1])])
+    middle = np.array(
+        [own.shapes.vertex[c].mean(axis=0) for c in np.split(own.shapes.corner, own.shapes.cptr[1:-1])]
+    )
     middle = (middle + state.centre[0]) @ turn
     normal = own.shapes.normal @ turn
     # the tops of both feet, and of the lintel's underside what does not lie on them
