@@ -1,1 +1,4 @@
-"""Contact detection: from the predicted configuration to contact points."""
+"""Contact detection: from the predicted configuration to contact points.
+
+Public: `Detector` (detection); `Contacts`, `gaps`, `material_points` (contacts); `Surfaces`, `surfaces` (surfaces).
+"""

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import csr_array, vstack
 
 from mechanics.arrays import Array, Bools, Ints
-from mechanics.contact._kernels.mortar import mortar_rows
+from mechanics.contact._kernels.mortar import Bodies, Interfaces, mortar_rows
 from mechanics.contact.contacts import Contacts
 from mechanics.contact.surfaces import Placed, Surfaces
 from mechanics.scene.state import State
@@ -14,16 +14,15 @@ from mechanics.scene.state import State
 __all__ = ["FaceCells", "ball_contacts", "face_cells"]
 
 
-# of the radius: where a ball would sink deeper than this before the nodes see it, or rises by more than this over what
-# a node stands for, the mesh is too coarse
+# part of the radius: where a ball would sink deeper before the nodes see it, or rises by more over the area of a node,
+# the mesh is too coarse
 _UNSEEN = 1e-3
-# cosine of the widest angle between the normals of ball and face
-_WIDEST = 0.1
+_WIDEST = 0.1  # cosine of the widest angle between the normals of ball and face
 
 
 @dataclass(frozen=True)
 class FaceCells:
-    """What each corner node of the meshed faces stands for: its test function ψ over the whole face.
+    """Test functions ψ of the corner nodes of the meshed faces, integrated over whole faces.
 
     Attributes
     ----------
@@ -44,23 +43,32 @@ class FaceCells:
 
 
 def face_cells(surfaces: Surfaces, nodes: int) -> FaceCells:
-    """The test functions of all meshed faces, as the mortar method integrates them over each face as a whole."""
+    """Integrate the test functions of all meshed faces, over each face as a whole, as the mortar method does."""
     meshes = surfaces.meshes
     face = np.flatnonzero(meshes.of_face >= 0)
-    origin = surfaces.vertex[surfaces.corner[surfaces.cptr[face]]]
-    edge = surfaces.vertex[surfaces.corner[surfaces.cptr[face] + 1]] - origin
-    n = surfaces.normal[face]
+    origin = surfaces.shapes.vertex[surfaces.shapes.corner[surfaces.shapes.cptr[face]]]
+    edge = surfaces.shapes.vertex[surfaces.shapes.corner[surfaces.shapes.cptr[face] + 1]] - origin
+    n = surfaces.shapes.normal[face]
     t1 = edge - np.einsum("fi,fi->f", edge, n)[:, None] * n
     t1 = t1 / np.linalg.norm(t1, axis=1)[:, None]
     frame = np.stack([n, t1, np.cross(n, t1)], axis=1)
-    both = np.column_stack([face, face])
     size = np.diff(meshes.node_ptr)[meshes.of_face[face]]
+    still = Interfaces(
+        np.column_stack([meshes.of_face[face], np.full(len(face), -1)]),
+        np.column_stack([face, face]),
+        np.zeros((len(face), 2), dtype=np.int64),
+        frame,
+        origin,
+        np.zeros(len(face)),
+    )
     row, node, area, middle, pointer, column, value = mortar_rows(
-        np.concatenate([[0], np.cumsum(size)]), np.ones(int(size.sum()), dtype=bool),
-        np.column_stack([meshes.of_face[face], np.full(len(face), -1)]), both, np.zeros_like(both), frame, origin,
-        np.zeros(len(face)), np.zeros((1, 3)), np.eye(3)[None], meshes.node_ptr, meshes.node, meshes.reference,
-        meshes.facet_ptr, meshes.facet, meshes.kind, meshes.cut, surfaces.vertex, surfaces.cptr, surfaces.corner,
-    )  # fmt: skip
+        np.concatenate([[0], np.cumsum(size)]),
+        np.ones(int(size.sum()), dtype=bool),
+        still,
+        Bodies(np.zeros((1, 3)), np.eye(3)[None]),
+        meshes,
+        surfaces.shapes,
+    )
     count = np.bincount(face[row], minlength=len(meshes.of_face))
     return FaceCells(
         np.concatenate([[0], np.cumsum(count)]).astype(np.int64),
@@ -82,7 +90,7 @@ def ball_contacts(
     limit: Array,
     gap: Array,
 ) -> tuple[list[Contacts], Bools]:
-    """Weighted contacts of pairs (np, 2) of a ball and a deformable shape, and which pairs are seen by their mesh.
+    """Make weighted contacts of pairs (np, 2) of a ball and a deformable shape; return the pairs that have them too.
 
     Of the face that lies farthest under the ball, every node within reach makes a contact; the meshed face is the
     candidate. Over its ψ the distance to the ball's centre has the mean |x̄ - c| + s²/2|x̄ - c| with s² the spread of
@@ -112,16 +120,16 @@ def ball_contacts(
 
 
 def _face_rows(surfaces: Surfaces, placed: Placed, cells: FaceCells, ball: int, other: int) -> slice:
-    """The cells of the face over which the centre of a ball lies highest."""
-    faces = slice(surfaces.fptr[other], surfaces.fptr[other + 1])
-    corner = placed.vertex[surfaces.corner[surfaces.cptr[faces]]]
-    height = np.einsum("fi,fi->f", placed.centre[surfaces.body[ball]] - corner, placed.normal[faces])
+    """Return the cells of the face over which the centre of a ball lies highest."""
+    faces = slice(surfaces.shapes.fptr[other], surfaces.shapes.fptr[other + 1])
+    corner = placed.shapes.vertex[surfaces.shapes.corner[surfaces.shapes.cptr[faces]]]
+    height = np.einsum("fi,fi->f", placed.centre[surfaces.body[ball]] - corner, placed.shapes.normal[faces])
     face = int(faces.start + height.argmax())
     return slice(int(cells.pointer[face]), int(cells.pointer[face + 1]))
 
 
 def _gaps(middle: Array, spread: Array, centre: Array, radius: float) -> tuple[Array, Array]:
-    """Mean gaps (n,) of cells to a ball, and unit vectors (n, 3) from its centre to them."""
+    """Return mean gaps (n,) of cells to a ball, and unit vectors (n, 3) from its centre to them."""
     away = middle - centre
     distance = np.linalg.norm(away, axis=1)
     return distance + spread / (2.0 * distance) - radius, away / distance[:, None]
@@ -137,7 +145,7 @@ def _pair(
     key: int,
     limit: float,
 ) -> Contacts:
-    """The contacts of one ball and one shape."""
+    """Make the contacts of one ball and one shape."""
     ball, block = surfaces.body[pair[0]], surfaces.body[pair[1]]
     centre, radius = placed.centre[ball], surfaces.radius[pair[0]]
     weights = cells.weights[rows]
@@ -145,10 +153,12 @@ def _pair(
     gap, n = _gaps(middle, cells.spread[rows], centre, radius)
     # t1 along an axis of the block that lies in the face, so that the frame turns with it
     face = int(np.searchsorted(cells.pointer, rows.start, side="right") - 1)
-    corners = placed.vertex[surfaces.corner[surfaces.cptr[face] : surfaces.cptr[face] + 2]]
+    corners = placed.shapes.vertex[
+        surfaces.shapes.corner[surfaces.shapes.cptr[face] : surfaces.shapes.cptr[face] + 2]
+    ]
     edge = corners[1] - corners[0]
     t1 = edge - (n @ edge)[:, None] * n
-    keep = np.flatnonzero((gap <= limit) & (n @ placed.normal[face] < -_WIDEST))
+    keep = np.flatnonzero((gap <= limit) & (n @ placed.shapes.normal[face] < -_WIDEST))
     t1 = t1[keep] / np.linalg.norm(t1[keep], axis=1)[:, None]
     n, gap = n[keep], gap[keep]
     frame = np.stack([n, t1, np.cross(n, t1)], axis=1)

@@ -45,7 +45,7 @@ class Contacts:
 
 
 def take(contacts: Contacts, rows: Ints) -> Contacts:
-    """Some contacts, in the order of `rows` (n,)."""
+    """Return some contacts, in the order of `rows` (n,)."""
     weights = contacts.weights
     if weights.nnz:
         weights = weights[(2 * rows[:, None] + np.arange(2)).ravel()]
@@ -62,7 +62,7 @@ def take(contacts: Contacts, rows: Ints) -> Contacts:
 
 
 def joined(parts: Sequence[Contacts]) -> Contacts:
-    """The contacts of all parts, one after the other."""
+    """Join the contacts of all parts, one after the other."""
     return Contacts(
         np.concatenate([part.bodies for part in parts]),
         np.concatenate([part.key for part in parts]),
@@ -74,7 +74,7 @@ def joined(parts: Sequence[Contacts]) -> Contacts:
 
 
 def material_points(contacts: Contacts, state: State) -> Array:
-    """Where the two material points of each contact are now, (nc, 2, 3) [m]."""
+    """Return the places of the two material points of each contact (nc, 2, 3) [m]."""
     points: Array = points_of(contacts.bodies, contacts.arm, state.centre, state.rotation)
     if contacts.weights.nnz:
         elastic = (contacts.weights @ state.node).reshape(-1, 2, 3)
@@ -84,7 +84,7 @@ def material_points(contacts: Contacts, state: State) -> Array:
 
 
 def gaps(contacts: Contacts, state: State) -> Array:
-    """Signed distance g = n·(x_candidate - x_antagonist) of each contact (nc,) [m], negative when overlapping."""
+    """Compute the gap g = n·(x_candidate - x_antagonist) of each contact (nc,), negative when overlapping [m]."""
     points = material_points(contacts, state)
     gap: Array = np.einsum("ci,ci->c", contacts.frame[:, 0], points[:, 0] - points[:, 1])
     return gap

@@ -15,33 +15,26 @@ from scipy.sparse import csr_array
 from mechanics.arrays import Array, Bools, Ints
 from mechanics.contact._kernels.balls import ball_points
 from mechanics.contact._kernels.broad_phase import boxes, close_pairs, place
-from mechanics.contact._kernels.narrow_phase import EDGES, FACE_FIRST, interface_points, separating_axes
+from mechanics.contact._kernels.narrow_phase import (
+    EDGES,
+    FACE_FIRST,
+    SEPARATED,
+    Pairs,
+    interface_points,
+    separating_axes,
+)
 from mechanics.contact.ball_contacts import FaceCells, ball_contacts, face_cells
 from mechanics.contact.contacts import Contacts, gaps, joined, take
 from mechanics.contact.mortar_contacts import mortar_contacts, surface_weights
-from mechanics.contact.surfaces import Placed, Surfaces
+from mechanics.contact.surfaces import Placed, Surfaces, middles
 from mechanics.scene.scene import Placement
 from mechanics.scene.state import State
 
 __all__ = ["FLAT", "THIN", "Detector"]
 
 
-# faces whose normals differ by less than 5° lie flat on one another
-FLAT = float(np.cos(np.radians(5.0)))
-# flat faces that overlap by less than this part of the smaller one do not touch
-THIN = 1e-6
-
-
-@dataclass(frozen=True)
-class _Pairs:
-    """Pairs of shapes with the feature by which they touch, as `separating_axes` gives them; balls have none."""
-
-    shapes: Ints
-    limit: Array
-    balls: Bools
-    kind: Ints
-    feature: Ints
-    axis: Array
+FLAT = float(np.cos(np.radians(5.0)))  # cosine of the angle within which faces lie flat on one another
+THIN = 1e-6  # flat faces that overlap by less than this part of the smaller one do not touch
 
 
 @dataclass(frozen=True)
@@ -54,20 +47,20 @@ class _Singles:
     area: Array
 
     def without(self, rows: Ints) -> "_Singles":
-        """All points but some."""
+        """Return all points except some."""
         keep = np.delete(np.arange(len(self.place)), rows)
         return _Singles(self.place[keep], self.frame[keep], self.nearest[keep], self.area[keep])
 
 
 @dataclass
 class _Hints:
-    """The faces that kept pairs apart when last looked at: they spare time, and never change a result."""
+    """Faces that kept pairs apart in the last detection: they save time, and never change a result."""
 
     key: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     face: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def of(self, key: Ints) -> Ints:
-        """Face of each pair key, sorted; -1 where none is known."""
+        """Return the face of each pair key, sorted; -1 where none is known."""
         if len(self.key) == 0:
             return np.full(len(key), -1)
         at = np.minimum(np.searchsorted(self.key, key), len(self.key) - 1)
@@ -76,7 +69,7 @@ class _Hints:
 
 @dataclass(frozen=True)
 class Detector:
-    """Finds the contacts of a configuration.
+    """Contact detection in a configuration.
 
     Attributes
     ----------
@@ -97,7 +90,7 @@ class Detector:
     _cells: list[FaceCells] = field(default_factory=list, repr=False)
 
     def __call__(self, state: State, reach: Array) -> Contacts:
-        """Contacts at the configuration of `state`; `reach` (nb,) is how far each body may move in the step [m]."""
+        """Find the contacts at the configuration of `state`, given the `reach` (nb,) of each body in the step [m]."""
         surfaces, placed = self.surfaces, _place(self.surfaces, state)
         pairs = self._touching(placed, reach[surfaces.body])
         flat = self._flat_and_meshed(pairs, placed)
@@ -119,11 +112,11 @@ class Detector:
         )
         return joined([points, *curved, take(contacts, np.flatnonzero(gaps(contacts, state) <= limit))])
 
-    def _touching(self, placed: Placed, reach: Array) -> _Pairs:
-        """Pairs of shapes nearer than their alert distance."""
+    def _touching(self, placed: Placed, reach: Array) -> Pairs:
+        """Find the pairs of shapes nearer than their alert distance."""
         own = self.surfaces
-        margin = np.maximum(self.alert * own.shape_size, self.distance) + reach
-        low, high = boxes(own.vptr, placed.vertex, margin)
+        margin = np.maximum(self.alert * own.shapes.size, self.distance) + reach
+        low, high = boxes(own.shapes.vptr, placed.shapes.vertex, margin)
         round_ = own.radius > 0
         around = placed.centre[own.body[round_]], (own.radius + margin)[round_, None]
         low[round_], high[round_] = around[0] - around[1], around[0] + around[1]
@@ -131,37 +124,31 @@ class Detector:
         key = _pair_key(shapes, len(own.body))
         order = np.argsort(key)
         shapes, key = shapes[order], key[order]
-        limit = np.maximum(self.alert * own.shape_size[shapes].min(axis=1), self.distance)
+        limit = np.maximum(self.alert * own.shapes.size[shapes].min(axis=1), self.distance)
         limit = limit + reach[shapes].sum(axis=1)
         balls = round_[shapes].any(axis=1)
         hint = self._hints.of(key)
-        kind, feature, axis = separating_axes(
-            shapes, np.where(balls, -np.inf, limit), hint, own.vptr, placed.vertex, own.fptr, own.cptr, own.corner,
-            placed.normal, own.eptr, own.edge_a, own.edge_b, own.edge_face, placed.inside, own.shape_size,
-        )  # fmt: skip
+        kind, feature, axis = separating_axes(shapes, np.where(balls, -np.inf, limit), hint, placed.shapes)
         self._hints.key, self._hints.face = key, hint
-        return _Pairs(shapes, limit, balls, kind, feature, axis)
+        return Pairs(shapes, limit, balls, kind, feature, axis)
 
-    def _flat_and_meshed(self, pairs: _Pairs, placed: Placed) -> Bools:
-        """Pairs of flat faces of which one has finite elements."""
+    def _flat_and_meshed(self, pairs: Pairs, placed: Placed) -> Bools:
+        """Choose the pairs of flat faces of which one has finite elements."""
         meshed = self.surfaces.meshes.of_face >= 0
         faces = (pairs.kind > 0) & (pairs.kind != EDGES)
         chosen: Bools = faces & meshed[np.where(faces[:, None], pairs.feature, 0)].any(axis=1)
-        normal = placed.normal[pairs.feature[chosen]]
+        normal = placed.shapes.normal[pairs.feature[chosen]]
         chosen[chosen] = -np.einsum("pi,pi->p", normal[:, 0], normal[:, 1]) > FLAT
         return chosen
 
     def _points(
-        self, pairs: _Pairs, but: Bools, balls: _Singles | None, placed: Placed, nodes: int
+        self, pairs: Pairs, weighted: Bools, balls: _Singles | None, placed: Placed, nodes: int
     ) -> Contacts:
-        """Contacts in single points: of polyhedra, of all pairs but some, and those of balls."""
+        """Make contacts in single points: those of polyhedra, except the `weighted` pairs, and those of balls."""
         own = self.surfaces
-        kind = np.where(but, 0, pairs.kind)
         found, frame, nearest, area = interface_points(
-            pairs.shapes, kind, pairs.feature, pairs.axis, pairs.limit,
-            self.points, self.placement == Placement.INERTIA, FLAT, THIN,
-            own.vptr, placed.vertex, own.fptr, own.cptr, own.corner, placed.normal,
-            own.eptr, own.edge_a, own.edge_b, own.shape_size, own.face_area,
+            pairs._replace(kind=np.where(weighted, SEPARATED, pairs.kind)),
+            self.points, self.placement == Placement.INERTIA, FLAT, THIN, placed.shapes,
         )  # fmt: skip
         # the antagonist owns the reference face; edges lie on the faces that look along the axis
         faces = (pairs.kind[found[:, 0]] != EDGES)[:, None]
@@ -183,22 +170,26 @@ class Detector:
             return take(Contacts(body, key, frame, area, arm, weights), np.flatnonzero(outside))
         return Contacts(body, key, frame, area, arm, weights)
 
-    def _balls(self, pairs: _Pairs, placed: Placed) -> _Singles:
-        """Single points of the pairs in which a ball takes part."""
+    def _balls(self, pairs: Pairs, placed: Placed) -> _Singles:
+        """Find the single points of the pairs in which a ball takes part."""
         own, balls = self.surfaces, np.flatnonzero(pairs.balls)
         place, frame, nearest, area = ball_points(
-            pairs.shapes[balls], pairs.limit[balls], own.radius, placed.centre[own.body], placed.rotation[own.body],
-            placed.vertex, own.fptr, own.cptr, own.corner, placed.normal, own.eptr, own.edge_a, own.edge_b,
-        )  # fmt: skip
+            pairs.shapes[balls],
+            pairs.limit[balls],
+            own.radius,
+            placed.centre[own.body],
+            placed.rotation[own.body],
+            placed.shapes,
+        )
         place[:, 0] = balls[place[:, 0]]
         return _Singles(place, frame, nearest, area)
 
-    def _curved(self, pairs: _Pairs, placed: Placed, state: State) -> tuple[list[Contacts], _Singles | None]:
-        """Weighted contacts of balls with meshes that see them, and single points of all other balls."""
+    def _curved(self, pairs: Pairs, placed: Placed, state: State) -> tuple[list[Contacts], _Singles | None]:
+        """Return weighted contacts of balls with meshes that see them, and single points of all other balls."""
         if not pairs.balls.any():
             return [], None
         own, points = self.surfaces, self._balls(pairs, placed)
-        meshed = own.meshes.of_face[own.fptr[:-1]][pairs.shapes[points.place[:, 0]]].max(axis=1) >= 0
+        meshed = own.meshes.of_face[own.shapes.fptr[:-1]][pairs.shapes[points.place[:, 0]]].max(axis=1) >= 0
         rows = np.flatnonzero(meshed)
         if len(rows) == 0:
             return [], points
@@ -213,11 +204,12 @@ class Detector:
 
 
 def _place(surfaces: Surfaces, state: State) -> Placed:
-    centre, turn = state.centre[surfaces.body], state.rotation[surfaces.body]
-    vertex = place(surfaces.vptr, surfaces.vertex, centre, turn)
-    normal = place(surfaces.fptr, surfaces.normal, np.zeros_like(centre), turn)
-    inside = np.add.reduceat(vertex, surfaces.vptr[:-1]) / np.diff(surfaces.vptr)[:, None]
-    return Placed(vertex, normal, state.centre, state.rotation, inside)
+    """Put all shapes where their bodies are."""
+    own, centre, turn = surfaces.shapes, state.centre[surfaces.body], state.rotation[surfaces.body]
+    vertex = place(own.vptr, own.vertex, centre, turn)
+    normal = place(own.fptr, own.normal, np.zeros_like(centre), turn)
+    shapes = own._replace(vertex=vertex, normal=normal, inside=middles(own.vptr, vertex))
+    return Placed(shapes, state.centre, state.rotation)
 
 
 def _pair_key(shapes: Ints, count: int) -> Ints:

@@ -1,17 +1,17 @@
-"""The finite elements on the faces of deformable bodies, one by one and packed in flat arrays."""
+"""Finite elements on the faces of deformable bodies, one by one and packed in flat arrays."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.arrays import Array, Bools, Ints
+from mechanics.arrays import Array, Ints
+from mechanics.contact._kernels.facets import FacetMeshes
 
-__all__ = ["FaceMesh", "PackedMeshes", "packed_meshes"]
+__all__ = ["FaceMesh", "packed_meshes"]
 
 
-# most nodes of a facet
-_WIDEST = 9
+_WIDEST = 9  # most nodes of a facet
 
 
 @dataclass(frozen=True)
@@ -32,33 +32,7 @@ class FaceMesh:
     cut: bool = False
 
 
-@dataclass(frozen=True)
-class PackedMeshes:
-    """The meshes of all faces; mesh m owns nodes node_ptr[m]:node_ptr[m+1] and facets facet_ptr[m]:facet_ptr[m+1].
-
-    Attributes
-    ----------
-    of_face : (nf,) the mesh of each face; -1 for those of rigid bodies
-    node_ptr, node, reference : nodes of each mesh, as in `FaceMesh`
-    facet_ptr, facet : (·, 9) facets of each mesh, padded with -1
-    kind : (nm,) nodes of a facet of each mesh
-    cut : (nm,) as in `FaceMesh`
-    fineness : (nf,) triangles (a quadrilateral counts for two) per area of each face [1/m²]; 0 without facets, -1 if
-        rigid
-    """
-
-    of_face: Ints
-    node_ptr: Ints
-    node: Ints
-    reference: Array
-    facet_ptr: Ints
-    facet: Ints
-    kind: Ints
-    cut: Bools
-    fineness: Array
-
-
-def packed_meshes(meshes: Sequence[FaceMesh | None]) -> PackedMeshes:
+def packed_meshes(meshes: Sequence[FaceMesh | None]) -> FacetMeshes:
     """Pack the meshes of all faces."""
     own = [mesh for mesh in meshes if mesh is not None]
     has = np.array([mesh is not None for mesh in meshes], dtype=bool)
@@ -67,7 +41,7 @@ def packed_meshes(meshes: Sequence[FaceMesh | None]) -> PackedMeshes:
     triangles = np.array([len(mesh.facet) * (_corners(mesh) - 2) for mesh in own], dtype=float)
     fineness = np.full(len(meshes), -1.0)
     fineness[has] = triangles / np.where(covered > 0, covered, 1.0)
-    return PackedMeshes(
+    return FacetMeshes(
         of_face=of_face,
         node_ptr=_pointer([len(mesh.node) for mesh in own]),
         node=np.concatenate([*(mesh.node for mesh in own), np.zeros(0)]).astype(np.int64),
@@ -94,7 +68,7 @@ def _corners(mesh: FaceMesh) -> int:
 
 
 def _area(mesh: FaceMesh) -> float:
-    """Area of the facets [m²]."""
+    """Compute the area of the facets [m²]."""
     x = mesh.reference[mesh.facet[:, : _corners(mesh)]]
     # half the cross product of the diagonals, of a triangle of two edges
     cross = np.cross(x[:, 2] - x[:, 0], x[:, -1] - x[:, 1]) if x.shape[1] == 4 else np.cross(*_two_edges(x))

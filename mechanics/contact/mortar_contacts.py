@@ -4,7 +4,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from mechanics.arrays import Array, Bools, Ints
-from mechanics.contact._kernels.mortar import mortar_rows, mortar_shares
+from mechanics.contact._kernels.mortar import Bodies, Interfaces, mortar_rows, mortar_shares
 from mechanics.contact._kernels.points import surface_points
 from mechanics.contact.contacts import Contacts
 from mechanics.contact.surfaces import Placed, Surfaces
@@ -12,18 +12,18 @@ from mechanics.contact.surfaces import Placed, Surfaces
 __all__ = ["mortar_contacts", "surface_weights"]
 
 
-# two faces as fine, or as large, up to this fraction are the same
-_ALIKE = 1e-6
-# none of the directions in which faces of stones are likely to look
+_ALIKE = 1e-6  # relative difference up to which two faces are equally fine or large
+# a direction in which faces of stones are unlikely to look
 _ASKEW = np.array([0.3015113446, 0.5381, 0.7870])
-# of a shape's width: a point farther from all finite elements lies on a face between the parts of a stone
-_BESIDE = 1e-3
+_BESIDE = (
+    1e-3  # of a shape's width: a point farther from all finite elements lies between the parts of a stone
+)
 
 
 def surface_weights(
     surfaces: Surfaces, placed: Placed, sides: Ints, face: Ints, normal: Array, arm: Array, nodes: int
 ) -> "tuple[csr_array[np.float64], Bools]":
-    """Weights (2 nc, nodes) of the nodes of deformable bodies at single contact points: their shape functions there.
+    """Find the weights (2 nc, nodes) of the nodes of deformable bodies at single contact points: their shape functions.
 
     Parameters
     ----------
@@ -38,23 +38,21 @@ def surface_weights(
     outside : (nc,) the points lie on the surface of both bodies, and not where parts of one meet
     """
     meshes = surfaces.meshes
-    elastic = (meshes.of_face[surfaces.fptr[:-1]] >= 0)[sides]
+    elastic = (meshes.of_face[surfaces.shapes.fptr[:-1]] >= 0)[sides]
     row = np.flatnonzero(elastic.ravel())
     shape = sides.ravel()[row]
     sign = np.where(row % 2, 1.0, -1.0)[:, None]
     towards = np.einsum("rji,rj->ri", placed.rotation[surfaces.body[shape]], sign * normal[row // 2])
     column, value, size, off = surface_points(
-        shape, face.ravel()[row], arm.reshape(-1, 3)[row], towards,
-        surfaces.fptr, surfaces.normal, meshes.of_face, meshes.node_ptr, meshes.node, meshes.reference,
-        meshes.facet_ptr, meshes.facet, meshes.kind,
-    )  # fmt: skip
+        shape, face.ravel()[row], arm.reshape(-1, 3)[row], towards, surfaces.shapes, meshes
+    )
     count = np.zeros(2 * len(sides), dtype=np.int64)
     count[row] = size
     filled = np.arange(column.shape[1]) < size[:, None]
     pointer = np.concatenate([[0], np.cumsum(count)])
     weights = csr_array((value[filled], column[filled], pointer), shape=(2 * len(sides), nodes))
     outside = np.ones((len(sides), 2), dtype=bool)
-    outside.reshape(-1)[row] = off <= _BESIDE * surfaces.shape_size[shape]
+    outside.reshape(-1)[row] = off <= _BESIDE * surfaces.shapes.size[shape]
     return weights, outside[:, 0] & outside[:, 1]
 
 
@@ -81,23 +79,24 @@ def mortar_contacts(
     face, body = faces[rows, order], surfaces.body[shapes[rows, order]]
     frame, origin = _frames(surfaces, placed, face)
     meshes = surfaces.meshes
-    least = thin * surfaces.face_area[face].min(axis=1)
-    interfaces = meshes.of_face[face], face, body, frame, origin, least
-    bodies = (
-        placed.centre, placed.rotation, meshes.node_ptr, meshes.node, meshes.reference, meshes.facet_ptr,
-        meshes.facet, meshes.kind, meshes.cut, placed.vertex, surfaces.cptr, surfaces.corner,
-    )  # fmt: skip
+    least = thin * surfaces.shapes.face_area[face].min(axis=1)
+    interfaces = Interfaces(meshes.of_face[face], face, body, frame, origin, least)
+    bodies = Bodies(placed.centre, placed.rotation)
     # where a face lies on one other alone, all its nodes have contacts
     plane = surfaces.plane[face[:, 0]]
     several = np.flatnonzero(np.bincount(plane)[plane] > 1)
-    pointer, share = mortar_shares(*(array[several] for array in interfaces), *bodies)
+    pointer, share = mortar_shares(
+        Interfaces._make(array[several] for array in interfaces), bodies, meshes, placed.shapes
+    )
     kept = _kept(surfaces, face[:, 0], several, pointer, share)
-    interface, node, area, middle, pointer, column, value = mortar_rows(*kept, *interfaces, *bodies)
+    interface, node, area, middle, pointer, column, value = mortar_rows(
+        *kept, interfaces, bodies, meshes, placed.shapes
+    )
     arm = np.zeros((len(interface), 2, 3))
     rigid = np.flatnonzero(meshes.of_face[face[interface, 1]] < 0)
     on = interface[rigid]
     at = (
-        _foot(origin[on], frame[on], placed.normal[face[on, 1]], middle[rigid, :2])
+        _foot(origin[on], frame[on], placed.shapes.normal[face[on, 1]], middle[rigid, :2])
         - placed.centre[body[on, 1]]
     )
     arm[rigid, 1] = np.einsum("cji,cj->ci", placed.rotation[body[on, 1]], at)
@@ -113,19 +112,19 @@ def mortar_contacts(
 
 
 def _first_is_candidate(surfaces: Surfaces, placed: Placed, shapes: Ints, faces: Ints) -> Bools:
-    """Whether the first face of each pair (np, 2) carries the contacts; the same whichever comes first in the scene.
+    """Decide whether the first face of each pair (np, 2) carries the contacts, whatever the order in the scene.
 
-    The finer mesh does, else the smaller face, else that of the smaller part, else the face that looked more against
-    some askew direction when the run began, or does now if both looked the same way.
+    The finer mesh does; of equally fine ones the smaller face, then that of the smaller part, then the face that looked
+    more against an askew direction when the run began, or does now if both looked the same way.
     """
     count = len(surfaces.body)
     # the smaller number wins
     judges = (
         (-surfaces.meshes.fineness[faces], _ALIKE),
-        (surfaces.face_area[faces], _ALIKE),
-        (surfaces.shape_size[shapes], _ALIKE),
-        (surfaces.normal[faces] @ _ASKEW, 1e-3),
-        (placed.normal[faces] @ _ASKEW, 1e-9),
+        (surfaces.shapes.face_area[faces], _ALIKE),
+        (surfaces.shapes.size[shapes], _ALIKE),
+        (surfaces.shapes.normal[faces] @ _ASKEW, 1e-3),
+        (placed.shapes.normal[faces] @ _ASKEW, 1e-9),
         (shapes / count, 0.0),
     )
     chosen, open_ = np.zeros(len(faces), dtype=bool), np.ones(len(faces), dtype=bool)
@@ -137,10 +136,10 @@ def _first_is_candidate(surfaces: Surfaces, placed: Placed, shapes: Ints, faces:
 
 
 def _kept(surfaces: Surfaces, face: Ints, several: Ints, start: Ints, share: Array) -> tuple[Ints, Bools]:
-    """In which interfaces each node of candidate faces (ni,) has a contact: where its share is the largest.
+    """Keep the contact of each node of candidate faces (ni,) in the interfaces where its share is the largest.
 
-    Else a node beside the seam of two antagonists would have one with each, more contacts than nodes, whose forces are
-    not unique. Faces of parts in one plane count as one face. Shares are those of all nodes of each candidate in
+    Otherwise a node beside the seam of two antagonists would have one with each: more contacts than nodes, whose forces
+    are not unique. Faces of parts in one plane count as one face. Shares are those of all nodes of each candidate in
     `several` interfaces, which begin at `start`.
     """
     meshes = surfaces.meshes
@@ -161,23 +160,23 @@ def _kept(surfaces: Surfaces, face: Ints, several: Ints, start: Ints, share: Arr
 
 
 def _frames(surfaces: Surfaces, placed: Placed, face: Ints) -> tuple[Array, Array]:
-    """Rows n, t1, t2 (np, 3, 3) and origins (np, 3) of interfaces of candidate and antagonist faces (np, 2).
+    """Return rows n, t1, t2 (np, 3, 3) and origins (np, 3) of interfaces of candidate and antagonist faces (np, 2).
 
     n is half-way between both normals; t1 runs along the first edge of the antagonist, so that the frame turns with
     the stones.
     """
-    n = placed.normal[face[:, 1]] - placed.normal[face[:, 0]]
+    n = placed.shapes.normal[face[:, 1]] - placed.shapes.normal[face[:, 0]]
     n = n / np.linalg.norm(n, axis=1)[:, None]
-    start = surfaces.cptr[face[:, 1]]
-    origin = placed.vertex[surfaces.corner[start]]
-    edge = placed.vertex[surfaces.corner[start + 1]] - origin
+    start = surfaces.shapes.cptr[face[:, 1]]
+    origin = placed.shapes.vertex[surfaces.shapes.corner[start]]
+    edge = placed.shapes.vertex[surfaces.shapes.corner[start + 1]] - origin
     t1 = edge - np.einsum("pi,pi->p", edge, n)[:, None] * n
     t1 = t1 / np.linalg.norm(t1, axis=1)[:, None]
     return np.stack([n, t1, np.cross(n, t1)], axis=1), origin
 
 
 def _foot(origin: Array, frame: Array, normal: Array, middle: Array) -> Array:
-    """The points of plane faces through `origin` above which plane coordinates `middle` (nc, 2) lie along n."""
+    """Return the points of plane faces through `origin` above which plane coordinates `middle` (nc, 2) lie along n."""
     across = np.einsum("cd,cdi->ci", middle, frame[:, 1:])
     rise = np.einsum("ci,ci->c", across, normal) / np.einsum("ci,ci->c", frame[:, 0], normal)
     foot: Array = origin + across - rise[:, None] * frame[:, 0]

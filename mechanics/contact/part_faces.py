@@ -1,4 +1,4 @@
-"""Which finite elements lie on the faces of a deformable block, and on those of its convex parts."""
+"""Finite elements on the faces of a deformable block, and on those of its convex parts."""
 
 from collections.abc import Sequence
 
@@ -14,18 +14,17 @@ __all__ = ["face_meshes", "part_face_meshes"]
 
 Faces = Sequence[Sequence[int]]
 
-# of the block's size, and of a facet's area: what lies nearer, or overlaps by less, does so by rounding
-_NEAR = 1e-6
-_SAME_AREA = 1e-6
+_NEAR = 1e-6  # of the block's size: a facet nearer to the plane of a face lies in it
+_SAME_AREA = 1e-6  # of a facet's area: a smaller overlap comes from rounding
 
 
 def face_meshes(mesh: SolidMesh, faces: int, start: int) -> list[FaceMesh]:
-    """The meshes of the first `faces` faces of a block; its nodes are numbered from `start` on."""
+    """Return the meshes of the first `faces` faces of a block; its nodes are numbered from `start` on."""
     return [_face_mesh(mesh, mesh.facet_face == face, start) for face in range(faces)]
 
 
 def part_face_meshes(mesh: SolidMesh, vertices: Array, faces: Faces, start: int) -> list[FaceMesh]:
-    """The meshes of the faces of a convex part, whose corners are given in the axes of the mesh (nv, 3) [m].
+    """Return the meshes of the faces of a convex part, whose corners are given in the axes of the mesh (nv, 3) [m].
 
     A facet belongs to each face with which it shares area, and such a face may cut through it. A face between two
     parts has no facets.
@@ -46,7 +45,7 @@ def part_face_meshes(mesh: SolidMesh, vertices: Array, faces: Faces, start: int)
 
 
 def _overlaps(facets: Array, polygon: Array, n: Array) -> tuple[Bools, bool]:
-    """Which facets (n, k, 3) share area with a convex polygon in their plane, and whether it cuts through any."""
+    """Find the facets (n, k, 3) that share area with a convex polygon in their plane, and whether it cuts any."""
     t1 = polygon[1] - polygon[0]
     t1 = t1 / np.linalg.norm(t1)
     flat = np.column_stack([t1, np.cross(n, t1)])

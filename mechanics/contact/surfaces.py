@@ -1,4 +1,4 @@
-"""The surfaces of all bodies in flat arrays: what contact detection needs to know of a scene."""
+"""Surfaces of all bodies in flat arrays, as contact detection needs them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,19 +6,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.arrays import Array, Ints
-from mechanics.contact.face_meshes import FaceMesh, PackedMeshes, packed_meshes
+from mechanics.contact._kernels.facets import FacetMeshes
+from mechanics.contact._kernels.narrow_phase import Polyhedra
+from mechanics.contact.face_meshes import FaceMesh, packed_meshes
 from mechanics.stones.polyhedra import face_plane, smallest_width
 
-__all__ = ["Placed", "Surfaces", "surfaces"]
+__all__ = ["Placed", "Surfaces", "middles", "surfaces"]
 
 
-# faces of the parts of a body lie in one plane up to this cosine, and this part of its size
-_SAME_WAY, _SAME_PLANE = 1.0 - 1e-12, 1e-6
+# faces of the parts of a body are in one plane
+_SAME_WAY = 1.0 - 1e-12  # if their normals have at least this cosine
+_SAME_PLANE = 1e-6  # and they lie off each other by no more than this part of its size
 
 
 @dataclass(frozen=True)
 class Surfaces:
-    """The convex polyhedra of all bodies, in body axes, as in mechanics.contact._kernels_narrow.
+    """The convex polyhedra and balls of all bodies.
 
     A body has one shape, or one for each of its convex parts; the shapes of a body follow one another.
 
@@ -26,17 +29,9 @@ class Surfaces:
     ----------
     body : (ns,) the body of each shape
     sptr : (nb+1,) shapes of each body
-    vptr : (ns+1,) vertices of each shape
-    vertex : (nv, 3) relative to the body's centre of mass, body axes [m]
-    fptr : (ns+1,) faces of each shape
-    cptr, corner : corners of each face
-    normal : (nf, 3) outward, body axes
-    eptr, edge_a, edge_b : edges of each shape, as vertex indices
-    edge_face : (ne, 2) the faces that meet in each edge
+    shapes : all shapes, in the axes of their bodies, from their centres of mass
     radius : (ns,) of balls, zero for polyhedra [m]
-    shape_size : (ns,) smallest width of each shape [m]
     size : (nb,) smallest width of each body [m]
-    face_area : (nf,) [m²]
     plane : (nf,) a number that faces of one body share if they lie in one plane
     face_mesh : per face, its finite elements; None for rigid bodies
     meshes : the same, packed
@@ -44,33 +39,22 @@ class Surfaces:
 
     body: Ints
     sptr: Ints
-    vptr: Ints
-    vertex: Array
-    fptr: Ints
-    cptr: Ints
-    corner: Ints
-    normal: Array
-    eptr: Ints
-    edge_a: Ints
-    edge_b: Ints
-    edge_face: Ints
+    shapes: Polyhedra
     radius: Array
-    shape_size: Array
     size: Array
-    face_area: Array
     plane: Ints
     face_mesh: tuple[FaceMesh | None, ...]
-    meshes: PackedMeshes
+    meshes: FacetMeshes
 
     @property
     def body_vptr(self) -> Ints:
         """(nb+1,) vertices of each body."""
-        return self.vptr[self.sptr]
+        return self.shapes.vptr[self.sptr]
 
     @property
     def body_of_vertex(self) -> Ints:
         """(nv,) the body of each vertex."""
-        return np.repeat(self.body, np.diff(self.vptr))
+        return np.repeat(self.body, np.diff(self.shapes.vptr))
 
 
 @dataclass(frozen=True)
@@ -79,16 +63,14 @@ class Placed:
 
     Attributes
     ----------
-    vertex, normal : of all shapes, as in `Surfaces`, world axes
-    centre, rotation : of the bodies
-    inside : (ns, 3) a point inside each shape [m]
+    shapes : of all bodies, world axes
+    centre : (nb, 3) of the bodies [m]
+    rotation : (nb, 3, 3) of the bodies [-]
     """
 
-    vertex: Array
-    normal: Array
+    shapes: Polyhedra
     centre: Array
     rotation: Array
-    inside: Array
 
 
 def surfaces(
@@ -111,7 +93,7 @@ def surfaces(
     owner = np.asarray(body, dtype=np.int64)
     sptr = _pointer(np.bincount(owner).tolist())
     radii = np.array(radius, dtype=float) if len(radius) else np.zeros(len(body))
-    shape_size = np.array(
+    size = np.array(
         [
             2.0 * r if r > 0 else smallest_width(v, group)
             for v, group, r in zip(vertices, faces, radii, strict=True)
@@ -120,24 +102,33 @@ def surfaces(
     return Surfaces(
         body=owner,
         sptr=sptr,
-        vptr=vptr,
-        vertex=vertex,
-        fptr=fptr,
-        cptr=_pointer([len(c) for c in corners]),
-        corner=np.concatenate(corners).astype(np.int64),
-        normal=normal,
-        eptr=_pointer([len(e) for e in edges]),
-        edge_a=np.ascontiguousarray(packed[:, 0]),
-        edge_b=np.ascontiguousarray(packed[:, 1]),
-        edge_face=np.ascontiguousarray(packed[:, 2:]),
+        shapes=Polyhedra(
+            vptr=vptr,
+            vertex=vertex,
+            fptr=fptr,
+            cptr=_pointer([len(c) for c in corners]),
+            corner=np.concatenate(corners).astype(np.int64),
+            normal=normal,
+            eptr=_pointer([len(e) for e in edges]),
+            edge_a=np.ascontiguousarray(packed[:, 0]),
+            edge_b=np.ascontiguousarray(packed[:, 1]),
+            edge_face=np.ascontiguousarray(packed[:, 2:]),
+            inside=middles(vptr, vertex),
+            size=size,
+            face_area=np.array([_area(p) for p in polygons]),
+        ),
         radius=radii,
-        shape_size=shape_size,
-        size=np.minimum.reduceat(shape_size, sptr[:-1]),
-        face_area=np.array([_area(p) for p in polygons]),
+        size=np.minimum.reduceat(size, sptr[:-1]),
         plane=_planes(owner, np.diff(fptr), normal, np.array([p[0] for p in polygons])),
         face_mesh=tuple(face_mesh),
         meshes=packed_meshes(face_mesh),
     )
+
+
+def middles(vptr: Ints, vertex: Array) -> Array:
+    """Return the mean of the vertices (ns, 3) of each shape."""
+    mean: Array = np.add.reduceat(vertex, vptr[:-1]) / np.diff(vptr)[:, None]
+    return mean
 
 
 def _pointer(counts: Sequence[int]) -> Ints:
@@ -150,7 +141,7 @@ def _area(polygon: Array) -> float:
 
 
 def _planes(body: Ints, count: Ints, normal: Array, corner: Array) -> Ints:
-    """For each face the first face of its body that lies in the same plane; one shape has no two of them."""
+    """Find for each face the first face of its body that lies in the same plane; one shape has no two of them."""
     plane, start = np.arange(len(normal)), np.cumsum(count) - count
     for b in np.flatnonzero(np.bincount(body) > 1):
         shapes = np.flatnonzero(body == b)
@@ -165,7 +156,7 @@ def _planes(body: Ints, count: Ints, normal: Array, corner: Array) -> Ints:
 def _edges(
     faces: tuple[tuple[int, ...], ...], vertex: Array, normal: Array, first_vertex: int, first_face: int
 ) -> Ints:
-    """Edges (ne, 4): two vertices and two faces, each once, directed along second normal × first normal."""
+    """List edges (ne, 4), two vertices and two faces, each once, directed along second normal × first normal."""
     face_of = {
         (a, b): n for n, face in enumerate(faces) for a, b in zip(face, (*face[1:], face[0]), strict=True)
     }

@@ -1,1 +1,4 @@
-"""The plane: disks and straight walls, with the laws and solvers of the stones."""
+"""Disks and straight walls in the plane, with the laws and solvers of the stones.
+
+Public: `Disk`, `PlanarScene`, `PlanarTime`, `Wall` (scene); `simulate_planar` (simulate); `PlanarResult` (result).
+"""

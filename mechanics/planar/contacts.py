@@ -1,13 +1,13 @@
-"""Contacts of the plane as a structure of arrays, and how they are found."""
+"""Contacts of the plane as a structure of arrays, and their detection."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from mechanics.arrays import Array, Ints
-from mechanics.planar._kernels.disks import find_disks, sort_contacts
+from mechanics.planar._kernels.disks import Disks, Watch, find_disks, sort_contacts
 from mechanics.planar._kernels.grid import build_grid
-from mechanics.planar._kernels.walls import end_neighbours, find_walls
+from mechanics.planar._kernels.walls import EndNeighbours, end_neighbours, find_walls
 from mechanics.planar.model import PlanarModel, PlanarState
 
 __all__ = ["PlanarContacts", "PlanarDetector"]
@@ -47,7 +47,7 @@ class PlanarContacts:
 
 
 class PlanarDetector:
-    """Finds the contacts of a configuration; cost linear in the number of bodies, whatever their sizes.
+    """Contact detection in the plane; the cost is linear in the number of bodies, whatever their sizes.
 
     Watched are gaps up to the alert distance, plus the reach of the laws, plus what a step can close at the present
     velocities. Where walls share an end, or one ends on another: a disk that meets one of them on its face does not
@@ -57,43 +57,40 @@ class PlanarDetector:
     def __init__(self, model: PlanarModel) -> None:
         self._model = model
         self._reach = max(law.reach for law in model.laws.laws)
-        self._neighbours: tuple[Ints, Ints, Array] | None = None
+        self._neighbours: EndNeighbours | None = None
 
     def __call__(self, state: PlanarState, ahead: Array | None = None) -> PlanarContacts:
-        """The contacts (nc), in an order that depends on the numbers of the bodies alone.
+        """Find the contacts (nc), in an order that depends on the numbers of the bodies alone.
 
-        `ahead` (nd,) widens the watch by what each disk may come nearer to anything besides [m].
+        `ahead` (nd,) widens the watch by a further distance that each disk may approach anything [m].
         """
         model, nd = self._model, len(self._model.radius)
-        scene, alert, step = model.scene, model.scene.alert_distance, model.scene.time.step
+        watch = Watch(model.scene.alert_distance, self._reach, model.scene.time.step)
         centre, velocity = state.centre[:nd], state.velocity[:nd]
         # without walls relative to the mean, so that disks that travel together are no harder than disks at rest
-        common = np.zeros(2) if len(scene.walls) else velocity[:, :2].mean(axis=0)
+        common = np.zeros(2) if len(model.scene.walls) else velocity[:, :2].mean(axis=0)
         pace = np.hypot(velocity[:, 0] - common[0], velocity[:, 1] - common[1])
         ahead = np.zeros(nd) if ahead is None else ahead
-        extent = model.radius * (1 + alert) + self._reach + step * pace + ahead
-        fixed, grid = model.fixed[:nd], build_grid(centre, extent)
-        names, values = find_disks(
-            centre, model.radius, velocity, fixed, alert, self._reach, step, ahead, extent, grid
-        )
-        if len(scene.walls):
+        extent = model.radius * (1 + watch.alert) + watch.reach + watch.step * pace + ahead
+        disks = Disks(centre, model.radius, velocity, model.fixed[:nd], ahead, extent)
+        grid = build_grid(centre, extent)
+        names, values = find_disks(disks, watch, grid)
+        if len(model.scene.walls):
             ends = model.ends(state)
-            speed = self._wall_speed(state)
             of_walls = find_walls(
-                centre, model.radius, velocity, fixed, ends, speed,
-                *self._neighbours_of(ends), alert, self._reach, step, ahead, grid,
-            )  # fmt: skip
+                disks, watch, grid, ends, self._wall_speed(state), self._neighbours_of(ends)
+            )
             names, values = np.vstack([names, of_walls[0]]), np.vstack([values, of_walls[1]])
         return self._contacts(state, *sort_contacts(names, values, nd))
 
     def _wall_speed(self, state: PlanarState) -> Array:
-        """Largest speed of a point of each wall (nw,) [m/s]."""
+        """Return the largest speed of a point of each wall (nw,) [m/s]."""
         velocity = state.velocity[len(self._model.radius) :]
         turning = np.abs(velocity[:, 2]) * np.hypot(self._model.half[:, 0], self._model.half[:, 1])
         return np.asarray(np.hypot(velocity[:, 0], velocity[:, 1]) + turning)
 
-    def _neighbours_of(self, ends: Array) -> tuple[Ints, Ints, Array]:
-        """Which walls share ends; looked up again only where walls move."""
+    def _neighbours_of(self, ends: Array) -> EndNeighbours:
+        """Find the walls that share ends, again only where walls move."""
         if self._neighbours is None or self._model.scene.loads.motions:
             self._neighbours = end_neighbours(ends)
         return self._neighbours

@@ -24,8 +24,7 @@ from mechanics.problem.problem import ScaledDelassus, mean_diagonal
 __all__ = ["PlanarDelassus", "PlanarGaussSeidel"]
 
 
-# contacts of one colour from which several threads pay: some 20 µs of work for one
-_GRAIN = 2000
+_GRAIN = 2000  # contacts of one colour from which several threads pay: some 20 µs of work for one
 
 
 @dataclass(frozen=True)
@@ -56,17 +55,17 @@ class PlanarDelassus:
         return result
 
     def apply(self, impulse: Array) -> Array:
-        """W r (nc, 2) [m/s]."""
+        """Return W r (nc, 2) [m/s]."""
         result: Array = apply(impulse, self.bodies, self.normal, self.lever, self.inertia)
         return result
 
     def velocity_change(self, impulse: Array) -> Array:
-        """M⁻¹ H r (nb, 3): what impulses do to vx, vy [m/s] and ω [rad/s]."""
+        """Return M⁻¹ H r (nb, 3): the change of vx, vy [m/s] and ω [rad/s]."""
         result: Array = velocity_change(impulse, self.bodies, self.normal, self.lever, self.inertia)
         return result
 
     def relative_velocity(self, velocity: Array) -> Array:
-        """Hᵀ v: u (nc, 2) [m/s] of the bodies' velocities (nb, 3)."""
+        """Return u = Hᵀ v (nc, 2) [m/s] of the bodies' velocities (nb, 3)."""
         result: Array = relative_velocity(velocity, self.bodies, self.normal, self.lever)
         return result
 
@@ -88,7 +87,7 @@ class PlanarDelassus:
 
     @cached_property
     def form(self) -> SparseForm:
-        """The same W with sparse matrices: three velocities for each body that moves."""
+        """W with sparse matrices: three velocities for each body that moves."""
         moving = np.flatnonzero(self.inertia[:, 0] > 0)
         place = np.full(len(self.inertia), -1)
         place[moving] = np.arange(len(moving))
@@ -107,7 +106,7 @@ class PlanarDelassus:
         return SparseForm(diags_array(mass, format="csc"), across.T.tocsc())
 
     def gauss_seidel(self, shift: Array, friction: Array, cohesion: Array) -> "PlanarGaussSeidel":
-        """Sweeps on u = W r + shift with Coulomb's μ and the cohesion k, each (nc,)."""
+        """Prepare sweeps on u = W r + shift with Coulomb's μ and the cohesion k, each (nc,)."""
         order, start = self.colouring
         record = records(order, shift, friction, cohesion, self.normal, self.lever, self.diagonal)
         bodies = self.bodies[order].astype(np.uint32)

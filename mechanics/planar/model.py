@@ -1,4 +1,4 @@
-"""Arrays of a scene of the plane: what does not change while it runs, and what does."""
+"""Arrays of a scene of the plane: those that stay constant while it runs, and the state."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ __all__ = ["PlanarModel", "PlanarState", "build_planar_model"]
 
 @dataclass(frozen=True)
 class PlanarState:
-    """Where the bodies are, and how they move; disks first, then walls.
+    """Places and velocities of the bodies; disks first, then walls.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class PlanarState:
 
 @dataclass(frozen=True)
 class PlanarModel:
-    """What does not change while a scene runs.
+    """Constant data of a scene of the plane.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class PlanarModel:
     laws: LawTable
 
     def ends(self, state: PlanarState) -> Array:
-        """Ends of the walls (nw, 2, 2) [m]."""
+        """Return the ends of the walls (nw, 2, 2) [m]."""
         nd = len(self.radius)
         turn, middle = state.angle[nd:], state.centre[nd:]
         half = np.column_stack(
@@ -67,7 +67,7 @@ class PlanarModel:
 
 
 def build_planar_model(scene: PlanarScene) -> tuple[PlanarModel, PlanarState]:
-    """The arrays of a scene, and its start."""
+    """Build the arrays of a scene, and its state at the start."""
     disks, nw = scene.disks, len(scene.walls)
     radius = np.array([disk.radius for disk in disks], dtype=float)
     density = np.array([disk.density for disk in disks], dtype=float)

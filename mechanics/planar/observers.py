@@ -1,4 +1,4 @@
-"""What is measured while a scene of the plane runs: energy, balance, rest, reactions."""
+"""Measurements while a scene of the plane runs: energy, balance, rest, reactions."""
 
 import numpy as np
 
@@ -12,20 +12,18 @@ from mechanics.planar.simulation import PlanarStep
 __all__ = ["PlanarEnergy", "PlanarWatch", "disk_speed", "imbalance", "kinetic_energy", "world_force"]
 
 
-# every disk rests below this part of the speed √(g · width) of a fall over its own width
-_REST_SPEED = 1e-4
-# loads that change by less than this part in a step are steady
-_STEADY = 1e-9
+_REST_SPEED = 1e-4  # of √(g · width), the speed of a fall over a disk's own width: below it the disk rests
+_STEADY = 1e-9  # relative change of the loads in a step below which they are steady
 
 
 def world_force(contacts: PlanarContacts, impulse: Array, step: float) -> Array:
-    """Mean forces r/h (nc, 2) on the candidates, in x and y [N]."""
+    """Compute the mean forces r/h (nc, 2) on the candidates, in x and y [N]."""
     n, r = contacts.normal, impulse / step
     return np.column_stack([n[:, 0] * r[:, 0] - n[:, 1] * r[:, 1], n[:, 1] * r[:, 0] + n[:, 0] * r[:, 1]])
 
 
 def kinetic_energy(model: PlanarModel, velocity: Array) -> float:
-    """½ vᵀ M v of the disks that can move [J]."""
+    """Compute ½ vᵀ M v of the disks that can move [J]."""
     free = ~model.fixed
     v = velocity[free]
     # sums of numpy's, not products of BLAS: those may depend on the number of threads
@@ -34,7 +32,7 @@ def kinetic_energy(model: PlanarModel, velocity: Array) -> float:
 
 
 def disk_speed(model: PlanarModel, velocity: Array) -> Array:
-    """Largest speed of a point of each disk that can move [m/s]; zero for the others (nd,)."""
+    """Compute the largest speed of a point of each disk that can move [m/s]; zero for the others (nd,)."""
     nd = len(model.radius)
     v = velocity[:nd]
     speed: Array = np.hypot(v[:, 0], v[:, 1]) + np.abs(v[:, 2]) * model.radius
@@ -42,9 +40,9 @@ def disk_speed(model: PlanarModel, velocity: Array) -> Array:
 
 
 def imbalance(model: PlanarModel, step: PlanarStep) -> Array:
-    """Unbalanced force of each disk over its weight, or unbalanced moment over weight × radius (nd,) [-].
+    """Compute the unbalanced force of each disk over its weight, or unbalanced moment over weight × radius (nd,) [-].
 
-    What is not in balance changes the velocity, so M Δv/h is the unbalanced force. Without gravity the largest contact
+    Unbalanced forces change the velocity, so M Δv/h is the unbalanced force. Without gravity the largest contact
     force replaces the weight. Zero for fixed disks.
     """
     nd, h = len(model.radius), model.scene.time.step
@@ -58,7 +56,7 @@ def imbalance(model: PlanarModel, step: PlanarStep) -> Array:
 
 
 class PlanarEnergy:
-    """Energy balance; what no term explains was made by the program.
+    """Energy balance; energy that no term explains is an error of the program.
 
     ΔE = W_ext + W_contact - D_scheme with W_contact = r·u_θ and D_scheme = (θ - ½) ‖Δv‖²_M holds exactly in the plane.
 
@@ -100,7 +98,7 @@ class PlanarEnergy:
 
 
 class PlanarWatch:
-    """Tells the outcome after each step.
+    """Watch of the outcome after each step.
 
     *Equilibrium*: for five steps in a row, each solved to its tolerance, every disk that is not fixed is in balance
     (unbalanced force and moment below the scene's tolerance) and slower than 10⁻⁴ √(g · its width). Without gravity g
@@ -115,7 +113,7 @@ class PlanarWatch:
         self._loads: Array | None = None
 
     def __call__(self, step: PlanarStep, balance: Array) -> Outcome:
-        """The outcome so far, given the imbalance of each disk (nd,)."""
+        """Return the outcome so far, given the imbalance of each disk (nd,)."""
         model, velocity = self._model, step.after.velocity
         last, self._loads = self._loads, step.loads
         change = np.inf if last is None else np.abs(step.loads - last).max()

@@ -1,4 +1,4 @@
-"""What a simulation of the plane gives back."""
+"""Results of a simulation of the plane."""
 
 from dataclasses import dataclass
 

@@ -168,7 +168,7 @@ class PlanarScene:
         self._check_named(known)
 
     def _check_named(self, known: set[str]) -> None:
-        """Rules and loads name bodies that there are, and motions only bodies that are fixed."""
+        """Check that rules and loads name bodies of the scene, and motions only fixed ones."""
         named = [(rule.first | rule.second, "a contact rule") for rule in self.rules]
         named += [(force.stones, "a force") for force in self.loads.forces]
         named += [(motion.stones, "a motion") for motion in self.loads.motions]

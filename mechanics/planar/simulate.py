@@ -33,6 +33,16 @@ def simulate_planar(scene: PlanarScene, progress: Callable[[Progress], None] | N
     ------
     SceneError : if a motion leaves the plane
     SolverError : if the motion is no longer finite
+
+    Examples
+    --------
+    A floor carries the weight of the disk that rests on it:
+
+    >>> from mechanics.planar.scene import Disk, PlanarScene, Wall
+    >>> disk, floor = Disk("disk", (0.0, 0.1), 0.1), Wall("floor", (-1.0, 0.0), (1.0, 0.0))
+    >>> result = simulate_planar(PlanarScene("rest", (disk,), (floor,)))
+    >>> round(result.reaction / result.weight, 6)
+    1.0
     """
     report = progress or (lambda _: None)
     clock = Clock()
@@ -63,7 +73,7 @@ def _frame(state: PlanarState) -> PlanarFrame:
 
 
 class _Log:
-    """Collects what the observers say of each step."""
+    """Record of the observations of each step."""
 
     def __init__(self, model: PlanarModel, start: PlanarState) -> None:
         self._model = model
@@ -90,7 +100,7 @@ class _Log:
         )
 
     def history(self) -> PlanarHistory:
-        """One array for each quantity."""
+        """Return one array for each quantity."""
         time, kinetic, speed, balance, eta, iterations, contacts, penetration = np.array(self._rows).T
         return PlanarHistory(
             time,

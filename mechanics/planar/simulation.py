@@ -19,13 +19,12 @@ from moma.errors import SolverError
 __all__ = ["PlanarSimulation", "PlanarStep"]
 
 
-# so many times a step is taken anew when it was seen to bring together what was not watched
-_LOOKS = 3
+_LOOKS = 3  # most repetitions of a step that brings together bodies that were not watched
 
 
 @dataclass(frozen=True)
 class PlanarStep:
-    """What one step found.
+    """Outcome of one step.
 
     Attributes
     ----------
@@ -37,7 +36,7 @@ class PlanarStep:
     impulse : (nc, 2) r on the candidates, local frame [N s]
     internal : (nc, STATE) what the laws remember
     gap : (nc,) at the end of the step [m]
-    loads : (nb, 3) what the loads did to the velocities
+    loads : (nb, 3) change of the velocities by the loads [m/s, rad/s]
     work : r·u_θ, the work of the contacts [J]
     driven : work that driven bodies put in through the contacts [J]
     """
@@ -134,9 +133,9 @@ class PlanarSimulation:
             return self._finish(kick, after, loads, solved)
 
     def _overlooked(self, kick: PlanarState, solved: _Solved) -> PlanarContacts | None:
-        """A wider look, if something that was not watched comes to overlap by what the impulses did; else None.
+        """Detect with a wider watch; return the contacts if the impulses make unwatched bodies overlap, otherwise None.
 
-        A disk that is hit may leave faster than anything came, and reach until the next kick what seemed far away.
+        A disk that is hit may leave faster than any body came, and reach distant bodies before the next kick.
         """
         scene, radius, h = self.model.scene, self.model.radius, self.model.scene.time.step
         change = (solved.velocity - kick.velocity)[: len(radius), :2]
@@ -149,7 +148,7 @@ class PlanarSimulation:
         return wider if (gap[new] < 0).any() else None
 
     def _kick(self, h: float, theta: float) -> PlanarState:
-        """The state at the instant of the kick, with the velocities just before it."""
+        """Return the state at the instant of the kick, with the velocities just before it."""
         kick = self._drive.place(fly(self.state, h * (1 - theta)))
         if self._first and len(self._drive.bodies):
             # before the first step the walls have moved as they go on to move
@@ -157,7 +156,7 @@ class PlanarSimulation:
         return kick
 
     def _driven(self, kick: PlanarState, velocity: Array) -> Array:
-        """`velocity` with that of the driven bodies just after the kick."""
+        """Return `velocity` with that of the driven bodies just after the kick."""
         if not len(self._drive.bodies):
             return velocity
         velocity = velocity.copy()
@@ -240,7 +239,7 @@ class PlanarSimulation:
         return replace(part, impulse=impulse, velocity=velocity)
 
     def _finish(self, kick: PlanarState, after: PlanarState, loads: Array, solved: _Solved) -> PlanarStep:
-        """Let the laws see what came of them, remember, and account."""
+        """Update the laws with the solution, store it for the next step, and account."""
         time, model, contacts, stated = self.model.scene.time, self.model, solved.contacts, solved.stated
         operator, solution, impulse = solved.operator, solved.solution, solved.impulse
         u_before = operator.relative_velocity(kick.velocity)

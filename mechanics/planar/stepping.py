@@ -38,7 +38,7 @@ class Drive:
         self.bodies: Ints = np.concatenate(groups) if groups else np.zeros(0, dtype=np.int64)
 
     def place(self, state: PlanarState) -> PlanarState:
-        """`state` with the driven bodies where they are at its time."""
+        """Return `state` with the driven bodies where they are at its time."""
         if not self._motions:
             return state
         centre, angle = state.centre.copy(), state.angle.copy()
@@ -58,7 +58,7 @@ class Drive:
         return replace(state, centre=centre, angle=angle)
 
     def velocity(self, now: PlanarState, duration: float) -> Array:
-        """Mean velocities (n, 3) of the driven bodies from `now`, where they are placed, for `duration`."""
+        """Return the mean velocities (n, 3) of the driven bodies from `now`, where they are placed, for `duration`."""
         later = self.place(replace(now, time=now.time + duration))
         turned = later.angle[self.bodies] - now.angle[self.bodies]
         return (
@@ -74,7 +74,7 @@ class Drive:
 
 
 def fly(state: PlanarState, duration: float) -> PlanarState:
-    """Every body goes on at its velocity."""
+    """Move every body on at its velocity."""
     return PlanarState(
         state.time + duration,
         state.centre + duration * state.velocity[:, :2],
@@ -84,7 +84,7 @@ def fly(state: PlanarState, duration: float) -> PlanarState:
 
 
 def space(state: PlanarState, bodies: Ints) -> tuple[Array, Array]:
-    """Centres (n, 3) and rotations (n, 3, 3) in the space whose plane z = 0 this is."""
+    """Return centres (n, 3) and rotations (n, 3, 3) in the space whose plane z = 0 this is."""
     co, si = np.cos(state.angle[bodies]), np.sin(state.angle[bodies])
     rotation = np.zeros((len(bodies), 3, 3))
     rotation[:, 0, 0] = rotation[:, 1, 1] = co
@@ -94,7 +94,7 @@ def space(state: PlanarState, bodies: Ints) -> tuple[Array, Array]:
 
 
 def load_velocity(model: PlanarModel, state: PlanarState, step: float) -> Array:
-    """M⁻¹ h P: what gravity and forces do in a step to the velocities (nb, 3), taken at the instant of the kick."""
+    """Compute M⁻¹ h P (nb, 3), by which gravity and forces at the instant of the kick change the velocities."""
     scene, loads = model.scene, model.scene.loads
     gravity = np.array([*scene.gravity, 0.0])
     for change in loads.gravity:

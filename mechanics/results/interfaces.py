@@ -66,23 +66,23 @@ def placed_faces(model: Model, state: State) -> Faces:
     """Return the faces of all stones at a state; corners of deformable stones follow their nodes."""
     surfaces = model.surfaces
     owner = surfaces.body_of_vertex
-    vertex = np.einsum("vij,vj->vi", state.rotation[owner], surfaces.vertex) + state.centre[owner]
+    vertex = np.einsum("vij,vj->vi", state.rotation[owner], surfaces.shapes.vertex) + state.centre[owner]
     for b, stone in enumerate(model.stones):
         if stone is not None:
             own = slice(surfaces.body_vptr[b], surfaces.body_vptr[b + 1])
-            away = np.linalg.norm(surfaces.vertex[own, None] - stone.mesh.nodes, axis=2)
+            away = np.linalg.norm(surfaces.shapes.vertex[own, None] - stone.mesh.nodes, axis=2)
             vertex[own] = state.node[model.nodes_of(b)][away.argmin(axis=1)]
-    count = np.diff(surfaces.cptr)
+    count = np.diff(surfaces.shapes.cptr)
     place = np.arange(int(count.max()))
-    chosen = surfaces.cptr[:-1, None] + np.where(place < count[:, None], place, 0)
-    corner = vertex[surfaces.corner[chosen]]
-    shape = np.repeat(np.arange(len(surfaces.body)), np.diff(surfaces.fptr))
+    chosen = surfaces.shapes.cptr[:-1, None] + np.where(place < count[:, None], place, 0)
+    corner = vertex[surfaces.shapes.corner[chosen]]
+    shape = np.repeat(np.arange(len(surfaces.body)), np.diff(surfaces.shapes.fptr))
     body = surfaces.body[shape]
     meant = (place < count[:, None])[..., None]
     return Faces(
         body=body,
         first=np.searchsorted(body, np.arange(len(model.mass) + 1)).astype(np.int64),
-        normal=np.einsum("fij,fj->fi", state.rotation[body], surfaces.normal),
+        normal=np.einsum("fij,fj->fi", state.rotation[body], surfaces.shapes.normal),
         centre=np.where(meant, corner, 0.0).sum(axis=1) / count[:, None],
         corner=corner,
         count=count,

@@ -1,31 +1,62 @@
-"""Numba kernels of the broad phase: bodies put in place, their boxes, and the pairs of boxes that overlap."""
+"""Broad phase: bodies put in place, their boxes, and the pairs of boxes that overlap."""
 
 import numpy as np
 from numba import njit
 
+from mechanics._kernels.vectors import row, write_row
+
 __all__ = ["boxes", "close_pairs", "place", "points_of"]
 
-# a box that spans more cells than this is compared with all others instead
-_MANY_CELLS = 64
+_MANY_CELLS = 64  # a box that spans more cells than this is compared with all others instead
+
+
+@njit(cache=True)
+def _placed(centre, rotation, local):
+    """Return centre + rotation · local."""
+    return (
+        centre[0] + rotation[0, 0] * local[0] + rotation[0, 1] * local[1] + rotation[0, 2] * local[2],
+        centre[1] + rotation[1, 0] * local[0] + rotation[1, 1] * local[1] + rotation[1, 2] * local[2],
+        centre[2] + rotation[2, 0] * local[0] + rotation[2, 1] * local[1] + rotation[2, 2] * local[2],
+    )
 
 
 @njit(cache=True)
 def place(pointer, local, centre, rotation):  # pragma: no cover - compiled
-    """centre + rotation · local for the rows pointer[b]:pointer[b+1] of each body; pass zero centres for directions."""
+    """Put points of bodies in place: centre + rotation · local.
+
+    Inputs
+    ------
+    pointer : (nb+1,) int64, rows of each body
+    local : (n, 3) float64, points in body axes [m]
+    centre : (nb, 3) float64 [m]; zero for directions
+    rotation : (nb, 3, 3) float64 [-]
+
+    Outputs
+    -------
+    (n, 3) float64 [m]
+    """
     out = np.empty_like(local)
     for b in range(pointer.shape[0] - 1):
         c, r = centre[b], rotation[b]
         for k in range(pointer[b], pointer[b + 1]):
-            x, y, z = local[k, 0], local[k, 1], local[k, 2]
-            out[k, 0] = c[0] + r[0, 0] * x + r[0, 1] * y + r[0, 2] * z
-            out[k, 1] = c[1] + r[1, 0] * x + r[1, 1] * y + r[1, 2] * z
-            out[k, 2] = c[2] + r[2, 0] * x + r[2, 1] * y + r[2, 2] * z
+            write_row(out, k, _placed(c, r, row(local, k)))
     return out
 
 
 @njit(cache=True)
 def boxes(pointer, vertex, margin):  # pragma: no cover - compiled
-    """Axis-parallel boxes (nb, 3), (nb, 3) around bodies, widened by a margin (nb,)."""
+    """Draw axis-parallel boxes around bodies.
+
+    Inputs
+    ------
+    pointer : (nb+1,) int64, vertices of each body
+    vertex : (nv, 3) float64 [m]
+    margin : (nb,) float64, by which the boxes are widened [m]
+
+    Outputs
+    -------
+    low, high : (nb, 3) float64 [m]
+    """
     nb = pointer.shape[0] - 1
     low, high = np.full((nb, 3), np.inf), np.full((nb, 3), -np.inf)
     for b in range(nb):
@@ -59,7 +90,7 @@ def _push(pairs, count, i, j):
 
 @njit(cache=True)
 def _cell_size(low, high):
-    """Median of the boxes' largest extents: most boxes span at most two cells in each direction."""
+    """Return the median of the boxes' largest extents [m]: most boxes span at most two cells in each direction."""
     nb, d = low.shape
     extent = np.empty(nb)
     for b in range(nb):
@@ -72,7 +103,7 @@ def _cell_size(low, high):
 
 @njit(cache=True)
 def _cells_of(low, high, origin, cell):
-    """First cell and number of cells of each box along each axis, and which boxes are too large for the grid."""
+    """Return first cell and number of cells of each box along each axis, and boxes that are too large for the grid."""
     nb, d = low.shape
     first, span = np.empty((nb, d), dtype=np.int64), np.empty((nb, d), dtype=np.int64)
     large = np.zeros(nb, dtype=np.bool_)
@@ -98,7 +129,7 @@ def _slot_of(x, y, z, mask):
 
 @njit(cache=True)
 def _fill(first, span, mask):
-    """Boxes sorted by the slot of each cell that they touch: slot pointers, box and cell of each entry."""
+    """Sort boxes by the slot of each cell that they touch; return slot pointers, box and cell of each entry."""
     nb, d = first.shape
     start = np.zeros(mask + 2, dtype=np.int64)
     total = 0
@@ -128,11 +159,20 @@ def _fill(first, span, mask):
 
 @njit(cache=True)
 def close_pairs(low, high, owner, fixed):  # pragma: no cover - compiled
-    """Pairs (np, 2), smaller index first, of boxes (n, d) that overlap, d = 2 or 3.
+    """Find the pairs of boxes that overlap, d = 2 or 3.
 
-    Boxes of one `owner` (n,), and of two `fixed` owners (n,), make no pair. A uniform grid, hashed, so that the cost
-    grows linearly with the number of boxes and neither with the space between them; boxes much larger than most
-    are compared with all others.
+    The grid is uniform and hashed, so the cost grows linearly with the number of boxes, and not with the space between
+    them; boxes much larger than most are compared with all others.
+
+    Inputs
+    ------
+    low, high : (n, d) float64 [m]
+    owner : (n,) int64; boxes of one owner make no pair
+    fixed : (n,) bool; two fixed boxes make no pair
+
+    Outputs
+    -------
+    (np, 2) int64, smaller index first
     """
     nb, d = low.shape
     pairs, count = np.empty((8 * nb + 8, 2), dtype=np.int64), 0
@@ -180,12 +220,23 @@ def close_pairs(low, high, owner, fixed):  # pragma: no cover - compiled
 
 @njit(cache=True)
 def points_of(body, arm, centre, rotation):  # pragma: no cover - compiled
-    """Places (nc, 2, 3) of points given by arms (nc, 2, 3) in the axes of bodies (nc, 2)."""
+    """Put the material points of contacts in place.
+
+    Inputs
+    ------
+    body : (nc, 2) int64
+    arm : (nc, 2, 3) float64, points in body axes [m]
+    centre : (nb, 3) float64 [m]
+    rotation : (nb, 3, 3) float64 [-]
+
+    Outputs
+    -------
+    (nc, 2, 3) float64 [m]
+    """
     out = np.empty_like(arm)
     for c in range(arm.shape[0]):
         for s in range(2):
             b = body[c, s]
-            r, x, y, z = rotation[b], arm[c, s, 0], arm[c, s, 1], arm[c, s, 2]
-            for d in range(3):
-                out[c, s, d] = centre[b, d] + r[d, 0] * x + r[d, 1] * y + r[d, 2] * z
+            a = _placed(centre[b], rotation[b], (arm[c, s, 0], arm[c, s, 1], arm[c, s, 2]))
+            out[c, s, 0], out[c, s, 1], out[c, s, 2] = a
     return out

@@ -1,18 +1,59 @@
-"""Numba kernels of finite-element facets: their shape functions, the inverse of their map, and quadrature on triangles.
+"""Finite-element facets: their shape functions, the inverse of their map, and quadrature on triangles.
 
 A facet has 3 or 6 nodes (triangle) or 4, 8 or 9 nodes (quadrilateral), corners first, in VTK's order. Its edges are
 straight with nodes at their middle, so the map from reference coordinates to the plane is that of its corners:
 affine on triangles, bilinear on quadrilaterals. Reference coordinates are (r, s) ≥ 0, r + s ≤ 1, or -1 ≤ r, s ≤ 1.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
-__all__ = ["QUADRATURE", "corner_count", "degree", "hats", "locate", "rule_of", "shapes"]
+from mechanics.arrays import Array, Bools, Ints
+
+__all__ = [
+    "QUADRATURE",
+    "FacetMeshes",
+    "corner_count",
+    "degree",
+    "hats",
+    "locate",
+    "rule_of",
+    "shape_functions",
+]
+
+
+class FacetMeshes(NamedTuple):
+    """The meshes of all faces; mesh m owns nodes node_ptr[m]:node_ptr[m+1] and facets facet_ptr[m]:facet_ptr[m+1].
+
+    Attributes
+    ----------
+    of_face : (nf,) int64, the mesh of each face; -1 for those of rigid bodies
+    node_ptr : (nm+1,) int64
+    node : (n,) int64, nodes of each mesh, numbered over all deformable bodies
+    reference : (n, 3) float64, their places in body axes [m]
+    facet_ptr : (nm+1,) int64
+    facet : (·, 9) int64, facets of each mesh as indices into its nodes, padded with -1
+    kind : (nm,) int64, nodes of a facet of each mesh
+    cut : (nm,) bool, the face, one of several parts, cuts through some facets, so that they reach beyond it
+    fineness : (nf,) float64, triangles (a quadrilateral counts for two) per area of each face; 0 without facets, -1 if
+        rigid [1/m²]
+    """
+
+    of_face: Ints
+    node_ptr: Ints
+    node: Ints
+    reference: Array
+    facet_ptr: Ints
+    facet: Ints
+    kind: Ints
+    cut: Bools
+    fineness: Array
 
 
 def _symmetric(groups):
-    """Points (n, 3): two area coordinates and the weight, of orbits given by one or two coordinates and a weight."""
+    """Return points (n, 3): two area coordinates and the weight, of orbits given by their coordinates and weight."""
     rows = []
     for *coordinates, weight in groups:
         a = coordinates[0]
@@ -52,13 +93,13 @@ QUADRATURE = np.vstack(_RULES)
 
 @njit(cache=True)
 def corner_count(kind):
-    """Corners of a facet with `kind` nodes."""
+    """Count the corners of a facet with `kind` nodes."""
     return 3 if kind == 3 or kind == 6 else 4
 
 
 @njit(cache=True)
 def degree(kind):
-    """Total degree in the plane of the shape functions of an affine facet with `kind` nodes."""
+    """Return the total degree in the plane of the shape functions of an affine facet with `kind` nodes."""
     if kind == 3:
         return 1
     if kind == 8:
@@ -68,14 +109,14 @@ def degree(kind):
 
 @njit(cache=True)
 def rule_of(wanted):
-    """First and last row of the quadrature on triangles that is exact to this degree."""
+    """Return the first and last row of the quadrature on triangles that is exact to this degree."""
     k = 0 if wanted <= 2 else 1 if wanted <= 4 else 2 if wanted == 5 else 3
     return QUADRATURE_START[k], QUADRATURE_START[k + 1]
 
 
 @njit(cache=True)
 def hats(corners, r, s, out):
-    """Linear (3 corners) or bilinear (4) functions at (r, s)."""
+    """Write the linear (3 corners) or bilinear (4) functions at (r, s)."""
     if corners == 3:
         out[0], out[1], out[2] = 1.0 - r - s, r, s
     else:
@@ -84,8 +125,8 @@ def hats(corners, r, s, out):
 
 
 @njit(cache=True)
-def shapes(kind, r, s, out):
-    """Shape functions of a facet with `kind` nodes at (r, s)."""
+def shape_functions(kind, r, s, out):
+    """Write the shape functions of a facet with `kind` nodes at (r, s)."""
     if kind == 3 or kind == 4:
         hats(kind, r, s, out)
     elif kind == 6:
@@ -110,7 +151,7 @@ def shapes(kind, r, s, out):
 
 @njit(cache=True)
 def locate(corner, count, x, y):
-    """Reference coordinates of a point of the plane in a facet with corners (≥ count, 2).
+    """Return the reference coordinates of a point of the plane in a facet with corners (≥ count, 2).
 
     Newton's method for quadrilaterals; one step of it is exact on a parallelogram.
     """

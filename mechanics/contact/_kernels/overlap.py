@@ -1,23 +1,66 @@
-"""Numba kernels of the mortar method: integrals over the overlap of two meshed faces of one plane."""
+"""Mortar method: integrals over the overlap of two meshed faces of one plane."""
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-from mechanics.contact._kernels.facets import QUADRATURE, corner_count, degree, hats, locate, rule_of, shapes
+from mechanics._kernels.vectors import column, dot, minus, row
+from mechanics.arrays import Array, Ints
+from mechanics.contact._kernels.facets import (
+    QUADRATURE,
+    corner_count,
+    degree,
+    hats,
+    locate,
+    rule_of,
+    shape_functions,
+)
 
-__all__ = ["flattened", "overlap_area", "overlap_integrals", "room"]
+__all__ = ["FlatMesh", "flattened", "overlap_area", "overlap_integrals", "room"]
 
-# corners that a facet can have when it is cut by another facet and by the outlines of two faces
-_MAX_CUT = 64
-# covered up to this part a facet is tested by hats, which stay within the overlap; from that part on by dual functions
-_HATS, _DUAL = 0.8, 0.98
-# where a joint ends at a node, rounding leaves overlaps of about this part of a facet, of which no pressure can be told
+_MAX_CUT = 64  # corners of a facet that is cut by another facet and by the outlines of two faces
+_HATS = 0.8  # part of a facet up to which it is tested by hats, which stay within the overlap
+_DUAL = 0.98  # part of a facet from which it is tested by dual functions
+# part of a facet's area that rounding leaves as overlap where a joint ends at a node: no pressure follows from it
 _NOTHING = 1e-12
+
+
+class FlatMesh(NamedTuple):
+    """A face mesh in the plane of an interface.
+
+    Attributes
+    ----------
+    x : (n, 2) float64, nodes [m]
+    facet : (m, kind) int64, indices into the nodes, corners first
+    kind : int64, nodes of a facet; 0 for a rigid face, which has none
+    """
+
+    x: Array
+    facet: Ints
+    kind: int
+
+
+class _Integrals(NamedTuple):
+    """Integrals over a facet with test functions ψ_i of its corners and shape functions N.
+
+    Attributes
+    ----------
+    share : (4,) float64, ∫ψ_i [m²]
+    moment : (4, 3) float64, ∫ψ_i (x, y, x² + y²) [m³, m³, m⁴]
+    mass : (corners, kind) float64, ∫ψ_i N_k [m²]
+    cross : (corners, kind of the other mesh) float64, ∫ψ_i N_j [m²]
+    """
+
+    share: Array
+    moment: Array
+    mass: Array
+    cross: Array
 
 
 @njit(cache=True)
 def _clip_flat(polygon, count, cutter, corners, kept):
-    """Keep what lies inside a convex polygon `cutter`, whichever way round it is, of `polygon`, in place."""
+    """Keep what lies inside a convex polygon `cutter` of either sense of `polygon`, in place; return its corners."""
     turn = 0.0
     for k in range(1, corners - 1):
         turn += (cutter[k, 0] - cutter[0, 0]) * (cutter[k + 1, 1] - cutter[0, 1]) - (
@@ -51,7 +94,7 @@ def _clip_flat(polygon, count, cutter, corners, kept):
 
 @njit(cache=True)
 def overlap_area(one, other):  # pragma: no cover - compiled
-    """Area common to two convex polygons (n, 2), (m, 2) of the plane."""
+    """Compute the area common to two convex polygons of the plane, (n, 2) and (m, 2) float64 [m]."""
     polygon, kept = np.empty((_MAX_CUT, 2)), np.empty((_MAX_CUT, 2))
     polygon[: one.shape[0]] = one
     count = _clip_flat(polygon, one.shape[0], other, other.shape[0], kept)
@@ -63,7 +106,7 @@ def overlap_area(one, other):  # pragma: no cover - compiled
 
 @njit(cache=True)
 def _triangle(polygon, k):
-    """Area of the triangle 0, k, k + 1."""
+    """Compute the signed area of the triangle 0, k, k + 1."""
     return 0.5 * (
         (polygon[k, 0] - polygon[0, 0]) * (polygon[k + 1, 1] - polygon[0, 1])
         - (polygon[k + 1, 0] - polygon[0, 0]) * (polygon[k, 1] - polygon[0, 1])
@@ -71,28 +114,37 @@ def _triangle(polygon, k):
 
 
 @njit(cache=True)
-def flattened(points, centre, rotation, origin, frame):
-    """Coordinates (n, 2) along the second and third row of a frame of points given in body axes."""
+def flattened(points, centre, rotation, origin, frame):  # pragma: no cover - compiled
+    """Return coordinates along the second and third row of a frame.
+
+    Inputs
+    ------
+    points : (n, 3) float64, body axes [m]
+    centre, rotation : (3,) and (3, 3) float64, of the body [m, -]
+    origin, frame : (3,) and (3, 3) float64, of the plane [m, -]
+
+    Outputs
+    -------
+    (n, 2) float64 [m]
+    """
     out = np.empty((points.shape[0], 2))
     for d in range(2):
-        t = frame[1 + d]
-        shift = 0.0
-        for e in range(3):
-            shift += t[e] * (centre[e] - origin[e])
+        t = row(frame, 1 + d)
+        shift = dot(t, minus(centre, origin))
         # Rᵀ t, so that each point costs one product
-        a0 = t[0] * rotation[0, 0] + t[1] * rotation[1, 0] + t[2] * rotation[2, 0]
-        a1 = t[0] * rotation[0, 1] + t[1] * rotation[1, 1] + t[2] * rotation[2, 1]
-        a2 = t[0] * rotation[0, 2] + t[1] * rotation[1, 2] + t[2] * rotation[2, 2]
+        a0, a1, a2 = dot(t, column(rotation, 0)), dot(t, column(rotation, 1)), dot(t, column(rotation, 2))
         for k in range(points.shape[0]):
             out[k, d] = shift + a0 * points[k, 0] + a1 * points[k, 1] + a2 * points[k, 2]
     return out
 
 
 @njit(cache=True)
-def _facet_boxes(x, facet, corners):
+def _facet_boxes(mesh):
+    """Return the boxes of facets, (m, 2) and (m, 2)."""
+    x, facet = mesh.x, mesh.facet
     low, high = np.full((facet.shape[0], 2), np.inf), np.full((facet.shape[0], 2), -np.inf)
     for t in range(facet.shape[0]):
-        for k in range(corners):
+        for k in range(corner_count(mesh.kind)):
             for d in range(2):
                 low[t, d] = min(low[t, d], x[facet[t, k], d])
                 high[t, d] = max(high[t, d], x[facet[t, k], d])
@@ -101,7 +153,10 @@ def _facet_boxes(x, facet, corners):
 
 @njit(cache=True)
 def _grid(low, high):
-    """Origin, cell sizes, cells along both axes of a grid with about one cell per box, and the boxes in each cell."""
+    """Sort boxes into a grid with about one cell per box.
+
+    Return its origin, cell sizes and number of cells along both axes, and pointers and boxes of the cells.
+    """
     n = low.shape[0]
     origin, top = np.full(2, np.inf), np.full(2, -np.inf)
     for t in range(n):
@@ -131,7 +186,7 @@ def _grid(low, high):
 
 @njit(cache=True)
 def _cells(low, high, origin, size, nx, ny):
-    """First and last cell along both axes; none where the box lies beside the grid."""
+    """Return the first and last cell of a box along both axes; none where it lies beside the grid."""
     x0, x1 = int(np.floor((low[0] - origin[0]) / size[0])), int(np.floor((high[0] - origin[0]) / size[0]))
     y0, y1 = int(np.floor((low[1] - origin[1]) / size[1])), int(np.floor((high[1] - origin[1]) / size[1]))
     # what ends at the far side of the grid lies in its last cell
@@ -140,7 +195,7 @@ def _cells(low, high, origin, size, nx, ny):
 
 @njit(cache=True)
 def _close_facets(low, high, low_a, high_a):
-    """Facets of the antagonist whose boxes overlap that of each candidate facet: pointers and facets."""
+    """Return pointers and facets of the antagonist whose boxes overlap that of each candidate facet."""
     origin, size, nx, ny, start, item = _grid(low_a, high_a)
     seen = np.full(low_a.shape[0], -1)
     pointer = np.zeros(low.shape[0] + 1, dtype=np.int64)
@@ -170,7 +225,7 @@ def _close_facets(low, high, low_a, high_a):
 
 @njit(cache=True)
 def room(array, needed):
-    """The array, or a copy with at least this many places."""
+    """Return the array, or a copy with at least this many places."""
     if needed <= array.shape[0]:
         return array
     grown = np.empty(max(needed, 2 * array.shape[0]), dtype=array.dtype)
@@ -180,6 +235,7 @@ def room(array, needed):
 
 @njit(cache=True)
 def _area(polygon, count):
+    """Compute the area of a convex polygon."""
     area = 0.0
     for t in range(1, count - 1):
         area += abs(_triangle(polygon, t))
@@ -187,11 +243,12 @@ def _area(polygon, count):
 
 
 @njit(cache=True)
-def _integrate(polygon, count, own, kind, far, far_kind, n_psi, n_own, n_far, share, moment, mass, cross):
-    """Add ∫ψ_i, ∫ψ_i (x, y, x² + y²), ∫ψ_i N_k, ∫ψ_i N_j over a polygon in the facets `own` and, if kind > 0, `far`."""
+def _integrate(polygon, count, own, kind, far, far_kind, values, total):
+    """Add the integrals over a polygon in the facets `own` and, if their kind is not 0, `far`; `values` is scratch."""
     corners = corner_count(kind)
     wanted = corners - 2 + max(degree(kind), degree(far_kind) if far_kind > 0 else 1)
     first, last = rule_of(wanted)
+    psi, n_own, n_far = values[0], values[1], values[2]
     for t in range(1, count - 1):
         area = abs(_triangle(polygon, t))
         for q in range(first, last):
@@ -200,32 +257,34 @@ def _integrate(polygon, count, own, kind, far, far_kind, n_psi, n_own, n_far, sh
             x = a * polygon[0, 0] + b * polygon[t, 0] + c * polygon[t + 1, 0]
             y = a * polygon[0, 1] + b * polygon[t, 1] + c * polygon[t + 1, 1]
             r, s = locate(own, corners, x, y)
-            hats(corners, r, s, n_psi)
-            shapes(kind, r, s, n_own)
+            hats(corners, r, s, psi)
+            shape_functions(kind, r, s, n_own)
             if far_kind > 0:
                 r, s = locate(far, corner_count(far_kind), x, y)
-                shapes(far_kind, r, s, n_far)
+                shape_functions(far_kind, r, s, n_far)
             for i in range(corners):
-                psi = w * n_psi[i]
-                share[i] += psi
-                moment[i, 0] += psi * x
-                moment[i, 1] += psi * y
-                moment[i, 2] += psi * (x * x + y * y)
+                v = w * psi[i]
+                total.share[i] += v
+                total.moment[i, 0] += v * x
+                total.moment[i, 1] += v * y
+                total.moment[i, 2] += v * (x * x + y * y)
                 for k in range(kind):
-                    mass[i, k] += psi * n_own[k]
+                    total.mass[i, k] += v * n_own[k]
                 for k in range(far_kind):
-                    cross[i, k] += psi * n_far[k]
+                    total.cross[i, k] += v * n_far[k]
 
 
 @njit(cache=True)
-def _take_corners(x, facet, corners, out):
-    for k in range(corners):
-        out[k, 0], out[k, 1] = x[facet[k], 0], x[facet[k], 1]
+def _take_corners(mesh, t, out):
+    """Write the corners of facet t."""
+    for k in range(corner_count(mesh.kind)):
+        n = mesh.facet[t, k]
+        out[k, 0], out[k, 1] = mesh.x[n, 0], mesh.x[n, 1]
 
 
 @njit(cache=True)
 def _hat_products(kind, corners, mass, out):
-    """∫ψ_i ψ_j from ∫ψ_i N_k: a hat is the sum of the shape functions, each by its value at their node."""
+    """Write ∫ψ_i ψ_j, from ∫ψ_i N_k: a hat is the sum of the shape functions times its values at their nodes."""
     for i in range(corners):
         for j in range(corners):
             before = j - 1 if j > 0 else corners - 1
@@ -238,7 +297,7 @@ def _hat_products(kind, corners, mass, out):
 
 @njit(cache=True)
 def _solve_small(matrix, right, count):
-    """Gauss elimination of symmetric positive matrices, in place; `right` becomes the solution."""
+    """Solve with a symmetric positive matrix by Gauss elimination, in place; `right` becomes the solution."""
     for k in range(count):
         for i in range(k + 1, count):
             f = matrix[i, k] / matrix[k, k]
@@ -255,7 +314,7 @@ def _solve_small(matrix, right, count):
 
 @njit(cache=True)
 def _turn_rows(turn, corners, rows):
-    """rows ← turn · rows."""
+    """Replace rows by turn · rows."""
     was = rows.copy()
     for i in range(corners):
         for k in range(rows.shape[1]):
@@ -267,7 +326,7 @@ def _turn_rows(turn, corners, rows):
 
 @njit(cache=True)
 def _turn_dual(own, kind, share, moment, mass, cross):
-    """Integrals with the hats of a facet become integrals with functions dual to them, where it is nearly all covered.
+    """Turn integrals with the hats of a facet into those with functions dual to them where it is nearly all covered.
 
     The dual functions φ are combinations of the hats, T ψ with T ∫ψψᵀ = diag ∫ψ. They have the same integrals and the
     same sum, one; φ_i meets no other node's hat, so that on linear facets a contact is its node alone (Wohlmuth 2000),
@@ -296,72 +355,74 @@ def _turn_dual(own, kind, share, moment, mass, cross):
     for e in range(cross.shape[0]):
         _turn_rows(turn, corners, cross[e])
     if kind == corners and dual == 1.0:
-        # what is zero is so without rounding, and takes no place
+        # set zeros exactly, so that they take no place
         for i in range(corners):
             for k in range(corners):
                 mass[i, k] = share[i] if i == k else 0.0
 
 
 @njit(cache=True)
-def overlap_integrals(x_c, facet_c, kind_c, x_a, facet_a, kind_a, outlines, outline_size, share, moment):
-    """Integrals over the overlap of two faces, by facets of the candidate, with hats or their dual functions as ψ.
+def overlap_integrals(own, other, outlines, outline_size, share, moment):  # pragma: no cover - compiled
+    """Integrate over the overlap of two faces, by facets of the candidate, with hats or their dual functions as ψ.
 
-    Parameters
-    ----------
-    x_c, facet_c, kind_c : plane nodes, facets and nodes of a facet of the candidate
-    x_a, facet_a, kind_a : those of the antagonist; kind_a = 0 if it is rigid
-    outlines, outline_size : convex polygons that bound the overlap besides the meshes
-    share, moment : (nodes,), (nodes, 3) to which ∫ψ_i and ∫ψ_i (x, y, x² + y²) are added
+    Inputs
+    ------
+    own, other : FlatMesh of candidate and antagonist; the kind of a rigid antagonist is 0
+    outlines : (n, 2) float64, convex polygons that bound the overlap besides the meshes, one after the other [m]
+    outline_size : (2,) int64, their corners
+    share : (nodes,) float64, to which ∫ψ_i is added [m²]
+    moment : (nodes, 3) float64, to which ∫ψ_i (x, y, x² + y²) is added [m³, m³, m⁴]
 
-    Returns
+    Outputs
     -------
-    used : facets of the candidate that meet the antagonist
-    mass : ∫ψ_i N_k of each, flat
-    pointer, far, cross : facets of the antagonist that each of these meets, and ∫ψ_i N_j of each pair, flat
+    used : int64, facets of the candidate that meet the antagonist
+    mass : float64, ∫ψ_i N_k of each, flat [m²]
+    pointer, far : int64, facets of the antagonist that each of these meets
+    cross : float64, ∫ψ_i N_j of each pair, flat [m²]
     """
-    corners, corners_a = corner_count(kind_c), corner_count(kind_a) if kind_a > 0 else 0
-    low, high = _facet_boxes(x_c, facet_c, corners)
-    most = facet_c.shape[0]
-    if kind_a > 0:
-        near_ptr, near = _close_facets(low, high, *_facet_boxes(x_a, facet_a, corners_a))
+    corners, corners_a = corner_count(own.kind), corner_count(other.kind) if other.kind > 0 else 0
+    low, high = _facet_boxes(own)
+    most = own.facet.shape[0]
+    if other.kind > 0:
+        near_ptr, near = _close_facets(low, high, *_facet_boxes(other))
     else:
         near_ptr, near = np.arange(most + 1), np.zeros(most, dtype=np.int64)
     used, pointer = np.empty(most, dtype=np.int64), np.zeros(most + 1, dtype=np.int64)
-    stride_c, stride_a = corners * kind_c, corners * kind_a
-    mass = np.zeros(most * stride_c)
+    stride, stride_a = corners * own.kind, corners * other.kind
+    mass = np.zeros(most * stride)
     far, cross = np.empty(near_ptr[-1], dtype=np.int64), np.zeros(near_ptr[-1] * stride_a)
     polygon, kept = np.empty((_MAX_CUT, 2)), np.empty((_MAX_CUT, 2))
-    own, other = np.empty((4, 2)), np.empty((4, 2))
-    n_psi, n_own, n_far = np.empty(4), np.empty(9), np.empty(9)
-    part, middle = np.empty(4), np.empty((4, 3))
+    mine, theirs = np.empty((4, 2)), np.empty((4, 2))
+    values, part, middle = np.empty((3, 9)), np.empty(4), np.empty((4, 3))
     count, pairs = 0, 0
     for t in range(most):
-        _take_corners(x_c, facet_c[t], corners, own)
-        block = mass[count * stride_c : (count + 1) * stride_c].reshape(corners, kind_c)
+        _take_corners(own, t, mine)
+        block = mass[count * stride : (count + 1) * stride].reshape(corners, own.kind)
         part[:], middle[:] = 0.0, 0.0
         for e in range(near_ptr[t], near_ptr[t + 1]):
-            polygon[:corners] = own[:corners]
+            polygon[:corners] = mine[:corners]
             k = corners
-            if kind_a > 0:
-                _take_corners(x_a, facet_a[near[e]], corners_a, other)
-                k = _clip_flat(polygon, k, other, corners_a, kept)
+            if other.kind > 0:
+                _take_corners(other, near[e], theirs)
+                k = _clip_flat(polygon, k, theirs, corners_a, kept)
             begin = 0
             for o in outline_size:
                 if k > 0 and o > 0:
                     k = _clip_flat(polygon, k, outlines[begin : begin + o], o, kept)
                 begin += o
-            if k < 3 or _area(polygon, k) <= _NOTHING * _area(own, corners):
+            if k < 3 or _area(polygon, k) <= _NOTHING * _area(mine, corners):
                 continue
-            pair = cross[pairs * stride_a : (pairs + 1) * stride_a].reshape(corners, kind_a)
-            _integrate(polygon, k, own, kind_c, other, kind_a, n_psi, n_own, n_far, part, middle, block, pair)
+            pair = cross[pairs * stride_a : (pairs + 1) * stride_a].reshape(corners, other.kind)
+            total = _Integrals(part, middle, block, pair)
+            _integrate(polygon, k, mine, own.kind, theirs, other.kind, values, total)
             far[pairs] = near[e]
             pairs += 1
         if pairs == pointer[count]:
             continue
-        pair = cross[pointer[count] * stride_a : pairs * stride_a].reshape(-1, corners, kind_a)
-        _turn_dual(own, kind_c, part, middle, block, pair)
+        met = cross[pointer[count] * stride_a : pairs * stride_a].reshape(-1, corners, other.kind)
+        _turn_dual(mine, own.kind, part, middle, block, met)
         for i in range(corners):
-            node = facet_c[t, i]
+            node = own.facet[t, i]
             share[node] += part[i]
             for d in range(3):
                 moment[node, d] += middle[i, d]

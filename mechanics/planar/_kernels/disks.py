@@ -1,34 +1,77 @@
-"""Numba kernels of contacts between disks, and of the order of contacts."""
+"""Contacts between disks, and the order of contacts."""
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
+from mechanics.arrays import Array, Bools
 from mechanics.planar._kernels.grid import bucket
 
-__all__ = ["FACE", "find_disks", "longer", "sort_contacts"]
+__all__ = ["FACE", "Disks", "Watch", "find_disks", "longer", "sort_contacts"]
 
 # feature 0 of a contact: on the face of both bodies; 1 and 2 are the ends of a wall
 FACE = 0
 
 
+class Disks(NamedTuple):
+    """Disks in motion.
+
+    Attributes
+    ----------
+    centre : (nd, 2) float64 [m]
+    radius : (nd,) float64 [m]
+    velocity : (nd, 3) float64, vx, vy [m/s] and ω [rad/s]
+    fixed : (nd,) bool
+    ahead : (nd,) float64, by which the watch of each disk is widened [m]
+    extent : (nd,) float64, radius and all that is watched around it [m]
+    """
+
+    centre: Array
+    radius: Array
+    velocity: Array
+    fixed: Bools
+    ahead: Array
+    extent: Array
+
+
+class Watch(NamedTuple):
+    """Gaps that are watched: alert × smaller radius [-], the reach of the laws [m], and what a step [s] can close."""
+
+    alert: float
+    reach: float
+    step: float
+
+
 @njit(cache=True)
 def longer(rows):  # pragma: no cover - compiled
-    """Room for twice as many rows."""
+    """Return a copy with room for twice as many rows."""
     more = np.empty((2 * rows.shape[0], rows.shape[1]), dtype=rows.dtype)
     more[: rows.shape[0]] = rows
     return more
 
 
 @njit(cache=True)
-def find_disks(
-    centre, radius, velocity, fixed, alert, reach, step, ahead, extent, grid
-):  # pragma: no cover - compiled
-    """Contacts between disks: bodies and feature (n, 3), n and gap (n, 3).
+def find_disks(disks, watch, grid):  # pragma: no cover - compiled
+    """Find the contacts between disks.
 
     A pair is watched if its gap is at most alert × smaller radius + reach + what it can close in a step at its present
-    relative velocity, + `ahead` (nd,) of both. The normal points from the second disk to the first, which has the
-    smaller index.
+    relative velocity, + `ahead` of both. The normal points from the second disk to the first, which has the smaller
+    index.
+
+    Inputs
+    ------
+    disks : Disks
+    watch : Watch
+    grid : Grid, of the disks and their extents
+
+    Outputs
+    -------
+    names : (n, 3) int64, bodies and feature
+    values : (n, 3) float64, n [-] and gap [m]
     """
+    centre, radius, velocity, fixed, ahead, extent = disks
+    alert, reach, step = watch
     origin, width, low, count, base, buckets, start, order, level, cell = grid
     names, values = np.empty((64, 3), dtype=np.int64), np.empty((64, 3))
     n = 0
@@ -63,7 +106,7 @@ def find_disks(
                         names, values = longer(names), longer(values)
                     sign = 1.0 if i < j else -1.0
                     names[n, 0], names[n, 1], names[n, 2] = min(i, j), max(i, j), FACE
-                    # two disks with one centre must be parted in some direction
+                    # two disks with one centre are separated along y
                     values[n, 0] = sign * dx / distance if distance > 0.0 else 0.0
                     values[n, 1] = sign * dy / distance if distance > 0.0 else 1.0
                     values[n, 2] = gap
@@ -73,7 +116,18 @@ def find_disks(
 
 @njit(cache=True)
 def sort_contacts(names, values, bodies):  # pragma: no cover - compiled
-    """Contacts by first body, second body and feature."""
+    """Sort contacts by first body, second body and feature.
+
+    Inputs
+    ------
+    names : (n, 3) int64, bodies and feature
+    values : (n, 3) float64
+    bodies : int64, number of disks
+
+    Outputs
+    -------
+    names, values : in order
+    """
     n = names.shape[0]
     start = np.zeros(bodies + 1, dtype=np.int64)
     for c in range(n):

@@ -1,23 +1,53 @@
-"""Numba kernels of the grids in which disks are found.
+"""Grids in which disks are found.
 
 Disks are sorted into grids of square cells, one for each class of sizes: a cell is at least as wide as the reach of
 each disk in it, and at most about twice. A disk looks for partners in its own grid and in the coarser ones, each time
 in nine cells, so the cost is linear whatever the sizes.
-
-A grid is a tuple: origin (2,), width (nl,), low (nl, 2) and count (nl, 2) of the cells in use, base (nl,), buckets
-(nl,), start (nbuckets+1,), order (nd,), level (nd,), cell (nd, 2). A class with few empty cells has one bucket for each
-cell; one with many shares buckets by a hash, and the cell of each disk tells who is meant.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-__all__ = ["bucket", "build_grid", "cells_along"]
+from mechanics.arrays import Array, Ints
+
+__all__ = ["Grid", "bucket", "build_grid", "cells_along"]
+
+
+class Grid(NamedTuple):
+    """Disks sorted into cells.
+
+    A class with few empty cells has one bucket for each cell; one with many shares buckets by a hash, and the cell of
+    each disk says to which cell it belongs.
+
+    Attributes
+    ----------
+    origin : (2,) float64, corner of cell (0, 0) of all classes [m]
+    width : (nl,) float64, cells of each class [m]
+    low, cells : (nl, 2) int64, first cell in use and number of cells along x and y
+    base, buckets : (nl,) int64, first bucket and number of buckets
+    start : (nbuckets+1,) int64, disks order[start[b]:start[b+1]] of each bucket
+    order : (nd,) int64
+    level : (nd,) int64, class of each disk
+    cell : (nd, 2) int64
+    """
+
+    origin: Array
+    width: Array
+    low: Ints
+    cells: Ints
+    base: Ints
+    buckets: Ints
+    start: Ints
+    order: Ints
+    level: Ints
+    cell: Ints
 
 
 @njit(cache=True)
 def bucket(cell_x, cell_y, level, low, count, base, buckets):
-    """Where the disks of a cell are kept; -1 outside."""
+    """Return the bucket of a cell; -1 outside the cells in use."""
     x, y = cell_x - low[level, 0], cell_y - low[level, 1]
     if x < 0 or y < 0 or x >= count[level, 0] or y >= count[level, 1]:
         return -1
@@ -30,7 +60,7 @@ def bucket(cell_x, cell_y, level, low, count, base, buckets):
 
 @njit(cache=True)
 def _size_classes(extent):
-    """Class (nd,) of each disk by its half width, and the width of the cells of each class that is in use (nl,)."""
+    """Return the class (nd,) of each disk by its half width, and the cell width (nl,) of each class in use."""
     nd = extent.shape[0]
     smallest, largest = np.inf, 0.0
     for i in range(nd):
@@ -60,7 +90,7 @@ def _size_classes(extent):
 
 @njit(cache=True)
 def _cells_in_use(centre, level, width):
-    """Origin, cell of each disk (nd, 2), and lowest (nl, 2) and number (nl, 2) of the cells of each class."""
+    """Return origin, cell of each disk (nd, 2), and lowest (nl, 2) and number (nl, 2) of the cells of each class."""
     nd, nl = centre.shape[0], width.shape[0]
     origin = np.array([centre[:, 0].min(), centre[:, 1].min()])
     cell = np.empty((nd, 2), dtype=np.int64)
@@ -77,7 +107,17 @@ def _cells_in_use(centre, level, width):
 
 @njit(cache=True)
 def build_grid(centre, extent):  # pragma: no cover - compiled
-    """Sort disks (nd,), one at least, of half widths `extent` into grids."""
+    """Sort disks, one at least, into grids.
+
+    Inputs
+    ------
+    centre : (nd, 2) float64 [m]
+    extent : (nd,) float64, half widths [m]
+
+    Outputs
+    -------
+    Grid
+    """
     level, width = _size_classes(extent)
     origin, cell, low, count = _cells_in_use(centre, level, width)
     nd, nl = centre.shape[0], width.shape[0]
@@ -103,13 +143,23 @@ def build_grid(centre, extent):  # pragma: no cover - compiled
     for i in range(nd):
         order[filled[where[i]]] = i
         filled[where[i]] += 1
-    return origin, width, low, count, base, buckets, start, order, level, cell
+    return Grid(origin, width, low, count, base, buckets, start, order, level, cell)
 
 
 @njit(cache=True)
-def cells_along(ends, far, k, origin, width, low, count, base, buckets, start, order, cell, near):
-    """Write the disks of class k in the cells within `far` of a wall to `near`; how many, or -1: too many cells."""
-    nd = order.shape[0]
+def cells_along(ends, far, k, grid, near):  # pragma: no cover - compiled
+    """Write the disks of class k in the cells within a distance of a wall; return how many, -1 for too many cells.
+
+    Inputs
+    ------
+    ends : (2, 2) float64, of the wall [m]
+    far : float64, the distance [m]
+    k : int64, the class
+    grid : Grid
+    near : (nd,) int64, to which the disks are written
+    """
+    origin, widths, low, count, base, buckets, start, order, _, cell = grid
+    width, nd = widths[k], order.shape[0]
     ax, ay = ends[0, 0] - origin[0], ends[0, 1] - origin[1]
     bx, by = ends[1, 0] - origin[0], ends[1, 1] - origin[1]
     if ax > bx:

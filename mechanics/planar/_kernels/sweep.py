@@ -1,4 +1,4 @@
-"""Numba kernels of W in the plane: products, exact local solves, Gauss–Seidel sweeps, matrix-free.
+"""W in the plane: products, exact local solves, Gauss–Seidel sweeps, matrix-free.
 
 With t = n turned by +90°, and the lever ℓ_n = a × n, ℓ_t = a × t of the contact point on each side,
 
@@ -27,7 +27,20 @@ _LN_I, _LT_I, _LN_J, _LT_J, _SHIFT, _MU, _K, _R, _INV_NN, _INV_TT, _NT = 2, 3, 4
 
 @njit(cache=True)
 def velocity_change(r, body, normal, lever, inertia):  # pragma: no cover - compiled
-    """ŵ H r: what the impulses (nc, 2) do to the bodies (nb, 3)."""
+    """Compute ŵ H r.
+
+    Inputs
+    ------
+    r : (nc, 2) float64, impulses [N s]
+    body : (nc, 2) int64
+    normal : (nc, 2) float64 [-]
+    lever : (nc, 4) float64 [m]
+    inertia : (nb, 2) float64 [1/kg, 1/(kg m²)]
+
+    Outputs
+    -------
+    (nb, 3) float64, change of vx, vy [m/s] and ω [rad/s]
+    """
     v = np.zeros((inertia.shape[0], 3))
     for c in range(r.shape[0]):
         nx, ny, r0, r1 = normal[c, 0], normal[c, 1], r[c, 0], r[c, 1]
@@ -48,7 +61,7 @@ def velocity_change(r, body, normal, lever, inertia):  # pragma: no cover - comp
 
 @njit(cache=True)
 def relative_velocity(v, body, normal, lever):  # pragma: no cover - compiled
-    """Hᵀ v: local relative velocities (nc, 2) of the bodies' velocities (nb, 3)."""
+    """Compute Hᵀ v: local relative velocities (nc, 2) [m/s] of the bodies' velocities (nb, 3)."""
     nc = body.shape[0]
     u = np.empty((nc, 2))
     for c in range(nc):
@@ -62,13 +75,13 @@ def relative_velocity(v, body, normal, lever):  # pragma: no cover - compiled
 
 @njit(cache=True)
 def apply(r, body, normal, lever, inertia):  # pragma: no cover - compiled
-    """W r (nc, 2)."""
+    """Compute W r (nc, 2) [m/s]."""
     return relative_velocity(velocity_change(r, body, normal, lever, inertia), body, normal, lever)
 
 
 @njit(cache=True)
 def diagonals(body, lever, inertia):  # pragma: no cover - compiled
-    """W_αα (nc, 2, 2)."""
+    """Compute W_αα (nc, 2, 2) [1/kg]."""
     nc = body.shape[0]
     w = np.empty((nc, 2, 2))
     for c in range(nc):
@@ -83,7 +96,7 @@ def diagonals(body, lever, inertia):  # pragma: no cover - compiled
 
 @njit(cache=True)
 def records(order, shift, friction, cohesion, normal, lever, diagonal):  # pragma: no cover - compiled
-    """What a sweep needs of each contact, in the order of the sweep (nc, 16)."""
+    """Build the records (nc, 16) of the contacts, in the order of the sweep."""
     record = np.zeros((len(order), 16))
     for p in range(len(order)):
         c, one = order[p], record[p]
@@ -99,7 +112,7 @@ def records(order, shift, friction, cohesion, normal, lever, diagonal):  # pragm
 
 @njit(cache=True)
 def solve_local(nn, nt, tt, bn, bt, mu, k):  # pragma: no cover - compiled
-    """The impulse (r_N, r_T) of one contact, exactly: u = W r + b, 0 ≤ u_N ⊥ r_N ≥ 0, |r_T| ≤ μ r_N + k.
+    """Solve one contact for its impulse (r_N, r_T), exactly: u = W r + b, 0 ≤ u_N ⊥ r_N ≥ 0, |r_T| ≤ μ r_N + k.
 
     Open, stick and both slips are tried in this order. With μ |W_NT| ≥ W_NN (Painlevé) a contact that departs may stay
     open or jam: one that can stay open stays open, one that can stick sticks, and of two slips the smaller one holds.
@@ -191,7 +204,7 @@ def _end(impulse, order, record):
 
 @njit(cache=True, parallel=True)
 def sweep(count, impulse, order, record, body, inertia, start, grain):  # pragma: no cover - compiled
-    """`count` passes over the records, colour by colour, every second one backwards; `impulse` is changed in place.
+    """Make `count` passes over the records, colour by colour, every second one backwards; change `impulse` in place.
 
     Records start[k] to start[k+1] share no moving body, so several threads give the same bits as one. Colours of fewer
     than `grain` contacts are not worth waking the other threads.

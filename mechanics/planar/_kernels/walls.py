@@ -1,20 +1,37 @@
-"""Numba kernels of contacts between disks and walls."""
+"""Contacts between disks and walls."""
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
+from mechanics.arrays import Array, Ints
 from mechanics.planar._kernels.disks import FACE, longer
 from mechanics.planar._kernels.grid import cells_along
 
-__all__ = ["end_neighbours", "find_walls"]
+__all__ = ["EndNeighbours", "end_neighbours", "find_walls"]
 
-# sine of the angle between two walls from which it counts as a bend
-_BEND = 1e-9
+_BEND = 1e-9  # sine of the angle from which two walls form a bend
+
+
+class EndNeighbours(NamedTuple):
+    """Walls that pass through the ends of others.
+
+    Attributes
+    ----------
+    start : (2 nw + 1,) int64, the neighbours of end e of wall w are start[2 w + e]:start[2 w + e + 1]
+    wall : (n,) int64
+    place : (n,) float64, parameter of the end on the neighbour, 0 and 1 at its own ends [-]
+    """
+
+    start: Ints
+    wall: Ints
+    place: Array
 
 
 @njit(cache=True)
 def _foot(x, y, ends):
-    """Parameter, within 0 to 1, of the point of a wall that is nearest to (x, y)."""
+    """Return the parameter, within 0 to 1, of the point of a wall that is nearest to (x, y)."""
     dx, dy = ends[1, 0] - ends[0, 0], ends[1, 1] - ends[0, 1]
     s = ((x - ends[0, 0]) * dx + (y - ends[0, 1]) * dy) / (dx * dx + dy * dy)
     return min(max(s, 0.0), 1.0)
@@ -22,7 +39,7 @@ def _foot(x, y, ends):
 
 @njit(cache=True)
 def end_neighbours(ends):  # pragma: no cover - compiled
-    """Walls that pass through the ends of others: start (2 nw + 1,), wall (n,), its parameter there (n,)."""
+    """Find the walls that pass through the ends of others, given `ends` (nw, 2, 2) float64 [m]."""
     nw = ends.shape[0]
     length = np.empty(nw)
     for w in range(nw):
@@ -48,18 +65,19 @@ def end_neighbours(ends):  # pragma: no cover - compiled
                 wall[n, 0], place[n, 0] = k, 0.0 if s <= near else 1.0 if s >= 1.0 - near else s
                 n += 1
             start[2 * w + e + 1] = n
-    return start, wall[:n, 0].copy(), place[:n, 0].copy()
+    return EndNeighbours(start, wall[:n, 0].copy(), place[:n, 0].copy())
 
 
 @njit(cache=True)
-def _touch_wall(x, y, w, ends, start, wall, place, overshoot):
-    """Feature, n and distance of the point (x, y) from a wall; feature -1 where other walls have the contact.
+def _touch_wall(x, y, w, ends, neighbours, overshoot):
+    """Return feature, n and distance of the point (x, y) from a wall; feature -1 where other walls have the contact.
 
     Past an end of the wall: where another wall goes on from there and is met on its face, this wall steps back, so that
     the end cannot catch what rolls along the two; but if this wall rises from the other like a valley's far side, its
     line is met before its end, and is watched a little ahead (`overshoot`). Of walls that are all met at the one end,
     the first has it.
     """
+    start, wall, place = neighbours
     ax, ay, bx, by = ends[w, 0, 0], ends[w, 0, 1], ends[w, 1, 0], ends[w, 1, 1]
     dx, dy = bx - ax, by - ay
     length = np.hypot(dx, dy)
@@ -108,24 +126,23 @@ def _touch_wall(x, y, w, ends, start, wall, place, overshoot):
 
 
 @njit(cache=True)
-def find_walls(
-    centre,
-    radius,
-    velocity,
-    fixed,
-    ends,
-    pace,
-    start_of_end,
-    wall,
-    place,
-    alert,
-    reach,
-    step,
-    ahead,
-    grid,
-):  # pragma: no cover - compiled
-    """Contacts of disks with walls: as `find_disks`; the wall w is body nd + w, `pace` (nw,) its largest speed."""
-    origin, width, low, count, base, buckets, start, order, level, cell = grid
+def find_walls(disks, watch, grid, ends, pace, neighbours):  # pragma: no cover - compiled
+    """Find the contacts of disks with walls; wall w is body nd + w.
+
+    Inputs
+    ------
+    disks, watch, grid : as of `find_disks`
+    ends : (nw, 2, 2) float64 [m]
+    pace : (nw,) float64, largest speed of each wall [m/s]
+    neighbours : EndNeighbours
+
+    Outputs
+    -------
+    names, values : as of `find_disks`
+    """
+    centre, radius, velocity, fixed, ahead, _ = disks
+    alert, reach, step = watch
+    width, level = grid.width, grid.level
     nd, nw = centre.shape[0], ends.shape[0]
     members = np.zeros(width.shape[0] + 1, dtype=np.int64)
     for i in range(nd):
@@ -142,9 +159,7 @@ def find_walls(
     for w in range(nw):
         for k in range(width.shape[0]):
             far = 0.5 * width[k] + step * pace[w]
-            found = cells_along(
-                ends[w], far, k, origin, width[k], low, count, base, buckets, start, order, cell, near
-            )
+            found = cells_along(ends[w], far, k, grid, near)
             if found < 0:
                 # the wall passes more cells than there are disks
                 found = members[k + 1] - members[k]
@@ -156,7 +171,7 @@ def find_walls(
                 x, y = centre[i, 0], centre[i, 1]
                 closing = step * (np.hypot(velocity[i, 0], velocity[i, 1]) + pace[w])
                 margin = alert * radius[i] + reach + closing + ahead[i]
-                feature, nx, ny, distance = _touch_wall(x, y, w, ends, start_of_end, wall, place, margin)
+                feature, nx, ny, distance = _touch_wall(x, y, w, ends, neighbours, margin)
                 if feature < 0 or distance - radius[i] > margin:
                     continue
                 if n == names.shape[0]:

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 
 from mechanics.contact.face_meshes import FaceMesh
-from mechanics.contact.surfaces import Placed, surfaces
+from mechanics.contact.surfaces import Placed, middles, surfaces
 from tests.pipelines.results_by_hand import BOX_FACES, box
 
 __all__ = ["BOTTOM", "KINDS", "TOP", "grid_mesh", "nodes_of", "two_boxes"]
@@ -81,7 +81,14 @@ def two_boxes(lower, upper, mesh_lower, mesh_upper, turn=None):
     rotation = np.array([np.eye(3), [[c, -s, 0], [s, c, 0], [0, 0, 1]]])
     centre = np.zeros((2, 3))
     vertex = np.vstack([vertices[0], vertices[1] @ rotation[1].T])
-    normal = np.vstack([shapes.normal[:6], shapes.normal[6:] @ rotation[1].T])
-    inside = np.array([vertex[:8].mean(axis=0), vertex[8:].mean(axis=0)])
+    normal = np.vstack([shapes.shapes.normal[:6], shapes.shapes.normal[6:] @ rotation[1].T])
     nodes = [mesh.reference @ rotation[f // 6].T for f, mesh in enumerate(meshes) if mesh is not None]
-    return shapes, Placed(vertex, normal, centre, rotation, inside), np.vstack([*nodes, np.zeros((0, 3))])
+    return (
+        shapes,
+        Placed(
+            shapes.shapes._replace(vertex=vertex, normal=normal, inside=middles(shapes.shapes.vptr, vertex)),
+            centre,
+            rotation,
+        ),
+        np.vstack([*nodes, np.zeros((0, 3))]),
+    )

@@ -165,7 +165,7 @@ def test_a_deformable_stone_shares_out_the_whole_overlap(other, degrees):
     model, state, contacts = detected(scene(fixed, base, upper))
     mine = (contacts.bodies == [2, 1]).all(axis=1)
     # one contact for each node of the finer face, its area ∫N
-    face = model.surfaces.face_mesh[model.surfaces.fptr[2]]
+    face = model.surfaces.face_mesh[model.surfaces.shapes.fptr[2]]
     assert mine.sum() == len(face.node)
     assert contacts.area[mine].sum() == pytest.approx(0.8 * 0.6, rel=1e-9)
     np.testing.assert_allclose(gaps(contacts, state), 0.0, atol=1e-12)

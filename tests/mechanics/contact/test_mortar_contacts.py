@@ -159,7 +159,10 @@ def test_both_sides_reproduce_constants_and_places_and_share_out_the_overlap(kin
         angle,
     )
     contacts = contacts_of(shapes, placed, nodes)
-    faces = [placed.vertex[shapes.corner[shapes.cptr[f] : shapes.cptr[f + 1]]] for f in (TOP, 6 + BOTTOM)]
+    faces = [
+        placed.shapes.vertex[placed.shapes.corner[placed.shapes.cptr[f] : placed.shapes.cptr[f + 1]]]
+        for f in (TOP, 6 + BOTTOM)
+    ]
     whole = moments(overlap(*faces, np.array([0.0, 0.0, 1.0]))[:, :2])[0]
     if whole < 1e-6 * 0.48:
         assert len(contacts) == 0

@@ -58,7 +58,7 @@ def test_each_part_is_a_shape_and_the_thinnest_one_is_the_size_of_the_stone():
     model, _ = build_model(scene(ground(), portal(), brick("a", (9, 0, 0), (10, 1, 1))))
     np.testing.assert_array_equal(model.surfaces.body, [0, 1, 1, 1, 2])
     np.testing.assert_array_equal(model.surfaces.sptr, [0, 1, 4, 5])
-    np.testing.assert_allclose(model.surfaces.shape_size, [1, 0.5, 0.5, 0.5, 1], rtol=1e-13)
+    np.testing.assert_allclose(model.surfaces.shapes.size, [1, 0.5, 0.5, 0.5, 1], rtol=1e-13)
     np.testing.assert_allclose(model.surfaces.size, [1, 0.5, 1], rtol=1e-13)
 
 
@@ -82,9 +82,11 @@ def test_the_facets_of_a_deformable_stone_lie_on_the_faces_of_its_parts(turn):
     for mesh in own.face_mesh:
         x = mesh.reference[mesh.facet]
         area.append(0.5 * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1).sum())
-    middle = np.array([own.vertex[c].mean(axis=0) for c in np.split(own.corner, own.cptr[1:-1])])
+    middle = np.array(
+        [own.shapes.vertex[c].mean(axis=0) for c in np.split(own.shapes.corner, own.shapes.cptr[1:-1])]
+    )
     middle = (middle + state.centre[0]) @ turn
-    normal = own.normal @ turn
+    normal = own.shapes.normal @ turn
     # the tops of both feet, and of the lintel's underside what does not lie on them
     seam = (np.abs(normal[:, 2]) > 0.9) & (np.abs(middle[:, 2] - 1.0) < 1e-9)
     assert sorted(np.array(area)[seam]) == pytest.approx([0.0, 0.0, 2.0], abs=1e-9)
@@ -92,11 +94,11 @@ def test_the_facets_of_a_deformable_stone_lie_on_the_faces_of_its_parts(turn):
     flat = np.abs(normal[:, 2]) > 0.9
     for face in np.flatnonzero(~seam):
         if inner[face] or flat[face]:
-            assert area[face] == pytest.approx(own.face_area[face], rel=1e-9)
+            assert area[face] == pytest.approx(own.shapes.face_area[face], rel=1e-9)
             assert not own.face_mesh[face].cut
         else:
             assert own.face_mesh[face].cut
-            assert area[face] > own.face_area[face] * 1.001
+            assert area[face] > own.shapes.face_area[face] * 1.001
 
 
 @pytest.mark.parametrize("element", [Element.HEX8, Element.HEX20, Element.TET10])

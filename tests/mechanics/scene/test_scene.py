@@ -82,7 +82,7 @@ def test_the_model_knows_the_stones_and_where_they_begin():
     np.testing.assert_allclose(
         state.node_velocity[nodes], np.array(velocity[:3]) + np.cross(velocity[3:], arm), atol=1e-12
     )
-    corners = model.surfaces.vertex[model.surfaces.vptr[1] : model.surfaces.vptr[2]]
+    corners = model.surfaces.shapes.vertex[model.surfaces.shapes.vptr[1] : model.surfaces.shapes.vptr[2]]
     np.testing.assert_allclose(state.centre[1] + corners, stones[1].vertices, atol=1e-13)
     assert model.inertia.inverse_mass.tolist() == [0.0, 1 / model.mass[1], 0.0]
 

@@ -18,7 +18,7 @@ ELEMENTS = {3: ElementTriP1, 4: ElementQuad1, 6: ElementTriP2, 8: ElementQuadS2,
 
 def values(kind, r, s):
     out = np.empty(9)
-    kernel.shapes(kind, r, s, out)
+    kernel.shape_functions(kind, r, s, out)
     return out[:kind]
 
 

@@ -23,13 +23,15 @@ coordinate = st.integers(-128, 128).map(lambda i: i / 64)
 
 def clipped(ring, a, b, side=2, slack=1e-9):
     """Kept corners (n, 3) and their labels."""
-    x, y, z = (np.zeros(kernel.MAX_POINTS) for _ in range(3))
-    label = np.zeros(kernel.MAX_POINTS, dtype=np.int64)
+    polygon, scratch = (
+        kernel.Polygon(*np.zeros((3, kernel.MAX_POINTS)), np.zeros(kernel.MAX_POINTS, dtype=np.int64))
+        for _ in range(2)
+    )
     count = len(ring)
-    x[:count], y[:count], z[:count], label[:count] = *ring.T, np.arange(count)
-    scratch = np.zeros_like(x), np.zeros_like(x), np.zeros_like(x), np.zeros_like(label)
-    count = kernel.clip(x, y, z, label, count, *a, *b, side, slack, *scratch)
-    return np.column_stack([x, y, z])[:count], label[:count].tolist()
+    for values, own in zip(polygon, (*ring.T, np.arange(count)), strict=True):
+        values[:count] = own
+    count = kernel.clip(polygon, count, tuple(map(float, a)), tuple(map(float, b)), side, slack, scratch)
+    return np.column_stack(polygon[:3])[:count], polygon.label[:count].tolist()
 
 
 def assert_same_ring(found, expected, atol):
@@ -79,16 +81,16 @@ def test_points_are_named_after_the_edge_that_begins_in_them():
 
 def points_of(first, second, kind, feature, axis=UP, points=4, inner=False, limit=0.1):
     """Contact points of one pair with a given feature: place, frame, nearest, area."""
-    stones = first, second
-    packed = surfaces(
-        [corners for corners, _ in stones], [faces for _, faces in stones],
-        [None] * sum(len(faces) for _, faces in stones), [0, 1],
-    )  # fmt: skip
-    return kernel.interface_points(
-        np.array([[0, 1]]), np.array([kind]), np.array([feature]), np.array([axis]), np.array([limit]),
-        points, inner, FLAT, THIN, packed.vptr, packed.vertex, packed.fptr, packed.cptr, packed.corner,
-        packed.normal, packed.eptr, packed.edge_a, packed.edge_b, packed.shape_size, packed.face_area,
-    )  # fmt: skip
+    pair = kernel.Pairs(
+        *map(np.array, ([[0, 1]], [limit], [False], [kind], [feature], [np.asarray(axis, dtype=float)]))
+    )
+    return kernel.interface_points(pair, points, inner, FLAT, THIN, packed(first, second))
+
+
+def packed(*stones):
+    """Polyhedra of stones, each given by corners and faces."""
+    corners, faces = zip(*stones, strict=True)
+    return surfaces(corners, faces, [None] * sum(map(len, faces)), range(len(stones))).shapes
 
 
 class Stack:
@@ -292,11 +294,10 @@ def test_two_edges_touch_in_the_feet_of_their_common_normal(seed):
     rng = np.random.default_rng(seed)
     first, second = ((box(-half, half) @ Rotation.random(random_state=rng).as_matrix().T, BOX_FACES)
                      for half in rng.uniform(0.3, 0.6, (2, 3)))  # fmt: skip
-    packed = surfaces([first[0], second[0]], [BOX_FACES] * 2, [None] * 12, [0, 1])
+    both = packed(first, second)
     one, two = int(rng.integers(12)), int(12 + rng.integers(12))
     a, b, c, d = (
-        packed.vertex[end]
-        for end in (packed.edge_a[one], packed.edge_b[one], packed.edge_a[two], packed.edge_b[two])
+        both.vertex[end] for end in (both.edge_a[one], both.edge_b[one], both.edge_a[two], both.edge_b[two])
     )
     axis = np.cross(b - a, d - c)
     assume(np.linalg.norm(axis) > 0.1)

@@ -20,20 +20,16 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def pack(first, second):
-    """Surfaces of two stones, each given by corners and faces."""
+    """Polyhedra of two stones, each given by corners and faces."""
     (one, one_faces), (two, two_faces) = first, second
     count = len(one_faces) + len(two_faces)
-    return surfaces([one, two], [one_faces, two_faces], [None] * count, [0, 1])
+    return surfaces([one, two], [one_faces, two_faces], [None] * count, [0, 1]).shapes
 
 
 def separating(first, second, alert=0.1, hint=-1):
     """Kind, feature and axis of one pair, and the hint that is left behind."""
     packed, hints = pack(first, second), np.array([hint])
-    kind, feature, axis = kernel.separating_axes(
-        np.array([[0, 1]]), np.array([alert]), hints, packed.vptr, packed.vertex, packed.fptr, packed.cptr,
-        packed.corner, packed.normal, packed.eptr, packed.edge_a, packed.edge_b, packed.edge_face,
-        np.array([first[0].mean(axis=0), second[0].mean(axis=0)]), packed.shape_size,
-    )  # fmt: skip
+    kind, feature, axis = kernel.separating_axes(np.array([[0, 1]]), np.array([alert]), hints, packed)
     return int(kind[0]), feature[0].tolist(), axis[0], int(hints[0])
 
 
@@ -124,7 +120,7 @@ def random_pair(seed, near=0.6):
     """Two stones, about as often apart as not."""
     rng = np.random.default_rng(seed)
     first, (corners, faces) = random_stone(rng), random_stone(rng)
-    return first, (corners + near * rng.normal(size=3), faces), pack(first, (corners, faces)).shape_size.min()
+    return first, (corners + near * rng.normal(size=3), faces), pack(first, (corners, faces)).size.min()
 
 
 @settings(max_examples=100, deadline=None)
