@@ -12,9 +12,9 @@ import mechanics.simulate
 from benchmarks.cost_scenes import Case
 from benchmarks.memory import peak_bytes
 from benchmarks.report import Row
-from mechanics.dynamics.clock import Clock
-from mechanics.dynamics.observers.energy import EnergyBalance
+from mechanics.dynamics.energy_balance import EnergyBalance
 from mechanics.dynamics.observers.equilibrium import imbalance
+from mechanics.dynamics.progress import Clock
 from mechanics.dynamics.simulation import Simulation
 from mechanics.dynamics.stopping import Watch
 from mechanics.model.model import build_model

@@ -18,8 +18,8 @@ from mechanics.arrays import Array
 from mechanics.contact.contacts import take
 from mechanics.delassus import rigid
 from mechanics.delassus.assembly import rigid_delassus
-from mechanics.dynamics.clock import Clock
 from mechanics.dynamics.contact_search import detector
+from mechanics.dynamics.progress import Clock
 from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
 from mechanics.planar.contacts import PlanarDetector

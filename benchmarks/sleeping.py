@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks.generated import box_faces, running_bond
 from benchmarks.report import Row, Table, guarded, machine, print_json, print_table, progress
 from mechanics.arrays import Array
-from mechanics.dynamics.observers.energy import EnergyBalance
+from mechanics.dynamics.energy_balance import EnergyBalance
 from mechanics.dynamics.observers.equilibrium import imbalance, support_reaction
 from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model

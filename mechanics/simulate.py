@@ -7,11 +7,11 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from mechanics.arrays import Array
-from mechanics.dynamics.clock import Clock
-from mechanics.dynamics.observers.energy import EnergyBalance, kinetic_energy
+from mechanics.dynamics.energy_balance import EnergyBalance
+from mechanics.dynamics.observers.energy import kinetic_energy
 from mechanics.dynamics.observers.equilibrium import imbalance, settlement, speed, support_reaction
 from mechanics.dynamics.outcome import Outcome, StaticStart
-from mechanics.dynamics.progress import Listener, Progress, silent
+from mechanics.dynamics.progress import Clock, Listener, Progress, silent
 from mechanics.dynamics.simulation import Simulation
 from mechanics.dynamics.static_start import static_start
 from mechanics.dynamics.step import Step

@@ -11,8 +11,8 @@ from mechanics.contact.detection import Detector
 from mechanics.delassus.assembly import mixed_delassus, rigid_delassus
 from mechanics.delassus.mixed import MixedDelassus
 from mechanics.delassus.rigid import RigidDelassus, schedule
-from mechanics.dynamics.clock import Clock
 from mechanics.dynamics.observers.equilibrium import displacement, speed
+from mechanics.dynamics.progress import Clock
 from mechanics.model.deformable import Compliance
 from mechanics.model.model import Model
 from mechanics.scene.state import State

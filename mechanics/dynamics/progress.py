@@ -1,9 +1,11 @@
-"""Progress of long computations and its listeners; a light module, for every stage of the pipelines."""
+"""Progress of long work, its listeners, and the time of each stage; light, so that every stage can use it."""
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
-__all__ = ["Listener", "Progress", "silent"]
+__all__ = ["Clock", "Listener", "Progress", "silent"]
 
 
 @dataclass(frozen=True)
@@ -21,3 +23,19 @@ Listener = Callable[[Progress], None]
 
 def silent(progress: Progress) -> None:
     """Ignore progress."""
+
+
+class Clock:
+    """Wall seconds by stage."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def __call__(self, stage: str) -> Iterator[None]:
+        """Add the time of a with-block to a stage."""
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - start

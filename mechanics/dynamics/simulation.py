@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 
 from mechanics.arrays import Bools
-from mechanics.dynamics.clock import Clock
 from mechanics.dynamics.contact_problem import contact_problem, shifted, unshifted
 from mechanics.dynamics.contact_search import ContactSearch
 from mechanics.dynamics.observers.energy import kinetic_energy
+from mechanics.dynamics.progress import Clock
 from mechanics.dynamics.relaxation import Relaxation, halted
 from mechanics.dynamics.sleeping import Sleepers
 from mechanics.dynamics.step import Step

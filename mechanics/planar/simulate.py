@@ -4,9 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mechanics.dynamics.clock import Clock
 from mechanics.dynamics.outcome import Outcome
-from mechanics.dynamics.progress import Progress
+from mechanics.dynamics.progress import Clock, Progress
 from mechanics.dynamics.stopping import LASTING
 from mechanics.planar.model import PlanarModel, PlanarState, build_planar_model
 from mechanics.planar.observers import (

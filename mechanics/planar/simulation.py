@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechanics.arrays import Array, Bools, Ints
-from mechanics.dynamics.clock import Clock
+from mechanics.dynamics.progress import Clock
 from mechanics.dynamics.warm_start import Memory
 from mechanics.planar.contacts import PlanarContacts, PlanarDetector
 from mechanics.planar.delassus import PlanarDelassus

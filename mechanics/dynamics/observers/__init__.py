@@ -1,5 +1,5 @@
-"""Energy balance and equilibrium of a scene in motion.
+"""Measures of a state: energies, imbalance, displacement, speed.
 
-Public: `EnergyBalance`, `kinetic_energy`, `elastic_energy` (energy); `imbalance`, `support_reaction`, `displacement`,
+Public: `kinetic_energy`, `elastic_energy` (energy); `imbalance`, `support_reaction`, `displacement`,
 `speed` (equilibrium).
 """

@@ -1,29 +1,17 @@
-"""Energy balance of the θ-scheme; energy that no term explains is an error of the program.
-
-With v_θ = θ v_{i+1} + (1-θ) v_i, the scheme gives exactly
-
-    ΔE = W_ext + W_contact - D_scheme,   W_contact = r·u_θ,   D_scheme = (θ - ½) (‖Δv‖²_M + ‖Δq‖²_K)
-
-where Δv is the jump at the kick, and Δq the change of the deformation of an elastic body in its own axes; its damping,
-h v_θᵀ V v_θ, counts with the scheme. The flights before and after the kick keep the energy of a body as it is. Elastic
-bodies that turn leave a remainder of the order of their strain. W_ext holds the loads and what driven bodies put in.
-"""
+"""Kinetic and elastic energy of a state."""
 
 import numpy as np
 
 from mechanics.arrays import Array
-from mechanics.delassus.assembly import local_velocity
-from mechanics.dynamics.step import Step
 from mechanics.model.model import Model
-from mechanics.model.stone_groups import ElasticGroup
 from mechanics.scene.state import State
 
-__all__ = ["EnergyBalance", "elastic_energy", "kinetic_energy"]
+__all__ = ["elastic_energy", "kinetic_energy", "mass_norm"]
 
 
 def kinetic_energy(model: Model, state: State) -> float:
     """Return ½ vᵀ M v of all bodies that can move [J]."""
-    return 0.5 * _mass_norm(model, state.rotation, state.velocity, state.node_velocity)
+    return 0.5 * mass_norm(model, state.rotation, state.velocity, state.node_velocity)
 
 
 def elastic_energy(model: Model, state: State) -> float:
@@ -35,7 +23,8 @@ def elastic_energy(model: Model, state: State) -> float:
     )
 
 
-def _mass_norm(model: Model, rotation: Array, velocity: Array, node_velocity: Array) -> float:
+def mass_norm(model: Model, rotation: Array, velocity: Array, node_velocity: Array) -> float:
+    """Return vᵀ M v of velocities of all bodies that can move [J]."""
     rigid = model.inertia.inverse_mass > 0
     local = np.einsum("bij,bi->bj", rotation[rigid], velocity[rigid, 3:])
     total = float(model.mass[rigid] @ (velocity[rigid, :3] ** 2).sum(axis=1))
@@ -45,99 +34,3 @@ def _mass_norm(model: Model, rotation: Array, velocity: Array, node_velocity: Ar
             v = node_velocity[model.nodes_of(b)].ravel()
             total += float(v @ (stone.operators.mass @ v))
     return total
-
-
-def _contact_work(model: Model, step: Step, theta: float) -> tuple[float, float]:
-    """Return r·u_θ, the work of the contacts, and the work that driven bodies put in through them [J]."""
-    contacts, operator, impulse = step.found.contacts, step.found.operator, step.active.impulse
-    before, after = step.predicted.velocity, step.kick.velocity
-    u_before = local_velocity(contacts, operator, before, step.predicted.node_velocity)
-    work = float(np.sum(impulse * (theta * step.relative + (1 - theta) * u_before)))
-    driven = np.where(model.fixed[:, None], theta * after + (1 - theta) * before, 0.0)
-    u_driven = local_velocity(contacts, operator, driven, np.zeros_like(step.after.node))
-    return work, -float(np.sum(impulse * u_driven))
-
-
-def _elastic_dissipation(model: Model, step: Step, theta: float, duration: float) -> float:
-    """Return (θ - ½) ‖Δq‖²_K + h v_θᵀ V v_θ of all deformable bodies [J]."""
-    total = 0.0
-    for group in model.elastic_stones.groups:
-        stone, count = group.stone, len(group.bodies)
-        before, after = (
-            _in_axes(group, state, state.node, state.centre) for state in (step.before, step.after)
-        )
-        change = (after - before).reshape(count, -1)
-        total += (theta - 0.5) * float(np.sum(change.T * (stone.operators.stiffness @ change.T)))
-        if stone.damping.nnz:
-            mean = theta * step.kick.node_velocity + (1 - theta) * step.predicted.node_velocity
-            mean = _in_axes(group, step.predicted, mean).reshape(count, -1)
-            total += duration * float(np.sum(mean.T * (stone.damping @ mean.T)))
-    return total
-
-
-def _in_axes(group: ElasticGroup, state: State, nodal: Array, origin: Array | None = None) -> Array:
-    """Return nodal vectors (k, n, 3) of equal stones in their own axes."""
-    own = nodal[group.nodes]
-    if origin is not None:
-        own = own - origin[group.bodies, None]
-    turned: Array = own @ state.rotation[group.bodies]
-    return turned
-
-
-class EnergyBalance:
-    """Terms of the energy balance, summed over a run.
-
-    Attributes
-    ----------
-    external, contact, scheme : work of loads and driven bodies, work of the contacts, dissipation of scheme, damping
-        and relaxation, so far [J]
-    unexplained : ΔE - external - contact + scheme, so far [J]
-    reference : largest energy in any term so far, at least 10⁻⁹ of weight times smallest width [J]
-    """
-
-    def __init__(self, model: Model, state: State) -> None:
-        self._model = model
-        self._energy = kinetic_energy(model, state) + elastic_energy(model, state)
-        self.external = self.contact = self.scheme = self.unexplained = 0.0
-        weight = float(model.mass[~model.fixed].sum() * np.linalg.norm(model.gravity(state.time)))
-        self.reference = max(self._energy, 1e-9 * weight * float(model.surfaces.size.min()))
-
-    def __call__(self, step: Step) -> None:
-        """Account for one step."""
-        model, theta = self._model, self._model.scene.time.theta
-        before, kick = step.predicted, step.kick
-        contact, driven = _contact_work(model, step, theta)
-        external = self._load_work(step, theta) + driven
-        jump = _mass_norm(
-            model,
-            before.rotation,
-            kick.velocity - before.velocity,
-            kick.node_velocity - before.node_velocity,
-        )
-        scheme = (theta - 0.5) * jump + _elastic_dissipation(model, step, theta, model.scene.time.step)
-        energy = kinetic_energy(model, step.after) + elastic_energy(model, step.after)
-        self.unexplained += energy - self._energy - external - contact + scheme
-        self.external += external
-        self.contact += contact
-        self.scheme += scheme + step.relaxed
-        self._energy = energy - step.relaxed
-        self.reference = max(self.reference, energy, abs(self.external), abs(self.contact), self.scheme)
-
-    def _load_work(self, step: Step, theta: float) -> float:
-        """Return h P·v_θ: loads at the kick times the mean of the velocities before and after it [J]."""
-        model = self._model
-        moving, h = model.inertia.moving, model.scene.time.step
-        mean = theta * step.kick.velocity + (1 - theta) * step.predicted.velocity
-        work = h * float(np.sum(step.kick.load[moving] * mean[moving]))
-        gravity = model.gravity(step.predicted.time)
-        for b, stone in enumerate(model.stones):
-            if stone is not None:
-                rows = model.nodes_of(b)
-                move = (step.after.node - step.before.node)[rows]
-                work += float(stone.weight @ (move @ gravity))
-        return work
-
-    @property
-    def error(self) -> float:
-        """|unexplained| / reference [-]."""
-        return abs(self.unexplained) / self.reference if self.reference > 0 else 0.0

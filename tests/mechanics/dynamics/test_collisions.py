@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from mechanics.dynamics.observers.energy import EnergyBalance, kinetic_energy
+from mechanics.dynamics.energy_balance import EnergyBalance
+from mechanics.dynamics.observers.energy import kinetic_energy
 from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
 from mechanics.scene.laws.dry_joint import DryJoint

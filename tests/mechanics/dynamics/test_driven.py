@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mechanics.dynamics.observers.energy import EnergyBalance
+from mechanics.dynamics.energy_balance import EnergyBalance
 from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
 from mechanics.scene.loads.forces import StoneForce

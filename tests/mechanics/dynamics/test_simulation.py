@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mechanics.dynamics.observers.energy import EnergyBalance, elastic_energy, kinetic_energy
+from mechanics.dynamics.energy_balance import EnergyBalance
+from mechanics.dynamics.observers.energy import elastic_energy, kinetic_energy
 from mechanics.dynamics.observers.equilibrium import displacement, imbalance, speed, support_reaction
 from mechanics.dynamics.outcome import Outcome
 from mechanics.dynamics.simulation import Simulation

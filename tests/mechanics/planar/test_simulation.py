@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mechanics.dynamics.clock import Clock
 from mechanics.dynamics.outcome import Outcome
+from mechanics.dynamics.progress import Clock
 from mechanics.planar.contacts import PlanarDetector
 from mechanics.planar.model import build_planar_model
 from mechanics.planar.scene import Disk, PlanarScene, PlanarTime, Wall

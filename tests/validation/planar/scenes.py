@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mechanics.dynamics.clock import Clock
+from mechanics.dynamics.progress import Clock
 from mechanics.planar.model import build_planar_model
 from mechanics.planar.scene import Disk, PlanarScene, PlanarTime, Wall
 from mechanics.planar.simulate import simulate_planar
