@@ -115,7 +115,7 @@ class Tower(Structure):
 
 
 class Storey(Structure):
-    """What lies between two floors."""
+    """The part of a building between two floors."""
 
 
 class Wall(Structure):
