@@ -20,7 +20,7 @@ def compile_once() -> None:
     from numba.core.compiler_lock import global_compiler_lock
     from numba.core.dispatcher import Dispatcher, NullCache
 
-    folder = Path(tempfile.gettempdir()) / f"kernels-{os.environ['PYTEST_XDIST_TESTRUNUID']}"
+    folder = Path(tempfile.gettempdir()) / f"moma-kernel-locks-{os.getuid()}"
     folder.mkdir(exist_ok=True)
     compile_anywhere, held = Dispatcher.compile, set()
 
