@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from survey.arrays import Array, Bools, Ints
-from survey.geometry._kernels.cutting import FULL, cut_out
+from survey.geometry._kernels.cutting import FULL, CutSolid, cut_out
 from survey.geometry.solids import Solid, area_vector
 
 __all__ = ["CutStone", "common_part", "cut_stones", "joins_three", "moves"]
@@ -196,7 +196,9 @@ def _intersect(planes: Array, centre: Array, reach: float, code: str) -> CutSton
     vertices = np.empty((16 * room, 3))
     loops, sizes = np.empty((room + 1, _MOST), np.int64), np.empty(room + 1, np.int64)
     of_face = np.empty(room + 1, np.int64)
-    status, corners, faces = cut_out(local, np.zeros(3), reach, _NEAR, vertices, loops, sizes, of_face)
+    status, corners, faces = cut_out(
+        local, np.zeros(3), reach, _NEAR, CutSolid(vertices, loops, sizes, of_face)
+    )
     if status != FULL:
         return None
     named = tuple(tuple(loops[f, : sizes[f]].tolist()) for f in range(faces))

@@ -1,11 +1,14 @@
 """Numba kernel that fits the plane half-way between the faces on either hand of a joint."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-__all__ = ["continuing_faces", "fit_middle_planes"]
+from survey.arrays import Array, Bools, Ints
+
+__all__ = ["JointCorners", "continuing_faces", "fit_middle_planes"]
 
 _ROUNDS = 30
 _HUBER = 1.5
@@ -33,27 +36,46 @@ _WEDGE = 0.035
 """Opening of a joint, as a slope, from which the two hands may have planes of their own (2°)."""
 
 
+class JointCorners(NamedTuple):
+    """Corners of the faces of several joints, joint after joint.
+
+    Attributes
+    ----------
+    points : (k, 3) in the frame of their joint: along it, along it, across [m]
+    hands : (k,) +1 above the joint, -1 below
+    sound : (k,) whether a corner is known from measurement
+    starts : (n + 1,) index of the first corner of each joint
+    scales : (n,) divisors of the coordinates of each joint [m]
+    """
+
+    points: Array
+    hands: Array
+    sound: Bools
+    starts: Ints
+    scales: Array
+
+
 @njit(cache=True)
-def fit_middle_planes(points, hands, sound, starts, scales, usual, straightness, planes, values):
+def fit_middle_planes(corners, usual, straightness, planes, values):
     """For each joint the plane half-way between the faces on either hand.
 
     In the frame of a joint a corner at (x, y) on hand s = ±1 is at the height z = a + b x + c y + s (w + p x + q y)/2.
     The middle plane is a + b x + c y; w is the width. The opening p, q is taken for zero unless it explains most of
     what is left over: two faces tell their mean direction better than each its own.
 
-    Parameters
-    ----------
-    points : (k, 3) corners in the frame of their joint: along it, along it, across [m]
-    hands : (k,) +1 above the joint, -1 below
-    sound : (k,) whether a corner is known from measurement
-    starts : (n + 1,) where the corners of each joint begin
-    scales : (n,) by which the coordinates of each joint are divided [m]
-    usual : usual width [m]; negative: not known
-    straightness : residual of a sound corner above which it is off the joint [m]
-    planes : (n, 3) into which a, b, c are written
-    values : (n, 5), zero, for width, rms, and of sound corners the largest residual, the share of those off, and the
-        largest residual of the others
+    Inputs
+    ------
+    corners : JointCorners
+    usual : float, usual width of joints [m]; negative: not known
+    straightness : float, residual of a sound corner above which it is off the joint [m]
+
+    Outputs
+    -------
+    planes : (n, 3) float64, a [m], b, c [-]
+    values : (n, 5) float64, zero on entry: width [m], rms [m], and of sound corners the largest residual [m], the
+        share of those off [-], and the largest residual of the others [m]
     """
+    points, hands, sound, starts, scales = corners
     for j in range(starts.shape[0] - 1):
         rows = slice(starts[j], starts[j + 1])
         _fit(points[rows], hands[rows], sound[rows], scales[j], usual, straightness, planes[j], values[j])

@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import connected_components
 
 from survey.arrays import Array, Bools, Ints
 from survey.geometry.adjacency import Polyhedra
-from survey.joints._kernels import continuing_faces, fit_middle_planes
+from survey.joints._kernels import JointCorners, continuing_faces, fit_middle_planes
 from survey.joints.bent_beds import bent
 from survey.joints.facing import FacePlanes, FacingFaces
 from survey.joints.settings import JointSettings
@@ -276,17 +276,10 @@ def _fitted(faces: StoneFaces, groups: _Groups, usual: float, settings: JointSet
     scale = np.ones(count)
     np.maximum.at(scale, joint, np.abs(local[:, :2]).max(axis=1))
     planes, values = np.zeros((count, 3)), np.zeros((count, 5))
-    fit_middle_planes(
-        np.ascontiguousarray(local),
-        np.repeat(groups.hands, sizes),
-        faces.sound[corner],
-        starts,
-        scale,
-        usual,
-        settings.straightness,
-        planes,
-        values,
+    corners = JointCorners(
+        np.ascontiguousarray(local), np.repeat(groups.hands, sizes), faces.sound[corner], starts, scale
     )
+    fit_middle_planes(corners, usual, settings.straightness, planes, values)
     normal = axes[:, 2] - planes[:, 1:2] * axes[:, 0] - planes[:, 2:3] * axes[:, 1]
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     offset = (normal * (centre + planes[:, :1] * axes[:, 2])).sum(axis=1)

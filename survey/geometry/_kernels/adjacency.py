@@ -241,7 +241,7 @@ def touching_faces(pairs, solid, planes, limits, out_pairs, out):
                 )
                 if facing > -cosine or _boxes_apart(boxes, i, j, width):
                     continue
-                if _contact(i, j, one, two, facing, solid, planes, limits, work, row):
+                if _contact((i, j), (one, two), facing, solid, planes, limits, work, row):
                     count = _add(groups, count, row)
         for g in range(count):
             _finish(groups[g])
@@ -274,7 +274,7 @@ def facing_faces(pairs, solid, planes, limits, out_faces, out):
                 )
                 if facing > -cosine or _boxes_apart(boxes, i, j, width):
                     continue
-                if _contact(i, j, one, two, facing, solid, planes, limits, work, row):
+                if _contact((i, j), (one, two), facing, solid, planes, limits, work, row):
                     if total < out.shape[0]:
                         out_faces[total, 0], out_faces[total, 1] = i, j
                         out[total] = row
@@ -283,11 +283,12 @@ def facing_faces(pairs, solid, planes, limits, out_faces, out):
 
 
 @njit(cache=True)
-def _contact(i, j, one, two, facing, solid, planes, limits, work, row):
-    """Whether face i of one solid touches face j of another; area, gap, place and normal (8,) into `row`.
+def _contact(faces, solids, facing, solid, planes, limits, work, row):
+    """Return whether a face of one solid touches a face of another; write area, gap, place and normal (8,) to `row`.
 
     `facing` is the cosine of the angle between their normals, about -1.
     """
+    (i, j), (one, two) = faces, solids
     vertices, corners, face_starts = solid[:3]
     normals, areas, convex = planes[0], planes[1], planes[3]
     width, overlap, share = limits[0], limits[1], limits[3]

@@ -1,6 +1,7 @@
 """Numba kernel that takes corners out of the outline of a face, one by one, as long as that is honest."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -9,6 +10,21 @@ __all__ = ["square"]
 
 _STRAIGHT = 0.34  # sine of 20°: a corner that turns less may lie half-way along a side
 _PARALLEL = 1e-9  # sine below which two sides do not meet
+
+
+class Bounds(NamedTuple):
+    """Limits of one round of corner removal.
+
+    Attributes
+    ----------
+    shift : distance by which a measured corner may end up off the outline [m]
+    restored : distance by which a worn corner may be restored [m]
+    straight : sine of the turn below which a corner may be removed; 0: any corner [-]
+    """
+
+    shift: float
+    restored: float
+    straight: float
 
 
 @njit(cache=True)
@@ -43,8 +59,8 @@ def square(flat, worn, limits):
         return polygon[:m].copy(), source, width, depth
     little = min(tolerance, limits[1] * width)
     # corners half-way along a side first: none of two short pieces of a side is a good one to prolong
-    m = _reduce(flat, worn, polygon, labels, m, 3, little, little, _STRAIGHT)
-    m = _reduce(flat, worn, polygon, labels, m, 4, shift, restored, 0.0)
+    m = _reduce(flat, worn, polygon, labels, m, 3, Bounds(little, little, _STRAIGHT))
+    m = _reduce(flat, worn, polygon, labels, m, 4, Bounds(shift, restored, 0.0))
     first = 0
     for k in range(m):
         if _apart(polygon[k], flat[0]) < _apart(polygon[first], flat[0]):
@@ -61,11 +77,9 @@ def _apart(a, b):
 
 
 @njit(cache=True)
-def _reduce(flat, worn, polygon, source, m, few, shift, restored, straight):
-    """Take out corners of a convex polygon, each time by the smallest allowed change of area; how many are left.
-
-    With `straight` above zero, only corners at which the outline turns by less than this sine.
-    """
+def _reduce(flat, worn, polygon, source, m, few, bounds):
+    """Remove corners of a convex polygon, always by the smallest allowed change of area; return how many are left."""
+    shift, restored, straight = bounds
     n = len(flat)
     trial, labels = np.empty((n, 2)), np.empty(n, np.int64)
     best, best_labels = np.empty((n, 2)), np.empty(n, np.int64)
