@@ -1,4 +1,4 @@
-"""Numba kernel that cuts a convex polyhedron out by its planes."""
+"""Numba kernel that cuts a convex polyhedron by its planes."""
 
 from typing import NamedTuple
 
@@ -10,14 +10,14 @@ from survey.arrays import Array, Ints
 __all__ = ["EMPTY", "FULL", "OPEN", "CutSolid", "cut_out"]
 
 FULL, EMPTY, OPEN = 0, 1, 2
-"""What came of it: a solid, nothing, or something that the planes do not close."""
+"""Outcome: a solid, nothing, or something that the planes do not close."""
 
 _MOST = 64
-"""Corners of a face, at most."""
+"""Largest number of corners of a face."""
 
 
 class CutSolid(NamedTuple):
-    """Room for a polyhedron that is being cut.
+    """Arrays for a polyhedron that is being cut.
 
     Attributes
     ----------
@@ -35,11 +35,11 @@ class CutSolid(NamedTuple):
 
 @njit(cache=True)
 def cut_out(planes, centre, reach, near, solid):
-    """Intersection of half-spaces n·x ≤ d within a box about a centre.
+    """Compute the intersection of half-spaces n·x ≤ d within a box about a centre.
 
     A box is cut by one plane after another. Corners within `near` of a plane count as lying on it, which keeps the
-    result closed whatever rounding does: what a plane leaves of the faces has one open ring of edges, and its new face
-    closes that. At the end each corner is put where three of its planes cross, those at the widest angles.
+    result closed whatever the rounding: the faces left by a plane have one open ring of edges, which its new face
+    closes. At the end each corner is put at the intersection of three of its planes, those at the widest angles.
 
     Inputs
     ------
