@@ -1,4 +1,4 @@
-"""What counts as a joint between two surveyed stones, and what becomes of it."""
+"""Settings of joint closing: criteria of a joint between two surveyed stones, and its treatment."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -7,11 +7,11 @@ __all__ = ["JointMode", "JointSettings"]
 
 
 class JointMode(StrEnum):
-    """What becomes of the open joints of a survey.
+    """Treatment of the open joints of a survey.
 
-    CLOSE: both stones are led to the middle of the joint and share its plane (dry joints). MORTAR: so too, and the
-    width that was open is kept as the thickness of the mortar, which the plane then stands for. AS_SURVEYED: stones
-    keep their measured sides, gaps and all.
+    CLOSE: both stones are extended to the middle of the joint and share its plane (dry joints). MORTAR: likewise, and
+    the open width is kept as the thickness of the mortar, which the plane then represents. AS_SURVEYED: stones keep
+    their measured sides and gaps.
     """
 
     CLOSE = "close"
@@ -21,13 +21,13 @@ class JointMode(StrEnum):
 
 @dataclass(frozen=True)
 class JointSettings:
-    """What counts as a joint, what becomes of it, and how far closing it may move a stone.
+    """Criteria of a joint, its treatment, and bounds on the displacement of stones.
 
     Attributes
     ----------
-    mode : what becomes of joints
-    max_width : faces farther apart do not touch [m]
-    max_angle : faces that open wider do not face each other [degrees]
+    mode : treatment of joints
+    max_width : largest distance of faces that touch [m]
+    max_angle : largest opening of faces that face each other [degrees]
     min_overlap : narrowest strip in which two faces must face each other [m]
     straightness : largest distance of a sound corner from its side of a joint that is taken as one plane [m]
     max_displacement : largest distance by which a corner may move [m]

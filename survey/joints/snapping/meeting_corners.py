@@ -1,9 +1,9 @@
-"""Corners of folds in which neighbours lie.
+"""Corners of folds where neighbours meet.
 
-Convex stones on either side of a plane never overlap, wherever their corners lie in it. Of a stone that is folded
-in, and touches others on both sides of the fold, the one side does not keep a neighbour of the other from reaching
-around the edge into it; unless the plane between the two neighbours passes through that very edge. So the corners
-of the fold lie on the planes of all stones that meet there.
+Convex stones on opposite sides of a plane never overlap, wherever their corners lie in it. Where a non-convex stone
+touches others on both sides of a fold, the plane of one side does not keep the neighbour on the other from reaching
+around the edge into the stone, unless the plane between the two neighbours passes through that very edge. So the
+corners of the fold lie on the planes of all stones that meet there.
 """
 
 from collections.abc import Sequence, Set
@@ -24,11 +24,11 @@ def meeting_corners(solids: Sequence[Solid], touching: Set[int], reach: float) -
     ----------
     solids : closed
     touching : numbers of the faces that touch others, counted through all solids
-    reach : corners no farther apart meet [m]
+    reach : largest distance of corners that meet [m]
 
     Returns
     -------
-    for each corner of a fold, counted through all solids, the nearest corner of each other solid that it meets
+    for each corner of a fold, counted through all solids, the nearest corner of each other solid within reach
     """
     starts = np.cumsum([0, *(len(one.vertices) for one in solids)])
     first_face = np.cumsum([0, *(len(one.faces) for one in solids)])

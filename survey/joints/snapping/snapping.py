@@ -1,11 +1,10 @@
-"""Solids whose coordinates were rounded: faces of neighbours that match but for a tolerance come to lie in one plane.
+"""Snapping of solids with rounded coordinates: matching faces of neighbours come to lie in one plane.
 
-Which faces belong together is found first (`survey.joints.snapping.matching_faces`); then corners and planes are
-moved together (`survey.geometry.plane_network`), each stone keeping its corners, edges and faces, all faces of which
-become plane to the last digit. Where a corner would have to move farther than the tolerance, what ties it is let go,
-one thing after the other until it stays: first corners of folds (`survey.joints.snapping.meeting_corners`) and planes
-that are common only at a seam, then the planeness of a free face, which is folded, and last the contact itself, which
-is left open and listed.
+Faces that belong together are found first (`survey.joints.snapping.matching_faces`). Then corners and planes are
+adjusted together (`survey.geometry.plane_network`); each stone keeps its corners, edges and faces, and all faces become
+planar to the last digit. Where a corner would have to move farther than the tolerance, its constraints are released
+one after another until it stays: first corners of folds and planes that are common only at a seam, then the planarity
+of a free face, which is folded, and last the contact itself, which is left open and listed.
 """
 
 from collections import Counter
@@ -26,7 +25,7 @@ __all__ = ["snap"]
 
 Polygon = tuple[int, ...]
 
-_EXACT = 1e-12  # of the size of all: farther from its planes no corner may stay
+_EXACT = 1e-12  # of the size of all: largest distance of a corner from its planes
 
 
 def snap(solids: Sequence[Solid], tolerance: float) -> tuple[tuple[Solid, ...], Snapping]:
@@ -34,12 +33,12 @@ def snap(solids: Sequence[Solid], tolerance: float) -> tuple[tuple[Solid, ...], 
 
     Parameters
     ----------
-    solids : closed, their faces plane within the tolerance
-    tolerance : farther than this no corner moves, and faces that are farther out of one plane do not match [m]
+    solids : closed, their faces planar within the tolerance
+    tolerance : largest displacement of a corner, and largest distance of matching faces from one plane [m]
 
     Returns
     -------
-    the solids, with the same corners in the same order, and what was changed
+    the solids, with the same corners in the same order, and a report of the changes
     """
     assembly = _Assembly(solids, tolerance)
     assembly.settle()
@@ -47,7 +46,7 @@ def snap(solids: Sequence[Solid], tolerance: float) -> tuple[tuple[Solid, ...], 
 
 
 class _Assembly:
-    """All solids with their corners and faces numbered through, and what ties them."""
+    """All solids with their corners and faces numbered consecutively, and their constraints."""
 
     def __init__(self, solids: Sequence[Solid], tolerance: float) -> None:
         self._given, self._tolerance = solids, tolerance
@@ -69,8 +68,8 @@ class _Assembly:
         self._settled = Settled(self._vertices, np.empty((0, 3)), np.empty(0))
 
     def settle(self) -> None:
-        """Move corners onto their planes; let go what would move one too far."""
-        while True:  # each round lets go of something, and triangles on their own stay where they are
+        """Move corners onto their planes; release constraints that would move one too far."""
+        while True:  # each round releases a constraint, and unmatched triangles stay in place
             self._join()
             corner, plane = self._incidences()
             if not len(corner):
@@ -83,7 +82,7 @@ class _Assembly:
             self._let_go(moved)
 
     def _join(self) -> None:
-        """Give each face its plane."""
+        """Assign a plane to each face."""
         corners = [self._vertices[list(face)] for face in self._faces]
         self._plane, apart = common_planes(corners, self._owner, self._matches, self._tolerance)
         for match in apart:
@@ -91,7 +90,7 @@ class _Assembly:
             self._open.append((match, "others that share their planes are too far from a common one"))
 
     def _incidences(self) -> tuple[Ints, Ints]:
-        """Which corner lies on which plane; a triangle of its own has no need of one."""
+        """Return the corner and plane of each incidence; an unmatched triangle needs no plane."""
         count = Counter(self._plane[k] for k in self._present())
         planes: dict[int, set[int]] = {}
         for k in self._present():
@@ -109,7 +108,7 @@ class _Assembly:
         return (k for k in range(len(self._faces)) if k not in self._gone)
 
     def _let_go(self, moved: Array) -> None:
-        """At the corners that move too far, one tie each; of corners with a common plane only the worst."""
+        """Release one constraint at each corner that moves too far, only the worst of those with a common plane."""
         at: dict[int, list[int]] = {}
         for k in self._present():
             for i in self._faces[k]:
@@ -148,11 +147,11 @@ class _Assembly:
         self._gone.add(face)
         self._faces += pieces
         self._owner += [self._owner[face]] * len(pieces)
-        self._plane += [-1] * len(pieces)  # until all get their planes anew
+        self._plane += [-1] * len(pieces)  # until planes are assigned again
         self._folded[self._owner[face]] += 1
 
     def solids(self) -> tuple[Solid, ...]:
-        """The solids as they are now."""
+        """Return the current solids."""
         faces: list[list[Polygon]] = [[] for _ in self._given]
         for k in self._present():
             owner = self._owner[k]
@@ -165,7 +164,7 @@ class _Assembly:
         )
 
     def report(self) -> Snapping:
-        """What was changed."""
+        """Return a report of the changes."""
         moved = np.linalg.norm(self._settled.vertices - self._vertices, axis=1)
         shared = {self._plane[one.faces[0]] for one in self._matches if one.area > 0.0}
         return Snapping(
