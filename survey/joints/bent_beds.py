@@ -16,7 +16,7 @@ from survey.geometry.adjacency import Polyhedra
 from survey.joints.facing import FacePlanes, FacingFaces
 from survey.joints.settings import JointSettings
 
-__all__ = ["bent"]
+__all__ = ["fit_bent_bed"]
 
 
 _FINE = 0.5  # of the straightness: distance from the chain that is preferred for corners
@@ -71,7 +71,7 @@ class _Chain:
         return float((self.residuals > far).mean()) if len(self.residuals) else 0.0
 
 
-def bent(
+def fit_bent_bed(
     solids: Polyhedra,
     planes: FacePlanes,
     sound: Bools,

@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import connected_components
 from survey.arrays import Array, Bools, Ints
 from survey.geometry.adjacency import Polyhedra
 from survey.joints._kernels import JointCorners, continuing_faces, fit_middle_planes
-from survey.joints.bent_beds import bent
+from survey.joints.bent_beds import fit_bent_bed
 from survey.joints.facing import FacePlanes, FacingFaces
 from survey.joints.settings import JointSettings
 
@@ -145,7 +145,7 @@ class _Found:
 
     def add_bent(self, links: Ints, settings: JointSettings, off: float) -> bool:
         """Add several planes for a bent joint; return False if no chain of planes fits it."""
-        found = bent(
+        found = fit_bent_bed(
             self.faces.solids, self.faces.planes, self.faces.sound, self.facing, links, settings, off
         )
         if found is None:

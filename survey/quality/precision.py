@@ -89,7 +89,7 @@ class StoneQuality:
 
     @property
     def measured(self) -> bool:
-        """Whether its plane is fitted to points of its own."""
+        """True if its plane is fitted to points of its own."""
         return self.source == "points"
 
 

@@ -8,17 +8,18 @@ of a free face, which is folded, and last the contact itself, which is left open
 """
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from survey.arrays import Array, Ints
+from survey.geometry.convexity import is_convex, reflex_edges
 from survey.geometry.folds import fold
 from survey.geometry.plane_network import Settled, settle
 from survey.geometry.solids import Solid
 from survey.joints.snapping.matching_faces import Match, common_planes, find_matches
-from survey.joints.snapping.meeting_corners import meeting_corners
 from survey.records.snapping import OpenContact, Snapping
 
 __all__ = ["snap"]
@@ -62,7 +63,7 @@ class _Assembly:
         self._gone: set[int] = set()  # faces that were folded: their pieces follow at the end
         self._matches = list(find_matches(solids, tolerance))
         touching = {k for one in self._matches if one.area > 0.0 for k in one.faces}
-        self._folds = meeting_corners(solids, touching, 2.0 * tolerance)
+        self._folds = _meeting_corners(solids, touching, 2.0 * tolerance)
         self._open: list[tuple[Match, str]] = []
         self._plane: list[int] = []
         self._settled = Settled(self._vertices, np.empty((0, 3)), np.empty(0))
@@ -181,3 +182,47 @@ class _Assembly:
                 for one, why in self._open
             ),
         )
+
+
+def _meeting_corners(solids: Sequence[Solid], touching: Set[int], reach: float) -> dict[int, tuple[int, ...]]:
+    """Find the corners of folds between touching faces, and the corners of other solids that meet them.
+
+    Convex stones on opposite sides of a plane never overlap, wherever their corners lie in it. Where a non-convex stone
+    touches others on both sides of a fold, the plane of one side does not keep the neighbour on the other from reaching
+    around the edge into the stone, unless the plane between the two neighbours passes through that very edge. So the
+    corners of the fold lie on the planes of all stones that meet there.
+
+    Parameters
+    ----------
+    solids : closed
+    touching : numbers of the faces that touch others, counted through all solids
+    reach : largest distance of corners that meet [m]
+
+    Returns
+    -------
+    for each corner of a fold, counted through all solids, the nearest corner of each other solid within reach
+    """
+    starts = np.cumsum([0, *(len(one.vertices) for one in solids)])
+    first_face = np.cumsum([0, *(len(one.faces) for one in solids)])
+    folds = {
+        int(starts[k]) + i
+        for k, one in enumerate(solids)
+        if not is_convex(one)
+        for edge in reflex_edges(one)
+        if {int(first_face[k]) + edge.first, int(first_face[k]) + edge.second} <= touching
+        for i in edge.corners
+    }
+    if not folds:
+        return {}
+    vertices = np.concatenate([one.vertices for one in solids])
+    owner = np.repeat(np.arange(len(solids)), np.diff(starts))
+    tree = cKDTree(vertices)
+    found = {}
+    for i in sorted(folds):
+        near = tree.query_ball_point(vertices[i], reach)
+        near.sort(key=lambda j: (float(np.linalg.norm(vertices[j] - vertices[i])), j))
+        nearest: dict[int, int] = {}
+        for j in near:
+            nearest.setdefault(int(owner[j]), j)
+        found[i] = tuple(j for one, j in nearest.items() if one != owner[i])
+    return {i: others for i, others in found.items() if others}

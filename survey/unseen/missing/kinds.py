@@ -78,7 +78,7 @@ class Filling:
 
     @property
     def usual(self) -> bool:
-        """Whether stones of such lengths are known on the facade."""
+        """True if stones of such lengths are known on the facade."""
         return abs(self.off) <= _UNLIKELY
 
 
