@@ -67,6 +67,17 @@ def close_joints(
     ------
     GeometryError
         naming the stone, if two have one code, one is degenerate, or one has too many convex parts
+
+    Examples
+    --------
+    >>> from survey.formats.reading import open_survey
+    >>> from survey.stones import survey_stones
+    >>> survey = open_survey("data/samples/window/window.moma", "moma")
+    >>> closed = close_joints([stone for stone in survey_stones(survey).stones if stone.course == 1])
+    >>> len(closed.solids), len(closed.report.joints), len(closed.report.gaps)
+    (10, 9, 0)
+    >>> round(1000 * max(joint.width for joint in closed.report.joints), 1)  # mm
+    15.2
     """
     settings = settings or JointSettings()
     blocky = tuple(stone if isinstance(stone, BlockyStone) else simplify(stone) for stone in stones)
