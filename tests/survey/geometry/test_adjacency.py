@@ -1,4 +1,4 @@
-"""Which stones touch, where and how much: against walls, arches and corners of which every joint is known."""
+"""Adjacency of stones, with area and place: against walls, arches and corners of which every joint is known."""
 
 import time
 from itertools import pairwise
@@ -25,27 +25,27 @@ def gathered(solids):
 
 
 def inset(block, by):
-    """A box with every side moved in, as a stone ends before the middle of its joint."""
+    """Shrink a box on all sides, as a stone ends before the middle of its joint."""
     vertices = np.asarray(block.vertices)
     middle = vertices.mean(axis=0)
     return vertices - by * np.sign(vertices - middle), block.faces
 
 
 def found(touching):
-    """{(first, second): area} of pairs that come once."""
+    """Return {(first, second): area} of pairs that occur once."""
     pairs = [tuple(pair) for pair in touching.pairs.tolist()]
     assert len(set(pairs)) == len(pairs)
     return dict(zip(pairs, touching.area.tolist(), strict=True))
 
 
 def prism(outline, low, high):
-    """A polygon (n, 2) of the x–z plane, from y = low to y = high."""
+    """Return a prism on a polygon (n, 2) of the x–z plane, from y = low to y = high."""
     block = masonry.prism("", outline, high - low, at=(low + high) / 2)
     return block.vertices, block.faces
 
 
 def wall(count=4, rows=5, length=0.6, height=0.3, depth=0.4):
-    """A running bond, its solids, and the joints that it must have: {(first, second): area}."""
+    """Return a running bond: its solids, and the joints that it must have: {(first, second): area}."""
     courses = masonry.bond(count, rows, halves_first=True)
     blocks = masonry.running_bond(courses, length, height, depth)
     ends = [[0.0, *np.cumsum(course)] for course in [[sum(courses[0])], *courses]]
@@ -272,7 +272,7 @@ def test_nothing_touches_nothing():
 
 
 def noisy_wall(seed, sigma=0.003):
-    """Hexahedra with slightly tilted faces, joints a centimetre wide, of a wall and of an arch."""
+    """Return hexahedra with slightly tilted faces, joints a centimetre wide, of a wall and of an arch."""
     rng = np.random.default_rng(seed)
     stones = [inset(block, 0.005) for block in wall(3, 3)[0]]
     stones += solids_of(masonry.semicircular_arch(7, 0.4, 1.2, 0.4))

@@ -1,4 +1,4 @@
-"""Stones that are not convex, cut into convex parts; the truth is counted in cubes, or known from how they are made."""
+"""Convex parts of non-convex stones; the truth is counted in cubes, or known from the construction."""
 
 from itertools import pairwise, product
 
@@ -18,7 +18,7 @@ Cell = tuple[int, ...]
 
 
 def turned(solid: Solid, seed: int, far: float = 0.0) -> Solid:
-    """The same solid anywhere else, in any direction."""
+    """Return the same solid elsewhere, in any direction."""
     random = np.random.default_rng(seed)
     turn = np.linalg.qr(random.normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
@@ -26,7 +26,7 @@ def turned(solid: Solid, seed: int, far: float = 0.0) -> Solid:
 
 
 def extruded(outline: list[tuple[float, float]], depth: float = 1.0) -> Solid:
-    """A prism over a simple polygon in the plane of x and z, counter-clockwise seen from -y."""
+    """Return a prism over a simple polygon in the plane of x and z, counter-clockwise seen from -y."""
     n = len(outline)
     front = np.array([(x, 0.0, z) for x, z in outline])
     faces = [tuple(range(n)), tuple(range(2 * n - 1, n - 1, -1))]
@@ -35,7 +35,7 @@ def extruded(outline: list[tuple[float, float]], depth: float = 1.0) -> Solid:
 
 
 def cubes(cells: set[Cell]) -> Solid:
-    """The surface of unit cubes, square by square."""
+    """Return the surface of unit cubes, square by square."""
     number: dict[Cell, int] = {}
     faces = []
     for cell in sorted(cells):
@@ -61,7 +61,7 @@ def hull_volume(solid: Solid) -> float:
 
 
 def check_parts(solid: Solid, volume: float) -> tuple[Solid, ...]:
-    """They are convex and closed, and as large as the whole; the parts as they come."""
+    """Check that the parts are convex, closed, and as large as the whole; return them."""
     parts = convex_parts(solid)
     size = float(np.ptp(solid.vertices, axis=0).max())
     far = 4 * np.spacing(np.abs(solid.vertices).max()) / size
@@ -131,7 +131,7 @@ def _signed(solid: Solid) -> float:
 
 @st.composite
 def heaps(draw: st.DrawFn) -> set[Cell]:
-    """Cubes that hang together by faces, without edges or corners at which they touch only."""
+    """Draw cubes connected by faces, without edges or corners that are their only contact."""
     cells: set[Cell] = {(0, 0, 0)}
     for _ in range(draw(st.integers(1, 5))):
         start = draw(st.sampled_from(sorted(cells)))
@@ -151,7 +151,7 @@ def heaps(draw: st.DrawFn) -> set[Cell]:
 
 
 def _hang_together(steps: list[Cell]) -> bool:
-    """Whether octants about a corner are all neighbours of neighbours."""
+    """Return whether octants about a corner are connected."""
     if not steps:
         return True
     reached, waiting = {steps[0]}, [steps[0]]

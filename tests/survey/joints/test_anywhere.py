@@ -1,4 +1,4 @@
-"""Closed stones are the same in any order, wherever they stand, and once more closed."""
+"""Invariance of joint closing: in any order, at any place, and when repeated."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from tests.survey.plain_blocks import as_stone, bond, moved
 
 
 def as_it_was(closed: ClosedStones) -> list[BlockyStone]:
-    """The closed stones as if they had been simplified to that."""
+    """Return the closed stones as if they had been simplified to that."""
     return [replace(one, solid=solid) for one, solid in zip(closed.simplified, closed.solids, strict=True)]
 
 

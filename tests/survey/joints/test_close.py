@@ -1,4 +1,4 @@
-"""Closing the joints of small assemblies whose closed shape is known, wherever they stand and in whatever order."""
+"""Joint closing of small assemblies whose closed shape is known, at any place and in any order."""
 
 import re
 from collections.abc import Sequence
@@ -35,7 +35,7 @@ CORNERED = drawn("L", [(0, 0), (1, 0), (1, 0.3), (0.4, 0.3), (0.4, 0.6), (0, 0.6
 
 
 def roofed(solid: Solid) -> Solid:
-    """The L with a roof of four sides on its arm: where these meet, planes cannot be moved one by one."""
+    """Put a roof of four sides on the arm of the L: where these meet, planes cannot be moved one by one."""
     top = next(face for face in solid.faces if (solid.vertices[list(face), 2] > 0.599).all())
     vertices = np.vstack([solid.vertices, [[0.2, 0.2, 0.7]]])
     sides = [(a, b, len(solid.vertices)) for a, b in zip(top, (*top[1:], top[0]), strict=True)]
@@ -46,7 +46,7 @@ ROOFED = roofed(CORNERED)
 
 
 def assert_sound(solids: Sequence[Solid]) -> None:
-    """All closed and convex, and none in another."""
+    """Check that all are closed and convex, and that none overlap."""
     for solid in solids:
         check_watertight(solid, convex=True)
     for i, j in near_pairs(solids):
@@ -102,7 +102,7 @@ def test_a_joint_that_would_move_a_corner_too_far_stays_open_and_the_others_clos
 
 
 def low_stone(count: int, low: int) -> list[SurveyedBlock]:
-    """A course of stones 0.3 m high but for one of 0.25 m, and a long stone across a joint of 12 mm above."""
+    """Return a course of stones 0.3 m high except one of 0.25 m, and a long stone across a joint of 12 mm above."""
     tops = [0.25 if k == low else 0.3 for k in range(count)]
     course = [box(f"A{k}", 0.5 * k + 0.005, 0.5 * k + 0.495, 0, top) for k, top in enumerate(tops)]
     return [*course, box("C", 0, 0.5 * count, 0.312, 0.6)]

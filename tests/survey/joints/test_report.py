@@ -1,4 +1,4 @@
-"""What the report of closed joints says, against what can be measured at the solids before and after."""
+"""Report of closed joints, against measurements of the solids before and after."""
 
 import numpy as np
 import pytest

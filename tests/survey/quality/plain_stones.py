@@ -1,4 +1,4 @@
-"""Stones of a wall in the plane y = 0, seen from -y, as a report sees them; without any measurement."""
+"""Stones of a wall in the plane y = 0, seen from -y, as in a report, without any measurement."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ SIGMA = 0.002
 def polygon_stone(
     code: str, kind: str, polygon: list[tuple[float, float]] | NDArray[np.float64], **changes: Any
 ) -> StoneQuality:
-    """A stone whose face is a polygon (x, z), counter-clockwise."""
+    """Return a stone whose face is a polygon (x, z), counter-clockwise."""
     flat = np.asarray(polygon, dtype=float)
     outline = np.column_stack([flat[:, 0], np.zeros(len(flat)), flat[:, 1]])
     x, z = flat[:, 0], flat[:, 1]
@@ -58,6 +58,6 @@ def polygon_stone(
 def rectangle(
     code: str, kind: str, x: float, z: float, length: float, height: float, **changes: Any
 ) -> StoneQuality:
-    """A stone with an upright rectangular face, (x, z) its lower left corner."""
+    """Return a stone with an upright rectangular face, (x, z) its lower left corner."""
     polygon = [(x, z), (x + length, z), (x + length, z + height), (x, z + height)]
     return polygon_stone(code, kind, polygon, **changes)

@@ -1,4 +1,4 @@
-"""Stones that are not what their kind means, and stones that only look so within the precision."""
+"""Stones that contradict their kind, and stones that only seem to within the precision."""
 
 import math
 
@@ -31,7 +31,7 @@ def course(*lengths: tuple[str, float]) -> list[StoneQuality]:
 def arch(
     centre: tuple[float, float], start: float, stop: float, count: int, radius: float = 1.0
 ) -> list[StoneQuality]:
-    """Voussoirs 0.35 m deep between two angles [degrees] over a chord for intrados."""
+    """Return voussoirs 0.35 m deep between two angles [degrees] with a chord for intrados."""
     angles = np.radians(np.linspace(start, stop, count + 1))
     ring = np.column_stack([np.cos(angles), np.sin(angles)])
     stones = []
@@ -128,7 +128,7 @@ def test_a_springer_has_a_sloped_side() -> None:
 
 
 def test_noise_alone_is_told_as_rarely_as_three_sigma_promise() -> None:
-    """Chance alone exceeds three standard deviations in 0.1 %: of true stones none or one is told."""
+    """Chance alone exceeds three standard deviations in 0.1 %: at most one of the true stones is reported."""
     rng = np.random.default_rng(9)
     told = 0
     for _ in range(40):

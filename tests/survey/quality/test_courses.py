@@ -25,7 +25,7 @@ def lines_of(stones: list[StoneQuality]) -> tuple[CourseLine, ...]:
 
 
 def course(heights: np.ndarray, number: int = 1, **changes: object) -> list[StoneQuality]:
-    """Stones 0.5 m long with 10 mm joints, whose two lower corners lie at the heights (m, 2)."""
+    """Return stones 0.5 m long with 10 mm joints, whose two lower corners lie at the heights (m, 2)."""
     stones = []
     for k, (left, right) in enumerate(heights):
         x, top = 0.51 * k, float(heights.max()) + 0.3
@@ -35,7 +35,7 @@ def course(heights: np.ndarray, number: int = 1, **changes: object) -> list[Ston
 
 
 def places(count: int) -> np.ndarray:
-    """x of the lower corners, (m, 2)."""
+    """Return x of the lower corners, (m, 2)."""
     start = 0.51 * np.arange(count)
     return np.column_stack([start, start + 0.5])
 

@@ -1,4 +1,4 @@
-"""Facades: who belongs to which wall, and the frame in which a wall is drawn."""
+"""Facades: the stones of each wall, and the frame in which it is drawn."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from survey.quality.facades import WIDEST, find_facades
 
 
 def looking(degrees, tilt=0.0):
-    """Unit normals that look towards azimuths, clockwise from y, turned up by `tilt`."""
+    """Return unit normals towards azimuths, clockwise from y, turned up by `tilt`."""
     azimuth, rise = np.radians(np.atleast_1d(degrees)), np.radians(tilt)
     level = np.column_stack([np.sin(azimuth), np.cos(azimuth)]) * np.cos(rise)
     return np.column_stack([level, np.full(len(azimuth), np.sin(rise))])

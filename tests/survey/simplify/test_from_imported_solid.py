@@ -1,4 +1,4 @@
-"""Solids of other programs, and what simplifying makes of them."""
+"""Simplification of imported solids."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def made(vertices: np.ndarray, faces: tuple[tuple[int, ...], ...] = SIDES) -> Su
 
 
 def prism_of(flat: np.ndarray, depth: float) -> tuple[np.ndarray, tuple[tuple[int, ...], ...]]:
-    """Corners and faces of a prism along y on a polygon (x, z), counter-clockwise seen from -y."""
+    """Return corners and faces of a prism along y on a polygon (x, z), counter-clockwise seen from -y."""
     n = len(flat)
     front = np.column_stack([flat[:, 0], np.zeros(n), flat[:, 1]])
     sides = [(i, i + n, (i + 1) % n + n, (i + 1) % n) for i in range(n)]
@@ -50,7 +50,7 @@ def random_turn(rng: np.random.Generator) -> np.ndarray:
 
 
 def random_hexahedron(rng: np.random.Generator) -> np.ndarray:
-    """Six planes near those of a box: its corners are where three of them cross; slender up to 1:20."""
+    """Draw six planes near those of a box, whose corners are where three of them cross; slender up to 1:20."""
     size = np.array([1.0, rng.uniform(0.05, 1.0), rng.uniform(0.05, 1.0)])[rng.permutation(3)]
     normals = np.vstack([np.eye(3), -np.eye(3)]) + rng.uniform(-0.04, 0.04, (6, 3)) * size.min() / size.max()
     normals /= np.linalg.norm(normals, axis=1)[:, None]

@@ -1,4 +1,4 @@
-"""Stones whose face was measured, and what simplifying makes of them."""
+"""Simplification of stones whose face was measured."""
 
 import re
 from collections import defaultdict
@@ -38,7 +38,7 @@ def surveyed(
     turn: np.ndarray = UNTURNED,
     shift: np.ndarray | float = 0.0,
 ) -> SurveyedBlock:
-    """A stone whose face lies at z = 0, seen from above, then turned and shifted with its observer."""
+    """Return a stone whose face lies at z = 0, seen from above, then turned and shifted with its observer."""
     vertices = np.column_stack([flat, np.broadcast_to(height, len(flat))])
     record = BlockRecord("A", "voussoir", None, vertices @ turn.T + shift, points @ turn.T + shift, sigma)
     if extrusion.direction is not None:
@@ -59,7 +59,7 @@ def cut_corner(quad: np.ndarray, corner: int, back: float, on: float) -> np.ndar
 
 
 def random_quad(rng: np.random.Generator) -> np.ndarray:
-    """A dressed face, 0.25 to 1.2 m, each corner up to 15 % of the shorter side out of square."""
+    """Draw a dressed face, 0.25 to 1.2 m, each corner up to 15 % of the shorter side out of square."""
     sides = rng.uniform(0.25, 1.2, 2)
     corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) * sides
     return corners + rng.uniform(-0.15, 0.15, (4, 2)) * sides.min()
@@ -71,7 +71,7 @@ def random_turn(rng: np.random.Generator) -> np.ndarray:
 
 
 def apart(found: np.ndarray, true: np.ndarray) -> float:
-    """Largest distance of a corner from the nearest of the other set, either way."""
+    """Return the largest distance of a corner from the nearest of the other set, either way."""
     distances = np.linalg.norm(found[:, None] - true, axis=2)
     return float(max(distances.min(axis=0).max(), distances.min(axis=1).max()))
 
@@ -81,7 +81,7 @@ def about(solid: Solid, origin: np.ndarray) -> Solid:
 
 
 def assert_sound_result(block: SurveyedBlock, stone: BlockyStone) -> None:
-    """What is true of every simplified stone, checked against the twin."""
+    """Check the facts of every simplified stone, against the twin."""
     origin = block.face.outline[0]
     old, new, report = about(block.solid, origin), about(stone.solid, origin), stone.report
     far = 4.0 * np.spacing(np.abs(stone.solid.vertices).max())
@@ -381,7 +381,7 @@ def test_a_flat_stone_is_refused_by_name() -> None:
 
 
 def inset(corners: np.ndarray, normal: np.ndarray, distances: list[float]) -> np.ndarray:
-    """Corners of a face whose sides are moved inwards: where each two neighbouring sides meet."""
+    """Return corners of a face whose sides are moved inwards: where each two neighbouring sides meet."""
     run = np.roll(corners, -1, axis=0) - corners
     inward = np.cross(normal, run)
     inward /= np.linalg.norm(inward, axis=1)[:, None]

@@ -1,4 +1,4 @@
-"""The core of a wall as blocks: closed, on common planes with the stones, as large as it truly is."""
+"""Core of a wall as blocks: closed, on common planes with the stones, of the true volume."""
 
 from itertools import combinations
 
@@ -34,7 +34,7 @@ BACK = [
 
 
 def core_of(front, back):
-    """True volume of the core between facings of whole rows."""
+    """Return the true volume of the core between facings of whole rows."""
     whole = 2.0 * HALF * 2.0 * BEDS[-1]
     return whole - sum(
         length * depth * (BEDS[k + 1] - BEDS[k])
