@@ -7,6 +7,7 @@ import numpy as np
 from numba import njit
 
 from survey.arrays import Array, Bools, Ints
+from survey.geometry._kernels.vectors import dot, height_over
 
 __all__ = ["JointCorners", "continuing_faces", "fit_middle_planes"]
 
@@ -238,10 +239,7 @@ def continuing_faces(pairs, solid, normals, offsets, joined, cosine, near):
             for g in range(starts[two], starts[two + 1]):
                 if not (joined[f] and joined[g]):
                     continue
-                turned = 0.0
-                for k in range(3):
-                    turned += normals[f, k] * normals[g, k]
-                if turned < cosine:
+                if dot(normals[f], normals[g]) < cosine:
                     continue
                 if (
                     _off(f, g, solid, normals, offsets) <= near
@@ -260,8 +258,5 @@ def _off(face, other, solid, normals, offsets):
     vertices, corners, face_starts, _ = solid
     farthest = 0.0
     for c in range(face_starts[face], face_starts[face + 1]):
-        height = -offsets[other]
-        for k in range(3):
-            height += normals[other, k] * vertices[corners[c], k]
-        farthest = max(farthest, abs(height))
+        farthest = max(farthest, abs(height_over(normals[other], offsets[other], vertices[corners[c]])))
     return farthest

@@ -8,6 +8,8 @@ import math
 import numpy as np
 from numba import njit
 
+from survey.geometry._kernels.vectors import dot
+
 __all__ = ["GROUPS", "face_planes", "facing_faces", "thickness", "touching_faces"]
 
 GROUPS = 4
@@ -175,7 +177,7 @@ def _height(vertices, ring, normal, n, place):
     for i in range(ring.shape[0]):
         for k in range(3):
             part += normal[k] * (vertices[ring[i], k] - place[k])
-    return part / ring.shape[0] / (normal[0] * n[0] + normal[1] * n[1] + normal[2] * n[2])
+    return part / ring.shape[0] / dot(normal, n)
 
 
 @njit(cache=True)
@@ -192,9 +194,7 @@ def thickness(one, solid, n):
     vertices, corners, face_starts, solid_starts = solid
     low, high = math.inf, -math.inf
     for c in range(face_starts[solid_starts[one]], face_starts[solid_starts[one + 1]]):
-        along = 0.0
-        for k in range(3):
-            along += vertices[corners[c], k] * n[k]
+        along = dot(vertices[corners[c]], n)
         low, high = min(low, along), max(high, along)
     return high - low
 
@@ -250,11 +250,7 @@ def touching_faces(pairs, solid, planes, limits, out_pairs, out):
         for i in range(solid_starts[one], solid_starts[one + 1]):
             for j in range(solid_starts[two], solid_starts[two + 1]):
                 # most faces look elsewhere: reject them without a call
-                facing = (
-                    normals[i, 0] * normals[j, 0]
-                    + normals[i, 1] * normals[j, 1]
-                    + normals[i, 2] * normals[j, 2]
-                )
+                facing = dot(normals[i], normals[j])
                 if facing > -cosine or _boxes_apart(boxes, i, j, width):
                     continue
                 if _contact((i, j), (one, two), facing, solid, planes, limits, work, row):
@@ -291,11 +287,7 @@ def facing_faces(pairs, solid, planes, limits, out_faces, out):
         one, two = pairs[pair]
         for i in range(solid_starts[one], solid_starts[one + 1]):
             for j in range(solid_starts[two], solid_starts[two + 1]):
-                facing = (
-                    normals[i, 0] * normals[j, 0]
-                    + normals[i, 1] * normals[j, 1]
-                    + normals[i, 2] * normals[j, 2]
-                )
+                facing = dot(normals[i], normals[j])
                 if facing > -cosine or _boxes_apart(boxes, i, j, width):
                     continue
                 if _contact((i, j), (one, two), facing, solid, planes, limits, work, row):

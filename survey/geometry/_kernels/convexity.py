@@ -5,6 +5,8 @@ import math
 import numpy as np
 from numba import njit
 
+from survey.geometry._kernels.vectors import height_over
+
 __all__ = ["deepest_overlaps", "highest_corners"]
 
 
@@ -34,10 +36,7 @@ def deepest_overlaps(pairs, vertices, vertex_starts, planes, plane_starts, least
             for p in range(plane_starts[one], plane_starts[one + 1]):
                 low = math.inf
                 for v in range(vertex_starts[two], vertex_starts[two + 1]):
-                    height = -planes[p, 3]
-                    for k in range(3):
-                        height += planes[p, k] * vertices[v, k]
-                    low = min(low, height)
+                    low = min(low, height_over(planes[p], planes[p, 3], vertices[v]))
                 depth = min(depth, -low)
                 if depth <= least:
                     break
@@ -71,8 +70,5 @@ def highest_corners(vertices, corners, face_starts, solid_starts, normals, offse
             extent[one] = max(extent[one], high - low)
         for f in range(solid_starts[one], solid_starts[one + 1]):
             for c in range(first, last):
-                out = -offsets[f]
-                for k in range(3):
-                    out += normals[f, k] * vertices[corners[c], k]
-                height[one] = max(height[one], out)
+                height[one] = max(height[one], height_over(normals[f], offsets[f], vertices[corners[c]]))
     return height, extent

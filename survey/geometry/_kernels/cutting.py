@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 
 from survey.arrays import Array, Ints
+from survey.geometry._kernels.vectors import height_over
 
 __all__ = ["EMPTY", "FULL", "OPEN", "CutSolid", "cut_out"]
 
@@ -86,9 +87,7 @@ def _cut(planes, p, near, solid, count, faces, distance):
     vertices, loops, sizes, of_face = solid
     inside, outside = False, False
     for v in range(count):
-        distance[v] = -planes[p, 3]
-        for k in range(3):
-            distance[v] += planes[p, k] * vertices[v, k]
+        distance[v] = height_over(planes[p], planes[p, 3], vertices[v])
     for f in range(faces):
         for k in range(sizes[f]):
             inside = inside or distance[loops[f, k]] < -near

@@ -8,7 +8,8 @@ import math
 import numpy as np
 from numba import njit
 
-from survey.geometry._kernels.adjacency import _basis, _flatten, _shared
+from survey.geometry._kernels.adjacency import _basis, _boxes_apart, _flatten, _shared
+from survey.geometry._kernels.vectors import dot
 
 __all__ = ["matching_faces", "near_pairs"]
 
@@ -75,9 +76,7 @@ def _spread(vertices, first, second, n):
     low, high = math.inf, -math.inf
     for ring in (first, second):
         for i in range(ring.shape[0]):
-            along = 0.0
-            for k in range(3):
-                along += vertices[ring[i], k] * n[k]
+            along = dot(vertices[ring[i]], n)
             low, high = min(low, along), max(high, along)
     return 0.5 * (high - low)
 
@@ -112,14 +111,10 @@ def matching_faces(pairs, solid, planes, tolerance, out, measures):
         one, two = pairs[pair]
         for i in range(solid_starts[one], solid_starts[one + 1]):
             for j in range(solid_starts[two], solid_starts[two + 1]):
-                facing = (
-                    normals[i, 0] * normals[j, 0]
-                    + normals[i, 1] * normals[j, 1]
-                    + normals[i, 2] * normals[j, 2]
-                )
+                facing = dot(normals[i], normals[j])
                 if (
                     facing > _OPPOSITE
-                    or _apart(boxes, i, j, 2.0 * tolerance)
+                    or _boxes_apart(boxes, i, j, 2.0 * tolerance)
                     or not min(sizes[i], sizes[j]) > 0.0
                 ):
                     continue
@@ -150,11 +145,3 @@ def matching_faces(pairs, solid, planes, tolerance, out, measures):
                     measures[count, 0], measures[count, 1] = spread, area
                 count += 1
     return count
-
-
-@njit(cache=True)
-def _apart(boxes, i, j, margin):
-    for k in range(3):  # noqa: SIM110  (numba has no any())
-        if boxes[i, k] > boxes[j, 3 + k] + margin or boxes[j, k] > boxes[i, 3 + k] + margin:
-            return True
-    return False

@@ -9,6 +9,8 @@ import math
 import numpy as np
 from numba import njit
 
+from survey.geometry._kernels.vectors import dot
+
 __all__ = ["area_vectors", "common_volume", "edge_distances", "face_planes", "volume", "worst_angle"]
 
 
@@ -190,7 +192,7 @@ def _split(body, plane):
     out, heights = np.empty((4, 3)), np.empty(4)
     inside, last = 0, 4
     for i in range(4):
-        height = plane[0] * body[i, 0] + plane[1] * body[i, 1] + plane[2] * body[i, 2] - plane[3]
+        height = dot(plane, body[i]) - plane[3]
         if height <= 0.0:
             place = inside
             inside += 1
