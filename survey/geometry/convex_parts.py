@@ -88,14 +88,14 @@ class _Cutter:
             raise GeometryError(
                 f"it is not convex, and would take more than {self._most} convex parts",
                 where=f"stone {self._solid.code}",
-                remedy="simplify it, or make several stones of it",
+                remedy="simplify it, or divide it into several stones",
             )
         filling = [parts for parts in found if self._is_filled(parts)]
         if not filling:
             raise GeometryError(
-                "its convex parts do not fill it: its faces are not quite planes",
+                "its convex parts do not fill it: its faces are not quite planar",
                 where=f"stone {self._solid.code}",
-                remedy="make them planes: moma ingest --snap",
+                remedy="make them planar: moma ingest --snap",
             )
         best = max(filling, key=self._worth)
         return tuple(replace(part, vertices=self._placed(part.vertices)) for part in best)

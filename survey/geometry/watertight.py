@@ -27,14 +27,16 @@ def check_watertight(solid: Solid, *, convex: bool = False) -> None:
     GeometryError
         naming the stone and its defect
     """
-    where, remedy = f"stone {solid.code}", "look at its corners in the survey"
+    where, remedy = f"stone {solid.code}", "check its corners in the survey"
     if not np.isfinite(solid.vertices).all():
         raise GeometryError("a corner is not finite", where=where, remedy=remedy)
     mesh = trimesh.Trimesh(solid.vertices, triangulate(solid), process=False)
     if not mesh.is_watertight:
         raise GeometryError("the solid is not closed", where=where, remedy=remedy)
     if not mesh.is_winding_consistent:
-        raise GeometryError("its faces are not all seen from outside", where=where, remedy=remedy)
+        raise GeometryError(
+            "its faces are not all counter-clockwise seen from outside", where=where, remedy=remedy
+        )
     if not mesh.volume > 0.0:
         raise GeometryError(
             f"its volume is {mesh.volume:.3g} m³: inside out or flat", where=where, remedy=remedy

@@ -61,7 +61,7 @@ def _check_full(solid: Solid) -> None:
         raise GeometryError(
             f"its faces enclose {volume:.3g} m³: it is flat, or seen from inside",
             where=f"stone {solid.code}",
-            remedy="look at its corners and at the order of those of each face",
+            remedy="check its corners and their order in each face",
         )
 
 

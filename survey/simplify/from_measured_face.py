@@ -82,16 +82,16 @@ def _check_flat(block: SurveyedBlock, squared: SquaredFace) -> None:
     where, count = f"stone {block.code}", len(squared.corners)
     if count < 3:
         raise GeometryError(
-            f"{count} corners of its face stand out, which enclose nothing",
+            f"the convex outline of its face has {count} corners, which enclose no area",
             where=where,
-            remedy="measure 3 corners or more that do not lie on one line",
+            remedy="measure 3 corners or more that are not on one line",
         )
     length = float(np.ptp(squared.corners, axis=0).max())
     if not min(squared.width, block.depth.value) > _SLIVER * max(length, 1.0):
         raise GeometryError(
             f"it is flat: its face is {squared.width * 1e3:.2g} mm wide, its depth {block.depth.value * 1e3:.2g} mm",
             where=where,
-            remedy="look at the corners of its face and at its depth",
+            remedy="check the corners of its face and its depth",
         )
 
 

@@ -85,7 +85,9 @@ def propose_infill(
 def _given(stones: Sequence[FacingStone], facings: tuple[Collection[str], Collection[str]]) -> FacingWall:
     one, other = (set(codes) for codes in facings)
     if one & other:
-        raise UsageError(f"stone {min(one & other)} is in both facings", remedy="let each stone be in one")
+        raise UsageError(
+            f"stone {min(one & other)} is in both facings", remedy="name each stone in one facing only"
+        )
     front, back = ([stone for stone in stones if stone.code in codes] for codes in (one, other))
     if not front or not back:
         raise UsageError("a facing has no stones", remedy="name stones of both sides of the wall")

@@ -17,7 +17,7 @@ from survey.joints.facing import find_facing
 from survey.joints.settings import JointSettings
 from survey.simplify.simplify import simplify
 from tests.survey.plain_blocks import as_stone, drawn, moved
-from tests.survey.unseen.statics import contacts, near_pairs, overlap_depth
+from tests.survey.unseen.statics import contact_area, near_pairs, overlap_depth
 
 USUAL = JointSettings()
 LENGTH, GAP = 0.5, 0.01
@@ -71,13 +71,6 @@ def upward(contact, building, plane):
 
 def stones_of(closed):
     return {solid.code: solid for solid in closed.solids}
-
-
-def contact_area(one, two):
-    return sum(
-        0.5 * np.linalg.norm(np.cross(p - p[0], np.roll(p, -1, axis=0) - p[0]).sum(axis=0))
-        for _, p in contacts(one, two)
-    )
 
 
 def assert_all_touch(closed, bed, count=8):

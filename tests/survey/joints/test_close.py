@@ -22,7 +22,7 @@ from survey.records.survey import BlockRecord
 from survey.simplify.simplify import BlockShape, simplify
 from survey.synthetic.window_bay.sample import make_sample
 from tests.survey.plain_blocks import DEPTH, as_stone, box, cuboid, drawn, moved, stone
-from tests.survey.unseen.statics import contacts, near_pairs, overlap_depth, side_planes
+from tests.survey.unseen.statics import contact_area, contacts, near_pairs, overlap_depth, side_planes
 
 # two stones with a 10 mm head joint, a long one above them across a 12 mm bed joint
 THREE = [box("A", 0, 0.495, 0, 0.3), box("B", 0.505, 1, 0, 0.3), box("C", 0, 1, 0.312, 0.6)]
@@ -59,11 +59,7 @@ def open_pairs(closed: ClosedStones) -> dict[frozenset[str], str]:
 
 def shared_area(closed: ClosedStones, one: str, two: str) -> float:
     solids = {solid.code: solid for solid in closed.solids}
-    polygons = [polygon for _, polygon in contacts(solids[one], solids[two])]
-    return sum(
-        0.5 * float(np.linalg.norm(np.cross(p - p[0], np.roll(p, -1, axis=0) - p[0]).sum(axis=0)))
-        for p in polygons
-    )
+    return contact_area(solids[one], solids[two])
 
 
 def test_a_t_junction_closes_half_way_and_fits_exactly() -> None:

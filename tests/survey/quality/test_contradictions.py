@@ -6,18 +6,12 @@ import numpy as np
 import pytest
 
 from survey.quality.contradictions import Contradiction, contradictions
-from survey.quality.facades import find_facades
 from survey.quality.precision import StoneQuality
-from tests.survey.quality.plain_stones import SIGMA, polygon_stone, rectangle
+from tests.survey.quality.plain_stones import SIGMA, facades_of, polygon_stone, rectangle
 
 
 def found(stones: list[StoneQuality]) -> tuple[Contradiction, ...]:
-    facades = find_facades(
-        np.array([one.normal for one in stones]),
-        np.array([one.area for one in stones]),
-        np.array([one.outline.mean(axis=0) for one in stones]),
-    )
-    return contradictions(stones, facades)
+    return contradictions(stones, facades_of(stones))
 
 
 def course(*lengths: tuple[str, float]) -> list[StoneQuality]:

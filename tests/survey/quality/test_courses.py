@@ -7,17 +7,8 @@ import pytest
 from scipy.stats import kstest
 
 from survey.quality.courses import CourseLine, course_heights, lower_corners, measure_courses
-from survey.quality.facades import Facade, find_facades
 from survey.quality.precision import StoneQuality
-from tests.survey.quality.plain_stones import polygon_stone, rectangle
-
-
-def facades_of(stones: list[StoneQuality]) -> tuple[Facade, ...]:
-    return find_facades(
-        np.array([one.normal for one in stones]),
-        np.array([one.area for one in stones]),
-        np.array([one.outline.mean(axis=0) for one in stones]),
-    )
+from tests.survey.quality.plain_stones import facades_of, polygon_stone, rectangle
 
 
 def lines_of(stones: list[StoneQuality]) -> tuple[CourseLine, ...]:

@@ -9,6 +9,11 @@ from survey.geometry.solids import Solid
 from survey.geometry.watertight import triangulate
 
 
+def random_turn(rng: np.random.Generator) -> np.ndarray:
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    return turn * np.sign(np.linalg.det(turn))
+
+
 def edges_of(solid: Solid) -> list[tuple[int, int]]:
     return sorted({tuple(sorted((f[k - 1], f[k]))) for f in solid.faces for k in range(len(f))})
 

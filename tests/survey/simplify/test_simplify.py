@@ -13,9 +13,9 @@ from moma.errors import GeometryError
 from survey.extrusion.depth import Depth
 from survey.extrusion.extrusion import SurveyedBlock, extrude
 from survey.faces.faces import outline_face
-from survey.geometry.solids import Solid
 from survey.geometry.watertight import check_watertight
 from survey.records.survey import BlockRecord, Extrusion
+from survey.simplify.blockiness import about
 from survey.simplify.simplify import BlockShape, BlockyStone, SimplifyBounds, simplify
 from tests.paths import ROOT
 from tests.survey.simplify import report_twin as twin
@@ -65,19 +65,10 @@ def random_quad(rng: np.random.Generator) -> np.ndarray:
     return corners + rng.uniform(-0.15, 0.15, (4, 2)) * sides.min()
 
 
-def random_turn(rng: np.random.Generator) -> np.ndarray:
-    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    return turn * np.sign(np.linalg.det(turn))
-
-
 def apart(found: np.ndarray, true: np.ndarray) -> float:
     """Return the largest distance of a corner from the nearest of the other set, either way."""
     distances = np.linalg.norm(found[:, None] - true, axis=2)
     return float(max(distances.min(axis=0).max(), distances.min(axis=1).max()))
-
-
-def about(solid: Solid, origin: np.ndarray) -> Solid:
-    return Solid(solid.code, solid.vertices - origin, solid.faces)
 
 
 def assert_sound_result(block: SurveyedBlock, stone: BlockyStone) -> None:
@@ -294,7 +285,7 @@ def test_any_face_gives_a_sound_solid_and_a_true_report(
             depth=depth,
             extrusion=Extrusion(direction, tail),
             sigma=0.001,
-            turn=random_turn(rng),
+            turn=twin.random_turn(rng),
             shift=shift,
         )
     except GeometryError:
@@ -339,7 +330,7 @@ def test_neither_place_nor_hand_nor_the_way_round_make_a_difference(
     rng = np.random.default_rng(seed)
     flat = cut_corner(random_quad(rng), 1, *rng.uniform(0.02, 0.03, 2))
     flat += rng.uniform(-0.001, 0.001, flat.shape)
-    turn, shift = random_turn(rng), far * rng.normal(size=3)
+    turn, shift = twin.random_turn(rng), far * rng.normal(size=3)
     here = simplify(surveyed(flat))
     hand = np.array([-1.0 if mirrored else 1.0, 1.0, 1.0])
     other = np.roll(flat[::-1] if back else flat, first, axis=0) * hand[:2]
@@ -376,7 +367,7 @@ def test_simplifying_again_changes_nothing(seed: int, tail: float, slender: floa
 
 
 def test_a_flat_stone_is_refused_by_name() -> None:
-    with pytest.raises(GeometryError, match=r"stone A: it is flat: .* look at the corners of its face"):
+    with pytest.raises(GeometryError, match=r"stone A: it is flat: .* check the corners of its face"):
         simplify(surveyed(TRAPEZIUM, depth=1e-7))
 
 

@@ -78,7 +78,12 @@ def _common(a: Solid, ka: int, b: Solid, kb: int) -> Array | None:
 
 
 def area_of(polygon: Array) -> float:
-    return 0.5 * float(np.linalg.norm(np.cross(polygon, np.roll(polygon, -1, axis=0)).sum(axis=0)))
+    arms = polygon - polygon[0]
+    return 0.5 * float(np.linalg.norm(np.cross(arms, np.roll(arms, -1, axis=0)).sum(axis=0)))
+
+
+def contact_area(a: Solid, b: Solid) -> float:
+    return sum(area_of(polygon) for _, polygon in contacts(a, b))
 
 
 def centroid(solid: Solid) -> tuple[float, Array]:
