@@ -42,11 +42,11 @@ class JointCorners(NamedTuple):
 
     Attributes
     ----------
-    points : (k, 3) in the frame of their joint: along it, along it, across [m]
-    hands : (k,) +1 above the joint, -1 below
-    sound : (k,) whether a corner is known from measurement
-    starts : (n + 1,) index of the first corner of each joint
-    scales : (n,) divisors of the coordinates of each joint [m]
+    points : (k, 3) float64, in the frame of their joint: along it, along it, across [m]
+    hands : (k,) float64, +1 above the joint, -1 below
+    sound : (k,) bool, whether a corner is known from measurement
+    starts : (n + 1,) int64, index of the first corner of each joint
+    scales : (n,) float64, divisors of the coordinates of each joint [m]
     """
 
     points: Array

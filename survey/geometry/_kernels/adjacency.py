@@ -190,7 +190,18 @@ def _boxes_apart(boxes, i, j, width):
 
 @njit(cache=True)
 def thickness(one, solid, n):
-    """Return the extent of a solid along n (3,) [m]."""
+    """Compute the extent of a solid along a direction.
+
+    Inputs
+    ------
+    one : int, solid
+    solid : vertices, corners, face_starts, solid_starts of `Polyhedra`
+    n : (3,) float64, unit vector [-]
+
+    Outputs
+    -------
+    extent : float [m]; returned
+    """
     vertices, corners, face_starts, solid_starts = solid
     low, high = math.inf, -math.inf
     for c in range(face_starts[solid_starts[one]], face_starts[solid_starts[one + 1]]):

@@ -51,7 +51,17 @@ def _contains(one, solid, normals, place, reach):
 
 @njit(cache=True)
 def thinnest_of(solid, normals):
-    """Return the least extent (n,) of each solid square to one of its faces [m]."""
+    """Compute the least extent of each solid square to one of its faces.
+
+    Inputs
+    ------
+    solid : vertices, corners, face_starts, solid_starts of `Polyhedra`
+    normals : (nf, 3) float64, outward unit normals of its faces [-]
+
+    Outputs
+    -------
+    extents : (n,) float64 [m]; returned
+    """
     solid_starts = solid[3]
     out = np.full(solid_starts.shape[0] - 1, math.inf)
     for one in range(out.shape[0]):

@@ -16,7 +16,16 @@ __all__ = ["area_vectors", "common_volume", "edge_distances", "face_planes", "vo
 
 @njit(cache=True)
 def area_vectors(vertices, corners, starts):
-    """Return area times outward normal of each face, (nf, 3) float64 [m²]."""
+    """Compute area times outward normal of each face.
+
+    Inputs
+    ------
+    vertices, corners, starts : the solid
+
+    Outputs
+    -------
+    vectors : (nf, 3) float64 [m²]; returned
+    """
     out = np.zeros((len(starts) - 1, 3))
     for f in range(len(starts) - 1):
         origin = vertices[corners[starts[f]]]
@@ -59,7 +68,16 @@ def _middle(vertices, corners, start, stop):
 
 @njit(cache=True)
 def volume(vertices, corners, starts):
-    """Compute the volume [m³] by the divergence theorem; a warped face is fanned about the mean of its corners."""
+    """Compute the volume by the divergence theorem; a warped face is fanned about the mean of its corners.
+
+    Inputs
+    ------
+    vertices, corners, starts : the solid
+
+    Outputs
+    -------
+    volume : float [m³], negative if the faces are seen from inside; returned
+    """
     origin = vertices[corners[0]]
     total = 0.0
     for f in range(len(starts) - 1):
@@ -72,7 +90,16 @@ def volume(vertices, corners, starts):
 
 @njit(cache=True)
 def worst_angle(vertices, corners, starts):
-    """Return the largest departure from a right angle of the inside angle between faces with a common edge [rad]."""
+    """Compute the largest departure from a right angle of the inside angle between faces with a common edge.
+
+    Inputs
+    ------
+    vertices, corners, starts : the solid
+
+    Outputs
+    -------
+    angle : float [rad]; returned
+    """
     planes = face_planes(vertices, corners, starts)
     worst = 0.0
     for f in range(len(starts) - 1):
