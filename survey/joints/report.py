@@ -105,7 +105,7 @@ class ClosingReport:
 
     @property
     def largest_displacement(self) -> float:
-        """Return the largest displacement of any corner [m]."""
+        """Largest displacement of any corner [m]."""
         return max((float(moved.max()) for moved in self.displacement.values()), default=0.0)
 
 
