@@ -234,7 +234,7 @@ def test_faces_may_be_a_little_out_of_parallel(degrees, touches):
 
 
 @pytest.mark.parametrize(("shared", "touches"), [(0.04, True), (0.02, False)])
-def test_stones_that_meet_at_an_edge_but_for_noise_do_not_touch(shared, touches):
+def test_stones_that_meet_at_an_edge_apart_from_noise_do_not_touch(shared, touches):
     contacts = find_touching(
         gathered([box((0, 0, 0), (1, 1, 1)), box((1 - shared, 0, 1), (2 - shared, 1, 2))])
     )

@@ -53,7 +53,7 @@ def assert_cut(planes):
         assert volume < 1e-6
     elif volume > 1e-6:
         assert_is_what_planes_leave(cut, planes)
-        # the hull of the corners is the solid, and that is what qhull has; but for slivers of less than 1e-5 m
+        # the hull of the corners is the solid, as of qhull, except for slivers of less than 1e-5 m
         own = ConvexHull(cut.solid.vertices).volume
         assert own == pytest.approx(volume_within(planes[list(cut.of_face)], SLIVER), rel=1e-9, abs=1e-12)
         height = (cut.solid.vertices @ planes[:, :3].T - planes[:, 3]).max()
@@ -77,7 +77,7 @@ def test_what_wild_planes_leave_of_a_box_is_what_qhull_finds(more):
 
 
 corner = st.sampled_from(range(8))
-# from so near a corner or an edge that only rounding tells on which side it lies, to a millimetre
+# from rounding distance of a corner or an edge to a millimetre
 nudge = st.sampled_from([0.0, 1e-16, -1e-16, 1e-12, -1e-12, 1e-4, -1e-4, -1e-3])
 
 
@@ -187,7 +187,7 @@ def test_slivers_that_are_no_more_than_rounding_are_left_out():
     assert len(cut.solid.faces) == 7
 
 
-def test_far_from_the_origin_stones_are_cut_as_near_it():
+def test_stones_are_cut_as_well_far_from_the_origin():
     far = np.array([4.1e5, 7.02e6, 312.0])
     planes = np.vstack([PLANES, through((0.9, 0.5, 0.3), (1.0, 0.7, 1.0))])
     moved = planes.copy()

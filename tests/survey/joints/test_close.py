@@ -339,7 +339,7 @@ def test_other_samples_close_as_well() -> None:
 
 
 def test_a_head_joint_whose_corners_are_worn_on_both_hands_stays_upright() -> None:
-    # two sound corners at the foot of the joint do not tell its direction; the worn ones, alike, do
+    # two sound corners at the foot of the joint do not define its direction; the worn ones, which agree, do
     grid = [(x, 0.0, z) for x in (0.1, 0.25, 0.4) for z in (0.05, 0.15, 0.25)]
     left = np.array([(0, 0, 0), (0.495, 0, 0), (0.465, 0.02, 0.27), (0, 0, 0.3)])
     right = (left * np.array([-1, 1, 1]) + np.array([1, 0, 0]))[[1, 0, 3, 2]]

@@ -194,10 +194,10 @@ def test_a_worn_corner_hardly_moves_the_plane():
     sound[2] = False
     fitted, values = fit(points, hands, sound)
     assert np.abs(fitted).max() < 2e-4
-    assert values[2] < 5e-4  # a worn corner's own residual is not told
+    assert values[2] < 5e-4  # a worn corner's own residual is not reported
 
 
-def test_where_one_hand_is_worn_the_usual_width_tells():
+def test_the_usual_width_applies_where_one_side_is_worn():
     points, hands = corners((0.0, 0.0, 0.0), 0.01, faces=1)
     sound = hands < 0.0
     points[hands > 0, 2] += 0.025  # all corners above are lost
@@ -211,7 +211,7 @@ def test_where_one_hand_is_worn_the_usual_width_tells():
 
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.floats(0.03, 0.3))
-def test_one_odd_corner_is_told_and_does_not_count(seed, off):
+def test_one_outlier_is_reported_and_ignored(seed, off):
     rng = np.random.default_rng(seed)
     points, hands = corners((0.0, 0.0, 0.0), 0.01, noise=0.001, rng=rng, faces=4)
     points[rng.integers(8, 24), 2] += off

@@ -158,7 +158,7 @@ def test_stones_are_parted_within_the_bound_and_lose_little(case):
 
 @settings(max_examples=15, deadline=None)
 @given(lapping())
-def test_nothing_is_cut_where_the_bound_forbids_it_and_all_is_told(case):
+def test_nothing_is_cut_where_the_bound_forbids_it_and_all_is_reported(case):
     solids, _ = case
     planes = planes_of(solids)
     before = find_overlaps(solids, planes)

@@ -199,7 +199,7 @@ def test_an_eroded_corner_is_restored_along_the_points_of_an_even_margin(seed: i
     assert stone.shape is BlockShape.HEXAHEDRON
     bound = SimplifyBounds()
     if "restored" in stone.report.reason:
-        # the even margin may be told wrong by as much as the tolerance, at a half of the side's length
+        # the even margin may be wrong by as much as the tolerance, at a half of the side's length
         assert apart(stone.solid.vertices[:4, :2], true) < 2.0 * stone.report.tolerance
         assert stone.sound.all()
     else:
@@ -218,7 +218,7 @@ def test_a_worn_corner_without_points_beside_it_stays_and_is_not_sound() -> None
     assert stone.sound.tolist() == [True, True, False, True]
 
 
-def test_a_bevel_within_the_tolerance_is_not_told_from_a_point_along_the_side() -> None:
+def test_a_bevel_within_the_tolerance_counts_as_a_point_along_the_side() -> None:
     outline = cut_corner(TRAPEZIUM, 1, 0.05, 0.004)
     stone = blocky(outline)
     assert stone.shape is BlockShape.HEXAHEDRON
@@ -382,7 +382,7 @@ def inset(corners: np.ndarray, normal: np.ndarray, distances: list[float]) -> np
     return np.array([np.linalg.solve(rows[k], [offsets[k - 1], offsets[k], heights[k]]) for k in range(4)])
 
 
-def test_the_corners_of_the_sample_are_as_near_to_the_true_ones_as_the_documentation_says(
+def test_the_corners_of_the_sample_are_as_accurate_as_documented(
     blocks: list[SurveyedBlock], truth: dict[str, dict[str, Any]]
 ) -> None:
     found: dict[str, list[tuple[float, float]]] = defaultdict(list)

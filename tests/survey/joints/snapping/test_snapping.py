@@ -353,7 +353,7 @@ def test_a_solid_that_snapping_would_spoil_is_refused(
     assert found.error.remedy == "give a smaller tolerance with --snap"
 
 
-def test_what_was_done_to_a_solid_is_said_with_it(tmp_path: Path) -> None:
+def test_changes_of_a_solid_are_reported_with_it(tmp_path: Path) -> None:
     path = tmp_path / "dome.obj"
     path.write_text(obj(dome(2), 3, doubled=True))
     stream = open_solids(path, ReadingOptions(snap=0.003))
