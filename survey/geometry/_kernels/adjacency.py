@@ -181,6 +181,12 @@ def _height(vertices, ring, normal, n, place):
 
 
 @njit(cache=True)
+def _buffers(face_starts):
+    """Return four polygons with room for the largest face, clipped by another."""
+    return np.empty((4, 2 * (face_starts[1:] - face_starts[:-1]).max() + 8, 2))
+
+
+@njit(cache=True)
 def _boxes_apart(boxes, i, j, width):
     for k in range(3):  # noqa: SIM110
         if boxes[i, k] > boxes[j, 3 + k] + width or boxes[j, k] > boxes[i, 3 + k] + width:
@@ -249,10 +255,7 @@ def touching_faces(pairs, solid, planes, limits, out_pairs, out):
     """
     face_starts, solid_starts = solid[2], solid[3]
     normals, boxes, width, cosine = planes[0], planes[2], limits[0], limits[2]
-    longest = 0
-    for f in range(face_starts.shape[0] - 1):
-        longest = max(longest, face_starts[f + 1] - face_starts[f])
-    work = (np.empty((4, 2 * longest + 8, 2)), np.empty((4, 3)))
+    work = (_buffers(face_starts), np.empty((4, 3)))
     row, total = np.empty(8), 0
     for pair in range(pairs.shape[0]):
         one, two = pairs[pair]
@@ -289,10 +292,7 @@ def facing_faces(pairs, solid, planes, limits, out_faces, out):
     """
     face_starts, solid_starts = solid[2], solid[3]
     normals, boxes, width, cosine = planes[0], planes[2], limits[0], limits[2]
-    longest = 0
-    for f in range(face_starts.shape[0] - 1):
-        longest = max(longest, face_starts[f + 1] - face_starts[f])
-    work = (np.empty((4, 2 * longest + 8, 2)), np.empty((4, 3)))
+    work = (_buffers(face_starts), np.empty((4, 3)))
     row, total = np.empty(8), 0
     for pair in range(pairs.shape[0]):
         one, two = pairs[pair]

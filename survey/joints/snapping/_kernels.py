@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numba import njit
 
-from survey.geometry._kernels.adjacency import _basis, _boxes_apart, _flatten, _shared
+from survey.geometry._kernels.adjacency import _basis, _boxes_apart, _buffers, _flatten, _shared
 from survey.geometry._kernels.vectors import dot
 
 __all__ = ["matching_faces", "near_pairs"]
@@ -101,10 +101,7 @@ def matching_faces(pairs, solid, planes, tolerance, out, measures):
     """
     vertices, corners, face_starts, solid_starts = solid
     normals, sizes, boxes, convex = planes
-    longest = 0
-    for f in range(face_starts.shape[0] - 1):
-        longest = max(longest, face_starts[f + 1] - face_starts[f])
-    buffers = np.empty((4, 2 * longest + 8, 2))
+    buffers = _buffers(face_starts)
     n, u, v = np.empty(3), np.empty(3), np.empty(3)
     count = 0
     for pair in range(pairs.shape[0]):
