@@ -1,1 +1,14 @@
-"""Pillar 1: ASCII surveys → planes → faces → extruded blocks → stones that touch."""
+"""Pillar 1: ASCII surveys → planes → faces → extruded blocks → stones that touch.
+
+formats       readers of survey files → records
+records       content of a survey file
+registration  survey frames and photographs → site frame
+faces         points → plane → outlined face
+extrusion     face and depth → solid block
+geometry      closed solids: cutting, convex parts, adjacency
+simplify      solid block → hexahedron, wedge or prism
+joints        blocks a joint apart → stones that share contact planes
+quality       report on precision, courses and contradictions
+unseen        proposals for the core of walls and for missing stones
+synthetic     buildings with known truth, for tests and examples
+"""

@@ -1,1 +1,7 @@
-"""Closed solids with planar faces: cutting, convex parts, adjacency, folds."""
+"""Closed solids with planar faces: cutting, convex parts, adjacency, folds.
+
+Public: `Solid`, `volume_of` (solids); `Polyhedra`, `Touching`, `find_touching` (adjacency); `cut_stones`, `CutStone`
+(cutting); `convex_parts` (convex_parts); `stone_parts` (stone_parts); `is_convex`, `reflex_edges` (convexity);
+`intersection` (half_spaces); `fold`, `warp` (folds); `settle` (plane_network); `check_watertight`, `triangulate`
+(watertight).
+"""

@@ -1,12 +1,12 @@
-"""Which solids touch: faces of two stones that face each other across an open joint and overlap.
+"""Detection of touching solids: faces that face each other across an open joint and overlap.
 
-Two faces touch if their normals are opposite but for `angle`, if what they share, seen square to the joint
+Two faces touch if their normals are opposite within `angle`, if the area they share, seen square to the joint
 between them, is more than `share` of the smaller face, and if the mean distance of their planes over that shared
-area is at most `width`; surveyed stones may also overlap a little. The joint's normal is the mean of
-the two faces' normals; nothing is assumed of a wall or of what is up.
+area is at most `width`; surveyed stones may also overlap a little. The joint's normal is the mean of the two
+faces' normals; nothing is assumed about a wall or the direction of up.
 
-Between two planes the distance is linear along the joint, so that its mean over an area is its value at the
-area's centroid: area and centroid of what two polygons share say all.
+The distance between two planes is linear along the joint, so its mean over an area is its value at the area's
+centroid: the area and centroid of the polygons' intersection suffice.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -40,8 +40,8 @@ class Polyhedra:
     ----------
     vertices : (nv, 3) of all solids [m]
     corners : (nc,) indices into `vertices`, face by face, counter-clockwise seen from outside
-    face_starts : (nf + 1,) where the corners of each face begin, and where those of the last one end
-    solid_starts : (n + 1,) where the faces of each solid begin, and where those of the last one end
+    face_starts : (nf + 1,) index of the first corner of each face; last entry: number of corners
+    solid_starts : (n + 1,) index of the first face of each solid; last entry: number of faces
     """
 
     vertices: Array
@@ -54,7 +54,7 @@ class Polyhedra:
 
     @classmethod
     def gather(cls, solids: Iterable[tuple[Array, Sequence[Sequence[int]]]]) -> "Polyhedra":
-        """Put solids, each as its vertices (nv, 3) and its faces, one after the other."""
+        """Concatenate solids, each given by its vertices (nv, 3) and its faces."""
         builder = PolyhedraBuilder()
         for vertices, faces in solids:
             builder.add(vertices, tuple(tuple(face) for face in faces))
@@ -63,7 +63,7 @@ class Polyhedra:
 
 @dataclass
 class PolyhedraBuilder:
-    """Solids as they come by; what is kept of each is its numbers."""
+    """Incremental builder of `Polyhedra`, which keeps only the numbers of each solid."""
 
     _vertices: bytearray = field(default_factory=bytearray)
     _corners: bytearray = field(default_factory=bytearray)
@@ -72,7 +72,7 @@ class PolyhedraBuilder:
     _known: dict[tuple[tuple[int, ...], ...], tuple[Ints, bytes]] = field(default_factory=dict)
 
     def add(self, vertices: Array, faces: tuple[tuple[int, ...], ...]) -> None:
-        """One more solid: vertices (nv, 3), and faces counter-clockwise seen from outside."""
+        """Add a solid: vertices (nv, 3), and faces counter-clockwise seen from outside."""
         if (known := self._known.get(faces)) is None:
             corners = np.fromiter(chain.from_iterable(faces), dtype=np.int64)
             known = corners, np.array([len(face) for face in faces], dtype=np.int64).tobytes()
@@ -84,7 +84,7 @@ class PolyhedraBuilder:
         self._solid_counts.append(len(faces))
 
     def build(self) -> Polyhedra:
-        """All solids so far."""
+        """Return all solids added so far."""
         counts = np.frombuffer(bytes(self._face_counts), dtype=np.int64)
         return Polyhedra(
             np.frombuffer(bytes(self._vertices)).reshape(-1, 3),
@@ -101,7 +101,7 @@ class Touching:
     Attributes
     ----------
     pairs : (m, 2) indices of the solids, smaller first
-    area : (m,) that they share, seen square to the joint [m²]
+    area : (m,) shared area, seen square to the joint [m²]
     gap : (m,) mean width of the joint, negative where they overlap [m]
     normal : (m, 3) unit normal of the joint, from the second to the first [-]
     centroid : (m, 3) of the shared area, half-way between the two faces [m]
@@ -131,15 +131,15 @@ def find_touching(
     Parameters
     ----------
     solids : closed, with planar faces of any number of corners, convex or not
-    width : of the widest open joint [m]; at most half the thickness of either stone, and no third stone in it
-    angle : by which the two faces may be out of parallel [degrees]
-    overlap : by which solids may lie in each other [m]
-    share : least part of the smaller face that the other covers [-]; below, they meet at an edge but for noise
-    among : (n,) solids of which one at least must be in a pair; None: all
+    width : widest open joint [m]; at most half the thickness of either stone, and no third stone in it
+    angle : largest angle between the two faces [degrees]
+    overlap : depth by which solids may overlap [m]
+    share : least part of the smaller face that the other covers [-]; below, they meet at an edge apart from noise
+    among : (n,) solids of which at least one must be in a pair; None: all
 
     Returns
     -------
-    Touching, the same for the same solids wherever they stand, but for rounding
+    Touching, independent of the solids' position except for rounding
     """
     wanted = np.ones(len(solids), np.bool_) if among is None else np.asarray(among, np.bool_)
     if len(solids) == 0 or not wanted.any():
@@ -162,13 +162,13 @@ def find_touching(
 
 
 def open_to_each_other(pairs: Ints, rows: Array, solid: Any, planes: Any, width: float) -> Bools:
-    """Contacts (m,) between which no third, thinner solid lies.
+    """Return whether each contact (m,) has no third, thinner solid in it.
 
     Parameters
     ----------
     pairs, rows : solids (m, 2), and (m, 8) area, gap, place and normal of their contacts
-    solid, planes : as of the kernels
-    width : of the widest joint [m]
+    solid, planes : as the kernels take them
+    width : widest joint [m]
     """
     thinnest = thinnest_of(solid, planes[0])
     if not (rows[:, 1] >= thinnest.min()).any():
@@ -192,11 +192,11 @@ def _touching(pairs: Ints, rows: Array, origin: Array) -> Touching:
     )
 
 
-_PAIRS = 1 << 15  # neighbours that are looked at in one go, so that memory does not grow with the crowd
+_PAIRS = 1 << 15  # neighbours examined at a time, which bounds the memory
 
 
 def boxes_of(faces: Array, starts: Ints, width: float) -> Array:
-    """Boxes (n, 6) of solids from those of their faces, wider by half a joint on all sides."""
+    """Return the boxes (n, 6) of solids from those of their faces, wider by half a joint on all sides."""
     out = np.empty((len(starts) - 1, 6))
     out[:, :3] = np.minimum.reduceat(faces[:, :3], starts[:-1]) - 0.5 * width
     out[:, 3:] = np.maximum.reduceat(faces[:, 3:], starts[:-1]) + 0.5 * width
@@ -204,10 +204,10 @@ def boxes_of(faces: Array, starts: Ints, width: float) -> Array:
 
 
 def near_pairs(boxes: Array, wanted: Bools) -> Iterator[Ints]:
-    """Pairs of overlapping boxes, about `_PAIRS` at a time."""
+    """Yield the pairs of overlapping boxes, about `_PAIRS` at a time."""
     centres = boxes[:, :3] + boxes[:, 3:]
     low, extent = centres.min(axis=0), np.ptp(centres, axis=0)
-    # one scale for all axes: a flat wall is not stretched into a cube
+    # one scale for all axes, so that a flat wall is not stretched into a cube
     scale = np.full(3, (2.0**21 - 1.0) / max(float(extent.max()), 1e-300))
     order = np.argsort(morton_codes(centres, low, scale), kind="stable")
     size = 1 << max(len(boxes) - 1, 0).bit_length()

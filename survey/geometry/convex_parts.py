@@ -1,14 +1,13 @@
-"""A stone that is not convex, cut into convex parts.
+"""Decomposition of a non-convex stone into convex parts.
 
-Where the stone is folded in, along a reflex edge, it is cut by a plane through the edge that leaves less than 180°
-on either side. The boundary of the stone is carried along in pieces: a region between cuts is convex as soon as no
-piece of the boundary lies in front of the plane of another; it is then what the half-spaces of its pieces and of
-its cuts have in common. No region is ever represented in any other way, so that there are no cut faces with holes
-to go wrong.
+Along each reflex edge the stone is cut by a plane through the edge that leaves less than 180° on either side. The
+boundary of the stone is carried along in pieces: a region between cuts is convex as soon as no piece of the
+boundary lies in front of the plane of another; it is then the intersection of the half-spaces of its pieces and
+cuts. Regions are never represented in any other way, so no cut faces with holes arise.
 
-A cut is the better the fewer reflex edges it leaves, so that planes through two of them come before the
-continuation of a face, and this before the bisector; of the ways to begin, the one is taken that ends in the fewest
-parts, and of these the one whose thinnest part is thickest.
+A cut is better the fewer reflex edges it leaves: planes through two of them come before the continuation of a face,
+and this before the bisector. Of the possible first cuts, the one is taken that ends in the fewest parts, and of
+these the one whose thinnest part is thickest.
 """
 
 from collections.abc import Iterator, Sequence
@@ -28,13 +27,13 @@ __all__ = ["convex_parts"]
 Place = tuple[float, float, float]
 Plane = tuple[float, float, float, float]
 
-_SAME_VOLUME = 1e-6  # of the stone's volume: by more the parts do not differ, if its faces are planes
+_SAME_VOLUME = 1e-6  # of the stone's volume: largest difference of its parts', if its faces are planes
 _BEGINNINGS = 8  # first cuts that are followed to the end
 
 
 @dataclass(frozen=True)
 class _Region:
-    """What lies between some cuts: half-spaces of the cuts, pieces (face, polygon) of the boundary, reflex edges."""
+    """Region between cuts: half-spaces of the cuts, pieces (face, polygon) of the boundary, reflex edges."""
 
     cuts: tuple[Plane, ...]
     pieces: tuple[tuple[int, tuple[Place, ...]], ...]
@@ -47,7 +46,7 @@ def convex_parts(solid: Solid, most: int = 32) -> tuple[Solid, ...]:
     Parameters
     ----------
     solid : closed, with planar faces
-    most : parts
+    most : largest number of parts
 
     Returns
     -------
@@ -57,7 +56,7 @@ def convex_parts(solid: Solid, most: int = 32) -> tuple[Solid, ...]:
     Raises
     ------
     GeometryError
-        if it would take more parts, or its faces are no planes
+        if it would take more parts, or its faces are not planes
     """
     if is_convex(solid):
         return (solid,)
@@ -66,7 +65,7 @@ def convex_parts(solid: Solid, most: int = 32) -> tuple[Solid, ...]:
 
 
 class _Cutter:
-    """One solid that is being cut; places are counted from its middle."""
+    """One solid being cut; coordinates are relative to its middle."""
 
     def __init__(self, solid: Solid, most: int) -> None:
         self._solid, self._most = solid, most
@@ -74,12 +73,12 @@ class _Cutter:
         self._origin = 0.5 * (self._low + self._high)
         self._local = replace(solid, vertices=solid.vertices - self._origin)
         self._size = float(np.linalg.norm(self._high - self._low))
-        self._flat = flatness(solid)  # places so near to one another are the same
+        self._flat = flatness(solid)  # distance within which two places are the same
         self._on = 0.1 * self._flat
         self._planes = [_plane(row) for row in planes_of_solid(self._local).tolist()]
 
     def parts(self) -> tuple[Solid, ...]:
-        """The best of several ways to cut it."""
+        """Return the best of several decompositions."""
         whole = _Region((), tuple(self._pieces()), reflex_edges(self._local))
         ranked = sorted(self._ranked(whole), key=lambda one: one[0])
         beginnings = [cut for rank, cut in ranked if rank[0] == ranked[0][0][0]][:_BEGINNINGS]
@@ -89,24 +88,24 @@ class _Cutter:
             raise GeometryError(
                 f"it is not convex, and would take more than {self._most} convex parts",
                 where=f"stone {self._solid.code}",
-                remedy="simplify it, or make several stones of it",
+                remedy="simplify it, or divide it into several stones",
             )
         filling = [parts for parts in found if self._is_filled(parts)]
         if not filling:
             raise GeometryError(
-                "its convex parts do not fill it: its faces are not quite planes",
+                "its convex parts do not fill it: its faces are not quite planar",
                 where=f"stone {self._solid.code}",
-                remedy="make them planes: moma ingest --snap",
+                remedy="make them planar: moma ingest --snap",
             )
         best = max(filling, key=self._worth)
         return tuple(replace(part, vertices=self._placed(part.vertices)) for part in best)
 
     def _worth(self, parts: Sequence[Solid]) -> tuple[int, float]:
-        """The fewer parts, and the thicker the thinnest, the better."""
+        """Return a key that is greater for fewer parts, then for a thicker thinnest part."""
         return -len(parts), round(min(map(_width, parts)) / self._size, 9)
 
     def _pieces(self) -> Iterator[tuple[int, tuple[Place, ...]]]:
-        """Faces as convex polygons."""
+        """Yield the faces as convex polygons."""
         corners = [_place(row) for row in self._local.vertices.tolist()]
         for k, face in enumerate(self._local.faces):
             if _turns_left(self._local.vertices[list(face)], np.array(self._planes[k][:3])):
@@ -119,7 +118,7 @@ class _Cutter:
                         yield k, tuple(corners[i] for i in triangle)
 
     def _follow(self, whole: _Region, first: Plane | None) -> list[Solid] | None:
-        """Cut until all is convex; None if that takes too many parts."""
+        """Cut until all regions are convex; return None if that takes too many parts."""
         waiting = list(self._halves(whole, first)) if first is not None else [whole]
         done: list[Solid] = []
         while waiting:
@@ -152,7 +151,7 @@ class _Cutter:
         return part
 
     def _holds(self, place: Array) -> bool:
-        """Whether a place is within the stone: the solid angle of all its faces about it (Oosterom & Strackee 1983)."""
+        """Return whether a place is in the stone, by the solid angle of its faces (van Oosterom & Strackee 1983)."""
         a, b, c = (self._local.vertices[triangulate(self._local)[:, k]] - place for k in range(3))
         p, q, r = (np.linalg.norm(one, axis=1) for one in (a, b, c))
         over = (a * np.cross(b, c)).sum(axis=1)
@@ -160,7 +159,7 @@ class _Cutter:
         return bool(np.arctan2(over, under).sum() > np.pi)
 
     def _ranked(self, region: _Region) -> Iterator[tuple[tuple[int, int, int], Plane]]:
-        """Cuts that divide a region, with the reflex edges and pieces that they leave; the fewer, the better."""
+        """Yield cuts that divide a region, fewest remaining reflex edges and pieces first."""
         for order, cut in enumerate(self._cuts(region)):
             halves = self._halves(region, cut)
             if all(half.pieces for half in halves):
@@ -170,7 +169,7 @@ class _Cutter:
                     yield (edges, pieces, order), cut
 
     def _cuts(self, region: _Region) -> Iterator[Plane]:
-        """Planes through two reflex edges, continuations of faces, bisectors."""
+        """Yield planes through two reflex edges, continuations of faces, and bisectors."""
         edges = region.edges
         for k, one in enumerate(edges):
             for other in edges[k + 1 :]:
@@ -182,11 +181,11 @@ class _Cutter:
             for one in edges:
                 normal = np.array(self._planes[one.first][:3]) - self._planes[one.second][:3]
                 yield _plane_through(normal, one.start)
-        else:  # pieces that do not hang together
+        else:  # pieces that are not connected
             yield from (self._planes[k] for k in dict(region.pieces))
 
     def _through(self, one: ReflexEdge, other: ReflexEdge) -> Plane | None:
-        """The plane of two edges, if they lie in one."""
+        """Return the plane of two edges if they are coplanar."""
         places = np.array([one.start, one.stop, other.start, other.stop])
         centred = places - places.mean(axis=0)
         _, extents, axes = np.linalg.svd(centred)
@@ -195,7 +194,7 @@ class _Cutter:
         return _plane_through(axes[2], one.start)
 
     def _divides(self, plane: Plane, edge: ReflexEdge) -> bool:
-        """Whether a plane through an edge leaves no more than 180° on either side."""
+        """Return whether a plane through an edge leaves at most 180° on either side."""
         along = np.cross(np.subtract(edge.stop, edge.start), plane[:3])
         first = float(np.dot(self._planes[edge.first][:3], along))
         second = float(np.dot(self._planes[edge.second][:3], along))
@@ -203,7 +202,7 @@ class _Cutter:
         return min(first, second) >= -slack or max(first, second) <= slack
 
     def _halves(self, region: _Region, cut: Plane) -> tuple[_Region, _Region]:
-        """What lies behind a plane, and what in front of it."""
+        """Return the parts of a region behind and in front of a plane."""
         other = (-cut[0], -cut[1], -cut[2], -cut[3])
         return self._behind(region, cut), self._behind(region, other)
 
@@ -211,7 +210,7 @@ class _Cutter:
         pieces = []
         for k, polygon in region.pieces:
             left = _clipped(polygon, cut, self._on)
-            if left is None:  # it lies in the cut, and belongs to the side of which it is the boundary
+            if left is None:  # it lies in the cut, and belongs to the side whose boundary it is
                 plane = self._planes[k]
                 if plane[0] * cut[0] + plane[1] * cut[1] + plane[2] * cut[2] > 0.0:
                     pieces.append((k, polygon))
@@ -225,7 +224,7 @@ class _Cutter:
         return _Region((*region.cuts, cut), tuple(pieces), tuple(edges))
 
     def _placed(self, vertices: Array) -> Array:
-        """Corners in the frame of the stone; those that are its own to the last digit."""
+        """Return corners in the frame of the stone; its own corners keep their last digit."""
         away = np.linalg.norm(vertices[:, None] - self._local.vertices, axis=2)
         nearest = away.argmin(axis=1)
         own = away[np.arange(len(vertices)), nearest] <= self._flat
@@ -258,7 +257,7 @@ def _turns_left(polygon: Array, normal: Array) -> bool:
 
 
 def _clipped(polygon: tuple[Place, ...], cut: Plane, on: float) -> tuple[Place, ...] | None:
-    """What of a convex polygon, or of an edge, lies behind a plane; None if all of it lies in the plane."""
+    """Return the part of a convex polygon or edge behind a plane; None if all of it lies in the plane."""
     a, b, c, d = cut
     heights = [a * x + b * y + c * z - d for x, y, z in polygon]
     if max(heights) <= on:
@@ -279,6 +278,6 @@ def _clipped(polygon: tuple[Place, ...], cut: Plane, on: float) -> tuple[Place, 
 
 
 def _width(solid: Solid) -> float:
-    """Smallest extent along the normal of a face [m]."""
+    """Return the smallest extent along the normal of a face [m]."""
     heights = solid.vertices @ planes_of_solid(solid)[:, :3].T
     return float(np.ptp(heights, axis=0).min())

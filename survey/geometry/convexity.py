@@ -1,4 +1,4 @@
-"""Where a closed polyhedron is not convex: edges at which its faces meet with more than 180° of stone between them."""
+"""Reflex edges of a closed polyhedron: edges with more than 180° of stone between their faces."""
 
 from dataclasses import dataclass
 
@@ -9,18 +9,18 @@ from survey.geometry.solids import Solid, highest_corner, planes_of_solid
 __all__ = ["ReflexEdge", "flatness", "is_convex", "reflex_edges"]
 
 
-_FLAT = 1e-9  # of its size: corners so little in front of a plane are on it, and edges so shallow are none
-_WARPS = 4.0  # times by which two faces that are not quite planes may seem to stand in front of each other
+_FLAT = 1e-9  # of its size: height within which a corner lies on a plane and an edge is not reflex
+_WARPS = 4.0  # warps of two faces by which one may seem to stand in front of the other
 
 
 @dataclass(frozen=True)
 class ReflexEdge:
-    """An edge into which the stone is folded.
+    """A reflex edge of a stone.
 
     Attributes
     ----------
     corners : numbers of its two corners
-    start, stop : (3,) where they are, or where a piece of the edge begins and ends [m]
+    start, stop : (3,) its ends, or those of a piece of it [m]
     first, second : numbers of its two faces
     """
 
@@ -32,7 +32,7 @@ class ReflexEdge:
 
 
 def flatness(solid: Solid) -> float:
-    """Heights below this tell nothing of a solid: 1e-9 of its size, and some times what its faces are warped [m]."""
+    """Return the height [m] below which corners lie on a plane: 1e-9 of the size, or several times the faces' warp."""
     planes = planes_of_solid(solid)
     warp = max(
         float(np.abs(solid.vertices[list(face)] @ plane[:3] - plane[3]).max())
@@ -42,19 +42,19 @@ def flatness(solid: Solid) -> float:
 
 
 def is_convex(solid: Solid, tolerance: float | None = None) -> bool:
-    """Whether no corner lies in front of the plane of a face.
+    """Return whether no corner lies in front of the plane of a face.
 
     Parameters
     ----------
     solid : closed
-    tolerance : by which a corner may [m]; `flatness` of the solid if None
+    tolerance : height by which a corner may do so [m]; None: `flatness` of the solid
     """
     tolerance = flatness(solid) if tolerance is None else tolerance
     return highest_corner(solid) <= tolerance
 
 
 def reflex_edges(solid: Solid) -> tuple[ReflexEdge, ...]:
-    """The edges with more than 180° of stone, in the order of the faces.
+    """Return the edges with more than 180° of stone, in the order of the faces.
 
     Parameters
     ----------

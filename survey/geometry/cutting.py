@@ -1,4 +1,4 @@
-"""Stones cut out by planes: of their own faces that are free, and of the joints that they share."""
+"""Cutting of stones by planes: those of their own free faces, and those of the joints that they share."""
 
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
@@ -7,22 +7,22 @@ from functools import lru_cache
 import numpy as np
 
 from survey.arrays import Array, Bools, Ints
-from survey.geometry._kernels.cutting import FULL, cut_out
+from survey.geometry._kernels.cutting import FULL, CutSolid, cut_out
 from survey.geometry.solids import Solid, area_vector
 
 __all__ = ["CutStone", "common_part", "cut_stones", "joins_three", "moves"]
 
 Faces = tuple[tuple[int, ...], ...]
 
-_NEAR = 1e-10  # metres: a corner that is as near as that to a plane lies on it
-_CLEAR = 1e-6  # metres by which a corner has to lie below all other planes for the faces to stay as they were
-_THIN = 1e-5  # metres: a face of the intersection that is thinner says nothing but rounding
+_NEAR = 1e-10  # metres: distance within which a corner lies on a plane
+_CLEAR = 1e-6  # metres: least depth of a corner below all other planes for the faces to stay as they were
+_THIN = 1e-5  # metres: thickness below which a face of the intersection is due to rounding
 _MOST = 64
 
 
 @dataclass(frozen=True)
 class CutStone:
-    """A convex stone, and which of the planes that were given each face lies on.
+    """A convex stone, with the plane of each face.
 
     Attributes
     ----------
@@ -37,20 +37,20 @@ class CutStone:
 def cut_stones(
     solids: Sequence[Solid], planes: Mapping[int, Array], notched: Container[int] = ()
 ) -> dict[int, CutStone | None]:
-    """Cut some stones out by new planes.
+    """Cut some stones by new planes.
 
     Parameters
     ----------
     solids : as they were
-    planes : of those stones that change, (n, 4) outward unit normals and offsets n·x ≤ d; the first planes belong to
+    planes : for each stone that changes, (n, 4) outward unit normals and offsets n·x ≤ d; the first planes belong to
         the faces of the solid, in their order, and further ones may follow
     notched : stones that are not convex, each corner of which joins three faces: their faces are moved, not cut, and
-        further planes do not count
+        further planes are ignored
 
     Returns
     -------
-    by index, the stone; with the corners and faces of the old one, in their order, where all its faces are left and no
-    others came; None where the planes leave nothing or do not close
+    stones by index; with the corners and faces of the old one, in their order, where all its faces are left and no
+    others were added; None where the planes leave nothing or do not close
     """
     out: dict[int, CutStone | None] = {}
     cut = {i: own for i, own in planes.items() if i not in notched}
@@ -69,12 +69,12 @@ def cut_stones(
 
 
 def joins_three(faces: Faces) -> bool:
-    """Whether each corner of a solid joins three faces, so that it stays closed when its planes move."""
+    """Return whether each corner joins three faces, so that the solid stays closed when its planes move."""
     return _meeting(faces) is not None
 
 
 def _with_faces_moved(solid: Solid, planes: Array) -> CutStone | None:
-    """A stone with the same corners and faces on new planes (nf, 4); None if an edge or a face would turn about."""
+    """Return a stone with the same topology on new planes (nf, 4); None if an edge or a face would reverse."""
     corners, wide = _crossings(solid.faces, planes[None])
     if not wide[0].all():
         return None
@@ -87,7 +87,7 @@ def _with_faces_moved(solid: Solid, planes: Array) -> CutStone | None:
 
 
 def moves(old: Solid, new: Solid) -> Array:
-    """How far each corner (nv,) of a solid has moved; where its faces are others, how far the nearest corner is [m]."""
+    """Return the displacement of each corner (nv,) [m]; if faces changed, to the nearest new corner."""
     if old.faces == new.faces:
         out: Array = np.linalg.norm(new.vertices - old.vertices, axis=1)
         return out
@@ -97,7 +97,7 @@ def moves(old: Solid, new: Solid) -> Array:
 
 
 def common_part(first: Array, second: Array, centre: Array, reach: float) -> Solid | None:
-    """What two convex solids, given by their planes (n, 4), have in common; None if that is nothing.
+    """Return the intersection of two convex solids, given by their planes (n, 4); None if it is empty.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def common_part(first: Array, second: Array, centre: Array, reach: float) -> Sol
 
 
 def _alike(solids: Sequence[Solid], planes: Mapping[int, Array]) -> dict[Faces, list[int]]:
-    """Stones that may keep their faces, by these: one plane for each, and three faces at each corner."""
+    """Group stones that may keep their faces by these: one plane for each face, three faces at each corner."""
     groups: dict[Faces, list[int]] = {}
     for i, own in planes.items():
         faces = solids[i].faces
@@ -120,7 +120,7 @@ def _alike(solids: Sequence[Solid], planes: Mapping[int, Array]) -> dict[Faces, 
 
 @lru_cache(maxsize=1024)
 def _meeting(faces: Faces) -> Ints | None:
-    """The three faces (nv, 3) that meet at each corner; None if there are other numbers of them."""
+    """Return the three faces (nv, 3) that meet at each corner; None if another number meets anywhere."""
     count = max(max(face) for face in faces) + 1
     at: list[list[int]] = [[] for _ in range(count)]
     for number, face in enumerate(faces):
@@ -130,7 +130,7 @@ def _meeting(faces: Faces) -> Ints | None:
 
 
 def _moved(faces: Faces, planes: Array) -> tuple[Array, Bools]:
-    """Corners (n, nv, 3) where the planes (n, nf, 4) of each one's faces cross, and whether these stay the faces."""
+    """Return corners (n, nv, 3) where the planes (n, nf, 4) cross, and (n,) whether the stones keep their faces."""
     corners, wide = _crossings(faces, planes)
     meeting = _meeting(faces)
     assert meeting is not None
@@ -142,7 +142,7 @@ def _moved(faces: Faces, planes: Array) -> tuple[Array, Bools]:
 
 
 def _crossings(faces: Faces, planes: Array) -> tuple[Array, Bools]:
-    """Corners (n, nv, 3) where the planes (n, nf, 4) of each one's faces cross, and (n, nv) whether at wide angles."""
+    """Return corners (n, nv, 3) where the planes (n, nf, 4) cross, and (n, nv) whether they do so at wide angles."""
     meeting = _meeting(faces)
     assert meeting is not None
     origin = _middle(planes)
@@ -155,7 +155,7 @@ def _crossings(faces: Faces, planes: Array) -> tuple[Array, Bools]:
 
 
 def _middle(planes: Array) -> Array:
-    """A place near each stone (n, 3): least squares of the distances from its planes."""
+    """Return a place near each stone (n, 3): least squares of the distances from its planes."""
     normals = planes[:, :, :3]
     matrix = np.einsum("nfi,nfj->nij", normals, normals) + 1e-9 * np.eye(3)
     right = np.einsum("nfi,nf->ni", normals, planes[:, :, 3])
@@ -164,7 +164,7 @@ def _middle(planes: Array) -> Array:
 
 
 def _cut(solid: Solid, planes: Array) -> CutStone | None:
-    """The general way; faces too thin to be more than rounding are left out."""
+    """Cut one stone in the general way, without faces so thin that they are due to rounding."""
     low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
     centre, reach = 0.5 * (low + high), 4.0 * float((high - low).max())
     wanted = np.arange(len(planes))
@@ -196,7 +196,9 @@ def _intersect(planes: Array, centre: Array, reach: float, code: str) -> CutSton
     vertices = np.empty((16 * room, 3))
     loops, sizes = np.empty((room + 1, _MOST), np.int64), np.empty(room + 1, np.int64)
     of_face = np.empty(room + 1, np.int64)
-    status, corners, faces = cut_out(local, np.zeros(3), reach, _NEAR, vertices, loops, sizes, of_face)
+    status, corners, faces = cut_out(
+        local, np.zeros(3), reach, _NEAR, CutSolid(vertices, loops, sizes, of_face)
+    )
     if status != FULL:
         return None
     named = tuple(tuple(loops[f, : sizes[f]].tolist()) for f in range(faces))

@@ -1,9 +1,8 @@
-"""Polygons that are not plane: folded along the diagonals that leave the least warp.
+"""Folding of warped polygons along the diagonals that leave the least warp.
 
-A polygon of a mesh with more than three corners says where its edges are, not how the surface runs between them.
-Where its corners lie in no plane it is cut along the diagonal that leaves its two halves flattest, and these again,
-until all are flat. Of diagonals that do equally well it is the shortest, so that two stones that share a side fold
-it alike.
+A polygon of a mesh with more than three corners defines its edges, not the surface between them. Where its corners
+are not coplanar it is cut along the diagonal that leaves its two halves flattest, and these again, until all are
+flat. Of equally good diagonals the shortest is taken, so that two stones that share a side fold it alike.
 """
 
 from collections.abc import Iterator
@@ -17,11 +16,11 @@ __all__ = ["fold", "warp"]
 
 Polygon = tuple[int, ...]
 
-_ALIKE = 1e-6  # of a polygon's size: warps that differ by less are alike
+_ALIKE = 1e-6  # of a polygon's size: difference below which warps are equal
 
 
 def warp(corners: Array) -> float:
-    """Largest distance of the corners (n, 3) of a polygon from its mean plane [m]; infinite if it has no area."""
+    """Return the largest distance of the corners (n, 3) from their mean plane [m]; infinite if the area is zero."""
     if len(corners) == 3:
         return 0.0
     normal = area_vector(corners)
@@ -32,17 +31,17 @@ def warp(corners: Array) -> float:
 
 
 def fold(vertices: Array, polygon: Polygon, tolerance: float) -> list[Polygon]:
-    """Cut a polygon into flat ones.
+    """Cut a polygon into flat polygons.
 
     Parameters
     ----------
     vertices : (nv, 3) [m]
     polygon : vertex indices, in order
-    tolerance : warp of a flat polygon [m]
+    tolerance : largest warp of a flat polygon [m]
 
     Returns
     -------
-    Polygons wound like it, which share the diagonals along which it was cut
+    Polygons wound like the original, which share the diagonals along which it was cut
     """
     if len(polygon) == 3 or warp(vertices[list(polygon)]) <= tolerance:
         return [polygon]
@@ -60,7 +59,7 @@ def fold(vertices: Array, polygon: Polygon, tolerance: float) -> list[Polygon]:
 
 
 def _halves(vertices: Array, polygon: Polygon) -> Iterator[tuple[Polygon, Polygon]]:
-    """Both sides of each diagonal that runs within the polygon, as it is seen square to its mean plane."""
+    """Yield both sides of each diagonal within the polygon, seen square to its mean plane."""
     corners = vertices[list(polygon)]
     normal = area_vector(corners)
     if not float(np.linalg.norm(normal)) > 0.0:
@@ -75,7 +74,7 @@ def _halves(vertices: Array, polygon: Polygon) -> Iterator[tuple[Polygon, Polygo
 
 
 def _within(flat: Array, i: int, j: int) -> bool:
-    """Whether the diagonal from corner i to corner j meets no side, and runs inside."""
+    """Return whether the diagonal from corner i to corner j crosses no side and runs inside."""
     n = len(flat)
     for k in range(n):
         following = (k + 1) % n

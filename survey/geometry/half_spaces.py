@@ -1,7 +1,7 @@
-"""What half-spaces have in common, as a convex polyhedron: planes cut away from a box one after the other.
+"""Intersection of half-spaces as a convex polyhedron: planes cut one after another from a box.
 
-The corners of all polyhedra that come from one box are kept in one list; an edge that is cut has its new corner
-once, so that what is cut stays closed whatever rounding does.
+The corners of all polyhedra cut from one box share one list, and each cut edge gets its new corner once, so the
+result stays closed whatever the rounding.
 """
 
 from collections.abc import Iterable
@@ -30,11 +30,11 @@ def intersection(
     code : of the solid
     planes : (nx, ny, nz, d) of each, n a unit vector
     low, high : (3,) corners of the box [m]
-    tolerance : corners so near to a plane lie on it [m]
+    tolerance : distance within which corners lie on a plane [m]
 
     Returns
     -------
-    Solid of at least four faces, in the order of its planes (those of the box first); None if nothing is left
+    Solid of at least four faces, in the order of its planes (those of the box first); None if it is empty
     """
     bounds = (low.tolist(), high.tolist())
     corners: list[Place] = [
@@ -53,7 +53,7 @@ def intersection(
 
 
 def _cut(corners: list[Place], faces: list[Polygon], plane: Plane, tolerance: float) -> list[Polygon]:
-    """The faces of what lies behind a plane; new corners are added to the list."""
+    """Return the faces of the part behind a plane; append new corners to the list."""
     a, b, c, d = plane
     heights = {
         i: a * corners[i][0] + b * corners[i][1] + c * corners[i][2] - d for face in faces for i in face
@@ -83,7 +83,7 @@ def _behind(
     side: dict[int, int],
     cut: dict[tuple[int, int], int],
 ) -> list[int]:
-    """The part of a face behind the plane."""
+    """Return the part of a face behind the plane."""
     polygon = []
     for i, j in zip(face, (*face[1:], face[0]), strict=True):
         if side[i] <= 0:
@@ -100,7 +100,7 @@ def _behind(
 
 
 def _loop(after: dict[int, int]) -> Polygon:
-    """The face that closes the cut."""
+    """Return the face that closes the cut."""
     if not after:
         return ()
     start = min(after)

@@ -1,6 +1,6 @@
-"""Corners that are to lie on planes, which are not known either: all of them with the least movement.
+"""Least-movement adjustment of corners onto planes that are unknown as well.
 
-Unknown are the corners x_v and the planes (n_p, d_p). The squared movement Σ |x_v - x_v⁰|² is least, subject to
+Unknown are the corners x_v and the planes (n_p, d_p). The squared movement Σ |x_v - x_v⁰|² is minimised, subject to
 n_p·x_v = d_p for each corner v of each plane p. Every step solves the linearised problem (sequential quadratic
 programming with the Hessian of the movement alone),
 
@@ -9,9 +9,9 @@ programming with the Hessian of the movement alone),
     | A   B   -δI | | λ  |   |  -g    |
 
 with A, B the derivatives of the distances g by corners and by planes. A plane turns about two axes in it and shifts
-along its normal; its turns are counted in metres at its own radius, so that all unknowns are lengths. δ makes the
-system solvable where a corner has more planes than three directions can tell apart; the last steps start from where the
-corners are, so that it leaves nothing behind.
+along its normal; its turns are scaled by its own radius, so that all unknowns are lengths. δ makes the system
+solvable where a corner has more planes than its three coordinates determine; the last steps start from the corners'
+current positions, so that it leaves no error.
 """
 
 from dataclasses import dataclass
@@ -28,16 +28,16 @@ __all__ = ["Settled", "settle"]
 _STEPS = 30
 _POLISH = 4
 _DONE = 1e-14  # of the size of all: smaller steps are rounding
-_SOFT = 1e-9  # δ and μ
+_SOFT = 1e-9  # δ and μ [-]
 
 
 @dataclass(frozen=True)
 class Settled:
-    """Where the corners came to lie.
+    """Adjusted corners and planes.
 
     Attributes
     ----------
-    vertices : (nv, 3) [m]
+    vertices : (nv, 3) corners [m]
     normals : (np, 3) unit normals of the planes [-]
     residual : (ni,) distance of each corner from each of its planes [m]
     """
@@ -48,12 +48,12 @@ class Settled:
 
 
 def settle(vertices: Array, corner: Ints, plane: Ints) -> Settled:
-    """Move corners onto planes by as little as can be.
+    """Move corners onto planes with the least total squared movement.
 
     Parameters
     ----------
-    vertices : (nv, 3) where the corners are [m]
-    corner, plane : (ni,) which corner lies on which plane; each plane has three corners or more, not in a line
+    vertices : (nv, 3) initial corners [m]
+    corner, plane : (ni,) corner and plane of each incidence; each plane has at least three corners, not on a line
     """
     centre = vertices.mean(axis=0)
     network = _Network(vertices - centre, corner, plane)
@@ -69,7 +69,7 @@ def settle(vertices: Array, corner: Ints, plane: Ints) -> Settled:
 
 
 class _Network:
-    """The corners and planes on their way."""
+    """Corners and planes during the iteration."""
 
     def __init__(self, vertices: Array, corner: Ints, plane: Ints) -> None:
         self.start, self.x = vertices.copy(), vertices.copy()
@@ -87,13 +87,13 @@ class _Network:
         self._offset = np.zeros(count)
 
     def distances(self) -> Array:
-        """Of each corner from each of its planes."""
+        """Return the distance of each corner from each of its planes (ni,) [m]."""
         lever = self.x[self._corner] - self._centre[self._plane]
         out: Array = (self.normal[self._plane] * lever).sum(axis=1) - self._offset[self._plane]
         return out
 
     def step(self) -> float:
-        """One step; how far the corner moved that moved farthest."""
+        """Do one step; return the largest movement of a corner [m]."""
         nv, count, ni = len(self.x), len(self._offset), len(self._corner)
         right = np.concatenate([(self.start - self.x).ravel(), np.zeros(3 * count), -self.distances()])
         solution = splu(self._matrix()).solve(right)
@@ -110,7 +110,7 @@ class _Network:
         return float(np.linalg.norm(move, axis=1).max(initial=0.0)) if ni else 0.0
 
     def _matrix(self) -> csc_array:
-        """Of the linearised problem, symmetric."""
+        """Return the symmetric matrix of the linearised problem."""
         nv, count, ni = len(self.x), len(self._offset), len(self._corner)
         lever = self.x[self._corner] - self._centre[self._plane]
         turns = np.einsum("ki,kij->kj", lever, self._turns[self._plane]) / self._radius[self._plane, None]

@@ -1,4 +1,4 @@
-"""Closed solids with planar faces: what a stone becomes once its hidden half is known."""
+"""Closed solids with planar faces: the shape of a stone once its hidden half is known."""
 
 from dataclasses import dataclass
 
@@ -26,14 +26,14 @@ class Solid:
 
 
 def area_vector(polygon: Array) -> Array:
-    """Area times normal of a polygon (n, 3) in space, counter-clockwise about it [m²]."""
+    """Return area times normal of a polygon (n, 3) in space, counter-clockwise about it [m²]."""
     corners = polygon - polygon[0]
     out: Array = 0.5 * np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
     return out
 
 
 def planes_of_solid(solid: Solid) -> Array:
-    """Planes (nf, 4) of a solid's faces: outward unit normals [-], and offsets d of n·x = d about the origin [m]."""
+    """Return the planes (nf, 4) of a solid's faces: outward unit normals [-], offsets d of n·x = d [m]."""
     rows = np.empty((len(solid.faces), 4))
     for row, face in zip(rows, solid.faces, strict=True):
         polygon = solid.vertices[list(face)]
@@ -44,15 +44,15 @@ def planes_of_solid(solid: Solid) -> Array:
 
 
 def highest_corner(solid: Solid) -> float:
-    """How far a corner stands out of the plane of a face; next to nothing if the solid is convex [m]."""
-    # about a place among the corners: far from the origin rounding would raise some
+    """Return the largest height of a corner above the plane of a face; about zero if the solid is convex [m]."""
+    # relative to a place among the corners: far from the origin, rounding would raise some
     local = Solid(solid.code, solid.vertices - solid.vertices.mean(axis=0), solid.faces)
     planes = planes_of_solid(local)
     return float((local.vertices @ planes[:, :3].T - planes[:, 3]).max())
 
 
 def volume_of(solid: Solid) -> float:
-    """Volume of a closed solid with planar faces, by the divergence theorem; negative if seen from inside [m³]."""
+    """Return the volume of a closed solid, by the divergence theorem; negative if seen from inside [m³]."""
     centre = solid.vertices.mean(axis=0)
     cones = (
         (solid.vertices[face[0]] - centre) @ area_vector(solid.vertices[list(face)]) for face in solid.faces

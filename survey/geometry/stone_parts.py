@@ -1,4 +1,4 @@
-"""Convex parts of any stone."""
+"""Convex parts of any stone, measured or infill."""
 
 from collections.abc import Iterator, Sequence
 from itertools import permutations
@@ -12,7 +12,7 @@ from survey.geometry.watertight import triangulate
 
 __all__ = ["grid_parts", "stone_parts"]
 
-_MANY = 40  # faces of a solid from which it is first looked at as a storey of infill
+_MANY = 40  # least number of faces of a solid that is tried as a storey of infill first
 
 
 def stone_parts(solid: Solid) -> tuple[Solid, ...]:
@@ -32,13 +32,13 @@ def stone_parts(solid: Solid) -> tuple[Solid, ...]:
 
 Box = tuple[tuple[int, int], ...]
 
-_FAMILY = float(np.cos(np.radians(25.0)))  # planes that are nearer to parallel are of one family
-_SAME = 1e-7  # metres: faces whose corners are nearer to each other's planes lie in one
-_VOLUME = 1e-6  # by more of its volume the parts of a solid do not differ from it
-_AT_ONCE = 2_000_000  # solid angles that are computed together
+_FAMILY = float(np.cos(np.radians(25.0)))  # cosine of 25°: planes nearer to parallel are of one family
+_SAME = 1e-7  # metres: distance of corners from each other's planes within which faces are coplanar
+_VOLUME = 1e-6  # of a solid's volume: largest difference of its parts' volume
+_AT_ONCE = 2_000_000  # solid angles that are computed together, which bounds the memory
 
 _BOX = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
-"""Faces of a box whose corner k is at bits k₂ k₁ k₀ of its three axes, seen from outside if these are right-handed."""
+"""Faces of a box whose corner k is at bits k₂ k₁ k₀ of its three axes; outward if the axes are right-handed."""
 
 
 def grid_parts(solid: Solid) -> tuple[Solid, ...] | None:
@@ -50,7 +50,7 @@ def grid_parts(solid: Solid) -> tuple[Solid, ...] | None:
 
     Returns
     -------
-    The parts, all under the solid's code; None if its faces are not in three families of planes that nowhere cross
+    The parts, all under the solid's code; None unless its faces are in three families of planes that nowhere cross
     """
     origin = solid.vertices.mean(axis=0)
     local = Solid(solid.code, solid.vertices - origin, solid.faces)
@@ -68,7 +68,7 @@ def grid_parts(solid: Solid) -> tuple[Solid, ...] | None:
 
 
 def _families(solid: Solid) -> list[Array] | None:
-    """The planes (n, 4) of each of three families, one after the other; None if there are not, or planes cross."""
+    """Return the planes (n, 4) of each of three families, in order; None unless there are three and none cross."""
     polygons = [solid.vertices[list(face)] for face in solid.faces]
     groups: list[list[Array]] = []
     for polygon in polygons:
@@ -90,7 +90,7 @@ def _families(solid: Solid) -> list[Array] | None:
 
 
 def _in_order(planes: Sequence[Array], places: Array) -> Array | None:
-    """Planes one after the other along their mean normal; None if two cross where the solid is."""
+    """Sort planes along their mean normal; return None if two cross where the solid is."""
     mean = np.sum([plane[:3] for plane in planes], axis=0)
     heights = np.array([(plane[3] - places @ plane[:3]) / (plane[:3] @ mean) for plane in planes])
     order = np.argsort(heights.mean(axis=1))
@@ -100,14 +100,14 @@ def _in_order(planes: Sequence[Array], places: Array) -> Array | None:
 
 
 def _nodes(families: Sequence[Array]) -> Array:
-    """Where three planes, one of each family, meet: (n0, n1, n2, 3) [m]."""
+    """Return the intersections (n0, n1, n2, 3) of three planes, one of each family [m]."""
     i, j, k = np.meshgrid(*(np.arange(len(family)) for family in families), indexing="ij")
     planes = np.stack([families[0][i], families[1][j], families[2][k]], axis=-2)
     return np.asarray(np.linalg.solve(planes[..., :3], planes[..., 3:])[..., 0], dtype=np.float64)
 
 
 def _inside(solid: Solid, nodes: Array) -> Bools:
-    """Which cells are in a solid: seen from the middle of one, its faces fill the whole sphere."""
+    """Return the cells inside a solid: seen from the middle of one, its faces fill the whole sphere."""
     shape = tuple(n - 1 for n in nodes.shape[:3])
     corners = [nodes[a : a + shape[0], b : b + shape[1], c : c + shape[2]] for a, b, c in np.ndindex(2, 2, 2)]
     middles = np.mean(corners, axis=0, dtype=np.float64).reshape(-1, 3)
@@ -120,7 +120,7 @@ def _inside(solid: Solid, nodes: Array) -> Bools:
 
 
 def _angles(points: Array, triangles: Array) -> Array:
-    """Solid angles (n,) under which points see a closed surface (van Oosterom and Strackee 1983)."""
+    """Return the solid angles (n,) of a closed surface seen from points (van Oosterom & Strackee 1983)."""
     a, b, c = (triangles[None, :, k] - points[:, None] for k in range(3))
     la, lb, lc = (np.linalg.norm(one, axis=2) for one in (a, b, c))
     volume = (a * np.cross(b, c)).sum(axis=2)
@@ -130,7 +130,7 @@ def _angles(points: Array, triangles: Array) -> Array:
 
 
 def _boxes(filled: Bools, order: Sequence[int]) -> list[Box]:
-    """Boxes of cells: from the first that is left as far as it goes, along one axis after the other."""
+    """Yield boxes of filled cells, each extended from the first one left along one axis after the other."""
     left, boxes = filled.copy(), []
     for first in np.argwhere(filled).tolist():
         if not left[tuple(first)]:
@@ -149,7 +149,7 @@ def _boxes(filled: Bools, order: Sequence[int]) -> list[Box]:
 
 
 def _part(code: str, nodes: Array, box: Box) -> Solid:
-    """The hexahedron of a box of cells."""
+    """Return the hexahedron of a box of cells."""
     vertices = np.array([nodes[place] for place in _corners(box)])
     part = Solid(code, vertices, _BOX)
     return part if volume_of(part) > 0.0 else Solid(code, vertices, tuple(face[::-1] for face in _BOX))

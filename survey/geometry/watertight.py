@@ -1,4 +1,4 @@
-"""Are the solids closed? Checked with trimesh, nothing repaired."""
+"""Closedness checks of solids with trimesh, which repairs nothing."""
 
 import numpy as np
 import trimesh
@@ -10,8 +10,8 @@ from survey.geometry.solids import Solid, area_vector, highest_corner
 
 __all__ = ["check_watertight", "triangulate"]
 
-_CONVEX_TOLERANCE = 1e-9  # metres that a corner may stand in front of a face plane
-_ON_A_SIDE = 1e-12  # of a triangle's size: corners so near to it are on its side
+_CONVEX_TOLERANCE = 1e-9  # metres: height of a corner in front of a face plane
+_ON_A_SIDE = 1e-12  # of a triangle's size: distance within which a corner is on its side
 
 
 def check_watertight(solid: Solid, *, convex: bool = False) -> None:
@@ -19,22 +19,24 @@ def check_watertight(solid: Solid, *, convex: bool = False) -> None:
 
     Parameters
     ----------
-    solid : what to check
-    convex : check also that it is convex, within 1e-9 m and what rounding leaves of its coordinates
+    solid : solid to check
+    convex : check convexity as well, within 1e-9 m and the rounding of its coordinates
 
     Raises
     ------
     GeometryError
-        naming the stone and what is wrong with it
+        naming the stone and its defect
     """
-    where, remedy = f"stone {solid.code}", "look at its corners in the survey"
+    where, remedy = f"stone {solid.code}", "check its corners in the survey"
     if not np.isfinite(solid.vertices).all():
         raise GeometryError("a corner is not finite", where=where, remedy=remedy)
     mesh = trimesh.Trimesh(solid.vertices, triangulate(solid), process=False)
     if not mesh.is_watertight:
         raise GeometryError("the solid is not closed", where=where, remedy=remedy)
     if not mesh.is_winding_consistent:
-        raise GeometryError("its faces are not all seen from outside", where=where, remedy=remedy)
+        raise GeometryError(
+            "its faces are not all counter-clockwise seen from outside", where=where, remedy=remedy
+        )
     if not mesh.volume > 0.0:
         raise GeometryError(
             f"its volume is {mesh.volume:.3g} m³: inside out or flat", where=where, remedy=remedy
@@ -76,7 +78,7 @@ def _is_ear(vertices: Array, rest: list[int], k: int, normal: Array) -> bool:
     if inward[0] @ (corners[2] - corners[0]) <= 0.0:
         return False
     others = vertices[[i for i in rest if i not in ids]]
-    # a corner on the side that would be cut is in the way, also where rounding puts it just outside
+    # a corner on the side to be cut is in the way, also where rounding puts it just outside
     slack = _ON_A_SIDE * np.linalg.norm(inward, axis=1) * float(np.abs(corners - corners[0]).max())
     inside = ((others[:, None, :] - corners) * inward).sum(axis=2) >= -slack
     return not inside.all(axis=1).any()

@@ -1,59 +1,82 @@
-"""Numba kernel that fits the plane half-way between the faces on either hand of a joint."""
+"""Numba kernels that fit the plane half-way between the faces on both sides of a joint."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-__all__ = ["continuing_faces", "fit_middle_planes"]
+from survey.arrays import Array, Bools, Ints
+from survey.geometry._kernels.vectors import dot, height_over
+
+__all__ = ["JointCorners", "continuing_faces", "fit_middle_planes"]
 
 _ROUNDS = 30
 _HUBER = 1.5
-"""Residuals beyond so many robust standard deviations lose weight."""
+"""Robust standard deviations beyond which residuals lose weight."""
 
 _PLANE = 0.25
-"""Of the straightness: by so much the corners of a joint that opens like a wedge may be off its two planes (rms)."""
+"""Of the straightness: largest rms of the corners of a wedge-shaped joint about its two planes."""
 
 _SHARP = 1e-4
-"""Metres below which a residual counts no more where their sum is to be least."""
+"""Metres: residual below which the weight no longer grows when the sum of residuals is minimised."""
 
 _MANY = 12
-"""Sound corners of a joint of more than two stones."""
+"""Least number of sound corners of a joint of more than two stones."""
 
 _WORN = 0.01
-"""Weight of a corner that is worn, and so some 25 mm off where a sound one is 2.5 mm off."""
+"""Weight of a worn corner: it is some 25 mm off where a sound one is 2.5 mm off."""
 
 _USUAL = 0.25
-"""Weight of the usual width of joints, where fewer than three sound corners tell of one of the hands."""
+"""Weight of the usual width of joints, used where fewer than three sound corners define one side."""
 
 _OWN = 4
-"""Sound corners that tell the plane of one hand, and more."""
+"""Least number of sound corners from which one side has its own plane."""
 
 _WEDGE = 0.035
-"""Opening of a joint, as a slope, from which the two hands may have planes of their own (2°)."""
+"""Least opening of a joint, as a slope, for which the two sides may have planes of their own (2°)."""
+
+
+class JointCorners(NamedTuple):
+    """Corners of the faces of several joints, joint after joint.
+
+    Attributes
+    ----------
+    points : (k, 3) float64, in the frame of their joint: along it, along it, across [m]
+    hands : (k,) float64, +1 above the joint, -1 below
+    sound : (k,) bool, whether a corner is known from measurement
+    starts : (n + 1,) int64, index of the first corner of each joint
+    scales : (n,) float64, divisors of the coordinates of each joint [m]
+    """
+
+    points: Array
+    hands: Array
+    sound: Bools
+    starts: Ints
+    scales: Array
 
 
 @njit(cache=True)
-def fit_middle_planes(points, hands, sound, starts, scales, usual, straightness, planes, values):
-    """For each joint the plane half-way between the faces on either hand.
+def fit_middle_planes(corners, usual, straightness, planes, values):
+    """Fit to each joint the plane half-way between the faces on its two sides.
 
-    In the frame of a joint a corner at (x, y) on hand s = ±1 is at the height z = a + b x + c y + s (w + p x + q y)/2.
-    The middle plane is a + b x + c y; w is the width. The opening p, q is taken for zero unless it explains most of
-    what is left over: two faces tell their mean direction better than each its own.
+    In the frame of a joint a corner at (x, y) on side s = ±1 is at the height z = a + b x + c y + s (w + p x + q y)/2.
+    The middle plane is a + b x + c y; w is the width. The opening p, q is assumed to be zero unless it explains most of
+    the residuals, since two faces give a better mean direction than each on its own.
 
-    Parameters
-    ----------
-    points : (k, 3) corners in the frame of their joint: along it, along it, across [m]
-    hands : (k,) +1 above the joint, -1 below
-    sound : (k,) whether a corner is known from measurement
-    starts : (n + 1,) where the corners of each joint begin
-    scales : (n,) by which the coordinates of each joint are divided [m]
-    usual : usual width [m]; negative: not known
-    straightness : residual of a sound corner above which it is off the joint [m]
-    planes : (n, 3) into which a, b, c are written
-    values : (n, 5), zero, for width, rms, and of sound corners the largest residual, the share of those off, and the
-        largest residual of the others
+    Inputs
+    ------
+    corners : JointCorners
+    usual : float, usual width of joints [m]; negative: unknown
+    straightness : float, residual of a sound corner above which it is off the joint [m]
+
+    Outputs
+    -------
+    planes : (n, 3) float64, a [m], b, c [-]
+    values : (n, 5) float64, zero on entry: width [m], rms [m], and of sound corners the largest residual [m], the
+        share of those off [-], and the largest residual of the others [m]
     """
+    points, hands, sound, starts, scales = corners
     for j in range(starts.shape[0] - 1):
         rows = slice(starts[j], starts[j + 1])
         _fit(points[rows], hands[rows], sound[rows], scales[j], usual, straightness, planes[j], values[j])
@@ -80,7 +103,7 @@ def _fit(points, hands, sound, scale, usual, straightness, plane, value):
             solution = open_
     value[2], value[3], total = _left_over(design, points[:, 2], sound, solution, straightness)
     if value[3] > 0.0:
-        # a few corners that are far off, at an end even more, tilt the plane: find those by the least sum of residuals
+        # corners that are far off, the more so at an end, tilt the plane; the least sum of residuals finds them
         flat = _least_sum(design, points[:, 2], sound)
         near = sound.copy()
         for i in range(k):
@@ -101,7 +124,7 @@ def _fit(points, hands, sound, scale, usual, straightness, plane, value):
 
 @njit(cache=True)
 def _left_over(design, heights, sound, solution, straightness):
-    """Largest residual of sound corners, the share of those that are off the joint, and the sum of residuals."""
+    """Return the largest residual of sound corners, the share of those off the joint, and the sum of residuals."""
     largest, off, number, total = 0.0, 0, 0, 0.0
     for i in range(design.shape[0]):
         if sound[i]:
@@ -113,7 +136,7 @@ def _left_over(design, heights, sound, solution, straightness):
 
 @njit(cache=True)
 def _least_sum(design, heights, sound):
-    """The solution (6,), without opening, with the least sum of residuals of sound corners."""
+    """Return the solution (6,), without opening, with the least sum of residuals of sound corners."""
     k = design.shape[0]
     solution, weights = np.zeros(6), np.empty(k)
     for i in range(k):
@@ -128,7 +151,7 @@ def _least_sum(design, heights, sound):
 
 @njit(cache=True)
 def _normal(design, heights, weights, unknowns):
-    """Matrix and right side of the normal equations; what nothing tells stays zero."""
+    """Return matrix and right side of the normal equations; unknowns without data stay zero."""
     matrix, right = np.zeros((unknowns, unknowns)), np.zeros(unknowns)
     for i in range(design.shape[0]):
         for c in range(unknowns):
@@ -150,14 +173,14 @@ def _value(row, solution):
 
 @njit(cache=True)
 def _huber(design, heights, sound, unknowns, prior, usual):
-    """Least squares with less weight on large residuals; the solution (6,) and the weighted mean square left over."""
+    """Return the Huber solution (6,) of the least squares, and the weighted mean square residual."""
     k = design.shape[0]
     solution, previous = np.zeros(6), np.zeros(6)
     weights = np.ones(k)
     for i in range(k):
         weights[i] = 1.0 if sound[i] else _WORN
     if unknowns == 4 and sound.sum() >= _MANY:
-        # from least squares an odd stone at the end of a bed would never be found to be odd
+        # least squares alone would never identify an odd stone at the end of a bed
         _weigh(design, heights, sound, _least_sum(design, heights, sound), weights)
     left = 0.0
     for _ in range(_ROUNDS):
@@ -174,7 +197,7 @@ def _huber(design, heights, sound, unknowns, prior, usual):
 
 @njit(cache=True)
 def _weigh(design, heights, sound, solution, weights):
-    """Huber's weights of residuals in place of `weights`; the mean square left over by these."""
+    """Replace `weights` by Huber's weights of the residuals; return the mean square residual by the old weights."""
     residuals, count, total = np.empty(design.shape[0]), 0, 0.0
     for i in range(design.shape[0]):
         residual = abs(heights[i] - _value(design[i], solution))
@@ -192,20 +215,20 @@ def _weigh(design, heights, sound, solution, weights):
 
 @njit(cache=True)
 def continuing_faces(pairs, solid, normals, offsets, joined, cosine, near):
-    """Faces of neighbouring stones that lie in one plane, as the tops of two stones of a course do.
+    """Find faces of neighbouring stones that lie in one plane, as the tops of two stones of a course do.
 
-    Parameters
-    ----------
-    pairs : (n, 2) stones that are neighbours
+    Inputs
+    ------
+    pairs : (n, 2) int64, neighbouring stones
     solid : vertices, corners, face_starts, solid_starts of `Polyhedra`
-    normals, offsets : (nf, 3), (nf,) of all faces
-    joined : (nf,) whether a face belongs to a joint
-    cosine : of the largest angle between the two
-    near : by which a corner of either may be off the plane of the other [m]
+    normals, offsets : (nf, 3) float64 unit [-], (nf,) float64 [m], of all faces
+    joined : (nf,) bool, whether a face belongs to a joint
+    cosine : float, of the largest angle between the two [-]
+    near : float, distance by which a corner of either may be off the plane of the other [m]
 
-    Returns
+    Outputs
     -------
-    (m, 2) faces
+    faces : (m, 2) int64; returned
     """
     starts = solid[3]
     out = np.empty((4 * pairs.shape[0], 2), np.int64)
@@ -216,10 +239,7 @@ def continuing_faces(pairs, solid, normals, offsets, joined, cosine, near):
             for g in range(starts[two], starts[two + 1]):
                 if not (joined[f] and joined[g]):
                     continue
-                turned = 0.0
-                for k in range(3):
-                    turned += normals[f, k] * normals[g, k]
-                if turned < cosine:
+                if dot(normals[f], normals[g]) < cosine:
                     continue
                 if (
                     _off(f, g, solid, normals, offsets) <= near
@@ -234,12 +254,9 @@ def continuing_faces(pairs, solid, normals, offsets, joined, cosine, near):
 
 @njit(cache=True)
 def _off(face, other, solid, normals, offsets):
-    """Farthest that a corner of one face is from the plane of another."""
+    """Return the largest distance of a corner of one face from the plane of another [m]."""
     vertices, corners, face_starts, _ = solid
     farthest = 0.0
     for c in range(face_starts[face], face_starts[face + 1]):
-        height = -offsets[other]
-        for k in range(3):
-            height += normals[other, k] * vertices[corners[c], k]
-        farthest = max(farthest, abs(height))
+        farthest = max(farthest, abs(height_over(normals[other], offsets[other], vertices[corners[c]])))
     return farthest

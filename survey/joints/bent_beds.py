@@ -1,8 +1,8 @@
-"""Beds that are not straight: several planes that meet at head joints.
+"""Bent beds of courses: several planes that meet at head joints.
 
-A course that has sagged is still a course. Its bed is taken as a chain of planes. Where two of them make a valley, the
-stone that lies across it gets two undersides, and the planes change at a head joint below; where they make a ridge, the
-stone under it gets two tops, and they change at a head joint above. So all stones stay convex and touch all over.
+A course that has sagged is still a course. Its bed is modelled as a chain of planes. Where two of them make a valley,
+the stone across it gets two undersides, and the planes change at a head joint below; where they make a ridge, the
+stone under it gets two tops, and they change at a head joint above. So all stones stay convex and have full contact.
 """
 
 from collections.abc import Iterator
@@ -16,27 +16,27 @@ from survey.geometry.adjacency import Polyhedra
 from survey.joints.facing import FacePlanes, FacingFaces
 from survey.joints.settings import JointSettings
 
-__all__ = ["bent"]
+__all__ = ["fit_bent_bed"]
 
 
-_FINE = 0.5  # of the straightness: how near to the chain corners are to be, if they can
-_FEW = 0.1  # part of the sound corners that may be off the chain
+_FINE = 0.5  # of the straightness: distance from the chain that is preferred for corners
+_FEW = 0.1  # largest part of the sound corners that may be off the chain
 _WORN = 0.01  # weight of a worn corner
-_LEAST = 3  # links that make a chain
-_MOST = 12  # chains of a bed
-_TURNS = 3  # in which valleys and ridges of a chain are told apart
+_LEAST = 3  # least number of links of a chain
+_MOST = 12  # largest number of chains of a bed
+_TURNS = 3  # largest number of iterations that classify a chain's valleys and ridges
 _ROUNDS = 10
 
 
 @dataclass(frozen=True)
 class _Bed:
-    """A joint seen from the side: its links in order along it.
+    """A joint in side view, with its links in order along it.
 
     Attributes
     ----------
-    axes : (3, 3) rows: along, square to it in the joint, across it
-    origin : (3,)
-    place, height : (m,) along and across of the middle of each link [m]
+    axes : (3, 3) rows: along, perpendicular to it in the joint, across it
+    origin : (3,) of the frame [m]
+    place, height : (m,) coordinates of the middle of each link along and across [m]
     lower, upper : (m,) faces of each link
     """
 
@@ -50,14 +50,14 @@ class _Bed:
 
 @dataclass(frozen=True)
 class _Chain:
-    """Planes one after the other.
+    """A chain of planes.
 
     Attributes
     ----------
-    posts, heights : (n + 1,) where along the bed one follows another, and how high they are there [m]
-    slant : rise across the bed, of all [-]
+    posts, heights : (n + 1,) places along the bed where planes meet or end, and the heights there [m]
+    slant : rise across the bed, common to all planes [-]
     residuals : of the sound corners [m]
-    number : (m,) the plane of each link
+    number : (m,) plane of each link
     """
 
     posts: Array
@@ -67,11 +67,11 @@ class _Chain:
     number: Ints
 
     def off(self, far: float) -> float:
-        """Part of the sound corners that are farther than that from the chain [-]."""
+        """Return the part of the sound corners that are farther than `far` from the chain [-]."""
         return float((self.residuals > far).mean()) if len(self.residuals) else 0.0
 
 
-def bent(
+def fit_bent_bed(
     solids: Polyhedra,
     planes: FacePlanes,
     sound: Bools,
@@ -80,14 +80,14 @@ def bent(
     settings: JointSettings,
     off: float,
 ) -> tuple[Array, Ints] | None:
-    """Planes of a joint that one plane does not fit.
+    """Fit a chain of planes to a joint that one plane does not fit.
 
     Parameters
     ----------
-    solids, planes, sound : the stones, the planes of their faces, and which of their corners are sound
-    facing, links : which faces face each other, and the pairs of this joint
-    settings : how far a sound corner may be off its plane
-    off : part of the sound corners that are off one plane; a chain leaves at most a quarter of them off
+    solids, planes, sound : stones, planes of their faces, and the corners that are sound
+    facing, links : pairs of facing faces, and those of this joint
+    settings : tolerance of a sound corner from its plane
+    off : part of the sound corners that are off one plane; a chain may leave at most a quarter of it off
 
     Returns
     -------
@@ -107,7 +107,7 @@ def bent(
                 break
             chain = _fitted(solids, sound, bed, posts, number)
             before, slopes = slopes, np.diff(chain.heights) / np.diff(posts)
-            # where a valley has turned out to be a ridge, its place is another
+            # where a valley turns out to be a ridge, the planes change elsewhere
             if ((np.diff(slopes) > 0.0) == (np.diff(before) > 0.0)).all():
                 if chain.off(settings.straightness) <= most:
                     coarse.append(chain)
@@ -136,7 +136,7 @@ def _bed(planes: FacePlanes, facing: FacingFaces, links: Ints) -> _Bed:
 
 
 def _extents(solids: Polyhedra, bed: _Bed) -> dict[int, tuple[float, float]]:
-    """From where to where each face reaches along the bed [m]."""
+    """Return the interval that each face covers along the bed [m]."""
     out = {}
     for face in np.unique(np.concatenate([bed.lower, bed.upper])).tolist():
         corners = solids.corners[solids.face_starts[face] : solids.face_starts[face + 1]]
@@ -146,7 +146,7 @@ def _extents(solids: Polyhedra, bed: _Bed) -> dict[int, tuple[float, float]]:
 
 
 def _chains(place: Array, height: Array) -> Iterator[list[int]]:
-    """Ends (in the order along the bed) of two straight chains that the links make, of three, and so on."""
+    """Yield the ends (in order along the bed) of two straight chains that the links make, of three, and so on."""
     order = np.argsort(place, kind="stable")
     x, y = place[order], median_filter(height[order], size=5, mode="mirror")
     for count in range(2, min(len(x) // _LEAST, _MOST) + 1):
@@ -154,7 +154,7 @@ def _chains(place: Array, height: Array) -> Iterator[list[int]]:
 
 
 def _divided(x: Array, y: Array, count: int) -> list[int]:
-    """Ends of so many chains of three links or more with the least sum of squares off their lines (Bellman 1961)."""
+    """Return the ends of `count` chains of at least three links with the least sum of squares (Bellman 1961)."""
     n = len(x)
     cost = _squares(x, y)
     best = np.full(n + 1, np.inf)
@@ -171,7 +171,7 @@ def _divided(x: Array, y: Array, count: int) -> list[int]:
 
 
 def _squares(x: Array, y: Array) -> Array:
-    """Sum of squares (n + 1, n + 1) off the line of links i to j - 1; infinite where there are too few."""
+    """Return the sum of squares (n + 1, n + 1) off the line of links i to j - 1; infinite for too few links."""
     x, y = x - x.mean(), y - y.mean()
     sums = [np.concatenate([[0.0], np.cumsum(term)]) for term in (np.ones_like(x), x, y, x * x, x * y, y * y)]
     n, sx, sy, sxx, sxy, syy = (one[None, :] - one[:, None] for one in sums)
@@ -189,7 +189,7 @@ def _slope(x: Array, y: Array) -> float:
 
 
 def _slopes(bed: _Bed, ends: list[int]) -> Array:
-    """Slopes (n,) of the lines of chains that end there [-]."""
+    """Return the slopes (n,) of the lines of the chains with these ends [-]."""
     order = np.argsort(bed.place, kind="stable")
     x, y = bed.place[order], bed.height[order]
     return np.array([_slope(x[a:b], y[a:b]) for a, b in zip([0, *ends[:-1]], ends, strict=True)])
@@ -198,7 +198,7 @@ def _slopes(bed: _Bed, ends: list[int]) -> Array:
 def _changes(
     bed: _Bed, ends: list[int], slopes: Array, extents: dict[int, tuple[float, float]]
 ) -> tuple[Ints, list[float]]:
-    """Plane (m,) of each link, and where (n - 1) along the bed one plane follows another [m]."""
+    """Return the plane (m,) of each link, and the places (n - 1) along the bed where planes change [m]."""
     order = np.argsort(bed.place, kind="stable")
     x = bed.place[order]
     middle = {face: 0.5 * (low + high) for face, (low, high) in extents.items()}
@@ -218,7 +218,7 @@ def _changes(
 
 
 def _fitted(solids: Polyhedra, sound: Bools, bed: _Bed, posts: Array, number: Ints) -> _Chain:
-    """The chain through posts that is nearest to the corners on either hand."""
+    """Fit the chain through posts to the corners on both sides."""
     rows, hands = [], []
     for side, sign in ((bed.lower, -1.0), (bed.upper, 1.0)):
         for face in np.unique(side).tolist():
@@ -243,7 +243,7 @@ def _fitted(solids: Polyhedra, sound: Bools, bed: _Bed, posts: Array, number: In
 
 
 def _hats(x: Array, posts: Array) -> Array:
-    """Weights (k, n + 1) with which heights at the posts make the height at each place of the chain."""
+    """Return the weights (k, n + 1) of the heights at the posts in the height of the chain at each place."""
     piece = np.clip(np.searchsorted(posts, x, side="right") - 1, 0, len(posts) - 2)
     share = (x - posts[piece]) / (posts[piece + 1] - posts[piece])
     out = np.zeros((len(x), len(posts)))
@@ -253,7 +253,7 @@ def _hats(x: Array, posts: Array) -> Array:
 
 
 def _planes(bed: _Bed, chain: _Chain) -> Array:
-    """The planes (n, 4) between posts, in the frame of the stones."""
+    """Return the planes (n, 4) between posts, in the frame of the stones."""
     slopes = np.diff(chain.heights) / np.diff(chain.posts)
     across = np.column_stack([-slopes, np.full(len(slopes), -chain.slant), np.ones(len(slopes))])
     normals = across / np.linalg.norm(across, axis=1)[:, None] @ bed.axes

@@ -1,4 +1,4 @@
-"""Which joints of a building can be closed, and the stones that come of it."""
+"""Joint closing within a displacement bound: the joints that can be closed, and the resulting stones."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -20,25 +20,25 @@ from survey.simplify.simplify import BlockyStone
 __all__ = ["Building", "Cut", "as_building", "close_within_bounds"]
 
 
-_ROUNDS = 10  # in which single joints are left open; then all of a stone that is still moved too far
-_CONVEX = 1e-6  # of a stone's size: a corner that stands out of a face's plane by less does so by rounding
+_ROUNDS = 10  # rounds in which single joints are left open; then all joints of a stone that moves too far
+_CONVEX = 1e-6  # of a stone's size: height of a corner above a face's plane that is due to rounding
 _BOTH_KEPT = "both stones keep their shape"
 _KEPT = "one of the stones keeps its shape, and the other is led by its other joints"
 
 
 @dataclass(frozen=True)
 class Building:
-    """All stones, about a place among them.
+    """All stones, in coordinates about a place among them.
 
     Attributes
     ----------
-    stones : simplified
-    solids : theirs, about `origin`
+    stones : simplified stones
+    solids : their solids, about `origin`
     origin : (3,) [m]
     faces : of all solids
     planes : (nf, 4) of these
     convex : (n,) whether a stone may be cut
-    notched : (n,) whether it is not convex, but its faces may be moved; others keep their shape
+    notched : (n,) whether a stone is not convex but its faces may be moved; others keep their shape
     """
 
     stones: tuple[BlockyStone, ...]
@@ -50,23 +50,23 @@ class Building:
     notched: Bools
 
     def rows(self, stone: int) -> slice:
-        """The faces of a stone."""
+        """Return the range of the faces of a stone."""
         starts = self.faces.solids.solid_starts
         return slice(int(starts[stone]), int(starts[stone + 1]))
 
 
 @dataclass(frozen=True)
 class Cut:
-    """Stones whose joints are closed where they can be.
+    """Stones whose joints are closed as far as possible.
 
     Attributes
     ----------
     contact : plane of each pair of facing faces
-    reasons : why each pair stays open; empty for those that are closed
+    reasons : reason why each pair stays open; empty if it is closed
     solids : all stones
-    planes : of each stone that may be cut or moved (n, 4), those of its faces first
-    free : of each of these, which of its planes touch no stone
-    of_face : of each stone that was cut, the plane of each face of its solid
+    planes : of each stone that may be cut or moved, (n, 4), those of its faces first
+    free : of each of these stones, whether each plane touches no stone
+    of_face : of each stone that was cut, plane of each face of its solid
     """
 
     contact: ContactPlanes
@@ -78,7 +78,7 @@ class Cut:
 
 
 def as_building(stones: Sequence[BlockyStone]) -> Building:
-    """Put the stones about a place among them.
+    """Express the stones in coordinates about a place among them.
 
     Raises
     ------
@@ -107,14 +107,14 @@ def as_building(stones: Sequence[BlockyStone]) -> Building:
 def close_within_bounds(
     building: Building, facing: FacingFaces, settings: JointSettings, known: Sequence[Solid]
 ) -> Cut:
-    """Close the joints of a building, but for those that would move a corner farther than the bound.
+    """Close the joints of a building, except those that would move a corner farther than the bound.
 
     Parameters
     ----------
     building : the stones
     facing : pairs of faces that face each other
     settings : bounds
-    known : the stones with their joints closed, as far as is known by now
+    known : the stones with their joints closed, as far as known so far
     """
     notched = set(np.flatnonzero(building.notched).tolist())
     reasons, unmended = [""] * len(facing), set[int]()
@@ -145,7 +145,7 @@ def close_within_bounds(
 
 
 def _sound(stone: BlockyStone) -> Bools:
-    """Which corners of the solid are known from measurement; a hidden one as well as the one it lies behind."""
+    """Return the corners known from measurement; a hidden one counts if the one in front of it does."""
     count, known = len(stone.solid.vertices), np.array(stone.sound, np.bool_)
     return np.tile(known, -(-count // len(known)))[:count]
 
@@ -155,7 +155,7 @@ def _arrays(solids: Polyhedra) -> tuple[Array, Ints, Ints, Ints]:
 
 
 def _of_all(some: ContactPlanes, links: Ints, count: int) -> ContactPlanes:
-    """The planes of some pairs, as planes of all."""
+    """Return the planes of some pairs as planes of all pairs."""
     of_link, side = np.full(count, -1), np.ones(count, np.int64)
     of_link[links], side[links] = some.of_link, some.side
     return ContactPlanes(some.normals, some.offsets, of_link, side)
@@ -168,7 +168,7 @@ def _stone_planes(
     known: Sequence[Solid],
     settings: JointSettings,
 ) -> tuple[dict[int, Array], dict[int, Bools]]:
-    """Planes of each convex stone: of its faces in order, those of joints or its own, then further ones of joints."""
+    """Return the planes of each convex stone: of its faces in order, from joints or its own, then further joints'."""
     taken = np.zeros(len(building.planes), np.bool_)
     taken[facing.faces[contact.of_link >= 0]] = True
     neighbours = building.faces.planes.owner[facing.faces[contact.of_link >= 0]]
@@ -198,7 +198,7 @@ def _stone_planes(
 
 
 def _changed(building: Building, stone: int, planes: Array) -> bool:
-    """Whether a stone has other planes than those of its faces."""
+    """Return whether a stone has other planes than those of its faces."""
     own = building.planes[building.rows(stone)]
     return len(planes) != len(own) or not np.array_equal(planes, own)
 
@@ -213,7 +213,7 @@ def _leave_open(
     reasons: list[str],
     all_of_it: bool,
 ) -> None:
-    """Give up the joint of a stone whose plane is farthest from the face it replaces, or all of its joints."""
+    """Leave open the joint of a stone whose plane is farthest from the face it replaces, or all its joints."""
     mine = building.faces.planes.owner[facing.faces] == stone
     own = np.flatnonzero(mine.any(axis=1) & (contact.of_link >= 0))
     if np.isinf(moved):

@@ -1,11 +1,11 @@
-"""Closing the joints: surveyed stones, a centimetre apart, become solids that share contact planes.
+"""Joint closing: surveyed stones, a centimetre apart, become solids that share contact planes.
 
-Every two faces that face each other get one plane (`survey.joints.contact_planes`), which both stones hold to the
-last bit: one keeps to its one side, the other to the other. A stone is then cut out anew by the planes of its joints
-and of those of its own faces that touch nothing (`survey.geometry.cutting`). So no two stones that share a joint
-overlap, wherever the joint runs: beds of a course, head joints, skewbacks, the radial joints of a vault that was seen
-from below. Stones that still overlap without sharing a joint, at the foot of an arch for instance, are parted
-(`survey.joints.overlaps`). What would move a corner farther than the bound stays open, and is listed.
+Every two faces that face each other get one plane (`survey.joints.contact_planes`), identical to the last bit in both
+stones, which lie on opposite sides of it. Each stone is then cut by the planes of its joints and of its own faces
+that touch nothing (`survey.geometry.cutting`). So no two stones that share a joint overlap, wherever the joint runs:
+beds of a course, head joints, skewbacks, the radial joints of a vault seen from below. Stones that still overlap
+without sharing a joint, for instance at the foot of an arch, are separated (`survey.joints.overlaps`). Joints that
+would move a corner farther than the bound stay open and are listed.
 """
 
 from collections.abc import Sequence
@@ -28,20 +28,20 @@ from survey.simplify.simplify import BlockyStone, simplify
 
 __all__ = ["ClosedStones", "close_joints", "newly_facing"]
 
-_ROUNDS = 4  # in which closing joints shows further ones, beside worn corners
-_MEETS = 1e-6  # metres: faces that are nearer share a plane
+_ROUNDS = 4  # rounds in which closing joints reveals further ones, beside worn corners
+_MEETS = 1e-6  # metres: distance within which faces share a plane
 _AS_SURVEYED = "joints are left as surveyed"
 
 
 @dataclass(frozen=True)
 class ClosedStones:
-    """Stones whose joints are closed, or left as they are.
+    """Stones whose joints are closed or left as they are.
 
     Attributes
     ----------
     solids : in the order given
     simplified : the stones before their joints were closed
-    report : what was changed, and what remains
+    report : changes, and remaining gaps and overlaps
     """
 
     solids: tuple[Solid, ...]
@@ -57,16 +57,27 @@ def close_joints(
     Parameters
     ----------
     stones : surveyed or simplified stones; of one wall or several, of arches and vaults
-    settings : what counts as a joint, what becomes of it, and bounds; None: JointSettings()
+    settings : criteria of a joint, treatment of joints, and bounds; None: JointSettings()
 
     Returns
     -------
-    ClosedStones; convex stones with joints are cut anew, others stay as they are
+    ClosedStones; convex stones with joints are cut, others stay as they are
 
     Raises
     ------
     GeometryError
-        naming the stone, if two have one code, one is degenerate, or one is of too many convex parts
+        naming the stone, if two have one code, one is degenerate, or one has too many convex parts
+
+    Examples
+    --------
+    >>> from survey.formats.reading import open_survey
+    >>> from survey.stones import survey_stones
+    >>> survey = open_survey("data/samples/window/window.moma", "moma")
+    >>> closed = close_joints([stone for stone in survey_stones(survey).stones if stone.course == 1])
+    >>> len(closed.solids), len(closed.report.joints), len(closed.report.gaps)
+    (10, 9, 0)
+    >>> round(1000 * max(joint.width for joint in closed.report.joints), 1)  # mm
+    15.2
     """
     settings = settings or JointSettings()
     blocky = tuple(stone if isinstance(stone, BlockyStone) else simplify(stone) for stone in stones)
@@ -100,7 +111,7 @@ def close_joints(
 
 
 def _closed(building: Building, facing: FacingFaces, settings: JointSettings) -> tuple[Cut, FacingFaces]:
-    """All joints closed that can be, also those that show only then."""
+    """Close all joints that can be closed, including those revealed by closing others."""
     cut = close_within_bounds(building, facing, settings, building.solids)
     for _ in range(_ROUNDS):
         before, facing = facing, newly_facing(building, facing, cut, settings)
@@ -111,7 +122,7 @@ def _closed(building: Building, facing: FacingFaces, settings: JointSettings) ->
 
 
 def _parts(building: Building, cut: Cut) -> tuple[list[Solid], dict[int, Array]]:
-    """Convex parts of the stones that are not convex, and their planes (n, 4), numbered after all stones."""
+    """Return the convex parts of non-convex stones, and their planes (n, 4), numbered after all stones."""
     parts: list[Solid] = []
     for i in np.flatnonzero(~building.convex).tolist():
         parts += stone_parts(cut.solids[i])
@@ -119,7 +130,7 @@ def _parts(building: Building, cut: Cut) -> tuple[list[Solid], dict[int, Array]]
 
 
 def _as_surveyed(building: Building, facing: FacingFaces) -> Cut:
-    """All stones as they are, and all joints open but for those whose faces share a plane already."""
+    """Return all stones as they are, with all joints open except those whose faces already share a plane."""
     convex = np.flatnonzero(building.convex).tolist()
     planes = {i: building.planes[building.rows(i)] for i in convex}
     free = {i: np.ones(len(planes[i]), np.bool_) for i in convex}
@@ -134,14 +145,14 @@ def _as_surveyed(building: Building, facing: FacingFaces) -> Cut:
 
 
 def newly_facing(building: Building, facing: FacingFaces, cut: Cut, settings: JointSettings) -> FacingFaces:
-    """The pairs of faces that are known, and those of further stones that face each other now.
+    """Return the known pairs of faces, and those of further stones that face each other now.
 
     Parameters
     ----------
     building : the stones as surveyed
-    facing : pairs that are known
-    cut : the stones with the joints of these closed
-    settings : what counts as a joint; a joint that shows now is at most half as wide
+    facing : known pairs
+    cut : stones with the joints of these closed
+    settings : criteria of a joint; a newly found joint is at most half as wide
     """
     solids = Polyhedra.gather((solid.vertices, solid.faces) for solid in cut.solids)
     found = find_facing(solids, planes_of(solids), replace(settings, max_width=0.5 * settings.max_width))
@@ -165,7 +176,7 @@ def newly_facing(building: Building, facing: FacingFaces, cut: Cut, settings: Jo
 
 
 def _surveyed_faces(building: Building, cut: Cut) -> Ints:
-    """The surveyed face that each face of the stones now was; -1 for one that came with a bend of its bed."""
+    """Return the surveyed face of each face of the cut stones; -1 for one that came from a bend of its bed."""
     out = []
     for i, solid in enumerate(cut.solids):
         rows = building.rows(i)
@@ -175,7 +186,7 @@ def _surveyed_faces(building: Building, cut: Cut) -> Ints:
 
 
 def _height(building: Building, faces: Ints, found: FacingFaces, links: list[int]) -> Array:
-    """Where the planes of surveyed faces lie along the normal of a joint, seen from its middle [m]."""
+    """Return the heights of the planes of surveyed faces along the normal of a joint, above its middle [m]."""
     normals, offsets = building.faces.planes.normals[faces], building.faces.planes.offsets[faces]
     centroid, normal = found.centroid[links], found.normal[links]
     out: Array = (offsets - (normals * centroid).sum(axis=1)) / (normals * normal).sum(axis=1)

@@ -1,11 +1,11 @@
-"""The contact planes of a building's joints: one for each straight bed, whatever the bond.
+"""Contact planes of a building's joints: one for each straight bed, whatever the bond.
 
-Faces that face each other in turn make one joint: the tops of a course and the undersides of the next, the two
+Faces that face each other in a chain make one joint: the tops of a course and the undersides of the next, the two
 sides of a head joint, springers and voussoir at a skewback. So do faces of neighbours that continue each other, where
-four stones meet at a cross. All of them are fitted together, so that a course stays a course. Where a bed is not
-straight it is taken as several planes that meet at head joints (`survey.joints.bent_beds`). Where that does not do
-either, the few stones that are off are led to the plane of the others; if they are not few, each two stones have a
-plane of their own.
+four stones meet at a cross. All of them are fitted together, so that a course stays a course. A bed that is not
+straight becomes several planes that meet at head joints (`survey.joints.bent_beds`). Where that fails as well, the
+few stones that are off are moved to the plane of the others; if they are not few, each pair of stones gets its own
+plane.
 """
 
 from dataclasses import dataclass, replace
@@ -16,32 +16,30 @@ from scipy.sparse.csgraph import connected_components
 
 from survey.arrays import Array, Bools, Ints
 from survey.geometry.adjacency import Polyhedra
-from survey.joints._kernels import continuing_faces, fit_middle_planes
-from survey.joints.bent_beds import bent
+from survey.joints._kernels import JointCorners, continuing_faces, fit_middle_planes
+from survey.joints.bent_beds import fit_bent_bed
 from survey.joints.facing import FacePlanes, FacingFaces
 from survey.joints.settings import JointSettings
 
 __all__ = ["ContactPlanes", "StoneFaces", "contact_planes", "some_links"]
 
 
-_ALIKE = 0.985  # cosine of 10°: faces of neighbours that are turned by more do not continue each other
-_FEW = 0.25  # part of the corners of a joint that may be off it
-_FINE = (
-    0.5  # of the straightness: corners of a bed that is straight but for odd ones are as near to it as that
-)
-_SAME = 1e-8  # metres: a face that has to stay and is as near as that to a plane lies in it
+_ALIKE = 0.985  # cosine of 10°: largest angle between faces of neighbours that continue each other
+_FEW = 0.25  # largest part of the corners of a joint that may be off it
+_FINE = 0.5  # of the straightness: distance within which the inliers of a straight bed lie
+_SAME = 1e-8  # metres: distance within which a face that must stay lies in a plane
 
 
 @dataclass(frozen=True)
 class StoneFaces:
-    """The faces of all stones, and what is known of them.
+    """Faces of all stones, and their measured corners.
 
     Attributes
     ----------
     solids : as they were surveyed, about a place among them
     planes : of their faces
     sound : (nv,) whether a corner is known from measurement
-    kept : (nf,) whether a face has to stay where it is
+    kept : (nf,) whether a face has to stay in place
     """
 
     solids: Polyhedra
@@ -50,20 +48,20 @@ class StoneFaces:
     kept: Bools
 
     def corners(self, face: int) -> Ints:
-        """Ints of a face's corners."""
+        """Return the vertex indices of a face's corners."""
         starts = self.solids.face_starts
         return self.solids.corners[starts[face] : starts[face + 1]]
 
 
 @dataclass(frozen=True)
 class ContactPlanes:
-    """The planes n·x = d of joints, and which joint has which.
+    """Planes n·x = d of joints, and the plane of each pair of faces.
 
     Attributes
     ----------
     normals, offsets : (np, 3) unit [-], (np,) [m]
-    of_link : (m,) plane of each pair of facing faces; -1 for one that has none
-    side : (m,) +1 if the plane's normal leads out of the first of the two faces, -1 if into it
+    of_link : (m,) plane of each pair of facing faces; -1 for none
+    side : (m,) +1 if the plane's normal points out of the first of the two faces, -1 if into it
     """
 
     normals: Array
@@ -74,7 +72,7 @@ class ContactPlanes:
 
 @dataclass(frozen=True)
 class _Groups:
-    """Faces of several joints, one after the other: (k,) face, hand ±1; (n + 1,) starts; normals (n, 3)."""
+    """Faces of several joints, concatenated: (k,) face, side ±1; (n + 1,) starts; normals (n, 3)."""
 
     faces: Ints
     hands: Array
@@ -85,14 +83,14 @@ class _Groups:
 def contact_planes(faces: StoneFaces, facing: FacingFaces, settings: JointSettings) -> ContactPlanes:
     """Find the contact plane of each pair of facing faces.
 
-    Faces that have to stay where they are take no part in the fit. What meets nothing else is led to them; what has
-    other joints meets them only where these lie in their very plane.
+    Faces that have to stay in place take no part in the fit. A face whose only joint is with them moves to their
+    plane; one with other joints meets them only if it already lies in their plane.
 
     Parameters
     ----------
     faces : of all stones
-    facing : the pairs
-    settings : how far a corner may be off its side of a straight joint
+    facing : pairs of facing faces
+    settings : tolerance of a corner from its side of a straight joint
     """
     found = _Found(faces, facing, [], [], np.full(len(facing), -1))
     kept = faces.kept[facing.faces]
@@ -104,7 +102,7 @@ def contact_planes(faces: StoneFaces, facing: FacingFaces, settings: JointSettin
 
 
 def _add_joints(found: "_Found", links: Ints, settings: JointSettings) -> None:
-    """Planes of the joints that these links make."""
+    """Add the planes of the joints that these links make."""
     faces, facing = found.faces, some_links(found.facing, links)
     label = _joints(faces, facing, settings)
     count = int(label.max()) + 1 if len(label) else 0
@@ -140,14 +138,14 @@ class _Found:
     of_link: Ints
 
     def add_many(self, planes: Array, links: Ints, number: Ints) -> None:
-        """Planes (n, 4), and which of them (m,) each link has."""
+        """Add planes (n, 4), and the plane (m,) of each link."""
         self.of_link[links] = len(self.normals) + number
         self.normals += list(planes[:, :3])
         self.offsets += planes[:, 3].tolist()
 
     def add_bent(self, links: Ints, settings: JointSettings, off: float) -> bool:
-        """A joint that is bent but not broken: several planes; False if that is not what it is."""
-        found = bent(
+        """Add several planes for a bent joint; return False if no chain of planes fits it."""
+        found = fit_bent_bed(
             self.faces.solids, self.faces.planes, self.faces.sound, self.facing, links, settings, off
         )
         if found is None:
@@ -156,13 +154,13 @@ class _Found:
         return True
 
     def add_each(self, links: Ints, usual: float, settings: JointSettings) -> None:
-        """A plane for each pair."""
+        """Add a plane for each pair."""
         part, number = some_links(self.facing, links), np.arange(len(links))
         planes, _ = _fitted(self.faces, _gathered(self.faces, part, number, len(links)), usual, settings)
         self.add_many(planes, links, number)
 
     def add_kept(self, link: int, kept: Bools) -> None:
-        """A pair of which a face has to stay: its plane, if the other has it too or nothing else to meet."""
+        """Add a pair with a face that must stay: its plane, if the other face lies in it or has no other joint."""
         first, second = self.facing.faces[link].tolist()
         stays, other = (first, second) if kept[0] else (second, first)
         plane = np.array([*self.faces.planes.normals[stays], self.faces.planes.offsets[stays]])
@@ -181,13 +179,13 @@ class _Found:
                 self.of_link[link] = number
 
     def _same(self, plane: Array, other: Array, face: int) -> bool:
-        """Whether a face lies in another plane as well, but for rounding."""
+        """Return whether a face also lies in another plane, within rounding."""
         corners = self.faces.solids.vertices[self.faces.corners(face)]
         alike = float(plane[:3] @ other[:3]) > 0.0
         return alike and bool(np.abs(corners @ other[:3] - other[3]).max() <= _SAME)
 
     def planes(self) -> ContactPlanes:
-        """All that were found, and on which side of them the first face of each pair lies."""
+        """Return all planes found, with the side of each on which the first face of each pair lies."""
         normals = np.array(self.normals).reshape(-1, 3)
         outward = self.faces.planes.normals[self.facing.faces[:, 0]]
         linked = self.of_link >= 0
@@ -197,7 +195,7 @@ class _Found:
 
 
 def some_links(facing: FacingFaces, links: Ints) -> FacingFaces:
-    """Only these pairs."""
+    """Return these pairs only."""
     return replace(
         facing,
         faces=facing.faces[links],
@@ -209,7 +207,7 @@ def some_links(facing: FacingFaces, links: Ints) -> FacingFaces:
 
 
 def _joints(faces: StoneFaces, facing: FacingFaces, settings: JointSettings) -> Ints:
-    """Number (m,) of the joint that each pair belongs to, in the order of their first pair."""
+    """Return the number (m,) of the joint of each pair, in the order of their first pair."""
     if not len(facing):
         return np.zeros(0, np.int64)
     count = len(faces.planes.areas)
@@ -224,7 +222,7 @@ def _joints(faces: StoneFaces, facing: FacingFaces, settings: JointSettings) -> 
 
 
 def _continuing(faces: StoneFaces, facing: FacingFaces, settings: JointSettings) -> Ints:
-    """Faces (m, 2) of neighbours that lie in one plane."""
+    """Return faces (m, 2) of neighbours that lie in one plane."""
     solids, planes = faces.solids, faces.planes
     joined = np.zeros(len(planes.areas), np.bool_)
     joined[facing.faces] = True
@@ -241,7 +239,7 @@ def _continuing(faces: StoneFaces, facing: FacingFaces, settings: JointSettings)
 
 
 def _gathered(faces: StoneFaces, facing: FacingFaces, label: Ints, count: int) -> _Groups:
-    """The faces of each joint, each once, and on which hand of it they are."""
+    """Return the faces of each joint, without repetition, and the side of it on which they lie."""
     of_face = np.repeat(label, 2) * len(faces.planes.areas) + facing.faces.ravel()
     unique = np.unique(of_face)
     joint, face = np.divmod(unique, len(faces.planes.areas))
@@ -257,7 +255,7 @@ def _gathered(faces: StoneFaces, facing: FacingFaces, label: Ints, count: int) -
 
 
 def _fitted(faces: StoneFaces, groups: _Groups, usual: float, settings: JointSettings) -> tuple[Array, Array]:
-    """Planes (n, 4) half-way between the two hands, and values (n, 5) as of the kernel."""
+    """Return planes (n, 4) half-way between the two sides, and the kernel's values (n, 5)."""
     count = len(groups.normals)
     solids = faces.solids
     sizes = np.diff(solids.face_starts)[groups.faces]
@@ -276,17 +274,10 @@ def _fitted(faces: StoneFaces, groups: _Groups, usual: float, settings: JointSet
     scale = np.ones(count)
     np.maximum.at(scale, joint, np.abs(local[:, :2]).max(axis=1))
     planes, values = np.zeros((count, 3)), np.zeros((count, 5))
-    fit_middle_planes(
-        np.ascontiguousarray(local),
-        np.repeat(groups.hands, sizes),
-        faces.sound[corner],
-        starts,
-        scale,
-        usual,
-        settings.straightness,
-        planes,
-        values,
+    corners = JointCorners(
+        np.ascontiguousarray(local), np.repeat(groups.hands, sizes), faces.sound[corner], starts, scale
     )
+    fit_middle_planes(corners, usual, settings.straightness, planes, values)
     normal = axes[:, 2] - planes[:, 1:2] * axes[:, 0] - planes[:, 2:3] * axes[:, 1]
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     offset = (normal * (centre + planes[:, :1] * axes[:, 2])).sum(axis=1)
@@ -294,7 +285,7 @@ def _fitted(faces: StoneFaces, groups: _Groups, usual: float, settings: JointSet
 
 
 def _frames(normals: Array) -> Array:
-    """Right-handed frames (n, 3, 3) whose last row is the normal."""
+    """Return right-handed frames (n, 3, 3) whose last row is the normal."""
     least = np.eye(3)[np.abs(normals).argmin(axis=1)] if len(normals) else np.zeros((0, 3))
     first = np.cross(least, normals)
     first /= np.linalg.norm(first, axis=1)[:, None]

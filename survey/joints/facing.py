@@ -1,4 +1,4 @@
-"""Which faces of neighbouring stones face each other across a joint."""
+"""Detection of faces of neighbouring stones that face each other across a joint."""
 
 from dataclasses import dataclass
 
@@ -18,12 +18,12 @@ class FacePlanes:
 
     Attributes
     ----------
-    normals : (nf, 3) unit, outward [-]
+    normals : (nf, 3) outward unit normals [-]
     offsets : (nf,) [m]
     areas : (nf,) [m²]
     boxes : (nf, 6) lower and upper corner of each face [m]
     convex : (nf,) whether the face's outline is convex
-    owner : (nf,) the solid
+    owner : (nf,) solid of each face
     """
 
     normals: Array
@@ -41,9 +41,9 @@ class FacingFaces:
     Attributes
     ----------
     faces : (m, 2) indices of the faces, that of the solid with the smaller index first
-    area : (m,) that they share, seen square to the joint [m²]
+    area : (m,) shared area, seen square to the joint [m²]
     gap : (m,) mean distance over it; negative where they overlap [m]
-    centroid : (m, 3) of it, half-way between the two [m]
+    centroid : (m, 3) of it, half-way between the two faces [m]
     normal : (m, 3) unit normal, from the second to the first [-]
     """
 
@@ -58,7 +58,7 @@ class FacingFaces:
 
 
 def planes_of(solids: Polyhedra) -> FacePlanes:
-    """Planes of all faces, each through the mean of its corners."""
+    """Return the planes of all faces, each through the mean of its corners."""
     normals, areas, boxes, convex = face_planes(solids.vertices, solids.corners, solids.face_starts)
     counts = np.diff(solids.face_starts)
     centres = (
@@ -75,7 +75,7 @@ def find_facing(solids: Polyhedra, planes: FacePlanes, settings: JointSettings) 
     ----------
     solids : closed, with coordinates about a place among them
     planes : of their faces
-    settings : widest joint, largest angle, narrowest strip that counts
+    settings : widest joint, largest angle, narrowest strip
     """
     limits = (
         settings.max_width,

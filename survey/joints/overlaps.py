@@ -1,4 +1,4 @@
-"""Stones that lie in each other, and how they are parted."""
+"""Detection and separation of overlapping stones."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,24 +14,24 @@ from survey.geometry.solids import Solid, volume_of
 __all__ = ["Overlapping", "find_overlaps", "part_stones"]
 
 
-_LEAST = 1e-10  # metres: solids that share a plane lie so deep in each other by rounding
-_ON_PLANE = 1e-8  # metres
-_LEAST_VOLUME = 1e-12  # cubic metres
-_ALIKE = 0.3  # normals of two faces that differ by less have no plane between them
-_SHALLOW = 0.01  # metres by which a free face rather gives way than that a stone gets a further face
+_LEAST = 1e-10  # metres: depth of overlap of solids that share a plane that is due to rounding
+_ON_PLANE = 1e-8  # metres: distance within which a corner lies on a plane
+_LEAST_VOLUME = 1e-12  # cubic metres: smallest overlap
+_ALIKE = 0.3  # difference of unit normals below which two faces have no plane between them
+_SHALLOW = 0.01  # metres: depth up to which a free face moves back, so that the stone gets no further face
 
 
 @dataclass(frozen=True)
 class Overlapping:
-    """Two convex solids that lie in each other.
+    """Two convex solids that overlap.
 
     Attributes
     ----------
     pair : their indices
     codes : of their stones
-    part : what both take
-    volume : of it [m³]
-    depth : by which one would have to move along a face's normal to be free [m]
+    part : intersection of the two
+    volume : of the intersection [m³]
+    depth : distance that one would have to move along a face's normal to be clear [m]
     """
 
     pair: tuple[int, int]
@@ -42,9 +42,9 @@ class Overlapping:
 
 
 def find_overlaps(solids: Sequence[Solid], planes: Mapping[int, Array]) -> list[Overlapping]:
-    """Pairs of solids that lie in each other, of those that `planes` names: convex ones, with their planes (n, 4).
+    """Return overlapping pairs among the solids that `planes` names: convex ones, with their planes (n, 4).
 
-    Parts of one stone have one code, and do not count.
+    Parts of one stone have one code and are ignored.
     """
     chosen = sorted(planes)
     if len(chosen) < 2:
@@ -72,7 +72,7 @@ def find_overlaps(solids: Sequence[Solid], planes: Mapping[int, Array]) -> list[
 def _overlapping(
     i: int, j: int, first: Solid, second: Solid, planes: Mapping[int, Array], depth: float
 ) -> Overlapping | None:
-    """What two solids have in common; None if that is nothing but rounding."""
+    """Return the intersection of two solids; None if it is empty within rounding."""
     low, high = first.vertices.min(axis=0), first.vertices.max(axis=0)
     part = common_part(planes[i], planes[j], 0.5 * (low + high), 2.0 * float((high - low).max()))
     if part is None or (volume := volume_of(part)) <= _LEAST_VOLUME:
@@ -82,7 +82,7 @@ def _overlapping(
 
 @dataclass
 class _Parting:
-    """Stones while they are parted: what each was, is now, its planes, and which of these are free to move."""
+    """State of the separation: original and current stones, their planes, and the planes that are free to move."""
 
     originals: Sequence[Solid]
     solids: list[Solid]
@@ -91,7 +91,7 @@ class _Parting:
     bound: float
 
     def part(self, found: Overlapping) -> None:
-        """Part two stones by the cheapest way that moves no corner farther than the bound."""
+        """Separate two stones by the cheapest method that moves no corner farther than the bound."""
         i, j = found.pair
         current = _overlapping(i, j, self.solids[i], self.solids[j], self.planes, found.depth)
         if current is None:
@@ -107,9 +107,9 @@ class _Parting:
         self._divide(current)
 
     def _retreats(self, one: int, other: int, found: Overlapping) -> list[tuple[float, int, int, Array]]:
-        """Ways in which a free face of a stone goes back to free another: how far, stone, plane, its new place.
+        """Return moves of a stone's free faces that clear another: (distance, stone, plane, its new place).
 
-        It goes back as a whole, or turns about one of its edges, as an intrados does at the foot of an arch.
+        A face moves back as a whole, or turns about one of its edges, as an intrados does at the foot of an arch.
         """
         out = []
         for p in np.flatnonzero(self.free[one]).tolist() if one in self.free else ():
@@ -121,7 +121,7 @@ class _Parting:
         return out
 
     def _divide(self, found: Overlapping) -> None:
-        """Cut one along a face of the other, or both through the middle of what they share: where least is lost."""
+        """Cut one along a face of the other, or both through the middle of their overlap: the least volume lost."""
         i, j = found.pair
         ways = [*self._beside(i, j), *self._beside(j, i), *self._between(found)]
         for _, cuts in sorted(ways, key=lambda way: way[0]):
@@ -129,13 +129,13 @@ class _Parting:
                 return
 
     def _beside(self, one: int, other: int) -> list[tuple[float, dict[int, Array]]]:
-        """Ways to cut one stone along each face of another: what is lost [m³], and the plane."""
+        """Return cuts of one stone along each face of another: volume lost [m³], and plane."""
         if one not in self.free:
             return []
         return [(self._lost(one, -plane), {one: -plane}) for plane in self.planes[other]]
 
     def _between(self, found: Overlapping) -> list[tuple[float, dict[int, Array]]]:
-        """Ways to cut both along a plane half-way between a face of each."""
+        """Return cuts of both along a plane half-way between a face of each."""
         i, j = found.pair
         middle, ways = found.part.vertices.mean(axis=0), []
         if i not in self.free or j not in self.free:
@@ -150,7 +150,7 @@ class _Parting:
         return ways
 
     def _lost(self, stone: int, plane: Array) -> float:
-        """What of a stone lies over a plane [m³]."""
+        """Return the volume of a stone above a plane [m³]."""
         solid = self.solids[stone]
         low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
         over = common_part(
@@ -159,7 +159,7 @@ class _Parting:
         return 0.0 if over is None else volume_of(over)
 
     def _cut(self, planes: dict[int, Array]) -> bool:
-        """Cut stones anew, all or none, if no corner moves farther than the bound."""
+        """Cut stones, all or none, if no corner moves farther than the bound."""
         cut = {i: stone.solid for i, stone in cut_stones(self.originals, planes).items() if stone is not None}
         if len(cut) < len(planes) or any(moves(self.originals[i], cut[i]).max() > self.bound for i in cut):
             return False
@@ -178,20 +178,20 @@ def part_stones(
     free: Mapping[int, Bools],
     bound: float,
 ) -> tuple[list[Solid], list[Overlapping]]:
-    """Part stones that lie in each other; a stone only gets smaller, so that no new overlap comes about.
+    """Separate overlapping stones; stones only shrink, so that no new overlap arises.
 
     Parameters
     ----------
     originals : all stones before any was cut
-    solids : as they are now
+    solids : current solids
     planes : of all convex ones, (n, 4); the first belong to the faces of the originals, in order
-    free : of each of these, whether it is a face that touches no stone; those that are not named are not cut, as
-        parts of stones that keep their shape
-    bound : farthest that a corner may move [m]
+    free : of each of these, whether it is a face that touches no stone; stones that are not listed are not cut, such
+        as parts of stones that keep their shape
+    bound : largest displacement of a corner [m]
 
     Returns
     -------
-    the stones, and the pairs that still lie in each other
+    the stones, and the pairs that still overlap
     """
     own = {i: rows.copy() for i, rows in planes.items()}
     state = _Parting(originals, list(solids), own, dict(free), bound)
@@ -201,7 +201,7 @@ def part_stones(
 
 
 def _face_on(solid: Solid, plane: Array) -> Array:
-    """Corners (n, 3) of the face of a solid that lies on a plane; none if there is no such face."""
+    """Return the corners (n, 3) of the face of a solid on a plane; empty if there is no such face."""
     for face in solid.faces:
         polygon = solid.vertices[list(face)]
         if np.abs(polygon @ plane[:3] - plane[3]).max() <= _ON_PLANE:
@@ -210,7 +210,7 @@ def _face_on(solid: Solid, plane: Array) -> Array:
 
 
 def _turns(plane: Array, polygon: Array, part: Array) -> list[tuple[float, Array]]:
-    """A face turned about each of its edges until what it shared (n, 3) lies before it: how far it goes, its plane."""
+    """Return turns of a face about each edge until the overlap (n, 3) is in front of it: (displacement, plane)."""
     out = []
     for k in range(len(polygon)):
         start, along = polygon[k - 1], polygon[k] - polygon[k - 1]

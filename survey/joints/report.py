@@ -1,4 +1,4 @@
-"""What closing the joints of a building found, changed, and left open."""
+"""Report of joint closing: joints found, changes, and joints left open."""
 
 from collections import defaultdict
 from collections.abc import Mapping
@@ -19,18 +19,18 @@ __all__ = ["ClosingReport", "Gap", "Joint", "Overlap", "closing_report"]
 
 @dataclass(frozen=True)
 class Joint:
-    """Where two stones face each other.
+    """A joint between two stones.
 
     Attributes
     ----------
     stones : codes of the two
-    plane : number of the contact plane; all joints of a straight bed have the same. -1 where it stays open
+    plane : number of the contact plane, common to all joints of a straight bed; -1 if the joint stays open
     width : mean distance of the two faces as surveyed; negative where they overlap [m]
     opening : angle between the two faces as surveyed [degrees]
-    area : that they share, after closing; as surveyed, seen square to the joint, where it stays open [m²]
+    area : shared after closing; as surveyed, seen square to the joint, if it stays open [m²]
     centroid : (3,) of that area [m]
     normal : (3,) unit normal, from the second stone to the first [-]
-    left_open : why it stays open; empty if it is closed
+    left_open : reason why it stays open; empty if it is closed
     """
 
     stones: tuple[str, str]
@@ -45,7 +45,7 @@ class Joint:
 
 @dataclass(frozen=True)
 class Gap:
-    """Two stones that face each other and do not meet.
+    """A gap between two stones that face each other.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class Gap:
     width : mean [m]
     area : over which they face each other [m²]
     centroid : (3,) [m]
-    reason : why it was not closed
+    reason : reason why it was not closed
     """
 
     stones: tuple[str, str]
@@ -65,13 +65,13 @@ class Gap:
 
 @dataclass(frozen=True)
 class Overlap:
-    """Two stones that lie in each other.
+    """An overlap of two stones.
 
     Attributes
     ----------
     stones : codes of the two
-    volume : that both take [m³]
-    depth : by which one would have to move to be free [m]
+    volume : of the overlap [m³]
+    depth : distance that one would have to move to be clear [m]
     centroid : (3,) [m]
     """
 
@@ -83,16 +83,16 @@ class Overlap:
 
 @dataclass(frozen=True)
 class ClosingReport:
-    """What closing the joints has changed, stone by stone and joint by joint.
+    """Changes made by joint closing, stone by stone and joint by joint.
 
     Attributes
     ----------
-    mode : what was made of the joints
-    joints : all that were found, open ones too
-    displacement : by code, how far each corner of the stone's solid moved [m]
+    mode : treatment of the joints
+    joints : all joints found, including open ones
+    displacement : by code, displacement of each corner of the stone's solid [m]
     volume_change : by code, new volume over old, minus 1 [-]
     alone : codes of stones without any joint
-    gaps, overlaps : what remains
+    gaps, overlaps : remaining ones
     """
 
     mode: JointMode
@@ -105,16 +105,16 @@ class ClosingReport:
 
     @property
     def largest_displacement(self) -> float:
-        """Largest distance that any corner moved [m]."""
+        """Largest displacement of any corner [m]."""
         return max((float(moved.max()) for moved in self.displacement.values()), default=0.0)
 
 
 # area, centroid and normal of faces in contact, by the pair of stones
 _Contacts = dict[tuple[int, int], list[tuple[float, Array, Array]]]
 
-_MEETS = 1e-6  # metres: faces of two stones that are nearer are in contact
-_SAME_WAY = 0.999  # cosine: contacts of two stones that look so much alike are of one joint
-_MOST_LOST = 0.5  # of the area in which two stones face each other: if more does not touch, a gap is reported
+_MEETS = 1e-6  # metres: distance within which faces of two stones are in contact
+_SAME_WAY = 0.999  # cosine of the largest angle between contacts of one joint
+_MOST_LOST = 0.5  # of the area of facing faces: a larger part without contact is reported as a gap
 _BENT = "the bed is bent or stepped here, and stones stay convex"
 
 
@@ -125,15 +125,15 @@ def closing_report(
     overlaps: list[Overlapping],
     settings: JointSettings,
 ) -> ClosingReport:
-    """Tell joints, movements, gaps and overlaps.
+    """Summarise joints, movements, gaps and overlaps.
 
     Parameters
     ----------
-    building : the stones before
-    facing : the pairs of faces that were to be closed
-    cut : what became of them, the solids in their last state
-    overlaps : stones that lie in each other still
-    settings : as they were closed
+    building : stones before closing
+    facing : pairs of faces to be closed
+    cut : closed stones, the solids in their final state
+    overlaps : stones that still overlap
+    settings : settings of the closing
     """
     now = Polyhedra.gather((solid.vertices, solid.faces) for solid in cut.solids)
     planes = planes_of(now)
@@ -162,7 +162,7 @@ def closing_report(
 
 
 def _overlaps(building: Building, found: list[Overlapping]) -> tuple[Overlap, ...]:
-    """One entry for each two stones; what parts of a stone share with another is added up."""
+    """Return one entry for each pair of stones, summed over their parts."""
     together: dict[tuple[str, str], list[Overlapping]] = defaultdict(list)
     for one in found:
         together[one.codes].append(one)
@@ -175,7 +175,7 @@ def _overlaps(building: Building, found: list[Overlapping]) -> tuple[Overlap, ..
 
 
 def _volume_changes(building: Building, cut: Cut, after: Array) -> list[float]:
-    """New volume (n,) over old, minus 1, of each stone; zero for one that is as it was."""
+    """Return the new volume (n,) over the old, minus 1, of each stone; zero for an unchanged one."""
     before = _volumes(building.faces.solids, building.faces.planes)
     out: list[float] = (after / before - 1.0).tolist()
     pairs = zip(building.solids, cut.solids, out, strict=True)
@@ -183,14 +183,14 @@ def _volume_changes(building: Building, cut: Cut, after: Array) -> list[float]:
 
 
 def _volumes(solids: Polyhedra, planes: FacePlanes) -> Array:
-    """Volumes (n,), by the divergence theorem [m³]."""
+    """Return volumes (n,), by the divergence theorem [m³]."""
     cones = planes.areas * planes.offsets / 3.0
     out: Array = np.add.reduceat(cones, solids.solid_starts[:-1])
     return out
 
 
 def _joints(building: Building, facing: FacingFaces, cut: Cut, touching: _Contacts) -> list[Joint]:
-    """All joints in the order of `facing`."""
+    """Return all joints in the order of `facing`."""
     planes, codes = building.faces.planes, [stone.code for stone in building.stones]
     pairs = planes.owner[facing.faces]
     cosines = -(planes.normals[facing.faces[:, 0]] * planes.normals[facing.faces[:, 1]]).sum(axis=1)
@@ -200,7 +200,7 @@ def _joints(building: Building, facing: FacingFaces, cut: Cut, touching: _Contac
         plane, reason = int(cut.contact.of_link[k]), cut.reasons[k]
         area, centroid, normal = float(facing.area[k]), facing.centroid[k], facing.normal[k]
         if not reason:
-            # the plane leads out of the first stone, the joint's normal into it
+            # the plane's normal points out of the first stone, the joint's into it
             normal = -cut.contact.side[k] * cut.contact.normals[plane]
             area, middle = _shared(touching.get((int(pairs[k, 0]), int(pairs[k, 1])), []), normal)
             centroid = centroid if middle is None else middle
@@ -220,9 +220,9 @@ def _joints(building: Building, facing: FacingFaces, cut: Cut, touching: _Contac
 
 
 def _width(building: Building, facing: FacingFaces, cut: Cut, link: int) -> float:
-    """How far the sound corners of the two faces lie apart, seen along the normal of their plane [m].
+    """Return the distance of the sound corners of the two faces along the normal of their plane [m].
 
-    Corners that were seen count; hidden ones follow from them, and open a joint like a wedge where faces are turned.
+    Measured corners count; hidden ones follow from them, and would open a joint like a wedge where faces are turned.
     """
     faces, plane = building.faces, int(cut.contact.of_link[link])
     side, total = float(cut.contact.side[link]), 0.0
@@ -243,7 +243,7 @@ def _width(building: Building, facing: FacingFaces, cut: Cut, link: int) -> floa
 
 
 def _contacts(solids: Polyhedra, planes: FacePlanes, settings: JointSettings) -> _Contacts:
-    """All faces that are in contact now."""
+    """Return all current contacts of faces."""
     close = replace(settings, max_width=_MEETS, max_angle=0.01, min_overlap=0.0)
     found = find_facing(solids, planes, close)
     out = defaultdict(list)
@@ -253,7 +253,7 @@ def _contacts(solids: Polyhedra, planes: FacePlanes, settings: JointSettings) ->
 
 
 def _shared(contacts: list[tuple[float, Array, Array]], normal: Array) -> tuple[float, Array | None]:
-    """Area and centroid of the contacts that look along a normal."""
+    """Return the area and centroid of the contacts with a given normal."""
     alike = [(area, centroid) for area, centroid, own in contacts if own @ normal > _SAME_WAY]
     total = sum(area for area, _ in alike)
     if not total > 0.0:

@@ -1,4 +1,4 @@
-"""Settings of joints between surveyed stones: what counts as a joint, and what becomes of it."""
+"""Settings of joint closing: criteria of a joint between two surveyed stones, and its treatment."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -19,11 +19,11 @@ class Setting(NamedTuple):
 
 
 class JointMode(StrEnum):
-    """What becomes of the open joints of a survey.
+    """Treatment of the open joints of a survey.
 
-    CLOSE: both stones are led to the middle of the joint and share its plane (dry joints). MORTAR: so too, and the
-    width that was open is kept as the thickness of the mortar, which the plane then stands for. AS_SURVEYED: stones
-    keep their measured sides, gaps and all.
+    CLOSE: both stones are extended to the middle of the joint and share its plane (dry joints). MORTAR: likewise, and
+    the open width is kept as the thickness of the mortar, which the plane then represents. AS_SURVEYED: stones keep
+    their measured sides and gaps.
     """
 
     CLOSE = "close"
@@ -33,7 +33,7 @@ class JointMode(StrEnum):
 
 @dataclass(frozen=True)
 class JointSettings:
-    """Definition of a joint, its treatment, and how far closing it may move a stone."""
+    """Criteria of a joint, its treatment, and bounds on the displacement of stones."""
 
     mode: Annotated[
         JointMode,

@@ -1,9 +1,9 @@
-"""Sides that touch no stone and whose corner is worn: the foot of a wall, its end, a reveal, an intrados.
+"""Sides that touch no stone and have a worn corner: the foot of a wall, its end, a reveal, an intrados.
 
-The measured corner lies back from where the stone's was, so that the plane through it is not the stone's. If three
-sound corners are left they tell the plane. Else the side is led to the nearest corner of a neighbour, as at the foot of
-an arch; where there is none, neighbours that continue the side tell its plane; and where there are none either, it is
-made parallel to the opposite side, if it is about so.
+The measured corner lies back from the original one, so the plane through it is not the stone's. If three sound corners
+are left they define the plane. Otherwise the side is extended to the nearest corner of a neighbour, as at the foot of
+an arch; if there is none, neighbours that continue the side define its plane; and failing these, it is made parallel to
+the opposite side if it is nearly so.
 """
 
 from collections.abc import Sequence
@@ -17,8 +17,8 @@ from survey.joints.contact_planes import StoneFaces
 __all__ = ["mended_planes"]
 
 
-_ALIKE = 0.985  # cosine of 10°
-_NEAR = 0.03  # metres by which a neighbour's corner may be off a side that it continues
+_ALIKE = 0.985  # cosine of 10°: largest angle between sides that continue each other or are parallel
+_NEAR = 0.03  # metres: distance of a neighbour's corner from a side that it continues
 
 
 def mended_planes(
@@ -29,16 +29,16 @@ def mended_planes(
     solids: Sequence[Solid],
     reach: float,
 ) -> Array:
-    """Planes of all faces, those of free sides with worn corners mended.
+    """Return the planes of all faces, with those of free sides with worn corners restored.
 
     Parameters
     ----------
     faces : of all stones
     rows : (nf, 4) their planes as measured
-    free : (nf,) which of them belong to no joint
+    free : (nf,) faces that belong to no joint
     neighbours : (n, 2) pairs of stones that share a joint
-    solids : all stones, their joints closed as far as is known
-    reach : of a worn corner to that of a neighbour [m]
+    solids : all stones, their joints closed as far as known
+    reach : largest distance of a worn corner from a neighbour's corner [m]
     """
     worn = np.add.reduceat(~faces.sound[faces.solids.corners], faces.solids.face_starts[:-1]) > 0
     beside: dict[int, list[int]] = {}
@@ -49,7 +49,7 @@ def mended_planes(
     for face in np.flatnonzero(worn & free & ~faces.kept).tolist():
         near = sorted(set(beside.get(int(faces.planes.owner[face]), [])))
         points = _sound(faces, face)
-        if len(points) not in (1, 2):  # three tell the plane as it was measured, and without any nothing does
+        if len(points) not in (1, 2):  # three define the plane as it was measured, and none leaves it unknown
             continue
         points = np.vstack([points, _nearest(faces, face, [solids[i].vertices for i in near], reach)])
         if _through(points, rows[face]) is None:
@@ -63,7 +63,7 @@ def mended_planes(
 
 
 def _continuing(faces: StoneFaces, rows: Array, free: Bools, face: int, beside: list[int]) -> Array:
-    """Sound corners (n, 3) of free sides of neighbours in the plane of a side's own sound corners."""
+    """Return sound corners (n, 3) of neighbours' free sides in the plane of a side's own sound corners."""
     own, starts = _sound(faces, face), faces.solids.solid_starts
     found = [np.zeros((0, 3))]
     for stone in beside:
@@ -75,7 +75,7 @@ def _continuing(faces: StoneFaces, rows: Array, free: Bools, face: int, beside: 
 
 
 def _nearest(faces: StoneFaces, face: int, beside: list[Array], reach: float) -> Array:
-    """The nearest corner (n, 3) of a neighbour to each worn one of a side."""
+    """Return the neighbour's corner (n, 3) nearest to each worn corner of a side."""
     corners = faces.corners(face)
     worn = faces.solids.vertices[corners[~faces.sound[corners]]]
     known = np.concatenate([np.zeros((0, 3)), *beside])
@@ -87,7 +87,7 @@ def _nearest(faces: StoneFaces, face: int, beside: list[Array], reach: float) ->
 
 
 def _parallel(faces: StoneFaces, rows: Array, face: int, points: Array) -> Array | None:
-    """The plane through points that is parallel to the opposite side, if that is about so."""
+    """Return the plane through points parallel to the opposite side, if it is nearly so."""
     stone, starts = int(faces.planes.owner[face]), faces.solids.solid_starts
     mine = rows[int(starts[stone]) : int(starts[stone + 1])]
     opposite = mine[int((mine[:, :3] @ rows[face, :3]).argmin()), :3]
@@ -97,14 +97,14 @@ def _parallel(faces: StoneFaces, rows: Array, face: int, points: Array) -> Array
 
 
 def _sound(faces: StoneFaces, face: int) -> Array:
-    """Sound corners (n, 3) of a face."""
+    """Return the sound corners (n, 3) of a face."""
     corners = faces.corners(face)
     out: Array = faces.solids.vertices[corners[faces.sound[corners]]]
     return out
 
 
 def _through(points: Array, like: Array) -> Array | None:
-    """Least-squares plane of points that spread in two directions, facing like another plane; else None."""
+    """Return the least-squares plane of points that spread in two directions, facing like another plane, or None."""
     if len(points) < 3:
         return None
     centre = points.mean(axis=0)

@@ -1,1 +1,6 @@
-"""The survey report: precision, courses, contradictions, points to measure again."""
+"""Quality of a survey: precision, courses, contradictions, points to measure again.
+
+Public: `appraise`, `judge_survey`, `StoneQuality`, `SurveyQuality` (precision); `find_facades`, `Facade` (facades);
+`measure_courses`, `course_heights`, `CourseLine` (courses); `contradictions`, `Contradiction` (contradictions);
+`standards`, `deviations` (canon); `wedges`, `sloped_side` (wedges); `list_remeasures`, `Remeasure` (remeasure).
+"""

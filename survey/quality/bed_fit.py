@@ -1,9 +1,9 @@
-"""Least squares through the beds of stones, whose corners are not independent of each other.
+"""Least squares through the beds of stones, whose corners are correlated.
 
-Corner j of stone i lies at z_ij = Σ β_k x_ij^k + u_i + e_ij, x from the middle of the course: u_i, of variance
-τ², is the height of its stone's bed, alike for all corners of the stone; e_ij, of variance κ² σ_ij², its own
+Corner j of stone i lies at z_ij = Σ β_k x_ij^k + u_i + e_ij, with x from the middle of the course; u_i, of variance
+τ², is the height of its stone's bed, common to all corners of the stone; e_ij, of variance κ² σ_ij², its own
 error. κ, at least 1, comes from the differences between corners of one stone; τ from the stones' means by the
-rule of Paule & Mandel (1982; DerSimonian & Kacker 2007): that value for which Σ residual² / variance is the
+rule of Paule & Mandel (1982; DerSimonian & Kacker 2007): the value for which Σ residual² / variance is the
 redundancy.
 """
 
@@ -20,7 +20,7 @@ __all__ = ["BedCorners", "BedScatter", "fit_bed", "pool", "scatter_of"]
 
 Rows = NDArray[np.intp]
 
-_FREEDOM = 5  # differences between corners of one stone from which κ can be told from 1
+_FREEDOM = 5  # least number of differences between corners of one stone from which κ is estimated
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class BedCorners:
 
     Attributes
     ----------
-    stone : (n,) number of the stone of each, from 0
+    stone : (n,) number of the stone of each corner, from 0
     along : (n,) place along the wall [m]
     height : (n,) z [m]
     sigma : (n,) standard deviation of z as measured [m]
@@ -42,7 +42,7 @@ class BedCorners:
 
     @property
     def count(self) -> int:
-        """How many stones."""
+        """Number of stones."""
         return int(self.stone.max()) + 1
 
     @property
@@ -53,13 +53,13 @@ class BedCorners:
 
 @dataclass(frozen=True)
 class BedScatter:
-    """How beds scatter.
+    """Scatter of beds.
 
     Attributes
     ----------
     tau : standard deviation of a stone's bed about the line [m]
-    kappa : how much more than measured the corners of one stone scatter, at least 1 [-]
-    freedom : stones minus parameters, from which tau is estimated
+    kappa : scatter of the corners of one stone over their measured precision, at least 1 [-]
+    freedom : stones minus parameters, the degrees of freedom of tau
     """
 
     tau: float
@@ -68,7 +68,7 @@ class BedScatter:
 
 
 def scatter_of(bed: BedCorners, parameters: int) -> BedScatter:
-    """τ and κ of one course from its own stones."""
+    """Estimate τ and κ of one course from its own stones."""
     weights = 1.0 / bed.sigma**2
     design, total = _design(bed, parameters), _by_stone(bed, weights[:, None])
     low = float(bed.height.min())
@@ -84,7 +84,7 @@ def scatter_of(bed: BedCorners, parameters: int) -> BedScatter:
 
 
 def pool(scatters: Sequence[BedScatter]) -> BedScatter | None:
-    """What courses of few stones borrow: the root mean squares of those that have enough."""
+    """Return the root mean squares of courses with enough stones, for courses of few; None if there are none."""
     freedom = sum(one.freedom for one in scatters)
     if not freedom:
         return None
@@ -94,7 +94,7 @@ def pool(scatters: Sequence[BedScatter]) -> BedScatter | None:
 
 
 def fit_bed(bed: BedCorners, scatter: BedScatter, parameters: int) -> tuple[Array, Array]:
-    """Generalised least squares, C = κ²σ² + τ² 1 1ᵀ of each stone, inverted by Sherman and Morrison."""
+    """Fit by generalised least squares, C = κ²σ² + τ² 1 1ᵀ of each stone, inverted by Sherman & Morrison."""
     weights = 1.0 / (scatter.kappa * bed.sigma) ** 2
     rows = np.column_stack([_design(bed, parameters), bed.height - bed.height.min()])
     sums = _by_stone(bed, weights[:, None] * rows)
@@ -107,12 +107,12 @@ def fit_bed(bed: BedCorners, scatter: BedScatter, parameters: int) -> tuple[Arra
 
 
 def _design(bed: BedCorners, parameters: int) -> Array:
-    """Powers of the distance from the middle."""
+    """Return the powers of the distance from the middle."""
     return (bed.along - bed.middle)[:, None] ** np.arange(parameters)
 
 
 def _by_stone(bed: BedCorners, columns: Array) -> Array:
-    """Sums over the corners of each stone, (m, k)."""
+    """Return the sums over the corners of each stone, (m, k)."""
     return np.array([np.bincount(bed.stone, column) for column in columns.T]).T
 
 
@@ -123,7 +123,7 @@ def _solve(rows: Array, weights: Array) -> Array:
 
 
 def _paule_mandel(rows: Array, variances: Array) -> float:
-    """τ for which Σ residual² / (variance + τ²) is the redundancy; 0 if the variances explain all."""
+    """Return τ for which Σ residual² / (variance + τ²) is the redundancy; 0 if the variances explain the scatter."""
     redundancy: int = rows.shape[0] - (rows.shape[1] - 1)
 
     def excess(square: float) -> float:

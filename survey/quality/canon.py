@@ -1,4 +1,4 @@
-"""Dimensions against theory: how far stones are from the usual ones of their kind."""
+"""Comparison of stones' dimensions with the usual ones of their kind."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -14,10 +14,10 @@ __all__ = ["ENOUGH", "Deviation", "KindStandard", "deviations", "standards"]
 
 
 ENOUGH = 5
-"""Stones of a kind from which a median and its scatter can be had."""
+"""Least number of stones of a kind for a median and its scatter."""
 
-_EXACT = 1e-6  # metres: nothing is known better than this
-_CONSISTENT = 1.4826  # median absolute deviation to standard deviation, of a normal distribution
+_EXACT = 1e-6  # metres: lower limit of the standard deviation of a dimension
+_CONSISTENT = 1.4826  # standard deviation over median absolute deviation, of a normal distribution [-]
 
 
 @dataclass(frozen=True)
@@ -28,10 +28,10 @@ class KindStandard:
     ----------
     kind : the kind of stone
     length, height : of its face, level and upwards [m]
-    length_scatter, height_scatter : how much stones differ from it, beyond the precision of their measurement,
-        standard deviation [m]
-    source : the evidence, in words
-    stones : how many stones of the survey it is the median of; 0 if archaeologists gave it
+    length_scatter, height_scatter : standard deviation of stones from it, beyond the precision of their
+        measurement [m]
+    source : evidence
+    stones : number of stones of the survey behind the median; 0 if archaeologists gave it
     """
 
     kind: str
@@ -45,7 +45,7 @@ class KindStandard:
 
 @dataclass(frozen=True, slots=True)
 class Deviation:
-    """How far one stone is from the usual ones of its kind.
+    """Deviation of one stone from the usual dimensions of its kind.
 
     Attributes
     ----------
@@ -63,20 +63,20 @@ class Deviation:
 
     @property
     def worst(self) -> float:
-        """The larger score, without its sign."""
+        """The larger score in absolute value."""
         return max(abs(self.length_score), abs(self.height_score))
 
 
 def standards(stones: Sequence[StoneQuality], canons: Iterable[Canon]) -> dict[str, KindStandard]:
-    """The usual face of every kind: the canon of the survey, else the median of five stones or more.
+    """Return the usual face of every kind: the canon of the survey, or the median of five stones or more.
 
-    The scatter of a median is 1.4826 times the median absolute deviation, which single odd stones do not
-    move, without the part that the precision of the measurement explains.
+    The scatter of a median is 1.4826 times the median absolute deviation, which single outliers do not affect,
+    less the part explained by the precision of the measurement.
 
     Parameters
     ----------
     stones : all stones of the survey
-    canons : what archaeologists hold for the usual dimensions
+    canons : usual dimensions according to archaeologists
     """
     found = {
         one.kind: KindStandard(one.kind, one.length, one.height, one.sigma, one.sigma, one.source, 0)
@@ -107,7 +107,7 @@ def _deviation(stone: StoneQuality, usual: KindStandard) -> Deviation:
 
 
 def _precision(stone: StoneQuality) -> float:
-    """Standard deviation of its dimensions; those of a solid that was modelled are taken as they are."""
+    """Return the standard deviation of its dimensions; zero for a modelled solid."""
     return stone.dimension_sigma if math.isfinite(stone.dimension_sigma) else 0.0
 
 
@@ -124,7 +124,7 @@ def _median(kind: str, stones: Sequence[StoneQuality]) -> KindStandard:
 
 
 def _centre(values: Array, precision: float) -> tuple[float, float]:
-    """Median, and robust standard deviation beyond what the precision explains."""
+    """Return the median, and the robust standard deviation beyond the precision."""
     middle = float(np.median(values))
     spread = _CONSISTENT * float(np.median(np.abs(values - middle)))
     return middle, math.sqrt(max(spread**2 - precision**2, 0.0))

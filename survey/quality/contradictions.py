@@ -1,10 +1,10 @@
-"""Stones whose measured proportions contradict what their kind means.
+"""Stones whose measured proportions contradict their kind.
 
-One rule is one function: what it compares, and with what limit. A stone contradicts its kind where the
-measured value is beyond the limit by more than three standard deviations of the measurement.
+Each rule is one function, which compares a quantity with a limit. A stone contradicts its kind if the measured
+value exceeds the limit by more than three standard deviations of the measurement.
 
 ===================  ============================================================================
-kind                 its definition, and what contradicts it
+kind                 definition, and contradiction
 ===================  ============================================================================
 header               laid across the wall: its face is longer than the stretchers beside it, or
                      than the stone is deep
@@ -35,12 +35,10 @@ SIGNIFICANT = 3.0
 """Standard deviations of the measurement beyond which a stone contradicts its kind."""
 
 _BESIDE = 4  # stretchers of its course next to a header with which it is compared, fewer at the ends
-_FEWEST = 3  # stones of which a median of the survey is taken
-_MEDIAN = 1.2533  # standard deviation of a median over that of a mean, of a normal distribution
-_PARALLEL = math.radians(1.0)  # a "wedge" of less turns an arch of 1 m in more than 180 stones
-_SLOPED = math.radians(
-    5.0
-)  # sides of ashlars are plumb or level to a degree; springings are steeper than this
+_FEWEST = 3  # least number of stones for a median of the survey
+_MEDIAN = 1.2533  # standard deviation of a median over that of a mean, of a normal distribution [-]
+_PARALLEL = math.radians(1.0)  # least convergence of a wedge: an arch of 1 m would have more than 180 stones
+_SLOPED = math.radians(5.0)  # least slope of a springing; sides of ashlars are plumb or level to a degree
 
 
 @dataclass(frozen=True)
@@ -50,8 +48,8 @@ class Contradiction:
     Attributes
     ----------
     code, kind, line : of the stone
-    text : what was measured and what was expected, with numbers
-    excess : by how much it is beyond the limit, in metres or radians
+    text : measured and expected values
+    excess : amount beyond the limit [m] or [rad]
     significance : the same in standard deviations of the measurement
     """
 
@@ -72,13 +70,13 @@ class _Finding:
 
 @dataclass(frozen=True)
 class _Around:
-    """What the rules ask of other stones.
+    """Quantities of other stones that the rules need.
 
     Attributes
     ----------
-    stretchers : median length of the stretchers beside each header, its standard deviation, and who they are
+    stretchers : median length of the stretchers beside each header, its standard deviation, and a description of them
     wedges : convergence of each stone of an arch
-    convergence : the least that makes a wedge here [rad]
+    convergence : least convergence of a wedge here [rad]
     """
 
     stretchers: Mapping[int, tuple[float, float, str]]
@@ -95,7 +93,7 @@ def contradictions(stones: Sequence[StoneQuality], facades: Sequence[Facade]) ->
     Parameters
     ----------
     stones : all stones of the survey
-    facades : which of them face one way
+    facades : facades of the stones
     """
     measured = wedges(stones, facades)
     around = _Around(_stretchers_beside(stones, facades), measured, _least_convergence(measured))
@@ -120,8 +118,8 @@ def contradictions(stones: Sequence[StoneQuality], facades: Sequence[Facade]) ->
 def _longer_than_stretchers(index: int, stone: StoneQuality, around: _Around) -> _Finding | None:
     if index not in around.stretchers:
         return None
-    median, sigma, whose = around.stretchers[index]
-    text = f"its face is {_metres(stone.length)} long, {whose} {_metres(median)}"
+    median, sigma, subject = around.stretchers[index]
+    text = f"its face is {_metres(stone.length)} long, {subject} {_metres(median)}"
     return _Finding(stone.length - median, math.hypot(stone.dimension_sigma, sigma), text)
 
 
@@ -147,8 +145,8 @@ def _no_wedge(index: int, _: StoneQuality, around: _Around) -> _Finding | None:
         return None
     wedge = around.wedges[index]
     angle, least = math.degrees(wedge.convergence), math.degrees(around.convergence)
-    whither = "converge" if angle >= 0.0 else "diverge"
-    text = f"its sides {whither} by {abs(angle):.1f}° towards the intrados; a wedge has {least:.1f}° here"
+    trend = "converge" if angle >= 0.0 else "diverge"
+    text = f"its sides {trend} by {abs(angle):.1f}° towards the intrados; a wedge has {least:.1f}° here"
     return _Finding(around.convergence - wedge.convergence, wedge.sigma, text)
 
 
@@ -176,7 +174,7 @@ def _metres(value: float) -> str:
 def _stretchers_beside(
     stones: Sequence[StoneQuality], facades: Sequence[Facade]
 ) -> dict[int, tuple[float, float, str]]:
-    """For every header: median length of the stretchers next to it in its course, else of the survey."""
+    """Return for every header the median length of the stretchers next to it in its course, or of the survey."""
     found = {}
     every = [stone for stone in stones if stone.kind == "stretcher"]
     whole = _middle(every, "stretchers of the survey have") if len(every) >= _FEWEST else None
@@ -197,7 +195,7 @@ def _stretchers_beside(
 def _courses(
     stones: Sequence[StoneQuality], facades: Sequence[Facade]
 ) -> Iterator[tuple[list[int], list[int], tuple[Array, Array]]]:
-    """Headers and stretchers of each course of each facade, and their places along it."""
+    """Yield headers and stretchers of each course of each facade, and their places along it."""
     for facade in facades:
         groups: dict[tuple[str | None, int | None], tuple[list[int], list[int]]] = {}
         for i in facade.members.tolist():
@@ -215,14 +213,14 @@ def _courses(
 
 
 def _middle(stones: Sequence[StoneQuality], words: str) -> tuple[float, float, str]:
-    """Median length, the part of its standard deviation that measurement explains, and whose it is."""
+    """Return the median length, the part of its standard deviation due to measurement, and a description."""
     squares = [stone.dimension_sigma**2 for stone in stones]
     sigma = _MEDIAN * math.sqrt(sum(squares)) / len(squares)
     return float(np.median([stone.length for stone in stones])), sigma, words
 
 
 def _least_convergence(measured: Mapping[int, Wedge]) -> float:
-    """Half of what the stones of the survey's arches have as a rule; 1° if there are too few."""
+    """Return half the median convergence of the survey's arch stones; 1° if there are too few."""
     if len(measured) < _FEWEST:
         return _PARALLEL
     return max(_PARALLEL, float(np.median([wedge.convergence for wedge in measured.values()])) / 2.0)

@@ -1,10 +1,10 @@
-"""Deformation of courses: how far their bed lines are from level and from straight, and how well that is known.
+"""Deformation of courses: departure of their bed lines from level and from straight, with its uncertainty.
 
-The bed line of a course is drawn through the lower corners of its stones: z against the distance s along the
-facade. The corners of one stone are not independent witnesses of the course, since its bed lies a little high
-or low as a whole; least squares that took them so would promise too much by up to √2. So the beds' own scatter
-is estimated with the line (`survey.quality.bed_fit`). Slope and sag are tested with Student's t and the number of
-stones, not of corners. Courses of fewer than five stones borrow the scatter of the others.
+The bed line of a course is fitted to the lower corners of its stones: z against the distance s along the
+facade. The corners of one stone are not independent, since its bed lies a little high or low as a whole; least squares
+that ignored this would be overconfident by up to √2. So the beds' own scatter is estimated with the line
+(`survey.quality.bed_fit`). Slope and sag are tested with Student's t and the number of stones, not of corners. Courses
+of fewer than five stones borrow the scatter of the others.
 """
 
 import math
@@ -31,12 +31,12 @@ __all__ = [
 
 
 ENOUGH = 5
-"""Stones from which the scatter of a course's beds can be estimated: with fewer, τ is uncertain by half."""
+"""Least number of stones for the scatter of a course's beds: with fewer, τ is uncertain by half."""
 
 SIGNIFICANT = 0.01
-"""A slope or sag that chance would exceed less often than this is called one."""
+"""Probability by chance below which a slope or sag is significant."""
 
-_LEVEL = math.tan(math.radians(30.0))  # a lower side steeper than this is a worn or bevelled corner, no bed
+_LEVEL = math.tan(math.radians(30.0))  # largest slope of a bed; steeper lower sides are worn or bevelled
 
 
 @dataclass(frozen=True)
@@ -45,29 +45,29 @@ class CourseLine:
 
     Attributes
     ----------
-    facade, zone, course : where it is
+    facade, zone, course : location
     stones : codes of its stones that have a bed, in order along the wall
     codes : (n,) stone of each corner
     along : (n,) place of each corner along the facade, to the right of the viewer [m]
     height : (n,) its z [m]
-    sigma : (n,) standard deviation of its z as measured [m]
-    left_out : lower corners that do not count: worn, or of unknown precision
+    sigma : (n,) standard deviation of its z, as measured [m]
+    left_out : lower corners that are ignored: worn, or of unknown precision
     middle : half-way between the ends, along the facade [m]
     level : z of the line there [m]; it and `slope` have the covariance
-    slope : rise to the right over length [-]; None if one corner alone is left
+    slope : rise to the right over length [-]; None if only one corner is left
     covariance : (2, 2) of level [m] and slope [-], in the frame of the survey
-    frame_sigma : standard deviation of a slope that comes from the frame itself, common to all courses [-]
-    slope_probability : that chance alone makes such a slope in a level course; None if the scatter of beds is
-        not known
+    frame_sigma : standard deviation of a slope due to the frame itself, common to all courses [-]
+    slope_probability : probability of such a slope in a level course by chance; None if the scatter of beds is
+        unknown
     sag : height of mid-span above the chord of the best parabola, negative where it sags [m]; None with fewer
         than five stones
     sag_sigma : its standard deviation [m]
-    sag_probability : that chance alone makes such a sag in a straight course
+    sag_probability : probability of such a sag in a straight course by chance
     deviations : (n,) of the corners from the straight line, upwards [m]
     rms : of the deviations [m]
     scatter : τ, standard deviation of a stone's bed about the line [m]
-    roughness : κ, how much more than measured the corners of one stone scatter [-]
-    evidence : where τ and κ come from: "own", "other courses", or "none" if both are unknown
+    roughness : κ, scatter of the corners of one stone over their measured precision [-]
+    evidence : source of τ and κ: "own", "other courses", or "none" if both are unknown
     """
 
     facade: str
@@ -96,44 +96,44 @@ class CourseLine:
 
     @property
     def slope_sigma(self) -> float | None:
-        """Standard deviation of the slope against level, that of the frame included [-]."""
+        """Standard deviation of the slope against level, including that of the frame [-]."""
         return None if self.slope is None else math.hypot(math.sqrt(self.covariance[1, 1]), self.frame_sigma)
 
     @property
     def span(self) -> float:
-        """Distance of its first from its last corner [m]."""
+        """Distance from the first to the last corner [m]."""
         return float(self.along[-1] - self.along[0])
 
     @property
     def worst(self) -> tuple[str, float]:
-        """Stone with the corner farthest from the line, and how far that is [m]."""
+        """Stone with the corner farthest from the line, and its distance [m]."""
         i = int(np.abs(self.deviations).argmax())
         return self.codes[i], float(self.deviations[i])
 
     @property
     def finding(self) -> str:
-        """What the numbers mean, in words."""
+        """Verdict on slope and sag."""
         if self.slope is None:
             return "not determined: one corner is left"
         if self.slope_probability is None:
             return "not tested: too few stones to know the scatter of beds"
-        said = []
+        found = []
         if self.slope_probability < SIGNIFICANT:
-            said.append(f"{'rises' if self.slope > 0.0 else 'falls'} to the right")
+            found.append(f"{'rises' if self.slope > 0.0 else 'falls'} to the right")
         if self.sag is not None and self.sag_probability is not None and self.sag_probability < SIGNIFICANT:
-            said.append("hogs" if self.sag > 0.0 else "sags")
-        return " and ".join(said) or ("level and straight" if self.sag is not None else "level")
+            found.append("hogs" if self.sag > 0.0 else "sags")
+        return " and ".join(found) or ("level and straight" if self.sag is not None else "level")
 
 
 @dataclass(frozen=True)
 class CourseHeight:
-    """From the bed of a course to that of the next.
+    """Height from the bed of a course to that of the next.
 
     Attributes
     ----------
     facade, zone, course : of the lower course
-    along : where along the facade it is taken: the middle of what the two courses share [m]
-    height : with its bed joint [m]
+    along : place along the facade where it is measured: the middle of the overlap of the two courses [m]
+    height : including its bed joint [m]
     sigma : standard deviation [m]
     """
 
@@ -147,7 +147,7 @@ class CourseHeight:
 
 @dataclass(frozen=True)
 class _Course:
-    """The lower corners of one course, and whose they are."""
+    """Lower corners of one course, with their stones."""
 
     facade: str
     zone: str | None
@@ -166,9 +166,9 @@ def measure_courses(
     Parameters
     ----------
     stones : all stones of the survey
-    facades : which stones face one way; level ones have no bed lines
-    tilts : (3, 3) covariances of small rotations about x, y and z with which the frames of the survey were
-        levelled by control points [rad²], of which the worst holds; none: the instrument levelled itself
+    facades : facades of the stones; level ones have no bed lines
+    tilts : (3, 3) covariances of small rotations about x, y and z with which the frames of the survey were levelled
+        by control points [rad²], of which the worst applies; none: the instrument levelled itself
 
     Returns
     -------
@@ -182,7 +182,7 @@ def measure_courses(
 
 
 def course_heights(lines: Sequence[CourseLine]) -> tuple[CourseHeight, ...]:
-    """Height of every course whose next one lies above part of it."""
+    """Return the height of every course whose next one lies above part of it."""
     found = []
     by_place = {(line.facade, line.zone, line.course): line for line in lines}
     for (facade, zone, course), line in by_place.items():
@@ -200,7 +200,7 @@ def course_heights(lines: Sequence[CourseLine]) -> tuple[CourseHeight, ...]:
 
 
 def lower_corners(outline: Array, frame: WallPlane) -> list[int]:
-    """Indices of the corners of a face on which it is bedded: the ends of its lower, nearly level sides.
+    """Return the indices of the corners on which a face is bedded: the ends of its lower, nearly level sides.
 
     Parameters
     ----------
@@ -215,14 +215,14 @@ def lower_corners(outline: Array, frame: WallPlane) -> list[int]:
 
 
 def _tilt(facade: Facade, tilts: Sequence[Array]) -> float:
-    """Standard deviation of a slope along a facade: the rotation ω raises s·u by (ω × u)_z s."""
+    """Return the standard deviation of a slope along a facade: the rotation ω raises s·u by (ω × u)_z s."""
     along = facade.frame.axes[0]
     lever = np.array([along[1], -along[0], 0.0])
     return max((math.sqrt(float(lever @ one @ lever)) for one in tilts), default=0.0)
 
 
 def _courses(stones: Sequence[StoneQuality], facade: Facade, frame_sigma: float) -> list[_Course]:
-    """Lower corners of a facade, by zone and course."""
+    """Return the lower corners of a facade, by zone and course."""
     groups: dict[tuple[str, int], list[StoneQuality]] = {}
     for i in facade.members.tolist():
         course = stones[i].course
@@ -299,7 +299,7 @@ def _line(course: _Course, own: BedScatter | None, pooled: BedScatter | None) ->
 
 
 def _sag(bed: BedCorners) -> tuple[float, float, float | None]:
-    """Height of mid-span above the chord of the best parabola, -c (L/2)², its sigma and probability."""
+    """Return the height of mid-span above the chord of the best parabola, -c (L/2)², its sigma and probability."""
     scatter = scatter_of(bed, 3)
     values, covariance = fit_bed(bed, scatter, 3)
     lever = -(((bed.along[-1] - bed.along[0]) / 2.0) ** 2)
@@ -308,11 +308,11 @@ def _sag(bed: BedCorners) -> tuple[float, float, float | None]:
 
 
 def _chance(value: float, sigma: float, freedom: int) -> float | None:
-    """Two-sided probability of Student's t."""
+    """Return the two-sided probability of Student's t."""
     return float(2.0 * stdtr(freedom, -abs(value) / sigma)) if freedom > 0 else None
 
 
 def _at(line: CourseLine, place: float) -> tuple[float, float]:
-    """Height of a line at a place along the facade, and its variance."""
+    """Return the height of a line at a place along the facade, and its variance."""
     row = np.array([1.0, place - line.middle])
     return line.level + (line.slope or 0.0) * float(row[1]), float(row @ line.covariance @ row)

@@ -1,4 +1,4 @@
-"""Facades: stones that face one way, and the elevation in which one draws them and measures along them."""
+"""Facades: stones that face one way, and the elevation in which they are drawn and measured."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -11,12 +11,12 @@ from survey.arrays import Array, Bools
 __all__ = ["LEVEL", "WIDEST", "Facade", "WallPlane", "find_facades", "upright_frame"]
 
 WIDEST = 30.0
-"""How far a face may be turned from the mean of its facade [degrees]."""
+"""Largest angle of a face from the mean direction of its facade [degrees]."""
 
 LEVEL = 45.0
-"""A face that looks up or down by more than this is of no facade: a floor, a soffit, a coping [degrees]."""
+"""Inclination above which a face belongs to no facade: a floor, a soffit, a coping [degrees]."""
 
-_ROUNDS = 50  # until the mean direction and the stones it takes agree; three or four do as a rule
+_ROUNDS = 50  # until the mean direction and its stones agree; usually three or four
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class WallPlane:
     axes: Array
 
     def flatten(self, points: Array) -> Array:
-        """Project points (…, 3) square onto the wall plane, (…, 2)."""
+        """Project points (…, 3) orthogonally onto the wall plane, (…, 2)."""
         flat: Array = (points - self.origin) @ self.axes[:2].T
         return flat
 
@@ -50,7 +50,7 @@ class Facade:
     name : "facade 1" is the largest; "faces up" and "faces down" are the level ones
     members : (m,) indices of its stones, in the order given
     frame : mean plane: along the facade (level, to the right of the viewer), up, outward
-    azimuth : direction it looks to, clockwise from the y axis of the survey's frame [degrees]; None if level
+    azimuth : direction that it faces, clockwise from the y axis of the survey's frame [degrees]; None if level
     area : of its faces together [m²]
     """
 
@@ -62,10 +62,10 @@ class Facade:
 
 
 def find_facades(normals: Array, areas: Array, centroids: Array) -> tuple[Facade, ...]:
-    """Group faces by the direction in which they look.
+    """Group faces by their direction.
 
-    The direction in which most area looks makes the first facade: all faces within 30° of its area-weighted
-    mean direction, in plan. What is left makes the next, and so on. Level faces stay apart.
+    The direction of the largest total area makes the first facade: all faces within 30° of its area-weighted
+    mean direction, in plan. The remaining faces make the next, and so on. Level faces stay apart.
 
     Parameters
     ----------
@@ -105,12 +105,12 @@ def _turns(normals: Array, areas: Array, standing: NDArray[np.intp]) -> Iterable
 
 
 def _gather(level: Array, areas: Array) -> Bools:
-    """Which of some plan directions, (n, 2), belong to the facade of the largest area."""
+    """Return the plan directions (n, 2) that belong to the facade of the largest area."""
     mean, mine = _peak(level, areas), np.ones(len(level), dtype=bool)
     for count in range(_ROUNDS):
         within = level @ mean >= np.cos(np.radians(WIDEST))
         if count > _ROUNDS // 2:
-            within &= mine  # two faces that take turns in pushing each other out: let both go
+            within &= mine  # two faces that keep excluding each other: drop both
         if not within.any():
             break
         mean = areas[within] @ level[within]
@@ -126,7 +126,7 @@ def _gather(level: Array, areas: Array) -> Bools:
 
 
 def _peak(level: Array, areas: Array) -> Array:
-    """The direction about which most area looks: a smoothed histogram in steps of a degree."""
+    """Return the direction with the most area about it: a smoothed histogram in steps of a degree."""
     angles = np.degrees(np.arctan2(level[:, 1], level[:, 0])) % 360.0
     mass = np.bincount(angles.astype(np.int64) % 360, weights=areas, minlength=360)
     offsets = np.arange(-180, 180)
@@ -140,7 +140,7 @@ def _facade(name: str, rows: NDArray[np.intp], normals: Array, areas: Array, cen
     weights = areas[rows]
     mean = weights @ normals[rows]
     normal = mean / max(float(np.linalg.norm(mean)), 1e-300)
-    first = centroids[rows[0]]  # about a place of the facade: nothing is lost 10⁶ m from the origin
+    first = centroids[rows[0]]  # relative to a place of the facade: no digits are lost 10⁶ m from the origin
     origin = first + weights @ (centroids[rows] - first) / weights.sum()
     standing = name.startswith("facade")
     azimuth = float(np.degrees(np.arctan2(normal[0], normal[1])) % 360.0) if standing else None
@@ -148,14 +148,14 @@ def _facade(name: str, rows: NDArray[np.intp], normals: Array, areas: Array, cen
 
 
 def upright_frame(normal: Array, origin: Array) -> WallPlane:
-    """The frame in which one stands before a wall: along it to the right, up, towards the viewer.
+    """Return the frame of a viewer before a wall: along it to the right, up, towards the viewer.
 
     Parameters
     ----------
     normal : (3,) unit outward normal of the wall [-]
     origin : (3,) [m]
     """
-    # up the wall where it stands; for a floor or a vault's soffit any direction in the plane serves
+    # up the wall if it stands; for a floor or a vault's soffit any direction in the plane serves
     upward = np.array([0.0, 0.0, 1.0]) if abs(normal[2]) < 0.9 else np.array([0.0, 1.0, 0.0])
     along = np.cross(upward, normal)
     along /= np.linalg.norm(along)

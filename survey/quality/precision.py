@@ -1,4 +1,4 @@
-"""How well a survey was measured: each stone in a few numbers, and all of them together."""
+"""Precision of a survey: each stone in a few numbers, and all of them together."""
 
 import math
 from collections import Counter
@@ -15,20 +15,20 @@ from survey.extrusion.extrusion import SurveyedBlock
 __all__ = ["Histogram", "StoneQuality", "SurveyQuality", "appraise", "judge_survey"]
 
 
-_SIGNIFICANT = 3.0  # standard deviations beyond which sigma0 is not 1 by chance
-_TOLERANCE = 0.1  # relative: nobody states a sigma better than this, so a smaller error of it is none
+_SIGNIFICANT = 3.0  # standard deviations beyond which sigma0 differs from 1 not by chance
+_TOLERANCE = 0.1  # relative error below which a stated sigma is right, since nobody states it better
 _NOTHING = "no stone has points of its own on its face: nothing was measured that could be judged"
 _REACH, _BIN = 5.0, 0.25  # of the histogram [standard deviations]; the end bins hold all beyond
 
 
 @dataclass(frozen=True, slots=True)
 class StoneQuality:
-    """What a report needs of one stone, without its points.
+    """Summary of one stone for a report, without its points.
 
     Attributes
     ----------
     code, kind, course, zone, line : as in the survey
-    source, provenance : how its face came to be known: "points", "photograph" or "solid", and in words
+    source, provenance : origin of its face: "points", "photograph" or "solid", and in words
     sigma : standard deviation of a coordinate, as stated [m]
     points : measured points and corners together
     rms : of the accepted residuals [m]
@@ -36,21 +36,21 @@ class StoneQuality:
     redundancy : accepted points minus 3
     blunders : names of the points left out; "point 3" where the instrument gave none
     worn : names of the corners that lie off the plane
-    shape, shape_text : verdict on one plane as its shape, in a word and in a sentence with numbers
+    shape, shape_text : verdict on a plane as its shape, in a word and in a sentence with numbers
     tilt_sigma : of the less certain tilt of its plane [degrees]
     offset_sigma : of its plane's height at its centroid [m]
     depth, depth_sigma : [m]; None if not known
-    depth_source, depth_origin : the evidence in words, and its rank: "stone", "rule", "kind", "structure", or "none"
+    depth_source, depth_origin : evidence in words, and its rank: "stone", "rule", "kind", "structure", or "none"
     length, height : of its face, level and upwards [m]
     dimension_sigma : standard deviation of each, as a difference of two corners [m]
     area : of its face [m²]
-    skew : how far its middle lines are from square [rad]; None unless it has four corners
+    skew : departure of its middle lines from a right angle [rad]; None unless it has four corners
     normal : (3,) outward [-]
     outline : (nv, 3) corners of its face, counter-clockwise seen from outside [m]
-    corner_sigma : (nv, 3) their standard deviations along x, y and z [m]
+    corner_sigma : (nv, 3) standard deviations of its corners along x, y and z [m]
     worn_corners : indices of `outline` that lie off the plane
     standardised : residuals of the accepted points and corners over their own standard deviation [-]
-    remarks : what was changed to make its outline a polygon, in words
+    remarks : changes that made its outline a polygon, in words
     """
 
     code: str
@@ -89,19 +89,19 @@ class StoneQuality:
 
     @property
     def measured(self) -> bool:
-        """Whether its plane is fitted to points of its own."""
+        """True if its plane is fitted to points of its own."""
         return self.source == "points"
 
 
 @dataclass(frozen=True)
 class Histogram:
-    """How often standardised residuals fall where.
+    """Histogram of standardised residuals.
 
     Attributes
     ----------
-    edges : (bins + 1,) in standard deviations; the end bins hold what lies beyond too
+    edges : (bins + 1,) in standard deviations; the end bins include all values beyond
     counts : (bins,) residuals
-    expected : (bins,) of as many normal ones
+    expected : (bins,) counts of as many normal residuals
     """
 
     edges: Array
@@ -115,16 +115,16 @@ class SurveyQuality:
 
     Attributes
     ----------
-    stones : how many were made
+    stones : number of stones made
     points, blunders, worn : points and corners measured, points left out, corners off their plane
     redundancy : of all faces together
     sigma0 : sqrt(Σ w r² / redundancy) of all faces; None without redundancy
     sigma0_sigma : its standard deviation if the residuals are normal, 1 / sqrt(2 redundancy)
     sigma : root mean square of the stated standard deviations [m]
-    verdict : whether the stated sigma is right, in words
+    verdict : verdict on the stated sigma, in words
     rms : of all accepted residuals [m]
-    residuals : their histogram
-    kinds, shapes, depths, provenances : how many stones of each
+    residuals : histogram of the residuals
+    kinds, shapes, depths, provenances : number of stones of each
     """
 
     stones: int
@@ -145,11 +145,11 @@ class SurveyQuality:
 
 
 def appraise(block: SurveyedBlock) -> StoneQuality:
-    """Put what a report needs of a stone into few numbers."""
+    """Summarise a stone for reports."""
     face, fit, record = block.face, block.face.fit, block.face.record
     measured = face.provenance.source == "points"
     corners = len(face.outline)
-    corner_sigma = block.vertex_sigma[:corners].copy()  # alone: the rest need not be kept
+    corner_sigma = block.vertex_sigma[:corners].copy()  # a copy: the rest need not be kept
     blunders, worn = _left_out(block) if measured else ((), ())
     return StoneQuality(
         code=block.code,
@@ -189,7 +189,7 @@ def appraise(block: SurveyedBlock) -> StoneQuality:
 
 
 def _standardised(block: SurveyedBlock) -> NDArray[np.float32]:
-    """Standardised residuals of what the fit accepted and other points check."""
+    """Return the standardised residuals that the fit accepted and other points check."""
     fit = block.face.fit
     accepted = np.isfinite(fit.standardised)
     accepted[list(fit.rejected)] = False
@@ -197,14 +197,14 @@ def _standardised(block: SurveyedBlock) -> NDArray[np.float32]:
 
 
 def _dimension_sigma(block: SurveyedBlock, corner_sigma: Array) -> float:
-    """Of the distance of two corners: √2 of that of one in the plane, which is what is not square to it."""
+    """Return the sigma of the distance of two corners: √2 of that of one corner in the plane of the face."""
     square = block.face.fit.height_sigma(block.face.outline) ** 2
     level = ((corner_sigma**2).sum(axis=1) - square) / 2.0
     return math.sqrt(2.0 * max(float(level.mean()), 0.0))
 
 
 def _left_out(block: SurveyedBlock) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names of the rejected points, and of the rejected corners."""
+    """Return the names of the rejected points, and of the rejected corners."""
     record = block.face.record
     count, rejected = len(record.points), block.face.fit.rejected
 
@@ -217,7 +217,7 @@ def _left_out(block: SurveyedBlock) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def judge_survey(stones: Sequence[StoneQuality]) -> SurveyQuality:
-    """Sum up the stones of a survey; stones without points of their own count for no residual."""
+    """Summarise the stones of a survey; stones without points of their own contribute no residual."""
     own = [one for one in stones if one.measured]
     squares = sum(one.redundancy * one.sigma0**2 for one in own if one.sigma0 is not None)
     redundancy = sum(one.redundancy for one in own)

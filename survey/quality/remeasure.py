@@ -1,4 +1,4 @@
-"""What to measure again: which stones, why, and what to do, most urgent first."""
+"""Stones to be measured again, with reason and action, most urgent first."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -13,21 +13,21 @@ from survey.records.survey import Reject
 __all__ = ["BLUNDERS", "SCATTER", "SMOOTH", "TILT", "Remeasure", "Urgency", "list_remeasures"]
 
 TILT = 0.5
-"""A plane whose tilt is less certain than this is too weak: 0.4 m behind the face it leaves a hidden corner
+"""Uncertainty of a plane's tilt above which it is too weak: 0.4 m behind the face it makes a hidden corner
 uncertain by 3.5 mm, a third of a joint [degrees]."""
 
 BLUNDERS = 0.25
-"""Part of a face's points left out from which the rest is doubtful: no fit survives half, and faults come in
+"""Part of a face's points left out above which the rest is doubtful: no fit survives half, and faults come in
 patches."""
 
 SCATTER = 1.5
-"""A face whose points scatter so many times as far as those of the survey was measured worse, or is rough."""
+"""Scatter of a face's points over that of the survey above which it was measured worse, or is rough."""
 
 SMOOTH = 1.0 / 3.0
-"""A face whose points scatter less than this part of the stated sigma was interpolated, not measured."""
+"""Scatter of a face's points over the stated sigma below which they were interpolated, not measured."""
 
-_UNLIKELY = 3.29  # two-sided normal quantile of 0.1 %: one sound stone in a thousand is sent for again
-_FREEDOM = 8  # redundancy from which a small scatter is no accident
+_UNLIKELY = 3.29  # two-sided normal quantile of 0.1 %: one sound stone in a thousand is listed by mistake
+_FREEDOM = 8  # least redundancy for which a small scatter is not accidental
 
 _SHAPE_ACTIONS = {
     ShapeKind.BEVELLED.value: "see on site: a broken edge is left out as it should be; a cut one is a face of its own",
@@ -37,7 +37,7 @@ _SHAPE_ACTIONS = {
 
 
 class Urgency(IntEnum):
-    """Why a stone is to be measured again, most urgent first."""
+    """Reasons to measure a stone again, most urgent first."""
 
     MISSING = 1
     UNCHECKED = 2
@@ -56,12 +56,12 @@ class Remeasure:
 
     Attributes
     ----------
-    code : of the stone; None if not even that could be read
-    line : of the survey file, counted from 1; 0 if not known
-    urgency : the sort of reason
-    severity : how bad it is, among reasons of its sort
-    reason : what is wrong, with numbers
-    action : what to do
+    code : of the stone; None if even that was unreadable
+    line : of the survey file, counted from 1; 0 if unknown
+    urgency : class of the reason
+    severity : severity among reasons of its class
+    reason : defect, with numbers
+    action : remedy
     """
 
     code: str | None
@@ -78,14 +78,14 @@ def list_remeasures(
     contradictions: Iterable[Contradiction],
     quality: SurveyQuality,
 ) -> tuple[Remeasure, ...]:
-    """List what to measure again, most urgent first; a stone may come with several reasons.
+    """List the stones to measure again, most urgent first; a stone may have several reasons.
 
     Parameters
     ----------
     stones : all stones that were made
     rejects : those that could not be made
     contradictions : stones whose proportions are not those of their kind
-    quality : of the survey; where its stated sigma is wrong, stones are compared with what it should be
+    quality : of the survey; where its stated sigma is wrong, stones are compared with the estimated one
     """
     found = [_missing(one) for one in rejects]
     scale = quality.sigma0 or 1.0

@@ -1,4 +1,4 @@
-"""The sides of arch stones: how they converge, and how they slope."""
+"""Convergence and slope of the sides of arch stones."""
 
 import math
 from collections.abc import Sequence
@@ -15,17 +15,15 @@ __all__ = ["Wedge", "sloped_side", "wedges"]
 
 
 _ARCH = ("voussoir", "keystone")
-_REACH = 3.0  # neighbours in the arch are nearer than so many times the stone's larger dimension
-_BULGE = (
-    0.02  # rise of a stone over the chord of its neighbours, over their distance, that shows the extrados
-)
-_LEVEL = 0.5  # a radius that rises by less than this (sine) does not tell by itself which end is up
-_SHORT = 0.5  # a side shorter than this part of the longest is an arris or a worn corner
+_REACH = 3.0  # of the stone's larger dimension: distance within which its neighbours in the arch are
+_BULGE = 0.02  # least rise over the chord of the neighbours, over their distance, that shows the extrados
+_LEVEL = 0.5  # sine of a radius' rise below which it does not show which end is up
+_SHORT = 0.5  # of the longest side: length below which a side is an arris or a worn corner
 
 
 @dataclass(frozen=True)
 class Wedge:
-    """How the two sides of an arch stone converge.
+    """Convergence of the two sides of an arch stone.
 
     Attributes
     ----------
@@ -38,11 +36,11 @@ class Wedge:
 
 
 def wedges(stones: Sequence[StoneQuality], facades: Sequence[Facade]) -> dict[int, Wedge]:
-    """Convergence of every voussoir and keystone of the standing facades, by index.
+    """Return the convergence of every voussoir and keystone of the standing facades, by index.
 
     A stone's sides are those that face along the arch, from one of its neighbours to the other; the extrados
-    is where it rises over the chord between them. Stones whose sides have worn corners are left out, and those
-    of which nothing tells where the intrados is.
+    is on the side where it rises over the chord between them. Stones whose sides have worn corners are left out, and
+    those whose intrados cannot be identified.
     """
     found = {}
     for facade in facades:
@@ -61,7 +59,7 @@ def wedges(stones: Sequence[StoneQuality], facades: Sequence[Facade]) -> dict[in
 
 
 def sloped_side(stone: StoneQuality) -> tuple[float, float]:
-    """By how much the most sloped of the longer sides is off both level and plumb, and its sigma [rad]."""
+    """Return the departure of the most sloped longer side from both level and plumb, and its sigma [rad]."""
     flat = upright_frame(stone.normal, stone.outline[0]).flatten(stone.outline)
     run = np.roll(flat, -1, axis=0) - flat
     length = np.linalg.norm(run, axis=1)
@@ -72,12 +70,12 @@ def sloped_side(stone: StoneQuality) -> tuple[float, float]:
 
 
 def _corner(stone: StoneQuality) -> float:
-    """Standard deviation of a corner in the plane of the face."""
+    """Return the standard deviation of a corner in the plane of the face."""
     return stone.dimension_sigma / math.sqrt(2.0)
 
 
 def _radial(k: int, centres: Array, tree: "cKDTree[None]", reach: float) -> Array | None:
-    """Unit vector towards the extrados in the elevation; None if it cannot be told."""
+    """Return the unit vector towards the extrados in the elevation; None if it cannot be determined."""
     if len(centres) == 1:
         return np.array([0.0, 1.0])  # an arch of one stone
     distances, near = tree.query(centres[k], k=min(3, len(centres)), distance_upper_bound=reach)
@@ -90,7 +88,7 @@ def _radial(k: int, centres: Array, tree: "cKDTree[None]", reach: float) -> Arra
         return np.array([0.0, 1.0])
     chord = centres[others[0]] - centres[k]
     rise = np.zeros(2)
-    if len(others) == 2:  # of three neighbours the one in the middle rises over the chord of the others
+    if len(others) == 2:  # of the three stones the middle one rises over the chord of the others
         three = centres[[k, *others]]
         longest = np.linalg.svd(three - three.mean(axis=0))[2][0]
         order = np.argsort(three @ longest)

@@ -1,8 +1,8 @@
-"""Solids of other programs with faces that are plane to the last digit, and no more of them than there are planes.
+"""Flattening of imported solids: faces planar to the last digit, and one face per plane.
 
-Meshes cut a plane face in two, or into triangles, and coordinates rounded to a millimetre bend it. Faces that share an
-edge and lie in one plane, within a tolerance, are one face here. A corner where three faces meet is put where their
-planes cross; corners where only one or two planes meet are none.
+Meshes cut a planar face in two, or into triangles, and coordinates rounded to a millimetre bend it. Faces that share
+an edge and lie in one plane, within a tolerance, are merged here. A corner of three faces is put at the intersection
+of their planes; corners of only one or two planes are dropped.
 """
 
 from collections import defaultdict
@@ -19,16 +19,14 @@ __all__ = ["FlatSolid", "flatten"]
 
 Face = tuple[int, ...]
 
-_SAME_SIDE = 0.9  # cosine between normals, which are poor in thin triangles: heights decide
-_PLANE = 1e-13  # of a solid's size: what a corner that lies on its planes is beside them
-_SHALLOWEST = (
-    1e-4  # determinant of three unit normals, below which nothing is said of where their planes cross
-)
+_SAME_SIDE = 0.9  # least cosine between normals, which are poor in thin triangles: heights decide
+_PLANE = 1e-13  # of a solid's size: distance of a corner from its planes that is due to rounding
+_SHALLOWEST = 1e-4  # determinant of three unit normals below which their intersection is undetermined
 
 
 @dataclass(frozen=True)
 class FlatSolid:
-    """A solid whose faces are plane.
+    """A solid whose faces are planar.
 
     Attributes
     ----------
@@ -42,12 +40,12 @@ class FlatSolid:
 
 
 def flatten(solid: Solid, tolerance: float) -> FlatSolid | None:
-    """Give a solid plane faces, one for each plane.
+    """Flatten the faces of a solid and merge those in one plane.
 
     Parameters
     ----------
     solid : closed, seen from outside, near the origin
-    tolerance : by which a corner may lie beside the plane of its face, and by which it may move [m]
+    tolerance : largest distance of a corner from the plane of its face, and its largest displacement [m]
 
     Returns
     -------
@@ -84,7 +82,7 @@ def flatten(solid: Solid, tolerance: float) -> FlatSolid | None:
 
 
 def _plane_groups(solid: Solid, vectors: Array, tolerance: float) -> list[list[int]]:
-    """Faces that share edges and lie in one plane, that of the largest of them."""
+    """Group faces that share edges and lie in one plane, that of the largest of them."""
     polygons = [solid.vertices[list(face)] for face in solid.faces]
     areas = np.linalg.norm(vectors, axis=1)
     normals = vectors / np.maximum(areas, 1e-300)[:, None]
@@ -113,7 +111,7 @@ def _edges(face: Face) -> list[tuple[int, int]]:
 
 
 def _outline(faces: list[Face]) -> Face | None:
-    """The one loop around faces that share edges; None if there are several, or it touches itself."""
+    """Return the one loop around faces that share edges; None if there are several, or it touches itself."""
     if len(faces) == 1:
         return faces[0]
     inside = {edge for face in faces for edge in _edges(face)}
@@ -129,7 +127,7 @@ def _outline(faces: list[Face]) -> Face | None:
 
 
 def _plane(solid: Solid, vectors: Array, group: list[int], corners: Container[int]) -> Array:
-    """Mean plane of the faces of a group: (4,) unit normal, and offset that is the mean of its corners'."""
+    """Return the mean plane (4,) of a group's faces: unit normal, and the mean offset of their corners."""
     vector = vectors[group].sum(axis=0)
     normal = vector / max(float(np.linalg.norm(vector)), 1e-300)
     own = sorted({i for k in group for i in solid.faces[k] if i in corners})
@@ -137,7 +135,7 @@ def _plane(solid: Solid, vectors: Array, group: list[int], corners: Container[in
 
 
 def _crossings(corners: Array, planes: Array, around: list[list[int]]) -> Array | None:
-    """Where the three planes around each corner cross, (n, 3); a corner that lies on all of them stays."""
+    """Return the intersections (n, 3) of the three planes around each corner; a corner on all of them stays."""
     three = planes[np.array(around)]
     heights = np.einsum("nki,ni->nk", three[:, :, :3], corners) - three[:, :, 3]
     if np.abs(np.linalg.det(three[:, :, :3])).min() < _SHALLOWEST:

@@ -1,4 +1,4 @@
-"""Stones that came as closed solids: hexahedra, wedges and prisms where they are so but for rounding, else general."""
+"""Simplification of imported solids: a hexahedron, wedge or prism if they are one within rounding, else general."""
 
 import numpy as np
 
@@ -17,13 +17,13 @@ from survey.simplify.squaring import SimplifyBounds
 __all__ = ["simplify_solid"]
 
 
-_PLANE = 5e-9  # metres: what rounding in a national grid bends a plane face
-_CONVEX = 1e-10  # of a stone's size: a corner above a face by less is on it
-_FLAT = 1e-12  # of the cube on a stone's length: a solid that encloses less is flat
+_PLANE = 5e-9  # metres: warp of a planar face due to rounding in a national grid
+_CONVEX = 1e-10  # of a stone's size: height below which a corner is on a face
+_FLAT = 1e-12  # of the cube on a stone's length: volume below which a solid is flat
 
 
 def simplify_solid(block: SurveyedBlock, bounds: SimplifyBounds) -> SimpleSolid:
-    """Simplify a stone that came as a solid; see `survey.simplify.simplify.simplify`."""
+    """Simplify an imported solid; see `survey.simplify.simplify.simplify`."""
     origin = block.solid.vertices.mean(axis=0)
     old, tolerance = about(block.solid, origin), bounds.least_tolerance
     _check_full(old)
@@ -32,7 +32,7 @@ def simplify_solid(block: SurveyedBlock, bounds: SimplifyBounds) -> SimpleSolid:
         None if found is None else _prism(found.solid, block.face.fit.normal, block.face.outline[0] - origin)
     )
     if found is not None and new is not None:
-        shape, reason = prism_shape(len(new.faces) - 2), _said(old, new, found)
+        shape, reason = prism_shape(len(new.faces) - 2), _describe(old, new, found)
     else:
         shape, new = BlockShape.POLYHEDRON, _general(old, tolerance)
         reason = _why_general(old, new)
@@ -61,17 +61,17 @@ def _check_full(solid: Solid) -> None:
         raise GeometryError(
             f"its faces enclose {volume:.3g} m³: it is flat, or seen from inside",
             where=f"stone {solid.code}",
-            remedy="look at its corners and at the order of those of each face",
+            remedy="check its corners and their order in each face",
         )
 
 
 def _prism(solid: Solid, outward: Array, first: Array) -> Solid | None:
-    """The solid as a convex prism, its visible corners first; None if it is none."""
+    """Return the solid as a convex prism, its visible corners first; None if it is not one."""
     return as_prism(solid, outward, first) if highest_corner(solid) <= _CONVEX * _size(solid) else None
 
 
 def _general(old: Solid, tolerance: float) -> Solid:
-    """A solid that is no prism, its faces plane: its corners are moved by as little as can be, or faces are folded."""
+    """Return a general solid with planar faces: its corners are moved as little as possible, or faces are folded."""
     if _is_plane(old):
         return old
     settled = _settled(_folded(old, tolerance))
@@ -80,7 +80,7 @@ def _general(old: Solid, tolerance: float) -> Solid:
 
 
 def _settled(solid: Solid) -> Solid:
-    """The solid with its corners on the planes of its faces."""
+    """Return the solid with its corners moved onto the planes of its faces."""
     ties = [(i, k) for k, face in enumerate(face for face in solid.faces if len(face) > 3) for i in face]
     if not ties:
         return solid
@@ -101,31 +101,31 @@ def _size(solid: Solid) -> float:
     return float(np.ptp(solid.vertices, axis=0).max())
 
 
-def _said(old: Solid, new: Solid, found: FlatSolid) -> str:
-    said = [f"{len(new.faces)} plane faces"]
+def _describe(old: Solid, new: Solid, found: FlatSolid) -> str:
+    words = [f"{len(new.faces)} plane faces"]
     if len(old.faces) > len(new.faces):
-        said.append(f"{len(old.faces)} faces lie in their planes")
+        words.append(f"{len(old.faces)} faces lie in their planes")
     if found.moved.max() > 0.0:
-        said.append(f"corners moved by up to {found.moved.max() * 1e3:.2g} mm to make them plane")
-    return "; ".join(said)
+        words.append(f"corners moved by up to {found.moved.max() * 1e3:.2g} mm to make them plane")
+    return "; ".join(words)
 
 
 def _why_general(old: Solid, new: Solid) -> str:
-    """Why a solid stays general, in words."""
-    said = [f"stays general, with {len(new.faces)} faces"]
+    """Return the reasons why a solid stays general."""
+    words = [f"stays general, with {len(new.faces)} faces"]
     if (rise := highest_corner(new)) > _CONVEX * _size(old):
-        said.append(f"not convex, a corner stands {rise * 1e3:.2g} mm above the plane of a face")
+        words.append(f"not convex, a corner stands {rise * 1e3:.2g} mm above the plane of a face")
     else:
-        said.append("convex, but no prism of which three planes meet in each corner")
+        words.append("convex, but no prism of which three planes meet in each corner")
     if len(new.faces) > len(old.faces):
-        said.append(f"folded from {len(old.faces)} that are not plane")
+        words.append(f"folded from {len(old.faces)} that are not plane")
     if (moved := float(np.linalg.norm(new.vertices - old.vertices, axis=1).max())) > 0.0:
-        said.append(f"corners moved by up to {moved * 1e3:.2g} mm to make them plane")
-    return "; ".join(said)
+        words.append(f"corners moved by up to {moved * 1e3:.2g} mm to make them plane")
+    return "; ".join(words)
 
 
 def _placed(new: Solid, old: Solid, world: Solid) -> Solid:
-    """A solid about the origin put where it belongs; corners that did not move keep their last bits."""
+    """Move a solid back from the origin; corners that were not moved keep their last bits."""
     origin = world.vertices.mean(axis=0)
     apart = np.abs(new.vertices[:, None, :] - old.vertices).max(axis=2)
     same, nearest = apart.min(axis=1) == 0.0, apart.argmin(axis=1)

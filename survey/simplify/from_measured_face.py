@@ -1,4 +1,4 @@
-"""Stones whose face was measured: a hexahedron, wedge or prism on as few corners of it as are honest."""
+"""Simplification of measured stones: a hexahedron, wedge or prism on as few corners of the face as are justified."""
 
 import numpy as np
 
@@ -21,14 +21,14 @@ from survey.simplify.worn_corners import restore_worn
 __all__ = ["simplify_face"]
 
 
-_EQUAL = 1e-12  # of a stone's size: coordinates that differ by less are the same
-_SLIVER = 1e-6  # metres, and part of its length: what is thinner encloses nothing
+_EQUAL = 1e-12  # of a stone's size: difference below which coordinates are equal
+_SLIVER = 1e-6  # metres, and of its length: thickness below which a solid encloses nothing
 
 
 def simplify_face(block: SurveyedBlock, bounds: SimplifyBounds) -> SimpleSolid:
     """Simplify a stone whose face was measured; see `survey.simplify.simplify.simplify`.
 
-    A face with a corner that lies too deep inside the outline of the others stays as it was surveyed.
+    A face with a corner too deep inside the outline of the others stays as surveyed.
     """
     fit = block.face.fit
     axes = np.array([fit.axes[0], np.cross(fit.normal, fit.axes[0])])
@@ -48,9 +48,9 @@ def simplify_face(block: SurveyedBlock, bounds: SimplifyBounds) -> SimpleSolid:
         farthest = min(bounds.max_restored, bounds.restored_share * squared.width)
         squared, count = restore_worn(squared, worn, (points - fit.centroid) @ axes.T, tolerance, farthest)
         solid, shape = _extruded(block, squared, axes), prism_shape(len(squared.corners))
-        # restored corners are as near to the true ones as sound ones are
+        # restored corners are as accurate as sound ones
         sound = (squared.source < 0) | ~worn[squared.source]
-        reason = _said(squared, worn, count)
+        reason = _describe(squared, worn, count)
     old, new = about(block.solid, fit.centroid), about(solid, fit.centroid)
     same = solid is block.solid
     left = np.zeros(len(old.vertices)) if same else from_edges(old.vertices, new)
@@ -71,7 +71,7 @@ def simplify_face(block: SurveyedBlock, bounds: SimplifyBounds) -> SimpleSolid:
 
 
 def _tolerance(block: SurveyedBlock, bounds: SimplifyBounds) -> float:
-    """What the survey cannot tell apart on this face: three standard deviations of a coordinate [m]."""
+    """Return the survey's resolution on this face: three standard deviations of a coordinate [m]."""
     # of a corner's three variances, two lie in the face, where it was measured; the plane's own is small
     variances = 0.5 * (block.vertex_sigma[: len(block.face.outline)] ** 2).sum(axis=1)
     known = [*np.sqrt(variances).tolist(), block.face.fit.rms]
@@ -82,21 +82,21 @@ def _check_flat(block: SurveyedBlock, squared: SquaredFace) -> None:
     where, count = f"stone {block.code}", len(squared.corners)
     if count < 3:
         raise GeometryError(
-            f"{count} corners of its face stand out, which enclose nothing",
+            f"the convex outline of its face has {count} corners, which enclose no area",
             where=where,
-            remedy="measure 3 corners or more that do not lie on one line",
+            remedy="measure 3 corners or more that are not on one line",
         )
     length = float(np.ptp(squared.corners, axis=0).max())
     if not min(squared.width, block.depth.value) > _SLIVER * max(length, 1.0):
         raise GeometryError(
             f"it is flat: its face is {squared.width * 1e3:.2g} mm wide, its depth {block.depth.value * 1e3:.2g} mm",
             where=where,
-            remedy="look at the corners of its face and at its depth",
+            remedy="check the corners of its face and its depth",
         )
 
 
 def _extruded(block: SurveyedBlock, squared: SquaredFace, axes: Array) -> Solid:
-    """The solid behind the squared face; that of the block itself if nothing has changed."""
+    """Return the solid behind the squared face; that of the block itself if nothing has changed."""
     fit, outline = block.face.fit, block.face.outline
     restored = fit.centroid + squared.corners @ axes
     corners = np.where(squared.source[:, None] < 0, restored, outline[squared.source])
@@ -114,7 +114,7 @@ def _extruded(block: SurveyedBlock, squared: SquaredFace, axes: Array) -> Solid:
 
 
 def _nearest_hexahedron(block: SurveyedBlock, flat: Array, axes: Array) -> Solid:
-    """The hexahedron on the quadrilateral that the face would become without bounds, about the middle of the face."""
+    """Return the hexahedron on the quadrilateral of the face without bounds, about the middle of the face."""
     fit, tail = block.face.fit, block.extrusion.tail
     corners = nearest_quadrilateral(flat) @ axes
     hidden = hidden_side(corners, fit.normal, block.depth.value, block.extrusion)
@@ -123,17 +123,17 @@ def _nearest_hexahedron(block: SurveyedBlock, flat: Array, axes: Array) -> Solid
     return prism(block.code, corners, hidden)
 
 
-def _said(squared: SquaredFace, worn: Bools, along_points: int) -> str:
-    """What was done to a measured face, in words."""
+def _describe(squared: SquaredFace, worn: Bools, along_points: int) -> str:
+    """Describe the changes of a measured face."""
     count, restored = len(squared.corners), int((squared.source < 0).sum())
     left_out = len(worn) - (count - restored) - along_points
-    said = [{3: "a triangular face", 4: "a face of four corners"}.get(count, f"a face of {count} corners")]
+    words = [{3: "a triangular face", 4: "a face of four corners"}.get(count, f"a face of {count} corners")]
     if left_out:
-        said.append(f"{left_out} of {len(worn)} measured corners left out")
+        words.append(f"{left_out} of {len(worn)} measured corners left out")
     if restored > along_points:
-        said.append(f"{restored - along_points} restored where the sides beside a bevel or a break meet")
+        words.append(f"{restored - along_points} restored where the sides beside a bevel or a break meet")
     if along_points:
-        said.append(f"{along_points} worn, restored along the points measured beside its sides")
+        words.append(f"{along_points} worn, restored along the points measured beside its sides")
     if count > 4:
-        said.append("four would lie too far from those that were measured")
-    return "; ".join(said)
+        words.append("four would lie too far from those that were measured")
+    return "; ".join(words)

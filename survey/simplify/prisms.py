@@ -1,4 +1,4 @@
-"""Solids that are prisms: their corners in the order of a stone, visible ones first."""
+"""Recognition of prisms, with corners in the order of a stone, visible ones first."""
 
 import numpy as np
 
@@ -11,15 +11,15 @@ __all__ = ["as_prism", "box_around"]
 
 
 def as_prism(solid: Solid, outward: Array, first: Array) -> Solid | None:
-    """The same solid with the corners of one end first, then those behind them; None if it is no prism.
+    """Return the solid with the corners of one end first, then those behind them; None if it is no prism.
 
     A prism here has two ends of n corners and n faces of four corners between them; its ends need not be parallel.
 
     Parameters
     ----------
     solid : closed, its faces plane
-    outward : (3,) normal of the visible face; of the ends, the one that looks most that way comes first
-    first : (3,) the corner that is nearest to it comes first [m]
+    outward : (3,) normal of the visible face; the end whose normal is nearest to it comes first
+    first : (3,) the corner nearest to this point comes first [m]
     """
     count = len(solid.faces) - 2
     ends = [k for k, face in enumerate(solid.faces) if len(face) == count]
@@ -43,7 +43,7 @@ def _both_ways(face: tuple[int, ...]) -> list[tuple[int, int]]:
 
 
 def box_around(solid: Solid, outward: Array) -> Solid:
-    """The smallest box around a solid with two sides parallel to its visible face, and two along one of its edges.
+    """Return the smallest box around a solid with sides parallel to its visible face and one of the face's edges.
 
     Parameters
     ----------

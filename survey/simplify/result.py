@@ -1,4 +1,4 @@
-"""What simplifying a stone yields: its solid, what that is, and what has changed."""
+"""Result of simplifying a stone: its solid, shape and changes."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -10,10 +10,10 @@ __all__ = ["BlockShape", "SimpleSolid", "Simplified", "prism_shape"]
 
 
 class BlockShape(StrEnum):
-    """What a simplified stone is.
+    """Shape of a simplified stone.
 
     HEXAHEDRON: six faces of four corners. WEDGE: a prism on a triangle. PRISM: one on a convex face of five corners
-    or more. POLYHEDRON: general, convex or not, as it was surveyed.
+    or more. POLYHEDRON: general, convex or not, as surveyed.
     """
 
     HEXAHEDRON = "hexahedron"
@@ -24,25 +24,24 @@ class BlockShape(StrEnum):
 
 @dataclass(frozen=True)
 class Simplified:
-    """What simplifying one stone changed, and how sure that is. docs/theory.md has the formulas.
+    """Changes made by simplifying one stone, and their certainty; docs/theory.md has the formulas.
 
     Attributes
     ----------
     displacement : (nv,) of each corner of the surveyed solid [m]: its distance from the nearest edge of the simplified
-        one; where that is larger, the distance from the surveyed edges of a new corner to which no surveyed corner is
-        nearer. Of a surveyed corner amid a plane face: its distance from that plane
+        one or, where larger, the distance from the surveyed edges of a new corner that has this surveyed corner as its
+        nearest. Of a surveyed corner in the middle of a planar face: its distance from that plane
     volume_change : new volume over surveyed volume, minus 1 [-]
     worst_angle : largest departure from a right angle of the angle between two neighbouring faces, inside the new
         solid [degrees]
-    blockiness : 1 for a hexahedron; else what the surveyed solid and a hexahedron have in common, over what they fill
-        together: that which it has become, or which its face would have become without bounds; for the solid of
-        another program the smallest box around it [-]
-    tolerance : by which the survey may be wrong: three standard deviations of its corners, or of its points from the
-        plane of the face [m]
-    within : whether no sound corner of the visible face, or of a solid of another program, is left farther from the
-        edges of the new solid than the tolerance. A bevel's corners are on them; what was restored beyond is told by
-        `displacement`
-    reason : what was done, or why nothing was, in words
+    blockiness : 1 for a hexahedron; otherwise the volume of the intersection of the surveyed solid and a hexahedron
+        over that of their union. The hexahedron is the result, or the one that the face would give without bounds;
+        for an imported solid, the smallest box around it [-]
+    tolerance : error of the survey: three standard deviations of its corners, or of its points from the plane of the
+        face [m]
+    within : whether every sound corner of the visible face, or of an imported solid, is within the tolerance of the
+        edges of the new solid. A bevel's corners are on them; corners restored beyond appear in `displacement`
+    reason : changes made, or the reason why there are none
     """
 
     displacement: Array
@@ -65,5 +64,5 @@ class SimpleSolid:
 
 
 def prism_shape(count: int) -> BlockShape:
-    """What a prism on a face of so many corners is."""
+    """Return the shape of a prism on a face of `count` corners."""
     return {3: BlockShape.WEDGE, 4: BlockShape.HEXAHEDRON}.get(count, BlockShape.PRISM)

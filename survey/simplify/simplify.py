@@ -1,9 +1,8 @@
-"""The simplest solid that is true to a surveyed stone, and what making it so has changed.
+"""Simplification of a surveyed stone to the simplest solid true to it, with a report of the changes.
 
-A stone whose face was measured becomes a hexahedron where its face has four sides (`survey.simplify.squaring`), a
-wedge where it has three, a prism where it has more. One that came as a solid of another program becomes one of these
-where its faces are so but for rounding (`survey.simplify.flattening`). What is none of them stays as it was surveyed,
-and says why.
+A stone whose face was measured becomes a hexahedron if its face has four sides (`survey.simplify.squaring`), a wedge
+if it has three, a prism if it has more. An imported solid becomes one of these if its faces are so within rounding
+(`survey.simplify.flattening`). Any other stone stays as surveyed, with the reason.
 """
 
 from dataclasses import dataclass
@@ -31,15 +30,15 @@ class BlockyStone:
     Attributes
     ----------
     code, kind, course : as in the survey
-    face : the measured face it comes from
+    face : measured face on which it is based
     depth : its depth, with the evidence
-    extrusion : how its hidden side lies
+    extrusion : construction of its hidden side
     solid : closed, with planar faces. A hexahedron, wedge or prism has the visible corners first, counter-clockwise
         seen from outside, then the hidden ones in the same order
-    sound : (n,) whether the place of each visible corner of the solid, or of each corner of a POLYHEDRON that another
-        program made, is known: measured, or restored; False: worn, and left where it was measured
-    shape : what it is
-    report : what was changed
+    sound : (n,) whether the place of each visible corner of the solid, or of each corner of an imported POLYHEDRON, is
+        known: measured, or restored; False: worn, and left where it was measured
+    shape : shape of the solid
+    report : changes
     """
 
     code: str
@@ -55,17 +54,17 @@ class BlockyStone:
 
 
 def simplify(block: SurveyedBlock, bounds: SimplifyBounds = _BOUNDS) -> BlockyStone:
-    """Make the simplest honest solid of a surveyed block.
+    """Make the simplest solid true to a surveyed block.
 
     Parameters
     ----------
-    block : a stone with its measured face of three or more corners, or with the solid that another program made
-    bounds : how far its corners may be moved for that
+    block : a stone with its measured face of three or more corners, or with an imported solid
+    bounds : largest changes
 
     Returns
     -------
-    BlockyStone. Its solid is closed, with plane faces, and convex but for a POLYHEDRON; one that needs no change is
-    that of the block. The first visible corner is the one nearest to the first of the face.
+    BlockyStone. Its solid is closed, with planar faces, and convex except for a POLYHEDRON; one that needs no change
+    is that of the block. The first visible corner is the one nearest to the first of the face.
 
     Raises
     ------

@@ -1,11 +1,11 @@
-"""From the measured outline of a face, bevels and worn corners included, to as few corners as are honest.
+"""Reduction of the measured outline of a face, with bevels and worn corners, to as few corners as are justified.
 
 A dressed face has four sides; further corners come from a bevel, a break, or a point measured half-way along a
-side. They are taken out one by one, each time by the smaller change of area: either a short side is dropped and
-its neighbours are prolonged until they meet (which restores a bevelled corner), or a corner is dropped. What
-remains is the stone's own quadrilateral, not a rectangle around it: the wedge of a voussoir and the sloped end of
-a springer stay as they were measured. Where the next step would leave a sound corner too far aside, or add more
-than a worn corner can have lost, the face keeps its five corners or more: a crossette is no bevelled stone.
+side. They are removed one by one, each time by the smaller change of area: either a short side is dropped and
+its neighbours are extended until they meet (which restores a bevelled corner), or a corner is dropped. The result
+is the stone's own quadrilateral, not a rectangle around it: the wedge of a voussoir and the sloped end of a springer
+stay as they were measured. Where the next step would leave a sound corner too far aside, or add more than a worn
+corner can have lost, the face keeps its five or more corners: a crossette is not a bevelled stone.
 """
 
 from dataclasses import dataclass
@@ -23,17 +23,17 @@ _BOUNDLESS = np.array([np.inf, np.inf, np.inf, np.inf, 0.0])
 
 @dataclass(frozen=True)
 class SimplifyBounds:
-    """How far a stone may be changed for the sake of a simple shape.
+    """Bounds on the changes of a stone for the sake of a simple shape.
 
     Attributes
     ----------
-    max_shift : farthest that a sound corner may be left from the new outline [m]
+    max_shift : largest distance of a sound corner from the new outline [m]
     shift_share : the same as a part of the face's smallest width, or the survey's tolerance if that is more [-]; the
         smaller bound holds
-    max_restored : farthest that a restored corner may stand out of the measured outline, and that a worn corner
-        may be left from the new one [m]
+    max_restored : largest distance of a restored corner outside the measured outline, and of a worn corner from the
+        new one [m]
     restored_share : the same as a part of the face's smallest width [-]; the smaller bound holds
-    least_tolerance : tolerance of a survey that is more precise than that, or of unknown precision [m]
+    least_tolerance : tolerance of a survey that is more precise than this, or of unknown precision [m]
     """
 
     max_shift: float = 0.03
@@ -45,15 +45,15 @@ class SimplifyBounds:
 
 @dataclass(frozen=True)
 class SquaredFace:
-    """A face with as few corners as are honest.
+    """A face reduced to as few corners as are justified.
 
     Attributes
     ----------
     corners : (m, 2) in the plane of the face, counter-clockwise, convex [m]
-    source : (m,) which measured corner each of them is; -1: restored where two sides meet
+    source : (m,) measured corner of each of them; -1: restored where two sides meet
     width : smallest distance between two parallels that enclose the face [m]
-    dent : how deep a corner lies inside the line of its neighbours [m], if that is too deep for it to be left out;
-        `corners` are then those that stand out. 0: the face is convex, or nearly
+    dent : depth of a corner inside the line of its neighbours [m], if too great for the corner to be dropped;
+        `corners` are then those of the convex hull. 0: the face is convex, or nearly
     """
 
     corners: Array
@@ -63,7 +63,7 @@ class SquaredFace:
 
 
 def square_face(flat: Array, worn: Bools, tolerance: float, bounds: SimplifyBounds) -> SquaredFace:
-    """Take out the corners of a face that it does not need.
+    """Remove the corners of a face that it does not need.
 
     Distances are those of the measured corners from the sides of the new outline, and of restored corners from
     the measured sides, so that many small steps cannot lead far. A quadrilateral with a corner half-way along a
@@ -72,9 +72,9 @@ def square_face(flat: Array, worn: Bools, tolerance: float, bounds: SimplifyBoun
     Parameters
     ----------
     flat : (n, 2) measured corners, a simple polygon, counter-clockwise [m]
-    worn : (n,) whether each corner is worn, so that its place is not that of the sound stone's corner
+    worn : (n,) whether each corner is worn, so that its place is not that of the original corner
     tolerance : of the survey [m]
-    bounds : how far a corner may be moved
+    bounds : largest displacement of a corner
 
     Returns
     -------
@@ -88,9 +88,9 @@ def square_face(flat: Array, worn: Bools, tolerance: float, bounds: SimplifyBoun
 
 
 def nearest_quadrilateral(flat: Array) -> Array:
-    """The quadrilateral (4, 2) that a face would become without any bounds.
+    """Return the quadrilateral (4, 2) of a face without any bounds.
 
-    Of a triangle, a parallelogram on two of its sides: the smallest around it, twice as large.
+    Of a triangle, a parallelogram on two of its sides: the smallest one around it, with twice its area.
     """
     corners: Array = square(np.ascontiguousarray(flat), np.zeros(len(flat), np.bool_), _BOUNDLESS)[0]
     if len(corners) == 3:

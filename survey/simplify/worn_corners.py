@@ -1,10 +1,10 @@
-"""Where a worn corner was: the points on the dressed margin beside it still run along the sides that it has lost.
+"""Restoration of worn corners from points on the dressed margin, which still run along the lost sides.
 
-An eroded corner is measured where the stone now ends, some centimetres from where its sides met. Points measured along
-the margin of the face lie at much the same distance from all its sides; the sound sides tell which. Of each of the
-two sides that the wear has shortened one end is left, the sound neighbour: the side is the line through it from which
-the points beside it are as far as from the others. Two sides so found meet in the corner. Where no such distance is
-common to the sound sides, or too few points lie at it, the corner stays as it was measured.
+An eroded corner is measured where the stone now ends, some centimetres from where its sides met. Points measured
+along the margin of the face lie at about the same distance from all its sides, and the sound sides give that distance.
+Of each of the two sides shortened by wear one end is left, the sound neighbour: the side is the line through it at
+the same distance from the points beside it. Two such sides meet in the corner. Where no such distance is common to
+the sound sides, or too few points lie at it, the corner stays as it was measured.
 """
 
 from dataclasses import replace
@@ -18,9 +18,9 @@ from survey.simplify.squaring import SquaredFace
 __all__ = ["restore_worn"]
 
 
-_FEWEST_BESIDE_SOUND = 4  # points that tell how wide the margin is
-_FEWEST_BESIDE_WORN = 2  # ... and where a side ran: one finds it, another checks
-_REACH = 0.5  # of the side's length, that one of them beside no other side must be from the sound end
+_FEWEST_BESIDE_SOUND = 4  # least number of points that give the width of the margin
+_FEWEST_BESIDE_WORN = 2  # least number of points that give a side: one finds it, another checks
+_REACH = 0.5  # of the side's length: least distance from the sound end of a point beside no other side
 
 
 def restore_worn(
@@ -34,11 +34,11 @@ def restore_worn(
     worn : (n,) whether each measured corner is worn
     points : (np, 2) that were measured on the face, without blunders [m]
     tolerance : of the survey, by which the width of an even margin may vary [m]
-    farthest : that a restored corner may stand out of the sides as measured [m]
+    farthest : largest distance of a restored corner outside the sides as measured [m]
 
     Returns
     -------
-    the face, and how many corners were restored: their `source` is -1
+    the face, and the number of restored corners, whose `source` is -1
     """
     count, restored = len(face.corners), 0
     lost = [k for k in range(count) if face.source[k] >= 0 and worn[face.source[k]]]
@@ -67,7 +67,7 @@ def restore_worn(
 def _margin(
     corners: Array, lost: list[int], points: Array, tolerance: float, farthest: float
 ) -> float | None:
-    """Distance of the margin's points from the sound sides [m]; None if there is none that most of them have."""
+    """Return the distance of the margin's points from the sound sides [m]; None if most have no common one."""
     count = len(corners)
     gathered = []
     for k in range(count):
@@ -86,7 +86,7 @@ def _margin(
 
 
 def _clear(corners: Array, side: int, points: Array, beside: float) -> Bools:
-    """Which points (np,) are not beside any other side, so that they can only be those of this one."""
+    """Return the points (np,) that are not beside any other side, so that they can only be those of this one."""
     count = len(corners)
     clear = np.ones(len(points), dtype=np.bool_)
     for k in range(count):
@@ -106,13 +106,13 @@ def _direction(
     tolerance: float,
     farthest: float,
 ) -> Array | None:
-    """Direction (2,) of a side through its sound end, which has points on its left at a distance; None if unknown.
+    """Return the direction (2,) of a side through its sound end, points at a distance on its left; None if unknown.
 
     Parameters
     ----------
     anchor : (2,) sound end [m]
     run : (2,) the side as measured, counter-clockwise around the face [m]
-    clear : (np,) which points are beside no other side
+    clear : (np,) points that are beside no other side
     """
     length = float(np.linalg.norm(run))
     step = points - anchor
@@ -124,7 +124,7 @@ def _direction(
     if not near.any():
         return None
     distance, angle = np.hypot(reach[near], height[near]), np.arctan2(height[near], reach[near])
-    # each point gives one line through the end; the one that suits most points counts
+    # each point gives one line through the end; the one that fits most points counts
     turns = angle - np.arcsin(margin / distance)
     misses = distance * np.sin(angle - turns[:, None]) - margin
     fits = np.abs(misses) <= tolerance
@@ -148,13 +148,13 @@ def _cross(u: Array, v: Array) -> Array:
 
 
 def _meeting(a: Array, u: Array, b: Array, v: Array) -> Array:
-    """Where the line through a along u meets that through b along v; a if they are parallel."""
+    """Return the intersection of the lines through a along u and through b along v; a if they are parallel."""
     turn = float(_cross(u, v))
     return a if abs(turn) < 1e-9 else a + float(_cross(b - a, v)) / turn * u
 
 
 def _stands_out(ends: tuple[Array, Array, Array], place: Array, tolerance: float, farthest: float) -> bool:
-    """Whether a place for the corner between two sides lies outside both, within the tolerance, but not too far."""
+    """Return whether a corner between two sides is outside both, within the tolerance, but not too far."""
     heights = []
     for start, stop in pairwise(ends):
         run = stop - start

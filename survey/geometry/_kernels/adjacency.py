@@ -1,4 +1,4 @@
-"""Numba kernels of touching faces: what two polygons share, seen square to the joint between them.
+"""Numba kernels of touching faces: the intersection of two polygons, seen square to the joint between them.
 
 Solids are held as in `survey.geometry.adjacency.Polyhedra`, in coordinates about a place among them.
 """
@@ -8,21 +8,34 @@ import math
 import numpy as np
 from numba import njit
 
+from survey.geometry._kernels.vectors import dot
+
 __all__ = ["GROUPS", "face_planes", "facing_faces", "thickness", "touching_faces"]
 
 GROUPS = 4
-"""Directions in which one solid can touch another; more are counted with the nearest of these."""
+"""Directions in which one solid can touch another; further ones are merged with the nearest of these."""
 
 _ONE_WAY = 0.866
-"""Cosine of 30°: overlaps that look so much alike are one contact, however many faces make it."""
+"""Cosine of 30°: overlaps nearer to parallel are one contact, however many faces make it."""
 
 _OF_STONE = 0.5
-"""A joint is at most so wide, against the thinner of its stones: across a course of thin bricks lies no joint."""
+"""Largest width of a joint over the thickness of the thinner stone, since no joint lies across a thin brick."""
 
 
 @njit(cache=True)
 def face_planes(vertices, corners, face_starts):
-    """Unit normals (nf, 3), areas (nf,), boxes (nf, 6) of faces, and whether each is convex."""
+    """Compute normals, areas and boxes of faces, and whether each is convex.
+
+    Inputs
+    ------
+    vertices : (nv, 3) float64 [m]
+    corners, face_starts : (nc,), (nf + 1,) int64, as in `Polyhedra`
+
+    Outputs
+    -------
+    normals, areas, boxes, convex : (nf, 3) float64 unit [-], (nf,) float64 [m²], (nf, 6) float64 lower and upper
+        corner [m], (nf,) bool; returned
+    """
     count = face_starts.shape[0] - 1
     normals, areas = np.zeros((count, 3)), np.zeros(count)
     boxes, convex = np.empty((count, 6)), np.ones(count, np.bool_)
@@ -46,7 +59,7 @@ def face_planes(vertices, corners, face_starts):
 
 @njit(cache=True)
 def _is_convex(vertices, ring, normal, area):
-    """Whether a ring turns left at every corner, but for what rounding and noise make of a straight one."""
+    """Return whether a ring turns left at every corner, within the rounding and noise of a straight one."""
     n = ring.shape[0]
     for i in range(n):
         a, b, c = vertices[ring[i]], vertices[ring[(i + 1) % n]], vertices[ring[(i + 2) % n]]
@@ -61,7 +74,7 @@ def _is_convex(vertices, ring, normal, area):
 
 @njit(cache=True)
 def _flatten(vertices, ring, origin, u, v, flip, out):
-    """Corners of a ring along two directions, in reverse order if asked; how many."""
+    """Project the corners of a ring onto two directions, in reverse order if `flip`; return their number."""
     n = ring.shape[0]
     for i in range(n):
         corner = vertices[ring[n - 1 - i if flip else i]]
@@ -75,7 +88,7 @@ def _flatten(vertices, ring, origin, u, v, flip, out):
 
 @njit(cache=True)
 def _clip(first, n, second, m, work, other):
-    """Area of what two convex polygons share, counter-clockwise both, and its moments (Sutherland & Hodgman 1974)."""
+    """Return area and moments of the intersection of two counter-clockwise convex polygons (Sutherland & Hodgman)."""
     for i in range(n):
         work[i, 0], work[i, 1] = first[i, 0], first[i, 1]
     for j in range(m):
@@ -111,7 +124,7 @@ def _clip(first, n, second, m, work, other):
 
 @njit(cache=True)
 def _triangle(polygon, i, out):
-    """Triangle of the fan about corner 0 into `out`, counter-clockwise; 1 if it was so, else -1."""
+    """Write triangle i of the fan about corner 0 to `out`, counter-clockwise; return its original sign, 1 or -1."""
     ax, ay = polygon[i, 0] - polygon[0, 0], polygon[i, 1] - polygon[0, 1]
     bx, by = polygon[i + 1, 0] - polygon[0, 0], polygon[i + 1, 1] - polygon[0, 1]
     left = ax * by - ay * bx >= 0.0
@@ -123,10 +136,10 @@ def _triangle(polygon, i, out):
 
 @njit(cache=True)
 def _shared(first, n, second, m, convex, buffers):
-    """As `_clip`, of any two simple polygons.
+    """Return area and moments of the intersection of any two simple polygons, as `_clip` does for convex ones.
 
-    A polygon is the sum of the triangles of a fan about its first corner, those that turn right counted
-    negative; so what two polygons share is the sum over pairs of triangles, with the product of their signs.
+    A polygon is the sum of the triangles of a fan about its first corner, clockwise ones counted negative; the
+    intersection is the sum over pairs of triangles, with the product of their signs.
     """
     work, other = buffers[2], buffers[3]
     if convex:
@@ -144,7 +157,7 @@ def _shared(first, n, second, m, convex, buffers):
 
 @njit(cache=True)
 def _basis(n, u, v):
-    """Two directions that make a right-handed frame with n."""
+    """Write two directions u, v that make a right-handed frame with n."""
     least = 0
     for k in range(1, 3):
         if abs(n[k]) < abs(n[least]):
@@ -159,12 +172,18 @@ def _basis(n, u, v):
 
 @njit(cache=True)
 def _height(vertices, ring, normal, n, place):
-    """How far along n the plane of a face lies from a place; its corners' mean is on the plane."""
+    """Return the height along n of a face's plane over a place; the mean of its corners is on the plane."""
     part = 0.0
     for i in range(ring.shape[0]):
         for k in range(3):
             part += normal[k] * (vertices[ring[i], k] - place[k])
-    return part / ring.shape[0] / (normal[0] * n[0] + normal[1] * n[1] + normal[2] * n[2])
+    return part / ring.shape[0] / dot(normal, n)
+
+
+@njit(cache=True)
+def _buffers(face_starts):
+    """Return four polygons with room for the largest face, clipped by another."""
+    return np.empty((4, 2 * (face_starts[1:] - face_starts[:-1]).max() + 8, 2))
 
 
 @njit(cache=True)
@@ -177,20 +196,29 @@ def _boxes_apart(boxes, i, j, width):
 
 @njit(cache=True)
 def thickness(one, solid, n):
-    """Extent of a solid along n."""
+    """Compute the extent of a solid along a direction.
+
+    Inputs
+    ------
+    one : int, solid
+    solid : vertices, corners, face_starts, solid_starts of `Polyhedra`
+    n : (3,) float64, unit vector [-]
+
+    Outputs
+    -------
+    extent : float [m]; returned
+    """
     vertices, corners, face_starts, solid_starts = solid
     low, high = math.inf, -math.inf
     for c in range(face_starts[solid_starts[one]], face_starts[solid_starts[one + 1]]):
-        along = 0.0
-        for k in range(3):
-            along += vertices[corners[c], k] * n[k]
+        along = dot(vertices[corners[c]], n)
         low, high = min(low, along), max(high, along)
     return high - low
 
 
 @njit(cache=True)
 def _add(groups, count, row):
-    """Count an overlap (8,): area, gap, place, normal, with the group that looks the same way, or as a new one."""
+    """Add an overlap (8,): area, gap, place, normal, to the group of the nearest normal, or to a new group."""
     best, nearest = -1, -2.0
     for g in range(count):
         size = math.sqrt(groups[g, 5] ** 2 + groups[g, 6] ** 2 + groups[g, 7] ** 2)
@@ -209,23 +237,25 @@ def _add(groups, count, row):
 
 @njit(cache=True)
 def touching_faces(pairs, solid, planes, limits, out_pairs, out):
-    """Contacts of pairs of solids into `out` (…, 8): area, gap, place, normal; how many.
+    """Compute the contacts of pairs of solids.
 
-    Parameters
-    ----------
-    pairs : (n, 2) solids
+    Inputs
+    ------
+    pairs : (n, 2) int64, solids
     solid : vertices, corners, face_starts, solid_starts of `Polyhedra`
     planes : as from `face_planes`
     limits : widest joint, deepest overlap [m], cosine of the largest angle, least share of the smaller face [-],
-        whether the width counts at the narrow end of a joint, not in its middle
-    out_pairs, out : at least `GROUPS` n rows
+        whether the width applies at the narrow end of a joint instead of its middle
+
+    Outputs
+    -------
+    out_pairs : (≥ `GROUPS` n, 2) int64, solids of each contact
+    out : (≥ `GROUPS` n, 8) float64, area [m²], gap [m], place [m], normal [-]
+    count : int, contacts; returned
     """
     face_starts, solid_starts = solid[2], solid[3]
     normals, boxes, width, cosine = planes[0], planes[2], limits[0], limits[2]
-    longest = 0
-    for f in range(face_starts.shape[0] - 1):
-        longest = max(longest, face_starts[f + 1] - face_starts[f])
-    work = (np.empty((4, 2 * longest + 8, 2)), np.empty((4, 3)))
+    work = (_buffers(face_starts), np.empty((4, 3)))
     row, total = np.empty(8), 0
     for pair in range(pairs.shape[0]):
         one, two = pairs[pair]
@@ -233,15 +263,11 @@ def touching_faces(pairs, solid, planes, limits, out_pairs, out):
         groups[:GROUPS] = 0.0
         for i in range(solid_starts[one], solid_starts[one + 1]):
             for j in range(solid_starts[two], solid_starts[two + 1]):
-                # most faces look elsewhere: that is found out without a call
-                facing = (
-                    normals[i, 0] * normals[j, 0]
-                    + normals[i, 1] * normals[j, 1]
-                    + normals[i, 2] * normals[j, 2]
-                )
+                # most faces look elsewhere: reject them without a call
+                facing = dot(normals[i], normals[j])
                 if facing > -cosine or _boxes_apart(boxes, i, j, width):
                     continue
-                if _contact(i, j, one, two, facing, solid, planes, limits, work, row):
+                if _contact((i, j), (one, two), facing, solid, planes, limits, work, row):
                     count = _add(groups, count, row)
         for g in range(count):
             _finish(groups[g])
@@ -252,29 +278,30 @@ def touching_faces(pairs, solid, planes, limits, out_pairs, out):
 
 @njit(cache=True)
 def facing_faces(pairs, solid, planes, limits, out_faces, out):
-    """As `touching_faces`, of single faces: each two that face each other into `out_faces` (…, 2) and `out` (…, 8).
+    """Compute the pairs of single faces that face each other.
 
-    Returns how many there are; what does not fit is counted only.
+    Inputs
+    ------
+    pairs, solid, planes, limits : as for `touching_faces`
+
+    Outputs
+    -------
+    out_faces : (room, 2) int64, the two faces of each pair
+    out : (room, 8) float64, as of `touching_faces`
+    count : int, pairs, including those beyond the room; returned
     """
     face_starts, solid_starts = solid[2], solid[3]
     normals, boxes, width, cosine = planes[0], planes[2], limits[0], limits[2]
-    longest = 0
-    for f in range(face_starts.shape[0] - 1):
-        longest = max(longest, face_starts[f + 1] - face_starts[f])
-    work = (np.empty((4, 2 * longest + 8, 2)), np.empty((4, 3)))
+    work = (_buffers(face_starts), np.empty((4, 3)))
     row, total = np.empty(8), 0
     for pair in range(pairs.shape[0]):
         one, two = pairs[pair]
         for i in range(solid_starts[one], solid_starts[one + 1]):
             for j in range(solid_starts[two], solid_starts[two + 1]):
-                facing = (
-                    normals[i, 0] * normals[j, 0]
-                    + normals[i, 1] * normals[j, 1]
-                    + normals[i, 2] * normals[j, 2]
-                )
+                facing = dot(normals[i], normals[j])
                 if facing > -cosine or _boxes_apart(boxes, i, j, width):
                     continue
-                if _contact(i, j, one, two, facing, solid, planes, limits, work, row):
+                if _contact((i, j), (one, two), facing, solid, planes, limits, work, row):
                     if total < out.shape[0]:
                         out_faces[total, 0], out_faces[total, 1] = i, j
                         out[total] = row
@@ -283,11 +310,12 @@ def facing_faces(pairs, solid, planes, limits, out_faces, out):
 
 
 @njit(cache=True)
-def _contact(i, j, one, two, facing, solid, planes, limits, work, row):
-    """Whether face i of one solid touches face j of another; area, gap, place and normal (8,) into `row`.
+def _contact(faces, solids, facing, solid, planes, limits, work, row):
+    """Return whether a face of one solid touches a face of another; write area, gap, place and normal (8,) to `row`.
 
     `facing` is the cosine of the angle between their normals, about -1.
     """
+    (i, j), (one, two) = faces, solids
     vertices, corners, face_starts = solid[:3]
     normals, areas, convex = planes[0], planes[1], planes[3]
     width, overlap, share = limits[0], limits[1], limits[3]
@@ -308,7 +336,7 @@ def _contact(i, j, one, two, facing, solid, planes, limits, work, row):
         place[k] = origin[k] + mx / area * u[k] + my / area * v[k]
     high = _height(vertices, first, normals[i], n, place)
     low = _height(vertices, second, normals[j], n, place)
-    # two faces that open like a wedge are as wide apart as they are at the narrow end
+    # two faces that open like a wedge are as wide apart as at their narrow end
     narrower = 0.5 * math.sqrt(area) * math.sqrt(max(1.0 / facing**2 - 1.0, 0.0)) if limits[4] else 0.0
     if not -overlap - narrower <= high - low <= width + narrower:
         return False
@@ -322,7 +350,7 @@ def _contact(i, j, one, two, facing, solid, planes, limits, work, row):
 
 @njit(cache=True)
 def _finish(group):
-    """From sums weighted by area to means."""
+    """Turn sums weighted by area into means."""
     for k in range(1, 5):
         group[k] /= group[0]
     size = math.sqrt(group[5] ** 2 + group[6] ** 2 + group[7] ** 2)

@@ -12,15 +12,19 @@ __all__ = ["hidden", "thinnest_of"]
 
 @njit(cache=True)
 def hidden(pairs, rows, near, solid, planes, thinnest, reach):
-    """Which contacts of two solids have a third one in the joint between them, as thin slabs and tiles are.
+    """Find the contacts of two solids that have a third one in the joint, as with thin slabs and tiles.
 
-    Parameters
-    ----------
-    pairs, rows : as from `touching_faces`
-    near : where the solids that each one touches begin, (n + 1,), and these
+    Inputs
+    ------
+    pairs, rows : (m, 2) int64, (m, 8) float64, as from `touching_faces`
+    near : (n + 1,) int64, first neighbour of each solid, and (k,) int64, the neighbours
     solid, planes : as for `touching_faces`
-    thinnest : (n,) thickness of each solid, seen square to one of its faces [m]
-    reach : how far beside the third solid the middle of the joint may lie [m]
+    thinnest : (n,) float64, thickness of each solid square to one of its faces [m]
+    reach : float, distance beside the third solid within which the middle of the joint may lie [m]
+
+    Outputs
+    -------
+    hidden : (m,) bool; returned
     """
     starts, touched = near
     out = np.zeros(pairs.shape[0], np.bool_)
@@ -34,7 +38,7 @@ def hidden(pairs, rows, near, solid, planes, thinnest, reach):
 
 @njit(cache=True)
 def _contains(one, solid, normals, place, reach):
-    """Whether a place is in a convex solid, or as near as that to it."""
+    """Return whether a place is in a convex solid or within `reach` of it."""
     vertices, corners, face_starts, solid_starts = solid
     for f in range(solid_starts[one], solid_starts[one + 1]):
         corner, outside = vertices[corners[face_starts[f]]], 0.0
@@ -47,7 +51,17 @@ def _contains(one, solid, normals, place, reach):
 
 @njit(cache=True)
 def thinnest_of(solid, normals):
-    """Least extent (n,) of each solid square to one of its faces."""
+    """Compute the least extent of each solid square to one of its faces.
+
+    Inputs
+    ------
+    solid : vertices, corners, face_starts, solid_starts of `Polyhedra`
+    normals : (nf, 3) float64, outward unit normals of its faces [-]
+
+    Outputs
+    -------
+    extents : (n,) float64 [m]; returned
+    """
     solid_starts = solid[3]
     out = np.full(solid_starts.shape[0] - 1, math.inf)
     for one in range(out.shape[0]):

@@ -1,4 +1,4 @@
-"""Numba kernels of boxes that overlap, by a tree of boxes.
+"""Numba kernels of overlapping boxes in a tree of boxes.
 
 The tree is complete and binary over boxes in Morton order: node 1 is the root, the children of k are 2k and
 2k + 1, and the leaves begin at `size`, a power of two; empty leaves have boxes that overlap nothing.
@@ -12,7 +12,17 @@ __all__ = ["count_near", "list_near", "morton_codes"]
 
 @njit(cache=True)
 def morton_codes(centres, low, scale):
-    """Interleave 21 bits of each coordinate, so that boxes that are near have codes that are near."""
+    """Interleave 21 bits of each coordinate, so that nearby boxes have similar codes.
+
+    Inputs
+    ------
+    centres : (n, 3) float64 [m]
+    low, scale : (3,) float64, origin [m] and cells per metre [1/m]
+
+    Outputs
+    -------
+    codes : (n,) uint64; returned
+    """
     out = np.empty(centres.shape[0], np.uint64)
     for i in range(centres.shape[0]):
         code = np.uint64(0)
@@ -26,7 +36,7 @@ def morton_codes(centres, low, scale):
 
 @njit(cache=True)
 def _apart(one, other):
-    """Whether two boxes (6,), lower corner first, have nothing in common."""
+    """Return whether two boxes (6,), lower corner first, are disjoint."""
     for k in range(3):  # noqa: SIM110  (numba has no any())
         if one[k] > other[3 + k] or other[k] > one[3 + k]:
             return True
@@ -35,7 +45,7 @@ def _apart(one, other):
 
 @njit(cache=True)
 def _near(leaf, tree, size, order, wanted, found, stop):
-    """Pairs of the leaf with later leaves, at least one of them wanted, into `found` from row `stop`."""
+    """Write pairs of the leaf with later leaves, at least one of them wanted, to `found` from row `stop`."""
     box = tree[size + leaf]
     mine = order[leaf]
     stack = np.empty(64, np.int64)
@@ -64,7 +74,19 @@ def _near(leaf, tree, size, order, wanted, found, stop):
 
 @njit(cache=True)
 def count_near(tree, size, order, wanted):
-    """How many pairs of boxes overlap, by leaf of the first."""
+    """Count the pairs of overlapping boxes by the leaf of the first.
+
+    Inputs
+    ------
+    tree : (2 size, 6) float64, boxes, lower corner first [m]
+    size : int, index of the first leaf
+    order : (n,) int64, solid of each leaf
+    wanted : (n,) bool, solids of which at least one must be in a pair
+
+    Outputs
+    -------
+    counts : (n,) int64; returned
+    """
     nothing = np.empty((0, 2), np.int64)
     counts = np.zeros(order.shape[0], np.int64)
     for leaf in range(order.shape[0]):
@@ -74,7 +96,17 @@ def count_near(tree, size, order, wanted):
 
 @njit(cache=True)
 def list_near(tree, size, order, wanted, start, stop, found):
-    """The pairs of some leaves, smaller index first."""
+    """List the pairs of the leaves `start` to `stop`, smaller index first.
+
+    Inputs
+    ------
+    tree, size, order, wanted : as for `count_near`
+    start, stop : int, range of leaves
+
+    Outputs
+    -------
+    found : (n, 2) int64, pairs of solids
+    """
     row = 0
     for leaf in range(start, stop):
         row = _near(leaf, tree, size, order, wanted, found, row)

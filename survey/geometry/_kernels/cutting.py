@@ -1,42 +1,63 @@
-"""Numba kernel that cuts a convex polyhedron out by its planes."""
+"""Numba kernel that cuts a convex polyhedron by its planes."""
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-__all__ = ["EMPTY", "FULL", "OPEN", "cut_out"]
+from survey.arrays import Array, Ints
+from survey.geometry._kernels.vectors import height_over
+
+__all__ = ["EMPTY", "FULL", "OPEN", "CutSolid", "cut_out"]
 
 FULL, EMPTY, OPEN = 0, 1, 2
-"""What came of it: a solid, nothing, or something that the planes do not close."""
+"""Outcome: a solid, nothing, or something that the planes do not close."""
 
 _MOST = 64
-"""Corners of a face, at most."""
+"""Largest number of corners of a face."""
+
+
+class CutSolid(NamedTuple):
+    """Arrays for a polyhedron that is being cut.
+
+    Attributes
+    ----------
+    vertices : (room, 3) corners [m]
+    loops : (n + 6, _MOST) corners of each face, counter-clockwise seen from outside
+    sizes : (n + 6,) number of corners of each face
+    of_face : (n + 6,) plane on which each face lies; -1: a side of the box
+    """
+
+    vertices: Array
+    loops: Ints
+    sizes: Ints
+    of_face: Ints
 
 
 @njit(cache=True)
-def cut_out(planes, centre, reach, near, vertices, loops, sizes, of_face):
-    """Intersection of half-spaces n·x ≤ d within a box about a centre.
+def cut_out(planes, centre, reach, near, solid):
+    """Compute the intersection of half-spaces n·x ≤ d within a box about a centre.
 
     A box is cut by one plane after another. Corners within `near` of a plane count as lying on it, which keeps the
-    result closed whatever rounding does: what a plane leaves of the faces has one open ring of edges, and its new face
-    closes that. At the end each corner is put where three of its planes cross, those at the widest angles.
+    result closed whatever the rounding: the faces left by a plane have one open ring of edges, which its new face
+    closes. At the end each corner is put at the intersection of three of its planes, those at the widest angles.
 
-    Parameters
-    ----------
-    planes : (n, 4) outward unit normals and offsets d
-    centre, reach : (3,) and half the side of the box, larger than the solid [m]
-    near : [m]
-    vertices : (room, 3) into which the corners are written
-    loops, sizes, of_face : (n + 6, _MOST), (n + 6,), (n + 6,) into which the faces are written: their corners,
-        counter-clockwise seen from outside, how many, and which plane they lie on
+    Inputs
+    ------
+    planes : (n, 4) float64, outward unit normals [-] and offsets d [m]
+    centre, reach : (3,) float64 and float, half the side of the box, larger than the solid [m]
+    near : float [m]
 
-    Returns
+    Outputs
     -------
-    status, number of corners, number of faces
+    solid : CutSolid, corners and faces written into it
+    status, number of corners, number of faces : returned
     """
+    vertices, loops, sizes, of_face = solid
     count, faces = _box(centre, reach, vertices, loops, sizes, of_face)
     distance = np.empty(vertices.shape[0])
     for p in range(planes.shape[0]):
-        status, count, faces = _cut(planes, p, near, vertices, count, loops, sizes, of_face, faces, distance)
+        status, count, faces = _cut(planes, p, near, solid, count, faces, distance)
         if status != FULL:
             return status, 0, 0
     for f in range(faces):
@@ -61,13 +82,12 @@ def _box(centre, reach, vertices, loops, sizes, of_face):
 
 
 @njit(cache=True)
-def _cut(planes, p, near, vertices, count, loops, sizes, of_face, faces, distance):
-    """Cut by one plane; the status, and the numbers of corners and faces."""
+def _cut(planes, p, near, solid, count, faces, distance):
+    """Cut by plane p; return the status and the numbers of corners and faces."""
+    vertices, loops, sizes, of_face = solid
     inside, outside = False, False
     for v in range(count):
-        distance[v] = -planes[p, 3]
-        for k in range(3):
-            distance[v] += planes[p, k] * vertices[v, k]
+        distance[v] = height_over(planes[p], planes[p, 3], vertices[v])
     for f in range(faces):
         for k in range(sizes[f]):
             inside = inside or distance[loops[f, k]] < -near

@@ -1,4 +1,4 @@
-"""Numba kernels of faces that match: that two solids turn to each other, in one plane but for a tolerance.
+"""Numba kernels of matching faces: opposite faces of two solids that lie in one plane within a tolerance.
 
 Solids are held as in `survey.geometry.adjacency.Polyhedra`, in coordinates about a place among them.
 """
@@ -8,19 +8,29 @@ import math
 import numpy as np
 from numba import njit
 
-from survey.geometry._kernels.adjacency import _basis, _flatten, _shared
+from survey.geometry._kernels.adjacency import _basis, _boxes_apart, _buffers, _flatten, _shared
+from survey.geometry._kernels.vectors import dot
 
 __all__ = ["matching_faces", "near_pairs"]
 
 _OPPOSITE = -0.9
-"""Cosine of faces that look at each other: heights over the common plane decide, but for small faces."""
+"""Cosine of opposite faces: heights over the common plane decide, except for small faces."""
 
 
 @njit(cache=True)
 def near_pairs(boxes, order, margin, out):
-    """Pairs (…, 2) of boxes (n, 6) that come nearer than a margin, into `out` as long as it has room; how many.
+    """Find pairs of boxes that come nearer than a margin.
 
-    `order` sorts the boxes by their lower x.
+    Inputs
+    ------
+    boxes : (n, 6) float64, lower and upper corner [m]
+    order : (n,) int64, boxes sorted by their lower x
+    margin : float [m]
+
+    Outputs
+    -------
+    out : (room, 2) int64, the pairs, as far as there is room
+    count : int, number of pairs; returned
     """
     count = 0
     for a in range(order.shape[0]):
@@ -62,54 +72,50 @@ def _grow(polygon, n, factor):
 
 @njit(cache=True)
 def _spread(vertices, first, second, n):
-    """Half the extent along n of the corners of two faces."""
+    """Return half the extent along n of the corners of two faces [m]."""
     low, high = math.inf, -math.inf
     for ring in (first, second):
         for i in range(ring.shape[0]):
-            along = 0.0
-            for k in range(3):
-                along += vertices[ring[i], k] * n[k]
+            along = dot(vertices[ring[i]], n)
             low, high = min(low, along), max(high, along)
     return 0.5 * (high - low)
 
 
 @njit(cache=True)
 def matching_faces(pairs, solid, planes, tolerance, out, measures):
-    """Faces of pairs of solids that lie in one plane, into `out` and `measures`, as far as there is room; how many.
+    """Find faces of pairs of solids that lie in one plane.
 
-    Parameters
-    ----------
-    pairs : (n, 2) solids
+    Inputs
+    ------
+    pairs : (n, 2) int64, solids
     solid : vertices, corners, face_starts, solid_starts of `Polyhedra`
     planes : as from `face_planes`
-    tolerance : within which the corners of both faces lie in their common plane [m]
-    out, measures : (…, 2) the two faces; (…, 2) how far their corners lie from the plane [m], and what they share [m²]:
-        negative if that is a seam no wider than the tolerance, or they come only so near
+    tolerance : float, distance of the corners of both faces from their common plane [m]
+
+    Outputs
+    -------
+    out : (room, 2) int64, the two faces, as far as there is room
+    measures : (room, 2) float64, distance of their corners from the plane [m], and shared area [m²]: negative for a
+        seam no wider than the tolerance, or if the faces only come that near
+    count : int, number of matches; returned
     """
     vertices, corners, face_starts, solid_starts = solid
     normals, sizes, boxes, convex = planes
-    longest = 0
-    for f in range(face_starts.shape[0] - 1):
-        longest = max(longest, face_starts[f + 1] - face_starts[f])
-    buffers = np.empty((4, 2 * longest + 8, 2))
+    buffers = _buffers(face_starts)
     n, u, v = np.empty(3), np.empty(3), np.empty(3)
     count = 0
     for pair in range(pairs.shape[0]):
         one, two = pairs[pair]
         for i in range(solid_starts[one], solid_starts[one + 1]):
             for j in range(solid_starts[two], solid_starts[two + 1]):
-                facing = (
-                    normals[i, 0] * normals[j, 0]
-                    + normals[i, 1] * normals[j, 1]
-                    + normals[i, 2] * normals[j, 2]
-                )
+                facing = dot(normals[i], normals[j])
                 if (
                     facing > _OPPOSITE
-                    or _apart(boxes, i, j, 2.0 * tolerance)
+                    or _boxes_apart(boxes, i, j, 2.0 * tolerance)
                     or not min(sizes[i], sizes[j]) > 0.0
                 ):
                     continue
-                # the larger face knows its normal better
+                # the larger face has the more accurate normal
                 a, b = sizes[i] / (sizes[i] + sizes[j]), sizes[j] / (sizes[i] + sizes[j])
                 size = math.sqrt(a * a + b * b - 2.0 * a * b * facing)
                 for k in range(3):
@@ -136,11 +142,3 @@ def matching_faces(pairs, solid, planes, tolerance, out, measures):
                     measures[count, 0], measures[count, 1] = spread, area
                 count += 1
     return count
-
-
-@njit(cache=True)
-def _apart(boxes, i, j, margin):
-    for k in range(3):  # noqa: SIM110  (numba has no any())
-        if boxes[i, k] > boxes[j, 3 + k] + margin or boxes[j, k] > boxes[i, 3 + k] + margin:
-            return True
-    return False

@@ -1,9 +1,9 @@
-"""Faces of neighbours that are meant to lie in one plane: which match, and which planes all of them are.
+"""Matching faces of neighbours that are meant to lie in one plane, and the common planes of all of them.
 
-Two faces match where they look at each other and the corners of both lie within a tolerance of one plane. What is
-matched is one plane for all: a bed on which many stones stand is not stone by stone another. Faces that meet at a
-seam alone, such as those of stones that stand across a corner from each other, join a plane as well if it can be
-theirs too; else such stones would be a tolerance deep in each other.
+Two faces match where they are opposite and the corners of both lie within a tolerance of one plane. Matches share one
+plane: a bed that carries many stones does not change from stone to stone. Faces that meet at a seam alone, such as
+those of stones diagonal to each other across a corner, join a plane as well if they fit it; otherwise such stones
+would overlap by the tolerance.
 """
 
 from collections.abc import Sequence
@@ -22,14 +22,14 @@ __all__ = ["Match", "common_planes", "find_matches"]
 
 @dataclass(frozen=True)
 class Match:
-    """Faces of two solids that lie in one plane but for a tolerance.
+    """Faces of two solids that lie in one plane within a tolerance.
 
     Attributes
     ----------
-    faces : numbers of the two, counted through all solids
-    solids : numbers of the two
-    spread : how far their corners lie from that plane [m]
-    area : that they share [m²]; 0 if they meet at a seam alone
+    faces : numbers of the two faces, counted through all solids
+    solids : numbers of the two solids
+    spread : distance of their corners from the plane [m]
+    area : shared area [m²]; 0 if they meet at a seam alone
     """
 
     faces: tuple[int, int]
@@ -39,12 +39,12 @@ class Match:
 
 
 def find_matches(solids: Sequence[Solid], tolerance: float) -> tuple[Match, ...]:
-    """Find the faces that match, those that do so best first, and seams last.
+    """Find the matching faces, best matches first and seams last.
 
     Parameters
     ----------
     solids : closed
-    tolerance : within which the corners of both faces lie in one plane [m]; faces that are twice as far apart match
+    tolerance : distance of the corners of both faces from one plane [m]; faces up to twice as far apart match
     """
     all_ = Polyhedra.gather((one.vertices, one.faces) for one in solids)
     local = np.ascontiguousarray(all_.vertices - all_.vertices.min(axis=0))
@@ -79,7 +79,7 @@ def find_matches(solids: Sequence[Solid], tolerance: float) -> tuple[Match, ...]
 
 @dataclass
 class _Plane:
-    """Faces that are to lie in one plane: their corners, and which way each stone looks at it."""
+    """Faces that are to lie in one plane: their corners, and the normal of each stone's face."""
 
     corners: Array
     looks: dict[int, Array]
@@ -88,7 +88,7 @@ class _Plane:
         return _Plane(np.concatenate([self.corners, other.corners]), {**other.looks, **self.looks})
 
     def flattens(self, other: "_Plane") -> bool:
-        """Whether a stone would have both its sides in the plane."""
+        """Return whether both sides of a stone would lie in the plane."""
         both = self.looks.keys() & other.looks.keys()
         return any(float(self.looks[one] @ other.looks[one]) < 0.0 for one in both)
 
@@ -96,19 +96,19 @@ class _Plane:
 def common_planes(
     corners: Sequence[Array], owner: Sequence[int], matches: Sequence[Match], tolerance: float
 ) -> tuple[list[int], list[Match]]:
-    """Join matching faces to planes, as long as the corners of all of a plane lie in it.
+    """Merge matching faces into planes as long as all corners of each plane lie in it.
 
     Parameters
     ----------
     corners : (n, 3) of each face [m]
-    owner : number of its solid
-    matches : in the order in which they are to be joined
-    tolerance : within which corners lie in a plane [m]
+    owner : number of each face's solid
+    matches : in the order in which they are merged
+    tolerance : distance of corners from their plane [m]
 
     Returns
     -------
-    for each face a face by which its plane is known: itself if it matches none; and the matches with a shared area
-    that could not be joined
+    for each face a face that identifies its plane, which is itself if it matches none; and the matches with a shared
+    area that could not be merged
     """
     root = list(range(len(corners)))
     planes: dict[int, _Plane] = {}
@@ -138,7 +138,7 @@ def _find(root: list[int], face: int) -> int:
 
 
 def _spread(places: Array) -> float:
-    """Half the extent of places across the plane that fits them best."""
+    """Return half the extent of places across the plane that fits them best [m]."""
     centred = places - places.mean(axis=0)
     normal = np.linalg.eigh(centred.T @ centred)[1][:, 0]
     heights = centred @ normal

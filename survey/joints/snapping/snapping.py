@@ -1,32 +1,32 @@
-"""Solids whose coordinates were rounded: faces of neighbours that match but for a tolerance come to lie in one plane.
+"""Snapping of solids with rounded coordinates: matching faces of neighbours come to lie in one plane.
 
-Which faces belong together is found first (`survey.joints.snapping.matching_faces`); then corners and planes are
-moved together (`survey.geometry.plane_network`), each stone keeping its corners, edges and faces, all faces of which
-become plane to the last digit. Where a corner would have to move farther than the tolerance, what ties it is let go,
-one thing after the other until it stays: first corners of folds (`survey.joints.snapping.meeting_corners`) and planes
-that are common only at a seam, then the planeness of a free face, which is folded, and last the contact itself, which
-is left open and listed.
+Faces that belong together are found first (`survey.joints.snapping.matching_faces`). Then corners and planes are
+adjusted together (`survey.geometry.plane_network`); each stone keeps its corners, edges and faces, and all faces become
+planar to the last digit. Where a corner would have to move farther than the tolerance, its constraints are released
+one after another until it stays: first corners of folds and planes that are common only at a seam, then the planarity
+of a free face, which is folded, and last the contact itself, which is left open and listed.
 """
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from survey.arrays import Array, Ints
+from survey.geometry.convexity import is_convex, reflex_edges
 from survey.geometry.folds import fold
 from survey.geometry.plane_network import Settled, settle
 from survey.geometry.solids import Solid
 from survey.joints.snapping.matching_faces import Match, common_planes, find_matches
-from survey.joints.snapping.meeting_corners import meeting_corners
 from survey.records.snapping import OpenContact, Snapping
 
 __all__ = ["snap"]
 
 Polygon = tuple[int, ...]
 
-_EXACT = 1e-12  # of the size of all: farther from its planes no corner may stay
+_EXACT = 1e-12  # of the size of all: largest distance of a corner from its planes
 
 
 def snap(solids: Sequence[Solid], tolerance: float) -> tuple[tuple[Solid, ...], Snapping]:
@@ -34,12 +34,12 @@ def snap(solids: Sequence[Solid], tolerance: float) -> tuple[tuple[Solid, ...], 
 
     Parameters
     ----------
-    solids : closed, their faces plane within the tolerance
-    tolerance : farther than this no corner moves, and faces that are farther out of one plane do not match [m]
+    solids : closed, their faces planar within the tolerance
+    tolerance : largest displacement of a corner, and largest distance of matching faces from one plane [m]
 
     Returns
     -------
-    the solids, with the same corners in the same order, and what was changed
+    the solids, with the same corners in the same order, and a report of the changes
     """
     assembly = _Assembly(solids, tolerance)
     assembly.settle()
@@ -47,7 +47,7 @@ def snap(solids: Sequence[Solid], tolerance: float) -> tuple[tuple[Solid, ...], 
 
 
 class _Assembly:
-    """All solids with their corners and faces numbered through, and what ties them."""
+    """All solids with their corners and faces numbered consecutively, and their constraints."""
 
     def __init__(self, solids: Sequence[Solid], tolerance: float) -> None:
         self._given, self._tolerance = solids, tolerance
@@ -63,14 +63,14 @@ class _Assembly:
         self._gone: set[int] = set()  # faces that were folded: their pieces follow at the end
         self._matches = list(find_matches(solids, tolerance))
         touching = {k for one in self._matches if one.area > 0.0 for k in one.faces}
-        self._folds = meeting_corners(solids, touching, 2.0 * tolerance)
+        self._folds = _meeting_corners(solids, touching, 2.0 * tolerance)
         self._open: list[tuple[Match, str]] = []
         self._plane: list[int] = []
         self._settled = Settled(self._vertices, np.empty((0, 3)), np.empty(0))
 
     def settle(self) -> None:
-        """Move corners onto their planes; let go what would move one too far."""
-        while True:  # each round lets go of something, and triangles on their own stay where they are
+        """Move corners onto their planes; release constraints that would move one too far."""
+        while True:  # each round releases a constraint, and unmatched triangles stay in place
             self._join()
             corner, plane = self._incidences()
             if not len(corner):
@@ -83,7 +83,7 @@ class _Assembly:
             self._let_go(moved)
 
     def _join(self) -> None:
-        """Give each face its plane."""
+        """Assign a plane to each face."""
         corners = [self._vertices[list(face)] for face in self._faces]
         self._plane, apart = common_planes(corners, self._owner, self._matches, self._tolerance)
         for match in apart:
@@ -91,7 +91,7 @@ class _Assembly:
             self._open.append((match, "others that share their planes are too far from a common one"))
 
     def _incidences(self) -> tuple[Ints, Ints]:
-        """Which corner lies on which plane; a triangle of its own has no need of one."""
+        """Return the corner and plane of each incidence; an unmatched triangle needs no plane."""
         count = Counter(self._plane[k] for k in self._present())
         planes: dict[int, set[int]] = {}
         for k in self._present():
@@ -109,7 +109,7 @@ class _Assembly:
         return (k for k in range(len(self._faces)) if k not in self._gone)
 
     def _let_go(self, moved: Array) -> None:
-        """At the corners that move too far, one tie each; of corners with a common plane only the worst."""
+        """Release one constraint at each corner that moves too far, only the worst of those with a common plane."""
         at: dict[int, list[int]] = {}
         for k in self._present():
             for i in self._faces[k]:
@@ -148,11 +148,11 @@ class _Assembly:
         self._gone.add(face)
         self._faces += pieces
         self._owner += [self._owner[face]] * len(pieces)
-        self._plane += [-1] * len(pieces)  # until all get their planes anew
+        self._plane += [-1] * len(pieces)  # until planes are assigned again
         self._folded[self._owner[face]] += 1
 
     def solids(self) -> tuple[Solid, ...]:
-        """The solids as they are now."""
+        """Return the current solids."""
         faces: list[list[Polygon]] = [[] for _ in self._given]
         for k in self._present():
             owner = self._owner[k]
@@ -165,7 +165,7 @@ class _Assembly:
         )
 
     def report(self) -> Snapping:
-        """What was changed."""
+        """Return a report of the changes."""
         moved = np.linalg.norm(self._settled.vertices - self._vertices, axis=1)
         shared = {self._plane[one.faces[0]] for one in self._matches if one.area > 0.0}
         return Snapping(
@@ -182,3 +182,47 @@ class _Assembly:
                 for one, why in self._open
             ),
         )
+
+
+def _meeting_corners(solids: Sequence[Solid], touching: Set[int], reach: float) -> dict[int, tuple[int, ...]]:
+    """Find the corners of folds between touching faces, and the corners of other solids that meet them.
+
+    Convex stones on opposite sides of a plane never overlap, wherever their corners lie in it. Where a non-convex stone
+    touches others on both sides of a fold, the plane of one side does not keep the neighbour on the other from reaching
+    around the edge into the stone, unless the plane between the two neighbours passes through that very edge. So the
+    corners of the fold lie on the planes of all stones that meet there.
+
+    Parameters
+    ----------
+    solids : closed
+    touching : numbers of the faces that touch others, counted through all solids
+    reach : largest distance of corners that meet [m]
+
+    Returns
+    -------
+    for each corner of a fold, counted through all solids, the nearest corner of each other solid within reach
+    """
+    starts = np.cumsum([0, *(len(one.vertices) for one in solids)])
+    first_face = np.cumsum([0, *(len(one.faces) for one in solids)])
+    folds = {
+        int(starts[k]) + i
+        for k, one in enumerate(solids)
+        if not is_convex(one)
+        for edge in reflex_edges(one)
+        if {int(first_face[k]) + edge.first, int(first_face[k]) + edge.second} <= touching
+        for i in edge.corners
+    }
+    if not folds:
+        return {}
+    vertices = np.concatenate([one.vertices for one in solids])
+    owner = np.repeat(np.arange(len(solids)), np.diff(starts))
+    tree = cKDTree(vertices)
+    found = {}
+    for i in sorted(folds):
+        near = tree.query_ball_point(vertices[i], reach)
+        near.sort(key=lambda j: (float(np.linalg.norm(vertices[j] - vertices[i])), j))
+        nearest: dict[int, int] = {}
+        for j in near:
+            nearest.setdefault(int(owner[j]), j)
+        found[i] = tuple(j for one, j in nearest.items() if one != owner[i])
+    return {i: others for i, others in found.items() if others}

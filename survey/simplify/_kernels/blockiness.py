@@ -1,7 +1,7 @@
-"""Numba kernels that measure a solid: volume, angles, how far from another one's edges, what two have in common.
+"""Numba kernels that measure a solid: volume, angles, distance from another solid's edges, common volume.
 
-A solid is its vertices (nv, 3), the corners of all faces one after the other, (nc,), and where each face begins,
-(nf + 1,).
+A solid is its vertices (nv, 3) float64 [m], the corners (nc,) int64 of all faces, concatenated, and the index
+starts (nf + 1,) int64 of each face's first corner.
 """
 
 import math
@@ -9,12 +9,23 @@ import math
 import numpy as np
 from numba import njit
 
+from survey.geometry._kernels.vectors import dot
+
 __all__ = ["area_vectors", "common_volume", "edge_distances", "face_planes", "volume", "worst_angle"]
 
 
 @njit(cache=True)
 def area_vectors(vertices, corners, starts):
-    """Area times outward normal of each face, (nf, 3)."""
+    """Compute area times outward normal of each face.
+
+    Inputs
+    ------
+    vertices, corners, starts : the solid
+
+    Outputs
+    -------
+    vectors : (nf, 3) float64 [m²]; returned
+    """
     out = np.zeros((len(starts) - 1, 3))
     for f in range(len(starts) - 1):
         origin = vertices[corners[starts[f]]]
@@ -25,7 +36,16 @@ def area_vectors(vertices, corners, starts):
 
 @njit(cache=True)
 def face_planes(vertices, corners, starts):
-    """Planes (nf, 4) of the faces: unit normal, and offset of the mean of the corners. Zero where there is no area."""
+    """Compute the planes of the faces, through the mean of their corners; zero for a face without area.
+
+    Inputs
+    ------
+    vertices, corners, starts : the solid
+
+    Outputs
+    -------
+    planes : (nf, 4) float64, outward unit normals [-] and offsets [m]; returned
+    """
     out = np.zeros((len(starts) - 1, 4))
     vectors = area_vectors(vertices, corners, starts)
     for f in range(len(starts) - 1):
@@ -39,7 +59,7 @@ def face_planes(vertices, corners, starts):
 
 @njit(cache=True)
 def _middle(vertices, corners, start, stop):
-    """Mean of the corners of a face."""
+    """Return the mean (3,) of the corners of a face."""
     out = np.zeros(3)
     for c in range(start, stop):
         out += vertices[corners[c]] / (stop - start)
@@ -48,7 +68,16 @@ def _middle(vertices, corners, start, stop):
 
 @njit(cache=True)
 def volume(vertices, corners, starts):
-    """Volume, by the divergence theorem; a face that is bent is that of the triangles on its middle."""
+    """Compute the volume by the divergence theorem; a warped face is fanned about the mean of its corners.
+
+    Inputs
+    ------
+    vertices, corners, starts : the solid
+
+    Outputs
+    -------
+    volume : float [m³], negative if the faces are seen from inside; returned
+    """
     origin = vertices[corners[0]]
     total = 0.0
     for f in range(len(starts) - 1):
@@ -61,7 +90,16 @@ def volume(vertices, corners, starts):
 
 @njit(cache=True)
 def worst_angle(vertices, corners, starts):
-    """Largest departure from a right angle of the angle inside, between two faces with a common edge [rad]."""
+    """Compute the largest departure from a right angle of the inside angle between faces with a common edge.
+
+    Inputs
+    ------
+    vertices, corners, starts : the solid
+
+    Outputs
+    -------
+    angle : float [rad]; returned
+    """
     planes = face_planes(vertices, corners, starts)
     worst = 0.0
     for f in range(len(starts) - 1):
@@ -83,7 +121,7 @@ def worst_angle(vertices, corners, starts):
 
 @njit(cache=True)
 def _face_with(p, q, corners, starts):
-    """The face that has the edge from p to q; -1 if there is none."""
+    """Return the face that has the edge from p to q; -1 if there is none."""
     for f in range(len(starts) - 1):
         for c in range(starts[f], starts[f + 1]):
             following = c + 1 if c + 1 < starts[f + 1] else starts[f]
@@ -94,7 +132,17 @@ def _face_with(p, q, corners, starts):
 
 @njit(cache=True)
 def edge_distances(points, vertices, corners, starts):
-    """Distance of each point (n, 3) from the nearest edge of a solid."""
+    """Compute the distance of points from the nearest edge of a solid.
+
+    Inputs
+    ------
+    points : (n, 3) float64 [m]
+    vertices, corners, starts : the solid
+
+    Outputs
+    -------
+    distances : (n,) float64 [m]; returned
+    """
     out = np.full(len(points), math.inf)
     for f in range(len(starts) - 1):
         for c in range(starts[f], starts[f + 1]):
@@ -111,9 +159,19 @@ def edge_distances(points, vertices, corners, starts):
 
 @njit(cache=True)
 def common_volume(vertices, corners, starts, planes):
-    """Volume that a solid has in common with a convex body, the half-spaces n·x ≤ d of planes (np, 4).
+    """Compute the volume of the intersection of a solid with a convex body.
 
-    The solid is the signed sum of tetrahedra over the triangles on the middles of its faces, each clipped by all.
+    The solid is the signed sum of tetrahedra over the triangles fanned about the means of its faces' corners, each
+    clipped by all planes.
+
+    Inputs
+    ------
+    vertices, corners, starts : the solid
+    planes : (np, 4) float64, half-spaces n·x ≤ d of the convex body
+
+    Outputs
+    -------
+    volume : float [m³]; returned
     """
     apex = _middle(vertices, corners, 0, len(corners))
     total = 0.0
@@ -134,7 +192,7 @@ def common_volume(vertices, corners, starts, planes):
 
 @njit(cache=True)
 def _clipped(four, planes):
-    """Volume of a tetrahedron inside half-spaces: clipped by one plane after the other, and cut into tetrahedra."""
+    """Return the volume of a tetrahedron inside half-spaces: clipped by one plane after another into tetrahedra."""
     waiting = np.empty((2 * len(planes) + 2, 4, 3))
     done = np.zeros(2 * len(planes) + 2, np.int64)
     waiting[0] = four
@@ -157,11 +215,11 @@ def _clipped(four, planes):
 
 @njit(cache=True)
 def _split(body, plane):
-    """How many corners of a tetrahedron are below a plane, its corners with these first, and their heights."""
+    """Count the corners of a tetrahedron below a plane; sort its corners, those first, with their heights."""
     out, heights = np.empty((4, 3)), np.empty(4)
     inside, last = 0, 4
     for i in range(4):
-        height = plane[0] * body[i, 0] + plane[1] * body[i, 1] + plane[2] * body[i, 2] - plane[3]
+        height = dot(plane, body[i]) - plane[3]
         if height <= 0.0:
             place = inside
             inside += 1
@@ -174,7 +232,7 @@ def _split(body, plane):
 
 @njit(cache=True)
 def _pieces(body, heights, inside):
-    """The tetrahedra (np, 4, 3) of the part of a tetrahedron, its corners below a plane first, that is below it."""
+    """Return the tetrahedra (np, 4, 3) of the part below a plane; corners below the plane come first in `body`."""
     if inside == 4:
         out = np.empty((1, 4, 3))
         out[0] = body

@@ -1,30 +1,48 @@
-"""Numba kernel that takes corners out of the outline of a face, one by one, as long as that is honest."""
+"""Numba kernel that removes corners from the outline of a face, one by one, within bounds."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 __all__ = ["square"]
 
-_STRAIGHT = 0.34  # sine of 20°: a corner that turns less may lie half-way along a side
+_STRAIGHT = 0.34  # sine of 20°: turn of a corner below which it may lie half-way along a side
 _PARALLEL = 1e-9  # sine below which two sides do not meet
+
+
+class Bounds(NamedTuple):
+    """Limits of one round of corner removal.
+
+    Attributes
+    ----------
+    shift : distance by which a measured corner may end up off the outline [m]
+    restored : distance by which a worn corner may be restored [m]
+    straight : sine of the turn below which a corner may be removed; 0: any corner [-]
+    """
+
+    shift: float
+    restored: float
+    straight: float
 
 
 @njit(cache=True)
 def square(flat, worn, limits):
     """Reduce a polygon to four corners, or to as few as the limits allow; see ``squaring.square_face``.
 
-    Parameters
-    ----------
-    flat : (n, 2) corners, counter-clockwise
-    worn : (n,) whether each corner's place is not to be trusted
-    limits : (5,) max_shift, shift_share, max_restored, restored_share, tolerance
+    Inputs
+    ------
+    flat : (n, 2) float64, corners, counter-clockwise [m]
+    worn : (n,) bool, whether each corner's place is not to be trusted
+    limits : (5,) float64, max_shift [m], shift_share [-], max_restored [m], restored_share [-], tolerance [m]
 
-    Returns
+    Outputs
     -------
-    polygon (m, 2), source (m,) which corner each is (-1: restored), width, depth: how far a corner lies inside
-    its convex hull beyond what is allowed (0: none does), in which case the polygon is the hull
+    polygon, source : (m, 2) float64 [m], (m,) int64, index of each corner (-1: restored); returned
+    width : float, smallest distance between two parallels that enclose the polygon [m]; returned
+    depth : float, depth of a corner inside its convex hull beyond the limits, in which case the polygon is the
+        hull; 0: none [m]; returned
     """
     n = len(flat)
     source = _hull(flat)
@@ -42,9 +60,9 @@ def square(flat, worn, limits):
     if depth > 0.0:
         return polygon[:m].copy(), source, width, depth
     little = min(tolerance, limits[1] * width)
-    # corners half-way along a side first: none of two short pieces of a side is a good one to prolong
-    m = _reduce(flat, worn, polygon, labels, m, 3, little, little, _STRAIGHT)
-    m = _reduce(flat, worn, polygon, labels, m, 4, shift, restored, 0.0)
+    # corners half-way along a side first: neither of two short pieces of a side is a good one to extend
+    m = _reduce(flat, worn, polygon, labels, m, 3, Bounds(little, little, _STRAIGHT))
+    m = _reduce(flat, worn, polygon, labels, m, 4, Bounds(shift, restored, 0.0))
     first = 0
     for k in range(m):
         if _apart(polygon[k], flat[0]) < _apart(polygon[first], flat[0]):
@@ -61,11 +79,9 @@ def _apart(a, b):
 
 
 @njit(cache=True)
-def _reduce(flat, worn, polygon, source, m, few, shift, restored, straight):
-    """Take out corners of a convex polygon, each time by the smallest allowed change of area; how many are left.
-
-    With `straight` above zero, only corners at which the outline turns by less than this sine.
-    """
+def _reduce(flat, worn, polygon, source, m, few, bounds):
+    """Remove corners of a convex polygon, always by the smallest allowed change of area; return how many are left."""
+    shift, restored, straight = bounds
     n = len(flat)
     trial, labels = np.empty((n, 2)), np.empty(n, np.int64)
     best, best_labels = np.empty((n, 2)), np.empty(n, np.int64)
@@ -88,7 +104,7 @@ def _reduce(flat, worn, polygon, source, m, few, shift, restored, straight):
 
 @njit(cache=True)
 def _turn(polygon, m, k):
-    """Sine of the angle by which an outline turns at corner k; 1 where it turns back."""
+    """Return the sine of the angle by which an outline turns at corner k; 1 where it turns back."""
     ux, uy = _side(polygon, m, k - 1)
     vx, vy = _side(polygon, m, k)
     if ux * vx + uy * vy <= 0.0:
@@ -98,14 +114,14 @@ def _turn(polygon, m, k):
 
 @njit(cache=True)
 def _side(polygon, m, k):
-    """From corner k to the next."""
+    """Return the vector from corner k to the next."""
     i, j = (k + m) % m, (k + 1) % m
     return polygon[j, 0] - polygon[i, 0], polygon[j, 1] - polygon[i, 1]
 
 
 @njit(cache=True)
 def _change(polygon, m, k, way, trial, source, labels):
-    """Polygon without corner k (way 0), or with the sides beside side k prolonged (way 1); the change of area."""
+    """Remove corner k (way 0), or side k by extending the sides beside it (way 1); return the change of area."""
     ux, uy = _side(polygon, m, k - 1)
     wx, wy = _side(polygon, m, k)
     gone, area, share = k, 0.5 * abs(ux * wy - uy * wx), 0.0
@@ -133,7 +149,7 @@ def _change(polygon, m, k, way, trial, source, labels):
 
 @njit(cache=True)
 def _allowed(flat, worn, polygon, source, m, shift, restored):
-    """Whether no measured corner is left too far from a polygon, and no restored one stands out too far."""
+    """Return whether all measured corners are near enough to a polygon, and restored ones not too far outside."""
     for k in range(m):
         if source[k] < 0 and _away(polygon[k], flat, len(flat)) > restored:
             return False
@@ -142,7 +158,7 @@ def _allowed(flat, worn, polygon, source, m, shift, restored):
 
 @njit(cache=True)
 def _deepest(flat, worn, polygon, m, shift, restored):
-    """Largest distance of a corner from a polygon's sides that is not allowed; 0 if all are."""
+    """Return the largest distance of a corner from a polygon's sides that is not allowed; 0 if all are."""
     deepest = 0.0
     for i in range(len(flat)):
         distance = _away(flat[i], polygon, m)
@@ -153,7 +169,7 @@ def _deepest(flat, worn, polygon, m, shift, restored):
 
 @njit(cache=True)
 def _away(point, polygon, m):
-    """Distance of a point from the nearest side of a polygon."""
+    """Return the distance of a point from the nearest side of a polygon."""
     nearest = math.inf
     for k in range(m):
         ax, ay = polygon[k]
@@ -169,7 +185,7 @@ def _away(point, polygon, m):
 
 @njit(cache=True)
 def _width(polygon, m):
-    """Smallest distance between two parallel lines that enclose a convex polygon."""
+    """Return the smallest distance between two parallel lines that enclose a convex polygon."""
     smallest = math.inf
     for k in range(m):
         ux, uy = _side(polygon, m, k)
@@ -184,7 +200,7 @@ def _width(polygon, m):
 
 @njit(cache=True)
 def _hull(flat):
-    """Indices of the corners that stand out, counter-clockwise (Andrew's monotone chain)."""
+    """Return the indices of the convex hull, counter-clockwise (Andrew's monotone chain)."""
     n = len(flat)
     order = np.arange(n)
     for i in range(1, n):  # few corners: sort by x, then y, by insertion
@@ -213,7 +229,7 @@ def _after(flat, i, j):
 
 @njit(cache=True)
 def _bend(flat, i, j, k):
-    """Twice the area of a triangle of three corners, positive if they turn to the left."""
+    """Return twice the area of a triangle of three corners, positive if they turn to the left."""
     ux, uy, vx, vy = (
         flat[j, 0] - flat[i, 0],
         flat[j, 1] - flat[i, 1],

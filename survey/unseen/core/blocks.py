@@ -1,4 +1,4 @@
-"""The core of a wall as convex blocks that meet the hidden sides of the stones before and behind them."""
+"""Core of a wall as convex blocks that meet the hidden sides of the stones before and behind them."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -16,10 +16,10 @@ __all__ = ["CoreBlock", "core_blocks"]
 
 
 _OUT = np.array([0.0, 0.0, 1.0])
-_ON_PLANE = 1e-10  # metres: corners so near to a plane lie on it
-_NOTHING = 1e-11  # cubic metres
-_SAME = 1e-6  # metres: head joints that are nearer are the same
-_MARGIN = 1.0  # metres around what is cut
+_ON_PLANE = 1e-10  # metres: distance within which corners lie on a plane
+_NOTHING = 1e-11  # cubic metres: smallest volume
+_SAME = 1e-6  # metres: distance within which head joints are the same
+_MARGIN = 1.0  # metres around the cut region
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class CoreBlock:
     Attributes
     ----------
     solid : in the frame of the wall
-    course : number of its course; None if it is of none
+    course : number of its course; None if it belongs to none
     between : codes of the stones before and behind it
     """
 
@@ -48,8 +48,8 @@ def core_blocks(wall: FacingWall, settings: InfillSettings) -> tuple[CoreBlock, 
     """Fill the core of a wall with blocks, strip by strip from below, from left to right.
 
     A block lies between two beds and two head joints of either facing, behind the hidden sides of the stones
-    around it. Where two joints of different facings nearly coincide one of them is left out, or what lies between
-    them, whichever leaves more of the core.
+    around it. Where two joints of different facings nearly coincide, either one of them or the core between them is
+    omitted, whichever leaves more of the core.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def core_blocks(wall: FacingWall, settings: InfillSettings) -> tuple[CoreBlock, 
 
     Returns
     -------
-    Blocks, of which no two overlap each other or a stone
+    Blocks that overlap neither each other nor a stone
     """
     stones = _Stones((*wall.front, *wall.back))
     blocks: list[CoreBlock] = []
@@ -72,7 +72,7 @@ def core_blocks(wall: FacingWall, settings: InfillSettings) -> tuple[CoreBlock, 
 
 
 def _cuts(sides: Iterable[Sequence[Stretch]]) -> list[_Cut]:
-    """Head joints of both facings, from left to right, each once."""
+    """Return the head joints of both facings, from left to right, without repetition."""
     cuts = [_Cut(one.start, one.left) for side in sides for one in side]
     cuts += [_Cut(one.stop, one.right) for side in sides for one in side]
     cuts.sort(key=lambda cut: cut.place)
@@ -86,7 +86,7 @@ def _cuts(sides: Iterable[Sequence[Stretch]]) -> list[_Cut]:
 def _stretches_of_core(
     cuts: list[_Cut], cells: "_Cells", settings: InfillSettings
 ) -> list[tuple[_Cut, _Cut]]:
-    """Pairs of cuts between which there may be a block."""
+    """Yield pairs of cuts between which there may be a block."""
     found: list[tuple[_Cut, _Cut]] = []
     waiting = cuts[:0:-1]
     left = cuts[0] if cuts else None
@@ -101,7 +101,7 @@ def _stretches_of_core(
 
 
 def _one_of(left: _Cut, one: _Cut, other: _Cut, right: _Cut, cells: "_Cells") -> tuple[_Cut, _Cut]:
-    """Where the block on the left of two near cuts ends and that on their right begins, so that most is filled."""
+    """Return the end of the block left of two near cuts and the start of that right of them that fill the most."""
 
     def filled(ends: tuple[_Cut, _Cut]) -> float:
         return cells.volume(left, ends[0]) + cells.volume(ends[1], right)
@@ -113,7 +113,7 @@ def _one_of(left: _Cut, one: _Cut, other: _Cut, right: _Cut, cells: "_Cells") ->
 
 
 class _Stones:
-    """The stones of both facings, to be searched by place."""
+    """The stones of both facings, searchable by place."""
 
     def __init__(self, stones: Sequence[FacingStone]) -> None:
         self.stones = stones
@@ -121,14 +121,14 @@ class _Stones:
         self._high = np.array([stone.solid.vertices.max(axis=0) for stone in stones])
 
     def near(self, solid: Solid) -> list[FacingStone]:
-        """Stones whose box meets that of a solid."""
+        """Return the stones whose box meets that of a solid."""
         low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
         found = np.flatnonzero(((self._low < high) & (self._high > low)).all(axis=1))
         return [self.stones[i] for i in found.tolist()]
 
 
 class _Cells:
-    """What is left of the core between two head joints of a strip."""
+    """The core remaining between two head joints of a strip."""
 
     def __init__(
         self,
@@ -141,17 +141,17 @@ class _Cells:
         self._made: dict[tuple[float, float], CoreBlock | None] = {}
 
     def volume(self, left: _Cut, right: _Cut) -> float:
-        """Volume of the block between two cuts [m³]."""
+        """Return the volume of the block between two cuts [m³]."""
         block = self.block(left, right)
         return 0.0 if block is None else volume_of(block.solid)
 
     def crossed(self, left: _Cut, right: _Cut) -> bool:
-        """Whether two cuts meet within the strip."""
+        """Return whether two cuts meet within the strip."""
         ends = [height_of(plane, left.place) for plane in (self.strip.lower, self.strip.upper)]
         return any(place_of(left.plane, height) >= place_of(right.plane, height) for height in ends)
 
     def block(self, left: _Cut, right: _Cut) -> CoreBlock | None:
-        """The block between two cuts; None if there is no core."""
+        """Return the block between two cuts; None if there is no core."""
         key = (left.place, right.place)
         if key not in self._made:
             self._made[key] = self._make(left, right)
@@ -177,7 +177,7 @@ class _Cells:
 
 
 def _carved(planes: list[Array], stones: _Stones) -> Solid | None:
-    """What half-spaces have in common, less the stones that reach into it: each is cut off by one of its own planes."""
+    """Intersect half-spaces, less the stones that reach into them: each is cut off by one of its own planes."""
     solid = _common(planes)
     for stone in stones.near(solid) if solid is not None else ():
         if solid is None:
@@ -191,7 +191,7 @@ def _carved(planes: list[Array], stones: _Stones) -> Solid | None:
 
 
 def _apart(solid: Solid, planes: Sequence[Array], stone: FacingStone) -> bool:
-    """Whether a convex solid and a stone have no volume in common."""
+    """Return whether a convex solid and a stone have no volume in common."""
     if any((solid.vertices @ plane[:3] >= plane[3] - _ON_PLANE).all() for plane in stone.planes):
         return True
     if any((stone.solid.vertices @ plane[:3] >= plane[3] - _ON_PLANE).all() for plane in planes):
@@ -201,7 +201,7 @@ def _apart(solid: Solid, planes: Sequence[Array], stone: FacingStone) -> bool:
 
 
 def _common(planes: Sequence[Array]) -> Solid | None:
-    """What half-spaces have in common."""
+    """Return the intersection of half-spaces; None if it is empty."""
     reach = max(abs(float(plane[3])) for plane in planes) + _MARGIN
     bounds = np.full(3, reach)
     solid = intersection("", [tuple(plane) for plane in planes], -bounds, bounds, _ON_PLANE)

@@ -1,4 +1,4 @@
-"""Solids made of the cells between planes of three families: closed, and nowhere touching themselves along an edge."""
+"""Solids made of the cells between planes of three families: closed, never touching themselves along an edge."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -31,10 +31,10 @@ class CellGrid:
 
     Attributes
     ----------
-    places : (ni,) of the upright planes along the wall, growing [m]
+    places : (ni,) positions of the upright planes along the wall, increasing [m]
     beds : (nj, 4) planes n·x = d, from below
     levels : (nk, 4) planes, from the front of the wall to its back
-    filled : (ni - 1, nj - 1, nk - 1) which cells are of the solid
+    filled : (ni - 1, nj - 1, nk - 1) whether each cell belongs to the solid
     """
 
     places: Array
@@ -44,7 +44,7 @@ class CellGrid:
 
 
 def grid_solids(grid: CellGrid) -> Iterator[Solid]:
-    """The solids of the filled cells, one for each connected part, without cells by which one would touch itself."""
+    """Yield a solid for each connected part of the filled cells, without cells where it would touch itself."""
     filled = _without_edges(grid.filled) if grid.filled.size else grid.filled
     parts, count = label(filled)
     for number in range(1, count + 1):
@@ -52,7 +52,7 @@ def grid_solids(grid: CellGrid) -> Iterator[Solid]:
 
 
 def _solid(grid: CellGrid, filled: Bools) -> Solid:
-    """The solid of connected cells; planes that cut nothing of it are left out."""
+    """Return the solid of connected cells, without planes that cut nothing of it."""
     planes = [grid.places, grid.beds, grid.levels]
     for axis in range(3):
         filled, planes[axis] = _coarser(filled, planes[axis], axis)
@@ -67,7 +67,7 @@ def _solid(grid: CellGrid, filled: Bools) -> Solid:
 
 
 def _rectangles(filled: Bools, side: Node) -> Iterator[tuple[Node, Node]]:
-    """The free sides of cells that look one way, put together: first and last cell of each rectangle."""
+    """Yield the free sides of cells that face one way, merged: first and last cell of each rectangle."""
     padded = np.pad(filled, 1)
     free = (padded & ~np.roll(padded, [-s for s in side], axis=(0, 1, 2)))[1:-1, 1:-1, 1:-1]
     one, other = (axis for axis in range(3) if side[axis] == 0)
@@ -87,7 +87,7 @@ def _rectangles(filled: Bools, side: Node) -> Iterator[tuple[Node, Node]]:
 
 
 def _around(low: Node, high: Node, side: Node) -> list[Node]:
-    """All nodes on the edge of a rectangle of cells' sides, counter-clockwise seen from outside."""
+    """Return all nodes on the edge of a rectangle of cells' sides, counter-clockwise seen from outside."""
     ends = [
         tuple(a if bit == 0 else b + 1 for a, b, bit in zip(low, high, corner, strict=True))
         for corner in _SIDES[side]
@@ -102,14 +102,14 @@ def _around(low: Node, high: Node, side: Node) -> list[Node]:
 
 
 def _turns(loop: list[Node]) -> Iterator[Node]:
-    """The nodes at which a loop turns."""
+    """Yield the nodes at which a loop turns."""
     for before, here, after in zip([loop[-1], *loop[:-1]], loop, [*loop[1:], loop[0]], strict=True):
         if any(2 * h != a + b for a, h, b in zip(before, here, after, strict=True)):
             yield here
 
 
 def _coarser(filled: Bools, planes: Array, axis: int) -> tuple[Bools, Array]:
-    """The cells without planes that have the same on both sides all over, and without empty layers at the ends."""
+    """Drop planes with the same cells on both sides everywhere, and empty layers at the ends."""
     layers = np.moveaxis(filled, axis, 0)
     used = np.flatnonzero(layers.reshape(len(layers), -1).any(axis=1))
     layers, planes = layers[used[0] : used[-1] + 1], planes[used[0] : used[-1] + 2]
@@ -118,7 +118,7 @@ def _coarser(filled: Bools, planes: Array, axis: int) -> tuple[Bools, Array]:
 
 
 def _node(planes: list[Array], node: Node) -> Array:
-    """Where three planes meet."""
+    """Return the intersection of three planes."""
     place, bed, level = (family[k] for family, k in zip(planes, node, strict=True))
     matrix = np.array([[1.0, 0.0, 0.0], bed[:3], level[:3]])
     out: Array = np.linalg.solve(matrix, np.array([float(place), bed[3], level[3]]))
@@ -126,7 +126,7 @@ def _node(planes: list[Array], node: Node) -> Array:
 
 
 def _without_edges(filled: Bools) -> Bools:
-    """Empty cells until no two touch along an edge alone, or at a corner alone, the fewest that will do in turn."""
+    """Empty cells until no two touch only along an edge or at a corner, each time the one that settles most."""
     filled = filled.copy()
     while True:
         touching = _touching(filled)
@@ -136,7 +136,7 @@ def _without_edges(filled: Bools) -> Bools:
 
 
 def _touching(filled: Bools) -> Counter[Node]:
-    """Cells that touch others where they must not, and how often."""
+    """Count for each cell its forbidden contacts with others."""
     found: Counter[Node] = Counter()
     padded = np.pad(filled, 1)
     for step in _DIAGONALS:
@@ -160,7 +160,7 @@ _DIAGONALS = [
 
 
 def _between(step: Node) -> list[Node]:
-    """Steps to the cells around the edge, or the corner, that a diagonal step goes through."""
+    """Return the steps to the cells around the edge, or the corner, that a diagonal step goes through."""
     choices = [(0,) if s == 0 else (0, s) for s in step]
     around = [(a, b, c) for a in choices[0] for b in choices[1] for c in choices[2]]
     return [one for one in around if one not in ((0, 0, 0), step)]

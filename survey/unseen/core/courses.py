@@ -1,4 +1,4 @@
-"""Where the core of a wall is cut: beds of its courses, head joints of its facings.
+"""Cuts of the core of a wall: beds of its courses, head joints of its facings.
 
 All in the frame of the wall: x along it, y up, z out of the front. Planes are (nx, ny, nz, d), n·x = d.
 """
@@ -16,17 +16,17 @@ __all__ = ["Stretch", "Strip", "height_of", "place_of", "stretches", "strips"]
 
 
 _ALONG, _UP = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
-_OFF_BED = 0.03  # metres: a corner farther from the bed of its course is left out of it
+_OFF_BED = 0.03  # metres: distance from the bed of its course above which a corner is left out
 
 
 @dataclass(frozen=True)
 class Strip:
-    """What lies between two beds.
+    """The space between two beds.
 
     Attributes
     ----------
     lower, upper : (4,) their planes, with normals upwards
-    course : number of the course of the front that begins at the lower bed, else of the back; None if none does
+    course : number of the course of the front, or of the back, that begins at the lower bed; None if none does
     """
 
     lower: Array
@@ -41,13 +41,13 @@ class Strip:
 
 @dataclass(frozen=True)
 class Stretch:
-    """What one stone of a facing takes of a strip.
+    """Part of a strip that one stone of a facing takes.
 
     Attributes
     ----------
     stone : of the facing
     left, right : (4,) planes of its head joints, with normals to the right
-    start, stop : where they are at half the height of the strip [m]
+    start, stop : their places at half the height of the strip [m]
     """
 
     stone: FacingStone
@@ -65,7 +65,7 @@ class _Bed:
 
 
 def strips(wall: FacingWall, settings: InfillSettings) -> tuple[Strip, ...]:
-    """The strips between the beds of both facings, from below; beds that nearly coincide are one."""
+    """Return the strips between the beds of both facings, from below; beds that nearly coincide are one."""
     beds = sorted(
         (bed for side in (wall.front, wall.back) for bed in _beds(side)), key=lambda bed: bed.height
     )
@@ -83,9 +83,9 @@ def strips(wall: FacingWall, settings: InfillSettings) -> tuple[Strip, ...]:
 
 
 def stretches(strip: Strip, stones: Sequence[FacingStone], settings: InfillSettings) -> list[Stretch]:
-    """What the stones of one facing take of a strip, from left to right.
+    """Return the parts of a strip that the stones of one facing take, from left to right.
 
-    Neighbours share the plane half-way between them; at a hole or an opening each ends where it ends.
+    Neighbours share the plane half-way between them; at a hole or an opening each ends at its own side.
     """
     found = []
     for stone in stones:
@@ -107,17 +107,17 @@ def stretches(strip: Strip, stones: Sequence[FacingStone], settings: InfillSetti
 
 
 def height_of(plane: Array, along: float) -> float:
-    """Height of a bed plane at a place along the wall, in the middle of its thickness [m]."""
+    """Return the height of a bed plane at a place along the wall, in the middle of its thickness [m]."""
     return float((plane[3] - plane[0] * along) / plane[1])
 
 
 def place_of(plane: Array, height: float) -> float:
-    """Where a head joint's plane is along the wall, at a height, in the middle of its thickness [m]."""
+    """Return the place of a head joint's plane along the wall, at a height, in the middle of its thickness [m]."""
     return float((plane[3] - plane[1] * height) / plane[0])
 
 
 def _fills(stone: FacingStone, strip: Strip) -> bool:
-    """Whether a stone takes more than half the height of the strip, where it stands."""
+    """Return whether a stone takes more than half the height of the strip at its place."""
     low, high = stone.solid.vertices[:, 1].min(), stone.solid.vertices[:, 1].max()
     along = float(stone.solid.vertices[:, 0].mean())
     bottom, top = height_of(strip.lower, along), height_of(strip.upper, along)
@@ -125,7 +125,7 @@ def _fills(stone: FacingStone, strip: Strip) -> bool:
 
 
 def _beds(stones: Sequence[FacingStone]) -> list[_Bed]:
-    """Lower and upper beds of each course of a facing; of each stone, if courses are not known."""
+    """Return lower and upper beds of each course of a facing, or of each stone if courses are unknown."""
     courses: dict[object, list[FacingStone]] = {}
     known = any(stone.course is not None for stone in stones)
     for stone in stones:
@@ -143,7 +143,7 @@ def _beds(stones: Sequence[FacingStone]) -> list[_Bed]:
 
 
 def _plane(corners: Array) -> Array:
-    """The bed plane through corners (n, 3), without those that are of another bed."""
+    """Fit the bed plane to corners (n, 3), without those of another bed."""
     near = np.abs(corners[:, 1] - np.median(corners[:, 1])) <= 2.0 * _OFF_BED
     for _ in range(3):
         some = corners[near]
@@ -158,7 +158,7 @@ def _plane(corners: Array) -> Array:
 
 
 def _between(one: Array, other: Array, place: float, height: float) -> Array:
-    """The plane half-way between two head joints, through a place at a height."""
+    """Return the plane half-way between two head joints, through a place at a height."""
     normal = one[:3] + other[:3]
     normal = normal / np.linalg.norm(normal)
     return np.append(normal, float(normal @ np.array([place, height, 0.0])))

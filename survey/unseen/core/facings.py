@@ -1,4 +1,4 @@
-"""The two facings of a wall: stones whose faces look opposite ways, back to back."""
+"""The two facings of a wall: stones whose faces point in opposite directions, back to back."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,10 +21,10 @@ __all__ = ["FacingStone", "FacingWall", "facing_stone", "find_walls", "wall_betw
 
 Indices = NDArray[np.intp]
 
-_CONVEX = 1e-7  # metres that a corner of a convex solid may stand in front of a face
-_SHARED = 0.02  # metres that two faces across a wall must cover of each other, along it and upwards
-_FLUSH = 0.15  # metres that a face may stand out from the next one of its facing
-_LEANING = 0.7  # a face looks along an axis if the cosine between them is larger
+_CONVEX = 1e-7  # metres: height of a corner of a convex solid in front of a face
+_SHARED = 0.02  # metres: least overlap of two faces across a wall, along it and upwards
+_FLUSH = 0.15  # metres: largest offset of a face from the next one of its facing
+_LEANING = 0.7  # cosine above which a face points along an axis
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class FacingStone:
 
     @cached_property
     def planes(self) -> Array:
-        """Half-spaces n·x ≤ d that hold the stone, (np, 4): those of its faces, or of its hull if it is not convex."""
+        """Half-spaces n·x ≤ d that contain the stone, (np, 4): of its faces, or of its hull if it is not convex."""
         unit = self.vectors / np.linalg.norm(self.vectors, axis=1)[:, None]
         corners = [self.solid.vertices[list(face)].mean(axis=0) for face in self.solid.faces]
         offsets = (unit * np.array(corners)).sum(axis=1)
@@ -60,7 +60,7 @@ class FacingStone:
         return np.column_stack([hull[:, :3], -hull[:, 3]])
 
     def towards(self, direction: Array) -> Indices | None:
-        """Corners of the largest face that looks along a direction; None if none does."""
+        """Return the corners of the largest face that points along a direction; None if none does."""
         areas = self.vectors @ direction
         best = int(areas.argmax())
         if areas[best] < _LEANING * float(np.linalg.norm(self.vectors[best])):
@@ -68,9 +68,9 @@ class FacingStone:
         return np.array(self.solid.faces[best], dtype=np.intp)
 
     def support(self, direction: Array) -> Array:
-        """Plane (4,) of the largest face that looks along a direction, moved out until the stone lies behind it.
+        """Return the plane (4,) of the largest face along a direction, moved out until the stone lies behind it.
 
-        Where no face looks that way, it is square to the direction.
+        Without a face that points along it, the plane is perpendicular to the direction.
         """
         face = self.towards(direction)
         normal = direction if face is None else area_vector(self.solid.vertices[face])
@@ -84,7 +84,7 @@ class FacingWall:
 
     Attributes
     ----------
-    front, back : their stones, in coordinates of the frame; the front looks along its third axis
+    front, back : their stones, in coordinates of the frame; the front faces along its third axis
     frame : along the wall, up, outward from the front; its origin is in the wall
     """
 
@@ -94,16 +94,16 @@ class FacingWall:
 
 
 def facing_stone(block: SurveyedBlock, solid: Solid | None = None) -> FacingStone:
-    """A surveyed stone; with another solid, such as that with closed joints, if it is given."""
+    """Return a surveyed stone, with another solid if given, such as one with closed joints."""
     return FacingStone(block.code, block.course, solid or block.solid, block.face.fit.normal)
 
 
 def find_walls(stones: Sequence[FacingStone], settings: InfillSettings) -> tuple[FacingWall, ...]:
-    """Walls with two facings.
+    """Find the walls with two facings.
 
-    Two stones belong to the two facings of a wall if their faces look opposite ways, each lies behind the other's
-    face at no more than the greatest thickness, and they overlap seen square to the wall. They belong to one facing
-    if their faces look one way, nearly flush, and are no farther apart than a joint. Stones that are so linked,
+    Two stones belong to the two facings of a wall if their faces point in opposite directions, each lies behind the
+    other's face within the greatest thickness, and they overlap seen square to the wall. They belong to one facing if
+    their faces point the same way, nearly flush, and are no farther apart than a joint. Stones linked in this way,
     directly or through others, make a wall.
 
     Parameters
@@ -132,12 +132,12 @@ def find_walls(stones: Sequence[FacingStone], settings: InfillSettings) -> tuple
 
 
 def wall_between(front: Sequence[FacingStone], back: Sequence[FacingStone]) -> FacingWall:
-    """The wall of two facings that are known.
+    """Return the wall of two known facings.
 
     Raises
     ------
     GeometryError
-        if one is empty, or they do not look opposite ways
+        if one is empty, or they do not face opposite ways
     """
     if not front or not back:
         raise GeometryError("a facing has no stones", remedy="name stones of both sides of the wall")
@@ -157,7 +157,7 @@ def wall_between(front: Sequence[FacingStone], back: Sequence[FacingStone]) -> F
 
 
 def _within(stones: Sequence[FacingStone], frame: WallPlane) -> tuple[FacingStone, ...]:
-    """The stones in coordinates of the frame."""
+    """Express the stones in coordinates of the frame."""
     moved = []
     for stone in stones:
         vertices = (stone.solid.vertices - frame.origin) @ frame.axes.T
@@ -173,7 +173,7 @@ def _mean_normal(stones: Sequence[FacingStone]) -> Array:
 
 
 def _linked(stones: Sequence[FacingStone], settings: InfillSettings) -> Indices:
-    """Pairs (m, 2) of stones that are back to back across a wall, or beside each other in a facing."""
+    """Return pairs (m, 2) of stones that are back to back across a wall, or beside each other in a facing."""
     if len(stones) < 2:
         return np.zeros((0, 2), np.intp)
     normals = np.array([stone.normal for stone in stones])
@@ -202,13 +202,13 @@ def _linked(stones: Sequence[FacingStone], settings: InfillSettings) -> Indices:
 
 
 def _front(stone: FacingStone) -> Array:
-    """Corners of the visible face."""
+    """Return the corners of the visible face."""
     face = stone.towards(stone.normal)
     return stone.solid.vertices if face is None else stone.solid.vertices[face]
 
 
 def _overlap(one: Array, other: Array, normal: Array) -> float:
-    """The least that the boxes of two faces cover of each other, along or up, seen square to the first [m]."""
+    """Return the least overlap of the boxes of two faces, along or up, seen square to the first [m]."""
     frame = upright_frame(normal, one[0])
     a, b = frame.flatten(one), frame.flatten(other)
     return float((np.minimum(a.max(axis=0), b.max(axis=0)) - np.maximum(a.min(axis=0), b.min(axis=0))).min())

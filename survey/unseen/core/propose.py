@@ -1,9 +1,9 @@
-"""The core between the two facings of a wall, which no survey sees: proposed from the hidden sides of the stones.
+"""Proposals for the core between the two facings of a wall, from the hidden sides of the stones.
 
-The stones of both facings are known with their depths; what lies between their hidden sides is core. It is made of
-convex blocks, cut where the joints of either facing are (`survey.unseen.core.blocks`), or of one continuum for each
-storey (`survey.unseen.core.storeys`). Stones that go through the wall, and headers whose tails meet, have no core
-behind them; nor has an opening, or a hole where a stone is missing.
+The stones of both facings are known with their depths; the space between their hidden sides is core. It is made of
+convex blocks, cut at the joints of both facings (`survey.unseen.core.blocks`), or of one continuum for each storey
+(`survey.unseen.core.storeys`). Stones that go through the wall, and headers whose tails meet, have no core behind
+them; nor has an opening, or a hole where a stone is missing.
 """
 
 from collections.abc import Collection, Sequence
@@ -22,16 +22,16 @@ __all__ = ["InfillProposal", "propose_infill"]
 
 @dataclass(frozen=True)
 class InfillProposal:
-    """A part of the core of a wall that nobody has seen.
+    """An unseen part of the core of a wall.
 
     Attributes
     ----------
     code : its name, e.g. I1-05-03: third block of course 5 of wall 1; or I1-S2: second storey of wall 1
     solid : closed; convex if it is a block
-    course : number of the course of a block; None if it is of none, or a storey
+    course : number of the course of a block; None if it belongs to none, or for a storey
     normal : (3,) of the first facing, towards the observer [-]
     volume : [m³]
-    evidence : on what it rests, in words
+    evidence : evidence, in words
     """
 
     code: str
@@ -53,9 +53,9 @@ def propose_infill(
 
     Parameters
     ----------
-    stones : with the solids that the core is to meet
-    settings : what the core is made of, and tolerances
-    facings : codes of the stones of the two facings of one wall; None: facings are recognised
+    stones : with the solids that the core meets
+    settings : make of the core, and tolerances
+    facings : codes of the stones of the two facings of one wall; None: facings are detected
     taken : codes that proposals must not have
 
     Returns
@@ -65,7 +65,7 @@ def propose_infill(
     Raises
     ------
     GeometryError
-        if facings are given that do not look opposite ways
+        if given facings do not face opposite ways
     UsageError
         if one of them is empty, or a stone is in both
     """
@@ -85,7 +85,9 @@ def propose_infill(
 def _given(stones: Sequence[FacingStone], facings: tuple[Collection[str], Collection[str]]) -> FacingWall:
     one, other = (set(codes) for codes in facings)
     if one & other:
-        raise UsageError(f"stone {min(one & other)} is in both facings", remedy="let each stone be in one")
+        raise UsageError(
+            f"stone {min(one & other)} is in both facings", remedy="name each stone in one facing only"
+        )
     front, back = ([stone for stone in stones if stone.code in codes] for codes in (one, other))
     if not front or not back:
         raise UsageError("a facing has no stones", remedy="name stones of both sides of the wall")
@@ -121,7 +123,7 @@ def _storeys(wall: FacingWall, name: str, settings: InfillSettings) -> list[Infi
 
 
 def _proposal(code: str, local: Solid, course: int | None, wall: FacingWall, text: str) -> InfillProposal:
-    """A solid of the wall's frame, in the frame of the site."""
+    """Convert a solid from the wall's frame to that of the site."""
     vertices = wall.frame.origin + local.vertices @ wall.frame.axes
     solid = Solid(code, vertices, local.faces)
     return InfillProposal(code, solid, course, wall.frame.axes[2], volume_of(local), text)

@@ -1,4 +1,4 @@
-"""How the core between two facings is made."""
+"""Settings of the core between two facings."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -7,9 +7,9 @@ __all__ = ["InfillSettings", "InfillShape"]
 
 
 class InfillShape(StrEnum):
-    """What the core of a wall is made of.
+    """Make of the core of a wall.
 
-    BLOCKS: convex blocks, cut where the joints of either facing are. STOREYS: one continuum for each storey.
+    BLOCKS: convex blocks, cut at the joints of both facings. STOREYS: one continuum for each storey.
     """
 
     BLOCKS = "blocks"
@@ -18,18 +18,18 @@ class InfillShape(StrEnum):
 
 @dataclass(frozen=True)
 class InfillSettings:
-    """How two facings are recognised, and how the core between them is made.
+    """Detection of two facings, and make of the core between them.
 
     Attributes
     ----------
     shape : blocks, or a continuum for each storey
-    storey_height : of a storey, which ends at the next bed [m]; None: the whole wall is one
-    max_thickness : of a wall, from one face to the other [m]
-    max_angle : by which two faces of a wall may be out of parallel [degrees]
-    max_joint : stones of a course that are farther apart have a hole or an opening between them [m]
-    merge : joints of the two facings that are nearer than this make one cut of the core [m]
-    min_thickness : where less is left between two hidden sides there is no core [m]
-    level : hidden sides whose depths differ by less have one plane in a continuum [m]
+    storey_height : height of a storey, which ends at the next bed [m]; None: the whole wall is one
+    max_thickness : largest thickness of a wall, from one face to the other [m]
+    max_angle : largest angle between two faces of a wall [degrees]
+    max_joint : largest distance of stones of a course without a hole or an opening between them [m]
+    merge : distance of joints of the two facings below which they make one cut of the core [m]
+    min_thickness : least distance of two hidden sides with core between them [m]
+    level : difference of depth below which hidden sides have one plane in a continuum [m]
     """
 
     shape: InfillShape = InfillShape.BLOCKS

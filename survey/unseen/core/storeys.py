@@ -1,8 +1,8 @@
-"""The core of a wall as one continuum for each storey, with plane sides that step around the tails of headers.
+"""Core of a wall as one continuum for each storey, with planar sides that step around the tails of headers.
 
 Hidden sides of about the same depth have one plane, behind the deepest of them: a level. Levels of both facings, beds
-and upright planes at the sides of deeper stones cut the wall into cells with plane sides; the core is made of those
-that no stone reaches into. What has one depth in front and one behind is a prism without steps.
+and upright planes at the sides of deeper stones cut the wall into cells with planar sides; the core consists of the
+cells that no stone reaches into. Where the front and the back have one depth each, it is a prism without steps.
 """
 
 from collections.abc import Sequence
@@ -23,8 +23,8 @@ __all__ = ["CoreStorey", "core_storeys"]
 Interval = tuple[float, float]
 
 _OUT = np.array([0.0, 0.0, 1.0])
-_TOUCHING = 1e-9  # metres by which a stone may reach into a cell without taking it
-_SNAP = 0.015  # metres: sides of deeper stones that are nearer make one cut if they can
+_TOUCHING = 1e-9  # metres: depth by which a stone may reach into a cell without taking it
+_SNAP = 0.015  # metres: distance below which sides of deeper stones make one cut if possible
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class CoreStorey:
     ----------
     solid : in the frame of the wall; convex where it has no steps
     number : of the storey, from 1 below
-    courses : first and last course that it covers; None where courses are not known
+    courses : first and last course that it covers; None if courses are unknown
     """
 
     solid: Solid
@@ -50,7 +50,7 @@ class _Deep:
     Attributes
     ----------
     stone : in the frame of the wall
-    cells : which cells it takes, of those from the front to the back between the levels
+    cells : range of the cells it takes, between the levels from the front to the back
     """
 
     stone: FacingStone
@@ -58,18 +58,18 @@ class _Deep:
 
     @property
     def along(self) -> Interval:
-        """Where it begins and ends along the wall [m]."""
+        """Its start and end along the wall [m]."""
         return float(self.stone.solid.vertices[:, 0].min()), float(self.stone.solid.vertices[:, 0].max())
 
     def above(self, plane: Array) -> Interval:
-        """Heights of its lowest and highest corner above a bed plane [m]."""
+        """Return the heights of its lowest and highest corner above a bed plane [m]."""
         heights = self.stone.solid.vertices @ plane[:3] - plane[3]
         return float(heights.min()), float(heights.max())
 
 
 @dataclass(frozen=True)
 class _Line:
-    """A bed plane (4,) that cuts the core, and by how much stones may reach across it."""
+    """A bed plane (4,) that cuts the core, and the depth by which stones may reach across it [m]."""
 
     plane: Array
     slack: float
@@ -85,7 +85,7 @@ def core_storeys(wall: FacingWall, settings: InfillSettings) -> tuple[CoreStorey
 
     Returns
     -------
-    Storeys; more than one solid of a number where stones that go through the wall, or openings, part a storey
+    Storeys; more than one solid of a number where through stones or openings divide a storey
     """
     rows = strips(wall, settings)
     planes, deep = _levels(wall, settings)
@@ -108,7 +108,7 @@ def core_storeys(wall: FacingWall, settings: InfillSettings) -> tuple[CoreStorey
 
 
 def _storeys(rows: Sequence[Strip], height: float | None) -> list[list[int]]:
-    """Numbers of the strips of each storey, from below: a storey ends at the first bed that makes it high enough."""
+    """Group the strips into storeys, from below: a storey ends at the first bed that makes it high enough."""
     groups: list[list[int]] = [[]]
     start = height_of(rows[0].lower, 0.0)
     for k, row in enumerate(rows):
@@ -121,9 +121,9 @@ def _storeys(rows: Sequence[Strip], height: float | None) -> list[list[int]]:
 
 
 def _levels(wall: FacingWall, settings: InfillSettings) -> tuple[list[Array], list[_Deep]]:
-    """Planes of all levels, from the front to the back, and the stones that are deeper than the first of their facing.
+    """Return the planes of all levels from front to back, and the stones deeper than the first of their facing.
 
-    A level that comes nearer than the least thickness to one of the other facing is none: its stones go through.
+    A level nearer than the least thickness to one of the other facing is dropped: its stones go through.
     """
     box = np.concatenate([stone.solid.vertices for stone in (*wall.front, *wall.back)])
     low, high = box.min(axis=0), box.max(axis=0)
@@ -158,7 +158,7 @@ def _levels(wall: FacingWall, settings: InfillSettings) -> tuple[list[Array], li
 def _facing_levels(
     stones: Sequence[FacingStone], inwards: Array, width: float
 ) -> tuple[list[Array], list[int]]:
-    """Planes of the levels of a facing, with normals into the wall, and the level of each stone."""
+    """Return the planes of the levels of a facing, with normals into the wall, and the level of each stone."""
     normal = np.sum([stone.support(inwards)[:3] for stone in stones], axis=0)
     normal = normal / np.linalg.norm(normal)
     depths = np.array([float((stone.solid.vertices @ normal).max()) for stone in stones])
@@ -172,10 +172,10 @@ def _facing_levels(
 
 
 def _beds(rows: Sequence[Strip], deep: Sequence[_Deep]) -> list[tuple[_Line, ...]]:
-    """Of each bed the plane that ends what is below and the one that begins what is above: one if it can be.
+    """Return the planes of each bed that end the space below and begin that above: one plane if possible.
 
-    Of stones with open joints some may reach across the bed, by less than the joints are open: closing the joints
-    will take them back.
+    With open joints some stones may reach across the bed, by less than the joints are open: closing the joints will
+    take them back.
     """
     planes = [rows[0].lower, *(row.upper for row in rows)]
     if not deep:
@@ -196,7 +196,7 @@ def _beds(rows: Sequence[Strip], deep: Sequence[_Deep]) -> list[tuple[_Line, ...
 
 
 def _one_or_two(begins: Array, ends: Array, otherwise: float) -> Interval:
-    """A place between where stones end and where others begin; two, if some begin before others end."""
+    """Return a place between the ends of stones and the starts of others; two, if some begin before others end."""
     last = float(ends.max()) if len(ends) else -np.inf
     first = float(begins.min()) if len(begins) else np.inf
     if last > first:
@@ -217,7 +217,7 @@ def _grid(
     deep: Sequence[_Deep],
     settings: InfillSettings,
 ) -> CellGrid:
-    """The cells of one storey, and which of them are of the core."""
+    """Return the cells of one storey, marked if they belong to the core."""
     covered = [_covered(wall, row, settings) for row in rows]
     here = [
         one
@@ -244,7 +244,7 @@ def _grid(
 
 
 def _covered(wall: FacingWall, row: Strip, settings: InfillSettings) -> list[Interval]:
-    """Where there are stones in front and behind along a strip."""
+    """Return the intervals along a strip with stones in front and behind."""
     spans = [_spans(row, side, settings) for side in (wall.front, wall.back)]
     both = [(max(a, c), min(b, d)) for a, b in spans[0] for c, d in spans[1]]
     return sorted(one for one in both if one[1] > one[0])
@@ -261,7 +261,7 @@ def _spans(row: Strip, stones: Sequence[FacingStone], settings: InfillSettings) 
 
 
 def _places(deep: Sequence[_Deep], covered: Sequence[Sequence[Interval]]) -> list[float]:
-    """Where the storey is cut along the wall: at the sides of deeper stones, and where a facing begins or ends."""
+    """Return the cuts of the storey along the wall: sides of deeper stones, and ends of a facing."""
     marks = [(place, kind) for one in deep for place, kind in zip(one.along, (True, False), strict=True)]
     ends = sorted(place for spans in covered for span in spans for place in span)
     if not ends:

@@ -1,4 +1,4 @@
-"""Gaps in the rows of voussoirs of arches, by the angles at which their joints point to the centre."""
+"""Gaps between the voussoirs of arches, from the angles at which their joints point to the centre."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,18 +18,18 @@ __all__ = ["ArchGap", "arch_gaps", "voussoir_outlines"]
 Ends = tuple[int, int]
 
 _WEDGES = {"voussoir", "keystone"}
-_ENOUGH = 3  # voussoirs from which the centre of an arch is found
-_REACH = 3.4  # lengths of a voussoir within which the next one stands, where one or two are missing
-_OFF_CENTRE = 0.15  # radii by which the joint of a springer may pass by the centre
-_ONE_SKEWBACK = float(np.radians(4.0))  # sides of springers that are nearer to parallel are one
+_ENOUGH = 3  # least number of voussoirs for the centre of an arch
+_REACH = 3.4  # lengths of a voussoir to the next one, where one or two are missing
+_OFF_CENTRE = 0.15  # radii: largest distance of a springer's joint from the centre
+_ONE_SKEWBACK = float(np.radians(4.0))  # angle within which sides of springers are one skewback
 _SHORTEST = 0.2  # sine of the least rise of a skewback
-_CROWDED = 0.5  # part of a voussoir's angle by which two of one ring may overlap
-_LEVEL = 0.03  # metres by which the ends of a level extrados may differ in height
+_CROWDED = 0.5  # of a voussoir's angle: largest overlap of two of one ring
+_LEVEL = 0.03  # metres: height difference of the ends of a level extrados
 
 
 @dataclass(frozen=True)
 class _Side:
-    """A side that points to the centre: its line, its angle from the plumb line to the right, its two ends."""
+    """A side that points to the centre: its line, its angle clockwise from the vertical, its two ends."""
 
     line: Line
     angle: float
@@ -39,16 +39,16 @@ class _Side:
 
 @dataclass(frozen=True)
 class ArchGap:
-    """Where voussoirs are missing in an arch.
+    """A gap of missing voussoirs in an arch.
 
     Attributes
     ----------
     left, right : the stones beside it
     sides : their sides towards it
-    count : how many are missing
-    keystone : which of them is at the crown of an arch that has no keystone; None if none is
+    count : number of missing voussoirs
+    keystone : index of the one at the crown of an arch without a keystone; None if there is none
     centre : of the arch, (2,) [m]
-    usual : angle that a voussoir usually takes [rad]
+    usual : usual angle of a voussoir [rad]
     """
 
     left: FlatStone
@@ -61,7 +61,7 @@ class ArchGap:
 
 
 def arch_gaps(elevation: Elevation, settings: MissingSettings) -> tuple[ArchGap, ...]:
-    """Gaps between the voussoirs of every arch, and between them and its springers, from left to right."""
+    """Return the gaps between the voussoirs of every arch, and between them and its springers, from left to right."""
     found: list[ArchGap] = []
     for wedges in _arches(elevation):
         centre = _centre(wedges)
@@ -76,7 +76,7 @@ def arch_gaps(elevation: Elevation, settings: MissingSettings) -> tuple[ArchGap,
 
 
 def voussoir_outlines(gap: ArchGap, joint: float) -> list[Array]:
-    """Outlines (4, 2) of the missing voussoirs: intrados left, intrados right, extrados right, extrados left."""
+    """Return the outlines (4, 2) of the missing voussoirs: intrados left and right, extrados right and left."""
     left, right = gap.sides
     inside = 0.5 * (left.inner + right.inner)
     first, last = left.line.moved(inside, joint), right.line.moved(inside, joint)
@@ -95,7 +95,7 @@ def voussoir_outlines(gap: ArchGap, joint: float) -> list[Array]:
 
 
 def _on(line: Line, gap: ArchGap, outer: bool) -> Array:
-    """Where a joint ends: on the line from the left neighbour's corner to the right one's, or on their arc."""
+    """Return the end of a joint: on the line between the neighbours' corners, or on their arc."""
     one, other = ((side.outer if outer else side.inner) for side in gap.sides)
     straight = meeting(line, line_through(one, other))
     if gap.count == 1 or (outer and abs(other[1] - one[1]) < _LEVEL):
@@ -109,12 +109,12 @@ def _on(line: Line, gap: ArchGap, outer: bool) -> Array:
 
 
 def _offset(line: Line, by: float) -> Line:
-    """The parallel to a line that points up, at a distance to its right."""
+    """Return the parallel to an upward line, at a distance to its right."""
     return Line(line.point + by * np.array([line.direction[1], -line.direction[0]]), line.direction)
 
 
 def _arches(elevation: Elevation) -> list[list[FlatStone]]:
-    """Voussoirs and keystones that follow one another, one or two missing ones left out."""
+    """Return rows of voussoirs and keystones with at most two missing between neighbours."""
     stones = [stone for stone in elevation.stones if stone.block.kind in _WEDGES]
     if len(stones) < _ENOUGH:
         return []
@@ -128,9 +128,9 @@ def _arches(elevation: Elevation) -> list[list[FlatStone]]:
 
 
 def _centre(stones: Sequence[FlatStone]) -> Array | None:
-    """The point that the joints of an arch are nearest to; None if they are parallel.
+    """Return the point nearest to the joints of an arch; None if they are parallel.
 
-    First the joints are taken for the sides that look along the row, then for those that look around the centre.
+    The joints are first taken to be the sides that face along the row, then those that face around the centre.
     """
     crowd = np.mean([stone.centre for stone in stones], axis=0)
     along = [_along(stone, stones) for stone in stones]
@@ -157,7 +157,7 @@ def _centre(stones: Sequence[FlatStone]) -> Array | None:
 
 
 def _along(stone: FlatStone, stones: Sequence[FlatStone]) -> Array:
-    """Direction of the row at a stone: from its nearest neighbour, or to it."""
+    """Return the direction of the row at a stone: from its nearest neighbour, or to it."""
     others = sorted(
         (one for one in stones if one is not stone),
         key=lambda one: float(np.linalg.norm(one.centre - stone.centre)),
@@ -168,7 +168,7 @@ def _along(stone: FlatStone, stones: Sequence[FlatStone]) -> Array:
 
 
 def _sides(stone: FlatStone, centre: Array) -> tuple[FlatStone, _Side, _Side] | None:
-    """A voussoir with its left and its right side."""
+    """Return a voussoir with its left and right sides; None if it lacks one."""
     radial = (stone.centre - centre) / np.linalg.norm(stone.centre - centre)
     clockwise = np.array([radial[1], -radial[0]])
     ends = [stone.side_ends(sign * clockwise) for sign in (-1.0, 1.0)]
@@ -179,7 +179,7 @@ def _sides(stone: FlatStone, centre: Array) -> tuple[FlatStone, _Side, _Side] | 
 
 
 def _side(stone: FlatStone, ends: Ends, opposite: Ends | None, centre: Array) -> _Side:
-    """One side; a worn corner is put where the side reaches as far as the opposite one."""
+    """Return one side; a worn corner is put where the side reaches as far as the opposite one."""
     inner, outer = _by_distance(stone, ends, centre)
     sound = [k for k in (inner, outer) if k not in stone.worn]
     middle = stone.outline[[inner, outer]].mean(axis=0) - centre
@@ -199,13 +199,13 @@ def _side(stone: FlatStone, ends: Ends, opposite: Ends | None, centre: Array) ->
 
 
 def _by_distance(stone: FlatStone, ends: Ends, centre: Array) -> Ends:
-    """The ends of a side at the intrados and at the extrados."""
+    """Return the ends of a side, that at the intrados first."""
     far = np.linalg.norm(stone.outline[list(ends)] - centre, axis=1)
     return ends if far[0] < far[1] else (ends[1], ends[0])
 
 
 def _mended(worn: Array, other: Array, line: Line, centre: Array) -> Array:
-    """The end of a side whose corner is worn: as far out as the other end of its edge, or as high."""
+    """Restore the end of a side whose corner is worn: as far out as the other end of its edge, or as high."""
     up = line.direction if line.direction @ (worn - centre) > 0.0 else -line.direction
     start = line.point - up * float((line.point - centre) @ up)
     beside = float(np.linalg.norm(start - centre))
@@ -219,7 +219,7 @@ def _mended(worn: Array, other: Array, line: Line, centre: Array) -> Array:
 def _springing(
     springers: Sequence[FlatStone], centre: Array, row: Sequence[tuple[FlatStone, _Side, _Side]]
 ) -> list[tuple[FlatStone, _Side, _Side]]:
-    """The skewbacks on both sides of an arch: of each all springers, one on the other, together."""
+    """Return the skewbacks on both sides of an arch: each one from all springers on top of one another."""
     far = [float(np.linalg.norm(point - centre)) for _, one, _ in row for point in (one.inner, one.outer)]
     middle = float(np.mean([stone.centre[0] for stone, _, _ in row]))
     found = []
@@ -245,7 +245,7 @@ def _springing(
 
 
 def _skewback(stone: FlatStone, sign: float, centre: Array) -> _Side | None:
-    """The side of a springer that points to the centre; to the right of it for a `sign` of 1."""
+    """Return the side of a springer that points to the centre; to the right of it for a `sign` of 1."""
     best: tuple[float, Ends] | None = None
     for k in range(len(stone.outline)):
         ends = (k, (k + 1) % len(stone.outline))
@@ -263,7 +263,7 @@ def _skewback(stone: FlatStone, sign: float, centre: Array) -> _Side | None:
 def _gaps(
     row: Sequence[tuple[FlatStone, _Side, _Side]], centre: Array, settings: MissingSettings
 ) -> list[ArchGap]:
-    """Gaps between the stones of a row."""
+    """Return the gaps between the stones of a row."""
     turns = np.array([right.angle - left.angle for stone, left, right in row if stone.block.kind in _WEDGES])
     usual = float(np.median(turns))
     found = []

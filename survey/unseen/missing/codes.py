@@ -1,4 +1,4 @@
-"""Codes for stones that nobody has seen, after those of their neighbours."""
+"""Codes for missing stones, derived from those of their neighbours."""
 
 import re
 
@@ -6,18 +6,18 @@ __all__ = ["FreeCodes"]
 
 
 class FreeCodes:
-    """Codes that are taken, and the next one that is free.
+    """Supply of free codes.
 
     Parameters
     ----------
-    taken : codes of stones; those that are given are added
+    taken : codes of stones; codes handed out are added
     """
 
     def __init__(self, taken: set[str]) -> None:
         self._taken = taken
 
     def after(self, left: str, right: str) -> str:
-        """H- and the code that a stone between two others would have: the next number after the left one."""
+        """Return H- and the code of a stone between two others: the next free number after the left one."""
         left, right = left.removeprefix("H-"), right.removeprefix("H-")
         for code, step in ((left, 1), (right, -1)):
             number = re.search(r"\d+$", code)

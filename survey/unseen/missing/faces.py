@@ -1,4 +1,4 @@
-"""From the outline of a missing stone in the elevation to a stone in space, with its evidence."""
+"""Conversion of a missing stone's outline in the elevation to a stone in space, with its evidence."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -18,13 +18,13 @@ from survey.unseen.missing.sides import Elevation, FlatStone
 __all__ = ["MissingFace", "is_plausible", "stone_of"]
 
 
-_SHORTEST = 0.05  # metres
-_ENOUGH = 3  # faces that have a common plane
+_SHORTEST = 0.05  # metres: least length of a side
+_ENOUGH = 3  # least number of faces for a common plane
 
 
 @dataclass(frozen=True)
 class MissingFace:
-    """What is thought of a stone that is missing, in the elevation.
+    """Hypothesis of a missing stone, in the elevation.
 
     Attributes
     ----------
@@ -33,8 +33,8 @@ class MissingFace:
     beside : its neighbours
     depth : with the evidence
     sigma : standard deviation of a corner in the plane of the facade [m]
-    along_sigma : the same of what is not known besides, along the facade: where two missing stones meet [m]
-    evidence : of outline and kind, in words
+    along_sigma : additional standard deviation along the facade, where two missing stones meet [m]
+    evidence : evidence of outline and kind, in words
     """
 
     code: str
@@ -74,7 +74,7 @@ def stone_of(face: MissingFace, elevation: Elevation) -> SurveyedBlock:
 
 
 def is_plausible(outline: Array) -> bool:
-    """Whether corners (4, 2) make a stone: convex, counter-clockwise, no side shorter than 5 cm."""
+    """Return whether corners (4, 2) make a stone: convex, counter-clockwise, no side shorter than 5 cm."""
     run = np.roll(outline, -1, axis=0) - outline
     after = np.roll(run, -1, axis=0)
     turns = run[:, 0] * after[:, 1] - run[:, 1] * after[:, 0]
@@ -82,7 +82,7 @@ def is_plausible(outline: Array) -> bool:
 
 
 def _plane(corners: Array, beside: Sequence[FlatStone], elevation: Elevation) -> PlaneEstimate:
-    """The common plane of the faces near an outline, else of all of the facade, else that of a neighbour."""
+    """Return the common plane of the faces near an outline, or of all of the facade, or that of a neighbour."""
     faces = [stone.block.face for stone in elevation.stones]
     around = elevation.neighbours
     near = around.near(corners, elevation.frame.axes[2])
@@ -99,7 +99,7 @@ def _plane(corners: Array, beside: Sequence[FlatStone], elevation: Elevation) ->
 
 
 def _fit(plane: PlaneEstimate, corners: Array) -> FaceFit:
-    """The predicted plane as any other, without residuals, its covariance at the middle of the corners."""
+    """Return the predicted plane as a fit without residuals, with its covariance at the middle of the corners."""
     middle = corners.mean(axis=0)
     carry = np.eye(3)
     carry[2, :2] = plane.axes @ (middle - plane.centroid)

@@ -1,4 +1,4 @@
-"""Gaps in the courses of a facade, put together to holes, and which of them are openings."""
+"""Gaps in the courses of a facade, grouped into holes, and the signs of openings."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,11 +16,11 @@ __all__ = ["CourseGap", "Gaps", "Hole", "find_gaps", "find_holes", "opening_sign
 
 _UP, _DOWN = np.array([0.0, 1.0]), np.array([0.0, -1.0])
 _LEVEL = np.array([1.0, 0.0])
-_AROUND = 4  # stones of the course from which the beds beside a gap are drawn
-_SAME_BED = 0.05  # metres: ends of stones that are farther apart are not of one bed
-_BEYOND = 0.05  # metres above and below a gap at which stones are looked for
+_AROUND = 4  # stones of the course that define the beds beside a gap
+_SAME_BED = 0.05  # metres: largest distance of ends of stones from one bed
+_BEYOND = 0.05  # metres above and below a gap at which stones are sought
 _SAMPLES = 21
-_SHARED = 0.05  # metres by which gaps of two courses must overlap to be one hole
+_SHARED = 0.05  # metres: least overlap of gaps of two courses that are one hole
 _FRAMES = {"jamb": "a jamb", "mullion": "a mullion"}
 _BELOW = {"sill": "a sill"}
 _ABOVE = {"lintel": "a lintel", "voussoir": "an arch", "keystone": "an arch"}
@@ -28,15 +28,15 @@ _ABOVE = {"lintel": "a lintel", "voussoir": "an arch", "keystone": "an arch"}
 
 @dataclass(frozen=True)
 class CourseGap:
-    """Where no stone is known between two neighbours of a course.
+    """A gap without known stones between two neighbours of a course.
 
     Attributes
     ----------
-    zone, course : where it is
+    zone, course : location
     left, right : the neighbours
-    start, stop : between them, at half the height of the course [m]
+    start, stop : ends of the gap, at half the height of the course [m]
     lower, upper : lines of its beds
-    below, above : index of the stone at places along it, under and over it; -1 where there is none, -2 for the ground
+    below, above : index of the stone under and over it at places along it; -1 for none, -2 for the ground
     """
 
     zone: str | None
@@ -63,7 +63,7 @@ class CourseGap:
 
 @dataclass(frozen=True)
 class Gaps:
-    """What the courses of a facade leave open.
+    """Gaps and joints of the courses of a facade.
 
     Attributes
     ----------
@@ -77,13 +77,13 @@ class Gaps:
 
 @dataclass(frozen=True)
 class Hole:
-    """Gaps that are one above the other.
+    """Gaps one above the other.
 
     Attributes
     ----------
     gaps : from below
-    courses : how many courses high it is
-    bounded : least part of the length of any of its gaps that has stones, or another gap, below it and above it [-]
+    courses : height in courses
+    bounded : least part of the length of any of its gaps with stones, or another gap, both below and above [-]
     """
 
     gaps: tuple[CourseGap, ...]
@@ -92,7 +92,7 @@ class Hole:
 
 
 def find_gaps(elevation: Elevation, settings: MissingSettings) -> Gaps:
-    """All gaps in the courses of a facade, course by course from below, from left to right."""
+    """Return all gaps in the courses of a facade, course by course from below, from left to right."""
     stones = elevation.stones
     low, high = elevation.boxes[:, 0, 1], elevation.boxes[:, 1, 1]
     courses: dict[tuple[str, int], list[FlatStone]] = {}
@@ -116,7 +116,7 @@ def find_gaps(elevation: Elevation, settings: MissingSettings) -> Gaps:
 
 
 def find_holes(gaps: Sequence[CourseGap]) -> tuple[Hole, ...]:
-    """Put gaps together that lie on one another."""
+    """Group gaps that lie on one another."""
     pairs = [
         (i, j)
         for i, one in enumerate(gaps)
@@ -136,7 +136,7 @@ def find_holes(gaps: Sequence[CourseGap]) -> tuple[Hole, ...]:
 
 
 def opening_signs(hole: Hole, elevation: Elevation) -> tuple[str, ...]:
-    """What frames a hole as one frames openings: jambs, a sill, a lintel, an arch."""
+    """Return the signs that a hole is framed as an opening: jambs, a sill, a lintel, an arch."""
     signs = []
     for gap in hole.gaps:
         signs += [f"{_FRAMES[kind]} on the left" for kind in [gap.left.block.kind] if kind in _FRAMES]
@@ -157,7 +157,7 @@ def _ends(members: Sequence[FlatStone]) -> tuple[float, float]:
 
 
 def _middle(members: Sequence[FlatStone]) -> Line:
-    """The line at half the height of a course, without stones that are much higher than the others."""
+    """Return the line at half the height of a course, without stones much higher than the others."""
     heights = np.array([np.ptp(stone.outline[:, 1]) for stone in members])
     usual = np.abs(heights - np.median(heights)) <= 0.3 * np.median(heights)
     boxes = np.array([[stone.outline.min(axis=0), stone.outline.max(axis=0)] for stone in members])
@@ -165,7 +165,7 @@ def _middle(members: Sequence[FlatStone]) -> Line:
 
 
 def _fitted(points: Array) -> Line:
-    """The nearly level line through points (n, 2)."""
+    """Fit a nearly level line to points (n, 2)."""
     centre = points.mean(axis=0)
     arms = points - centre
     spread = float((arms[:, 0] ** 2).sum())
@@ -177,7 +177,7 @@ def _fitted(points: Array) -> Line:
 def _between(
     stones: Sequence[FlatStone], middle: Line, ends: tuple[float, float]
 ) -> list[tuple[FlatStone, FlatStone, float, float]]:
-    """Neighbours along a line, and where the one ends and the other begins."""
+    """Yield neighbours along a line, with the end of the one and the start of the other."""
     spans = [(span, stone) for stone in stones if (span := stone.crossing(middle)) is not None]
     spans = [(span, stone) for span, stone in spans if span[1] > ends[0] and span[0] < ends[1]]
     spans.sort(key=lambda one: one[0])
@@ -214,7 +214,7 @@ def _gap(
 
 
 def _bed(members: Sequence[FlatStone], towards: Array, start: float, stop: float) -> Line | None:
-    """Upper or lower bed of a course at a gap, through sound corners of the nearest stones of the course."""
+    """Fit the upper or lower bed of a course at a gap to sound corners of the nearest stones of the course."""
     sides = [(stone, stone.side_ends(towards)) for stone in members]
     known = [(stone, ends) for stone, ends in sides if ends is not None and not stone.worn & set(ends)]
     known.sort(key=lambda one: max(start - one[0].centre[0], one[0].centre[0] - stop))
@@ -227,7 +227,7 @@ def _bed(members: Sequence[FlatStone], towards: Array, start: float, stop: float
 
 
 def _stones_at(elevation: Elevation, places: Array, bed: Line, above: float) -> Ints:
-    """Which stone is at places along a bed, some way above it; -1 where there is none."""
+    """Return the stone at each place at a height above a bed; -1 where there is none."""
     found = np.full(len(places), -1, dtype=np.int64)
     points = np.array([[place, bed.at_place(place) + above] for place in places.tolist()])
     boxes = elevation.boxes
@@ -241,7 +241,7 @@ def _stones_at(elevation: Elevation, places: Array, bed: Line, above: float) -> 
 
 
 def _on_the_ground(elevation: Elevation, lower: Line, start: float, stop: float) -> bool:
-    """Whether no stone is known under a gap, however deep."""
+    """Return whether no stone is known under a gap at any depth."""
     boxes = elevation.boxes
     over = (boxes[:, 1, 0] > start) & (boxes[:, 0, 0] < stop)
     return not bool((boxes[over, :, 1].mean(axis=1) < lower.at_place(0.5 * (start + stop))).any())
@@ -256,7 +256,7 @@ def _lies_on(upper: CourseGap, lower: CourseGap) -> bool:
 
 
 def _bounded(gap: CourseGap, hole: Sequence[CourseGap]) -> float:
-    """Least part of a gap's length with stones, the ground or another gap of its hole, below or above it."""
+    """Return the least part of a gap's length with stones, the ground or another gap of its hole, below or above."""
     places = gap.start + (np.arange(_SAMPLES) + 0.5) / _SAMPLES * gap.width
     parts = []
     for found, others in (

@@ -1,11 +1,11 @@
-"""Which stones would fill a gap: the usual lengths and depths of the kinds of a facade.
+"""Stones that would fill a gap, from the usual lengths and depths of the kinds of a facade.
 
 A gap of width w is filled by stones of kinds k₁ … kₙ with probability
 
     p(k₁ … kₙ | w) ∝ rⁿ⁻¹ · n!/(…) · Π pₖ · N(w - (n + 1) j; Σ lₖ, Σ σₖ²)
 
-with the share pₖ of a kind, its usual length lₖ and how much that varies, σₖ, the usual joint j, and r, how much rarer
-it is that a further stone is missing beside one.
+with the share pₖ of a kind, the mean lₖ and standard deviation σₖ of its length, the usual joint j, and the factor r
+by which each further missing stone is less likely.
 """
 
 import math
@@ -37,11 +37,11 @@ _PARTICULAR = {
     "infill",
     "support",
 }
-_ENOUGH = 3  # stones of a kind from which its usual length is known
-_LEAST_SIGMA = 0.02  # metres by which lengths of a kind vary at the least
-_FURTHER = 0.3  # how much rarer it is that a further stone is missing
-_UNLIKELY = 3.5  # standard deviations
-_CLOSE = 0.1  # metres: head joints of two courses that are farther apart are as good as any
+_ENOUGH = 3  # least number of stones of a kind for its usual length
+_LEAST_SIGMA = 0.02  # metres: least standard deviation of a kind's length
+_FURTHER = 0.3  # factor by which each further missing stone is less likely [-]
+_UNLIKELY = 3.5  # standard deviations beyond which a length is unusual
+_CLOSE = 0.1  # metres: distance of head joints of two courses beyond which they count as staggered
 
 
 @dataclass(frozen=True)
@@ -63,13 +63,13 @@ class UsualKind:
 
 @dataclass(frozen=True)
 class Filling:
-    """What would fill a gap.
+    """Stones that would fill a gap.
 
     Attributes
     ----------
-    kinds : of its stones
-    probability : against all other fillings that were thought of [-]
-    off : difference of the gap's width from their usual length together, in standard deviations
+    kinds : of the stones
+    probability : against all other fillings considered [-]
+    off : difference of the gap's width from their total usual length, in standard deviations
     """
 
     kinds: tuple[str, ...]
@@ -78,12 +78,12 @@ class Filling:
 
     @property
     def usual(self) -> bool:
-        """Whether stones of such lengths are known on the facade."""
+        """True if stones of such lengths are known on the facade."""
         return abs(self.off) <= _UNLIKELY
 
 
 def usual_kinds(elevation: Elevation) -> tuple[UsualKind, ...]:
-    """The kinds of plain stones of a facade; kinds that frame openings and arches, and corners, are left out."""
+    """Return the kinds of plain stones of a facade, without those that frame openings and arches, and corners."""
     lengths: dict[str, list[float]] = {}
     for stone in elevation.stones:
         if stone.block.course is not None and stone.block.kind not in _PARTICULAR:
@@ -104,7 +104,7 @@ def usual_kinds(elevation: Elevation) -> tuple[UsualKind, ...]:
 def likeliest(
     width: float, joint: float, kinds: Sequence[UsualKind], settings: MissingSettings
 ) -> Filling | None:
-    """The likeliest stones in a gap; None if no kind is known."""
+    """Return the most likely stones in a gap; None if no kind is known."""
     found = []
     for count in range(1, settings.max_stones + 2):
         for some in combinations_with_replacement(kinds, count):
@@ -125,10 +125,10 @@ def likeliest(
 def split(
     gap: CourseGap, filling: Filling, kinds: Sequence[UsualKind], elevation: Elevation
 ) -> tuple[tuple[str, ...], tuple[float, ...]]:
-    """The order of several stones in a gap, and where one ends and the next begins.
+    """Return the order of several stones in a gap, and the places along it where they meet.
 
-    Their usual lengths are stretched to fill the gap; of all orders that one is taken whose joints stay farthest
-    from the head joints of the courses above and below.
+    Their usual lengths are stretched to fill the gap; the order is chosen whose joints stay farthest from the head
+    joints of the courses above and below.
     """
     lengths = {one.kind: one.length for one in kinds}
     avoid = _joints_around(gap, elevation)
@@ -151,7 +151,7 @@ def split(
 def depth_of_kind(
     kind: str, gap_beside: Sequence[FlatStone], elevation: Elevation, course: int | None
 ) -> Depth:
-    """How deep a stone of a kind probably is: as those of its course, else of the facade, else as its neighbours."""
+    """Return the probable depth of a kind: that of its course, or of the facade, or of its neighbours."""
     alike = [stone.block for stone in elevation.stones if stone.block.kind == kind]
     same = [block for block in alike if course is not None and block.course == course]
     blocks, where = (same, f" of course {course}") if len(same) >= _ENOUGH else (alike, "")
@@ -169,7 +169,7 @@ def depth_of_kind(
 
 
 def _joints_around(gap: CourseGap, elevation: Elevation) -> Array:
-    """Ends of the stones above and below a gap, along the wall [m]."""
+    """Return the ends of the stones above and below a gap, along the wall [m]."""
     places = []
     for found in (gap.below, gap.above):
         for i in sorted({i for i in found.tolist() if i >= 0}):

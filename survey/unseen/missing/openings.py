@@ -1,7 +1,7 @@
-"""Stones that are missing in the frame of an opening: jambs beside it, the sill below it.
+"""Missing stones in the frame of an opening: jambs beside it, the sill below it.
 
-The other jambs tell where the opening begins and ends. A course whose gap reaches beyond that lacks its jamb; the
-lowest gap, if it reaches beyond on both sides, lacks the sill.
+The other jambs show the edges of the opening. A course whose gap reaches beyond them lacks its jamb; the lowest gap,
+if it reaches beyond on both sides, lacks the sill.
 """
 
 from collections.abc import Iterator
@@ -15,21 +15,21 @@ from survey.unseen.missing.sides import Elevation
 
 __all__ = ["FrameGap", "frame_gaps"]
 
-_ENOUGH = 2  # jambs on one side that tell where the opening is
+_ENOUGH = 2  # least number of jambs on one side that show the edge of the opening
 _STRAIGHT = 0.03  # metres by which they may differ
 _OF_ARCHES = {"voussoir", "keystone", "springer"}
-_LONGEST = 1.3  # times the longest jamb of the facade: a longer gap lacks other stones too
+_LONGEST = 1.3  # of the longest jamb of the facade: a longer gap lacks other stones too
 
 
 @dataclass(frozen=True)
 class FrameGap:
-    """Where a stone of an opening's frame is missing.
+    """A gap of a stone of an opening's frame.
 
     Attributes
     ----------
     gap : of the course
     kind : "jamb" or "sill"
-    start, stop : where the stone ends on the side of the opening [m]; None: at the neighbour's joint
+    start, stop : ends of the stone on the side of the opening [m]; None: at the neighbour's joint
     """
 
     gap: CourseGap
@@ -41,12 +41,12 @@ class FrameGap:
 def frame_gaps(
     hole: Hole, signs: tuple[str, ...], elevation: Elevation, settings: MissingSettings
 ) -> Iterator[FrameGap]:
-    """The stones that are missing around an opening.
+    """Return the missing stones around an opening.
 
     Parameters
     ----------
     hole : the opening
-    signs : what frames it, as `missing_stones_gaps.opening_signs` says
+    signs : signs of its frame, as of `survey.unseen.missing.gaps.opening_signs`
     elevation : the facade
     settings : the least length of a stone
     """
@@ -62,7 +62,7 @@ def frame_gaps(
             if (gap.below != -1).mean() >= settings.covered:
                 yield FrameGap(gap, "sill", None, None)
             continue
-        # a course above the jambs, at the arch, is none of theirs
+        # a course above the jambs, at the arch, has no jamb
         spans = gap.start <= left + _STRAIGHT and gap.stop >= right - _STRAIGHT
         spans = spans and not {gap.left.block.kind, gap.right.block.kind} & _OF_ARCHES
         if spans and settings.min_length < before <= longest and gap.left.block.kind != "jamb":
@@ -72,7 +72,7 @@ def frame_gaps(
 
 
 def _reveal(places: list[float]) -> float | None:
-    """Where an opening begins or ends, if enough jambs agree on it."""
+    """Return the edge of an opening, if enough jambs agree on it."""
     if len(places) < _ENOUGH:
         return None
     middle = float(np.median(places))

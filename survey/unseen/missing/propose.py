@@ -1,9 +1,9 @@
-"""Stones that are missing in the survey of a wall, proposed from their neighbours.
+"""Proposals for missing stones of a surveyed wall, from their neighbours.
 
-A hole is a gap between two neighbours of a course that is wider than a joint and has stones, or the ground, below
-it and stones above it; in an arch, an angle between two voussoirs that no joint is wide. Openings stay open: what two
-jambs, a jamb and a sill or the like frame, what is several courses high, and what would take many stones. The end of a
-wall and its top tell nothing of what may be missing there.
+A hole is a gap between two neighbours of a course that is wider than a joint, with stones, or the ground, below
+and stones above; in an arch, an angle between two voussoirs wider than any joint. Openings stay open: gaps framed by
+two jambs, a jamb and a sill or the like, gaps several courses high, and gaps that would take many stones. The end of
+a wall and its top give no evidence of missing stones.
 """
 
 from collections.abc import Collection, Iterator, Sequence
@@ -28,22 +28,22 @@ __all__ = ["MissingStone", "propose_missing"]
 
 _LEFT, _RIGHT, _UPRIGHT = np.array([-1.0, 0.0]), np.array([1.0, 0.0]), np.array([0.0, 1.0])
 _USUAL_JOINT = 0.01  # metres, where no joint can be measured
-_SCATTER = 0.003  # metres: how far a stone ends from the middle of its joint, one time as another
-_TALL = 0.04  # metres: ends of gaps of two courses that are nearer belong to one stone
-_ROUNDS = 4  # of proposals that rest on those of the round before
-_BEHIND = 0.05  # metres behind its face where a proposal is compared with stones seen from elsewhere
-_SPLIT_SIGMA = 0.08  # metres: how well the joint between two missing stones is known
+_SCATTER = 0.003  # metres: standard deviation of a stone's end about the middle of its joint
+_TALL = 0.04  # metres: distance of ends of gaps of two courses below which they belong to one stone
+_ROUNDS = 4  # rounds of proposals, each of which rests on the one before
+_BEHIND = 0.05  # metres: depth behind the face at which stones seen from elsewhere are compared
+_SPLIT_SIGMA = 0.08  # metres: standard deviation of the joint between two missing stones
 
 
 @dataclass(frozen=True)
 class MissingStone:
-    """A stone that the survey does not have, as it probably is.
+    """A missing stone of a survey, as it probably is.
 
     Attributes
     ----------
     block : the stone; its face's provenance is "hypothesis", with the evidence
-    beside : codes of the stones, or proposals, on its left and on its right
-    notes : what makes it less certain, in words
+    beside : codes of the stones, or proposals, to its left and right
+    notes : reasons for less certainty, in words
     """
 
     block: SurveyedBlock
@@ -52,7 +52,7 @@ class MissingStone:
 
     @property
     def evidence(self) -> str:
-        """On what it rests, in words."""
+        """Evidence for the stone, in words."""
         return self.block.face.provenance.text
 
 
@@ -62,13 +62,13 @@ def propose_missing(
     *,
     taken: Collection[str] = (),
 ) -> tuple[MissingStone, ...]:
-    """Propose the stones that are missing in all facades of a survey.
+    """Propose the missing stones of all facades of a survey.
 
     Parameters
     ----------
-    blocks : all stones that are known
-    settings : what counts as a hole, and what as an opening
-    taken : codes that proposals must not have, besides those of the stones
+    blocks : all known stones
+    settings : criteria of holes and openings
+    taken : codes, besides those of the stones, that proposals must not have
 
     Returns
     -------
@@ -80,7 +80,7 @@ def propose_missing(
     for elevation in elevations(blocks):
         mine = {id(stone.block) for stone in elevation.stones}
         others = [block for block in blocks if id(block) not in mine]
-        # what was beside a missing jamb is a hole of its own once the jamb is there
+        # the space beside a missing jamb is a hole of its own once the jamb is there
         for _ in range(_ROUNDS):
             new = []
             for propose in (_voussoirs, _of_courses):
@@ -95,7 +95,7 @@ def propose_missing(
 
 
 def _is_there(proposal: SurveyedBlock, others: Sequence[SurveyedBlock]) -> bool:
-    """Whether another stone, seen from elsewhere, takes the middle of the proposal: it reaches through the wall."""
+    """Return whether another stone, seen from elsewhere, reaches through the wall to the middle of the proposal."""
     outline = proposal.face.outline
     middle = outline.mean(axis=0) - _BEHIND * proposal.face.fit.normal
     places = np.concatenate([[middle], 0.5 * (middle + outline - _BEHIND * proposal.face.fit.normal)])
@@ -193,7 +193,7 @@ def _of_courses(elevation: Elevation, settings: MissingSettings, codes: FreeCode
 def _frame_stone(
     frame: FrameGap, joint: float, elevation: Elevation, codes: FreeCodes
 ) -> Iterator[MissingStone]:
-    """A jamb that ends where the others do, or a sill."""
+    """Propose a jamb that ends where the others do, or a sill."""
     gap = frame.gap
     beside = (gap.left, gap.right)
     sides = _sides(gap, gap.upper, joint)
@@ -227,7 +227,7 @@ def _frame_stone(
 
 
 def _sides(gap: CourseGap, upper: Line, joint: float) -> tuple[Line, Line]:
-    """Where a stone in a gap would end: a joint away from its neighbours."""
+    """Return the sides of a stone in a gap: a joint away from its neighbours."""
     inside = np.array([gap.middle, 0.5 * (gap.lower.at_place(gap.middle) + upper.at_place(gap.middle))])
     left = gap.left.side(_RIGHT, _UPRIGHT) or Line(np.array([gap.start, inside[1]]), _UPRIGHT)
     right = gap.right.side(_LEFT, _UPRIGHT) or Line(np.array([gap.stop, inside[1]]), _UPRIGHT)
@@ -235,13 +235,13 @@ def _sides(gap: CourseGap, upper: Line, joint: float) -> tuple[Line, Line]:
 
 
 def _quadrilateral(left: Line, right: Line, lower: Line, upper: Line) -> Array:
-    """Corners (4, 2), counter-clockwise from the lower left one."""
+    """Return corners (4, 2), counter-clockwise from the lower left one."""
     pairs = ((left, lower), (right, lower), (right, upper), (left, upper))
     return np.array([meeting(one, other) for one, other in pairs])
 
 
 def _is_tall(hole: Hole) -> bool:
-    """Whether two gaps on one another begin and end at the same places: one stone, two courses high, is missing."""
+    """Return whether two gaps above one another have the same ends: one stone, two courses high, is missing."""
     if len(hole.gaps) != 2 or hole.courses != 2:
         return False
     lower, upper = hole.gaps
@@ -250,7 +250,7 @@ def _is_tall(hole: Hole) -> bool:
 
 @dataclass(frozen=True)
 class _Fill:
-    """A gap that is to be filled."""
+    """A gap to be filled."""
 
     gap: CourseGap
     filling: Filling
@@ -261,7 +261,7 @@ class _Fill:
     signs: tuple[str, ...]
 
     def stones(self, codes: FreeCodes) -> Iterator[MissingStone]:
-        """The stones of the gap, from left to right."""
+        """Yield the stones of the gap, from left to right."""
         gap, count = self.gap, len(self.filling.kinds)
         kinds, cuts = split(gap, self.filling, self.known, self.elevation)
         before, outlines = gap.left.block.code, list(self._outlines(cuts))
@@ -280,7 +280,7 @@ class _Fill:
             yield MissingStone(stone_of(face, self.elevation), names, self._notes())
 
     def _kind(self, kind: str) -> str:
-        """The kind by length; between a stone of an arch and one of the wall it is a springer."""
+        """Return the kind by length; between a stone of an arch and one of the wall, a springer."""
         arch = [stone.block.kind in ("voussoir", "keystone") for stone in (self.gap.left, self.gap.right)]
         known = any(stone.block.kind == "springer" for stone in self.elevation.stones)
         return "springer" if known and any(arch) and not all(arch) else kind

@@ -1,4 +1,4 @@
-"""What counts as a missing stone, and what as an opening."""
+"""Settings of missing stones: criteria of a hole, and of an opening."""
 
 from dataclasses import dataclass
 
@@ -7,15 +7,15 @@ __all__ = ["MissingSettings"]
 
 @dataclass(frozen=True)
 class MissingSettings:
-    """What counts as a hole in the survey of a wall, and what as an opening of the wall.
+    """Criteria of a hole in the survey of a wall, and of an opening of the wall.
 
     Attributes
     ----------
-    max_joint : neighbours of a course that are farther apart have a hole between them [m]
-    min_length : of a stone; a narrower hole is an open joint or a break [m]
+    max_joint : largest distance of neighbours of a course without a hole between them [m]
+    min_length : least length of a stone; a narrower hole is an open joint or a break [m]
     covered : least part of a hole's length with stones, or the ground, below it, and with stones above it [-]
-    max_stones : a hole that would take more stones is an opening
-    max_courses : so is one that is higher
+    max_stones : largest number of stones that fill a hole; a larger hole is an opening
+    max_courses : largest height of a hole, in courses; a higher one is an opening
     """
 
     max_joint: float = 0.06

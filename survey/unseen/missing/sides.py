@@ -1,4 +1,4 @@
-"""Stones in the elevation of their facade: their sides as lines, worn corners left out.
+"""Stones in the elevation of their facade: their sides as lines, without worn corners.
 
 Coordinates (s, t): s along the facade to the right as seen from outside, t up, metres.
 """
@@ -17,9 +17,9 @@ from survey.quality.facades import WallPlane, find_facades
 __all__ = ["Elevation", "FlatStone", "Line", "elevations", "line_through", "meeting"]
 
 
-_FACING = float(np.cos(np.radians(50.0)))  # a side looks a way if its normal is not farther from it
-_NEARLY = float(np.cos(np.radians(12.0)))  # how far wear may turn a side
-_LAYER = 0.5  # metres between two walls that look the same way
+_FACING = float(np.cos(np.radians(50.0)))  # cosine of 50°: largest angle of a side from its direction
+_NEARLY = float(np.cos(np.radians(12.0)))  # cosine of 12°: largest turn of a side by wear
+_LAYER = 0.5  # metres: least distance of two walls that face the same way
 
 
 @dataclass(frozen=True)
@@ -30,28 +30,28 @@ class Line:
     direction: Array
 
     def moved(self, towards: Array, by: float) -> "Line":
-        """The parallel line at a distance, on the side of a point (2,)."""
+        """Return the parallel line at a distance, on the side of a point (2,)."""
         normal = np.array([-self.direction[1], self.direction[0]])
         sign = 1.0 if normal @ (towards - self.point) > 0.0 else -1.0
         return Line(self.point + sign * by * normal, self.direction)
 
     def at_height(self, height: float) -> float:
-        """Where it is along the wall, at a height [m]."""
+        """Return its place along the wall at a height [m]."""
         return float(self.point[0] + (height - self.point[1]) * self.direction[0] / self.direction[1])
 
     def at_place(self, place: float) -> float:
-        """How high it is at a place along the wall [m]."""
+        """Return its height at a place along the wall [m]."""
         return float(self.point[1] + (place - self.point[0]) * self.direction[1] / self.direction[0])
 
 
 def line_through(one: Array, other: Array) -> Line:
-    """The line through two points."""
+    """Return the line through two points."""
     run = other - one
     return Line(one, run / np.linalg.norm(run))
 
 
 def meeting(one: Line, other: Line) -> Array:
-    """Where two lines cross, (2,)."""
+    """Return the intersection (2,) of two lines."""
     matrix = np.column_stack([one.direction, -other.direction])
     along = np.linalg.solve(matrix, other.point - one.point)
     out: Array = one.point + along[0] * one.direction
@@ -80,10 +80,10 @@ class FlatStone:
         return out
 
     def side(self, towards: Array, otherwise: Array) -> Line | None:
-        """The line of the side that looks a way (2,); None if none does.
+        """Return the line of the side that faces a direction (2,); None if none does.
 
-        Where an end of the side is worn the line goes through the sound one, in the direction `otherwise` (2,), if
-        the side is nearly in that direction.
+        If one end of the side is worn, the line goes through the sound one, in the direction `otherwise` (2,), if the
+        side is nearly in that direction.
         """
         ends = self.side_ends(towards)
         if ends is None:
@@ -95,18 +95,18 @@ class FlatStone:
         return Line(self.outline[sound[0] if sound else ends[0]], otherwise)
 
     def side_ends(self, towards: Array) -> tuple[int, int] | None:
-        """Indices of the ends of the side that looks a way; None if none does."""
+        """Return the indices of the ends of the side that faces a direction; None if none does."""
         run = np.roll(self.outline, -1, axis=0) - self.outline
         length = np.hypot(run[:, 0], run[:, 1])
         facing = (run[:, 1] * towards[0] - run[:, 0] * towards[1]) / length
         if not (facing >= _FACING).any():
             return None
-        # of a long side that looks half away and a short one that looks there it is the short one
+        # of a long side that faces half away and a short one that faces the direction, take the short one
         k = int(np.where(facing >= _FACING, length * facing**4, 0.0).argmax())
         return k, (k + 1) % len(self.outline)
 
     def crossing(self, height: Line) -> tuple[float, float] | None:
-        """Where a nearly level line enters and leaves it, along the wall [m]; None if it passes by."""
+        """Return the places along the wall where a nearly level line enters and leaves it [m]; None if it misses."""
         normal = np.array([-height.direction[1], height.direction[0]])
         above = (self.outline - height.point) @ normal
         places = []
@@ -117,7 +117,7 @@ class FlatStone:
         return (min(places), max(places)) if places else None
 
     def contains(self, point: Array) -> bool:
-        """Whether a point (2,) is in its outline."""
+        """Return whether a point (2,) is in its outline."""
         inside = False
         for here, after in zip(self.outline, np.roll(self.outline, -1, axis=0), strict=True):
             if (here[1] > point[1]) != (after[1] > point[1]):
@@ -128,12 +128,12 @@ class FlatStone:
 
 @dataclass(frozen=True)
 class Elevation:
-    """A facade as one draws it.
+    """A facade in elevation.
 
     Attributes
     ----------
     frame : of the facade
-    stones : all that face this way, and are of this wall
+    stones : all that face this way and belong to this wall
     """
 
     frame: WallPlane
@@ -141,7 +141,7 @@ class Elevation:
 
     @cached_property
     def neighbours(self) -> Neighbours:
-        """The faces of its stones, to be searched by place."""
+        """Faces of its stones, searchable by place."""
         return Neighbours([stone.block.face for stone in self.stones])
 
     @cached_property
@@ -151,7 +151,7 @@ class Elevation:
 
 
 def elevations(blocks: Sequence[SurveyedBlock]) -> tuple[Elevation, ...]:
-    """The standing facades of a survey; walls that look one way and stand behind one another are apart."""
+    """Return the standing facades of a survey; walls that face one way but stand one behind the other are apart."""
     if not blocks:
         return ()
     normals = np.array([block.face.fit.normal for block in blocks])

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from archmodel.store.stones import store_survey
+from mechanics.scene.shapes import bond
 from survey.geometry.solids import area_vector
 from tests.archmodel.stones import box_stone, hash_of
 from tests.validation import masonry
@@ -45,7 +46,7 @@ def take_in(database, stones, name="wall"):
 
 def wall(count=4, rows=4, zone=None):
     """A running bond of stretchers 0.6 × 0.3 m: stones "COURSE-PLACE", on a base of its own course 0."""
-    blocks = masonry.running_bond(masonry.bond(count, rows, halves_first=True), 0.6, 0.3, 0.4)
+    blocks = masonry.running_bond(bond(count, rows, halves_first=True), 0.6, 0.3, 0.4)
     base = stone(blocks[0], course=0, zone=zone)
     courses = [int(block.code.split("-")[0]) for block in blocks[1:]]
     return [

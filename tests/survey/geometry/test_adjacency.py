@@ -1,4 +1,4 @@
-"""Which stones touch, where and how much: against walls, arches and corners of which every joint is known."""
+"""Adjacency of stones, with area and place: against walls, arches and corners of which every joint is known."""
 
 import time
 from itertools import pairwise
@@ -9,6 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from mechanics.scene import shapes
+from mechanics.scene.scene import Fidelity
 from survey.geometry.adjacency import Polyhedra, find_touching
 from tests.survey.geometry.touching_twin import touching
 from tests.validation import masonry
@@ -25,28 +27,28 @@ def gathered(solids):
 
 
 def inset(block, by):
-    """A box with every side moved in, as a stone ends before the middle of its joint."""
+    """Shrink a box on all sides, as a stone ends before the middle of its joint."""
     vertices = np.asarray(block.vertices)
     middle = vertices.mean(axis=0)
     return vertices - by * np.sign(vertices - middle), block.faces
 
 
 def found(touching):
-    """{(first, second): area} of pairs that come once."""
+    """Return {(first, second): area} of pairs that occur once."""
     pairs = [tuple(pair) for pair in touching.pairs.tolist()]
     assert len(set(pairs)) == len(pairs)
     return dict(zip(pairs, touching.area.tolist(), strict=True))
 
 
 def prism(outline, low, high):
-    """A polygon (n, 2) of the x–z plane, from y = low to y = high."""
-    block = masonry.prism("", outline, high - low, at=(low + high) / 2)
+    """Return a prism on a polygon (n, 2) of the x–z plane, from y = low to y = high."""
+    block = shapes.prism("", outline, high - low, at=(low + high) / 2)
     return block.vertices, block.faces
 
 
 def wall(count=4, rows=5, length=0.6, height=0.3, depth=0.4):
-    """A running bond, its solids, and the joints that it must have: {(first, second): area}."""
-    courses = masonry.bond(count, rows, halves_first=True)
+    """Return a running bond: its solids, and the joints that it must have: {(first, second): area}."""
+    courses = shapes.bond(count, rows, halves_first=True)
     blocks = masonry.running_bond(courses, length, height, depth)
     ends = [[0.0, *np.cumsum(course)] for course in [[sum(courses[0])], *courses]]
     starts = np.cumsum([0, *(len(one) - 1 for one in ends)])
@@ -132,8 +134,37 @@ def test_a_wall_that_meets_another_touches_its_side():
     assert found(contacts) == pytest.approx({(0, 1): 0.12, (0, 2): 0.2 * 0.3, (1, 2): 0.1 * 0.3})
 
 
+def facade(count, courses, returns, brick=(0.08, 0.04, 0.028)):
+    """Return a façade of `count` bricks along x with return walls of `returns` bricks along y at both ends, in running bond.
+
+    In the first and every other course the façade runs through to the corners and the returns begin behind it; in
+    the others the returns run through, with a half brick at their end, and the façade lies between them, shifted by
+    half a brick. Bricks are twice as long as wide. Without returns every other course begins and ends with a half
+    brick.
+    """
+    length, width, height = brick
+    total, deep = count * length, width + returns * length
+    low, high = (-width, -width, -height), (total + width, deep + width, 0.0)
+    blocks = [masonry.cuboid("base", low, high, Fidelity.FIXED)]
+    for row in range(courses):
+        through = row % 2 == 0
+        front = np.arange(0.0, total + width / 2, length) if through else np.arange(width, total, length)
+        if not returns and not through:
+            front = np.array([0.0, *front, total])
+        spans = [((a, 0.0), (b, width)) for a, b in pairwise(front)]
+        side = np.arange(width if through else 0.0, deep + width / 2, length)
+        side = side if through else np.array([*side, deep])
+        for x in (0.0, total - width) if returns else ():
+            spans += [((x, a), (x + width, b)) for a, b in pairwise(side)]
+        z = (row * height, (row + 1) * height)
+        blocks += [
+            masonry.cuboid(f"{row + 1}-{k + 1}", (*a, z[0]), (*b, z[1])) for k, (a, b) in enumerate(spans)
+        ]
+    return tuple(blocks)
+
+
 def test_quoins_touch_the_stones_of_both_walls():
-    blocks = masonry.facade(2, 2, returns=2)
+    blocks = facade(2, 2, returns=2)
     contacts = find_touching(gathered(solids_of(blocks)))
     length, width, height = 0.08, 0.04, 0.028
     codes = [block.code for block in blocks]
@@ -156,7 +187,7 @@ def test_faces_need_not_be_convex():
     )
 
     def slab(polygon, low, high):
-        block = masonry.prism("", polygon, high - low, at=(low + high) / 2)
+        block = shapes.prism("", polygon, high - low, at=(low + high) / 2)
         return block.vertices[:, [0, 2, 1]] * [1, 1, -1], block.faces  # the polygon in plan
 
     lower = slab(teeth * 0.1, 0.0, 0.2)  # from z = -0.2 to 0
@@ -234,7 +265,7 @@ def test_faces_may_be_a_little_out_of_parallel(degrees, touches):
 
 
 @pytest.mark.parametrize(("shared", "touches"), [(0.04, True), (0.02, False)])
-def test_stones_that_meet_at_an_edge_but_for_noise_do_not_touch(shared, touches):
+def test_stones_that_meet_at_an_edge_apart_from_noise_do_not_touch(shared, touches):
     contacts = find_touching(
         gathered([box((0, 0, 0), (1, 1, 1)), box((1 - shared, 0, 1), (2 - shared, 1, 2))])
     )
@@ -272,7 +303,7 @@ def test_nothing_touches_nothing():
 
 
 def noisy_wall(seed, sigma=0.003):
-    """Hexahedra with slightly tilted faces, joints a centimetre wide, of a wall and of an arch."""
+    """Return hexahedra with slightly tilted faces, joints a centimetre wide, of a wall and of an arch."""
     rng = np.random.default_rng(seed)
     stones = [inset(block, 0.005) for block in wall(3, 3)[0]]
     stones += solids_of(masonry.semicircular_arch(7, 0.4, 1.2, 0.4))

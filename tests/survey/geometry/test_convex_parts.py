@@ -1,4 +1,4 @@
-"""Stones that are not convex, cut into convex parts; the truth is counted in cubes, or known from how they are made."""
+"""Convex parts of non-convex stones; the truth is counted in cubes, or known from the construction."""
 
 from itertools import pairwise, product
 
@@ -13,29 +13,21 @@ from survey.geometry.convex_parts import convex_parts
 from survey.geometry.convexity import is_convex, reflex_edges
 from survey.geometry.solids import Solid, planes_of_solid
 from survey.geometry.watertight import check_watertight
+from tests.survey.plain_blocks import drawn
 
 Cell = tuple[int, ...]
 
 
 def turned(solid: Solid, seed: int, far: float = 0.0) -> Solid:
-    """The same solid anywhere else, in any direction."""
+    """Return the same solid elsewhere, in any direction."""
     random = np.random.default_rng(seed)
     turn = np.linalg.qr(random.normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
     return Solid(solid.code, solid.vertices @ turn.T + far * random.normal(size=3), solid.faces)
 
 
-def extruded(outline: list[tuple[float, float]], depth: float = 1.0) -> Solid:
-    """A prism over a simple polygon in the plane of x and z, counter-clockwise seen from -y."""
-    n = len(outline)
-    front = np.array([(x, 0.0, z) for x, z in outline])
-    faces = [tuple(range(n)), tuple(range(2 * n - 1, n - 1, -1))]
-    faces += [((i + 1) % n, i, i + n, (i + 1) % n + n) for i in range(n)]
-    return Solid("A", np.concatenate([front, front + np.array([0.0, depth, 0.0])]), tuple(faces))
-
-
 def cubes(cells: set[Cell]) -> Solid:
-    """The surface of unit cubes, square by square."""
+    """Return the surface of unit cubes, square by square."""
     number: dict[Cell, int] = {}
     faces = []
     for cell in sorted(cells):
@@ -61,7 +53,7 @@ def hull_volume(solid: Solid) -> float:
 
 
 def check_parts(solid: Solid, volume: float) -> tuple[Solid, ...]:
-    """They are convex and closed, and as large as the whole; the parts as they come."""
+    """Check that the parts are convex, closed, and as large as the whole; return them."""
     parts = convex_parts(solid)
     size = float(np.ptp(solid.vertices, axis=0).max())
     far = 4 * np.spacing(np.abs(solid.vertices).max()) / size
@@ -89,17 +81,17 @@ SAW = [(0.0, 0.0), (5.0, 0.0), (5.0, 2.0), (4.0, 1.0), (3.0, 2.0), (2.0, 1.0), (
 def test_prisms_fall_into_as_few_parts_as_they_can(
     outline: list[tuple[float, float]], area: float, folds: int, count: int, seed: int | None, far: float
 ) -> None:
-    solid = extruded(outline)
+    solid = drawn("A", outline, far=1.0)
     solid = solid if seed is None else turned(solid, seed, far)
     assert len(reflex_edges(solid)) == folds
     assert len(check_parts(solid, area)) == count
 
 
 def test_an_angle_falls_into_boxes_and_keeps_its_own_corners() -> None:
-    parts = convex_parts(extruded(L))
+    parts = convex_parts(drawn("A", L, far=1.0))
     assert sorted(len(part.vertices) for part in parts) == [8, 8]
     places = {tuple(place) for part in parts for place in part.vertices.tolist()}
-    assert {tuple(place) for place in extruded(L).vertices.tolist()} <= places
+    assert {tuple(place) for place in drawn("A", L, far=1.0).vertices.tolist()} <= places
 
 
 def test_a_groin_stone_is_cut_through_both_folds_at_once() -> None:
@@ -131,7 +123,7 @@ def _signed(solid: Solid) -> float:
 
 @st.composite
 def heaps(draw: st.DrawFn) -> set[Cell]:
-    """Cubes that hang together by faces, without edges or corners at which they touch only."""
+    """Draw cubes connected by faces, without edges or corners that are their only contact."""
     cells: set[Cell] = {(0, 0, 0)}
     for _ in range(draw(st.integers(1, 5))):
         start = draw(st.sampled_from(sorted(cells)))
@@ -151,7 +143,7 @@ def heaps(draw: st.DrawFn) -> set[Cell]:
 
 
 def _hang_together(steps: list[Cell]) -> bool:
-    """Whether octants about a corner are all neighbours of neighbours."""
+    """Return whether octants about a corner are connected."""
     if not steps:
         return True
     reached, waiting = {steps[0]}, [steps[0]]
@@ -189,9 +181,9 @@ def test_a_stone_with_a_cavity_is_filled_around_it() -> None:
 
 
 def test_what_is_convex_stays_itself_and_parts_are_the_same_again() -> None:
-    box = extruded([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
+    box = drawn("A", [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], far=1.0)
     assert convex_parts(box) == (box,)
-    first, second = convex_parts(turned(extruded(PORTAL), 5)), convex_parts(turned(extruded(PORTAL), 5))
+    first, second = (convex_parts(turned(drawn("A", PORTAL, far=1.0), 5)) for _ in range(2))
     for one, other in zip(first, second, strict=True):
         assert one.faces == other.faces
         np.testing.assert_array_equal(one.vertices, other.vertices)
@@ -202,12 +194,12 @@ def test_what_takes_too_many_parts_is_refused() -> None:
     with pytest.raises(
         GeometryError, match="stone A: it is not convex, and would take more than 2 convex parts"
     ):
-        convex_parts(extruded(PORTAL), most=2)
+        convex_parts(drawn("A", PORTAL, far=1.0), most=2)
 
 
 def test_faces_that_are_not_plane_are_named_as_the_reason() -> None:
-    solid = extruded(L)
+    solid = drawn("A", L, far=1.0)
     bent = solid.vertices.copy()
     bent[0] += [0.0, 0.02, -0.02]
-    with pytest.raises(GeometryError, match="its faces are not quite planes"):
+    with pytest.raises(GeometryError, match="its faces are not quite planar"):
         convex_parts(Solid("A", bent, solid.faces))

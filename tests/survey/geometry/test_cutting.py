@@ -1,45 +1,32 @@
-"""Stones cut out by planes: against half-spaces intersected by qhull, on wild and on nearly degenerate planes."""
+"""Stones cut by planes: against half-spaces intersected by qhull, on wild and on nearly degenerate planes."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.optimize import linprog
-from scipy.spatial import ConvexHull, HalfspaceIntersection
+from scipy.spatial import ConvexHull
 
 from survey.geometry.cutting import common_part, cut_stones, moves
 from survey.geometry.solids import Solid
 from survey.geometry.watertight import check_watertight
+from tests.survey.largest_ball import volume_within
 from tests.survey.plain_blocks import cuboid, drawn
 from tests.survey.unseen.statics import side_planes
 
 BOX = cuboid("S", (0.0, 0.0, 0.0), (1.0, 0.5, 0.4))
 PLANES = side_planes(BOX)
 FACES = range(6)
+SLIVER = 1e-5  # metres: radius of the largest ball in a body too thin to be sure of
 
 
 def through(point, normal):
-    """The plane n·x = d through a point."""
+    """Return the plane n·x = d through a point."""
     unit = np.asarray(normal, dtype=float) / np.linalg.norm(normal)
     return np.array([*unit, unit @ np.asarray(point, dtype=float)])
 
 
-def true_volume(planes):
-    """By qhull, about the centre of the largest ball; 0 where no ball of 1e-5 m fits: such slivers say nothing."""
-    found = linprog(
-        [0, 0, 0, -1],
-        A_ub=np.column_stack([planes[:, :3], np.ones(len(planes))]),
-        b_ub=planes[:, 3],
-        bounds=[(None, None)] * 3 + [(None, 1.0)],
-    )
-    if found.status != 0 or found.x[3] < 1e-5:
-        return 0.0
-    halves = np.column_stack([planes[:, :3], -planes[:, 3]])
-    return ConvexHull(HalfspaceIntersection(halves, found.x[:3]).intersections).volume
-
-
 def assert_is_what_planes_leave(cut, planes):
-    """Closed, convex, every edge in two faces in opposite directions, corners on their planes, the true volume."""
+    """Check: closed, convex, every edge in two faces in opposite directions, corners on planes, the true volume."""
     solid = cut.solid
     check_watertight(solid, convex=True)
     edges = [edge for face in solid.faces for edge in zip(face, (*face[1:], face[0]), strict=True)]
@@ -61,14 +48,14 @@ def assert_is_what_planes_leave(cut, planes):
 
 def assert_cut(planes):
     cut = cut_stones([BOX], {0: planes})[0]
-    volume = true_volume(planes)
+    volume = volume_within(planes, SLIVER)
     if cut is None:
         assert volume < 1e-6
     elif volume > 1e-6:
         assert_is_what_planes_leave(cut, planes)
-        # the hull of the corners is the solid, and that is what qhull has; but for slivers of less than 1e-5 m
+        # the hull of the corners is the solid, as of qhull, except for slivers of less than 1e-5 m
         own = ConvexHull(cut.solid.vertices).volume
-        assert own == pytest.approx(true_volume(planes[list(cut.of_face)]), rel=1e-9, abs=1e-12)
+        assert own == pytest.approx(volume_within(planes[list(cut.of_face)], SLIVER), rel=1e-9, abs=1e-12)
         height = (cut.solid.vertices @ planes[:, :3].T - planes[:, 3]).max()
         assert own == pytest.approx(volume, rel=1e-9 if height < 1e-9 else 1e-4)
     return cut
@@ -90,13 +77,13 @@ def test_what_wild_planes_leave_of_a_box_is_what_qhull_finds(more):
 
 
 corner = st.sampled_from(range(8))
-# from so near a corner or an edge that only rounding tells on which side it lies, to a millimetre
+# from rounding distance of a corner or an edge to a millimetre
 nudge = st.sampled_from([0.0, 1e-16, -1e-16, 1e-12, -1e-12, 1e-4, -1e-4, -1e-3])
 
 
 @st.composite
 def degenerate(draw):
-    """A plane through corners of the box: through one, along an edge, along a diagonal, or through three."""
+    """Draw a plane through corners of the box: through one, along an edge, along a diagonal, or through three."""
     a, b, c = (BOX.vertices[draw(corner)] for _ in range(3))
     kind = draw(st.sampled_from(["corner", "edge", "three"]))
     normal = np.array(draw(direction))
@@ -124,7 +111,7 @@ def test_planes_through_corners_and_edges_leave_a_closed_solid(more):
 def test_a_plane_that_comes_twice_changes_nothing(again, more):
     planes = np.vstack([PLANES, *more])
     once, twice = assert_cut(planes), cut_stones([BOX], {0: np.vstack([planes, PLANES[again]])})[0]
-    if true_volume(planes) > 1e-6:  # what is smaller may be rounding in one of two
+    if volume_within(planes, SLIVER) > 1e-6:  # what is smaller may be rounding in one of two
         assert ConvexHull(twice.solid.vertices).volume == pytest.approx(
             ConvexHull(once.solid.vertices).volume, rel=1e-9
         )
@@ -200,7 +187,7 @@ def test_slivers_that_are_no_more_than_rounding_are_left_out():
     assert len(cut.solid.faces) == 7
 
 
-def test_far_from_the_origin_stones_are_cut_as_near_it():
+def test_stones_are_cut_as_well_far_from_the_origin():
     far = np.array([4.1e5, 7.02e6, 312.0])
     planes = np.vstack([PLANES, through((0.9, 0.5, 0.3), (1.0, 0.7, 1.0))])
     moved = planes.copy()
@@ -218,7 +205,7 @@ def test_what_two_solids_have_in_common_is_what_qhull_finds(more, shift):
     second[:, 3] += PLANES[:, :3] @ np.array(shift)
     second = np.vstack([second, *more])
     found = common_part(PLANES, second, np.array([0.5, 0.25, 0.2]), 2.0)
-    volume = true_volume(np.vstack([PLANES, second]))
+    volume = volume_within(np.vstack([PLANES, second]), SLIVER)
     if volume > 1e-6:
         check_watertight(found)
         assert ConvexHull(found.vertices).volume == pytest.approx(volume, rel=1e-9, abs=1e-12)

@@ -1,4 +1,4 @@
-"""Polygons that are not plane are folded where they leave the least warp."""
+"""Folding of warped polygons where it leaves the least warp."""
 
 from itertools import pairwise
 

@@ -1,4 +1,4 @@
-"""Touching faces found slowly: every pair of faces, and polygons intersected as the hull of their common points."""
+"""Slow reference of touching faces: every pair of faces, intersected as the hull of their common points."""
 
 from itertools import combinations
 
@@ -9,7 +9,7 @@ from survey.geometry.solids import area_vector
 
 
 def touching(solids, width=0.04, angle=12.0, overlap=0.02, share=0.03):
-    """{(first, second): [(area, gap, normal, place) of each pair of faces]} of convex solids (vertices, faces)."""
+    """Return {(first, second): [(area, gap, normal, place) of each two faces]} of convex solids (vertices, faces)."""
     found = {}
     for (i, one), (j, two) in combinations(enumerate(solids), 2):
         contacts = [
@@ -60,7 +60,7 @@ def _contact(first, second, width, angle, overlap, share):
 
 
 def _common_points(one, two):
-    """Corners of each convex polygon within the other, and crossings of their sides."""
+    """Return corners of each convex polygon within the other, and crossings of their sides."""
     points = [p for p in one if _within(p, two)] + [p for p in two if _within(p, one)]
     for a, b in zip(one, np.roll(one, -1, axis=0), strict=True):
         for c, d in zip(two, np.roll(two, -1, axis=0), strict=True):

@@ -11,19 +11,19 @@ Polygon = tuple[int, ...]
 
 
 def rounded(solids: list[Solid], digits: int = 3) -> list[Solid]:
-    """What a file of so many decimals keeps of them."""
+    """Round coordinates to the decimals of a file."""
     return [Solid(one.code, np.round(one.vertices, digits), one.faces) for one in solids]
 
 
 def outward(code: str, vertices: Array, faces: list[Polygon]) -> Solid:
-    """A solid whose faces agree with each other, seen from outside."""
+    """Return a solid whose faces agree with each other, seen from outside."""
     middle = vertices.mean(axis=0)
     volume = sum(float((vertices[one[0]] - middle) @ area_vector(vertices[list(one)])) for one in faces)
     return Solid(code, vertices, tuple(faces if volume > 0.0 else [one[::-1] for one in faces]))
 
 
 def prism(code: str, front: Array, back: Array) -> Solid:
-    """Between two polygons (n, 3) of which corner goes with corner."""
+    """Return the solid between two polygons (n, 3) with matching corners."""
     n = len(front)
     faces: list[Polygon] = [tuple(range(n)), tuple(range(2 * n - 1, n - 1, -1))]
     faces += [((i + 1) % n, i, i + n, (i + 1) % n + n) for i in range(n)]
@@ -31,7 +31,7 @@ def prism(code: str, front: Array, back: Array) -> Solid:
 
 
 def wall(courses: int = 4, stones: int = 4, turn: float = 0.3, lean: float = 0.1) -> list[Solid]:
-    """Running bond with half stones at its ends, turned about z by so many radians, and leaning."""
+    """Return a running bond with half stones at its ends, turned about z by `turn` radians, and leaning."""
     out = []
     c, s = np.cos(turn), np.sin(turn)
     frame = np.array([[c, s, 0.0], [-s * np.cos(lean), c * np.cos(lean), -np.sin(lean)], np.zeros(3)])
@@ -51,7 +51,7 @@ def wall(courses: int = 4, stones: int = 4, turn: float = 0.3, lean: float = 0.1
 
 
 def dome(rings: int = 3, around: int = 10, radius: float = 5.0, thickness: float = 0.6) -> list[Solid]:
-    """Rings of stones of six sides each, which all pass through the centre; inner and outer face are hexagons.
+    """Return rings of stones of six sides each, which all pass through the centre; both faces are hexagons.
 
     Each is a trapezoid to the left and one to the right of a fold, along the meridian through its middle; given as one
     polygon, as other programs do.
@@ -79,7 +79,7 @@ def groin(
     thickness: float = 0.4,
     turn: float = 0.4,
 ) -> list[Solid]:
-    """Where two barrel vaults meet: stones with an arm in each of them, mitred, and a straight stone at each arm.
+    """Return a groin of two barrel vaults: stones with an arm in each, mitred, and a straight stone at each arm.
 
     The angles are those of the lowest and the highest bed above level. All is turned about z by so many radians, so
     that rounding meets no plane by chance.
@@ -109,7 +109,7 @@ def groin(
 
 
 def obj(solids: list[Solid], digits: int | None = 3, doubled: bool = False) -> str:
-    """The file; every face twice, if asked for."""
+    """Return the text of an OBJ file; every face twice if `doubled`."""
     rows, count = [], 0
     for one in solids:
         rows.append(f"o {one.code}")

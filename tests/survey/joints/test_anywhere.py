@@ -1,4 +1,4 @@
-"""Closed stones are the same in any order, wherever they stand, and once more closed."""
+"""Invariance of joint closing: in any order, at any place, and when repeated."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from tests.survey.plain_blocks import as_stone, bond, moved
 
 
 def as_it_was(closed: ClosedStones) -> list[BlockyStone]:
-    """The closed stones as if they had been simplified to that."""
+    """Return the closed stones as if they had been simplified to that."""
     return [replace(one, solid=solid) for one, solid in zip(closed.simplified, closed.solids, strict=True)]
 
 
@@ -60,7 +60,7 @@ def test_stones_close_alike_wherever_the_building_stands(seed, turned, shift) ->
         np.testing.assert_allclose(two.vertices, one.vertices @ turn.T + shift, rtol=0.0, atol=1e-10)
 
 
-def test_far_from_the_origin_of_a_grid_stones_close_as_near_it() -> None:
+def test_stones_close_as_well_far_from_the_origin_of_a_grid() -> None:
     far = np.array([4.1e5, 7.02e6, 312.0])
     solids, observer = bond(4, 4, 0.01, 0.002, 3), np.array([0.9, -9.0, 0.4])
     here = close_joints([as_stone(solid, observer) for solid in solids])

@@ -1,4 +1,4 @@
-"""Beds that sag or rise: chains of planes that are known, and the best divisions found by trying all."""
+"""Bent beds: chains of planes that are known, and the best divisions found by trying all."""
 
 from itertools import combinations, pairwise
 
@@ -17,14 +17,14 @@ from survey.joints.facing import find_facing
 from survey.joints.settings import JointSettings
 from survey.simplify.simplify import simplify
 from tests.survey.plain_blocks import as_stone, drawn, moved
-from tests.survey.unseen.statics import contacts, near_pairs, overlap_depth
+from tests.survey.unseen.statics import contact_area, near_pairs, overlap_depth
 
 USUAL = JointSettings()
 LENGTH, GAP = 0.5, 0.01
 
 
 def course(tops, bottoms, starts, name):
-    """Stones between two lines, each line z(x); they end 5 mm before the head joints."""
+    """Return stones between two lines, each line z(x); they end 5 mm before the head joints."""
     out = []
     for k, (a, b) in enumerate(pairwise(starts)):
         x0, x1 = a + GAP / 2, b - GAP / 2
@@ -34,7 +34,7 @@ def course(tops, bottoms, starts, name):
 
 
 def two_courses(bed, count=8):
-    """Courses in running bond across a bed z = bed(x), which is 10 mm wide."""
+    """Return courses in running bond across a bed z = bed(x), which is 10 mm wide."""
     lower = LENGTH * np.arange(count + 1.0)
     upper = np.array([0.0, *(lower[:-1] + LENGTH / 2), lower[-1]])
     return [
@@ -44,7 +44,7 @@ def two_courses(bed, count=8):
 
 
 def bend(slope, at):
-    """Level up to a place, then rising or falling."""
+    """Return a bed that is level up to a place, then rising or falling."""
     return lambda x: slope * max(x - at, 0.0)
 
 
@@ -63,7 +63,7 @@ def found(solids):
 
 
 def upward(contact, building, plane):
-    """Slope dz/dx of a plane, and its height at x = 0."""
+    """Return slope dz/dx of a plane, and its height at x = 0."""
     normal, offset = contact.normals[plane], contact.offsets[plane]
     offset = offset + normal @ building.origin
     return -normal[0] / normal[2], (offset - normal[1] * 0.2) / normal[2]
@@ -71,13 +71,6 @@ def upward(contact, building, plane):
 
 def stones_of(closed):
     return {solid.code: solid for solid in closed.solids}
-
-
-def contact_area(one, two):
-    return sum(
-        0.5 * np.linalg.norm(np.cross(p - p[0], np.roll(p, -1, axis=0) - p[0]).sum(axis=0))
-        for _, p in contacts(one, two)
-    )
 
 
 def assert_all_touch(closed, bed, count=8):
@@ -192,12 +185,12 @@ def test_at_a_step_no_stone_lies_in_another_and_what_does_not_meet_is_listed():
 
 
 def line_squares(x, y):
-    """Sum of squares off the least-squares line."""
+    """Return the sum of squares off the least-squares line."""
     return float(((y - np.polyval(np.polyfit(x, y, 1), x)) ** 2).sum())
 
 
 def smoothed(y):
-    """Medians of five, mirrored at the ends."""
+    """Return medians of five, mirrored at the ends."""
     far = [y[2], y[1], *y, y[-2], y[-3]]
     return np.array([np.median(far[k : k + 5]) for k in range(len(y))])
 

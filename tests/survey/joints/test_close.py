@@ -1,4 +1,4 @@
-"""Closing the joints of small assemblies whose closed shape is known, wherever they stand and in whatever order."""
+"""Joint closing of small assemblies whose closed shape is known, at any place and in any order."""
 
 import re
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ from survey.records.survey import BlockRecord
 from survey.simplify.simplify import BlockShape, simplify
 from survey.synthetic.window_bay.sample import make_sample
 from tests.survey.plain_blocks import DEPTH, as_stone, box, cuboid, drawn, moved, stone
-from tests.survey.unseen.statics import contacts, near_pairs, overlap_depth, side_planes
+from tests.survey.unseen.statics import contact_area, contacts, near_pairs, overlap_depth, side_planes
 
 # two stones with a 10 mm head joint, a long one above them across a 12 mm bed joint
 THREE = [box("A", 0, 0.495, 0, 0.3), box("B", 0.505, 1, 0, 0.3), box("C", 0, 1, 0.312, 0.6)]
@@ -35,7 +35,7 @@ CORNERED = drawn("L", [(0, 0), (1, 0), (1, 0.3), (0.4, 0.3), (0.4, 0.6), (0, 0.6
 
 
 def roofed(solid: Solid) -> Solid:
-    """The L with a roof of four sides on its arm: where these meet, planes cannot be moved one by one."""
+    """Put a roof of four sides on the arm of the L: where these meet, planes cannot be moved one by one."""
     top = next(face for face in solid.faces if (solid.vertices[list(face), 2] > 0.599).all())
     vertices = np.vstack([solid.vertices, [[0.2, 0.2, 0.7]]])
     sides = [(a, b, len(solid.vertices)) for a, b in zip(top, (*top[1:], top[0]), strict=True)]
@@ -46,7 +46,7 @@ ROOFED = roofed(CORNERED)
 
 
 def assert_sound(solids: Sequence[Solid]) -> None:
-    """All closed and convex, and none in another."""
+    """Check that all are closed and convex, and that none overlap."""
     for solid in solids:
         check_watertight(solid, convex=True)
     for i, j in near_pairs(solids):
@@ -59,11 +59,7 @@ def open_pairs(closed: ClosedStones) -> dict[frozenset[str], str]:
 
 def shared_area(closed: ClosedStones, one: str, two: str) -> float:
     solids = {solid.code: solid for solid in closed.solids}
-    polygons = [polygon for _, polygon in contacts(solids[one], solids[two])]
-    return sum(
-        0.5 * float(np.linalg.norm(np.cross(p - p[0], np.roll(p, -1, axis=0) - p[0]).sum(axis=0)))
-        for p in polygons
-    )
+    return contact_area(solids[one], solids[two])
 
 
 def test_a_t_junction_closes_half_way_and_fits_exactly() -> None:
@@ -102,7 +98,7 @@ def test_a_joint_that_would_move_a_corner_too_far_stays_open_and_the_others_clos
 
 
 def low_stone(count: int, low: int) -> list[SurveyedBlock]:
-    """A course of stones 0.3 m high but for one of 0.25 m, and a long stone across a joint of 12 mm above."""
+    """Return a course of stones 0.3 m high except one of 0.25 m, and a long stone across a joint of 12 mm above."""
     tops = [0.25 if k == low else 0.3 for k in range(count)]
     course = [box(f"A{k}", 0.5 * k + 0.005, 0.5 * k + 0.495, 0, top) for k, top in enumerate(tops)]
     return [*course, box("C", 0, 0.5 * count, 0.312, 0.6)]
@@ -343,7 +339,7 @@ def test_other_samples_close_as_well() -> None:
 
 
 def test_a_head_joint_whose_corners_are_worn_on_both_hands_stays_upright() -> None:
-    # two sound corners at the foot of the joint do not tell its direction; the worn ones, alike, do
+    # two sound corners at the foot of the joint do not define its direction; the worn ones, which agree, do
     grid = [(x, 0.0, z) for x in (0.1, 0.25, 0.4) for z in (0.05, 0.15, 0.25)]
     left = np.array([(0, 0, 0), (0.495, 0, 0), (0.465, 0.02, 0.27), (0, 0, 0.3)])
     right = (left * np.array([-1, 1, 1]) + np.array([1, 0, 0]))[[1, 0, 3, 2]]

@@ -1,4 +1,4 @@
-"""Contact planes of joints: the kernel's fit against numpy, and which joints have one plane."""
+"""Contact planes of joints: the kernel's fit against numpy, and the grouping of joints by plane."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from survey.geometry.solids import Solid
-from survey.joints._kernels import continuing_faces, fit_middle_planes
+from survey.joints._kernels import JointCorners, continuing_faces, fit_middle_planes
 from survey.joints.bounded_closing import as_building, close_within_bounds
 from survey.joints.contact_planes import contact_planes
 from survey.joints.facing import find_facing
@@ -20,7 +20,7 @@ SQUARE = np.array([(-0.5, -0.2), (0.5, -0.2), (0.5, 0.2), (-0.5, 0.2)])
 
 
 def corners(plane, width, opening=(0.0, 0.0), noise=0.0, rng=None, faces=2):
-    """Points (k, 3) and hands (k,) of faces on either hand of a middle plane (a, b, c)."""
+    """Return points (k, 3) and sides (k,) of faces on both sides of a middle plane (a, b, c)."""
     points, hands = [], []
     for face in range(faces):
         for hand in (1.0, -1.0):
@@ -39,29 +39,30 @@ def scale_of(points):
 
 
 def fit(points, hands, sound=None, usual=-1.0, straightness=0.02):
-    """The kernel, of one joint: plane (3,) and values (5,)."""
+    """Fit one joint by the kernel: plane (3,) and values (5,)."""
     sound = np.ones(len(points), np.bool_) if sound is None else np.asarray(sound)
     planes, values = np.zeros((1, 3)), np.zeros((1, 5))
     starts, scales = np.array([0, len(points)]), np.array([scale_of(points)])
-    fit_middle_planes(points, hands, sound, starts, scales, usual, straightness, planes, values)
+    corners = JointCorners(points, hands, sound, starts, scales)
+    fit_middle_planes(corners, usual, straightness, planes, values)
     return planes[0], values[0]
 
 
 def solved(design, heights, weight, prior=0.0, usual=0.0):
-    """Weighted least squares with the usual width as one more observation; what nothing tells stays zero."""
+    """Solve weighted least squares with the usual width as one more observation; unknowns without data stay zero."""
     pull = np.diag(np.r_[np.zeros(3), prior, np.zeros(design.shape[1] - 4)])
     matrix = design.T @ (weight[:, None] * design) + pull + 1e-12 * weight.sum() * np.eye(design.shape[1])
     return np.linalg.solve(matrix, design.T @ (weight * heights) + pull.sum(axis=0) * usual)
 
 
 def weights(residual, sound):
-    """Huber's, against the spread of sound corners; a hundredth for the others."""
+    """Return Huber's weights, against the spread of sound corners; a hundredth for the others."""
     spread = max(1.4826 * np.median(residual[sound]), 1e-4) if sound.any() else 1e-4
     return np.where(sound, np.minimum(1.0, 1.5 * spread / np.maximum(residual, 1e-300)), 0.01)
 
 
 def robust(design, heights, sound, prior, usual):
-    """Huber's estimate, and the weighted mean square left over; from the least sum where there are many corners."""
+    """Return Huber's estimate and the weighted mean square residual, from the least sum if there are many corners."""
     weight, previous = np.where(sound, 1.0, 0.01), 0.0
     if design.shape[1] == 4 and sound.sum() >= 12:
         weight = weights(np.abs(heights - design @ least_sum(design, heights, sound)), sound)
@@ -77,7 +78,7 @@ def robust(design, heights, sound, prior, usual):
 
 
 def least_sum(design, heights, sound):
-    """The solution with the least sum of residuals of sound corners, those below 0.1 mm squared."""
+    """Return the solution with the least sum of residuals of sound corners, those below 0.1 mm squared."""
     weight = np.where(sound, 1.0, 0.0)
     for _ in range(300):
         solution = solved(design, heights, weight)
@@ -86,7 +87,7 @@ def least_sum(design, heights, sound):
 
 
 def twin_fit(points, hands, sound, usual, straightness, scale):
-    """The same with numpy: with parallel faces, with faces that open, and without what is far off."""
+    """Fit in numpy: with parallel faces, with faces that open, and without outliers."""
     (x, y), z = points[:, :2].T / scale, points[:, 2]
     above = int((sound & (hands > 0.0)).sum())
     below = int(sound.sum()) - above
@@ -193,10 +194,10 @@ def test_a_worn_corner_hardly_moves_the_plane():
     sound[2] = False
     fitted, values = fit(points, hands, sound)
     assert np.abs(fitted).max() < 2e-4
-    assert values[2] < 5e-4  # a worn corner's own residual is not told
+    assert values[2] < 5e-4  # a worn corner's own residual is not reported
 
 
-def test_where_one_hand_is_worn_the_usual_width_tells():
+def test_the_usual_width_applies_where_one_side_is_worn():
     points, hands = corners((0.0, 0.0, 0.0), 0.01, faces=1)
     sound = hands < 0.0
     points[hands > 0, 2] += 0.025  # all corners above are lost
@@ -210,7 +211,7 @@ def test_where_one_hand_is_worn_the_usual_width_tells():
 
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.floats(0.03, 0.3))
-def test_one_odd_corner_is_told_and_does_not_count(seed, off):
+def test_one_outlier_is_reported_and_ignored(seed, off):
     rng = np.random.default_rng(seed)
     points, hands = corners((0.0, 0.0, 0.0), 0.01, noise=0.001, rng=rng, faces=4)
     points[rng.integers(8, 24), 2] += off
@@ -301,7 +302,7 @@ def test_both_stones_of_a_joint_hold_its_plane_to_the_last_bit(seed, turned):
 
 
 def slowly_continuing(pairs, building, joined, cosine, near):
-    """Faces of neighbours that lie in one plane, pair by pair."""
+    """Return faces of neighbours that lie in one plane, pair by pair."""
     planes, out = building.faces.planes, []
     for one, two in pairs.tolist():
         for f in np.flatnonzero(joined & (planes.owner == one)).tolist():

@@ -1,4 +1,4 @@
-"""Faces that face each other across a joint, against every pair of faces looked at slowly."""
+"""Faces that face each other across a joint, against a slow search over every pair of faces."""
 
 import numpy as np
 import pytest
@@ -27,12 +27,12 @@ def facing(solids, limits=USUAL):
 
 
 def polygons(solids):
-    """(solid, corners) of all faces."""
+    """Return (solid, corners) of all faces."""
     return [(n, one.vertices[list(face)]) for n, one in enumerate(solids) for face in one.faces]
 
 
 def slowly(solids, limits=USUAL):
-    """{(face, face): (area, gap, normal, place)} of all that face each other, widths counted at the narrow end."""
+    """Return {(face, face): (area, gap, normal, place)} of all facing pairs, with widths at the narrow end."""
     found, faces = {}, polygons(solids)
     for i, (one, first) in enumerate(faces):
         for j, (two, second) in enumerate(faces):
@@ -64,7 +64,7 @@ def assert_as_found_slowly(solids, limits=USUAL):
 
 
 def arch(count=7, inner=1.2, outer=1.6, joint=0.004):
-    """Voussoirs with open joints of the same angle."""
+    """Return voussoirs with open joints of the same angle."""
     out = []
     for k in range(count):
         a, b = np.pi * k / count + joint, np.pi * (k + 1) / count - joint

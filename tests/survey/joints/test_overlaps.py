@@ -1,17 +1,17 @@
-"""Stones that lie in each other: found as by qhull, and parted without loss beyond what they shared."""
+"""Overlapping stones: detected as by qhull, and separated without loss beyond the overlap."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.optimize import linprog
-from scipy.spatial import ConvexHull, HalfspaceIntersection
+from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from survey.geometry._kernels.convexity import deepest_overlaps
 from survey.geometry.solids import Solid, planes_of_solid, volume_of
 from survey.geometry.watertight import check_watertight
 from survey.joints.overlaps import find_overlaps, part_stones
+from tests.survey.largest_ball import volume_within
 from tests.survey.plain_blocks import cuboid, drawn, moved
 from tests.survey.unseen.statics import overlap_depth, side_planes
 
@@ -27,28 +27,12 @@ def all_free(planes):
 
 
 def shared_volume(one, two):
-    """By qhull, about the centre of the largest ball in both; 0 where that is smaller than a micrometre."""
-    depth = overlap_depth(one, two)
-    if depth < 1e-6:
-        return 0.0
-    planes = np.vstack([side_planes(one), side_planes(two)])
-    halves = np.column_stack([planes[:, :3], -planes[:, 3]])
-    return ConvexHull(HalfspaceIntersection(halves, ball_centre(planes)).intersections).volume
-
-
-def ball_centre(planes):
-    """Of the largest ball within planes (n, 4)."""
-    found = linprog(
-        [0, 0, 0, -1],
-        A_ub=np.column_stack([planes[:, :3], np.ones(len(planes))]),
-        b_ub=planes[:, 3],
-        bounds=[(None, None)] * 3 + [(None, 1.0)],
-    )
-    return found.x[:3]
+    """Return the volume by qhull, about the centre of the largest ball in both; 0 if it is below a micrometre."""
+    return volume_within(np.vstack([side_planes(one), side_planes(two)]), 1e-6)
 
 
 def heap(seed, count=6, spread=0.6):
-    """Boxes and wedges that lie about, in each other too."""
+    """Draw boxes and wedges, overlapping or not."""
     rng, out = np.random.default_rng(seed), []
     for k in range(count):
         size = rng.uniform(0.2, 0.5, 3)
@@ -139,7 +123,7 @@ def test_volume_and_planes_are_those_of_the_hull(seed):
 
 @st.composite
 def lapping(draw):
-    """Two stones, turned against each other, the second so deep in the first as joints are."""
+    """Return two stones, turned against each other, that overlap by the width of a joint."""
     depth = draw(st.floats(0.001, 0.03))
     at = draw(st.tuples(st.floats(-0.4, 0.4), st.floats(-0.3, 0.3)))
     turn = Rotation.from_rotvec(draw(st.tuples(*[st.floats(-0.6, 0.6)] * 3))).as_matrix()
@@ -174,7 +158,7 @@ def test_stones_are_parted_within_the_bound_and_lose_little(case):
 
 @settings(max_examples=15, deadline=None)
 @given(lapping())
-def test_nothing_is_cut_where_the_bound_forbids_it_and_all_is_told(case):
+def test_nothing_is_cut_where_the_bound_forbids_it_and_all_is_reported(case):
     solids, _ = case
     planes = planes_of(solids)
     before = find_overlaps(solids, planes)

@@ -1,4 +1,4 @@
-"""What the report of closed joints says, against what can be measured at the solids before and after."""
+"""Report of closed joints, against measurements of the solids before and after."""
 
 import numpy as np
 import pytest
@@ -82,7 +82,7 @@ def test_the_opening_is_the_angle_between_the_two_faces():
     assert joint.width == pytest.approx(0.010 + 0.5 * lean, rel=0.01)
 
 
-def test_a_gap_tells_the_area_over_which_stones_face_each_other():
+def test_a_gap_reports_the_area_over_which_stones_face_each_other():
     report = close_joints(THREE, JointSettings(mode=JointMode.AS_SURVEYED)).report
     areas = {frozenset(gap.stones): gap.area for gap in report.gaps}
     assert areas == pytest.approx(

@@ -1,4 +1,4 @@
-"""Free sides with worn corners: what tells their plane, in which order, and what stays as it was measured."""
+"""Free sides with worn corners: the sources of their plane, in order, and the planes that stay as measured."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ LOST = (2, 6)  # the corner, in front and behind
 
 
 def faces_of(solids, lost=LOST, kept=()):
-    """All faces; of the first solid some corners are not sound."""
+    """Return all faces; of the first solid some corners are not sound."""
     gathered = Polyhedra.gather((solid.vertices, solid.faces) for solid in solids)
     planes = planes_of(gathered)
     sound = np.ones(len(gathered.vertices), np.bool_)
@@ -32,7 +32,7 @@ def faces_of(solids, lost=LOST, kept=()):
 
 
 def mended(solids, lost=LOST, free=None, kept=(), beside=True, reach=REACH):
-    """Planes (nf, 4) before and after."""
+    """Return planes (nf, 4) before and after."""
     faces = faces_of(solids, lost, kept)
     rows = np.column_stack([faces.planes.normals, faces.planes.offsets])
     neighbours = np.array([(0, k) for k in range(1, len(solids))] if beside else [], np.int64).reshape(-1, 2)
@@ -88,7 +88,7 @@ def test_a_stone_that_shares_no_joint_leads_nothing():
 
 
 def continuing():
-    """A neighbour whose top is in the plane z = 0.3 + 0.02 x of the sound end of W's top."""
+    """Return a neighbour whose top is in the plane z = 0.3 + 0.02 x of the sound end of W's top."""
     return drawn("B", [(1.01, 0), (1.5, 0), (1.5, 0.33), (1.01, 0.3 + 0.02 * 1.01)])
 
 

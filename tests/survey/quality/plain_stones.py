@@ -1,10 +1,11 @@
-"""Stones of a wall in the plane y = 0, seen from -y, as a report sees them; without any measurement."""
+"""Stones of a wall in the plane y = 0, seen from -y, as in a report, without any measurement."""
 
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from survey.quality.facades import Facade, find_facades
 from survey.quality.precision import StoneQuality
 
 SIGMA = 0.002
@@ -13,7 +14,7 @@ SIGMA = 0.002
 def polygon_stone(
     code: str, kind: str, polygon: list[tuple[float, float]] | NDArray[np.float64], **changes: Any
 ) -> StoneQuality:
-    """A stone whose face is a polygon (x, z), counter-clockwise."""
+    """Return a stone whose face is a polygon (x, z), counter-clockwise."""
     flat = np.asarray(polygon, dtype=float)
     outline = np.column_stack([flat[:, 0], np.zeros(len(flat)), flat[:, 1]])
     x, z = flat[:, 0], flat[:, 1]
@@ -58,6 +59,14 @@ def polygon_stone(
 def rectangle(
     code: str, kind: str, x: float, z: float, length: float, height: float, **changes: Any
 ) -> StoneQuality:
-    """A stone with an upright rectangular face, (x, z) its lower left corner."""
+    """Return a stone with an upright rectangular face, (x, z) its lower left corner."""
     polygon = [(x, z), (x + length, z), (x + length, z + height), (x, z + height)]
     return polygon_stone(code, kind, polygon, **changes)
+
+
+def facades_of(stones: list[StoneQuality]) -> tuple[Facade, ...]:
+    return find_facades(
+        np.array([one.normal for one in stones]),
+        np.array([one.area for one in stones]),
+        np.array([one.outline.mean(axis=0) for one in stones]),
+    )

@@ -7,7 +7,7 @@ from survey.quality.bed_fit import BedCorners, BedScatter, fit_bed, pool, scatte
 
 
 def beds(rng: np.random.Generator, stones: int, tau: float, kappa: float) -> BedCorners:
-    """One to three corners a stone, with standard deviations of their own."""
+    """Draw one to three corners a stone, with standard deviations of their own."""
     number = np.repeat(np.arange(stones), rng.integers(1, 4, stones))
     along = np.sort(rng.uniform(0.0, 0.6 * stones, len(number)))
     sigma = rng.uniform(0.001, 0.003, len(number))

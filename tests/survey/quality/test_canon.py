@@ -1,4 +1,4 @@
-"""Usual dimensions of a kind, and how far a stone is from them."""
+"""Usual dimensions of a kind, and the deviation of stones from them."""
 
 import math
 

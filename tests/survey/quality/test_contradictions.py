@@ -1,4 +1,4 @@
-"""Stones that are not what their kind means, and stones that only look so within the precision."""
+"""Stones that contradict their kind, and stones that only seem to within the precision."""
 
 import math
 
@@ -6,18 +6,12 @@ import numpy as np
 import pytest
 
 from survey.quality.contradictions import Contradiction, contradictions
-from survey.quality.facades import find_facades
 from survey.quality.precision import StoneQuality
-from tests.survey.quality.plain_stones import SIGMA, polygon_stone, rectangle
+from tests.survey.quality.plain_stones import SIGMA, facades_of, polygon_stone, rectangle
 
 
 def found(stones: list[StoneQuality]) -> tuple[Contradiction, ...]:
-    facades = find_facades(
-        np.array([one.normal for one in stones]),
-        np.array([one.area for one in stones]),
-        np.array([one.outline.mean(axis=0) for one in stones]),
-    )
-    return contradictions(stones, facades)
+    return contradictions(stones, facades_of(stones))
 
 
 def course(*lengths: tuple[str, float]) -> list[StoneQuality]:
@@ -31,7 +25,7 @@ def course(*lengths: tuple[str, float]) -> list[StoneQuality]:
 def arch(
     centre: tuple[float, float], start: float, stop: float, count: int, radius: float = 1.0
 ) -> list[StoneQuality]:
-    """Voussoirs 0.35 m deep between two angles [degrees] over a chord for intrados."""
+    """Return voussoirs 0.35 m deep between two angles [degrees] with a chord for intrados."""
     angles = np.radians(np.linspace(start, stop, count + 1))
     ring = np.column_stack([np.cos(angles), np.sin(angles)])
     stones = []
@@ -47,7 +41,7 @@ def arch(
     return stones
 
 
-def test_a_header_longer_than_the_stretchers_beside_it_is_told() -> None:
+def test_a_header_longer_than_the_stretchers_beside_it_is_reported() -> None:
     stones = course(("stretcher", 0.35), ("header", 0.39), ("stretcher", 0.36), ("stretcher", 0.34))
     (one,) = found(stones)
     assert (one.code, one.excess) == ("1", pytest.approx(0.04))
@@ -56,12 +50,12 @@ def test_a_header_longer_than_the_stretchers_beside_it_is_told() -> None:
     assert "stretchers beside it" in one.text
 
 
-def test_within_the_precision_nothing_is_told() -> None:
+def test_nothing_is_reported_within_the_precision() -> None:
     assert found(course(("stretcher", 0.405), ("header", 0.414), ("stretcher", 0.405))) == ()
     assert found(course(("header", 0.405), ("stretcher", 0.55), ("stretcher", 0.55))) == ()
 
 
-def test_a_header_longer_than_deep_is_told_if_the_depth_is_known_well_enough() -> None:
+def test_a_header_longer_than_deep_is_reported_if_the_depth_is_known_well_enough() -> None:
     stones = course(("stretcher", 0.9), ("header", 0.5), ("stretcher", 0.9))
     (one,) = found(stones)  # 0.5 m against 0.40 ± 0.02 m
     assert one.significance == pytest.approx(0.1 / math.hypot(0.02, math.sqrt(2) * SIGMA))
@@ -98,7 +92,7 @@ def test_the_stones_of_a_true_arch_are_wedges(start: float, stop: float) -> None
 
 
 @pytest.mark.parametrize("place", [0, 4, 7])
-def test_a_voussoir_that_is_no_wedge_is_told_wherever_it_sits(place: int) -> None:
+def test_a_voussoir_that_is_no_wedge_is_reported_wherever_it_sits(place: int) -> None:
     """A semicircle of nine: at its springing the sides are nearly level, at its crown nearly plumb."""
     stones = arch((5.0, 2.0), 0.0, 180.0, 9)
     flat = stones[place].outline[:, [0, 2]]
@@ -111,7 +105,7 @@ def test_a_voussoir_that_is_no_wedge_is_told_wherever_it_sits(place: int) -> Non
     assert one.significance == pytest.approx(math.radians(10.0) / (2 * SIGMA / 0.35), rel=0.02)
 
 
-def test_a_keystone_upside_down_is_told() -> None:
+def test_a_keystone_upside_down_is_reported() -> None:
     stones = arch((0.0, 0.0), 50.0, 130.0, 9)
     flat = stones[4].outline[::-1, [0, 2]] * [1, -1] + [0, 2.35]
     stones[4] = polygon_stone("K", "keystone", flat, course=None)
@@ -127,8 +121,8 @@ def test_a_springer_has_a_sloped_side() -> None:
     assert (one.code, one.excess) == ("B", pytest.approx(math.radians(5.0)))
 
 
-def test_noise_alone_is_told_as_rarely_as_three_sigma_promise() -> None:
-    """Chance alone exceeds three standard deviations in 0.1 %: of true stones none or one is told."""
+def test_noise_alone_is_reported_as_rarely_as_three_sigma_promise() -> None:
+    """Chance alone exceeds three standard deviations in 0.1 %: at most one of the true stones is reported."""
     rng = np.random.default_rng(9)
     told = 0
     for _ in range(40):

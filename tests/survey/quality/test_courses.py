@@ -7,17 +7,8 @@ import pytest
 from scipy.stats import kstest
 
 from survey.quality.courses import CourseLine, course_heights, lower_corners, measure_courses
-from survey.quality.facades import Facade, find_facades
 from survey.quality.precision import StoneQuality
-from tests.survey.quality.plain_stones import polygon_stone, rectangle
-
-
-def facades_of(stones: list[StoneQuality]) -> tuple[Facade, ...]:
-    return find_facades(
-        np.array([one.normal for one in stones]),
-        np.array([one.area for one in stones]),
-        np.array([one.outline.mean(axis=0) for one in stones]),
-    )
+from tests.survey.quality.plain_stones import facades_of, polygon_stone, rectangle
 
 
 def lines_of(stones: list[StoneQuality]) -> tuple[CourseLine, ...]:
@@ -25,7 +16,7 @@ def lines_of(stones: list[StoneQuality]) -> tuple[CourseLine, ...]:
 
 
 def course(heights: np.ndarray, number: int = 1, **changes: object) -> list[StoneQuality]:
-    """Stones 0.5 m long with 10 mm joints, whose two lower corners lie at the heights (m, 2)."""
+    """Return stones 0.5 m long with 10 mm joints, whose two lower corners lie at the heights (m, 2)."""
     stones = []
     for k, (left, right) in enumerate(heights):
         x, top = 0.51 * k, float(heights.max()) + 0.3
@@ -35,7 +26,7 @@ def course(heights: np.ndarray, number: int = 1, **changes: object) -> list[Ston
 
 
 def places(count: int) -> np.ndarray:
-    """x of the lower corners, (m, 2)."""
+    """Return x of the lower corners, (m, 2)."""
     start = 0.51 * np.arange(count)
     return np.column_stack([start, start + 0.5])
 

@@ -1,4 +1,4 @@
-"""Facades: who belongs to which wall, and the frame in which a wall is drawn."""
+"""Facades: the stones of each wall, and the frame in which it is drawn."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from survey.quality.facades import WIDEST, find_facades
 
 
 def looking(degrees, tilt=0.0):
-    """Unit normals that look towards azimuths, clockwise from y, turned up by `tilt`."""
+    """Return unit normals towards azimuths, clockwise from y, turned up by `tilt`."""
     azimuth, rise = np.radians(np.atleast_1d(degrees)), np.radians(tilt)
     level = np.column_stack([np.sin(azimuth), np.cos(azimuth)]) * np.cos(rise)
     return np.column_stack([level, np.full(len(azimuth), np.sin(rise))])
@@ -18,7 +18,7 @@ def groups(normals, areas=None):
     return find_facades(normals, areas, np.zeros((len(normals), 3)))
 
 
-def test_the_four_walls_and_the_floor_of_a_room_are_told_apart():
+def test_the_four_walls_and_the_floor_of_a_room_are_distinguished():
     rng = np.random.default_rng(3)
     walls = np.repeat([10.0, 100.0, 190.0, 280.0], [40, 30, 20, 10]) + rng.uniform(-5, 5, 100)
     found = groups(np.vstack([looking(walls), looking(0.0, 90.0), looking(0.0, -80.0)]))
@@ -35,7 +35,7 @@ def test_the_frame_is_level_along_the_wall_to_the_right_of_the_viewer_and_outwar
         looking([350.0, 10.0], tilt=-6.0), np.ones(2), np.array([[7e6, 4, 1], [7e6, 6, 3.0]])
     )
     along, up, outward = facade.frame.axes
-    assert along == pytest.approx([-1.0, 0.0, 0.0])  # who looks south has the west on the right
+    assert along == pytest.approx([-1.0, 0.0, 0.0])  # west is on the right of a viewer who looks south
     assert outward @ looking(0.0, -6.0)[0] == pytest.approx(1.0, abs=1e-4)
     assert up[2] > 0.99
     assert facade.frame.origin == pytest.approx([7e6, 5.0, 2.0], abs=1e-8)

@@ -1,4 +1,4 @@
-"""The quality of a survey: what is said of a stone, and whether the stated precision is right."""
+"""Quality of a survey: the summary of a stone, and the verdict on the stated precision."""
 
 import math
 from dataclasses import replace
@@ -17,7 +17,7 @@ FRONT = np.array([0.0, -10.0, 0.0])
 
 
 def wall_face(rng: np.random.Generator, true_sigma: float, stated: float, **changes: object) -> StoneQuality:
-    """A plane face 0.6 m x 0.3 m in the plane y = 0, measured at its corners and 16 points."""
+    """Return a plane face 0.6 m x 0.3 m in the plane y = 0, measured at its corners and 16 points."""
     corners = np.array([[0, 0, 0], [0.6, 0, 0], [0.6, 0, 0.3], [0, 0, 0.3]])
     points = np.column_stack([rng.uniform(0, 0.6, 16), np.zeros(16), rng.uniform(0, 0.3, 16)])
     record = BlockRecord(

@@ -1,4 +1,4 @@
-"""What is to be measured again, in the order of its urgency."""
+"""Stones to be measured again, in the order of their urgency."""
 
 import numpy as np
 import pytest

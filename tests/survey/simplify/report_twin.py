@@ -1,4 +1,4 @@
-"""What the report of a simplified stone says, found anew from the two solids: slow, and by other ways."""
+"""Slow reference of the report of a simplified stone, from the two solids and by other methods."""
 
 import itertools
 
@@ -9,12 +9,17 @@ from survey.geometry.solids import Solid
 from survey.geometry.watertight import triangulate
 
 
+def random_turn(rng: np.random.Generator) -> np.ndarray:
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    return turn * np.sign(np.linalg.det(turn))
+
+
 def edges_of(solid: Solid) -> list[tuple[int, int]]:
     return sorted({tuple(sorted((f[k - 1], f[k]))) for f in solid.faces for k in range(len(f))})
 
 
 def distance_to_edges(point: np.ndarray, solid: Solid) -> float:
-    """By dense sampling of each edge, then by the foot of the perpendicular."""
+    """Return the distance by the foot of the perpendicular on each edge, or its ends."""
     best = np.inf
     for a, b in edges_of(solid):
         p, q = solid.vertices[a], solid.vertices[b]
@@ -34,7 +39,7 @@ def displacement(old: Solid, new: Solid) -> np.ndarray:
 
 
 def volume(solid: Solid) -> float:
-    """Sum of signed tetrahedra on the mean of the corners."""
+    """Return the sum of signed tetrahedra on the mean of the corners."""
     middle = solid.vertices.mean(axis=0)
     return sum(float(np.linalg.det(solid.vertices[t] - middle)) for t in triangulate(solid)) / 6.0
 
@@ -50,7 +55,7 @@ def planes(solid: Solid) -> list[np.ndarray]:
 
 
 def common_share(a: Solid, b: Solid) -> float:
-    """Of two convex solids that have something in common: the corners of what both hold, and the hull of these."""
+    """Return the share of two intersecting convex solids by the hull of the corners of their intersection."""
     middle = np.mean([a.vertices.mean(axis=0), b.vertices.mean(axis=0)], axis=0)
     common = HalfspaceIntersection(
         np.array(
@@ -66,7 +71,7 @@ def common_share(a: Solid, b: Solid) -> float:
 
 
 def worst_angle(solid: Solid) -> float:
-    """Of a convex solid: 180° less the angle between the outward normals, over all pairs of faces with an edge."""
+    """Return the worst of 180° less the angle between the outward normals of a convex solid's adjacent faces."""
     normals = [plane[:3] for plane in planes(solid)]
     worst = 0.0
     for i, j in itertools.combinations(range(len(solid.faces)), 2):
@@ -77,7 +82,7 @@ def worst_angle(solid: Solid) -> float:
 
 
 def bend(solid: Solid) -> float:
-    """Largest distance of a corner from the plane of its face, over the solid's size."""
+    """Return the largest distance of a corner from the plane of its face, over the solid's size."""
     size = float(np.ptp(solid.vertices, axis=0).max())
     return (
         max(
@@ -89,5 +94,5 @@ def bend(solid: Solid) -> float:
 
 
 def highest(solid: Solid) -> float:
-    """Largest height of any corner above any face."""
+    """Return the largest height of any corner above any face."""
     return max(float((solid.vertices @ p[:3] + p[3]).max()) for p in planes(solid))

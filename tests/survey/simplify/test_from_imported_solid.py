@@ -1,4 +1,4 @@
-"""Solids of other programs, and what simplifying makes of them."""
+"""Simplification of imported solids."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def made(vertices: np.ndarray, faces: tuple[tuple[int, ...], ...] = SIDES) -> Su
 
 
 def prism_of(flat: np.ndarray, depth: float) -> tuple[np.ndarray, tuple[tuple[int, ...], ...]]:
-    """Corners and faces of a prism along y on a polygon (x, z), counter-clockwise seen from -y."""
+    """Return corners and faces of a prism along y on a polygon (x, z), counter-clockwise seen from -y."""
     n = len(flat)
     front = np.column_stack([flat[:, 0], np.zeros(n), flat[:, 1]])
     sides = [(i, i + n, (i + 1) % n + n, (i + 1) % n) for i in range(n)]
@@ -44,13 +44,8 @@ def prism_of(flat: np.ndarray, depth: float) -> tuple[np.ndarray, tuple[tuple[in
     )
 
 
-def random_turn(rng: np.random.Generator) -> np.ndarray:
-    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    return turn * np.sign(np.linalg.det(turn))
-
-
 def random_hexahedron(rng: np.random.Generator) -> np.ndarray:
-    """Six planes near those of a box: its corners are where three of them cross; slender up to 1:20."""
+    """Draw six planes near those of a box, whose corners are where three of them cross; slender up to 1:20."""
     size = np.array([1.0, rng.uniform(0.05, 1.0), rng.uniform(0.05, 1.0)])[rng.permutation(3)]
     normals = np.vstack([np.eye(3), -np.eye(3)]) + rng.uniform(-0.04, 0.04, (6, 3)) * size.min() / size.max()
     normals /= np.linalg.norm(normals, axis=1)[:, None]
@@ -93,7 +88,7 @@ def assert_sound_result(block: SurveyedBlock, stone: BlockyStone, shape: BlockSh
 @given(SEEDS, st.sampled_from([0.0, 1e3, 1e6]))
 def test_a_hexahedron_keeps_its_corners_to_the_last_bit_wherever_it_is(seed: int, far: float) -> None:
     rng = np.random.default_rng(seed)
-    corners = random_hexahedron(rng) @ random_turn(rng).T + far * rng.normal(size=3)
+    corners = random_hexahedron(rng) @ twin.random_turn(rng).T + far * rng.normal(size=3)
     block = made(corners)
     stone = simplify(block)
     assert_sound_result(block, stone, BlockShape.HEXAHEDRON)
@@ -112,7 +107,7 @@ def test_a_hexahedron_keeps_its_corners_to_the_last_bit_wherever_it_is(seed: int
 @given(SEEDS, st.booleans())
 def test_a_triangulated_and_divided_box_becomes_its_hexahedron(seed: int, rounded: bool) -> None:
     rng = np.random.default_rng(seed)
-    true = random_hexahedron(rng) @ random_turn(rng).T
+    true = random_hexahedron(rng) @ twin.random_turn(rng).T
     # a corner in the middle of a face, one in the middle of an edge of it, then triangles
     vertices = np.vstack([true, true[list(SIDES[0])].mean(axis=0), true[[0, 1]].mean(axis=0)])
     a, b, c, d = SIDES[0]
@@ -176,7 +171,7 @@ def test_a_prism_stays_one(seed: int, count: int, depth: float) -> None:
     rng = np.random.default_rng(seed)
     angles = 2.0 * np.pi * (np.arange(count) + rng.uniform(-0.3, 0.3, count)) / count
     vertices, faces = prism_of(0.5 * np.column_stack([np.cos(angles), np.sin(angles)]), depth)
-    block = made(vertices @ random_turn(rng).T, faces)
+    block = made(vertices @ twin.random_turn(rng).T, faces)
     stone = simplify(block)
     assert_sound_result(block, stone, BlockShape.WEDGE if count == 3 else BlockShape.PRISM)
     assert stone.report.displacement.max() <= 1e-15
@@ -253,5 +248,5 @@ def test_a_solid_seen_from_inside_or_flat_is_refused_by_name() -> None:
             solid,
             block.vertex_sigma,
         )
-        with pytest.raises(GeometryError, match=r"stone A: its faces enclose .* look at its corners"):
+        with pytest.raises(GeometryError, match=r"stone A: its faces enclose .* check its corners"):
             simplify(wrong)

@@ -1,4 +1,4 @@
-"""Stones whose face was measured, and what simplifying makes of them."""
+"""Simplification of stones whose face was measured."""
 
 import re
 from collections import defaultdict
@@ -13,9 +13,9 @@ from moma.errors import GeometryError
 from survey.extrusion.depth import Depth
 from survey.extrusion.extrusion import SurveyedBlock, extrude
 from survey.faces.faces import outline_face
-from survey.geometry.solids import Solid
 from survey.geometry.watertight import check_watertight
 from survey.records.survey import BlockRecord, Extrusion
+from survey.simplify.blockiness import about
 from survey.simplify.simplify import BlockShape, BlockyStone, SimplifyBounds, simplify
 from tests.paths import ROOT
 from tests.survey.simplify import report_twin as twin
@@ -38,7 +38,7 @@ def surveyed(
     turn: np.ndarray = UNTURNED,
     shift: np.ndarray | float = 0.0,
 ) -> SurveyedBlock:
-    """A stone whose face lies at z = 0, seen from above, then turned and shifted with its observer."""
+    """Return a stone whose face lies at z = 0, seen from above, then turned and shifted with its observer."""
     vertices = np.column_stack([flat, np.broadcast_to(height, len(flat))])
     record = BlockRecord("A", "voussoir", None, vertices @ turn.T + shift, points @ turn.T + shift, sigma)
     if extrusion.direction is not None:
@@ -59,29 +59,20 @@ def cut_corner(quad: np.ndarray, corner: int, back: float, on: float) -> np.ndar
 
 
 def random_quad(rng: np.random.Generator) -> np.ndarray:
-    """A dressed face, 0.25 to 1.2 m, each corner up to 15 % of the shorter side out of square."""
+    """Draw a dressed face, 0.25 to 1.2 m, each corner up to 15 % of the shorter side out of square."""
     sides = rng.uniform(0.25, 1.2, 2)
     corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) * sides
     return corners + rng.uniform(-0.15, 0.15, (4, 2)) * sides.min()
 
 
-def random_turn(rng: np.random.Generator) -> np.ndarray:
-    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    return turn * np.sign(np.linalg.det(turn))
-
-
 def apart(found: np.ndarray, true: np.ndarray) -> float:
-    """Largest distance of a corner from the nearest of the other set, either way."""
+    """Return the largest distance of a corner from the nearest of the other set, either way."""
     distances = np.linalg.norm(found[:, None] - true, axis=2)
     return float(max(distances.min(axis=0).max(), distances.min(axis=1).max()))
 
 
-def about(solid: Solid, origin: np.ndarray) -> Solid:
-    return Solid(solid.code, solid.vertices - origin, solid.faces)
-
-
 def assert_sound_result(block: SurveyedBlock, stone: BlockyStone) -> None:
-    """What is true of every simplified stone, checked against the twin."""
+    """Check the facts of every simplified stone, against the twin."""
     origin = block.face.outline[0]
     old, new, report = about(block.solid, origin), about(stone.solid, origin), stone.report
     far = 4.0 * np.spacing(np.abs(stone.solid.vertices).max())
@@ -208,7 +199,7 @@ def test_an_eroded_corner_is_restored_along_the_points_of_an_even_margin(seed: i
     assert stone.shape is BlockShape.HEXAHEDRON
     bound = SimplifyBounds()
     if "restored" in stone.report.reason:
-        # the even margin may be told wrong by as much as the tolerance, at a half of the side's length
+        # the even margin may be wrong by as much as the tolerance, at a half of the side's length
         assert apart(stone.solid.vertices[:4, :2], true) < 2.0 * stone.report.tolerance
         assert stone.sound.all()
     else:
@@ -227,7 +218,7 @@ def test_a_worn_corner_without_points_beside_it_stays_and_is_not_sound() -> None
     assert stone.sound.tolist() == [True, True, False, True]
 
 
-def test_a_bevel_within_the_tolerance_is_not_told_from_a_point_along_the_side() -> None:
+def test_a_bevel_within_the_tolerance_counts_as_a_point_along_the_side() -> None:
     outline = cut_corner(TRAPEZIUM, 1, 0.05, 0.004)
     stone = blocky(outline)
     assert stone.shape is BlockShape.HEXAHEDRON
@@ -294,7 +285,7 @@ def test_any_face_gives_a_sound_solid_and_a_true_report(
             depth=depth,
             extrusion=Extrusion(direction, tail),
             sigma=0.001,
-            turn=random_turn(rng),
+            turn=twin.random_turn(rng),
             shift=shift,
         )
     except GeometryError:
@@ -339,7 +330,7 @@ def test_neither_place_nor_hand_nor_the_way_round_make_a_difference(
     rng = np.random.default_rng(seed)
     flat = cut_corner(random_quad(rng), 1, *rng.uniform(0.02, 0.03, 2))
     flat += rng.uniform(-0.001, 0.001, flat.shape)
-    turn, shift = random_turn(rng), far * rng.normal(size=3)
+    turn, shift = twin.random_turn(rng), far * rng.normal(size=3)
     here = simplify(surveyed(flat))
     hand = np.array([-1.0 if mirrored else 1.0, 1.0, 1.0])
     other = np.roll(flat[::-1] if back else flat, first, axis=0) * hand[:2]
@@ -376,12 +367,12 @@ def test_simplifying_again_changes_nothing(seed: int, tail: float, slender: floa
 
 
 def test_a_flat_stone_is_refused_by_name() -> None:
-    with pytest.raises(GeometryError, match=r"stone A: it is flat: .* look at the corners of its face"):
+    with pytest.raises(GeometryError, match=r"stone A: it is flat: .* check the corners of its face"):
         simplify(surveyed(TRAPEZIUM, depth=1e-7))
 
 
 def inset(corners: np.ndarray, normal: np.ndarray, distances: list[float]) -> np.ndarray:
-    """Corners of a face whose sides are moved inwards: where each two neighbouring sides meet."""
+    """Return corners of a face whose sides are moved inwards: where each two neighbouring sides meet."""
     run = np.roll(corners, -1, axis=0) - corners
     inward = np.cross(normal, run)
     inward /= np.linalg.norm(inward, axis=1)[:, None]
@@ -391,7 +382,7 @@ def inset(corners: np.ndarray, normal: np.ndarray, distances: list[float]) -> np
     return np.array([np.linalg.solve(rows[k], [offsets[k - 1], offsets[k], heights[k]]) for k in range(4)])
 
 
-def test_the_corners_of_the_sample_are_as_near_to_the_true_ones_as_the_documentation_says(
+def test_the_corners_of_the_sample_are_as_accurate_as_documented(
     blocks: list[SurveyedBlock], truth: dict[str, dict[str, Any]]
 ) -> None:
     found: dict[str, list[tuple[float, float]]] = defaultdict(list)

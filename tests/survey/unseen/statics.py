@@ -1,4 +1,4 @@
-"""Rigid-block statics by linear programming, for the tests: do forces exist that hold every stone?"""
+"""Rigid-block statics by linear programming, for the tests: existence of forces that hold every stone."""
 
 from collections.abc import Sequence
 from itertools import combinations
@@ -9,12 +9,13 @@ from scipy.sparse import coo_array
 
 from survey.arrays import Array
 from survey.geometry.solids import Solid
+from tests.survey.largest_ball import largest_ball
 
 FACETS = 8  # of the friction cone; a pyramid inside the cone, so that what it allows Coulomb allows
 
 
 def side_planes(solid: Solid) -> Array:
-    """(nf, 4) outward unit normals and offsets."""
+    """Return (nf, 4) outward unit normals and offsets."""
     rows = []
     for face in solid.faces:
         p = solid.vertices[list(face)]
@@ -33,22 +34,17 @@ def near_pairs(solids: Sequence[Solid], reach: float = 1e-6) -> list[tuple[int, 
 
 
 def overlap_depth(a: Solid, b: Solid) -> float:
-    """Radius of the largest ball inside both; negative if they are apart [m]."""
+    """Return the radius of the largest ball inside both; negative if they are apart [m]."""
     centre = a.vertices.mean(axis=0)
     planes = np.vstack([side_planes(a), side_planes(b)])
-    offsets = planes[:, 3] - planes[:, :3] @ centre
-    found = linprog(
-        [0, 0, 0, -1],
-        A_ub=np.column_stack([planes[:, :3], np.ones(len(planes))]),
-        b_ub=offsets,
-        bounds=[(None, None)] * 3 + [(None, 1.0)],
-    )
-    assert found.status == 0
-    return float(found.x[3])
+    planes[:, 3] -= planes[:, :3] @ centre
+    radius = largest_ball(planes)[1]
+    assert np.isfinite(radius)
+    return radius
 
 
 def contacts(a: Solid, b: Solid, tolerance: float = 1e-7) -> list[tuple[Array, Array]]:
-    """Shared polygons: (normal from b to a, corners (n, 3))."""
+    """Return shared polygons: (normal from b to a, corners (n, 3))."""
     out = []
     for ka, (*na, da) in enumerate(side_planes(a)):
         for kb, (*nb, db) in enumerate(side_planes(b)):
@@ -60,7 +56,7 @@ def contacts(a: Solid, b: Solid, tolerance: float = 1e-7) -> list[tuple[Array, A
 
 
 def _common(a: Solid, ka: int, b: Solid, kb: int) -> Array | None:
-    """Corners of face ka of a cut by the edges of face kb of b (Sutherland and Hodgman)."""
+    """Return corners of face ka of a cut by the edges of face kb of b (Sutherland and Hodgman)."""
     polygon = list(a.vertices[list(a.faces[ka])])
     cutter = b.vertices[list(b.faces[kb])]
     outward = side_planes(b)[kb, :3]
@@ -82,11 +78,16 @@ def _common(a: Solid, ka: int, b: Solid, kb: int) -> Array | None:
 
 
 def area_of(polygon: Array) -> float:
-    return 0.5 * float(np.linalg.norm(np.cross(polygon, np.roll(polygon, -1, axis=0)).sum(axis=0)))
+    arms = polygon - polygon[0]
+    return 0.5 * float(np.linalg.norm(np.cross(arms, np.roll(arms, -1, axis=0)).sum(axis=0)))
+
+
+def contact_area(a: Solid, b: Solid) -> float:
+    return sum(area_of(polygon) for _, polygon in contacts(a, b))
 
 
 def centroid(solid: Solid) -> tuple[float, Array]:
-    """Volume and centroid by tetrahedra from a corner."""
+    """Return volume and centroid by tetrahedra from a corner."""
     base, volume, moment = solid.vertices[0], 0.0, np.zeros(3)
     for face in solid.faces:
         p = solid.vertices[list(face)] - base
@@ -98,7 +99,7 @@ def centroid(solid: Solid) -> tuple[float, Array]:
 
 
 def can_stand(solids: Sequence[Solid], fixed: Sequence[bool], friction: float) -> bool:
-    """Whether contact forces exist that balance the weight of every stone that is not fixed."""
+    """Return whether contact forces exist that balance the weight of every stone that is not fixed."""
     gravity_centres = [centroid(s) for s in solids]
     rows, columns, values, column = [], [], [], 0
     for i, j in near_pairs(solids):

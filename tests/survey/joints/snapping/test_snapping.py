@@ -1,4 +1,4 @@
-"""Assemblies rounded to a millimetre get the contact planes back that they were made with."""
+"""Snapping of assemblies rounded to a millimetre to the contact planes with which they were made."""
 
 from collections.abc import Callable
 from itertools import combinations
@@ -25,6 +25,7 @@ from survey.joints.snapping.snapping import snap
 from survey.records.snapping import Snapping
 from survey.records.survey import Reject, SolidRecord
 from tests.survey.joints.assemblies import dome, groin, obj, prism, rounded, wall
+from tests.survey.largest_ball import volume_within
 
 
 def read(path: Path, text: str, **options: float) -> tuple[list[Solid], Snapping | None]:
@@ -38,21 +39,15 @@ def read(path: Path, text: str, **options: float) -> tuple[list[Solid], Snapping
 
 
 def out_of_plane(places: Array) -> float:
-    """Largest distance from the plane that fits best."""
+    """Return the largest distance from the plane that fits best."""
     centred = places - places.mean(axis=0)
     return float(np.abs(centred @ np.linalg.svd(centred)[2][2]).max())
 
 
 def common_volume(one: Solid, other: Solid) -> float:
-    """Of two convex solids; by linear programming and qhull."""
-    planes = np.concatenate([planes_of_solid(one), planes_of_solid(other)])
-    rows = np.column_stack([planes[:, :3], np.ones(len(planes))])  # the largest ball within
-    ball = linprog([0, 0, 0, -1], A_ub=rows, b_ub=planes[:, 3], bounds=[(None, None)] * 3 + [(0, None)])
-    if ball.status != 0 or ball.x[3] < 1e-9:
-        return 0.0
+    """Return the common volume of two convex solids, by linear programming and qhull."""
     try:
-        common = HalfspaceIntersection(np.column_stack([planes[:, :3], -planes[:, 3]]), ball.x[:3])
-        return float(ConvexHull(common.intersections).volume)
+        return volume_within(np.concatenate([planes_of_solid(one), planes_of_solid(other)]), 1e-9)
     except QhullError:
         return 0.0
 
@@ -235,7 +230,7 @@ def test_the_network_moves_corners_by_as_little_as_a_general_minimiser_does() ->
 
 
 def shared_area(one: Array, other: Array) -> float:
-    """Of two convex polygons that look at each other, seen square to the mean of their planes, by qhull."""
+    """Return the common area of two opposite convex polygons, seen square to the mean of their planes, by qhull."""
     normal = area_vector(other) - area_vector(one)
     axes = np.linalg.svd(normal[None, :])[2][1:]
     rows = []
@@ -278,7 +273,7 @@ def test_matches_are_those_that_a_slow_search_finds() -> None:
 
 @st.composite
 def cut_boxes(draw: st.DrawFn) -> list[Solid]:
-    """A box cut by planes, each through a piece that is there already: many stones, no regularity."""
+    """Cut a box by planes, each through a piece that is already there: many stones, no regularity."""
     random = np.random.default_rng(draw(st.integers(0, 10**6)))
     low, high = np.zeros(3), np.array([2.0, 1.2, 1.5])
     pieces: list[list[tuple[float, float, float, float]]] = [[]]
@@ -358,7 +353,7 @@ def test_a_solid_that_snapping_would_spoil_is_refused(
     assert found.error.remedy == "give a smaller tolerance with --snap"
 
 
-def test_what_was_done_to_a_solid_is_said_with_it(tmp_path: Path) -> None:
+def test_changes_of_a_solid_are_reported_with_it(tmp_path: Path) -> None:
     path = tmp_path / "dome.obj"
     path.write_text(obj(dome(2), 3, doubled=True))
     stream = open_solids(path, ReadingOptions(snap=0.003))

@@ -1,4 +1,4 @@
-"""The core of a wall as blocks: closed, on common planes with the stones, as large as it truly is."""
+"""Core of a wall as blocks: closed, on common planes with the stones, of the true volume."""
 
 from itertools import combinations
 
@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from moma.errors import GeometryError, UsageError
 from pipelines.ingest.records import surveyed_block
 from pipelines.propose.records import core_record
-from survey.geometry.solids import area_vector, volume_of
+from survey.geometry.solids import volume_of
 from survey.geometry.watertight import check_watertight
 from survey.joints.close import close_joints
 from survey.joints.settings import JointSettings
@@ -19,6 +19,7 @@ from survey.unseen.core.facings import facing_stone
 from survey.unseen.core.propose import propose_infill
 from survey.unseen.core.settings import InfillSettings
 from tests.survey.unseen.core.two_facings import HALF, boxes_meet, contains, depth_of_overlap, facing
+from tests.survey.unseen.statics import side_planes
 
 BEDS = [0.0, 0.3, 0.62, 0.9]
 FRONT = [
@@ -34,7 +35,7 @@ BACK = [
 
 
 def core_of(front, back):
-    """True volume of the core between facings of whole rows."""
+    """Return the true volume of the core between facings of whole rows."""
     whole = 2.0 * HALF * 2.0 * BEDS[-1]
     return whole - sum(
         length * depth * (BEDS[k + 1] - BEDS[k])
@@ -42,13 +43,6 @@ def core_of(front, back):
         for k, row in enumerate(rows)
         for length, depth in row
     )
-
-
-def unit_planes(solid):
-    vectors = np.array([area_vector(solid.vertices[list(face)]) for face in solid.faces])
-    normals = vectors / np.linalg.norm(vectors, axis=1)[:, None]
-    centres = np.array([solid.vertices[list(face)].mean(axis=0) for face in solid.faces])
-    return normals, (normals * centres).sum(axis=1)
 
 
 def test_the_core_of_plain_facings_is_what_the_stones_leave():
@@ -65,13 +59,13 @@ def test_the_core_of_plain_facings_is_what_the_stones_leave():
 def test_every_block_shares_planes_with_the_stones_that_its_evidence_names():
     stones = {one.code: one for one in facing(FRONT, BEDS) + facing(BACK, BEDS, back=True)}
     for block in propose_infill(list(stones.values())):
-        normals, offsets = unit_planes(block.solid)
+        planes = side_planes(block.solid)
         named = [code for code in stones if code in block.evidence]
         assert len(named) == 2
         for code in named:
             hidden = -stones[code].normal
             plane = hidden @ stones[code].solid.vertices[4]
-            meets = (normals @ hidden < -1.0 + 1e-12) & (np.abs(offsets + plane) < 1e-9)
+            meets = (planes[:, :3] @ hidden < -1.0 + 1e-12) & (np.abs(planes[:, 3] + plane) < 1e-9)
             assert meets.sum() == 1, (block.code, code)
 
 

@@ -1,4 +1,4 @@
-"""The core of a wall as one continuum for each storey: closed, around the tails of headers, nearly all of it."""
+"""Core of a wall as one continuum for each storey: closed, around the tails of headers, nearly all of it."""
 
 import numpy as np
 import pytest
@@ -104,7 +104,7 @@ def test_solids_of_cells_are_closed_and_as_large_as_the_cells(data):
 
 
 def touches_at_an_edge(filled):
-    """Whether two cells share an edge or a corner without a third beside both."""
+    """Return whether two cells share an edge or a corner without a third beside both."""
     cells = {tuple(cell) for cell in np.argwhere(filled).tolist()}
     for one in cells:
         for step in np.ndindex(3, 3, 3):

@@ -1,7 +1,6 @@
-"""Small walls of two facings for the tests of the core, and checks that know nothing of how it was made."""
+"""Small walls of two facings for the tests of the core, and checks that are independent of its construction."""
 
 import numpy as np
-from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
@@ -9,12 +8,13 @@ from survey.extrusion.extrusion import prism
 from survey.geometry.solids import Solid
 from survey.geometry.watertight import triangulate
 from survey.unseen.core.facings import FacingStone
+from tests.survey.largest_ball import largest_ball
 
 HALF = 0.5  # of the thickness of the wall [m]
 
 
 def facing(rows, beds, *, back=False, joint=0.0, placed=None):
-    """Stones of one facing of a wall along x, whose front looks along -y.
+    """Return stones of one facing of a wall along x, whose front faces -y.
 
     rows: for each course (length, depth) of the stones from the left of the plan; a depth of None leaves a hole.
     """
@@ -39,29 +39,28 @@ def facing(rows, beds, *, back=False, joint=0.0, placed=None):
 
 
 def moved(stone, rotation, shift):
-    """The stone elsewhere."""
+    """Return the stone elsewhere."""
     turn = Rotation.from_rotvec(rotation).as_matrix()
     solid = Solid(stone.code, stone.solid.vertices @ turn.T + shift, stone.solid.faces)
     return FacingStone(stone.code, stone.course, solid, turn @ stone.normal)
 
 
 def depth_of_overlap(one, other):
-    """Radius of the largest ball in what two convex solids share; negative if they are apart [m]."""
+    """Return the radius of the largest ball in the overlap of two convex solids; negative if they are apart [m]."""
     shift = one.mean(axis=0)
     planes = np.concatenate([ConvexHull(points - shift).equations for points in (one, other)])
-    rows = np.column_stack([planes[:, :3], np.ones(len(planes))])
-    done = linprog([0, 0, 0, -1], A_ub=rows, b_ub=-planes[:, 3], bounds=[(None, None)] * 4)
-    assert done.status == 0
-    return float(done.x[3])
+    radius = largest_ball(planes * [1.0, 1.0, 1.0, -1.0])[1]
+    assert np.isfinite(radius)
+    return radius
 
 
 def boxes_meet(one, other):
-    """Whether the boxes of two sets of corners overlap."""
+    """Return whether the boxes of two sets of corners overlap."""
     return bool((one.min(axis=0) < other.max(axis=0)).all() and (other.min(axis=0) < one.max(axis=0)).all())
 
 
 def contains(solid, points):
-    """Which points are in a closed solid: the solid angle under which they see it is 4π there."""
+    """Return the points inside a closed solid: the solid angle of its surface seen from them is 4π."""
     corners = solid.vertices[triangulate(solid)]
     a, b, c = (corners[None, :, k] - points[:, None] for k in range(3))
     la, lb, lc = (np.linalg.norm(side, axis=2) for side in (a, b, c))

@@ -1,4 +1,4 @@
-"""Stones taken out of surveys are proposed where they were; whole walls and windows stay as they are."""
+"""Stones taken out of surveys are proposed at their places; whole walls and windows stay as they are."""
 
 from dataclasses import replace
 from functools import cache
@@ -31,7 +31,7 @@ def blocks_of(survey):
 
 @cache
 def sample():
-    """Surveyed stones of the sample, and their true solids by code."""
+    """Return surveyed stones of the sample, and their true solids by code."""
     made = make_sample()
     return blocks_of(made.survey), {one.plan.code: one for one in made.stones}
 
@@ -41,7 +41,7 @@ def proposed(blocks, gone, given=None):
 
 
 def error(proposal, true):
-    """Largest distance of a corner from the true one, where joints are closed [m]."""
+    """Return the largest distance of a corner from the true one, where joints are closed [m]."""
     outline = proposal.block.face.outline
     if len(outline) != len(true):
         return np.inf
@@ -53,7 +53,7 @@ def face_of(solid):
 
 
 def inner_codes():
-    """Stones of the sample that have a neighbour on each side, and one above."""
+    """Return stones of the sample that have a neighbour on each side, and one above."""
     blocks, _ = sample()
     rows = {}
     for one in blocks:
@@ -232,7 +232,7 @@ def test_proposals_turn_with_the_wall(turn, shift):
 
 @cache
 def arched():
-    """A wall with an arch."""
+    """Return a wall with an arch."""
     return blocks_of(wall(90, 5, arch=Arch.SEGMENTAL).survey)
 
 
