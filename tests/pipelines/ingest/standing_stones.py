@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from archmodel.store.stones import store_survey
+from mechanics.scene.scene import Block
 from mechanics.scene.shapes import bond
 from survey.geometry.solids import area_vector
 from tests.archmodel.stones import box_stone, hash_of
@@ -72,4 +73,4 @@ def arch(count=9, thickness=0.4, radius=1.5, prefix="", at=(0.0, 0.0, 0.0), last
 
 def replace_block(block, vertices):
     """The block with other corners."""
-    return masonry.Block(block.code, vertices, block.faces, block.material, block.fidelity)
+    return Block(block.code, vertices, block.faces, block.material, block.fidelity)

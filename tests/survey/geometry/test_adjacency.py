@@ -135,7 +135,7 @@ def test_a_wall_that_meets_another_touches_its_side():
 
 
 def facade(count, courses, returns, brick=(0.08, 0.04, 0.028)):
-    """Return a façade of `count` bricks along x with return walls of `returns` bricks along y at both ends, in running bond.
+    """Return a façade of `count` bricks along x in running bond, with returns of `returns` bricks along y at both ends.
 
     In the first and every other course the façade runs through to the corners and the returns begin behind it; in
     the others the returns run through, with a half brick at their end, and the façade lies between them, shifted by
