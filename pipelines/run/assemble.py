@@ -16,7 +16,7 @@ from pipelines.run.remarks import remarks
 from pipelines.scene.file import SceneFile
 from pipelines.scene.keys import typed_values
 from pipelines.scene.laws import law_rules
-from pipelines.scene.loads import build_loads, thrown
+from pipelines.scene.loads import FORCES, build_loads, thrown
 from pipelines.scene.selection import STRESS, Groups, StoneModel, select_groups, select_stones
 from pipelines.scene.settings import MeshSettings
 from survey.extrusion.extrusion import SurveyedBlock
@@ -94,7 +94,7 @@ def assemble_stones(scene: SceneFile, models: tuple[StoneModel, ...], groups: Gr
 def wishes_of(scene: SceneFile, models: Sequence[StoneModel], groups: Groups) -> Wishes:
     """Return what the scene asks of the models of its stones."""
     asked = scene.output.pictures or ()
-    pushed = (groups[entry.path][0] for entry in scene.loads if entry.type == "force")
+    pushed = (groups[entry.path][0] for entry in scene.loads if entry.type in FORCES)
     return Wishes(
         named={one.record.code: one.listed for one in models if one.listed is not None},
         default=scene.bodies.default,
