@@ -17,6 +17,7 @@ from mechanics.scene.scene import Fidelity
 from mechanics.stones.materials import Material
 from moma.errors import MissingLibraryError
 from pipelines.arrays import Array
+from pipelines.draw.catalogue import PICTURES
 from pipelines.draw.offscreen.jobs import save_job
 from pipelines.draw.offscreen.surfaces import FIELDS, stone_fields, wall_surface
 
@@ -37,17 +38,6 @@ _PACKAGES = {
     "libSM": "libsm6",
     "libICE": "libice6",
 }
-_TITLES = {
-    "von_mises": "Von Mises stress",
-    "displacement": "displacement",
-    "principal_tension": "tension",
-    "principal_compression": "compression",
-    "utilisation": "stress over strength",
-    "error": "error of the stress",
-    "pressure": "pressure in the joints",
-    "resultants": "resultants of the joints",
-}
-_NOTES = {"resultants": "strokes: as long as the force is large; blue: within the kern, red: outside"}
 _ENDINGS = {
     Outcome.EQUILIBRIUM: "at equilibrium",
     Outcome.MOVING: "still moving",
@@ -74,13 +64,14 @@ def draw_pictures(result: Result, folder: Path, names: Sequence[str], towards: A
     if not wanted:
         return ()
     up = -np.array(result.scene.gravity)
+    ending = f"{_ENDINGS[result.outcome]} after {result.time:.3g} s"
     jobs = [
         {
             "quantity": name,
             "path": str((folder / f"{name}.png").absolute()),
             "top": _top(result, name),
-            "title": f"{result.scene.name}: {_TITLES[name]}, {_ENDINGS[result.outcome]} after {result.time:.3g} s",
-            "note": _NOTES.get(name, ""),
+            "title": f"{result.scene.name}: {PICTURES[name].title}, {ending}",
+            "note": PICTURES[name].note,
             "towards": towards.tolist(),
             "up": up.tolist() if up.any() else [0.0, 0.0, 1.0],
         }
@@ -93,9 +84,9 @@ def draw_pictures(result: Result, folder: Path, names: Sequence[str], towards: A
 def missing(result: Result, name: str) -> str | None:
     """Give the reason why a picture would show nothing of this result; None if it shows something."""
     stressed = [body.values for body in result.bodies if body.values is not None]
-    if name in ("pressure", "resultants"):
+    if PICTURES[name].shows == "joints":
         return None if result.joints.pressed.any() else "no joint is pressed"
-    if name != "displacement" and not stressed:
+    if PICTURES[name].shows == "stress" and not stressed:
         deforms = any(body.fidelity is Fidelity.DEFORMABLE for body in result.bodies)
         return "no stress was asked for" if deforms else "no stone deforms"
     if name == "utilisation" and all(one.utilisation is None for one in stressed):
@@ -105,7 +96,7 @@ def missing(result: Result, name: str) -> str | None:
 
 def _top(result: Result, name: str) -> float | None:
     """Return the end of the scale, exceeded in 1 % of the volume; None stands for the largest value."""
-    if name not in ("von_mises", "principal_tension", "principal_compression", "utilisation"):
+    if not PICTURES[name].capped:
         return None
     known = [
         (_fields_of(body, block.material, name), body.node_volume)

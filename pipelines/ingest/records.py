@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any, get_args
 
 import numpy as np
@@ -21,9 +21,13 @@ __all__ = ["frame_record", "stone_record", "surveyed_block"]
 
 
 _STONE = ("code", "kind", "course")
-_MEASURED = (
-    "line", "vertices", "points", "sigma", "notes", "zone", "station", "photograph", "image", "sigmas", "names",
-)  # fmt: skip
+# measured in the one, resolved for every stone in the other
+_DEPTH = ("depth", "depth_sigma", "depth_source")
+_MEASURED = tuple(
+    one.name
+    for one in fields(BlockRecord)
+    if one.name in {field.name for field in fields(StoneRecord)}.difference(_STONE, _DEPTH)
+)
 _PLANE = ("normal", "offset", "centroid", "axes", "covariance", "rms", "redundancy")
 """Names that stones and their records share: of the stone, of its BlockRecord, of its FaceFit."""
 

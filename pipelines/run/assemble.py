@@ -8,6 +8,7 @@ from sqlalchemy.orm import Session
 
 from mechanics.scene.scene import Block, Fidelity, Part, Scene
 from pipelines.arrays import Array
+from pipelines.draw.catalogue import PICTURES
 from pipelines.ingest.records import surveyed_block
 from pipelines.run.fidelity import Modelled, Wishes, modelled, neighbours
 from pipelines.run.local_frame import entry_about, local_origin, stone_about
@@ -15,9 +16,9 @@ from pipelines.run.remarks import remarks
 from pipelines.scene.file import SceneFile
 from pipelines.scene.keys import typed_values
 from pipelines.scene.laws import law_rules
-from pipelines.scene.loads import build_loads, thrown
+from pipelines.scene.loads import FORCES, build_loads, thrown
 from pipelines.scene.selection import STRESS, Groups, StoneModel, select_groups, select_stones
-from pipelines.scene.settings import STRESS_PICTURES, MeshSettings
+from pipelines.scene.settings import MeshSettings
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.solids import Solid
 from survey.geometry.stone_parts import stone_parts
@@ -93,12 +94,12 @@ def assemble_stones(scene: SceneFile, models: tuple[StoneModel, ...], groups: Gr
 def wishes_of(scene: SceneFile, models: Sequence[StoneModel], groups: Groups) -> Wishes:
     """Return what the scene asks of the models of its stones."""
     asked = scene.output.pictures or ()
-    pushed = (groups[entry.path][0] for entry in scene.loads if entry.type == "force")
+    pushed = (groups[entry.path][0] for entry in scene.loads if entry.type in FORCES)
     return Wishes(
         named={one.record.code: one.listed for one in models if one.listed is not None},
         default=scene.bodies.default,
         stress=None if scene.output.stress is None else groups[STRESS][0],
-        pictures=tuple(name for name in asked if name in STRESS_PICTURES),
+        pictures=tuple(name for name in asked if PICTURES[name].shows == "stress"),
         pushed=frozenset[str]().union(*pushed),
         ring=scene.bodies.ring,
     )

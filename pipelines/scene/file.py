@@ -14,11 +14,12 @@ from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import ContactSettings, SolverSettings, TimeSettings
 from mechanics.stones.materials import Material, Orthotropy
 from moma.errors import SceneError
+from pipelines.draw.catalogue import PICTURES
 from pipelines.scene.array_tables import Entry, read_entries
 from pipelines.scene.keys import build, typed_values
 from pipelines.scene.laws import BONDS, JointLaw, read_laws
 from pipelines.scene.loads import read_loads, read_throws
-from pipelines.scene.settings import PICTURES, Fidelities, MaterialRule, MeshSettings, Output, Selection
+from pipelines.scene.settings import Fidelities, MaterialRule, MeshSettings, Output, Selection
 from pipelines.scene.tables import ARRAYS, AUTO, MATERIAL_KEYS, MESH_KEYS, ORTHOTROPY_KEYS, TABLES
 from pipelines.toml.lines import key_lines, parse_toml, read_text
 from pipelines.toml.schema import Document, check_table, nearest

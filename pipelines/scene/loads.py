@@ -20,7 +20,7 @@ from pipelines.scene.array_tables import Entry, file_beside, read_entries
 from pipelines.scene.keys import keys_of
 from pipelines.toml.schema import Document, Key, Kind
 
-__all__ = ["LOAD_TYPES", "THROW_KEYS", "build_loads", "read_loads", "read_throws", "thrown"]
+__all__ = ["FORCES", "LOAD_TYPES", "THROW_KEYS", "build_loads", "read_loads", "read_throws", "thrown"]
 
 Codes = frozenset[str]
 Groups = Mapping[tuple[str, ...], Sequence[Codes]]
@@ -150,12 +150,11 @@ def build_loads(document: Document, entries: Iterable[Entry], groups: Groups, bl
     for entry in entries:
         codes, values = groups[entry.path], entry.values
         with document.at(*entry.path):
-            if entry.type == "gravity_ramp":
-                gravity.append(GravityRamp(values["duration"]))
-            elif entry.type == "tilt":
-                gravity.append(_tilt(values))
-            elif entry.type == "force":
-                forces.append(_force(document, entry, codes[0], blocks))
+            if entry.type in _GRAVITY:
+                gravity.append(_GRAVITY[entry.type](values))
+            elif entry.type in FORCES:
+                _check_rigid(document, entry, codes[0], blocks)
+                forces.append(FORCES[entry.type](document, entry, codes[0], blocks))
             else:
                 _check_supports(document, entry, codes, blocks, supports)
                 motions += _MOTIONS[entry.type](values, codes)
@@ -209,12 +208,18 @@ def _tilt(values: Mapping[str, Any]) -> TiltingTable:
     return TiltingTable(values["axis"], _in_radians(values["angle"]))
 
 
+def _gravity_ramp(values: Mapping[str, Any]) -> GravityRamp:
+    return GravityRamp(values["duration"])
+
+
+_GRAVITY: Mapping[str, Callable[[Mapping[str, Any]], GravityChange]] = {
+    "gravity_ramp": _gravity_ramp,
+    "tilt": _tilt,
+}
+
+
 def _force(document: Document, entry: Entry, codes: Codes, blocks: Blocks) -> StoneForce:
     values, point = entry.values, entry.values["point"]
-    for code in sorted(codes):
-        if blocks[code].fidelity is not Fidelity.RIGID:
-            what = f"a force on stone {code}, which is {blocks[code].fidelity}"
-            document.fail(what, *entry.path, "stones", remedy="forces act on rigid stones; leave it out")
     if point is None:
         return StoneForce(codes, values["force"], follows=values["follows"])
     if len(codes) > 1:
@@ -224,6 +229,18 @@ def _force(document: Document, entry: Entry, codes: Codes, blocks: Blocks) -> St
     block = blocks[code]
     x, y, z = (np.array(point) - mass_properties(block.vertices, block.faces, code).centroid).tolist()
     return StoneForce(codes, values["force"], (x, y, z), values["follows"])
+
+
+FORCES: Mapping[str, Callable[[Document, Entry, Codes, Blocks], Force]] = {"force": _force}
+"""Loads that push stones, which stay rigid, by their type."""
+
+
+def _check_rigid(document: Document, entry: Entry, codes: Codes, blocks: Blocks) -> None:
+    """Refuse a force on stones that are not rigid."""
+    for code in sorted(codes):
+        if blocks[code].fidelity is not Fidelity.RIGID:
+            what = f"a force on stone {code}, which is {blocks[code].fidelity}"
+            document.fail(what, *entry.path, "stones", remedy="forces act on rigid stones; leave it out")
 
 
 def _check_supports(

@@ -9,26 +9,12 @@ from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.meshers.choice import Mesher
 from mechanics.stones.settings import Setting
 
-__all__ = ["PICTURES", "STRESS_PICTURES", "Fidelities", "MaterialRule", "MeshSettings", "Output", "Selection"]
+__all__ = ["Fidelities", "MaterialRule", "MeshSettings", "Output", "Selection"]
 
 _COARSER = 2.0
 """Edges of the ring over those of the stones for whose sake it deforms: docs/accuracy.md, section 13."""
 
 Texts = tuple[str, ...]
-
-STRESS_PICTURES = ("von_mises", "principal_tension", "principal_compression", "utilisation", "error")
-"""Pictures that show nothing of rigid stones."""
-
-PICTURES = (
-    "von_mises",
-    "displacement",
-    "principal_tension",
-    "principal_compression",
-    "utilisation",
-    "error",
-    "pressure",
-    "resultants",
-)
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,12 @@
 """Pictures of a result, drawn off screen by PyVista (``python -m`` this module ``JOB.json``)."""
 
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from pipelines.draw.catalogue import PICTURES
 from pipelines.draw.offscreen.jobs import run_job
 from pipelines.draw.offscreen.parts import (
     LIGHT,
@@ -36,18 +36,18 @@ def colouring(surface: WallSurface, quantity: str, top: float | None) -> Colouri
 
     The scale ends at `top`, rounded up; without it, at the largest value.
     """
-    title, unit_of, palette = _LOOKS[quantity]
+    picture = PICTURES[quantity]
     raw = surface.joint_pressure if quantity == "pressure" else surface.field(quantity)
     largest = float(np.nanmax(raw, initial=0.0))
     end, intervals = nice_ceiling(top or largest or 1.0)
-    scale, unit = unit_of(end)
+    scale, unit = picture.unit_of(end)
     return Colouring(
         values=raw * scale,
-        title=f"{title} [{unit}]" if unit else title,
+        title=f"{picture.scale} [{unit}]" if unit else picture.scale,
         top=end * scale,
         intervals=intervals,
         saturated=largest > end * (1.0 + 1e-9),
-        palette=palette,
+        palette=picture.palette,
     )
 
 
@@ -67,32 +67,6 @@ def draw(surface: WallSurface, path: Path, job: dict[str, Any]) -> None:
     place_camera(pyvista, plotter, surface.points, np.array(job["towards"]), np.array(job["up"]))
     add_edges(pyvista, plotter, surface.points, surface.edges)
     save_picture(plotter, path, job["title"], job.get("note", ""))
-
-
-def _length_unit(largest: float) -> tuple[float, str]:
-    if largest >= 0.1:
-        return 1.0, "m"
-    return (1e3, "mm") if largest >= 1e-4 else (1e6, "µm")
-
-
-def _pascals(largest: float) -> tuple[float, str]:
-    return (1e-6, "MPa") if largest >= 1e5 else (1e-3, "kPa")
-
-
-def _always(factor: float, unit: str) -> Callable[[float], tuple[float, str]]:
-    return lambda _: (factor, unit)
-
-
-# of each quantity: title, factor and unit by the end of the scale, palette
-_LOOKS: dict[str, tuple[str, Callable[[float], tuple[float, str]], tuple[str, float]]] = {
-    "von_mises": ("Von Mises stress", _always(1e-6, "MPa"), ("inferno_r", 0.85)),
-    "displacement": ("Displacement", _length_unit, ("viridis_r", 1.0)),
-    "principal_tension": ("Largest principal stress, tension", _pascals, ("Reds", 1.0)),
-    "principal_compression": ("Smallest principal stress, compression", _pascals, ("Blues", 1.0)),
-    "utilisation": ("Stress over strength", _always(1.0, ""), ("YlOrRd", 1.0)),
-    "error": ("Estimated error of the stress", _always(100.0, "%"), ("Purples", 1.0)),
-    "pressure": ("Mean pressure of the joints", _pascals, ("inferno_r", 0.85)),
-}
 
 
 def _add_stones(pyvista: Any, plotter: Any, surface: WallSurface, colours: Colouring) -> None:

@@ -9,12 +9,13 @@ from mechanics.results.stress_values import utilisation
 from mechanics.scene.scene import Fidelity
 from mechanics.stones.materials import Material
 from pipelines.arrays import Array, Bools, Ints
+from pipelines.draw.catalogue import PICTURES
 from pipelines.draw.offscreen.parts import fan_polygons
 
 __all__ = ["FIELDS", "WallSurface", "stone_fields", "wall_surface"]
 
 
-FIELDS = ("von_mises", "displacement", "principal_tension", "principal_compression", "utilisation", "error")
+FIELDS = tuple(name for name, picture in PICTURES.items() if picture.shows != "joints")
 """Columns of `WallSurface.fields`."""
 
 _EDGE_ANGLE = np.deg2rad(20.0)  # triangles that meet at a smaller angle belong to one face
@@ -96,15 +97,17 @@ def wall_surface(result: Result) -> WallSurface:
 
 def stone_fields(body: BodyResult, material: Material) -> Array:
     """Compute the FIELDS of the points of one stone, (n, len(FIELDS)), as in `WallSurface`."""
-    fields_ = np.full((len(body.reference), len(FIELDS)), np.nan)
-    fields_[:, 1] = np.linalg.norm(body.displacement, axis=1)
+    known = {"displacement": np.linalg.norm(body.displacement, axis=1)}
     if body.von_mises is not None and body.principal is not None and body.values is not None:
-        fields_[:, 0] = body.von_mises
-        fields_[:, 2] = np.maximum(body.principal[:, 0], 0.0)
-        fields_[:, 3] = np.maximum(-body.principal[:, 2], 0.0)
-        fields_[:, 4] = utilisation(body.principal, material)
-        fields_[:, 5] = body.values.error
-    return fields_
+        known |= {
+            "von_mises": body.von_mises,
+            "principal_tension": np.maximum(body.principal[:, 0], 0.0),
+            "principal_compression": np.maximum(-body.principal[:, 2], 0.0),
+            "utilisation": utilisation(body.principal, material),
+            "error": np.full(len(body.reference), body.values.error),
+        }
+    unknown = np.full(len(body.reference), np.nan)
+    return np.column_stack([known.get(name, unknown) for name in FIELDS])
 
 
 def _fans(faces: tuple[tuple[int, ...], ...]) -> Ints:

@@ -10,6 +10,8 @@ import sys
 import pytest
 
 import moma
+from moma.cli.options import SurveyFormat
+from survey.formats.reading import FORMATS
 from tests.moma.commands import answer, fails, invoke, prints
 from tests.paths import ROOT
 
@@ -23,6 +25,10 @@ def database(tmp_path_factory):
     url = f"sqlite:///{tmp_path_factory.mktemp('db') / 'window.db'}"
     prints("ingest", SAMPLE / "window.moma", "--db", url)
     return url
+
+
+def test_the_formats_that_can_be_named_are_those_that_are_read():
+    assert [one.value for one in SurveyFormat] == list(FORMATS)
 
 
 @pytest.mark.slow

@@ -1,16 +1,19 @@
 """Pictures of a result: surfaces, colours, and drawing processes that fail."""
 
+import re
+
 import numpy as np
 import pytest
 
 from moma.errors import MissingLibraryError
 from pipelines.draw import pictures
+from pipelines.draw.catalogue import PICTURES
 from pipelines.draw.offscreen.jobs import load_surface, save_surface
 from pipelines.draw.offscreen.parts import nice_ceiling
 from pipelines.draw.offscreen.result import colouring
 from pipelines.draw.offscreen.surfaces import WallSurface, wall_surface
 from pipelines.draw.pictures import draw_pictures, missing, package_of
-from pipelines.scene.settings import PICTURES
+from tests.paths import ROOT
 from tests.pipelines.results_by_hand import result_of, rigid_body
 
 TOWARDS = np.array([0.0, -1.0, 0.0])
@@ -98,6 +101,12 @@ def test_the_resultants_are_blue_within_the_kern_and_red_outside(strong, tmp_pat
     }
     assert len(rows["blue"]) > len(rows["red"]) > 0  # the larger force has the longer stroke
     assert rows["red"].max() < rows["blue"].min()  # the upper joint is out of its kern
+
+
+def test_every_picture_is_documented():
+    page = (ROOT / "docs/scene.md").read_text(encoding="utf-8")
+    section = page.split("\n## Pictures\n")[1].split("\n## ")[0]
+    assert re.findall(r"^\| `(\w+)` \|", section, re.MULTILINE) == list(PICTURES)
 
 
 @pytest.mark.parametrize(
