@@ -74,6 +74,7 @@ def test_lmgc90_stands_beside_it(scenes):
     assert row["ours_eta"] <= row["theirs_eta"]
 
 
+@pytest.mark.slow
 def test_the_tables_have_one_line_for_each_setting(scenes):
     done = run("lmgc90", "--scenes", scenes, "--ours-only", "--steps", 3, "--accurate")
     assert done.returncode == 0, done.stderr

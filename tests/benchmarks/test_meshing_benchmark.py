@@ -31,6 +31,7 @@ def test_each_mesher_meshes_each_shape_with_about_as_many_nodes():
     assert all(row["machine"] for row in rows)
 
 
+@pytest.mark.slow
 def test_the_tables_have_a_row_for_each():
     lines = [line for line in run("--stones").splitlines() if line.startswith("|")]
     assert len(lines) == 2 + 3 * 5

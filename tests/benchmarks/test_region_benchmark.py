@@ -9,6 +9,7 @@ import pytest
 from tests.paths import ROOT
 
 
+@pytest.mark.slow
 def test_a_ring_that_takes_in_the_whole_arch_has_no_error_and_none_has_one():
     options = ["--structures", "arch", "--regions", "keystone", "--rings", "0", "99", "--json"]
     done = subprocess.run(
