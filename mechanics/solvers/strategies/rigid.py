@@ -91,12 +91,13 @@ class Alternating:
         before = "warm start" if warm else f"cold start, {len(start.impulse):,} contacts"
         for name, solve, from_best in self._stages(problem, warm):
             count = self.max_iterations - best.iterations
-            if best.converged or count <= 0:
-                break
             begin = ContactStart(best.impulse, best.velocity) if from_best else start
             found = self._judged(problem, solve(count)(problem, begin), f"{name}: {before}")
             before = f"{name} stood at η {found.natural_map:.0e}"
             best = _better(best, found)
+            # the stages after sweeps ask for W in a form that can be factorised, which takes as long as a sweep
+            if best.converged or best.iterations >= self.max_iterations:
+                break
         return best
 
     def _stages(
