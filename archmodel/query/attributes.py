@@ -148,7 +148,7 @@ _COMPUTED = (
     Attribute(
         "outcome",
         None,
-        "equilibrium, moving or collapsed",
+        "equilibrium, moving, collapsed, undecided or interrupted",
         lambda scope, run: scope.run(run).c.outcome,
         of_run=True,
     ),

@@ -7,11 +7,16 @@ __all__ = ["Outcome", "StaticStart"]
 
 
 class Outcome(StrEnum):
-    """End of a run."""
+    """End of a run.
+
+    *Undecided*: the steps that would decide were not solved. *Interrupted*: ended by its user before its time.
+    """
 
     EQUILIBRIUM = "equilibrium"
     MOVING = "moving"
     COLLAPSED = "collapsed"
+    UNDECIDED = "undecided"
+    INTERRUPTED = "interrupted"
 
 
 @dataclass(frozen=True)

@@ -161,7 +161,9 @@ class Result:
     Attributes
     ----------
     scene : what was simulated
-    outcome : equilibrium, moving or collapsed
+    outcome : verdict of the run
+    reason : of the outcome, one clause; empty where it needs none
+    cautions : facts without which the outcome misleads, the gravest first; they stand beside it wherever it is shown
     steps : time steps done
     time : simulated time [s]
     bodies : one per block, in the scene's order
@@ -196,3 +198,5 @@ class Result:
     wall_time: dict[str, float]
     static: StaticStart | None = None
     solvers: Mapping[str, int] = field(default_factory=dict)
+    reason: str = ""
+    cautions: tuple[str, ...] = ()

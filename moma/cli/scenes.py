@@ -79,6 +79,8 @@ def run(
     for warning in done.warnings:
         say(f"warning: {warning}")
     print(as_json(done.summary) if json else "\n".join(run_lines(done, verbose)))
+    if done.summary["outcome"] in ("undecided", "interrupted"):
+        raise typer.Exit(1)
 
 
 @reporting

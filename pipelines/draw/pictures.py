@@ -42,6 +42,8 @@ _ENDINGS = {
     Outcome.EQUILIBRIUM: "at equilibrium",
     Outcome.MOVING: "still moving",
     Outcome.COLLAPSED: "collapsed",
+    Outcome.UNDECIDED: "undecided: not solved",
+    Outcome.INTERRUPTED: "interrupted",
 }
 
 

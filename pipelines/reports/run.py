@@ -28,6 +28,8 @@ _OUTCOMES = {
     "equilibrium": "It stands: every stone came to rest, in balance.",
     "moving": "It was still moving at the end of the simulated time: neither at rest nor collapsed.",
     "collapsed": "It falls: at least one stone moved too far to come back, and was still moving.",
+    "undecided": "Nothing can be said: the steps that would decide were not solved.",
+    "interrupted": "It was interrupted before its time: what it would have come to is not known.",
 }
 
 _ERRORS = (

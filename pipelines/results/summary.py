@@ -14,7 +14,7 @@ from mechanics.scene.scene import Fidelity
 from pipelines.results.quantities import quantities
 from pipelines.results.stone_values import stress_statistics
 
-__all__ = ["as_json", "summarise"]
+__all__ = ["as_json", "headline", "summarise"]
 
 
 def summarise(
@@ -37,6 +37,8 @@ def summarise(
     summary: dict[str, Any] = {
         "scene": result.scene.name,
         "outcome": str(result.outcome),
+        "headline": headline(result),
+        "cautions": list(result.cautions),
         "bodies": {
             str(one): fidelities.count(one) for one in (Fidelity.RIGID, Fidelity.DEFORMABLE, Fidelity.FIXED)
         },
@@ -62,6 +64,12 @@ def summarise(
         "version": version,
     }
     return {key: _finite(value) for key, value in summary.items()}
+
+
+def headline(result: Result) -> str:
+    """Return the outcome with its reason and its first caution: the first line that a person reads of a run."""
+    said = ": ".join(filter(None, (f"{result.outcome} after {result.time:.4g} s", result.reason)))
+    return "; but ".join(filter(None, (said, *result.cautions[:1])))
 
 
 def as_json(value: Mapping[str, Any] | list[Any]) -> str:

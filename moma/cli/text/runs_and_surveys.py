@@ -90,8 +90,9 @@ def run_lines(report: "RunReport", verbose: bool) -> list[str]:
     summary = report.summary
     bodies, reaction, stress = summary["bodies"], summary["reaction"], summary["von_mises"]
     lines = [
-        f"{summary['scene']}: {summary['outcome']} after {summary['time']['simulated']:.4g} s "
+        f"{summary['scene']}: {summary['headline']} "
         f"({summary['steps']} steps, {summary['time']['wall']:.1f} s of work)",
+        *(f"  caution: {caution}" for caution in summary["cautions"]),
         f"  {', '.join(f'{count} {name}' for name, count in bodies.items())} stones, "
         f"{summary['contacts']} contact points",
         f"  weight {reaction['weight'] / 1e3:.2f} kN, reaction {reaction['total_vertical'] / 1e3:.2f} kN, "
