@@ -13,10 +13,9 @@ from benchmarks.cost_scenes import Case
 from benchmarks.memory import peak_bytes
 from benchmarks.report import Row
 from mechanics.dynamics.energy_balance import EnergyBalance
-from mechanics.dynamics.observers.equilibrium import imbalance
 from mechanics.dynamics.progress import Clock
 from mechanics.dynamics.simulation import Simulation
-from mechanics.dynamics.stopping import Watch
+from mechanics.dynamics.stopping import Watch, balance_of
 from mechanics.model.model import build_model
 from mechanics.results.forecast.plan import Amounts, plan
 from moma.errors import SolverError
@@ -60,9 +59,7 @@ def _asleep(case: Case) -> Row:
             begun = time.process_time()
         step = simulation.step()
         energy(step)
-        active = step.active
-        out = imbalance(model, step.after, active.contacts, active.force, step.kick.load, step.resting)
-        watch(step.after, out, step.solution)
+        watch(step, balance_of(model, step))
     took = (time.process_time() - begun) / _ASLEEP
     if not simulation.asleep[model.inertia.moving].all():
         raise SolverError("not all sleep", where=scene.name)

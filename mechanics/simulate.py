@@ -9,13 +9,13 @@ from threadpoolctl import ThreadpoolController
 from mechanics.arrays import Array
 from mechanics.dynamics.energy_balance import EnergyBalance
 from mechanics.dynamics.observers.energy import kinetic_energy
-from mechanics.dynamics.observers.equilibrium import imbalance, settlement, speed, support_reaction
+from mechanics.dynamics.observers.equilibrium import settlement, speed, support_reaction
 from mechanics.dynamics.outcome import Outcome, StaticStart
 from mechanics.dynamics.progress import Clock, Listener, Progress, silent
 from mechanics.dynamics.simulation import Simulation
 from mechanics.dynamics.static_start import static_start
 from mechanics.dynamics.step import Step
-from mechanics.dynamics.stopping import LASTING, Watch
+from mechanics.dynamics.stopping import LASTING, Verdict, Watch, balance_of, lasts
 from mechanics.model.model import Model, build_model
 from mechanics.results.postprocess import Observer
 from mechanics.results.result import Energies, Errors, History, Result
@@ -67,7 +67,13 @@ def _simulate(scene: Scene, report: Listener) -> Result:
         step = simulation.step()
         with clock("observe"):
             balance = log(step)
-            outcome = watch(step.after, balance, step.solution)
+            outcome = watch(step, balance)
+        if outcome is Outcome.EQUILIBRIUM and (settings.stop_at_equilibrium or count == total):
+            at_once = count == LASTING and not settings.relaxation and simulation.cold
+            with clock("confirm"):
+                confirmed = at_once or lasts(simulation.released())
+            if not confirmed:
+                outcome, simulation = watch.disproved(), simulation.released()
         text = f"balance {balance.max():.1e}, η {step.solution.natural_map:.1e}"
         report(Progress("step", count, total, text))
         done = settings.stop_at_equilibrium and outcome is not Outcome.MOVING
@@ -76,7 +82,8 @@ def _simulate(scene: Scene, report: Listener) -> Result:
                 log.frames.append(log.observer.frame(step))
         if done:
             break
-    return _result(log, step, outcome, watch.rest_time, clock, static)
+    verdict = watch.verdict(outcome, step.after, static)
+    return _result(log, step, verdict, watch.rest_time, clock, static)
 
 
 class _Log:
@@ -101,9 +108,7 @@ class _Log:
         self.unconverged += not solution.converged
         if solution.why:
             self.solvers[solution.why] += 1
-        self.balance = balance = imbalance(
-            model, step.after, step.active.contacts, step.active.force, step.kick.load, step.resting
-        )
+        self.balance = balance = balance_of(model, step)
         self._rows.append(  # in the order of History
             (
                 step.after.time,
@@ -128,7 +133,7 @@ class _Log:
 
 
 def _result(
-    log: _Log, last: Step, outcome: Outcome, rest_time: float, clock: Clock, static: StaticStart | None
+    log: _Log, last: Step, verdict: Verdict, rest_time: float, clock: Clock, static: StaticStart | None
 ) -> Result:
     model, observer, energy, history = log.model, log.observer, log.energy, log.history()
     support = support_reaction(model, last.contacts, last.force, last.after.time)
@@ -145,7 +150,7 @@ def _result(
     )
     return Result(
         scene=model.scene,
-        outcome=outcome,
+        outcome=verdict.outcome,
         steps=len(history.time),
         time=last.after.time,
         bodies=bodies,
@@ -153,7 +158,7 @@ def _result(
         joints=joints,
         errors=errors,
         energies=Energies(energy.external, energy.contact, energy.scheme),
-        rest_time=rest_time if outcome is Outcome.EQUILIBRIUM else None,
+        rest_time=rest_time if verdict.outcome is Outcome.EQUILIBRIUM else None,
         reaction=support.reaction,
         weight=support.weight,
         frames=tuple(log.frames),
@@ -161,4 +166,6 @@ def _result(
         wall_time=dict(clock.seconds),
         static=static,
         solvers=dict(log.solvers.most_common()),
+        reason=verdict.reason,
+        cautions=verdict.cautions,
     )

@@ -49,7 +49,7 @@ def contact_problem(
         compliance=operator.diagonal[:, 0, 0],
         step=time.step,
         theta=time.theta,
-        push_out=time.relaxation,
+        push_out=time.relaxation & model.elastic[contacts.bodies].any(axis=1),
         first=first,
         state=internal,
     )

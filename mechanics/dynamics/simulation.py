@@ -32,6 +32,11 @@ class Simulation:
     solver : of the contact problems; None: that of the scene
     elastic_scale : measure how well they are solved against the elastic part of W alone (`mixed_delassus`)
     fresh_contacts : detect contacts in every step, even where nothing has moved since the last detection
+
+    Attributes
+    ----------
+    state : at the end of the last step
+    cold : it began without the forces of another simulation
     """
 
     def __init__(
@@ -48,11 +53,13 @@ class Simulation:
         with self.clock("assemble"):
             self._compliance = compliances(model, self._step, self._theta)
         self._detect = ContactSearch(model, self._compliance, self.clock, fresh_contacts, elastic_scale)
+        self._given_solver = solver
         self._solve = solver or choose_solver(model.scene.solver, not model.rigid_only)
         self._relax = Relaxation(model)
         self._memory = Memory()
         self._sleepers = Sleepers(model, start, self._memory)
         self._first = True
+        self.cold = True
 
     @property
     def asleep(self) -> Bools:
@@ -67,8 +74,24 @@ class Simulation:
         """Continue from the end of another run of the same bodies, with its forces and internal variables."""
         self.state = replace(other.state, time=self.state.time)
         self._memory = other._memory.at_rest(self._step / other._step)
+        self.cold = False
         self._sleepers = Sleepers(self.model, self.state, self._memory)
         self._first = False
+
+    def released(self) -> "Simulation":
+        """Return a simulation that goes on from here, neither halted any more nor knowing a force between rigid stones.
+
+        A relaxation goes on with θ = 1, as its user does not ask for the motion.
+        """
+        time = self.model.scene.time
+        free = replace(time, relaxation=False, theta=1.0 if time.relaxation else time.theta)
+        model = replace(self.model, scene=replace(self.model.scene, time=free))
+        other = Simulation(model, self.start, self.clock, self._given_solver)
+        other.state, other._first = self.state, False
+        rigid = bool(model.inertia.moving.any())
+        other._memory = self._memory.without_forces() if rigid else self._memory
+        other._sleepers = Sleepers(model, self.state, other._memory)
+        return other
 
     def step(self) -> Step:
         """Advance by one step of the Moreau–Jean θ-scheme (Moreau 1988, Jean 1999; docs/theory.md §2).

@@ -1,31 +1,66 @@
-"""Criteria by which a run ends: equilibrium or collapse."""
+"""Criteria by which a run ends, and the words in which its outcome is given."""
+
+from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.arrays import Array
-from mechanics.dynamics.observers.equilibrium import displacement, seen_from_supports, speed
-from mechanics.dynamics.outcome import Outcome
+from mechanics.arrays import Array, Bools
+from mechanics.dynamics.observers.equilibrium import (
+    displacement,
+    imbalance,
+    rotation_angle,
+    seen_from_supports,
+    speed,
+)
+from mechanics.dynamics.outcome import Outcome, StaticStart
+from mechanics.dynamics.simulation import Simulation
+from mechanics.dynamics.step import Step
 from mechanics.model.model import Model
-from mechanics.problem.problem import ContactSolution
+from mechanics.problem.residual import residual
 from mechanics.scene.state import State
 
-__all__ = ["LASTING", "Watch"]
+__all__ = ["LASTING", "MOVED", "Verdict", "Watch", "balance_of", "lasts"]
 
 
 LASTING = 5  # steps in a row that must be in balance
-_REST_SPEED = 1e-4  # of √(g · size), the speed of a fall over a body's own size, below which it rests [-]
+MOVED = 0.01  # displacement over a stone's width that the reader of a verdict must know of [-]
+_REST_SPEED = 1e-4  # of √(g · width), the speed of a fall over a body's own width, below which it rests [-]
 _FALL_SPEED = 0.05  # of the same speed, above which a body falls [-]
-_TRUSTED = 1e-2  # natural map above which a step proves no fall, as its velocities may be errors [-]
+_TOPPLED = (
+    np.pi / 4
+)  # rotation beyond which a stone that comes to rest has toppled [rad]; rocking returns from less
+_DOUBT = (
+    0.5  # velocity that unsolved steps may have added, over that of a motion, up to which it is proven [-]
+)
+_RELEASED = (
+    50  # most steps in which a rest must show that it lasts without the forces by which it was reached
+)
+_STAYS = 1e-3  # displacement over the width within which a released stone stays where it rested [-]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Outcome with its reason and its cautions, as `Result` has them."""
+
+    outcome: Outcome
+    reason: str
+    cautions: tuple[str, ...]
 
 
 class Watch:
     """Outcome of a run, judged after each step.
 
-    *Equilibrium*: for five steps in a row, and after all loads have ceased to change, every body that is not fixed is
-    in balance (unbalanced force and moment below the scene's tolerance) and slower than 10⁻⁴ √(g · its smallest width).
-    *Collapsed*: a body has moved by more than the scene's fraction of its smallest width and is faster than
-    0.05 √(g · width), in a step solved to η < 0.01. Without gravity g counts as 1 m/s². Displacements and speeds are
-    relative to the supports where these are driven.
+    *Equilibrium*: for five steps in a row, solved, and after all loads have ceased to change, every body that is not
+    fixed is in balance (unbalanced force and moment below the scene's tolerance) and slower than 10⁻⁴ √(g · its
+    width). *Collapsed*: a body has sunk, along the load that acts on it, by more than the scene's fraction of its
+    width, and is faster than 0.05 √(g · width); or it has come to rest after such a fall, or after toppling. A body
+    that rocks lifts its centre, one that slides slowly keeps its support: both move, and may still come to rest.
+    *Undecided*: steps that were not solved may have added as much velocity as the motion has. Without gravity g
+    counts as 1 m/s². Displacements and speeds are relative to the supports where these are driven.
+
+    Parameters
+    ----------
+    model, start : of the run
 
     Attributes
     ----------
@@ -34,26 +69,174 @@ class Watch:
 
     def __init__(self, model: Model, start: State) -> None:
         self._model, self._start = model, start
-        self._quiet = 0
+        self._quiet = self._unsolved = self._steps = 0
+        self._doubt = self._worst_error = self._fastest = 0.0
+        self._still = False
+        self._culprit, self._sunk, self._speed = 0, 0.0, 0.0
         self.rest_time = 0.0
 
-    def __call__(self, state: State, balance: Array, solution: ContactSolution) -> Outcome:
-        """Return the outcome so far, from the imbalance of each body (nb,) and the solution of the step."""
-        model, settings = self._model, self._model.scene.time
-        fall = np.sqrt((float(np.linalg.norm(model.gravity(state.time))) or 1.0) * model.surfaces.size)
+    def __call__(self, step: Step, balance: Array) -> Outcome:
+        """Return the outcome so far, from a step and the imbalance of each body (nb,) after it."""
+        model, state, solution = self._model, step.after, step.solution
+        self._steps += 1
+        error = 0.0 if solution.converged else _error(step)
+        self._unsolved += not solution.converged
+        self._doubt += error
+        self._worst_error = max(self._worst_error, error)
         seen = seen_from_supports(model, self._start, state)
-        pace = np.where(model.fixed, 0.0, speed(model, seen) / fall)
-        quiet = (
+        speeds = np.where(model.fixed, 0.0, speed(model, seen))
+        pace = speeds / _fall(model, state)
+        self._fastest = max(self._fastest, float(speeds.max()))
+        still = (
             state.time >= model.scene.loads.until
-            and solution.converged
-            and balance.max() <= settings.balance_tolerance
+            and balance.max() <= model.scene.time.balance_tolerance
             and pace.max() <= _REST_SPEED
         )
-        self._quiet = self._quiet + 1 if quiet else 0
+        self._still = still and not solution.converged
+        self._quiet = self._quiet + 1 if still and solution.converged else 0
         if self._quiet == 1:
             self.rest_time = state.time
-        if self._quiet >= LASTING:
-            return Outcome.EQUILIBRIUM
-        far = displacement(model, self._start, seen) > settings.collapse_displacement * model.surfaces.size
-        fallen = solution.natural_map < _TRUSTED and bool((far & (pace > _FALL_SPEED)).any())
-        return Outcome.COLLAPSED if fallen else Outcome.MOVING
+        limit = model.scene.time.collapse_displacement * model.surfaces.size
+        sunk = self._sinking(step, seen)
+        fallen = ~model.fixed & (sunk > limit)
+        falling = fallen & (pace > _FALL_SPEED)
+        if falling.any():
+            proven = falling & (self._doubt <= _DOUBT * speeds)
+            self._blame(proven if proven.any() else falling, sunk, speeds)
+            return Outcome.COLLAPSED if proven.any() else Outcome.UNDECIDED
+        self._culprit = int(speeds.argmax())
+        self._speed = float(speeds[self._culprit])
+        if self._quiet < LASTING:
+            return Outcome.MOVING
+        fallen |= self._toppled(seen, limit)
+        if fallen.any():
+            self._blame(fallen, sunk, speeds)
+            return Outcome.COLLAPSED
+        return Outcome.EQUILIBRIUM
+
+    def disproved(self) -> Outcome:
+        """Take back a rest that did not last once its forces were forgotten."""
+        self._quiet = 0
+        return Outcome.MOVING
+
+    def verdict(self, outcome: Outcome, state: State, static: StaticStart | None) -> Verdict:
+        """Return the outcome in words, from that of the last step, its state, and the static start."""
+        if outcome is Outcome.MOVING and (self._still or self._doubt > _DOUBT * self._fastest):
+            outcome = Outcome.UNDECIDED
+        cautions = []
+        if outcome is Outcome.EQUILIBRIUM:
+            cautions += self._moved(state)
+            if self._doubt > _DOUBT * self._fastest:
+                cautions.append(f"on the way {self._unsolved_steps()}")
+        if static is not None and not static.found:
+            cautions.append("no static equilibrium was found: the run began at rest, all loads at once")
+        return Verdict(outcome, self._reason(outcome), tuple(cautions))
+
+    def _reason(self, outcome: Outcome) -> str:
+        code = self._model.scene.blocks[self._culprit].code
+        if outcome is Outcome.UNDECIDED:
+            return self._unsolved_steps()
+        if outcome is Outcome.MOVING:
+            return f"stone {code} moves at {_short(self._speed)}/s"
+        if outcome is Outcome.COLLAPSED and self._quiet >= LASTING:
+            return f"stone {code} has fallen or toppled, and lies {_short(max(self._sunk, 0.0))} lower"
+        if outcome is Outcome.COLLAPSED:
+            return f"stone {code} has sunk by {_short(self._sunk)} and moves at {_short(self._speed)}/s"
+        return ""
+
+    def _unsolved_steps(self) -> str:
+        return (
+            f"{self._unsolved} of {self._steps} steps were not solved, with errors of up to "
+            f"{_short(self._worst_error)}/s"
+        )
+
+    def _moved(self, state: State) -> list[str]:
+        """Return a caution that names the stone that moved furthest over its width, if it is worth one."""
+        model = self._model
+        seen = seen_from_supports(model, self._start, state)
+        moved = np.where(model.fixed, 0.0, displacement(model, self._start, seen))
+        share = moved / model.surfaces.size
+        far = int(share.argmax())
+        if share[far] <= MOVED:
+            return []
+        code = model.scene.blocks[far].code
+        return [
+            f"stone {code} moved by {_short(moved[far])}, {_percent(share[far])} of its width, before it came to rest"
+        ]
+
+    def _sinking(self, step: Step, seen: State) -> Array:
+        """Return how far each body (nb,) has moved along its present load, weight included [m]."""
+        weight = self._model.mass[:, None] * self._model.gravity(seen.time)
+        load = np.where(self._model.elastic[:, None], weight, step.kick.load[:, :3])
+        size = np.linalg.norm(load, axis=1)
+        along = np.einsum("bi,bi->b", seen.centre - self._start.centre, load)
+        sunk: Array = np.divide(along, size, out=np.zeros_like(size), where=size > 0)
+        return sunk
+
+    def _toppled(self, seen: State, limit: Array) -> Bools:
+        """Return the bodies (nb,) that have turned and left their place; balls may roll."""
+        turned: Bools = rotation_angle(self._start, seen) > _TOPPLED
+        if not turned.any():
+            return turned
+        round_ = np.array([block.radius is not None for block in self._model.scene.blocks])
+        away = displacement(self._model, self._start, seen) > limit
+        return turned & away & ~round_ & ~self._model.fixed
+
+    def _blame(self, bodies: Bools, sunk: Array, speeds: Array) -> None:
+        """Remember the body that has sunk furthest over its width."""
+        self._culprit = int(np.where(bodies, sunk / self._model.surfaces.size, -np.inf).argmax())
+        self._sunk, self._speed = float(sunk[self._culprit]), float(speeds[self._culprit])
+
+
+def balance_of(model: Model, step: Step) -> Array:
+    """Return the imbalance of each body (nb,) after a step [-]."""
+    active = step.active
+    return imbalance(model, step.after, active.contacts, active.force, step.kick.load, step.resting)
+
+
+def lasts(simulation: Simulation) -> bool:
+    """Return whether a rest lasts in a released simulation, which this advances.
+
+    Rigid stones in a gap admit forces that press them against each other without cause: an overlap that was pushed
+    out, an impact or a solver's long way may leave such forces, and friction then holds what nothing carries. So the
+    stones forget all contact forces, and must find those of their rest again without leaving it.
+    """
+    model, begin = simulation.model, simulation.state
+    settings, quiet = model.scene.time, 0
+    for _ in range(_RELEASED):
+        step = simulation.step()
+        seen = seen_from_supports(model, begin, step.after)
+        if (displacement(model, begin, seen) > _STAYS * model.surfaces.size)[~model.fixed].any():
+            return False
+        pace = (speed(model, seen) / _fall(model, step.after))[~model.fixed]
+        calm = (
+            step.solution.converged
+            and balance_of(model, step).max() <= settings.balance_tolerance
+            and pace.max(initial=0.0) <= _REST_SPEED
+        )
+        quiet = quiet + 1 if calm else 0
+        if quiet >= LASTING:
+            return True
+    return False
+
+
+def _fall(model: Model, state: State) -> Array:
+    """Return √(g · width) of each body (nb,) [m/s], with g = 1 m/s² where there is no gravity."""
+    speed: Array = np.sqrt((float(np.linalg.norm(model.gravity(state.time))) or 1.0) * model.surfaces.size)
+    return speed
+
+
+def _error(step: Step) -> float:
+    """Return the largest velocity by which a contact of an unsolved step breaks its law [m/s]."""
+    problem = step.problem
+    fastest = float(np.abs(problem.u_free).max(initial=0.0)) or float(np.abs(problem.bias).max(initial=0.0))
+    return residual(problem, step.solution.impulse).velocity * fastest
+
+
+def _short(length: float) -> str:
+    """Return a length in a unit that suits it."""
+    return f"{length:.3g} m" if length >= 1.0 else f"{1e3 * length:.3g} mm"
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.2g} %" if share < 1.0 else f"{100.0 * share:.0f} %"

@@ -79,6 +79,10 @@ class Memory:
         if self._place is not None and place is not None:
             self._place = np.vstack([self._place, place])
 
+    def without_forces(self) -> "Memory":
+        """Return the same contacts with their internal variables alone."""
+        return self.at_rest(0.0)
+
     def at_rest(self, factor: float) -> "Memory":
         """Return the same forces for a step that is `factor` times as long, of bodies that have come to rest."""
         d, other = self._dimension, Memory(self._dimension)

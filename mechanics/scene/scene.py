@@ -199,7 +199,7 @@ class TimeSettings:
         bool, Setting("Mass of deformable stones at their nodes alone, not along the shape functions.")
     ] = False
     stop_at_equilibrium: Annotated[
-        bool, Setting("Stop once every stone is at rest and in balance, or one has collapsed.")
+        bool, Setting("Stop once every stone is at rest and in balance, or the scene has collapsed.")
     ] = True
     balance_tolerance: Annotated[
         float,
@@ -213,7 +213,7 @@ class TimeSettings:
     collapse_displacement: Annotated[
         float,
         Setting(
-            "A stone that moved by more than this fraction of its smallest side and still moves has collapsed.",
+            "A stone that has sunk by more than this fraction of its width, and still falls or lies there, has collapsed.",
             "-",
             above=0,
             infinite=True,

@@ -14,6 +14,7 @@ __all__ = [
     "Support",
     "displacement",
     "imbalance",
+    "rotation_angle",
     "seen_from_supports",
     "settlement",
     "speed",
@@ -132,6 +133,13 @@ def displacement(model: Model, start: State, state: State) -> Array:
         own.body_vptr, own.shapes.vertex, state.centre, state.rotation, start.centre, start.rotation
     )
     return _with_nodes(model, largest, np.linalg.norm(state.node - start.node, axis=1))
+
+
+def rotation_angle(start: State, state: State) -> Array:
+    """Return the angle by which each body has turned since `start` (nb,), at most π [rad]."""
+    trace = np.einsum("bij,bij->b", state.rotation, start.rotation)
+    angle: Array = np.arccos(np.clip(0.5 * (trace - 1.0), -1.0, 1.0))
+    return angle
 
 
 def speed(model: Model, state: State) -> Array:

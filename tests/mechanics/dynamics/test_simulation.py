@@ -332,7 +332,9 @@ def test_steps_that_the_solver_leaves_unsolved_are_counted():
     result = simulate(one)
     assert result.errors.unconverged_steps == result.steps == 10
     assert result.errors.natural_map > 1e-14
-    assert result.outcome is Outcome.MOVING  # never in equilibrium on the word of an unsolved step
+    # never in equilibrium, nor anything else, on the word of unsolved steps
+    assert result.outcome is Outcome.UNDECIDED
+    assert result.reason.startswith("10 of 10 steps were not solved")
 
 
 def test_frames_are_kept_as_often_as_asked_and_progress_is_told():
