@@ -7,7 +7,7 @@ import pytest
 
 from mechanics.scene.shapes import bond, semicircular_arch, wall
 from tests.validation.statics.limit_analysis import multiplier, stands
-from tests.validation.wild import imperfect, limits, motions, sizes, supports  # noqa: F401 they enter their scenes
+from tests.validation.wild import driven, imperfect, limits, motions, sizes, supports  # noqa: F401 they enter scenes
 from tests.validation.wild.scene_list import SCENES, Truth
 
 MARGIN = 1.03
