@@ -1,0 +1,79 @@
+"""The list of wild scenes: each is a function with its true verdict, and how to state one.
+
+A verdict is true by statics or energy, never by MOMA's own motion: the docstring of each function gives the closed
+form, or says that the linear program of `tests.validation.statics.limit_analysis` decides, and with which margin.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import ContactSettings, Scene, SolverSettings, TimeSettings
+
+G = 9.81
+SCENES: dict[str, "Wild"] = {}
+"""All of them by name, in the order of their files."""
+
+
+class Truth(StrEnum):
+    """Fate of the stones."""
+
+    STANDS = (
+        "stands"  # at rest in the end, near its place: rocking that comes back and stones that land included
+    )
+    FALLS = "falls"  # a stone loses its support, wherever it comes to lie afterwards
+    SLIDES = "slides"  # without end, still supported
+
+
+@dataclass(frozen=True)
+class Wild:
+    """One scene.
+
+    Attributes
+    ----------
+    name : of the function
+    truth : verdict
+    build : makes the scene
+    pace : factor on the time steps, for scenes that are slower than stones of a metre on Earth [-]
+    """
+
+    name: str
+    truth: Truth
+    build: Callable[[], Scene]
+    pace: float = 1.0
+
+
+def wild(truth: Truth, pace: float = 1.0) -> Callable[[Callable[[], Scene]], Callable[[], Scene]]:
+    """Enter a function that makes a scene in the list."""
+
+    def enter(build: Callable[[], Scene]) -> Callable[[], Scene]:
+        assert build.__name__ not in SCENES, build.__name__
+        SCENES[build.__name__] = Wild(build.__name__, truth, build, pace)
+        return build
+
+    return enter
+
+
+stands, falls, slides = wild(Truth.STANDS), wild(Truth.FALLS), wild(Truth.SLIDES)
+
+
+def scene(
+    blocks, friction=0.7, *, duration=3.0, gravity=(0.0, 0.0, -G), motion=False, law=None, rules=(), **more
+):
+    """A scene that asks for its rest, or, with `motion`, for the motion itself."""
+    return Scene(
+        "wild",
+        tuple(blocks),
+        gravity=tuple(float(x) for x in gravity),
+        contact=ContactSettings(law or DryJoint(friction), tuple(rules)),
+        time=TimeSettings(step=1e-3, theta=0.5 if motion else 1.0, duration=duration),
+        solver=SolverSettings(),
+        **more,
+    )
+
+
+def tilted(multiplier, direction=(1.0, 0.0, 0.0), g=G):
+    """Weight, and `multiplier` times the weight along a direction [m/s²]."""
+    x, y, z = direction
+    return (g * multiplier * x, g * multiplier * y, g * multiplier * z - g)
