@@ -213,7 +213,7 @@ class TimeSettings:
     collapse_displacement: Annotated[
         float,
         Setting(
-            "A stone that has sunk by more than this fraction of its width, and still falls or lies there, has collapsed.",
+            "A stone that has sunk by more than this fraction of its width, and falls or lies there, has collapsed.",
             "-",
             above=0,
             infinite=True,
