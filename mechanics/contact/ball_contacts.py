@@ -7,7 +7,7 @@ from scipy.sparse import csr_array, vstack
 
 from mechanics.arrays import Array, Bools, Ints
 from mechanics.contact._kernels.mortar import Bodies, Interfaces, mortar_rows
-from mechanics.contact.contacts import Contacts
+from mechanics.contact.contacts import NODE, Contacts
 from mechanics.contact.surfaces import Placed, Surfaces
 from mechanics.scene.state import State
 
@@ -169,7 +169,7 @@ def _pair(
     order = np.column_stack([np.arange(len(keep)), np.arange(len(keep)) + len(keep)]).ravel()
     return Contacts(
         np.tile([block, ball], (len(keep), 1)),
-        key + (1 << 23) + cells.node[rows][keep],
+        key + NODE + cells.node[rows][keep],
         frame,
         cells.area[rows][keep],
         arm,

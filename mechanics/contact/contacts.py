@@ -8,9 +8,16 @@ from scipy.sparse import csr_array, vstack
 
 from mechanics.arrays import Array, Ints
 from mechanics.contact._kernels.broad_phase import points_of
+from mechanics.contact._kernels.narrow_phase import NAME_BITS
 from mechanics.scene.state import State
 
-__all__ = ["Contacts", "gaps", "joined", "material_points", "take"]
+__all__ = ["NODE", "PAIR_BIT", "Contacts", "gaps", "joined", "material_points", "take"]
+
+
+# A contact's key names the pair of shapes in its high bits; below them the node that carries the contact, or the name
+# of a single point within the pair.
+NODE = 1 << NAME_BITS
+PAIR_BIT = NAME_BITS + 1
 
 
 @dataclass(frozen=True)

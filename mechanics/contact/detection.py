@@ -24,7 +24,7 @@ from mechanics.contact._kernels.narrow_phase import (
     separating_axes,
 )
 from mechanics.contact.ball_contacts import FaceCells, ball_contacts, face_cells
-from mechanics.contact.contacts import Contacts, gaps, joined, take
+from mechanics.contact.contacts import PAIR_BIT, Contacts, gaps, joined, take
 from mechanics.contact.mortar_contacts import mortar_contacts, surface_weights
 from mechanics.contact.surfaces import Placed, Surfaces, middles
 from mechanics.scene.scene import Placement
@@ -76,7 +76,7 @@ class Detector:
     surfaces : the bodies' polyhedra and face meshes
     fixed : (nb,) bodies that no contact moves; pairs of them are left out
     alert : gap below which a contact is watched, relative to the smaller shape [-]
-    points, placement : how many contact points two rigid faces have, and where
+    points, placement : how many contact points two rigid faces have at least where these describe them, and where
     distance : gap up to which some law acts, whatever the size of the stones [m]
     """
 
@@ -213,5 +213,5 @@ def _place(surfaces: Surfaces, state: State) -> Placed:
 
 
 def _pair_key(shapes: Ints, count: int) -> Ints:
-    key: Ints = (shapes[:, 0] * count + shapes[:, 1]) << 24
+    key: Ints = (shapes[:, 0] * count + shapes[:, 1]) << PAIR_BIT
     return key

@@ -6,7 +6,7 @@ from scipy.sparse import csr_array
 from mechanics.arrays import Array, Bools, Ints
 from mechanics.contact._kernels.mortar import Bodies, Interfaces, mortar_rows, mortar_shares
 from mechanics.contact._kernels.points import surface_points
-from mechanics.contact.contacts import Contacts
+from mechanics.contact.contacts import NODE, Contacts
 from mechanics.contact.surfaces import Placed, Surfaces
 
 __all__ = ["mortar_contacts", "surface_weights"]
@@ -102,7 +102,7 @@ def mortar_contacts(
     arm[rigid, 1] = np.einsum("cji,cj->ci", placed.rotation[body[on, 1]], at)
     contacts = Contacts(
         body[interface],
-        key[interface] + (1 << 23) + node,
+        key[interface] + NODE + node,
         frame[interface],
         area,
         arm,

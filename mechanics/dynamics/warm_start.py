@@ -3,13 +3,11 @@
 import numpy as np
 
 from mechanics.arrays import Array, Ints
+from mechanics.contact.contacts import PAIR_BIT
 from mechanics.problem.problem import ContactSolution, ContactStart
 from mechanics.scene.laws.law import BOND, STATE
 
 __all__ = ["Memory"]
-
-
-_POINT_BITS = 24  # lowest bits of a key, which number the contact points of one pair of shapes
 
 
 class Memory:
@@ -54,7 +52,7 @@ class Memory:
         state = self._values[:, 2 * self._dimension :]
         if not len(new) or self._place is None or not state[:, BOND].any():
             return
-        pair, asked = self._key[order] >> _POINT_BITS, key[new] >> _POINT_BITS
+        pair, asked = self._key[order] >> PAIR_BIT, key[new] >> PAIR_BIT
         low, high = np.searchsorted(pair, asked, side="left"), np.searchsorted(pair, asked, side="right")
         heirs, count = new[high > low], (high - low)[high > low]
         if not len(heirs):

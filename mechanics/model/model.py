@@ -27,7 +27,6 @@ from moma.errors import GeometryError, SceneError
 __all__ = ["Model", "build_model"]
 
 
-_MAX_FACES = 64  # contact keys number the faces of a stone in six bits
 _SAME_VOLUME = (
     1e-6  # largest difference of the volume of a stone's parts from that of its outline, relative [-]
 )
@@ -264,12 +263,12 @@ def _check(block: Block) -> None:
             raise SceneError(what, where=f"stone {block.code}", remedy=remedy)
     # the facets of a ball are for pictures
     for part in _parts(block) if block.radius is None else ():
-        corners = max(len(face) for face in part.faces)
-        if len(part.faces) > _MAX_FACES or corners > MAX_CORNERS:
+        corners = sum(map(len, part.faces))
+        if corners > MAX_CORNERS:
             raise GeometryError(
-                f"{len(part.faces)} faces with up to {corners} corners",
+                f"{len(part.faces)} faces with {corners} corners together",
                 where=f"stone {block.code}",
-                remedy=f"simplify it to at most {_MAX_FACES} faces with at most {MAX_CORNERS} corners each",
+                remedy=f"simplify it until its faces have at most {MAX_CORNERS} corners together",
             )
 
 

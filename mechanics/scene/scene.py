@@ -151,7 +151,13 @@ class ContactSettings:
             at_most=1,
         ),
     ] = 0.05
-    points: Annotated[int, Setting("Contact points of two flat faces, at most.", choices=(1, 3, 4, 8))] = 4
+    points: Annotated[
+        int,
+        Setting(
+            "Contact points of two flat faces; at its corners, more where the edge of the common face needs more.",
+            choices=(1, 3, 4, 8),
+        ),
+    ] = 4
     placement: Annotated[
         Placement,
         Setting(

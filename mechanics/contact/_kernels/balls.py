@@ -18,9 +18,6 @@ from mechanics._kernels.vectors import (
 
 __all__ = ["ball_points"]
 
-# label of the contact of a ball, next to the kinds of `narrow_phase`
-BALL = 4
-
 
 @njit(cache=True)
 def _onto_segment(c, a, b):
@@ -99,7 +96,7 @@ def ball_points(pair, limit, radius, middle, axes, shapes):  # pragma: no cover 
 
     Outputs
     -------
-    place, frame, nearest, area : as of `interface_points`; the area is zero
+    place, frame, nearest, area : as of `interface_points`; name and area are zero
     """
     most = pair.shape[0]
     place = np.empty((most, 3), dtype=np.int64)
@@ -125,6 +122,6 @@ def ball_points(pair, limit, radius, middle, axes, shapes):  # pragma: no cover 
         _frame(n, axes[other], frame[count])
         write_row(nearest, 2 * count, along(c, -radius[ball], n))
         write_row(nearest, 2 * count + 1, point)
-        place[count, 0], place[count, 1], place[count, 2] = p, first, BALL << 21
+        place[count, 0], place[count, 1], place[count, 2] = p, first, 0
         count += 1
     return place[:count], frame[:count], nearest[: 2 * count].reshape(count, 2, 3), np.zeros(count)

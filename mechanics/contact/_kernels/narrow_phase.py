@@ -8,11 +8,25 @@ from numba import njit
 from mechanics._kernels.vectors import along, cross, dot, minus, norm, over, row, write_frame, write_row
 from mechanics.arrays import Array, Bools, Ints
 
-__all__ = ["Pairs", "Polygon", "Polyhedra", "clip", "interface_points", "point_areas", "separating_axes"]
+__all__ = [
+    "MAX_CORNERS",
+    "NAME_BITS",
+    "Pairs",
+    "Polygon",
+    "Polyhedra",
+    "clip",
+    "interface_points",
+    "point_areas",
+    "separating_axes",
+    "spread",
+]
 
-# most corners of a face; clipping one convex polygon by another gives at most the sum of both
-MAX_CORNERS = 16
-MAX_POINTS = 2 * MAX_CORNERS
+# Contact points are named by numbers below 2²⁷ within a pair of shapes: the kind of the pair, what the point is (a
+# corner of the incident face, a cut by a side of the reference face, or a point inside), and a corner of one shape with
+# a face of the other, or two edges. Shapes have at most a third as many faces as corners of faces, half as many edges.
+NAME_BITS = 27
+_KIND_BIT, _WHAT_BIT = 25, 23
+MAX_CORNERS = 5000  # corners over all faces of a shape: 5000 · 5000 / 3 < 2²³
 # kinds of pairs: apart, or in touch at a face of the first shape, a face of the second, or two edges
 SEPARATED, FACE_FIRST, FACE_SECOND, EDGES = 0, 1, 2, 3
 # margin, relative to the size of the smaller shape, by which the second shape's face or two edges must separate better
@@ -24,6 +38,10 @@ _PARALLEL = 0.999999  # cosine of the angle below which faces need no look at ed
 # end together clip cleanly
 _ON_SIDE = 1e-7
 _LEAST_SHARE = 0.1  # smallest area of a contact point, relative to an even share of the overlap
+# distance by which the edge of an overlap may recede where a corner is left out, relative to twice its smaller radius
+# of gyration, which is the radius of a disk and 1.15 of half the width of a rectangle: stones then tip within 1 % of
+# their limit
+_RECEDES = 5e-3
 
 
 class Polyhedra(NamedTuple):
@@ -88,9 +106,9 @@ class Polygon(NamedTuple):
 
     Attributes
     ----------
-    x, y : (MAX_POINTS,) float64, coordinates in the plane of the face [m]
-    z : (MAX_POINTS,) float64, height above it [m]
-    label : (MAX_POINTS,) int64, unique within the polygon
+    x, y : (n,) float64, coordinates in the plane of the face [m]
+    z : (n,) float64, height above it [m]
+    label : (n,) int64, unique within the polygon
     """
 
     x: Array
@@ -244,14 +262,14 @@ def separating_axes(pair, limit, hint, shapes):  # pragma: no cover - compiled
 def clip(polygon, count, a, b, side, slack, kept):  # pragma: no cover - compiled
     """Keep what lies left of a → b of a convex polygon, in place (Sutherland & Hodgman 1974); return its corners.
 
-    A point is named after the edge that begins in it: the polygon's own edge, or MAX_CORNERS + the side that was cut
-    along; no two points get the same label.
+    A point is named after the edge that begins in it: the polygon's own edge, or the side that was cut along; no two
+    points get the same label. Clipping a convex polygon adds one corner at most.
 
     Inputs
     ------
     polygon : Polygon, of which the first `count` corners are used; z is carried along
     a, b : two float64 each, ends of the side in the plane [m]
-    side : int64, number of the side
+    side : int64, label of the side, none of the polygon's own
     slack : float64, distance from the line within which a corner is on it [m]
     kept : Polygon, scratch
     """
@@ -265,19 +283,20 @@ def clip(polygon, count, a, b, side, slack, kept):  # pragma: no cover - compile
         dp = uy * (x[p] - a[0]) - ux * (y[p] - a[1])
         dq = uy * (x[q] - a[0]) - ux * (y[q] - a[1])
         inside, next_inside = dp <= slack, dq <= slack
-        if inside and k < MAX_POINTS:
+        # rounding that makes a polygon not quite convex must not write beyond its room
+        if inside and k < kx.shape[0]:
             kx[k], ky[k], kz[k], kl[k] = x[p], y[p], z[p], label[p]
             k += 1
         leaves, enters = inside and not next_inside, next_inside and not inside
-        if ((leaves and dp < -slack) or (enters and dq < -slack)) and k < MAX_POINTS:
+        if ((leaves and dp < -slack) or (enters and dq < -slack)) and k < kx.shape[0]:
             t = dp / (dp - dq)
             kx[k], ky[k] = x[p] + t * (x[q] - x[p]), y[p] + t * (y[q] - y[p])
             kz[k] = z[p] + t * (z[q] - z[p])
-            kl[k] = MAX_CORNERS + side if leaves else label[p]
+            kl[k] = side if leaves else label[p]
             k += 1
         elif leaves and k > 0:
             # the corner lies on the side: what follows it is the side
-            kl[k - 1] = MAX_CORNERS + side
+            kl[k - 1] = side
     for p in range(k):
         x[p], y[p], z[p], label[p] = kx[p], ky[p], kz[p], kl[p]
     return k
@@ -348,26 +367,57 @@ def point_areas(x, y, count, area, mx, my, out):  # pragma: no cover - compiled
 
 
 @njit(cache=True)
-def _spread(x, y, count, wanted, chosen):
-    """Choose `wanted` corners of a convex polygon, in order, by leaving out those that cut off least, one by one.
+def _cut_off(x, y, a, b, c):
+    """Return twice the area of the triangle of three points."""
+    return abs((x[b] - x[a]) * (y[c] - y[a]) - (x[c] - x[a]) * (y[b] - y[a]))
 
-    A corner cuts off the triangle with its two neighbours (Visvalingam & Whyatt 1993), so points on an edge go first,
-    and true corners stay.
+
+@njit(cache=True)
+def _recess(x, y, count, a, c):
+    """Return the largest distance of the corners between a and c from the line through both [m]."""
+    ux, uy = x[c] - x[a], y[c] - y[a]
+    length = np.sqrt(ux * ux + uy * uy)
+    far, p = 0.0, a
+    while True:
+        p = p + 1 if p + 1 < count else 0
+        if p == c:
+            return far
+        dx, dy = x[p] - x[a], y[p] - y[a]
+        far = max(far, abs(ux * dy - uy * dx) / length if length > 0.0 else np.sqrt(dx * dx + dy * dy))
+
+
+@njit(cache=True)
+def spread(x, y, count, wanted, recess, chosen):  # pragma: no cover - compiled
+    """Choose `wanted` corners of a convex polygon, or more where these would not describe its edge; return how many.
+
+    Corners are left out one by one. A corner cuts off the triangle with its two neighbours (Visvalingam & Whyatt
+    1993); the one that cuts off least goes first, so points on an edge go before corners, unless some corner left out
+    would lie farther than `recess` from the edge that remains.
+
+    Inputs
+    ------
+    x, y : (≥ count,) float64, corners in order [m]
+    count, wanted : int64
+    recess : float64 [m]
+    chosen : (≥ count,) int64, to which the corners are written, in order
     """
     for p in range(count):
         chosen[p] = p
     kept = count
     while kept > wanted:
-        out, least = 0, np.inf
+        out, least = -1, np.inf
         for p in range(kept):
             a, b, c = chosen[p - 1 if p else kept - 1], chosen[p], chosen[p + 1 if p + 1 < kept else 0]
-            area = abs((x[b] - x[a]) * (y[c] - y[a]) - (x[c] - x[a]) * (y[b] - y[a]))
+            area = _cut_off(x, y, a, b, c)
             # of corners that cut off the same the first goes, whatever the rounding
-            if area < least * (1.0 - 1e-6):
+            if area < least * (1.0 - 1e-6) and _recess(x, y, count, a, c) <= recess:
                 out, least = p, area
+        if out < 0:
+            break
         for p in range(out, kept - 1):
             chosen[p] = chosen[p + 1]
         kept -= 1
+    return kept
 
 
 @njit(cache=True)
@@ -389,8 +439,18 @@ def _inner_points(points, m, x, y):
 
 
 @njit(cache=True)
-def _nearest_points(polygon, count, limit, points, chosen):
-    """Keep at most `points` of the points within `limit` of the reference face, in place; return how many."""
+def _gyration(m):
+    """Return the smaller radius of gyration of a polygon [m]."""
+    mean, half = 0.5 * (m.xx + m.yy), 0.5 * (m.xx - m.yy)
+    return np.sqrt(max(mean - np.sqrt(half * half + m.xy * m.xy), 0.0))
+
+
+@njit(cache=True)
+def _nearest_points(polygon, count, limit, points, recess, chosen):
+    """Keep the points within `limit` of the reference face that `spread` chooses, in place; return how many.
+
+    Of a single point the lowest is kept.
+    """
     x, y, z, label = polygon
     k = 0
     for q in range(count):
@@ -400,23 +460,37 @@ def _nearest_points(polygon, count, limit, points, chosen):
     if k <= points:
         return k
     if points == 1:
-        chosen[0] = 0
+        kept, chosen[0] = 1, 0
         for q in range(k):
             if z[q] < z[chosen[0]]:
                 chosen[0] = q
     else:
-        _spread(x, y, k, points, chosen)
-    for q in range(points):
+        kept = spread(x, y, k, points, recess, chosen)
+    for q in range(kept):
         c = chosen[q]
         x[q], y[q], z[q], label[q] = x[c], y[c], z[c], label[c]
-    return points
+    return kept
 
 
 @njit(cache=True)
-def _empty_polygon():
-    return Polygon(
-        np.empty(MAX_POINTS), np.empty(MAX_POINTS), np.empty(MAX_POINTS), np.empty(MAX_POINTS, np.int64)
-    )
+def _polygon_of(size):
+    return Polygon(np.empty(size), np.empty(size), np.empty(size), np.empty(size, np.int64))
+
+
+@njit(cache=True)
+def _room_needed(kind, feature, cptr, points):
+    """Return the most corners of an overlap, and of all overlaps and pairs of edges together."""
+    largest, total = max(points, 1), 0
+    for p in range(kind.shape[0]):
+        if kind[p] == EDGES:
+            total += 1
+        elif kind[p] != SEPARATED:
+            # clipping one convex polygon by another gives at most the sum of both
+            corners = max(points, 1)
+            for f in feature[p]:
+                corners += cptr[f + 1] - cptr[f]
+            largest, total = max(largest, corners), total + corners
+    return largest, total
 
 
 @njit(cache=True)
@@ -426,7 +500,8 @@ def interface_points(pairs, points, inner, flat, thin, shapes):  # pragma: no co
     Inputs
     ------
     pairs : Pairs
-    points : int64, largest number of points of two faces; with one, the centroid of the overlap
+    points : int64, number of points of two faces, more where its edge needs more (`spread`); with one, the centroid of
+        the overlap
     inner : bool, points of flat faces lie inside, where they carry the area's second moments
     flat : float64, cosine of the angle within which faces lie flat on one another [-]
     thin : float64, flat faces that overlap by less than this part of the smaller one do not touch [-]
@@ -434,17 +509,17 @@ def interface_points(pairs, points, inner, flat, thin, shapes):  # pragma: no co
 
     Outputs
     -------
-    place : (nc, 3) int64, pair, candidate (0 or 1 of the pair), label that is unique within the pair
+    place : (nc, 3) int64, pair, candidate (0 or 1 of the pair), name that is unique within the pair, below 2²⁷
     frame : (nc, 3, 3) float64, rows n, t1, t2 [-]
     nearest : (nc, 2, 3) float64, points on candidate and antagonist [m]
     area : (nc,) float64 [m²]
     """
-    most = pairs.shapes.shape[0] * max(points, 1)
+    largest, most = _room_needed(pairs.kind, pairs.feature, shapes.cptr, points)
     place = np.empty((most, 3), dtype=np.int64)
     frame, nearest, area = np.empty((most, 3, 3)), np.empty((2 * most, 3)), np.empty(most)
-    polygon, kept = _empty_polygon(), _empty_polygon()
+    polygon, kept = _polygon_of(largest), _polygon_of(largest)
     x, y, z, label = polygon
-    share, chosen = np.empty(MAX_POINTS), np.empty(MAX_POINTS, dtype=np.int64)
+    share, chosen = np.empty(largest), np.empty(largest, dtype=np.int64)
     # unpacked once: in the loop the compiler would count references
     pair, limit, _, kind, feature, axis = pairs
     _, vertex, fptr, cptr, corner, normal, eptr, edge_a, edge_b, _, _, size, face_area = shapes
@@ -453,6 +528,7 @@ def interface_points(pairs, points, inner, flat, thin, shapes):  # pragma: no co
         if kind[p] == SEPARATED:
             continue
         i, j, f = pair[p, 0], pair[p, 1], frame[count]
+        base = kind[p] << _KIND_BIT
         reference, incident = feature[p, 0], feature[p, 1]
         if kind[p] == EDGES:
             a, b = row(vertex, edge_a[reference]), row(vertex, edge_b[reference])
@@ -461,9 +537,7 @@ def interface_points(pairs, points, inner, flat, thin, shapes):  # pragma: no co
             write_row(nearest, 2 * count, first_foot)
             write_row(nearest, 2 * count + 1, second_foot)
             place[count, 0], place[count, 1] = p, 0
-            place[count, 2] = (
-                (EDGES << 21) + (((reference - eptr[i]) % 512) << 9) + (incident - eptr[j]) % 512
-            )
+            place[count, 2] = base + (reference - eptr[i]) * (eptr[j + 1] - eptr[j]) + incident - eptr[j]
             area[count] = 0.0
             count += 1
             continue
@@ -478,13 +552,13 @@ def interface_points(pairs, points, inner, flat, thin, shapes):  # pragma: no co
         # seen along the normal the incident face runs clockwise
         for v in range(cptr[incident + 1] - 1, cptr[incident] - 1, -1):
             arm = minus(row(vertex, corner[v]), o)
-            x[k], y[k], z[k], label[k] = dot(t1, arm), dot(t2, arm), dot(n, arm), v - cptr[incident]
+            x[k], y[k], z[k], label[k] = dot(t1, arm), dot(t2, arm), dot(n, arm), v
             k += 1
         slack, end = _ON_SIDE * min(size[i], size[j]), (0.0, 0.0)
         for v in range(start, stop):
             begin, arm = end, minus(row(vertex, corner[v + 1 if v + 1 < stop else start]), o)
             end = dot(t1, arm), dot(t2, arm)
-            k = clip(polygon, k, begin, end, v - start, slack, kept)
+            k = clip(polygon, k, begin, end, -1 - v, slack, kept)
             if k == 0:
                 break
         if k == 0:
@@ -492,7 +566,7 @@ def interface_points(pairs, points, inner, flat, thin, shapes):  # pragma: no co
         m, lies_flat = _moments(x, y, k), -dot(g, n) > flat
         if lies_flat and m.area < thin * min(face_area[reference], face_area[incident]):
             continue
-        near = 0
+        near, inside = 0, False
         for q in range(k):
             if z[q] <= limit[p]:
                 near += 1
@@ -500,22 +574,29 @@ def interface_points(pairs, points, inner, flat, thin, shapes):  # pragma: no co
             gx, gy = _slope(f, g)
             height = z[0] - gx * x[0] - gy * y[0]
             _inner_points(points, m, x, y)
-            k = points
+            k, inside = points, True
             for q in range(k):
-                z[q], label[q], share[q] = height + gx * x[q] + gy * y[q], 2 * MAX_CORNERS + q, m.area / k
+                z[q], label[q], share[q] = height + gx * x[q] + gy * y[q], q, m.area / k
         elif near == 0:
             continue
         else:
-            k = _nearest_points(polygon, k, limit[p], points, chosen)
+            k = _nearest_points(polygon, k, limit[p], points, 2.0 * _RECEDES * _gyration(m), chosen)
             point_areas(x, y, k, m.area, m.x, m.y, share)
-        local = ((reference - fptr[owner]) % 64 << 6) + (incident - fptr[other]) % 64
-        base = (kind[p] << 21) + (local << 9)
+        face, facing = reference - fptr[owner], incident - fptr[other]
+        faces, opposed = fptr[owner + 1] - fptr[owner], fptr[other + 1] - fptr[other]
         for q in range(k):
             frame[count] = f
             foot = along(along(o, x[q], t1), y[q], t2)
             write_row(nearest, 2 * count, along(foot, z[q], n))
             write_row(nearest, 2 * count + 1, foot)
-            place[count, 0], place[count, 1], place[count, 2] = p, 1 if owner == i else 0, base + label[q]
+            place[count, 0], place[count, 1] = p, 1 if owner == i else 0
+            if inside:
+                name = (2 << _WHAT_BIT) + label[q] * faces + face
+            elif label[q] >= 0:
+                name = (label[q] - cptr[fptr[other]]) * faces + face
+            else:
+                name = (1 << _WHAT_BIT) + (-1 - label[q] - cptr[fptr[owner]]) * opposed + facing
+            place[count, 2] = base + name
             area[count] = share[q]
             count += 1
     return place[:count], frame[:count], nearest[: 2 * count].reshape(count, 2, 3), area[:count]

@@ -19,7 +19,6 @@ from mechanics.contact._kernels.facets import (
 
 __all__ = ["FlatMesh", "flattened", "overlap_area", "overlap_integrals", "room"]
 
-_MAX_CUT = 64  # corners of a facet that is cut by another facet and by the outlines of two faces
 _HATS = 0.8  # part of a facet up to which it is tested by hats, which stay within the overlap
 _DUAL = 0.98  # part of a facet from which it is tested by dual functions
 # part of a facet's area that rounding leaves as overlap where a joint ends at a node: no pressure follows from it
@@ -60,7 +59,10 @@ class _Integrals(NamedTuple):
 
 @njit(cache=True)
 def _clip_flat(polygon, count, cutter, corners, kept):
-    """Keep what lies inside a convex polygon `cutter` of either sense of `polygon`, in place; return its corners."""
+    """Keep what lies inside a convex polygon `cutter` of either sense of `polygon`, in place; return its corners.
+
+    There must be room for the corners of both.
+    """
     turn = 0.0
     for k in range(1, corners - 1):
         turn += (cutter[k, 0] - cutter[0, 0]) * (cutter[k + 1, 1] - cutter[0, 1]) - (
@@ -76,10 +78,10 @@ def _clip_flat(polygon, count, cutter, corners, kept):
             q = p + 1 if p + 1 < count else 0
             dp = ux * (polygon[p, 1] - ay) - uy * (polygon[p, 0] - ax)
             dq = ux * (polygon[q, 1] - ay) - uy * (polygon[q, 0] - ax)
-            if dp >= 0.0:
+            if dp >= 0.0 and k < kept.shape[0]:
                 kept[k, 0], kept[k, 1] = polygon[p, 0], polygon[p, 1]
                 k += 1
-            if dp > 0.0 > dq or dq > 0.0 > dp:
+            if (dp > 0.0 > dq or dq > 0.0 > dp) and k < kept.shape[0]:
                 t = dp / (dp - dq)
                 kept[k, 0] = polygon[p, 0] + t * (polygon[q, 0] - polygon[p, 0])
                 kept[k, 1] = polygon[p, 1] + t * (polygon[q, 1] - polygon[p, 1])
@@ -95,7 +97,8 @@ def _clip_flat(polygon, count, cutter, corners, kept):
 @njit(cache=True)
 def overlap_area(one, other):  # pragma: no cover - compiled
     """Compute the area common to two convex polygons of the plane, (n, 2) and (m, 2) float64 [m]."""
-    polygon, kept = np.empty((_MAX_CUT, 2)), np.empty((_MAX_CUT, 2))
+    most = one.shape[0] + other.shape[0]
+    polygon, kept = np.empty((most, 2)), np.empty((most, 2))
     polygon[: one.shape[0]] = one
     count = _clip_flat(polygon, one.shape[0], other, other.shape[0], kept)
     area = 0.0
@@ -391,7 +394,9 @@ def overlap_integrals(own, other, outlines, outline_size, share, moment):  # pra
     stride, stride_a = corners * own.kind, corners * other.kind
     mass = np.zeros(most * stride)
     far, cross = np.empty(near_ptr[-1], dtype=np.int64), np.zeros(near_ptr[-1] * stride_a)
-    polygon, kept = np.empty((_MAX_CUT, 2)), np.empty((_MAX_CUT, 2))
+    # a facet cut by another facet and by the outlines of two faces has at most as many corners as all of them together
+    room_for = corners + corners_a + outline_size.sum()
+    polygon, kept = np.empty((room_for, 2)), np.empty((room_for, 2))
     mine, theirs = np.empty((4, 2)), np.empty((4, 2))
     values, part, middle = np.empty((3, 9)), np.empty(4), np.empty((4, 3))
     count, pairs = 0, 0

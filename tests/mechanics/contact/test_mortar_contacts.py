@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mechanics.contact.contacts import material_points
+from mechanics.contact.contacts import NODE, material_points
 from mechanics.contact.mortar_contacts import mortar_contacts
 from mechanics.scene.state import State
 from tests.mechanics.contact.box_faces import BOTTOM, KINDS, TOP, nodes_of, two_boxes
@@ -130,7 +130,7 @@ def test_weights_are_the_integrals_of_their_twin(kind, far, angle):
     assert (contacts.bodies == [1, 0]).all()
     weights = contacts.weights.toarray()
     # none of these overlaps leaves slivers
-    found = np.searchsorted(own.node, contacts.key - (1 << 23))
+    found = np.searchsorted(own.node, contacts.key - NODE)
     np.testing.assert_array_equal(found, np.flatnonzero(share > 0))
     np.testing.assert_allclose(contacts.area, share[found], atol=1e-14)
     own_rows = weights[0::2][:, own.node] * contacts.area[:, None]

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mechanics.contact.contacts import PAIR_BIT
 from mechanics.dynamics.warm_start import Memory
 from mechanics.problem.problem import ContactSolution
 from mechanics.scene.laws.law import BOND, SLIP, STATE
@@ -92,7 +93,7 @@ def bonded_pairs():
     """Two contacts of the pair 5, one of the pair 6; the bond of the second is damaged."""
     state = np.zeros((3, STATE))
     state[:, BOND], state[:, SLIP] = [1.0, 0.5, 0.0], [1.0, 2.0, 3.0]
-    key = np.array([(5 << 24) + 40, (5 << 24) + 2, (6 << 24) + 1])
+    key = np.array([(5 << PAIR_BIT) + 40, (5 << PAIR_BIT) + 2, (6 << PAIR_BIT) + 1])
     place = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.1]])
     return key, state, place
 
@@ -101,7 +102,15 @@ def test_a_new_contact_of_a_bonded_joint_takes_the_bond_of_the_nearest():
     """Pair 5 has lost its contact 2 and got 7 and 8; pair 9 is new, and its contact stays without a bond."""
     memory, (key, state, place) = Memory(), bonded_pairs()
     memory.store(key, solution(numbers(3)), state, place)
-    asked = np.array([(9 << 24) + 2, (5 << 24) + 7, (6 << 24) + 3, (5 << 24) + 40, (5 << 24) + 8])
+    asked = np.array(
+        [
+            (9 << PAIR_BIT) + 2,
+            (5 << PAIR_BIT) + 7,
+            (6 << PAIR_BIT) + 3,
+            (5 << PAIR_BIT) + 40,
+            (5 << PAIR_BIT) + 8,
+        ]
+    )
     where = np.array([[0.0, 0.0, 0.0], [0.9, 0.1, 0.0], [5.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.4, 0.0, 0.3]])
     start, found = memory.recall(asked, where)
     np.testing.assert_array_equal(found[:, BOND], [0.0, 0.5, 0.0, 1.0, 1.0])

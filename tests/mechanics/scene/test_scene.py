@@ -7,7 +7,7 @@ from mechanics.model.model import build_model
 from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene
 from mechanics.stones.materials import Material
 from moma.errors import GeometryError, SceneError
-from tests.mechanics.shapes import LIMESTONE, TURN, brick, ground, moved, scene
+from tests.mechanics.shapes import LIMESTONE, TURN, brick, ellipse, ground, moved, prism, scene
 from tests.pipelines.results_by_hand import BOX_FACES, box
 
 
@@ -88,10 +88,9 @@ def test_the_model_knows_the_stones_and_where_they_begin():
 
 
 def test_a_stone_with_more_corners_than_contacts_can_name_is_refused():
-    angle = np.linspace(0, 2 * np.pi, 17, endpoint=False)
-    ring = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(17)])
-    sides = tuple((i, (i + 1) % 17, 17 + (i + 1) % 17, 17 + i) for i in range(17))
-    faces = (tuple(range(16, -1, -1)), tuple(range(17, 34)), *sides)
-    drum = Block("D1", np.vstack([ring, ring + np.array([0, 0, 1])]), faces, LIMESTONE)
-    with pytest.raises(GeometryError, match="stone D1: 19 faces with up to 17 corners; simplify"):
-        build_model(scene(drum))
+    """A drum has six corners of faces for each of its sides; 833 sides are the most that can be named."""
+    rings = (ellipse(sides, (1.0, 1.0)) for sides in (833, 834))
+    allowed, refused = (Block("D1", *prism(ring, 0.0, 1.0), LIMESTONE) for ring in rings)
+    build_model(scene(allowed))
+    with pytest.raises(GeometryError, match="stone D1: 836 faces with 5004 corners together; simplify"):
+        build_model(scene(refused))

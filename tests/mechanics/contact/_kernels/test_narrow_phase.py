@@ -21,13 +21,12 @@ coordinate = st.integers(-128, 128).map(lambda i: i / 64)
 # --- clipping ---
 
 
-def clipped(ring, a, b, side=2, slack=1e-9):
-    """Kept corners (n, 3) and their labels."""
-    polygon, scratch = (
-        kernel.Polygon(*np.zeros((3, kernel.MAX_POINTS)), np.zeros(kernel.MAX_POINTS, dtype=np.int64))
-        for _ in range(2)
-    )
+def clipped(ring, a, b, side=99, slack=1e-9):
+    """Kept corners (n, 3) and their labels; there is room for one corner more than the ring has."""
     count = len(ring)
+    polygon, scratch = (
+        kernel.Polygon(*np.zeros((3, count + 1)), np.zeros(count + 1, dtype=np.int64)) for _ in range(2)
+    )
     for values, own in zip(polygon, (*ring.T, np.arange(count)), strict=True):
         values[:count] = own
     count = kernel.clip(polygon, count, tuple(map(float, a)), tuple(map(float, b)), side, slack, scratch)
@@ -71,9 +70,9 @@ def test_clipping_along_an_edge_takes_nothing_and_renames_nothing():
 def test_points_are_named_after_the_edge_that_begins_in_them():
     square = np.column_stack([box((0, 0, 0), (1, 1, 0))[:4, :2], np.zeros(4)])
     # what lies left of x = 1/2, upwards: corners 0 and 3, and both cuts
-    found, label = clipped(square, (0.5, 0), (0.5, 1), side=5)
+    found, label = clipped(square, (0.5, 0), (0.5, 1), side=7)
     np.testing.assert_allclose(found[:, :2], [(0, 0), (0.5, 0), (0.5, 1), (0, 1)])
-    assert label == [0, kernel.MAX_CORNERS + 5, 2, 3]
+    assert label == [0, 7, 2, 3]
 
 
 # --- the points of two faces ---
@@ -179,15 +178,35 @@ def test_the_areas_add_up_to_the_overlap_and_have_its_centroid(seed, points):
         np.testing.assert_allclose(area @ nearest[:, 0, :2], first, atol=1e-11)
 
 
-def spread_twin(x, wanted):
-    """Corner by corner, leave out the one that cuts off the smallest triangle; of equals, the first."""
+def recedes(x, kept):
+    """How far the corners left out lie from the edge that remains [m]."""
+    far = 0.0
+    for a, c in zip(kept, [*kept[1:], kept[0] + len(x)], strict=True):
+        chord = x[c % len(x)] - x[a]
+        left = [x[p % len(x)] - x[a] for p in range(a + 1, c)]
+        far = max([far, *(abs(chord[0] * d[1] - chord[1] * d[0]) / np.linalg.norm(chord) for d in left)])
+    return far
+
+
+def half_width(x):
+    """Twice the smaller radius of gyration of a polygon: the radius of a disk [m]."""
+    whole, first, second = moments(x)
+    central = second / whole - np.outer(first, first) / whole**2
+    return 2.0 * np.sqrt(np.linalg.eigvalsh(central)[0])
+
+
+def spread_twin(x, wanted, recess):
+    """Leave out the corner that cuts off the smallest triangle while the edge recedes by less; of equals, the first."""
     chosen = list(range(len(x)))
     while len(chosen) > wanted:
         before, after = x[np.roll(chosen, 1)], x[np.roll(chosen, -1)]
         edges = x[chosen] - before, after - before
         area = np.abs(edges[0][:, 0] * edges[1][:, 1] - edges[0][:, 1] * edges[1][:, 0])
-        out = int(np.flatnonzero(area <= area.min() * (1 + 1e-6))[0])
-        del chosen[out]
+        allowed = [recedes(x, chosen[:p] + chosen[p + 1 :]) <= recess for p in range(len(chosen))]
+        if not any(allowed):
+            break
+        area = np.where(allowed, area, np.inf)
+        del chosen[int(np.flatnonzero(area <= area.min() * (1 + 1e-6))[0])]
     return chosen
 
 
@@ -196,22 +215,62 @@ def test_points_on_an_edge_go_before_corners():
     x = np.array([0.55, 1.0, 1.0, 0.825, 0.55])
     y = np.array([-0.125, -0.125, 0.125, 0.125 + 1e-9, 0.125])
     chosen = np.empty(5, dtype=np.int64)
-    kernel._spread(x, y, 5, 4, chosen)
+    assert kernel.spread(x, y, 5, 4, 1e-3, chosen) == 4
     np.testing.assert_array_equal(chosen[:4], [0, 1, 2, 4])
 
 
 @settings(max_examples=100, deadline=None)
 @given(seeds, st.sampled_from([3, 4, 8]))
-def test_of_many_corners_those_that_cut_off_most_are_kept(seed, points):
+def test_of_many_corners_those_that_cut_off_least_are_left_out_while_the_edge_stays(seed, points):
     stack = Stack(seed)
     large_enough(stack)
     everything = stack.points(points=32)
     kept = stack.points(points=points)
-    assert len(kept[0]) == min(points, len(everything[0]))
-    rows = spread_twin(everything[2][:, 0, :2], len(kept[0]))
-    if len(kept[0]) < len(everything[0]):
-        np.testing.assert_array_equal(kept[0], everything[0][rows])
-        np.testing.assert_array_equal(kept[2], everything[2][rows])
+    x = everything[2][:, 0, :2]
+    rows = spread_twin(x, points, 5e-3 * half_width(x))
+    np.testing.assert_array_equal(kept[0], everything[0][rows])
+    np.testing.assert_array_equal(kept[2], everything[2][rows])
+
+
+@settings(max_examples=60, deadline=None)
+@given(seeds, st.integers(3, 200), st.sampled_from([3, 4, 8]), st.floats(0.2, 1.0))
+def test_leaving_corners_out_moves_no_edge_by_more_than_the_recess(seed, corners, points, narrow):
+    """The corners lie anywhere on an ellipse: often several beside one another."""
+    angle = np.sort(np.random.default_rng(seed).uniform(0, 2 * np.pi, corners))
+    x = np.column_stack([np.cos(angle), narrow * np.sin(angle)])
+    chosen = np.empty(corners, dtype=np.int64)
+    kept = chosen[: kernel.spread(*x.T.copy(), corners, points, 0.01, chosen)].tolist()
+    assert kept == sorted(set(kept))
+    assert len(kept) >= min(points, corners)
+    assert recedes(x, kept) <= 0.01 * (1 + 1e-12)
+
+
+@pytest.mark.parametrize(("sides", "count"), [(3, 3), (5, 5), (16, 16), (32, 32), (64, 32), (400, 63)])
+def test_a_regular_face_keeps_the_corners_that_decide_whatever_their_number(sides, count):
+    """In each direction the edge lies within 0.5 % of the radius of where it was; 400 corners need no 400 points."""
+    ring = ellipse(sides, (1.0, 1.0), 0.3)
+    place, _, nearest, area = points_of(
+        prism(ring, -1.0, 0.0), prism(ring, 0.0, 1.0), kernel.FACE_FIRST, [1, sides + 2]
+    )
+    assert min(sides, 32) <= len(place) <= count
+    assert len(set(place[:, 2].tolist())) == len(place)
+    assert area.sum() == pytest.approx(0.5 * sides * np.sin(2 * np.pi / sides), rel=1e-9)
+    angle = np.sort(np.arctan2(nearest[:, 0, 1], nearest[:, 0, 0]))
+    widest = np.diff([*angle, angle[0] + 2 * np.pi]).max()
+    assert np.cos(widest / 2) >= np.cos(np.pi / sides) - 5e-3
+
+
+@pytest.mark.parametrize("sides", [4, 7, 40, 800])
+def test_names_of_points_stay_below_their_room(sides):
+    """All of the corners, cuts by sides, and points inside; the largest face of the largest stone that is allowed."""
+    ring = ellipse(sides, (1.0, 1.0), 0.3)
+    assert 6 * sides <= kernel.MAX_CORNERS
+    for upper in (ring, 1.01 * ring[:: max(sides // 4, 1)], ellipse(sides, (1.0, 0.9), 0.4)):
+        stones = prism(ring, -1.0, 0.0), prism(upper, 0.0, 1.0)
+        for inner in (False, True):
+            place, *_ = points_of(*stones, kernel.FACE_FIRST, [1, sides + 2], points=8, inner=inner)
+            assert len(set(place[:, 2].tolist())) == len(place) >= 4
+            assert place[:, 2].max() < 1 << kernel.NAME_BITS
 
 
 @settings(max_examples=100, deadline=None)
