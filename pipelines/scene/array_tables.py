@@ -6,6 +6,7 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from mechanics.scene.loads.accelerogram import Accelerogram
+from mechanics.scene.loads.ground_motion import braking_time
 from mechanics.scene.loads.tables import read_history
 from mechanics.scene.loads.time_series import History
 from pipelines.toml.lines import Path
@@ -73,6 +74,8 @@ def _shown(value: Any) -> str:
             return f"from {value.time[0]:g} s to {value.time[-1]:g} s"
         case Accelerogram():
             rest = f"{value.velocity[-1]:.2g} m/s, {value.displacement[-1]:.2g} m"
+            braking = braking_time(value)
+            rest += f", brakes for {braking:.3g} s" * (braking > value.dt)
             return f"{value.name!r} ({value.duration:g} s, peak {value.peak:.3g} m/s², ends with {rest})"
         case float():
             return f"{value:g}"

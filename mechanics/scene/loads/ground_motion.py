@@ -12,7 +12,9 @@ from mechanics.scene.loads.time_series import History
 from mechanics.stones.settings import Setting
 from moma.errors import SceneError
 
-__all__ = ["Component", "GroundMotion"]
+__all__ = ["Component", "GroundMotion", "braking_time"]
+
+_BRAKING = 0.1  # deceleration after a record over its peak, too little to shake a stone by itself [-]
 
 
 @dataclass(frozen=True)
@@ -33,8 +35,8 @@ class Component:
 class GroundMotion:
     """Recorded motion of the ground with its stones.
 
-    The velocity is linear between the samples; one step after the last it is zero, and the ground then stays where it
-    is.
+    The velocity is linear between the samples. Whatever is left of it at the last one goes to zero linearly within
+    `braking_time`, and the ground then stays where it is.
 
     Attributes
     ----------
@@ -82,6 +84,15 @@ class GroundMotion:
         record = component.record
         direction = np.array(component.direction) / np.linalg.norm(component.direction)
         speed = np.append(self.scale * record.velocity, 0.0)
-        return History(
-            self.start + np.linspace(0.0, record.dt * len(record), len(speed)), np.outer(speed, direction)
-        )
+        instants = np.append(record.time, record.duration + braking_time(record))
+        return History(self.start + instants, np.outer(speed, direction))
+
+
+def braking_time(record: Accelerogram) -> float:
+    """Return the time within which the ground comes to rest after a record [s].
+
+    A record that ends at rest needs one step. Any other one, such as a single pulse, leaves a velocity, which is taken
+    away with a tenth of the record's peak acceleration: within one step it would be a blow.
+    """
+    left = abs(float(record.velocity[-1]))
+    return max(record.dt, left / (_BRAKING * record.peak)) if left > 0 else record.dt

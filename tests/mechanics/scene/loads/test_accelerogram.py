@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mechanics.scene.loads.accelerogram import Accelerogram
-from mechanics.scene.loads.ground_motion import Component, GroundMotion
+from mechanics.scene.loads.ground_motion import Component, GroundMotion, braking_time
 from mechanics.scene.loads.record_processing import band_pass, without_drift
 from moma.errors import SceneError
 
@@ -121,13 +121,36 @@ def test_the_ground_moves_as_its_records_say_from_the_start_on():
 
 
 def test_after_a_record_the_ground_stays_where_it_is():
-    """A residual velocity of the record dies away linearly within one step."""
+    """2 m/s² for 1 s leave 2 m/s, which 0.2 m/s² take away within 10 s and 10 m."""
     push = record(lambda time: np.full_like(time, 2.0), 1.0)
     motion = GroundMotion(frozenset({"G"}), (Component((1.0, 0.0, 0.0), push),))
-    last = motion.pose(1.0 + DT).displacement[0]
-    assert last == pytest.approx(1.0 + DT * 2.0 / 2, rel=1e-12)
-    assert motion.pose(50.0).displacement[0] == last
-    assert motion.until == pytest.approx(1.0 + DT)
+    assert motion.until == pytest.approx(11.0)
+    last = motion.pose(11.0).displacement[0]
+    assert last == pytest.approx(11.0, rel=1e-12)
+    assert motion.pose(50.0).displacement[0] == pytest.approx(last, rel=1e-14)
+
+
+@pytest.mark.parametrize("scale", [1.0, -0.3])
+def test_a_pulse_ends_without_a_blow(scale):
+    """A half sine of 1.5 m/s² and 0.25 s leaves v = 2 A T/π = 0.24 m/s; the ground then brakes with A/10 until 1.84 s.
+
+    Stones under a record with no velocity left, or hardly any, see no more than its peak either.
+    """
+    pulse = record(lambda time: 1.5 * np.sin(np.pi * time / 0.25), 0.25)
+    left = 2 * 1.5 * 0.25 / np.pi
+    motion = GroundMotion(frozenset({"G"}), (Component((1.0, 0.0, 0.0), pulse),), scale=scale)
+    assert motion.until == pytest.approx(0.25 + left / 0.15, rel=1e-3)
+    time = np.arange(1, 400) * DT
+    place = np.array([motion.pose(float(t)).displacement[0] for t in (0.0, *time, time[-1] + DT)])
+    acceleration = np.diff(place, 2) / DT**2
+    assert np.abs(acceleration[time < 0.25]).max() == pytest.approx(abs(scale) * 1.5, rel=1e-3)
+    assert np.abs(acceleration[time > 0.25 + DT]).max() <= abs(scale) * 0.15 * (1 + 1e-6)
+    assert braking_time(pulse) == pytest.approx(left / 0.15, rel=1e-3)
+
+
+def test_a_record_that_ends_at_rest_needs_one_step_more():
+    assert braking_time(record(lambda time: np.sin(2 * np.pi * time), 2.0)) == DT
+    assert braking_time(record(np.zeros_like, 2.0)) == DT
 
 
 @pytest.mark.parametrize(
