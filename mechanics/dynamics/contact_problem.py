@@ -11,13 +11,14 @@ from mechanics.dynamics.contact_search import Detection
 from mechanics.dynamics.stepping import Kick
 from mechanics.model.model import Model
 from mechanics.problem.problem import ContactProblem, ContactStart
-from mechanics.scene.laws.law import Approach, Terms
+from mechanics.scene.laws.law import REST, Approach, Terms
 from mechanics.scene.state import State
 from mechanics.stones.validation import SMALLEST
 
 __all__ = ["contact_problem", "shifted", "terms_of", "unshifted"]
 
 
+_TOUCH = 1e-9  # overlap over a body's size that comes from rounding, and is no property of a joint [-]
 # bias of a law that does not act in a step, over the fastest free velocity: its own, infinity, is no number to solvers
 _NEVER = 1e3
 
@@ -26,6 +27,9 @@ def contact_problem(
     model: Model, predicted: State, found: Detection, free: Kick, internal: Array, first: bool
 ) -> tuple[ContactProblem, Approach]:
     """State the problem u = W r̃ + (u_free - W s n), (u, r̃) in the shift and cone of its law, for r̃ = r + s n.
+
+    Stones that overlap as the run begins touch: survey and rounding leave such joints, and nothing moves because of
+    them. The gap of that instant counts as closed from then on, so that only what overlaps deeper later is corrected.
 
     Parameters
     ----------
@@ -41,11 +45,19 @@ def contact_problem(
     approach : the contacts as the laws see them before the step
     """
     contacts, operator, time = found.contacts, found.operator, model.scene.time
+    gap = gaps(contacts, predicted)
+    speed = local_velocity(contacts, operator, predicted.velocity, predicted.node_velocity)[:, 0]
+    size = model.surfaces.size[contacts.bodies].min(axis=1)
+    if first:
+        # the gap before the flight to the predicted configuration
+        initial = gap - time.step * (1 - time.theta) * speed
+        internal = internal.copy()
+        internal[:, REST] = np.where(initial < -_TOUCH * size, initial, internal[:, REST])
     approach = Approach(
-        gap=gaps(contacts, predicted),
-        speed=local_velocity(contacts, operator, predicted.velocity, predicted.node_velocity)[:, 0],
+        gap=gap,
+        speed=speed,
         area=contacts.area,
-        size=model.surfaces.size[contacts.bodies].min(axis=1),
+        size=size,
         compliance=operator.diagonal[:, 0, 0],
         step=time.step,
         theta=time.theta,

@@ -5,16 +5,20 @@ import numpy as np
 from mechanics.arrays import Array, Ints
 from mechanics.contact.contacts import PAIR_BIT
 from mechanics.problem.problem import ContactSolution, ContactStart
-from mechanics.scene.laws.law import BOND, STATE
+from mechanics.scene.laws.law import BOND, REST, STATE
 
 __all__ = ["Memory"]
+
+
+_OF_PLACES = [BOND, REST]  # internal variables that belong to places in a joint
 
 
 class Memory:
     """Impulses, velocities and internal variables by contact key.
 
-    Bonds belong to places in a joint. A face that slides a little, or is cut at another edge, gets contacts with new
-    keys; where a joint has bonds, these inherit the internal variables of the nearest earlier contact of the pair.
+    Bonds, and gaps that count as closed, belong to places in a joint. A face that slides a little, or is cut at another
+    edge, gets contacts with new keys; where any contact has one of the two, these inherit the internal variables of the
+    nearest earlier contact of the pair.
 
     Parameters
     ----------
@@ -30,8 +34,8 @@ class Memory:
     def recall(self, key: Ints, place: Array | None = None) -> tuple[ContactStart, Array]:
         """Return the warm start of the contacts of some keys (nc,), and their internal variables (nc, STATE).
 
-        Both are zero for new contacts, except for the internal variables in bonded joints if the places (nc, d) [m]
-        are given.
+        Both are zero for new contacts, except for the internal variables in joints with bonds or gaps that count as
+        closed if the places (nc, d) [m] are given.
         """
         if key is self._key:
             values = self._values
@@ -48,9 +52,9 @@ class Memory:
         return ContactStart(values[:, :d], values[:, d : 2 * d]), values[:, 2 * d :]
 
     def _inherit(self, values: Array, new: Ints, key: Ints, place: Array, order: Ints) -> None:
-        """Copy the internal variables of the nearest old contacts to new ones (rows of `values`) in bonded joints."""
+        """Copy the internal variables of the nearest old contacts of their pairs to new ones (rows of `values`)."""
         state = self._values[:, 2 * self._dimension :]
-        if not len(new) or self._place is None or not state[:, BOND].any():
+        if not len(new) or self._place is None or not state[:, _OF_PLACES].any():
             return
         pair, asked = self._key[order] >> PAIR_BIT, key[new] >> PAIR_BIT
         low, high = np.searchsorted(pair, asked, side="left"), np.searchsorted(pair, asked, side="right")

@@ -36,7 +36,8 @@ class Approach:
     first : first step of the run, in which bonds are made
     state : (n, STATE) internal variables, as the law left them in the last step; zeros for new contacts.
         BOND intact fraction (1 whole, between: damaged, 0 never bonded, -1 broken), SLIDING 1 if it slid in the last
-        step, OPENING largest opening so far [m], SLIP path of sliding so far [m], REST gap that counts as closed [m]
+        step, OPENING largest opening so far [m], SLIP path of sliding so far [m], REST gap that counts as closed, where
+        stones overlapped or mortar filled a joint as the run began [m]
     """
 
     gap: Array
