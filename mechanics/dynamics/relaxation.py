@@ -8,7 +8,7 @@ from mechanics.dynamics.observers.energy import kinetic_energy
 from mechanics.model.model import Model
 from mechanics.scene.state import State
 
-__all__ = ["Relaxation", "halted"]
+__all__ = ["Relaxation", "halted", "relaxation_caution"]
 
 
 class Relaxation:
@@ -16,21 +16,38 @@ class Relaxation:
 
     Parameters
     ----------
-    model : a scene; without `relaxation` in its time settings nothing is halted
+    model : a scene; nothing is halted without `relaxation` in its time settings, nor where stones begin in motion,
+        as the first halt would take away what is to be followed
     """
 
     def __init__(self, model: Model) -> None:
         self._model = model
+        self._halts = model.scene.time.relaxation and not _in_motion(model)
         self._kinetic = 0.0
 
     def __call__(self, state: State) -> State:
         """Return the state with which a run goes on after the end of a step."""
-        if not self._model.scene.time.relaxation:
+        if not self._halts:
             return state
         kinetic, last = kinetic_energy(self._model, state), self._kinetic
         falling = kinetic < last
         self._kinetic = 0.0 if falling else kinetic
         return halted(state) if falling else state
+
+
+def relaxation_caution(model: Model) -> str | None:
+    """Return what a reader of a relaxation's verdict must know of it; None if it needs no word."""
+    if not model.scene.time.relaxation:
+        return None
+    if _in_motion(model):
+        return "nothing was halted, as stones begin in motion: relaxation finds rest from rest only"
+    if model.scene.loads.until > 0:
+        return "relaxation left out the inertia of the motion while loads or supports changed"
+    return None
+
+
+def _in_motion(model: Model) -> bool:
+    return any(any(block.velocity) for block in model.scene.blocks)
 
 
 def halted(state: State) -> State:

@@ -71,8 +71,14 @@ class Simulation:
         self.state = replace(halted(self.state), time=time)
 
     def take_over(self, other: "Simulation") -> None:
-        """Continue from the end of another run of the same bodies, with its forces and internal variables."""
-        self.state = replace(other.state, time=self.state.time)
+        """Continue where another run of the same bodies came to rest, with its forces and internal variables.
+
+        The bodies have the velocities with which this run begins.
+        """
+        own = self.state
+        self.state = replace(
+            other.state, time=own.time, velocity=own.velocity, node_velocity=own.node_velocity
+        )
         self._memory = other._memory.at_rest(self._step / other._step)
         self.cold = False
         self._sleepers = Sleepers(self.model, self.state, self._memory)

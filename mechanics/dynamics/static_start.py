@@ -8,6 +8,7 @@ import numpy as np
 from mechanics.dynamics.observers.equilibrium import displacement, imbalance
 from mechanics.dynamics.outcome import StaticStart
 from mechanics.dynamics.progress import Progress
+from mechanics.dynamics.relaxation import halted
 from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import Model
 from mechanics.scene.scene import TimeSettings
@@ -36,7 +37,7 @@ def static_start(
     With θ = 1 such a step is the static problem (docs/theory.md §2): M/h² is negligible beside K, but determines the
     motion that nothing else holds. Driven supports stay where they are.
     """
-    still = _still(model, _STEP)
+    still, start = _still(model, _STEP), halted(start)
     asked = model.scene.solver
     solver: Solver | None = None
     if not model.rigid_only:

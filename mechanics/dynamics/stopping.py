@@ -13,6 +13,7 @@ from mechanics.dynamics.observers.equilibrium import (
     speed,
 )
 from mechanics.dynamics.outcome import Outcome, StaticStart
+from mechanics.dynamics.relaxation import relaxation_caution
 from mechanics.dynamics.simulation import Simulation
 from mechanics.dynamics.step import Step
 from mechanics.model.model import Model
@@ -128,6 +129,8 @@ class Watch:
             cautions += self._moved(state)
             if self._doubt > _DOUBT * self._fastest:
                 cautions.append(f"on the way {self._unsolved_steps()}")
+        if (left_out := relaxation_caution(self._model)) is not None:
+            cautions.append(left_out)
         if static is not None and not static.found:
             cautions.append("no static equilibrium was found: the run began at rest, all loads at once")
         return Verdict(outcome, self._reason(outcome), tuple(cautions))
