@@ -443,7 +443,7 @@ def test_check_reports_laws_and_loads(url, tmp_path):
     report = check_scene(path, url)
     assert report.laws == ("mortar, 1 stones and 8 stones: friction 0.5, tension 100000, shear 200000",)
     assert report.loads == (
-        "ground_motion, 10 stones: x 'a' (2 s, peak 2 m/s², ends with 2 m/s, 2 m, brakes for 10 s), unit m/s2, azimuth 0, "
-        "scale 1, start 0, order 4, baseline 0",
+        "ground_motion, 10 stones: x 'a' (2 s, peak 2 m/s², ends with 2 m/s, 2 m, brakes for 10 s), unit m/s2, "
+        "azimuth 0, scale 1, start 0, order 4, baseline 0",
         "throw, 1 stones: velocity (1, 0, 0), spin (0, 0, 0)",
     )
