@@ -27,6 +27,9 @@ _MANY = 12
 _WORN = 0.01
 """Weight of a worn corner: it is some 25 mm off where a sound one is 2.5 mm off."""
 
+_WEAR = 0.025
+"""Metres: residual of a worn corner beyond which it loses weight, since no wear explains a corner 25 cm off."""
+
 _USUAL = 0.25
 """Weight of the usual width of joints, used where fewer than three sound corners define one side."""
 
@@ -95,22 +98,28 @@ def _fit(points, hands, sound, scale, usual, straightness, plane, value):
         x, y, s = points[i, 0] / scale, points[i, 1] / scale, 0.5 * hands[i]
         design[i, 0], design[i, 1], design[i, 2] = 1.0, x, y
         design[i, 3], design[i, 4], design[i, 5] = s, s * x, s * y
+    unknowns = 4
     solution, left = _huber(design, points[:, 2], sound, 4, prior, usual)
     if above >= _OWN and number - above >= _OWN:
         open_, less = _huber(design, points[:, 2], sound, 6, prior, usual)
         wedge = math.sqrt(open_[4] ** 2 + open_[5] ** 2) / scale
         if wedge > _WEDGE and less < 0.1 * left and less < (_PLANE * straightness) ** 2:
-            solution = open_
+            unknowns, solution = 6, open_
     value[2], value[3], total = _left_over(design, points[:, 2], sound, solution, straightness)
     if value[3] > 0.0:
         # corners that are far off, the more so at an end, tilt the plane; the least sum of residuals finds them
         flat = _least_sum(design, points[:, 2], sound)
+        _, off, less = _left_over(design, points[:, 2], sound, flat, straightness)
+        if off < value[3] or (off == value[3] and less < total):
+            unknowns, start = 4, flat
+        else:
+            start = solution
         near = sound.copy()
         for i in range(k):
-            near[i] = sound[i] and abs(points[i, 2] - _value(design[i], flat)) <= straightness
-        again, _ = _huber(design, points[:, 2], near, 4, prior, usual)
-        largest, off, less = _left_over(design, points[:, 2], sound, again, straightness)
-        if off < value[3] or (off == value[3] and less < total):
+            near[i] = sound[i] and abs(points[i, 2] - _value(design[i], start)) <= straightness
+        again, _ = _huber(design, points[:, 2], near, unknowns, prior, usual)
+        largest, off, _ = _left_over(design, points[:, 2], sound, again, straightness)
+        if off <= value[3]:
             solution, value[2], value[3] = again, largest, off
     plane[0], plane[1], plane[2] = solution[0], solution[1] / scale, solution[2] / scale
     total, weight = 0.0, 0.0
@@ -124,12 +133,15 @@ def _fit(points, hands, sound, scale, usual, straightness, plane, value):
 
 @njit(cache=True)
 def _left_over(design, heights, sound, solution, straightness):
-    """Return the largest residual of sound corners, the share of those off the joint, and the sum of residuals."""
+    """Return the largest residual of sound corners, the share of those off the joint, and the sum of residuals.
+
+    Corners off the joint count in the sum as if they lay at its edge: their distance says nothing of the plane.
+    """
     largest, off, number, total = 0.0, 0, 0, 0.0
     for i in range(design.shape[0]):
         if sound[i]:
             residual = abs(heights[i] - _value(design[i], solution))
-            largest, number, total = max(largest, residual), number + 1, total + residual
+            largest, number, total = max(largest, residual), number + 1, total + min(residual, straightness)
             off += residual > straightness
     return largest, off / max(number, 1), total
 
@@ -209,7 +221,8 @@ def _weigh(design, heights, sound, solution, weights):
     spread = 1e-4 if count == 0 else max(1.4826 * np.median(residuals[:count]), 1e-4)
     for i in range(design.shape[0]):
         residual = abs(heights[i] - _value(design[i], solution))
-        weights[i] = min(1.0, _HUBER * spread / max(residual, 1e-300)) if sound[i] else _WORN
+        weight, bend = (1.0, _HUBER * spread) if sound[i] else (_WORN, _WEAR)
+        weights[i] = weight * min(1.0, bend / max(residual, 1e-300))
     return left
 
 
