@@ -10,7 +10,6 @@ from pipelines.results.stone_values import stone_results, stress_statistics
 from pipelines.results.summary import as_json, summarise
 from tests.pipelines.results_by_hand import LIMESTONE, deformable_body, result_of, rigid_body
 
-
 STILL = (0.0, 0.0, 0.0)
 
 
@@ -67,14 +66,19 @@ def test_the_summary_names_the_stone_of_each_extreme_stress():
     strong = replace(LIMESTONE, tensile_strength=10e6, compressive_strength=10e6)
     weak = replace(LIMESTONE, tensile_strength=1e6, compressive_strength=10e6)
     bodies = [
-        deformable_body("pulled", (0, 0, 0), (1, 1, 1), lambda p: 1e6 - 4e6 * p[:, 2], 0.5, STILL, strong, 0.2),
+        deformable_body(
+            "pulled", (0, 0, 0), (1, 1, 1), lambda p: 1e6 - 4e6 * p[:, 2], 0.5, STILL, strong, 0.2
+        ),
         deformable_body("pressed", (2, 0, 0), (3, 1, 1), lambda p: 4e6 * p[:, 2], 0.5, STILL, strong, 0.1),
         deformable_body("used", (4, 0, 0), (5, 1, 1), lambda p: -2e6 * p[:, 2], 0.5, STILL, weak, 0.3),
     ]
     summary = summarise(result_of(bodies, pairs=(), forces=()), version="1", seconds={})
     stress = summary["stress"]
     assert (stress["tension"]["stone"], stress["tension"]["value"]) == ("pulled", pytest.approx(3e6))
-    assert (stress["compression"]["stone"], stress["compression"]["value"]) == ("pressed", pytest.approx(-4e6))
+    assert (stress["compression"]["stone"], stress["compression"]["value"]) == (
+        "pressed",
+        pytest.approx(-4e6),
+    )
     assert stress["utilisation"] == {"value": pytest.approx(2.0), "stone": "used", "governing": "tension"}
     assert stress["error"] == {"value": pytest.approx(0.3), "stone": "used"}
 
