@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sqlalchemy import select
 
+from archmodel.assertions.withdraw import withdraw_relations
 from archmodel.database.session import open_database
 from archmodel.relations.graph import (
     carried_by,
@@ -176,6 +177,26 @@ def test_questions_can_be_asked_of_an_earlier_state(empty):
     assert "1-2" not in codes(asked(empty, load_path, "1-1", as_of=first).stones)
     assert "1-2" in codes(asked(empty, load_path, "1-1").stones)
     assert asked(empty, load_path, "1-1", as_of=first - 1).stones == ()
+
+
+def test_a_relation_that_was_withdrawn_is_on_no_path_and_between_no_neighbours(empty):
+    """1-1 was said to rest on 1-2, and then not: paths and neighbours have it only at the entries between."""
+    first = stand(empty, wall(2, 2))
+    said = declare(empty, "rests_on", [("1-1", "1-2")])
+    with empty.session() as session:
+        numbers = dict(session.execute(select(Entity.code, Entity.id)).all())
+        withdrawn = new_entry(session, "declaration", "seen better")
+        withdraw_relations(session, withdrawn, "rests_on", [numbers["1-1"]], [numbers["1-2"]])
+        entries = first, said, withdrawn.id, None
+    for question, code, other, options in (
+        (load_path, "1-1", "1-2", {}),
+        (load_path, "1-2", "1-1", {"up": True}),
+        (carried_by, "1-1", "1-2", {}),
+        (carries, "1-2", "1-1", {}),
+    ):
+        found = [asked(empty, question, code, as_of=entry, **options) for entry in entries]
+        known = [other in codes(one.stones if question is load_path else one) for one in found]
+        assert known == [False, True, False, False]
 
 
 def test_courses_come_by_zone_and_number_with_their_stones_from_left_to_right(empty):

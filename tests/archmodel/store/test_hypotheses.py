@@ -7,7 +7,7 @@ import pytest
 from sqlalchemy import func, select
 
 from archmodel.database.session import open_database
-from archmodel.query.api import find
+from archmodel.query.api import find, find_faces, find_rows
 from archmodel.store.hypotheses import store_hypotheses, withdraw_hypotheses
 from archmodel.store.revisions import Outcome
 from archmodel.store.stones import load_stones
@@ -81,6 +81,7 @@ def test_one_that_is_withdrawn_is_found_no_more_and_forgotten_not(session, recor
     assert withdraw_hypotheses(session, entry, numbers[:1]) == Outcome(withdrawn=1)
     assert withdraw_hypotheses(session, entry, numbers) == Outcome(withdrawn=1, unchanged=1)
     assert find(session, "entity") == []
+    assert find_rows(session, "entity", ["hypothesis = true"]) == find_faces(session, "entity") == []
     assert count(session, Entity) == 2
     kept = session.scalars(select(Measurement).order_by(Measurement.id)).all()
     assert [one.superseded_id for one in kept] == [entry.id, entry.id]

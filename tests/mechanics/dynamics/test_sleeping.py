@@ -13,7 +13,7 @@ from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.loads.forces import StoneForce
 from mechanics.scene.loads.gravity import TiltingTable
 from mechanics.scene.loads.load import Loads
-from mechanics.scene.loads.motions import settlement
+from mechanics.scene.loads.motions import ImposedMotion, settlement
 from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import ContactSettings, Scene, TimeSettings
 from mechanics.simulate import simulate
@@ -193,6 +193,38 @@ def test_a_sleeping_wall_fails_under_a_growing_push_at_the_same_instant():
     assert first[0.0] == pytest.approx(0.15 + 0.6 * 0.25 + np.sqrt(5e-4 / G), abs=2e-3)
 
 
+def pushed(most, **more):
+    """A block of 0.4 × 0.4 × 0.2 m whose horizontal push grows from 0.1 s to 0.15 s to a part of its weight."""
+    (stone,) = stack(1)
+    weight = 2400.0 * 0.4 * 0.4 * 0.2 * G
+    push = History(np.array([0.0, 0.1, 0.15]), np.outer([0.0, 0.0, most * weight], [1.0, 0.0, 0.0]))
+    return scene(stone, loads=Loads(forces=(StoneForce(frozenset({stone.code}), push),)), **more)
+
+
+@pytest.mark.parametrize(("most", "sleeps"), [(0.9 * SLEEP, True), (5 * SLEEP, False)])
+def test_a_push_beyond_sleep_wakes_a_stone_that_friction_holds(most, sleeps):
+    """No step ends with a stone asleep whose push, over its weight, is more than `sleep`; up to that, it sleeps on."""
+    for simulation, step in run(pushed(most), 148):
+        if 0.06 < step.after.time < 0.1:
+            assert simulation.asleep[1]
+    assert simulation.asleep[1] == sleeps
+    history = simulate(pushed(most)).history
+    assert history.balance[60:].max() <= SLEEP
+    assert (history.balance[160:200].max() > 0.5 * SLEEP) == sleeps
+
+
+def test_a_sleeping_stone_wakes_where_it_alone_keeps_the_scene_from_its_end():
+    """A push of half of `sleep` leaves it asleep, but out of balance by more than the scene's tolerance for its end."""
+    one = pushed(0.5e-2, sleep=1e-2, duration=0.4)
+    still = simulate(one)
+    assert still.errors.balance == pytest.approx(0.5e-2, rel=1e-3)
+    result = simulate(replace(one, time=replace(one.time, stop_at_equilibrium=True)))
+    assert one.time.balance_tolerance < 0.5e-2
+    assert result.outcome is Outcome.EQUILIBRIUM
+    assert 0.15 < result.time < 0.25
+    assert result.errors.balance <= one.time.balance_tolerance
+
+
 def test_supports_that_move_wake_all():
     """A support that sinks from 0.2 s on takes its stack along; a sleeping stone would stay in the air."""
     stones = stack(2)
@@ -202,6 +234,17 @@ def test_supports_that_move_wake_all():
             assert not simulation.asleep.any()
     assert simulation.asleep[1:].all()
     assert step.after.centre[1:, 2] - [0.1, 0.3] == pytest.approx(-0.01, abs=1e-6)
+
+
+def test_a_support_that_only_turns_wakes_all():
+    """A floor turns about its middle, on which a block stands: friction takes the block along."""
+    block = box("block", (-0.2, -0.2, 0.0), (0.2, 0.2, 0.2))
+    spin = History(np.array([0.0, 0.1, 0.2, 0.3]), np.array([0.0, 0.0, 1.0, 0.0]))
+    turning = ImposedMotion(frozenset({"ground"}), spin=spin)
+    for simulation, step in run(scene(block, loads=Loads(motions=(turning,)), duration=0.4)):
+        assert simulation.asleep[1] or not 0.06 < step.after.time < 0.1
+        assert not (simulation.asleep[1] and 0.11 < step.after.time < 0.29)
+    np.testing.assert_allclose(step.after.rotation[1], rotation((0.0, 0.0, 1.0), np.degrees(0.1)), atol=1e-4)
 
 
 def test_a_stone_that_is_pulled_from_under_another_wakes_it():

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
-from mechanics.results.joints import parting
+from mechanics.results.interfaces import placed_faces
+from mechanics.results.joints import joint_results, parting, starting_joints
+from mechanics.results.postprocess import Observer
 from mechanics.scene.scene import Fidelity, Part
 from mechanics.simulate import simulate
 from tests.mechanics.shapes import BOX_FACES, brick, detected, ground, moved, scene
@@ -112,6 +115,27 @@ def test_a_block_that_was_pushed_has_slid_as_far_as_it_moved():
     moving = simulate(replace(one, time=replace(one.time, duration=0.1)))
     assert moving.joints.slipping[joint] == pytest.approx(1.0)
     assert moving.joints.friction_use[joint] == pytest.approx(1.0, rel=1e-6)
+
+
+def test_slipping_and_open_are_parts_of_the_area_not_of_the_points():
+    """Four points that stand for 1, 2, 3 and 4 parts of ten of the area of a joint."""
+    one = scene(ground(), brick("a", (0, 0, 0), (1, 1, 0.5)), step=0.01)
+    model, start = build_model(one)
+    step, observer = Simulation(model, start).step(), Observer(model, start)
+    observer.begin(step)
+    contacts, joints = observer.contacts_and_joints(step)
+    assert joints.area == pytest.approx(contacts.area.sum())
+    known = starting_joints(model, start, step.contacts)
+    faces = placed_faces(model, step.after)
+    area = joints.area * np.array([0.1, 0.2, 0.3, 0.4])
+    for status, slipping, idle in (
+        (("slip", "open", "stick", "broken"), 0.1, 0.6),
+        (("stick", "slip", "slip", "open"), 0.5, 0.4),
+        (("bonded", "bonded", "stick", "stick"), 0.0, 0.0),
+    ):
+        given = replace(contacts, area=area, status=np.array(status))
+        found = joint_results(model, known, faces, known.face, step, given)
+        assert (found.slipping, found.open) == (pytest.approx([slipping]), pytest.approx([idle]))
 
 
 def test_a_toppling_block_opens_its_joint_and_leans_on_its_edge():

@@ -1,6 +1,7 @@
 """From survey file to results in folder and database, on the two lowest courses of the sample."""
 
 import json
+import sqlite3
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +21,7 @@ from pipelines.run.assemble import assemble
 from pipelines.run.run import run_scene, write_results
 from pipelines.scene.file import parse_scene
 from pipelines.scene.selection import select_stones
+from tests.moma.commands import answer, fails
 from tests.pipelines.results_by_hand import result_of, rigid_body
 from tests.pipelines.scenes import fails_at_line
 
@@ -160,6 +162,23 @@ def test_a_run_writes_its_folder_and_keeps_its_results(own_url, tmp_path):
     again = run_scene(tmp_path / "low.toml", own_url, tmp_path / "out")
     assert again.run > done.run
     assert again.summary["von_mises"] == done.summary["von_mises"]
+
+
+def test_results_that_cannot_be_stored_are_an_error_and_stay_in_their_folder(own_url, tmp_path):
+    """The database takes no more runs by the time the simulation is over."""
+    with sqlite3.connect(own_url.removeprefix("sqlite:///")) as database:
+        full = "begin select raise(abort, 'the disk is full'); end"
+        database.execute(f"create trigger full before insert on joint_result {full}")
+    database.close()
+    text = LOW.replace('deformable = ["W02-02"]\n', "") + "[output]\npictures = []\n"
+    (tmp_path / "low.toml").write_text(text, encoding="utf-8")
+    said = fails(1, "run", tmp_path / "low.toml", "--db", own_url, "--out", tmp_path / "out")
+    assert f"the results are in {tmp_path / 'out'}, but could not be stored" in said
+    assert "the disk is full" in said
+    summary = json.loads((tmp_path / "out/summary.json").read_text(encoding="utf-8"))
+    assert summary["outcome"] == "equilibrium"
+    assert sorted(summary["files"]) == sorted(one.name for one in (tmp_path / "out").iterdir())
+    assert answer("runs", "--db", own_url) == []
 
 
 def test_a_picture_that_shows_nothing_is_a_warning(own_url, tmp_path):

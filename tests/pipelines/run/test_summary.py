@@ -1,12 +1,16 @@
 """Summary and results by stone of a run whose numbers are known."""
 
 import json
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from pipelines.results.stone_values import stone_results, stress_statistics
 from pipelines.results.summary import as_json, summarise
-from tests.pipelines.results_by_hand import result_of, rigid_body
+from tests.pipelines.results_by_hand import LIMESTONE, deformable_body, result_of, rigid_body
+
+STILL = (0.0, 0.0, 0.0)
 
 
 def test_the_volume_of_the_nodes_is_the_volume_of_the_stone(mixed):
@@ -55,3 +59,47 @@ def test_the_summary_has_its_keys_and_says_nothing_that_json_cannot(mixed):
 
 def test_without_deformable_stones_there_is_no_stress(rigid):
     assert summarise(rigid, version="1", seconds={})["von_mises"] is None
+
+
+def test_the_summary_names_the_stone_of_each_extreme_stress():
+    """Three stones between ±1, ±2 and ±3 MPa upright: the extremes of each kind are those of different stones."""
+    strong = replace(LIMESTONE, tensile_strength=10e6, compressive_strength=10e6)
+    weak = replace(LIMESTONE, tensile_strength=1e6, compressive_strength=10e6)
+    bodies = [
+        deformable_body(
+            "pulled", (0, 0, 0), (1, 1, 1), lambda p: 1e6 - 4e6 * p[:, 2], 0.5, STILL, strong, 0.2
+        ),
+        deformable_body("pressed", (2, 0, 0), (3, 1, 1), lambda p: 4e6 * p[:, 2], 0.5, STILL, strong, 0.1),
+        deformable_body("used", (4, 0, 0), (5, 1, 1), lambda p: -2e6 * p[:, 2], 0.5, STILL, weak, 0.3),
+    ]
+    summary = summarise(result_of(bodies, pairs=(), forces=()), version="1", seconds={})
+    stress = summary["stress"]
+    assert (stress["tension"]["stone"], stress["tension"]["value"]) == ("pulled", pytest.approx(3e6))
+    assert (stress["compression"]["stone"], stress["compression"]["value"]) == (
+        "pressed",
+        pytest.approx(-4e6),
+    )
+    assert stress["utilisation"] == {"value": pytest.approx(2.0), "stone": "used", "governing": "tension"}
+    assert stress["error"] == {"value": pytest.approx(0.3), "stone": "used"}
+
+
+def test_the_summary_counts_compressed_joints_outside_the_kern():
+    """Resultants at 0.6, 1.2, 1.8 and 2.4 of the kern; the last joint bears nothing."""
+    stones = [rigid_body(f"S{k}", (0, 0, k), (1, 1, k + 1)) for k in range(5)]
+    forces = np.tile([0.0, 0.0, 1000.0], (4, 1))
+    result = result_of(stones, pairs=[(k + 1, k) for k in range(4)], forces=forces)
+    kern = np.append(result.joints.kern[:3], np.nan)
+    parted = np.array([False, False, False, True])
+    joints = summarise(
+        replace(result, joints=replace(result.joints, kern=kern, parted=parted)), version="1", seconds={}
+    )["joints"]
+    assert (joints["count"], joints["pressed"], joints["out_of_kern"], joints["parted"]) == (4, 3, 2, 1)
+
+
+def test_the_largest_displacement_is_that_of_the_point_that_went_farthest():
+    """A stone 2 m high that grows by 5 mm/m: its base stays, its top rises by 10 mm."""
+    stone = rigid_body("a", (0, 0, 0), (1, 1, 2))
+    lifted = stone.reference * [1.0, 1.0, 1.005]
+    result = result_of([replace(stone, position=lifted)], pairs=(), forces=())
+    assert summarise(result, version="1", seconds={})["displacement"]["max"] == pytest.approx(0.01)
+    assert stone_results(result)[0].displacement_max == pytest.approx(0.01)
