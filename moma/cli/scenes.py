@@ -11,6 +11,13 @@ from moma.cli.options import DEFAULT_DB, Db, Json, Profile, SceneArgument, Verbo
 
 __all__ = ["check", "run", "trade"]
 
+AcceptUnsound = Annotated[
+    bool,
+    typer.Option(
+        "--accept-unsound", help="Run a scene that moma check finds unsound; mark all results accordingly."
+    ),
+]
+
 
 @reporting
 def check(
@@ -64,6 +71,7 @@ def run(
             help="Write the meshes of deformable stones for Gmsh, Code_Aster, Abaqus, …; see docs/runs.md.",
         ),
     ] = None,
+    accept_unsound: AcceptUnsound = False,
     profile: Profile = None,
     db: Db = DEFAULT_DB,
     json: Json = False,
@@ -75,7 +83,9 @@ def run(
     from pipelines.run.run import run_scene
 
     with progress_bars() as listener:
-        done = run_scene(scene, db, out or Path("out") / scene.stem, listener, profile, meshes)
+        done = run_scene(
+            scene, db, out or Path("out") / scene.stem, listener, profile, meshes, accept_unsound
+        )
     for warning in done.warnings:
         say(f"warning: {warning}")
     print(as_json(done.summary) if json else "\n".join(run_lines(done, verbose)))
@@ -110,6 +120,7 @@ def trade(
         Path | None,
         typer.Option("--out", metavar="DIR", help="Folder of the study; default: out/SCENE-trade."),
     ] = None,
+    accept_unsound: AcceptUnsound = False,
     db: Db = DEFAULT_DB,
     json: Json = False,
     verbose: Verbose = False,
@@ -119,7 +130,7 @@ def trade(
     from moma.cli.text.tradeoff import trade_lines
     from pipelines.tradeoff.study import Asked, run_trade
 
-    asked = Asked(60.0 * budget, jobs, error, of)
+    asked = Asked(60.0 * budget, jobs, error, of, accept_unsound)
     folder = out or Path("out") / f"{scene.stem}-trade"
     try:
         with progress_bars() as listener:
