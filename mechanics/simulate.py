@@ -74,12 +74,14 @@ def _simulate(
     model, start = built
     simulation = Simulation(model, start, clock)
     if settings.start == Start.EQUILIBRIUM:
+        report(Progress("static", 0, None, "searching for the static equilibrium"))
         with clock("start"):
             static, search = static_start(model, start, report)
         if static.found:
             simulation.take_over(search)
     log, watch = _Log(model, start, simulation.state), Watch(model, start)
     total = max(1, round(settings.duration / settings.step))
+    report(Progress("step", 0, total))
     for count in range(1, total + 1):
         step = simulation.step()
         with clock("observe"):

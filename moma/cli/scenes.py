@@ -6,8 +6,9 @@ from typing import Annotated
 
 import typer
 
-from moma.cli.console import progress_bars, reporting, say
+from moma.cli.console import reporting, say
 from moma.cli.options import DEFAULT_DB, Db, Json, Profile, SceneArgument, Verbose
+from moma.cli.progress import Interruption, progress_bars
 
 __all__ = ["check", "run", "trade"]
 
@@ -44,7 +45,8 @@ def check(
     from moma.cli.text.runs_and_surveys import profile_lines
     from pipelines.run.check import check_scene
 
-    report = check_scene(scene, db, pictures, profile)
+    with progress_bars() as listener:
+        report = check_scene(scene, db, pictures, profile, listener)
     for warning in report.warnings:
         say(f"warning: {warning}")
     lines = check_lines(report, verbose, explain)
@@ -82,10 +84,9 @@ def run(
     from moma.cli.text.runs_and_surveys import run_lines
     from pipelines.run.run import run_scene
 
-    with progress_bars() as listener:
-        done = run_scene(
-            scene, db, out or Path("out") / scene.stem, listener, profile, meshes, accept_unsound
-        )
+    folder, stop = out or Path("out") / scene.stem, Interruption()
+    with progress_bars() as listener, stop.handled():
+        done = run_scene(scene, db, folder, stop.listening(listener), profile, meshes, accept_unsound, stop)
     for warning in done.warnings:
         say(f"warning: {warning}")
     print(as_json(done.summary) if json else "\n".join(run_lines(done, verbose)))

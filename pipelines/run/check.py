@@ -6,6 +6,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 from archmodel.database.session import open_database
+from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.results.forecast.cost import expected_cost, machine_slowness
 from mechanics.results.forecast.plan import Plan, plan
 from mechanics.scene.scene import Fidelity, Scene
@@ -42,7 +43,11 @@ _INDEX = "check.json"
 
 
 def check_scene(
-    path: str | Path, url: str, pictures: Path | None = None, profile: str | None = None
+    path: str | Path,
+    url: str,
+    pictures: Path | None = None,
+    profile: str | None = None,
+    progress: Listener = silent,
 ) -> CheckReport:
     """Check a scene file against a database, without running anything.
 
@@ -54,6 +59,7 @@ def check_scene(
     url : of the database
     pictures : folder for pictures of the stones and their joints, and for the report as ``check.json``; None: none
     profile : name of the profile whose settings take precedence over the scene's; None: the scene as written
+    progress : called at every stage
 
     Raises
     ------
@@ -64,15 +70,18 @@ def check_scene(
     if pictures is not None:
         check_replaceable(pictures, _INDEX)
     scene = read_scene(path)
+    progress(Progress("blocks", 0, None, "reading the stones"))
     with open_database(url, create=False) as database, database.session(read_only=True) as session:
         models = select_stones(scene, session)
         scene = with_profile(scene, profile, models)
         groups = select_groups(scene, session, models)
     problems: list[str] = []
     assembly, needs = None, None
+    progress(Progress("blocks", 0, None, f"closing the joints of {len(models)} stones"))
     try:
         assembly = assemble_stones(scene, models, groups)
         problems += unsound_stones(assembly)
+        progress(Progress("check", 0, None, "meshes, and contacts at the start"))
         needs = plan(assembly.scene)
         problems += unsupported(assembly.scene, needs.loose)
     except (GeometryError, MeshError) as error:
@@ -80,6 +89,7 @@ def check_scene(
     report = _report(scene, models, groups, assembly, needs, tuple(problems))
     if pictures is None or assembly is None:
         return report
+    progress(Progress("write", 0, None, "pictures"))
     return _with_pictures(report, assembly, pictures)
 
 

@@ -95,15 +95,18 @@ def run_scene(
     check_replaceable(folder)
     if meshes is not None:
         check_mesh_file(meshes)
+    progress(Progress("blocks", 0, None, "reading the stones"))
     with open_database(url, create=False) as database:
         with _timed(seconds, "blocks"), database.session(read_only=True) as session:
             as_of, models = latest_entry(session), select_stones(scene, session)
             scene = with_profile(scene, profile, models)
+            progress(Progress("blocks", 0, None, f"closing the joints of {len(models)} stones"))
             assembly = assemble_stones(scene, models, select_groups(scene, session, models))
         if meshes is not None:
             check_mesh_file(meshes, _elements(assembly))
         with _timed(seconds, "mesh"):
             built = build_model(assembly.scene, lambda done, total: progress(Progress("mesh", done, total)))
+        progress(Progress("check", 0, None, "contacts at the start"))
         with _timed(seconds, "check"):
             problems = problems_of(assembly, loose_blocks(*built))
         if not accept_unsound:

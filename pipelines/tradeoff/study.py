@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from archmodel.database.session import open_database
-from mechanics.dynamics.progress import Listener, silent
+from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.model.model import build_model
 from mechanics.results.forecast.plan import loose_blocks
 from mechanics.scene.scene import Fidelity
@@ -95,6 +95,7 @@ def run_trade(
     SceneError, GeometryError, DatabaseError : see `pipelines.run.assemble`
     """
     scene = read_scene(path)
+    progress(Progress("blocks", 0, None, "reading the stones and closing their joints"))
     with open_database(url, create=False) as database, database.session(read_only=True) as session:
         assembly = assemble(scene, session)
     problems = problems_of(assembly, loose_blocks(*build_model(assembly.scene)))

@@ -131,7 +131,7 @@ def test_a_run_writes_its_folder_and_keeps_its_results(own_url, tmp_path):
     (tmp_path / "low.toml").write_text(LOW, encoding="utf-8")
     heard = []
     done = run_scene(tmp_path / "low.toml", own_url, tmp_path / "out", heard.append)
-    assert {report.stage for report in heard} == {"mesh", "step", "write"}
+    assert {report.stage for report in heard} == {"blocks", "mesh", "check", "step", "write"}
     summary = json.loads((tmp_path / "out/summary.json").read_text(encoding="utf-8"))
     assert summary == done.summary
     assert summary["outcome"] == "equilibrium"
