@@ -1,6 +1,7 @@
 """Run a scene from its start to its outcome, with its history and error measures."""
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import fields
 
 import numpy as np
@@ -25,8 +26,20 @@ from mechanics.scene.state import State
 __all__ = ["simulate"]
 
 
-def simulate(scene: Scene, progress: Listener = silent) -> Result:
+def simulate(
+    scene: Scene,
+    progress: Listener = silent,
+    stop: Callable[[], bool] = lambda: False,
+    built: tuple[Model, State] | None = None,
+) -> Result:
     """Run a scene until it rests, has collapsed, or its duration is over.
+
+    Parameters
+    ----------
+    scene : the scene
+    progress : called at every stage and step
+    stop : asked after every step; where it says True, the run ends as interrupted
+    built : what `build_model` made of the scene, if it is known; None: build it
 
     A block that stands on a fixed one is carried by its own weight:
 
@@ -48,21 +61,27 @@ def simulate(scene: Scene, progress: Listener = silent) -> Result:
     """
     # dense products of stones are small: more threads than those of the scene cost more than they gain
     with ThreadpoolController().limit(limits=scene.solver.threads, user_api="blas"):
-        return _simulate(scene, progress)
+        return _simulate(scene, progress, stop, built)
 
 
-def _simulate(scene: Scene, report: Listener) -> Result:
+def _simulate(
+    scene: Scene, report: Listener, stop: Callable[[], bool], built: tuple[Model, State] | None
+) -> Result:
     clock, settings, static = Clock(), scene.time, None
-    with clock("mesh"):
-        model, start = build_model(scene, lambda done, total: report(Progress("mesh", done, total)))
+    if built is None:
+        with clock("mesh"):
+            built = build_model(scene, lambda done, total: report(Progress("mesh", done, total)))
+    model, start = built
     simulation = Simulation(model, start, clock)
     if settings.start == Start.EQUILIBRIUM:
+        report(Progress("static", 0, None, "searching for the static equilibrium"))
         with clock("start"):
             static, search = static_start(model, start, report)
         if static.found:
             simulation.take_over(search)
     log, watch = _Log(model, start, simulation.state), Watch(model, start)
     total = max(1, round(settings.duration / settings.step))
+    report(Progress("step", 0, total))
     for count in range(1, total + 1):
         step = simulation.step()
         with clock("observe"):
@@ -77,6 +96,8 @@ def _simulate(scene: Scene, report: Listener) -> Result:
         text = f"balance {balance.max():.1e}, η {step.solution.natural_map:.1e}"
         report(Progress("step", count, total, text))
         done = settings.stop_at_equilibrium and outcome is not Outcome.MOVING
+        if not done and count < total and stop():
+            outcome, done = Outcome.INTERRUPTED, True
         if done or count == total or (scene.frame_every and count % scene.frame_every == 0):
             with clock("stress"):
                 log.frames.append(log.observer.frame(step))

@@ -12,6 +12,7 @@
     │   └── NoDatabaseError        exit 1   ... that does not exist
     ├── ExchangeError              exit 1   an exchange document
     ├── MeshError                  exit 1   a stone that cannot be meshed
+    ├── UnsoundSceneError          exit 1   a scene with problems that make its result worthless
     ├── SolverError                exit 1   a step that was not solved
     └── MissingLibraryError        exit 1   a missing shared library
 
@@ -32,6 +33,7 @@ __all__ = [
     "SceneError",
     "SolverError",
     "SurveyError",
+    "UnsoundSceneError",
     "UsageError",
 ]
 
@@ -94,6 +96,10 @@ class ExchangeError(MomaError):
 
 class MeshError(MomaError):
     """Stone that cannot be meshed."""
+
+
+class UnsoundSceneError(MomaError):
+    """Scene that can be run, but whose result would be worthless."""
 
 
 class SolverError(MomaError):

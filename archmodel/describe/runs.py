@@ -24,7 +24,11 @@ _SHOWN = 12
 
 
 def list_runs(session: Session) -> list[dict[str, object]]:
-    """List all runs, oldest first: run, scene, stored_at, outcome, stones, contacts, the error measures, wall [s]."""
+    """List all runs, oldest first.
+
+    Of each: run, scene, stored_at, outcome, cautions (without which it misleads), stones, contacts, the error
+    measures, wall [s].
+    """
     stones = select(func.count()).where(EntityResult.run_id == Run.id).correlate(Run).scalar_subquery()
     statement = select(Run, stones).options(joinedload(Run.entry)).order_by(Run.id)
     return [
@@ -33,6 +37,7 @@ def list_runs(session: Session) -> list[dict[str, object]]:
             "scene": run.scene,
             "stored_at": run.entry.recorded_at.isoformat(timespec="seconds"),
             "outcome": run.outcome,
+            "cautions": run.summary.get("cautions", []),
             "stones": count,
             "contacts": run.contacts,
             **{name: getattr(run, name) for name in ERRORS},
@@ -78,6 +83,7 @@ def describe_run(session: Session, number: int, count: int = 5) -> dict[str, Any
         "scene": run.scene,
         "stored_at": run.entry.recorded_at.isoformat(timespec="seconds"),
         "outcome": run.outcome,
+        "cautions": run.summary.get("cautions", []),
         "stones": sum(stones.values()),
         "fidelities": stones,
         "contacts": run.contacts,

@@ -1,4 +1,4 @@
-"""Output on stderr, beside the results: progress, warnings, errors."""
+"""Output on stderr, beside the results: warnings and errors."""
 
 import sys
 import traceback
@@ -6,19 +6,13 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import wraps
-from typing import TYPE_CHECKING, Any, ParamSpec, TextIO
+from typing import ParamSpec, TextIO
 
 import typer
 
 from moma.errors import MomaError
 
-if TYPE_CHECKING:
-    from rich.progress import TaskID
-
-    from mechanics.dynamics.progress import Listener
-    from mechanics.dynamics.progress import Progress as ProgressReport
-
-__all__ = ["progress_bars", "reporting", "say"]
+__all__ = ["reporting", "say"]
 
 P = ParamSpec("P")
 
@@ -69,30 +63,3 @@ def _short_warnings() -> Iterator[None]:
     with warnings.catch_warnings():
         warnings.showwarning = show
         yield
-
-
-@contextmanager
-def progress_bars() -> "Iterator[Listener]":
-    """Yield a listener that draws one bar per stage on a terminal, and nothing elsewhere."""
-    if not sys.stderr.isatty():
-        yield lambda report: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns: list[Any] = [
-        TextColumn("{task.description:>12}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("{task.fields[text]}"),
-    ]
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
-        tasks: dict[str, TaskID] = {}
-
-        def show(report: "ProgressReport") -> None:
-            if report.stage not in tasks:
-                tasks[report.stage] = bars.add_task(report.stage, total=report.total, text="")
-            bars.update(tasks[report.stage], completed=report.done, total=report.total, text=report.text)
-
-        yield show

@@ -62,7 +62,10 @@ def runs(
     if json:
         print(as_json(found))
     elif number is None and found:
-        print(as_table(_LIST | _MORE if verbose else _LIST, found))
+        marked = [
+            row | {"outcome": row["outcome"] + (" (caution)" if row["cautions"] else "")} for row in found
+        ]
+        print(as_table(_LIST | _MORE if verbose else _LIST, marked))
         say(f"{len(found)} found")
     elif number is None:
         say("no run found; simulate with moma run SCENE.toml")

@@ -6,10 +6,18 @@ from typing import Annotated
 
 import typer
 
-from moma.cli.console import progress_bars, reporting, say
+from moma.cli.console import reporting, say
 from moma.cli.options import DEFAULT_DB, Db, Json, Profile, SceneArgument, Verbose
+from moma.cli.progress import Interruption, progress_bars
 
 __all__ = ["check", "run", "trade"]
+
+AcceptUnsound = Annotated[
+    bool,
+    typer.Option(
+        "--accept-unsound", help="Run a scene that moma check finds unsound; mark all results accordingly."
+    ),
+]
 
 
 @reporting
@@ -37,7 +45,8 @@ def check(
     from moma.cli.text.runs_and_surveys import profile_lines
     from pipelines.run.check import check_scene
 
-    report = check_scene(scene, db, pictures, profile)
+    with progress_bars() as listener:
+        report = check_scene(scene, db, pictures, profile, listener)
     for warning in report.warnings:
         say(f"warning: {warning}")
     lines = check_lines(report, verbose, explain)
@@ -64,6 +73,7 @@ def run(
             help="Write the meshes of deformable stones for Gmsh, Code_Aster, Abaqus, …; see docs/runs.md.",
         ),
     ] = None,
+    accept_unsound: AcceptUnsound = False,
     profile: Profile = None,
     db: Db = DEFAULT_DB,
     json: Json = False,
@@ -74,8 +84,9 @@ def run(
     from moma.cli.text.runs_and_surveys import run_lines
     from pipelines.run.run import run_scene
 
-    with progress_bars() as listener:
-        done = run_scene(scene, db, out or Path("out") / scene.stem, listener, profile, meshes)
+    folder, stop = out or Path("out") / scene.stem, Interruption()
+    with progress_bars() as listener, stop.handled():
+        done = run_scene(scene, db, folder, stop.listening(listener), profile, meshes, accept_unsound, stop)
     for warning in done.warnings:
         say(f"warning: {warning}")
     print(as_json(done.summary) if json else "\n".join(run_lines(done, verbose)))
@@ -110,6 +121,7 @@ def trade(
         Path | None,
         typer.Option("--out", metavar="DIR", help="Folder of the study; default: out/SCENE-trade."),
     ] = None,
+    accept_unsound: AcceptUnsound = False,
     db: Db = DEFAULT_DB,
     json: Json = False,
     verbose: Verbose = False,
@@ -119,7 +131,7 @@ def trade(
     from moma.cli.text.tradeoff import trade_lines
     from pipelines.tradeoff.study import Asked, run_trade
 
-    asked = Asked(60.0 * budget, jobs, error, of)
+    asked = Asked(60.0 * budget, jobs, error, of, accept_unsound)
     folder = out or Path("out") / f"{scene.stem}-trade"
     try:
         with progress_bars() as listener:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from moma.cli.console import progress_bars, reporting, say
+from moma.cli.console import reporting, say
 from moma.cli.options import (
     DEFAULT_DB,
     Codes,
@@ -24,6 +24,7 @@ from moma.cli.options import (
     Unit,
     Verbose,
 )
+from moma.cli.progress import progress_bars
 from moma.errors import UsageError
 
 __all__ = ["ingest", "survey_report"]

@@ -7,6 +7,7 @@ import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from textwrap import shorten
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from pipelines.draw.offscreen.surfaces import FIELDS, stone_fields, wall_surface
 
 __all__ = ["draw_apart", "draw_pictures", "missing", "package_of"]
 
+_TITLE = 100  # characters of a caution that fit below the title of a picture
 _TIMEOUT = 300.0  # [s]; software rendering of 10⁵ triangles takes a few
 _PACKAGES = {
     "libGL": "libgl1",
@@ -67,6 +69,8 @@ def draw_pictures(result: Result, folder: Path, names: Sequence[str], towards: A
         return ()
     up = -np.array(result.scene.gravity)
     ending = f"{_ENDINGS[result.outcome]} after {result.time:.3g} s"
+    if result.cautions:
+        ending += f"\n{shorten(result.cautions[0], _TITLE, placeholder=' …')}"
     jobs = [
         {
             "quantity": name,

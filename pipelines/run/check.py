@@ -6,6 +6,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 from archmodel.database.session import open_database
+from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.results.forecast.cost import expected_cost, machine_slowness
 from mechanics.results.forecast.plan import Plan, plan
 from mechanics.scene.scene import Fidelity, Scene
@@ -29,23 +30,24 @@ from pipelines.run.closing_check import (
     simplification_report,
 )
 from pipelines.run.fidelity import Modelled, modelled
+from pipelines.run.soundness import unsound_stones, unsupported
 from pipelines.scene.array_tables import describe
 from pipelines.scene.file import SceneFile, read_scene
 from pipelines.scene.selection import Groups, StoneModel, select_groups, select_stones
 from pipelines.tuning.profiles import with_profile
 from survey.geometry.solids import Solid
-from survey.geometry.watertight import check_watertight
-from survey.joints.settings import JointMode
 
 __all__ = ["check_scene"]
 
 _INDEX = "check.json"
-_DEEP = 0.005  # overlap [m]; less is survey noise, which the contacts absorb
-_NAMED = 6  # most stones, or pairs of stones, that one problem names
 
 
 def check_scene(
-    path: str | Path, url: str, pictures: Path | None = None, profile: str | None = None
+    path: str | Path,
+    url: str,
+    pictures: Path | None = None,
+    profile: str | None = None,
+    progress: Listener = silent,
 ) -> CheckReport:
     """Check a scene file against a database, without running anything.
 
@@ -57,6 +59,7 @@ def check_scene(
     url : of the database
     pictures : folder for pictures of the stones and their joints, and for the report as ``check.json``; None: none
     profile : name of the profile whose settings take precedence over the scene's; None: the scene as written
+    progress : called at every stage
 
     Raises
     ------
@@ -67,23 +70,26 @@ def check_scene(
     if pictures is not None:
         check_replaceable(pictures, _INDEX)
     scene = read_scene(path)
+    progress(Progress("blocks", 0, None, "reading the stones"))
     with open_database(url, create=False) as database, database.session(read_only=True) as session:
         models = select_stones(scene, session)
         scene = with_profile(scene, profile, models)
         groups = select_groups(scene, session, models)
     problems: list[str] = []
     assembly, needs = None, None
+    progress(Progress("blocks", 0, None, f"closing the joints of {len(models)} stones"))
     try:
         assembly = assemble_stones(scene, models, groups)
-        problems += _unsound_solids(assembly.scene)
-        problems += _unclosed(assembly) + _alone(assembly) + _overlapping(assembly)
+        problems += unsound_stones(assembly)
+        progress(Progress("check", 0, None, "meshes, and contacts at the start"))
         needs = plan(assembly.scene)
-        problems += _unsupported(needs)
+        problems += unsupported(assembly.scene, needs.loose)
     except (GeometryError, MeshError) as error:
         problems.append(str(error))
     report = _report(scene, models, groups, assembly, needs, tuple(problems))
     if pictures is None or assembly is None:
         return report
+    progress(Progress("write", 0, None, "pictures"))
     return _with_pictures(report, assembly, pictures)
 
 
@@ -187,69 +193,6 @@ def _mesh_quality(meshes: MeshReport) -> MeshQualityReport | None:
     )
 
 
-def _unsound_solids(scene: Scene) -> list[str]:
-    problems = []
-    for block in scene.blocks:
-        try:
-            check_watertight(Solid(block.code, block.vertices, block.faces), convex=not block.parts)
-        except GeometryError as error:
-            problems.append(str(error))
-    return problems
-
-
-def _unclosed(assembly: Assembly) -> list[str]:
-    """Report stones whose joints all stay open although they were to be closed."""
-    if assembly.closing.mode is JointMode.AS_SURVEYED:
-        return []
-    held = {block.code for block in assembly.scene.blocks if block.fidelity is Fidelity.FIXED}
-    closed = {code for one in assembly.closing.joints if not one.left_open for code in one.stones}
-    left = {
-        code: one.left_open
-        for one in reversed(assembly.closing.joints)
-        for code in one.stones
-        if one.left_open and code not in closed | held
-    }
-    if not left:
-        return []
-    first = min(left)
-    return [
-        f"no joint of these could be closed: {_some(sorted(left))}; of {first}, {left[first]}; look at the survey "
-        "there, or allow more by max_displacement in [joints]"
-    ]
-
-
-def _alone(assembly: Assembly) -> list[str]:
-    """Report stones, neither thrown nor fixed, that face no other across a joint."""
-    if assembly.closing.mode is JointMode.AS_SURVEYED or len(assembly.models) == 1:
-        return []
-    alone = set(assembly.closing.alone)
-    loose = [
-        block.code
-        for block in assembly.scene.blocks
-        if block.code in alone and block.fidelity is not Fidelity.FIXED and not any(block.velocity)
-    ]
-    if not loose:
-        return []
-    return [
-        f"these face no other stone across a joint: {_some(sorted(loose))}; look at max_width, max_angle and "
-        "min_overlap in [joints], or leave them out"
-    ]
-
-
-def _overlapping(assembly: Assembly) -> list[str]:
-    """Report stones that initially overlap deeply and would be driven apart."""
-    deep = [one for one in assembly.closing.overlaps if one.depth > _DEEP]
-    return [
-        f"{' and '.join(one.stones)} lie {one.depth * 1e3:.0f} mm in each other; measure them again, or exclude one"
-        for one in sorted(deep, key=lambda one: -one.volume)[:_NAMED]
-    ]
-
-
-def _some(codes: Sequence[str]) -> str:
-    more = f" and {len(codes) - _NAMED} more" if len(codes) > _NAMED else ""
-    return ", ".join(codes[:_NAMED]) + more
-
-
 def _cost(needs: Plan, scene: Scene) -> Cost:
     expected = expected_cost(needs, scene, machine_slowness())
     return Cost(
@@ -263,13 +206,3 @@ def _cost(needs: Plan, scene: Scene) -> Cost:
         longest=expected.longest,
         peak=expected.memory,
     )
-
-
-def _unsupported(needs: Plan) -> list[str]:
-    """Report stones that nothing can support; usually a selection or a joint is not as intended."""
-    if not needs.bodies[Fidelity.FIXED]:
-        return ['no stone is fixed, so nothing holds the others; give [bodies] fixed, e.g. ["course = 1"]']
-    if not needs.loose:
-        return []
-    named = _some(needs.loose)
-    return [f"no chain of touching stones ties these to a fixed one: {named}; they will fall"]

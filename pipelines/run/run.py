@@ -1,9 +1,9 @@
 """A scene from file to results: assemble, simulate, write, and keep the results in the database."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,8 @@ from archmodel.store.run_record import StoneResult
 from archmodel.store.runs import store_run
 from archmodel.tables.entries import latest_entry
 from mechanics.dynamics.progress import Listener, Progress, silent
+from mechanics.model.model import build_model
+from mechanics.results.forecast.plan import loose_blocks
 from mechanics.results.result import Outcome, Result
 from mechanics.scene.scene import Fidelity
 from mechanics.simulate import simulate
@@ -29,6 +31,7 @@ from pipelines.results.summary import as_json, summarise
 from pipelines.results.vtk import write_frames
 from pipelines.run.assemble import Assembly, assemble_stones
 from pipelines.run.record import run_record
+from pipelines.run.soundness import caution_of, problems_of, refuse_unsound
 from pipelines.scene.file import SceneFile, read_scene
 from pipelines.scene.selection import select_groups, select_stones
 from pipelines.tuning.expected_errors import ProfileReport, profile_report
@@ -64,6 +67,8 @@ def run_scene(
     progress: Listener = silent,
     profile: str | None = None,
     meshes: str | Path | None = None,
+    accept_unsound: bool = False,
+    stop: Callable[[], bool] = lambda: False,
 ) -> RunReport:
     """Run a scene file on the stones of a database, and write the results into a folder.
 
@@ -75,10 +80,13 @@ def run_scene(
     progress : called at every stage
     profile : name of the profile whose settings take precedence over the scene's; None: the scene as written
     meshes : file for the volume meshes of the deformable stones; None: none
+    accept_unsound : run a scene that `check_scene` finds unsound all the same; every result says so then
+    stop : asked after every step; where it says True, the run ends there as interrupted, with results of what there is
 
     Raises
     ------
     UsageError : the folder holds other files, there is no such profile, or the meshes cannot be written
+    UnsoundSceneError : the scene has problems that `check_scene` reports, and they are not accepted
     SceneError, GeometryError, MeshError, SolverError : see `assemble` and `mechanics.simulate`
     DatabaseError : the database cannot be read, or not written at the end; the folder is complete then
     """
@@ -87,14 +95,25 @@ def run_scene(
     check_replaceable(folder)
     if meshes is not None:
         check_mesh_file(meshes)
+    progress(Progress("blocks", 0, None, "reading the stones"))
     with open_database(url, create=False) as database:
         with _timed(seconds, "blocks"), database.session(read_only=True) as session:
             as_of, models = latest_entry(session), select_stones(scene, session)
             scene = with_profile(scene, profile, models)
+            progress(Progress("blocks", 0, None, f"closing the joints of {len(models)} stones"))
             assembly = assemble_stones(scene, models, select_groups(scene, session, models))
         if meshes is not None:
             check_mesh_file(meshes, _elements(assembly))
-        result = simulate(assembly.scene, progress)
+        with _timed(seconds, "mesh"):
+            built = build_model(assembly.scene, lambda done, total: progress(Progress("mesh", done, total)))
+        progress(Progress("check", 0, None, "contacts at the start"))
+        with _timed(seconds, "check"):
+            problems = problems_of(assembly, loose_blocks(*built))
+        if not accept_unsound:
+            refuse_unsound(problems, str(path))
+        result = simulate(assembly.scene, progress, stop, built)
+        if problems:
+            result = replace(result, cautions=(caution_of(problems), *result.cautions))
         seconds |= result.wall_time
         stones, reached = stone_results(result), profile_report(profile, scene, result)
         with replacing(folder) as fresh:
@@ -155,7 +174,7 @@ def write_results(
     progress(Progress("write", 2, 3, "report.html"))
     reached = None if profile is None else asdict(profile)
     summary = summarise(result, version=version("moma-masonry"), seconds=seconds, profile=reached)
-    write_report(folder / "report.html", result, summary, stones, warnings)
+    write_report(folder / "report.html", result, summary, stones, [*result.cautions, *warnings])
     (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
     summary["origin"] = assembly.origin.tolist()
     summary["warnings"] = warnings

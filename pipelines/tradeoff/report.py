@@ -143,6 +143,7 @@ def _as_csv(rows: Sequence[Mapping[str, Any]]) -> str:
 def study_png(record: Mapping[str, Any]) -> bytes:
     """Draw the picture of a study from the contents of its trade.json."""
     title = f"{record['scene']}: error against the finest affordable run ({record['reference']['name']})"
+    title = "\n".join([title, *record["cautions"]])
     return trade_png(title, _panels(record), record["asked_error"])
 
 

@@ -68,13 +68,14 @@ def carry_out(
             left = end - time.monotonic()
             while len(runs.names) < limits.jobs and (choice := _next(by_name, ended, runs, left, limits)):
                 runs.begin(choice)
-                progress(Progress("trade", len(ended), len(by_name), choice.setting.name))
+            budget = f"{max(left, 0.0):.0f} s of the budget left"
+            progress(Progress("trade", len(ended), len(by_name), ", ".join([budget, *runs.names])))
             if not runs.names:
                 return Forecast(by_name, ended), left
             for run in runs.collect():
                 store.keep(run)
                 ended[run.name] = run
-                progress(Progress("trade", len(ended), len(by_name), _described(run)))
+                progress(Progress("trade", len(ended), len(by_name), f"{budget}, {_described(run)}"))
             time.sleep(_PAUSE)
 
 

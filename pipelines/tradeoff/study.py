@@ -6,11 +6,14 @@ from pathlib import Path
 from typing import Any
 
 from archmodel.database.session import open_database
-from mechanics.dynamics.progress import Listener, silent
+from mechanics.dynamics.progress import Listener, Progress, silent
+from mechanics.model.model import build_model
+from mechanics.results.forecast.plan import loose_blocks
 from mechanics.scene.scene import Fidelity
 from moma.errors import UsageError
 from pipelines.results.quantities import QUANTITIES
 from pipelines.run.assemble import assemble
+from pipelines.run.soundness import caution_of, problems_of, refuse_unsound
 from pipelines.scene.file import read_scene
 from pipelines.toml.schema import nearest
 from pipelines.tradeoff.grid import grid
@@ -36,12 +39,14 @@ class Asked:
     jobs : runs at a time
     error : below which a setting is recommended [-]
     quantity : of this error; None: von_mises_p99 if a stone deforms, support_reactions if none does
+    accept_unsound : study a scene that `check_scene` finds unsound all the same; the study says so then
     """
 
     budget: float = 600.0
     jobs: int = 1
     error: float = 0.05
     quantity: str | None = None
+    accept_unsound: bool = False
 
     def __post_init__(self) -> None:
         if self.quantity is not None and self.quantity not in QUANTITIES:
@@ -86,11 +91,16 @@ def run_trade(
     Raises
     ------
     UsageError : the folder holds other files
+    UnsoundSceneError : the scene has problems that `check_scene` reports, and they are not accepted
     SceneError, GeometryError, DatabaseError : see `pipelines.run.assemble`
     """
     scene = read_scene(path)
+    progress(Progress("blocks", 0, None, "reading the stones and closing their joints"))
     with open_database(url, create=False) as database, database.session(read_only=True) as session:
         assembly = assemble(scene, session)
+    problems = problems_of(assembly, loose_blocks(*build_model(assembly.scene)))
+    if not asked.accept_unsound:
+        refuse_unsound(problems, str(path))
     width = typical_width(assembly.models)
     blocks = assembly.scene.blocks
     soft = any(block.fidelity is Fidelity.DEFORMABLE for block in blocks)
@@ -102,7 +112,9 @@ def run_trade(
     job = Job(scene.text, str(path), url, {}, width)
     forecast, left = carry_out(job, settings, store, limits, progress)
     goal = Goal(scene.name, quantity, asked.error, width)
-    record = study_record(goal, forecast, left, limits)
+    record = study_record(goal, forecast, left, limits) | {
+        "cautions": [caution_of(problems)] if problems else []
+    }
     write_study(store, record)
     return TradeReport(store.folder, record)
 

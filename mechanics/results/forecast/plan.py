@@ -12,9 +12,10 @@ from mechanics.delassus.multifrontal import fronts
 from mechanics.dynamics.contact_search import detector
 from mechanics.model.model import Model, build_model
 from mechanics.scene.scene import Fidelity, Scene
+from mechanics.scene.state import State
 from mechanics.stones.meshing.quality import MeshReport
 
-__all__ = ["Amounts", "Plan", "plan"]
+__all__ = ["Amounts", "Plan", "loose_blocks", "plan"]
 
 
 _NUMBER = 8  # size of a floating-point number [bytes]
@@ -82,8 +83,7 @@ def plan(scene: Scene) -> Plan:
     SceneError, GeometryError, MeshError : if the scene cannot be built
     """
     model, start = build_model(scene)
-    detect = detector(model)
-    contacts = detect(start, np.zeros(len(scene.blocks)))
+    contacts = detector(model)(start, np.zeros(len(scene.blocks)))
     pairs = np.unique(np.sort(contacts.bodies, axis=1), axis=0)
     codes = [block.code for block in scene.blocks]
     fidelities = [block.fidelity for block in scene.blocks]
@@ -98,6 +98,12 @@ def plan(scene: Scene) -> Plan:
         loose=tuple(codes[i] for i in _loose(pairs, model.fixed)),
         amounts=_amounts(model, contacts.bodies),
     )
+
+
+def loose_blocks(model: Model, start: State) -> tuple[str, ...]:
+    """Return the codes of the blocks that no chain of touching blocks ties to a fixed one at the start."""
+    pairs = detector(model)(start, np.zeros(len(model.mass))).bodies
+    return tuple(model.scene.blocks[i].code for i in _loose(pairs, model.fixed))
 
 
 def _memory(model: Model, bodies: Ints) -> int:

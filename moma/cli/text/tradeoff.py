@@ -27,7 +27,8 @@ def trade_lines(report: "TradeReport", verbose: bool) -> list[str]:
     done = [row for row in rows if row["status"] == "done"]
     lines = [
         f"{record['scene']}: {len(done)} of {len(rows)} settings run, {record['spent']:.0f} s of "
-        f"{record['budget']:.0f} s spent"
+        f"{record['budget']:.0f} s spent",
+        *(f"  caution: {caution}" for caution in record["cautions"]),
     ]
     if done:
         lines += [

@@ -61,8 +61,8 @@ def ran(request, new_url, tmp_path, monkeypatch):
     ingest([tmp_path / "wall.moma"], url)
     simulate = run_module.simulate
 
-    def listening(scene, progress):
-        given.append(simulate(scene, progress))
+    def listening(*asked):
+        given.append(simulate(*asked))
         return given[0]
 
     monkeypatch.setattr(run_module, "simulate", listening)

@@ -1,0 +1,143 @@
+"""Problems of a scene that make its result worthless; `moma check` lists them, and `moma run` refuses them."""
+
+from collections.abc import Sequence
+
+from mechanics.scene.scene import Fidelity, Scene
+from moma.errors import GeometryError, UnsoundSceneError
+from pipelines.run.assemble import Assembly
+from survey.geometry.solids import Solid
+from survey.geometry.watertight import check_watertight
+from survey.joints.settings import JointMode
+
+__all__ = ["caution_of", "problems_of", "refuse_unsound", "unsound_stones", "unsupported"]
+
+_DEEP = 0.005  # overlap [m]; less is survey noise, which the contacts absorb
+_NAMED = 6  # most stones, or pairs of stones, that one problem names
+
+
+def problems_of(assembly: Assembly, loose: Sequence[str]) -> tuple[str, ...]:
+    """Return all problems of a scene; none if it is sound.
+
+    Parameters
+    ----------
+    assembly : the scene, and how it came about
+    loose : codes of the stones that no chain of touching stones ties to a fixed one (`loose_blocks`)
+    """
+    return (*unsound_stones(assembly), *unsupported(assembly.scene, loose))
+
+
+def caution_of(problems: Sequence[str]) -> str:
+    """Return the caution that goes with the outcome of a scene that was run in spite of its problems."""
+    return f"run although the scene is unsound: {_facts(problems)}"
+
+
+def refuse_unsound(problems: Sequence[str], where: str) -> None:
+    """Refuse to run a scene that has problems.
+
+    Raises
+    ------
+    UnsoundSceneError : with all problems and their remedies
+    """
+    if problems:
+        listed = problems if len(problems) == 1 else [f"({i}) {one}" for i, one in enumerate(problems, 1)]
+        raise UnsoundSceneError(
+            f"the scene is unsound: {'; '.join(listed)}",
+            where=where,
+            remedy="or run it all the same with --accept-unsound, which marks all its results",
+        )
+
+
+def unsound_stones(assembly: Assembly) -> list[str]:
+    """Return the problems of the stones and of their joints, as far as they are known without contacts."""
+    return [
+        *_unsound_solids(assembly.scene),
+        *_unclosed(assembly),
+        *_alone(assembly),
+        *_overlapping(assembly),
+    ]
+
+
+def _unsound_solids(scene: Scene) -> list[str]:
+    problems = []
+    for block in scene.blocks:
+        try:
+            check_watertight(Solid(block.code, block.vertices, block.faces), convex=not block.parts)
+        except GeometryError as error:
+            problems.append(str(error))
+    return problems
+
+
+def _unclosed(assembly: Assembly) -> list[str]:
+    """Report stones whose joints all stay open although they were to be closed."""
+    if assembly.closing.mode is JointMode.AS_SURVEYED:
+        return []
+    held = {block.code for block in assembly.scene.blocks if block.fidelity is Fidelity.FIXED}
+    closed = {code for one in assembly.closing.joints if not one.left_open for code in one.stones}
+    left = {
+        code: one.left_open
+        for one in reversed(assembly.closing.joints)
+        for code in one.stones
+        if one.left_open and code not in closed | held
+    }
+    if not left:
+        return []
+    first = min(left)
+    return [
+        f"no joint of these could be closed: {_some(sorted(left))}; of {first}, {left[first]}; look at the survey "
+        "there, or allow more by max_displacement in [joints]"
+    ]
+
+
+def _alone(assembly: Assembly) -> list[str]:
+    """Report stones, neither thrown nor fixed, that face no other across a joint."""
+    if assembly.closing.mode is JointMode.AS_SURVEYED or len(assembly.models) == 1:
+        return []
+    alone = set(assembly.closing.alone)
+    loose = [
+        block.code
+        for block in assembly.scene.blocks
+        if block.code in alone and block.fidelity is not Fidelity.FIXED and not any(block.velocity)
+    ]
+    if not loose:
+        return []
+    return [
+        f"these face no other stone across a joint: {_some(sorted(loose))}; look at max_width, max_angle and "
+        "min_overlap in [joints], or leave them out"
+    ]
+
+
+def _overlapping(assembly: Assembly) -> list[str]:
+    """Report stones that initially overlap deeply and would be driven apart."""
+    deep = [one for one in assembly.closing.overlaps if one.depth > _DEEP]
+    return [
+        f"{' and '.join(one.stones)} lie {one.depth * 1e3:.0f} mm in each other; measure them again, or exclude one"
+        for one in sorted(deep, key=lambda one: -one.volume)[:_NAMED]
+    ]
+
+
+def unsupported(scene: Scene, loose: Sequence[str]) -> list[str]:
+    """Return a problem where nothing can support stones; usually a selection or a joint is not as intended.
+
+    Parameters
+    ----------
+    scene : the scene
+    loose : codes of the stones that no chain of touching stones ties to a fixed one
+    """
+    if all(block.fidelity is not Fidelity.FIXED for block in scene.blocks):
+        return ['no stone is fixed, so nothing holds the others; give [bodies] fixed, e.g. ["course = 1"]']
+    thrown = {block.code for block in scene.blocks if any(block.velocity)}
+    falling = [code for code in loose if code not in thrown]
+    if not falling:
+        return []
+    return [f"no chain of touching stones ties these to a fixed one: {_some(falling)}; they will fall"]
+
+
+def _some(codes: Sequence[str]) -> str:
+    more = f" and {len(codes) - _NAMED} more" if len(codes) > _NAMED else ""
+    return ", ".join(codes[:_NAMED]) + more
+
+
+def _facts(problems: Sequence[str]) -> str:
+    """Return the first problem without its remedy, and the number of the others."""
+    first, more = problems[0].split("; ")[0], len(problems) - 1
+    return first + (f" (and {more} more problem{'s' if more > 1 else ''})" if more else "")
