@@ -18,6 +18,7 @@ from mechanics.dynamics.static_start import static_start
 from mechanics.dynamics.step import Step
 from mechanics.dynamics.stopping import LASTING, Verdict, Watch, balance_of, lasts
 from mechanics.model.model import Model, build_model
+from mechanics.results.peaks import PeakTracker
 from mechanics.results.postprocess import Observer
 from mechanics.results.result import Energies, Errors, History, Result
 from mechanics.scene.scene import Scene, Start
@@ -114,6 +115,7 @@ class _Log:
         self.model, self._start = model, start
         self.observer = Observer(model, start)
         self.frames = [self.observer.first_frame(first)]
+        self.peaks = PeakTracker(model, start)
         self.balance = np.zeros(len(model.mass))
         self.energy = EnergyBalance(model, first)
         self.unconverged = 0
@@ -124,7 +126,8 @@ class _Log:
         """Account for one step, and return the imbalance of each body (nb,)."""
         model, solution = self.model, step.solution
         if not self._rows:
-            self.observer.begin(step)
+            self.peaks.begin(self.observer.begin(step))
+        self.peaks(step)
         self.energy(step)
         self.unconverged += not solution.converged
         if solution.why:
@@ -189,4 +192,6 @@ def _result(
         solvers=dict(log.solvers.most_common()),
         reason=verdict.reason,
         cautions=verdict.cautions,
+        peaks=log.peaks.peaks(log.frames, joints, last.after),
+        series=log.peaks.series(),
     )

@@ -1,5 +1,5 @@
 """Results of a run: positions, stresses, contact forces, joints.
 
-Public: `Result`, `BodyResult`, `Frame`, `History`, `Errors` (result); `ContactResult`, `JointResult` (contact_result);
-`StressValues` (stress_values); `Observer` (postprocess).
+Public: `Result`, `BodyResult`, `Frame`, `History`, `Errors`, `Peaks`, `Series` (result); `ContactResult`, `JointResult`
+(contact_result); `StressValues` (stress_values); `Observer` (postprocess); `PeakTracker` (peaks).
 """

@@ -58,6 +58,8 @@ class JointResult:
     frame : (nj, 3, 3) rows n, t1, t2; n from the second to the first stone, t1 along the larger second moment [-]
     centroid : (nj, 3) of the polygon [m]
     area : (nj,) [m²]
+    sliver : (nj,) its area is not above `mechanics.results.joints.SLIVER` of the faces of its stones: its force counts,
+        its pressure, eccentricity and kern say nothing of the masonry
     second_moment : (nj, 2) ∫ y₁² and ∫ y₂² along t1 and t2 about the centroid [m⁴]
     force : (nj, 3) resultant on the first stone, world axes [N]
     moment : (nj, 3) about the centroid [N m]
@@ -82,6 +84,7 @@ class JointResult:
     frame: Array
     centroid: Array
     area: Array
+    sliver: Bools
     second_moment: Array
     force: Array
     moment: Array
@@ -105,6 +108,11 @@ class JointResult:
     def pressed(self) -> Bools:
         """(nj,) true for joints under compression."""
         return np.isfinite(self.kern)
+
+    @property
+    def bearing(self) -> Bools:
+        """(nj,) true for joints under compression that are not slivers."""
+        return self.pressed & ~self.sliver
 
     @property
     def in_kern(self) -> Bools:

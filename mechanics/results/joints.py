@@ -9,13 +9,28 @@ from mechanics.arrays import Array, Bools, Ints
 from mechanics.contact.contacts import Contacts, material_points
 from mechanics.dynamics.step import Step
 from mechanics.model.model import Model
+from mechanics.results._kernels import JointCorners
 from mechanics.results.contact_result import ContactResult, JointResult
 from mechanics.results.interfaces import Faces, find_interfaces, placed_faces
 from mechanics.results.joint_sections import Section, eccentricity, sections
 from mechanics.results.patch_pressure import patch_pressure
 from mechanics.scene.state import State
 
-__all__ = ["StartingJoints", "joint_results", "parting", "starting_joints"]
+__all__ = [
+    "SLIVER",
+    "StartingJoints",
+    "joint_corners",
+    "joint_results",
+    "largest_faces",
+    "parting",
+    "starting_joints",
+]
+
+SLIVER = 5e-3
+"""Area of a joint over the smaller of the largest faces of its two stones, up to which it is a sliver [-].
+
+Slivers come from the rounding of corners. Their forces count, but force over area says nothing of the stone.
+"""
 
 
 _CLOSED = 1e-2  # gap of a closed joint over the size of the smaller stone, at most [-], as for bonds
@@ -30,12 +45,14 @@ class StartingJoints:
     ----------
     state : the start
     face : (nj, 2) pairs of faces
+    bodies : (nj, 2) of these, the lower first
     section : their polygons then
     closed : (nj,) open by no more than a hundredth of the smaller stone's size, as for bonds
     """
 
     state: State
     face: Ints
+    bodies: Ints
     section: Section
     closed: Bools
 
@@ -47,7 +64,36 @@ def starting_joints(model: Model, start: State, contacts: Contacts) -> StartingJ
     section = sections(faces, face)
     meant = np.arange(section.gap.shape[1]) < section.count[:, None]
     nearest = np.where(meant, section.gap, np.inf).min(axis=1, initial=np.inf)
-    return StartingJoints(start, face, section, nearest <= _CLOSED * faces.size[face].min(axis=1))
+    closed = nearest <= _CLOSED * faces.size[face].min(axis=1)
+    return StartingJoints(start, face, faces.body[face], section, closed)
+
+
+def largest_faces(model: Model) -> Array:
+    """Return the area (nb,) of the largest face of each body [m²]."""
+    faces = model.surfaces
+    owner = np.repeat(faces.body, np.diff(faces.shapes.fptr))
+    return _largest(owner, faces.shapes.face_area, len(model.mass))
+
+
+def joint_corners(start: StartingJoints) -> JointCorners:
+    """Return the corners of the joints of the start in the axes of their stones, by which their motion is followed."""
+    section, state = start.section, start.state
+    meant = np.arange(section.corner.shape[1]) < section.count[:, None]
+    joint = np.repeat(np.arange(len(start.face)), section.count)
+    first = _sides(section, np.arange(len(start.face)))[0][meant]
+    a, b = start.bodies[joint].T
+
+    def in_axes(body: Ints, point: Array) -> Array:
+        return np.einsum("kji,kj->ki", state.rotation[body], point - state.centre[body])
+
+    return JointCorners(
+        bodies=start.bodies,
+        first=np.concatenate([[0], np.cumsum(section.count)]).astype(np.int64),
+        own=in_axes(a, first),
+        # the same place: the gap at the start is no opening
+        other=in_axes(b, first),
+        normal=np.einsum("jai,ja->ji", state.rotation[start.bodies[:, 1]], section.frame[:, 0]),
+    )
 
 
 def parting(contacts: Contacts, start: State, state: State) -> tuple[Array, Array]:
@@ -97,6 +143,7 @@ def joint_results(
         frame=section.frame,
         centroid=section.centroid,
         area=section.area,
+        sliver=section.area <= SLIVER * largest_faces(model)[bodies].min(axis=1, initial=np.inf),
         second_moment=section.moment,
         force=force,
         moment=moment,

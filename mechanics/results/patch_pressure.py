@@ -9,10 +9,11 @@ from scipy.spatial import cKDTree
 
 from mechanics.arrays import Array, Ints
 
-__all__ = ["patch_pressure"]
+__all__ = ["REACH", "patch_pressure"]
 
 
-_REACH = 1.5  # radius of a patch over the mean distance of the contact points of a joint [-]
+REACH = 1.5
+"""Radius of a patch over the mean distance of the contact points of a joint [-]."""
 
 
 def patch_pressure(point: Array, force: Array, area: Array, joint: Ints) -> Array:
@@ -28,7 +29,7 @@ def patch_pressure(point: Array, force: Array, area: Array, joint: Ints) -> Arra
     if not len(joint):
         return np.zeros(0)
     number = np.bincount(joint)
-    radius = _REACH * np.sqrt(np.bincount(joint, area) / np.maximum(number, 1))
+    radius = REACH * np.sqrt(np.bincount(joint, area) / np.maximum(number, 1))
     first = np.full(len(number), len(joint))
     np.minimum.at(first, joint, np.arange(len(joint)))
     # in units of the radius; a fourth coordinate keeps joints apart

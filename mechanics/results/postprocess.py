@@ -78,9 +78,10 @@ class Observer:
         """Return the frame of the start, before the first contact forces are known."""
         return self._frame(state, _no_contacts())
 
-    def begin(self, step: Step) -> None:
-        """Take the contacts of the first step as the joints of the start."""
+    def begin(self, step: Step) -> StartingJoints:
+        """Take the contacts of the first step as the joints of the start, and return these."""
         self._joints = starting_joints(self._model, self._start, step.contacts)
+        return self._joints
 
     def frame(self, step: Step) -> Frame:
         """Return the frame of the end of a step."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from mechanics.arrays import Array, Ints
 from mechanics.dynamics.outcome import Outcome, StaticStart
@@ -16,8 +17,13 @@ __all__ = [
     "Errors",
     "Frame",
     "History",
+    "JointSeries",
+    "Largest",
     "Outcome",
+    "Peak",
+    "Peaks",
     "Result",
+    "Series",
     "StaticStart",
 ]
 
@@ -154,6 +160,101 @@ class Energies:
     scheme: float
 
 
+class Largest(NamedTuple):
+    """Largest value of each body during a run.
+
+    Attributes
+    ----------
+    value : (nb,) NaN where not known
+    time : (nb,) of it [s]
+    partner : (nb,) the other stone, where it is a value of a joint; -1 otherwise
+    """
+
+    value: Array
+    time: Array
+    partner: Ints
+
+
+@dataclass(frozen=True)
+class Peak:
+    """Largest value of a number during a run, its time [s], and the value at the end."""
+
+    value: float
+    time: float
+    end: float
+
+
+@dataclass(frozen=True)
+class Peaks:
+    """Largest values of a whole run; those at its end stand in `Result`.
+
+    They are taken in every step, except the stresses. Forces and pressures are means over a step.
+
+    Attributes
+    ----------
+    displacement : of the points of stones that are not fixed [m]
+    relative : the same seen from the supports, by the mean of their translations [m]
+    relative_end : (nb,) that at the end [m]
+    opening, sliding : of joints, as in `JointResult` [m]
+    pressure : of joints that are not slivers, as `JointResult.pressure_max` [Pa]
+    von_mises, tension, compression : largest in the frames of Von Mises stress, σ1 and -σ3; NaN without stress [Pa]
+    reaction : of the supports against gravity [N]
+    shear : of the supports across gravity: the base shear [N]
+    """
+
+    displacement: Largest
+    relative: Largest
+    relative_end: Array
+    opening: Largest
+    sliding: Largest
+    pressure: Largest
+    von_mises: Largest
+    tension: Largest
+    compression: Largest
+    reaction: Peak
+    shear: Peak
+
+
+@dataclass(frozen=True)
+class JointSeries:
+    """Joints of the start between two of the chosen stones, step by step.
+
+    Attributes
+    ----------
+    joint : (nj,) as in `JointResult`
+    opening, sliding : (steps, nj) [m]
+    normal, shear : (steps, nj) forces across, compression positive, and along the joint [N]
+    """
+
+    joint: Ints
+    opening: Array
+    sliding: Array
+    normal: Array
+    shear: Array
+
+
+@dataclass(frozen=True)
+class Series:
+    """Motion of chosen stones, step by step, in the order of `Scene.series`.
+
+    Attributes
+    ----------
+    body : (n,) indices into the scene's blocks
+    time : (steps,) [s]
+    centre : (steps, n, 3) of mass [m]
+    turn : (steps, n, 3) rotation vector since the start [rad]
+    velocity : (steps, n, 6) translation [m/s] and rotation [rad/s], world axes
+    joints : those between two of the stones
+    """
+
+    body: Ints
+    time: Array
+    centre: Array
+    turn: Array
+    velocity: Array
+    joints: JointSeries
+
+
 @dataclass(frozen=True)
 class Result:
     """The end of a run, with its history.
@@ -179,6 +280,8 @@ class Result:
     wall_time : wall seconds by stage: mesh, start, assemble, detect, solve, advance, stress
     static : search for the equilibrium in which the run began; None if it began at rest
     solvers : number of steps by chosen method and reason, most frequent first
+    peaks : largest values of the whole run
+    series : motion of the stones of `Scene.series`; None without any
     """
 
     scene: Scene
@@ -200,3 +303,5 @@ class Result:
     solvers: Mapping[str, int] = field(default_factory=dict)
     reason: str = ""
     cautions: tuple[str, ...] = ()
+    peaks: Peaks | None = None
+    series: Series | None = None

@@ -316,6 +316,7 @@ class Scene:
     contact, time, solver : settings
     loads : all loads besides gravity
     frame_every : number of steps between two frames of the motion; 0 keeps the first and last only
+    series : codes of the blocks whose motion is kept in every step
     """
 
     name: str
@@ -326,6 +327,7 @@ class Scene:
     solver: SolverSettings = field(default_factory=SolverSettings)
     loads: Loads = field(default_factory=Loads)
     frame_every: int = 0
+    series: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         codes = [block.code for block in self.blocks]
@@ -341,3 +343,6 @@ class Scene:
                 ("frame_every", self.frame_every, self.frame_every >= 0, "give 0 or a number of steps"),
             ),
         )
+        unknown = sorted(set(self.series) - set(codes))
+        if unknown:
+            raise SceneError(f"series names no block: {', '.join(unknown)}", where=self.name)

@@ -120,6 +120,7 @@ def joints_of(pairs, forces, heights):
         frame=np.tile(np.array([[0.0, 0, -1], [1, 0, 0], [0, -1, 0]]), (count, 1, 1)),
         centroid=centroid,
         area=np.ones(count),
+        sliver=np.zeros(count, dtype=bool),
         second_moment=np.full((count, 2), 1.0 / 12.0),
         force=-np.array(forces, dtype=float).reshape(-1, 3),
         moment=np.column_stack([np.zeros(count), normal * away, np.zeros(count)]),

@@ -1,0 +1,156 @@
+"""Largest values of a run, followed in every step; those of stresses in its frames."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mechanics.arrays import Array, Bools
+from mechanics.contact.contacts import material_points
+from mechanics.dynamics.observers.equilibrium import displacement, seen_from_supports
+from mechanics.dynamics.step import Step
+from mechanics.model.model import Model
+from mechanics.results._kernels import JointCorners, joint_motion, keep_largest, patch_pressures
+from mechanics.results.contact_result import JointResult
+from mechanics.results.joints import SLIVER, StartingJoints, joint_corners, largest_faces
+from mechanics.results.patch_pressure import REACH
+from mechanics.results.result import Frame, Largest, Peak, Peaks, Series
+from mechanics.results.series import Recorder
+from mechanics.scene.state import State
+from mechanics.stones.elasticity.tensors import principal, von_mises
+
+__all__ = ["PeakTracker"]
+
+
+class PeakTracker:
+    """Largest values so far, and the time series of chosen stones.
+
+    Displacements are those of `displacement`, of stones that are not fixed; relative ones are seen from the supports.
+    Opening and sliding of the joints of the start are followed at their corners, also where stones have parted.
+    Pressures are those of `patch_pressure`, of joints that are not slivers. Forces are means over a step.
+
+    Parameters
+    ----------
+    model, start : the scene, and its stones before they carry load, from where displacements count
+    """
+
+    def __init__(self, model: Model, start: State) -> None:
+        count = len(model.mass)
+        self._model, self._start, self._moves = model, start, ~model.fixed
+        self._displacement, self._opening, self._sliding, self._pressure = (
+            _record(count, start.time) for _ in range(4)
+        )
+        self._relative = _record(count, start.time) if model.motions else self._displacement
+        self._least = SLIVER * largest_faces(model)
+        self._sign = np.zeros(count)
+        self._sign[model.fixed] = 1.0
+        self._reaction: list[tuple[float, Array]] = []
+        self._joints: JointCorners | None = None
+        self._series = Recorder(model, start) if model.scene.series else None
+
+    def begin(self, joints: StartingJoints) -> None:
+        """Take the joints of the start."""
+        self._joints = joint_corners(joints)
+        if self._series is not None:
+            self._series.begin(joints)
+
+    def __call__(self, step: Step) -> None:
+        """Account for one step."""
+        model, after, contacts = self._model, step.after, step.contacts
+        _keep(self._displacement, displacement(model, self._start, after), after.time, self._moves)
+        if model.motions:
+            seen = seen_from_supports(model, self._start, after)
+            _keep(self._relative, displacement(model, self._start, seen), after.time, self._moves)
+        assert self._joints is not None
+        opening, sliding = joint_motion(self._joints, after.centre, after.rotation)
+        keep_largest(self._joints.bodies, opening, after.time, self._opening)
+        keep_largest(self._joints.bodies, sliding, after.time, self._sliding)
+        # distances are the same in the axes of a rigid stone
+        point = material_points(contacts, after) if contacts.weights.nnz else contacts.arm
+        pairs, pressure = patch_pressures(
+            contacts.bodies, contacts.frame, point[:, 0], step.force, contacts.area, REACH, self._least
+        )
+        keep_largest(pairs, pressure, after.time, self._pressure)
+        sign = self._sign[contacts.bodies[:, 1]] - self._sign[contacts.bodies[:, 0]]
+        self._reaction.append((after.time, sign @ step.force))
+        if self._series is not None:
+            self._series(step, opening, sliding)
+
+    def peaks(self, frames: Sequence[Frame], joints: JointResult, end: State) -> Peaks:
+        """Return the peaks of the run, with the stresses of its frames and its joints at the end."""
+        model, time = self._model, end.time
+        for frame in frames:
+            own = np.flatnonzero(frame.contacts.joint >= 0)
+            bodies = frame.contacts.bodies[own]
+            keep_largest(bodies, frame.contacts.opening[own], frame.time, self._opening)
+            keep_largest(bodies, frame.contacts.slide[own], frame.time, self._sliding)
+        whole = np.flatnonzero(~joints.sliver)
+        for record, values in (
+            (self._opening, joints.opening),
+            (self._sliding, joints.sliding),
+            (self._pressure, joints.pressure_max),
+        ):
+            rows = whole if record is self._pressure else np.arange(len(joints))
+            keep_largest(joints.bodies[rows], values[rows], time, record)
+        vertical, shear = self._reactions()
+        seen = seen_from_supports(model, self._start, end)
+        return Peaks(
+            displacement=_known(self._displacement, self._moves),
+            relative=_known(self._relative, self._moves),
+            relative_end=np.where(self._moves, displacement(model, self._start, seen), np.nan),
+            opening=self._opening,
+            sliding=self._sliding,
+            pressure=self._pressure,
+            **_stresses(frames),
+            reaction=vertical,
+            shear=shear,
+        )
+
+    def series(self) -> Series | None:
+        """Return the time series of the chosen stones; None where none is chosen."""
+        return None if self._series is None else self._series.series()
+
+    def _reactions(self) -> tuple[Peak, Peak]:
+        """Return the largest support reaction against gravity, and across it (along z without gravity)."""
+        found = []
+        for time, force in self._reaction:
+            gravity = self._model.gravity(time)
+            size = float(np.linalg.norm(gravity))
+            up = -gravity / size if size > 0 else np.array([0.0, 0.0, 1.0])
+            along = float(force @ up)
+            found.append((along, float(np.linalg.norm(force - along * up)), time))
+        vertical, across = max(found, key=lambda one: one[0]), max(found, key=lambda one: one[1])
+        last = found[-1]
+        return Peak(vertical[0], vertical[2], last[0]), Peak(across[1], across[2], last[1])
+
+
+def _stresses(frames: Sequence[Frame]) -> dict[str, Largest]:
+    """Return the largest stresses of each stone in the frames; NaN where they are not known."""
+    count = len(frames[0].stresses)
+    records = {name: _record(count, np.nan) for name in ("von_mises", "tension", "compression")}
+    for record in records.values():
+        record.value[:] = -np.inf
+    for frame in frames:
+        for body, stress in enumerate(frame.stresses):
+            if stress is None:
+                continue
+            values = principal(stress)[0]
+            found = float(von_mises(stress).max()), float(values[:, 0].max()), float(-values[:, 2].min())
+            for record, value in zip(records.values(), found, strict=True):
+                if value > record.value[body]:
+                    record.value[body], record.time[body] = value, frame.time
+    return {name: _known(record, np.isfinite(record.value)) for name, record in records.items()}
+
+
+def _record(count: int, time: float) -> Largest:
+    return Largest(np.zeros(count), np.full(count, time), np.full(count, -1))
+
+
+def _keep(record: Largest, values: Array, time: float, rows: Bools) -> None:
+    more = rows & (values > record.value)
+    record.value[more] = values[more]
+    record.time[more] = time
+
+
+def _known(record: Largest, rows: Bools) -> Largest:
+    """Return the record with NaN in the other rows."""
+    return Largest(np.where(rows, record.value, np.nan), np.where(rows, record.time, np.nan), record.partner)
