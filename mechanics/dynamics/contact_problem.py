@@ -61,7 +61,7 @@ def contact_problem(
         compliance=operator.diagonal[:, 0, 0],
         step=time.step,
         theta=time.theta,
-        push_out=time.relaxation & model.elastic[contacts.bodies].any(axis=1),
+        push_out=model.elastic[contacts.bodies].any(axis=1) & time.relaxation,
         first=first,
         state=internal,
     )

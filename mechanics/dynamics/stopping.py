@@ -183,7 +183,8 @@ class Watch:
             return turned
         round_ = np.array([block.radius is not None for block in self._model.scene.blocks])
         away = displacement(self._model, self._start, seen) > limit
-        return turned & away & ~round_ & ~self._model.fixed
+        toppled: Bools = turned & away & ~round_ & ~self._model.fixed
+        return toppled
 
     def _blame(self, bodies: Bools, sunk: Array, speeds: Array) -> None:
         """Remember the body that has sunk furthest over its width."""

@@ -1,0 +1,160 @@
+"""Verdicts: rests that last, falls without return, motions in between, and what unsolved steps leave open."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from mechanics.dynamics.outcome import Outcome
+from mechanics.scene.scene import SolverSettings, Start
+from mechanics.scene.shapes import box
+from mechanics.simulate import simulate
+from tests.mechanics.shapes import brick, ground, moved, scene
+
+G = 9.81
+
+
+def opening(**time):
+    """A wall of stones half a metre long with an opening of 0.75 m, a stone of the course above it over nothing."""
+    stones = []
+    for course in range(5):
+        edges = np.unique(np.clip(np.arange(-0.25 * (course % 2), 3.1, 0.5), 0.0, 2.75))
+        for k, (low, high) in enumerate(pairwise(edges)):
+            sides = ((low, min(high, 1.125)), (max(low, 1.875), high)) if course < 3 else ((low, high),)
+            stones += [
+                brick(f"{course}-{k}-{n}", (a, 0, 0.25 * course), (b, 0.25, 0.25 * course + 0.25))
+                for n, (a, b) in enumerate(sides)
+                if b > a
+            ]
+    return scene(ground(), *stones, duration=1.0, **time)
+
+
+@pytest.mark.parametrize("step", [1e-3, pytest.param(2e-3, marks=pytest.mark.slow), 5e-3])
+def test_a_wall_without_a_lintel_collapses_whatever_the_step_though_a_relaxation_jams_it(step):
+    """Its stones rest after 8 mm to 0.12 m where they are halted, held by forces that nothing causes."""
+    result = simulate(opening(step=step, relaxation=True))
+    assert result.outcome is Outcome.COLLAPSED
+    assert result.reason.startswith("stone 3-")
+
+
+def slope(angle, velocity, **time):
+    """A flat stone on a slope with friction 0.6, in motion."""
+    turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+    base, stone = ground((-20, -1, -1), (20, 1, 0)), brick("slab", (0, 0, 0), (1, 0.5, 0.2))
+    along = turn @ [velocity, 0, 0]
+    return scene(
+        moved(base, turn), replace(moved(stone, turn), velocity=(*along, 0, 0, 0)), step=2e-3, **time
+    )
+
+
+def test_a_stone_in_balance_that_slides_at_a_constant_speed_moves():
+    """At tan α = μ friction balances the weight of a sliding stone: balance alone is no rest."""
+    result = simulate(slope(np.arctan(0.6), 0.1, duration=0.1))
+    assert result.errors.balance < 1e-4
+    assert result.outcome is Outcome.MOVING
+    assert result.reason == "stone slab moves at 100 mm/s"
+
+
+def test_a_slow_slide_is_a_motion_however_far_it_goes():
+    result = simulate(slope(np.arctan(0.6), 0.05, duration=1.0, collapse_displacement=0.05))
+    assert result.outcome is Outcome.MOVING
+    moved_by = np.linalg.norm(result.bodies[1].displacement, axis=1).max()
+    assert moved_by == pytest.approx(0.05, rel=0.01)
+
+
+def test_a_stone_at_rest_in_steps_that_are_not_solved_is_undecided():
+    stones = (brick(str(k), (0, 0, k), (1, 0.5, k + 1)) for k in range(2))
+    solver = SolverSettings(tolerance=1e-17, max_iterations=100)
+    one = replace(scene(ground(), *stones, step=5e-3, duration=0.1), solver=solver)
+    result = simulate(one)
+    assert result.errors.balance < 1e-6
+    assert result.outcome is Outcome.UNDECIDED
+    assert "of 20 steps were not solved" in result.reason
+
+
+def test_a_fall_that_unsolved_steps_may_have_caused_is_undecided():
+    one = replace(opening(step=5e-3), solver=SolverSettings(tolerance=1e-15, max_iterations=1))
+    result = simulate(one)
+    assert result.errors.unconverged_steps > 0
+    assert result.outcome is Outcome.UNDECIDED
+    assert "steps were not solved, with errors of up to" in result.reason
+
+
+def test_a_block_that_rocks_far_and_comes_back_stands():
+    """Let go at 0.9 of its tipping angle its top swings through 0.7 of its width."""
+    angle = 0.9 * np.arctan(0.4)
+    turn = np.array([[np.cos(angle), 0, -np.sin(angle)], [0, 1, 0], [np.sin(angle), 0, np.cos(angle)]])
+    block = moved(brick("a", (0, 0, 0), (0.4, 0.4, 1)), turn)
+    result = simulate(scene(ground(), block, step=4e-3, duration=5.0))
+    assert result.outcome is Outcome.EQUILIBRIUM
+    assert result.cautions[0].startswith("stone a moved by ")
+
+
+def test_a_cube_that_topples_has_collapsed_though_its_centre_is_as_high_as_before():
+    # about its edge, at 1.2 times the least speed that takes it over, √(3 g (√2 - 1) / 2a)
+    spin = 1.2 * np.sqrt(1.5 * G * (np.sqrt(2) - 1) / 0.5)
+    velocity = 0.25 * spin, 0.0, 0.25 * spin, 0.0, spin, 0.0
+    block = replace(brick("cube", (0, 0, 0), (0.5, 0.5, 0.5)), velocity=velocity)
+    result = simulate(scene(ground(), block, step=4e-3, duration=5.0))
+    assert result.outcome is Outcome.COLLAPSED
+    assert result.bodies[1].position[:, 2].max() == pytest.approx(0.5, abs=1e-3)
+    assert result.reason.startswith("stone cube has fallen or toppled")
+
+
+def test_a_stone_that_drops_before_it_rests_is_named_with_its_share():
+    result = simulate(scene(ground(), brick("a", (0, 0, 0.02), (1, 0.8, 0.42)), step=5e-3))
+    assert result.outcome is Outcome.EQUILIBRIUM
+    assert result.cautions == ("stone a moved by 20 mm, 5 % of its width, before it came to rest",)
+
+
+def test_a_static_start_that_fails_is_said_beside_the_verdict():
+    one = scene(ground(), brick("a", (0, 0, 0.02), (1, 0.8, 0.04)), step=5e-3, start=Start.EQUILIBRIUM)
+    result = simulate(one)
+    assert not result.static.found
+    assert "no static equilibrium was found: the run began at rest, all loads at once" in result.cautions
+
+
+def test_a_static_start_keeps_the_velocities_of_the_scene():
+    block = replace(brick("a", (0, 0, 0), (1, 0.8, 0.4)), velocity=(1.0, 0, 0, 0, 0, 0))
+    result = simulate(scene(ground(), block, step=1e-3, start=Start.EQUILIBRIUM))
+    assert result.static.found
+    # v²/(2 μ g)
+    assert result.bodies[1].displacement[:, 0].mean() == pytest.approx(1 / (2 * 0.6 * G), rel=0.01)
+
+
+def test_a_relaxation_does_not_halt_stones_that_begin_in_motion():
+    block = replace(brick("a", (0, 0, 0), (1, 0.8, 0.4)), velocity=(1.0, 0, 0, 0, 0, 0))
+    result = simulate(scene(ground(), block, step=1e-3, relaxation=True))
+    assert result.bodies[1].displacement[:, 0].mean() == pytest.approx(1 / (2 * 0.6 * G), rel=0.01)
+    assert any(caution.startswith("nothing was halted") for caution in result.cautions)
+
+
+def test_an_overlap_between_fixed_stones_does_not_hold_what_nothing_carries():
+    """A block 2 µm too wide between two fixed walls: an overlap that is pushed out would wedge it."""
+    walls = ground((-1, 0, 0), (0, 1, 1), "left"), ground((1, 0, 0), (2, 1, 1), "right")
+    for relaxation in (False, True):
+        block = brick("block", (-1e-6, 0.2, 0.2), (1 + 1e-6, 0.8, 0.8))
+        result = simulate(scene(*walls, block, step=5e-3, relaxation=relaxation))
+        assert result.outcome is Outcome.COLLAPSED
+
+
+def test_a_wedge_that_friction_holds_rests_and_lasts():
+    """A keystone in a slot whose sides are 10° off the vertical, tan 10° = 0.18 < μ: held from the first step."""
+    low, high = 0.1, 0.1 + 0.5 * np.tan(np.radians(10))
+    wedge = box("wedge", (-0.1, 0, 0), (0.1, 0.3, 0.5))
+    corners = wedge.vertices.copy()
+    corners[:, 0] = np.sign(corners[:, 0]) * np.where(corners[:, 2] > 0.25, high, low)
+    sides = []
+    for sign in (-1, 1):
+        side = ground((0.1, -0.1, 0), (1, 0.4, 0.5), f"side{sign}")
+        at = side.vertices.copy()
+        inner = at[:, 0] < 0.5
+        at[inner, 0] = np.where(at[inner, 2] > 0.25, high, low)
+        at[:, 0] *= sign
+        faces = side.faces if sign > 0 else tuple(tuple(reversed(face)) for face in side.faces)
+        sides.append(replace(side, vertices=at, faces=faces))
+    for relaxation in (False, True):
+        result = simulate(scene(*sides, replace(wedge, vertices=corners), step=2e-3, relaxation=relaxation))
+        assert result.outcome is Outcome.EQUILIBRIUM
+        assert not result.cautions
