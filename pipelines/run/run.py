@@ -3,7 +3,7 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -24,11 +24,13 @@ from pipelines.draw.pictures import draw_pictures, missing
 from pipelines.reports.run import write_report
 from pipelines.results.folder import check_replaceable, replacing
 from pipelines.results.joints_csv import write_joints
+from pipelines.results.series_csv import write_series
 from pipelines.results.stone_values import stone_results
 from pipelines.results.summary import as_json, summarise
 from pipelines.results.vtk import write_frames
 from pipelines.run.assemble import Assembly, assemble_stones
-from pipelines.run.record import run_record
+from pipelines.run.inputs import run_inputs
+from pipelines.run.record import run_record, versions
 from pipelines.scene.file import SceneFile, read_scene
 from pipelines.scene.selection import select_groups, select_stones
 from pipelines.tuning.expected_errors import ProfileReport, profile_report
@@ -91,7 +93,9 @@ def run_scene(
         with _timed(seconds, "blocks"), database.session(read_only=True) as session:
             as_of, models = latest_entry(session), select_stones(scene, session)
             scene = with_profile(scene, profile, models)
-            assembly = assemble_stones(scene, models, select_groups(scene, session, models))
+            groups = select_groups(scene, session, models)
+            assembly = assemble_stones(scene, models, groups)
+            assembly = replace(assembly, inputs=run_inputs(scene, assembly, groups, session))
         if meshes is not None:
             check_mesh_file(meshes, _elements(assembly))
         result = simulate(assembly.scene, progress)
@@ -144,6 +148,7 @@ def write_results(
         progress(Progress("write", 0, 3, "results.pvd"))
         write_frames(result, folder)
         write_joints(folder / "joints.csv", result, assembly.origin)
+        write_series(folder, result, assembly.origin)
     with _timed(seconds, "pictures"):
         progress(Progress("write", 1, 3, "pictures"))
         pictures, omitted = _pictures(scene, result)
@@ -155,6 +160,8 @@ def write_results(
     progress(Progress("write", 2, 3, "report.html"))
     reached = None if profile is None else asdict(profile)
     summary = summarise(result, version=version("moma-masonry"), seconds=seconds, profile=reached)
+    summary["inputs"] = {title: list(lines) for title, lines in assembly.inputs.items()}
+    summary["versions"] = dict(versions())
     write_report(folder / "report.html", result, summary, stones, warnings)
     (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
     summary["origin"] = assembly.origin.tolist()

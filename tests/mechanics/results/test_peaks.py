@@ -85,7 +85,9 @@ def test_turns_are_those_since_the_start():
 @pytest.mark.parametrize("fidelity", [Fidelity.RIGID, Fidelity.DEFORMABLE])
 def test_motion_of_the_ground_is_no_motion_relative_to_it(fidelity):
     """The ground goes 20 mm aside and comes back, slowly enough that its stone rides on it."""
-    there = History(np.array([0.0, 0.1, 0.2, 0.3, 0.4]), np.array([0, 0.2, 0, -0.2, 0])[:, None] * [1.0, 0, 0])
+    there = History(
+        np.array([0.0, 0.1, 0.2, 0.3, 0.4]), np.array([0, 0.2, 0, -0.2, 0])[:, None] * [1.0, 0, 0]
+    )
     one = scene(ground(), brick("cube", (0, 0, 0), (0.5, 0.5, 0.5), fidelity), duration=0.5, **ALWAYS)
     result = simulate(replace(one, loads=Loads(motions=(ImposedMotion(frozenset({"ground"}), there),))))
     peaks = result.peaks
