@@ -59,7 +59,8 @@ def describe_run(session: Session, number: int, count: int = 5) -> dict[str, Any
     Returns
     -------
     dict
-        as in `list_runs`, and: steps, simulated [s], fidelities, as_of, author, versions, settings, scene_text;
+        as in `list_runs`, and: steps, simulated [s], fidelities, headline, cautions, peaks (largest values of the run),
+        as_of, author, versions, settings, scene_text;
         simplification (mode; how many stones of each shape, and how many outside of the survey's tolerance; the largest
         displacement of a corner and its stone; None where solids are not kept),
         largest_stresses (by stone), and joints by what is worst of them: largest_openings, least_centred
@@ -91,6 +92,8 @@ def describe_run(session: Session, number: int, count: int = 5) -> dict[str, Any
         "simulated": run.simulated,
         "wall": run.wall,
         "errors": {name: getattr(run, name) for name in ERRORS},
+        "headline": run.summary.get("headline"),
+        "peaks": _peaks(run.summary),
         "as_of": run.as_of_id,
         "author": run.entry.author,
         "versions": dict(run.versions),
@@ -167,6 +170,15 @@ def _stresses(session: Session, run: int, count: int) -> list[dict[str, object]]
         .order_by(EntityResult.von_mises_max.desc(), Entity.id)
     )
     return [dict(row) for row in session.execute(statement).mappings()]
+
+
+def _peaks(summary: Mapping[str, Any]) -> list[dict[str, object]]:
+    """List the largest values of the run: peak, value and value at the end, unit, time [s], stone or joint."""
+    return [
+        {"peak": name.replace("_", " "), **one, "stones": " – ".join(one["stones"]) or None}
+        for name, one in (summary.get("peaks") or {}).items()
+        if one is not None
+    ]
 
 
 def _simplification(session: Session, run: int) -> dict[str, object] | None:

@@ -39,6 +39,13 @@ STONE_VALUES: Mapping[str, tuple[str, str]] = {
     "joint_opening": ("m", "largest opening of its joints"),
     "joint_sliding": ("m", "largest sliding in its joints since the start"),
     "joint_friction_use": ("-", "largest part of friction and cohesion that a joint of it uses"),
+    "displacement_peak": ("m", "largest displacement of its points during the run"),
+    "displacement_peak_time": ("s", "time of that"),
+    "relative_displacement_peak": ("m", "largest displacement during the run, seen from the supports"),
+    "joint_opening_peak": ("m", "largest opening of its joints during the run"),
+    "joint_sliding_peak": ("m", "largest sliding in its joints during the run"),
+    "joint_pressure_peak": ("Pa", "largest pressure in its joints during the run"),
+    "von_mises_peak": ("Pa", "largest Von Mises stress in the frames of the run"),
 }
 """Unit and meaning of the named values of a stone's result that can be asked for."""
 
@@ -52,7 +59,7 @@ class StoneResult:
     code : the stone
     fidelity : fixed, rigid or deformable
     von_mises_max, von_mises_mean : [Pa]; None if the stone was rigid
-    displacement_max : [m]
+    displacement_max : of its points, at the end [m]
     contact_force_max : largest force of one contact point [N]
     values : further named numbers; those of STONE_VALUES can be asked for
     """
@@ -98,8 +105,8 @@ class JointArrays:
     area : (nj,) [m²]
     parted : (nj,) it was closed at the start and is now wide open
     force_normal, force_shear : (nj,) across it, compression positive, and the size of the rest [N]
-    pressure_mean, pressure_max : (nj,) [Pa]; NaN where it has no area, as all that may be NaN
-    kern : (nj,) up to 1: the resultant is within the kern; NaN without compression [-]
+    pressure_mean, pressure_max : (nj,) [Pa]; NaN where it has no area or is a sliver, as all that may be NaN
+    kern : (nj,) up to 1: the resultant is within the kern; NaN without compression, and of slivers [-]
     friction_use : (nj,) shear over the strength of friction and cohesion; NaN where that is zero [-]
     slipping, open : (nj,) parts of its contact area that slip, that transmit nothing; NaN where it has none [-]
     gap : (nj,) largest [m]

@@ -72,7 +72,7 @@ class EntityResult(Base):
     run_id: Mapped[int] = mapped_column(ForeignKey("run.id"), primary_key=True)
     von_mises_max: Mapped[float | None] = attribute("Pa", "largest Von Mises stress")
     von_mises_mean: Mapped[float | None] = attribute("Pa", "mean Von Mises stress")
-    displacement_max: Mapped[float] = attribute("m", "largest displacement")
+    displacement_max: Mapped[float] = attribute("m", "largest displacement of its points at the end")
     contact_force_max: Mapped[float | None] = attribute("N", "largest contact force")
     values: Mapped[dict[str, float]] = mapped_column(JSON_TYPE)
     fidelity: Mapped[str] = attribute(None, "fixed, rigid or deformable", words=FIDELITIES)
@@ -93,7 +93,7 @@ class JointResult(Base):
     area : [m²]
     parted : it was closed at the start and is now wide open
     force_normal, force_shear : compression positive, and the size of the rest [N]
-    pressure_mean, pressure_max : [Pa]
+    pressure_mean, pressure_max : [Pa]; None of slivers
     kern, friction_use, slipping, open : [-]; None where there is nothing to say
     gap, opening, sliding : [m]
     width : as surveyed, which is the thickness of its mortar; None if not known [m]

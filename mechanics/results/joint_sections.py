@@ -127,8 +127,9 @@ def eccentricity(section: Section, force: Array, moment: Array, least: float) ->
     pressed = (compression > least) & (section.area > 0)
     place = np.column_stack([-np.einsum("ji,ji->j", moment, t2), np.einsum("ji,ji->j", moment, t1)])
     place = place / np.where(pressed, compression, np.nan)[:, None]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        slope = place * (section.area / section.moment.T).T
+    # the second moment of a sliver can vanish in rounding
+    solid = section.moment > 0.0
+    slope = np.where(solid, place * section.area[:, None] / np.where(solid, section.moment, 1.0), np.nan)
     meant = np.arange(section.corner.shape[1]) < section.count[:, None]
     kern = _largest(-np.einsum("jd,jkd->jk", slope, section.corner), meant)
     rows = np.arange(len(section.count))[:, None]

@@ -240,6 +240,7 @@ class Series:
     Attributes
     ----------
     body : (n,) indices into the scene's blocks
+    start : (n, 3) centres of mass at the start [m]
     time : (steps,) [s]
     centre : (steps, n, 3) of mass [m]
     turn : (steps, n, 3) rotation vector since the start [rad]
@@ -248,6 +249,7 @@ class Series:
     """
 
     body: Ints
+    start: Array
     time: Array
     centre: Array
     turn: Array

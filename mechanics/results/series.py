@@ -55,7 +55,8 @@ class Recorder:
         since = rotation @ self._start.rotation[self._body].transpose(0, 2, 1)
         turn = Rotation.from_matrix(since.reshape(-1, 3, 3)).as_rotvec().reshape(centre.shape)
         columns = (np.array(column) for column in zip(*self._of_joints, strict=True))
-        return Series(self._body, time, centre, turn, velocity, JointSeries(self._joint, *columns))
+        joints = JointSeries(self._joint, *columns)
+        return Series(self._body, self._start.centre[self._body], time, centre, turn, velocity, joints)
 
     def _elastic_motion(self, state: State) -> Array:
         """Return the mean motion (nb, 6) of the elastic stones."""

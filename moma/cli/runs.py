@@ -29,7 +29,9 @@ _JOINTS = {
     "opening": "m",
     "sliding": "m",
 }
+_PEAKS = {"peak": None, "value": None, "end": None, "unit": None, "time": "s", "stones": None}
 _TABLES = {
+    "peaks": ("largest values during the run, and at its end", _PEAKS),
     "largest_stresses": ("largest Von Mises stresses", _STRESSES),
     "largest_openings": ("joints that have opened most", _JOINTS),
     "least_centred": ("joints with the resultant farthest out of the kern", _JOINTS),

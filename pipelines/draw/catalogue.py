@@ -21,7 +21,8 @@ class Picture:
     scale : title of the scale of colours; "" if nothing is coloured by value
     unit_of : factor and unit by the end of the scale
     palette : map of colours, and the part of it that is used
-    capped : the scale ends at the value exceeded in 1 % of the volume, not at the largest one
+    capped : the scale ends at the value exceeded in 1 % of the volume, or in joints that bear 1 % of the force, not at
+        the largest one
     note : line below the picture
     """
 
@@ -85,7 +86,12 @@ PICTURES: Mapping[str, Picture] = {
         ("Purples", 1.0),
     ),
     "pressure": Picture(
-        "pressure in the joints", "joints", "Mean pressure of the joints", _pascals, ("inferno_r", 0.85)
+        "pressure in the joints",
+        "joints",
+        "Mean pressure of the joints",
+        _pascals,
+        ("inferno_r", 0.85),
+        capped=True,
     ),
     "resultants": Picture(
         "resultants of the joints",

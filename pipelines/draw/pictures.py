@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from mechanics.results.contact_result import JointResult
 from mechanics.results.result import BodyResult, Outcome, Result
 from mechanics.results.stress_values import volume_quantile
 from mechanics.scene.scene import Fidelity
@@ -24,7 +25,7 @@ from pipelines.draw.offscreen.surfaces import FIELDS, stone_fields, wall_surface
 
 __all__ = ["draw_apart", "draw_pictures", "missing", "package_of"]
 
-_TITLE = 100  # characters of a caution that fit below the title of a picture
+_LONGEST = 100  # characters of a caution in a heading, which has one line
 _TIMEOUT = 300.0  # [s]; software rendering of 10⁵ triangles takes a few
 _PACKAGES = {
     "libGL": "libgl1",
@@ -44,8 +45,8 @@ _ENDINGS = {
     Outcome.EQUILIBRIUM: "at equilibrium",
     Outcome.MOVING: "still moving",
     Outcome.COLLAPSED: "collapsed",
-    Outcome.UNDECIDED: "undecided: not solved",
-    Outcome.INTERRUPTED: "interrupted",
+    Outcome.UNDECIDED: "UNDECIDED: not solved",
+    Outcome.INTERRUPTED: "INTERRUPTED",
 }
 
 
@@ -68,15 +69,12 @@ def draw_pictures(result: Result, folder: Path, names: Sequence[str], towards: A
     if not wanted:
         return ()
     up = -np.array(result.scene.gravity)
-    ending = f"{_ENDINGS[result.outcome]} after {result.time:.3g} s"
-    if result.cautions:
-        ending += f"\n{shorten(result.cautions[0], _TITLE, placeholder=' …')}"
     jobs = [
         {
             "quantity": name,
             "path": str((folder / f"{name}.png").absolute()),
             "top": _top(result, name),
-            "title": f"{result.scene.name}: {PICTURES[name].title}, {ending}",
+            "title": "\n".join(_heading(result, name)),
             "note": PICTURES[name].note,
             "towards": towards.tolist(),
             "up": up.tolist() if up.any() else [0.0, 0.0, 1.0],
@@ -101,9 +99,17 @@ def missing(result: Result, name: str) -> str | None:
 
 
 def _top(result: Result, name: str) -> float | None:
-    """Return the end of the scale, exceeded in 1 % of the volume; None stands for the largest value."""
+    """Return the end of the scale; None stands for the largest value.
+
+    Stresses end where 1 % of the volume exceeds them, pressures where joints that bear 1 % of the force do.
+    """
     if not PICTURES[name].capped:
         return None
+    if name == "pressure":
+        joints, rows = result.joints, result.joints.bearing
+        if not rows.any():
+            return None
+        return volume_quantile(joints.pressure_mean[rows], _compression(joints)[rows], 0.99)
     known = [
         (_fields_of(body, block.material, name), body.node_volume)
         for body, block in zip(result.bodies, result.scene.blocks, strict=True)
@@ -112,6 +118,49 @@ def _top(result: Result, name: str) -> float | None:
     values, volumes = (np.concatenate(column) for column in zip(*known, strict=True))
     finite = np.isfinite(values)
     return volume_quantile(values[finite], volumes[finite], 0.99) or None
+
+
+def _heading(result: Result, name: str) -> list[str]:
+    """Return the lines above a picture: content and outcome, the gravest caution, the largest value."""
+    picture, ending = PICTURES[name], f"{_ENDINGS[result.outcome]} after {result.time:.3g} s"
+    lines = [f"{result.scene.name}: {picture.title}, {ending}"]
+    lines += [shorten(caution, _LONGEST, placeholder=" …") for caution in result.cautions[:1]]
+    largest = _largest(result, name) if picture.capped else None
+    if largest is not None:
+        value, place = largest
+        factor, unit = picture.unit_of(value)
+        lines.append(f"largest: {value * factor:.4g}{f' {unit}' if unit else ''}, {place}")
+    return lines
+
+
+def _largest(result: Result, name: str) -> tuple[float, str] | None:
+    """Return the largest value of a capped picture, and its place in words."""
+    if name == "pressure":
+        return _largest_pressure(result)
+    found = [
+        (float(np.nanmax(values)), body.code)
+        for body, block in zip(result.bodies, result.scene.blocks, strict=True)
+        if np.isfinite(values := _fields_of(body, block.material, name)).any()
+    ]
+    value, code = max(found, default=(0.0, ""))
+    return (value, f"in {code}") if value > 0.0 else None
+
+
+def _largest_pressure(result: Result) -> tuple[float, str] | None:
+    """Return the largest mean pressure of a joint, its place, and how many slivers it leaves out."""
+    joints = result.joints
+    if not joints.bearing.any():
+        return None
+    number = int(np.where(joints.bearing, joints.pressure_mean, -np.inf).argmax())
+    first, second = (result.bodies[body].code for body in joints.bodies[number])
+    slivers = int((joints.pressed & joints.sliver).sum())
+    out = f"; {slivers} slivers left out" if slivers else ""
+    return float(joints.pressure_mean[number]), f"between {first} and {second}{out}"
+
+
+def _compression(joints: JointResult) -> Array:
+    """Return the normal forces of the joints (nj,) [N]."""
+    return joints.pressure_mean * joints.area
 
 
 def _fields_of(body: BodyResult, material: Material, name: str) -> Array:

@@ -9,6 +9,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 __all__ = [
     "Picture",
+    "kilonewtons",
     "kilopascals",
     "megapascals",
     "millimetres",
@@ -56,27 +57,34 @@ def _is_quantity(cell: str) -> bool:
 
 def megapascals(pascals: float | None) -> str:
     """Format a stress given in pascals."""
-    return "–" if pascals is None else f"{pascals / 1e6:.4f} MPa"
+    return "–" if pascals is None else f"{pascals / 1e6:z.4f} MPa"
 
 
 def kilopascals(pascals: float) -> str:
     """Format a pressure given in pascals."""
-    return f"{pascals / 1e3:.4g} kPa"
+    return f"{pascals / 1e3:z.4g} kPa"
 
 
-def millimetres(metres: float) -> str:
-    """Format a length given in metres."""
-    return f"{metres * 1e3:.4g} mm"
+def kilonewtons(newtons: float) -> str:
+    """Format a force given in newtons."""
+    return f"{newtons / 1e3:z.2f} kN"
+
+
+def millimetres(metres: float, least: float = 0.0) -> str:
+    """Format a length given in metres; a smaller one than `least` [m], the tolerance, as such."""
+    if abs(metres) < least:
+        return f"0 within {least * 1e3:.1g} mm"
+    return f"{metres * 1e3:z.4g} mm"
 
 
 def percent(part: float) -> str:
     """Format a fraction."""
-    return f"{100.0 * part:.1f} %"
+    return f"{100.0 * part:z.1f} %"
 
 
 def ratio(value: float | None) -> str:
     """Format a ratio; a dash if it is not known."""
-    return "–" if value is None or not np.isfinite(value) else f"{value:.3g}"
+    return "–" if value is None or not np.isfinite(value) else f"{value:z.3g}"
 
 
 def scientific(value: float | int | None) -> str:

@@ -12,6 +12,7 @@ from mechanics.results.result import Result
 from pipelines.arrays import Array
 from pipelines.draw.history_plot import history_svg
 from pipelines.reports.html import (
+    kilonewtons,
     kilopascals,
     megapascals,
     millimetres,
@@ -21,6 +22,7 @@ from pipelines.reports.html import (
     scientific,
     write_page,
 )
+from pipelines.reports.peaks import peak_rows
 
 __all__ = ["write_report"]
 
@@ -31,6 +33,8 @@ _OUTCOMES = {
     "undecided": "Nothing can be said: the steps that would decide were not solved.",
     "interrupted": "It was interrupted before its time: what it would have come to is not known.",
 }
+
+_OPEN = ("undecided", "interrupted")
 
 _ERRORS = (
     (
@@ -66,7 +70,8 @@ _CAPTIONS = {
     "utilisation.png": f"Stress over strength, the larger of tension and compression: at 1 a stone fails. {_GREY}",
     "error.png": "Estimated error of the stress of each stone (Zienkiewicz and Zhu): where it is large, the mesh is "
     f"too coarse for its stress. {_GREY}",
-    "pressure.png": "Mean pressure of each compressed joint; the stones are transparent.",
+    "pressure.png": "Mean pressure of each compressed joint; the stones are transparent. The scale ends where joints "
+    "that carry 1 % of the force exceed it, rounded up.",
     "resultants.png": "The resultant of each joint, drawn through the point where it meets the joint, its length in "
     "proportion. Blue: within the kern, so that a linear pressure acts everywhere. Red: outside, so that part of the "
     "joint is unloaded.",
@@ -117,12 +122,23 @@ def write_report(
         "run.html",
         name=result.scene.name,
         lead=_OUTCOMES[str(result.outcome)],
+        decided=str(result.outcome) not in _OPEN,
+        headline=_capital(summary["headline"]),
+        cautions=summary["cautions"],
         warnings=warnings,
         pictures=[picture(one, _CAPTIONS[one.name]) for one in pictures if one.is_file()],
         summary=_summary_rows(summary),
-        errors=[(name, scientific(summary["errors"][key]), words) for key, name, words in _ERRORS],
+        notes=_notes(summary),
+        peaks=peak_rows(summary),
+        inputs=_inputs(summary),
+        errors=[(name, _error(key, result, summary), words) for key, name, words in _ERRORS],
         profile=_profile(summary["profile"]),
-        sections=[_stressed(stones), _pulled(stones), _uncertain(stones), *_joints(result)],
+        sections=[
+            _stressed(stones, summary["tolerance"]["length"]),
+            _pulled(stones),
+            _uncertain(stones),
+            *_joints(result, summary),
+        ],
         history=history_svg(result.history),
         stages=[(stage, f"{seconds:.2f} s") for stage, seconds in summary["time"]["by_stage"].items()],
         version=summary["version"],
@@ -134,9 +150,9 @@ def _summary_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     rows = [
         ("Stones", ", ".join(f"{count} {name}" for name, count in bodies.items())),
         ("Contact points", str(summary["contacts"])),
-        ("Weight carried", f"{reaction['weight'] / 1e3:.2f} kN"),
-        ("Reaction of the supports", f"{reaction['total_vertical'] / 1e3:.2f} kN"),
-        ("Largest displacement", millimetres(summary["displacement"]["max"])),
+        ("Weight carried", kilonewtons(reaction["weight"])),
+        ("Reaction of the supports", kilonewtons(reaction["total_vertical"])),
+        ("Largest displacement", _displacement(summary)),
     ]
     if stress is not None:
         rows += [
@@ -158,6 +174,57 @@ def _summary_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     return rows
 
 
+def _displacement(summary: Mapping[str, Any]) -> str:
+    """Format the largest displacement of the run and, where another is left, that at its end."""
+    found, least = summary["displacement"], summary["tolerance"]["length"]
+    largest, end = (millimetres(found[key], least) for key in ("max", "end"))
+    if found["time"] is None or largest == end:
+        return largest
+    return f"{largest} after {found['time']:.4g} s; {end} at the end"
+
+
+def _notes(summary: Mapping[str, Any]) -> list[str]:
+    """Return what must be known of the forces: slivers, and other states of force that are in balance too."""
+    notes, slivers = [], summary["joints"]["slivers"]
+    if slivers["count"]:
+        notes.append(
+            f"{slivers['count']} of {summary['joints']['count']} joints are slivers: their area is not above "
+            f"{100 * slivers['limit']:g} % of the faces of their stones. They carry {kilonewtons(slivers['force'])} "
+            f"({kilonewtons(slivers['largest_force'])} at most); pressure and kern, up to "
+            f"{megapascals(slivers['largest_pressure'])}, say nothing of the masonry and are left out of the largest "
+            "values, the tables and the scales of colours."
+        )
+    if (text := summary["admissible"]["text"]) is not None:
+        notes.append(
+            f"{_capital(text)}. What depends on them alone, a largest pressure above all, can be otherwise."
+        )
+    notes.append(
+        f"Movements below {summary['tolerance']['length'] * 1e3:.1g} mm are within the tolerance of the solver."
+    )
+    return notes
+
+
+def _inputs(summary: Mapping[str, Any]) -> list[tuple[str, list[str]]]:
+    """Return the lines of each input, and the versions of the programs."""
+    rows = [(title, lines) for title, lines in summary.get("inputs", {}).items() if lines]
+    if "versions" in summary:
+        rows.append(("Versions", [", ".join(f"{name} {one}" for name, one in summary["versions"].items())]))
+    return rows
+
+
+def _error(key: str, result: Result, summary: Mapping[str, Any]) -> str:
+    """Format an error measure; below the tolerance to which the run was solved, as such."""
+    scene, value = result.scene, summary["errors"][key]
+    tolerances = {"natural_map": scene.solver.tolerance, "balance": scene.time.balance_tolerance}
+    if value is not None and key in tolerances and value <= tolerances[key]:
+        return f"{scientific(value)}, below the tolerance of {tolerances[key]:g}"
+    return scientific(value)
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
 def _profile(profile: Mapping[str, Any] | None) -> dict[str, Any] | None:
     """Format the settings that a profile gave the run and the errors to expect of it."""
     if profile is None:
@@ -173,14 +240,14 @@ def _profile(profile: Mapping[str, Any] | None) -> dict[str, Any] | None:
     }
 
 
-def _stressed(stones: Sequence[StoneResult]) -> _Section:
+def _stressed(stones: Sequence[StoneResult], least: float) -> _Section:
     """List the stones with the largest stress."""
     rows = [
         (
             stone.code,
             megapascals(stone.von_mises_max),
             megapascals(stone.von_mises_mean),
-            millimetres(stone.displacement_max),
+            millimetres(stone.displacement_max, least),
         )
         for stone in _worst(stones, lambda stone: stone.von_mises_max)
     ]
@@ -227,11 +294,11 @@ def _worst(stones: Sequence[StoneResult], value: Callable[[StoneResult], float |
     return [stone for _, stone in known[:_MOST]]
 
 
-def _joints(result: Result) -> list[_Section]:
+def _joints(result: Result, summary: Mapping[str, Any]) -> list[_Section]:
     """List the joints with the most eccentric resultants, and those that slid or opened most."""
     joints = result.joints
-    seen = _SEEN * np.sqrt(joints.area)
-    eccentric = np.where(joints.pressed, joints.kern, -np.inf)
+    seen = np.maximum(_SEEN * np.sqrt(joints.area), summary["tolerance"]["length"])
+    eccentric = np.where(joints.bearing, joints.kern, -np.inf)
     slid = np.where(joints.sliding > seen, joints.sliding, -np.inf)
     opened = np.where(joints.opening > seen, joints.opening, -np.inf)
     head = (
@@ -258,7 +325,7 @@ def _joint_rows(result: Result, order: Array) -> list[tuple[str, ...]]:
             " – ".join(codes[body] for body in joints.bodies[number]),
             ratio(float(joints.kern[number])),
             ratio(float(joints.edge[number])),
-            kilopascals(float(joints.pressure_mean[number])),
+            "sliver" if joints.sliver[number] else kilopascals(float(joints.pressure_mean[number])),
             millimetres(float(joints.opening[number])),
             millimetres(float(joints.sliding[number])),
             ratio(float(joints.friction_use[number])),

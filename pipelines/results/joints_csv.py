@@ -32,6 +32,7 @@ JOINT_COLUMNS: Mapping[str, str] = {
     "slipping": "part of the contact area that slips [-]",
     "open": "part of the contact area that bears nothing [-]",
     "friction_use": "shear over what friction and cohesion can bear; empty where that is nothing [-]",
+    "sliver": "1: its area is tiny beside the faces of its stones, and its pressure and kern say nothing",
     "parted": "1: it was closed at the start and is now wide open",
 }
 """Columns and their meaning."""
@@ -68,15 +69,16 @@ def _columns(joints: JointResult) -> dict[str, Array]:
     values = {
         name: getattr(joints, name)
         for name in JOINT_COLUMNS
-        if hasattr(joints, name) and name not in ("eccentricity", "parted")
+        if hasattr(joints, name) and name not in ("eccentricity", "sliver", "parted")
     }
     return values | {
         "force_normal": normal,
         "force_shear": shear,
         "eccentricity": np.linalg.norm(joints.eccentricity, axis=1),
+        "sliver": joints.sliver.astype(np.float64),
         "parted": joints.parted.astype(np.float64),
     }
 
 
 def _cell(value: float) -> str:
-    return f"{value:.12g}" if np.isfinite(value) else ""
+    return f"{value + 0.0:.12g}" if np.isfinite(value) else ""

@@ -7,7 +7,7 @@ import numpy as np
 
 from archmodel.store.run_record import StoneResult
 from mechanics.results.contact_result import JointResult
-from mechanics.results.result import BodyResult, Result
+from mechanics.results.result import BodyResult, Peaks, Result
 from mechanics.results.stress_values import volume_quantile
 from pipelines.arrays import Array, Ints
 
@@ -64,7 +64,7 @@ def stone_results(result: Result) -> tuple[StoneResult, ...]:
     """Return the results for the database, one per stone, in the order of the scene."""
     force = np.linalg.norm(result.contacts.force, axis=1)
     largest = _largest(result.contacts.bodies, force, len(result.bodies))
-    of_joints = _joint_values(result.joints, len(result.bodies))
+    further = _joint_values(result.joints, len(result.bodies)) | _peak_values(result.peaks)
     return tuple(
         StoneResult(
             code=body.code,
@@ -73,15 +73,15 @@ def stone_results(result: Result) -> tuple[StoneResult, ...]:
             von_mises_mean=None if body.values is None else body.values.von_mises_mean,
             displacement_max=float(np.linalg.norm(body.displacement, axis=1).max()),
             contact_force_max=None if np.isnan(largest[number]) else float(largest[number]),
-            values=_values(body, {name: float(one[number]) for name, one in of_joints.items()}),
+            values=_values(body, {name: float(one[number]) for name, one in further.items()}),
         )
         for number, body in enumerate(result.bodies)
     )
 
 
-def _values(body: BodyResult, of_joints: Mapping[str, float]) -> dict[str, float]:
+def _values(body: BodyResult, further: Mapping[str, float]) -> dict[str, float]:
     """Return the known values of a stone by name; archmodel.store.run_record.STONE_VALUES explains them."""
-    values: dict[str, float | None] = {"volume": body.volume, "mass": body.mass, **of_joints}
+    values: dict[str, float | None] = {"volume": body.volume, "mass": body.mass, **further}
     if body.values is not None:
         values |= {name: getattr(body.values, name) for name in _STRESSES}
         values["stress_error"] = body.values.error
@@ -89,16 +89,33 @@ def _values(body: BodyResult, of_joints: Mapping[str, float]) -> dict[str, float
 
 
 def _joint_values(joints: JointResult, count: int) -> dict[str, Array]:
-    """Return the worst value (nb,) over the joints of each stone; NaN where none is known."""
+    """Return the worst value (nb,) over the joints of each stone; NaN where none is known.
+
+    Pressure and kern of slivers are left out.
+    """
+    whole = np.where(joints.sliver, np.nan, 1.0)
+    values = {
+        "pressure": joints.pressure_max * whole,
+        "kern": joints.kern * whole,
+        "opening": joints.opening,
+        "sliding": joints.sliding,
+        "friction_use": joints.friction_use,
+    }
+    return {f"joint_{name}": _largest(joints.bodies, one, count) for name, one in values.items()}
+
+
+def _peak_values(peaks: Peaks | None) -> dict[str, Array]:
+    """Return the largest values (nb,) of each stone during the run; NaN where not known."""
+    if peaks is None:
+        return {}
     return {
-        f"joint_{name}": _largest(joints.bodies, getattr(joints, attribute), count)
-        for name, attribute in (
-            ("pressure", "pressure_max"),
-            ("kern", "kern"),
-            ("opening", "opening"),
-            ("sliding", "sliding"),
-            ("friction_use", "friction_use"),
-        )
+        "displacement_peak": peaks.displacement.value,
+        "displacement_peak_time": peaks.displacement.time,
+        "relative_displacement_peak": peaks.relative.value,
+        "joint_opening_peak": peaks.opening.value,
+        "joint_sliding_peak": peaks.sliding.value,
+        "joint_pressure_peak": peaks.pressure.value,
+        "von_mises_peak": peaks.von_mises.value,
     }
 
 

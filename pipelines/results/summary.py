@@ -9,10 +9,13 @@ from typing import Any
 import numpy as np
 
 from mechanics.results.contact_result import JointResult
+from mechanics.results.joints import SLIVER
 from mechanics.results.result import Result
 from mechanics.scene.scene import Fidelity
+from pipelines.results.peaks import peak_records
 from pipelines.results.quantities import quantities
 from pipelines.results.stone_values import stress_statistics
+from pipelines.results.trust import indeterminacy, length_tolerance
 
 __all__ = ["as_json", "headline", "summarise"]
 
@@ -33,6 +36,8 @@ def summarise(
     """
     stress = stress_statistics(result)
     displacement = max(float(np.linalg.norm(body.displacement, axis=1).max()) for body in result.bodies)
+    peaks = peak_records(result)
+    largest = peaks["displacement"] or {"value": displacement, "time": None, "stones": []}
     fidelities = [body.fidelity for body in result.bodies]
     summary: dict[str, Any] = {
         "scene": result.scene.name,
@@ -57,9 +62,17 @@ def summarise(
         "stress": _stress(result),
         "joints": _joints(result.joints),
         "energies": asdict(result.energies),
-        "displacement": {"max": displacement},
+        "displacement": {
+            "max": largest["value"],
+            "time": largest["time"],
+            "stones": largest["stones"],
+            "end": displacement,
+        },
         "settlement": {"max": float(result.history.settlement[-1])},
         "reaction": {"total_vertical": result.reaction, "weight": result.weight},
+        "peaks": peaks,
+        "tolerance": {"length": length_tolerance(result)},
+        "admissible": indeterminacy(result),
         "profile": profile,
         "version": version,
     }
@@ -112,14 +125,25 @@ def _stress(result: Result) -> dict[str, Any] | None:
 
 
 def _joints(joints: JointResult) -> dict[str, Any]:
+    """Return counts and largest values of the joints; slivers count apart."""
+    bearing, slivers = joints.bearing, joints.pressed & joints.sliver
+    normal = np.einsum("ji,ji->j", joints.force, joints.frame[:, 0])
     return {
         "count": len(joints),
-        "pressed": int(joints.pressed.sum()),
+        "pressed": int(bearing.sum()),
         "parted": int(joints.parted.sum()),
-        "out_of_kern": int((joints.pressed & ~joints.in_kern).sum()),
+        "out_of_kern": int((bearing & ~joints.in_kern).sum()),
         "largest_opening": float(joints.opening.max(initial=0.0)),
         "largest_sliding": float(joints.sliding.max(initial=0.0)),
-        "largest_pressure": float(joints.pressure_max.max(initial=0.0)),
+        "largest_pressure": float(joints.pressure_max[~joints.sliver].max(initial=0.0)),
+        "slivers": {
+            "count": int(joints.sliver.sum()),
+            "limit": SLIVER,
+            "pressed": int(slivers.sum()),
+            "force": float(normal[slivers].sum()),
+            "largest_force": float(normal[slivers].max(initial=0.0)),
+            "largest_pressure": float(joints.pressure_max[joints.sliver].max(initial=0.0)),
+        },
     }
 
 

@@ -192,6 +192,7 @@ def joint_grid(joints: JointResult) -> Grid:
         cell_data={
             "bodies": joints.bodies.astype(np.int64),
             "parted": joints.parted.astype(np.int64),
+            "sliver": joints.sliver.astype(np.int64),
             "normal": joints.frame[:, 0],
             "in_kern": joints.in_kern.astype(np.int64),
             **{name: getattr(joints, name) for name in _JOINT_ARRAYS},

@@ -1,7 +1,7 @@
 """From the database to a scene: selected stones → simplified solids → closed joints → blocks."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from sqlalchemy.orm import Session
@@ -17,7 +17,7 @@ from pipelines.scene.file import SceneFile
 from pipelines.scene.keys import typed_values
 from pipelines.scene.laws import law_rules
 from pipelines.scene.loads import FORCES, build_loads, thrown
-from pipelines.scene.selection import STRESS, Groups, StoneModel, select_groups, select_stones
+from pipelines.scene.selection import SERIES, STRESS, Groups, StoneModel, select_groups, select_stones
 from pipelines.scene.settings import MeshSettings
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.solids import Solid
@@ -43,6 +43,7 @@ class Assembly:
     towards : (3,) mean normal of the faces, from the wall to the observer [-]
     origin : (3,) of the scene, in the frame of the site [m]
     remarks : keys of the scene without effect, and limits of its stresses
+    inputs : what went into the run, lines of text by title, for its report
     """
 
     scene: Scene
@@ -53,6 +54,7 @@ class Assembly:
     towards: Array
     origin: Array
     remarks: tuple[str, ...] = ()
+    inputs: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 def assemble(scene: SceneFile, session: Session) -> Assembly:
@@ -123,6 +125,7 @@ def _scene(scene: SceneFile, blocks: Sequence[Block], groups: Groups, origin: Ar
         solver=scene.solver,
         loads=build_loads(document, loads, groups, by_code),
         frame_every=scene.output.frame_every,
+        series=tuple(block.code for block in blocks if block.code in groups[SERIES][0]),
     )
 
 

@@ -87,7 +87,10 @@ def run_record(
 def joint_arrays(joints: JointResult, origin: Array, widths: Array) -> JointArrays:
     """Return the joints in the frame of the site, given the scene's `origin` (3,) and surveyed `widths` (nj,) [m]."""
     normal, shear = normal_and_shear(joints)
+    # force over area says nothing of a sliver
+    whole = np.where(joints.sliver, np.nan, 1.0)
     own = {
+        **{name: getattr(joints, name) * whole for name in ("pressure_mean", "pressure_max", "kern")},
         "stones": joints.bodies,
         "centroid": joints.centroid + origin,
         "normal": joints.frame[:, 0],

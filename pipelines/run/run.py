@@ -26,11 +26,13 @@ from pipelines.draw.pictures import draw_pictures, missing
 from pipelines.reports.run import write_report
 from pipelines.results.folder import check_replaceable, replacing
 from pipelines.results.joints_csv import write_joints
+from pipelines.results.series_csv import write_series
 from pipelines.results.stone_values import stone_results
 from pipelines.results.summary import as_json, summarise
 from pipelines.results.vtk import write_frames
 from pipelines.run.assemble import Assembly, assemble_stones
-from pipelines.run.record import run_record
+from pipelines.run.inputs import run_inputs
+from pipelines.run.record import run_record, versions
 from pipelines.run.soundness import caution_of, problems_of, refuse_unsound
 from pipelines.scene.file import SceneFile, read_scene
 from pipelines.scene.selection import select_groups, select_stones
@@ -101,7 +103,9 @@ def run_scene(
             as_of, models = latest_entry(session), select_stones(scene, session)
             scene = with_profile(scene, profile, models)
             progress(Progress("blocks", 0, None, f"closing the joints of {len(models)} stones"))
-            assembly = assemble_stones(scene, models, select_groups(scene, session, models))
+            groups = select_groups(scene, session, models)
+            assembly = assemble_stones(scene, models, groups)
+            assembly = replace(assembly, inputs=run_inputs(scene, assembly, groups, session))
         if meshes is not None:
             check_mesh_file(meshes, _elements(assembly))
         with _timed(seconds, "mesh"):
@@ -163,6 +167,7 @@ def write_results(
         progress(Progress("write", 0, 3, "results.pvd"))
         write_frames(result, folder)
         write_joints(folder / "joints.csv", result, assembly.origin)
+        write_series(folder, result, assembly.origin)
     with _timed(seconds, "pictures"):
         progress(Progress("write", 1, 3, "pictures"))
         pictures, omitted = _pictures(scene, result)
@@ -174,7 +179,9 @@ def write_results(
     progress(Progress("write", 2, 3, "report.html"))
     reached = None if profile is None else asdict(profile)
     summary = summarise(result, version=version("moma-masonry"), seconds=seconds, profile=reached)
-    write_report(folder / "report.html", result, summary, stones, [*result.cautions, *warnings])
+    summary["inputs"] = {title: list(lines) for title, lines in assembly.inputs.items()}
+    summary["versions"] = dict(versions())
+    write_report(folder / "report.html", result, summary, stones, warnings)
     (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
     summary["origin"] = assembly.origin.tolist()
     summary["warnings"] = warnings

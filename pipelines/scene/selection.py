@@ -16,14 +16,17 @@ from pipelines.scene.file import SceneFile
 from pipelines.toml.lines import Path
 from pipelines.toml.schema import nearest
 
-__all__ = ["STRESS", "Groups", "StoneModel", "select_groups", "select_stones"]
+__all__ = ["SERIES", "STRESS", "Groups", "StoneModel", "select_groups", "select_stones"]
 
 _CODE = re.compile(r"[\w.:/+-]+")  # a text without blanks or comparison is meant as a code
 
 STRESS = ("output", "stress")
 """Key that names the stones whose stress is wanted."""
 
-# the codes of each group of stones that a table of an array names, by the table's path; and those of STRESS
+SERIES = ("output", "series")
+"""Key that names the stones whose motion is wanted in every step."""
+
+# the codes of each group of stones that a table of an array names, by the table's path; those of STRESS and SERIES
 Groups = Mapping[Path, tuple[frozenset[str], ...]]
 
 
@@ -52,7 +55,7 @@ def select_stones(scene: SceneFile, session: Session) -> tuple[StoneModel, ...]:
 
 
 def select_groups(scene: SceneFile, session: Session, models: Sequence[StoneModel]) -> Groups:
-    """Return the selected stones that the meshes, laws, loads and throws of a scene name, and its output of stress.
+    """Return the selected stones that the meshes, laws, loads and throws of a scene name, and those of its outputs.
 
     Raises
     ------
@@ -67,7 +70,8 @@ def select_groups(scene: SceneFile, session: Session, models: Sequence[StoneMode
         )
         for entry in entries
     }
-    groups[STRESS] = (frozenset(_named(scene, session, records, STRESS, scene.output.stress or ())),)
+    for key, items in ((STRESS, scene.output.stress or ()), (SERIES, scene.output.series)):
+        groups[key] = (frozenset(_named(scene, session, records, key, items)),)
     return groups
 
 

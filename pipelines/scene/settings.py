@@ -122,3 +122,9 @@ class Output:
             "Pictures to draw, see below; if not given, displacement, and von_mises where a stone deforms."
         ),
     ] = None
+    series: Annotated[
+        Texts,
+        Setting(
+            "Codes or expressions of the stones whose motion is written in every step, with the joints between them."
+        ),
+    ] = ()

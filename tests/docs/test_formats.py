@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 from moma.cli import app
 from pipelines.results.joints_csv import JOINT_COLUMNS
+from pipelines.results.series_csv import SERIES_COLUMNS
 from pipelines.results.summary import summarise
 from pipelines.results.vtk import body_cells, body_grid, contact_grid, joint_grid
 from survey.formats.native import reader as moma_ascii
@@ -61,12 +62,18 @@ def test_every_column_of_the_joints_is_documented():
     assert rows("Joints", 2) == [[f"`{name}`", meaning] for name, meaning in JOINT_COLUMNS.items()]
 
 
+def test_every_column_of_the_series_is_documented():
+    columns = [one for of_file in SERIES_COLUMNS.values() for one in of_file.items()]
+    assert rows("Time series", 2) == [[f"`{name}`", meaning] for name, meaning in columns]
+
+
 def test_every_key_of_the_summary_is_documented(result):
     section = PAGE.split("\n## `summary.json`")[1].split("\n## ")[0]
     named = set(re.findall(r"`(\w+)`", section))
     summary = summarise(result, version="1", seconds={})
     assert set(summary) <= named
     assert set(summary["joints"]) <= named
+    assert set(summary["displacement"]) <= named
     assert set(summary["stress"]) <= named
 
 

@@ -95,8 +95,9 @@ def run_lines(report: "RunReport", verbose: bool) -> list[str]:
         *(f"  caution: {caution}" for caution in summary["cautions"]),
         f"  {', '.join(f'{count} {name}' for name, count in bodies.items())} stones, "
         f"{summary['contacts']} contact points",
-        f"  weight {reaction['weight'] / 1e3:.2f} kN, reaction {reaction['total_vertical'] / 1e3:.2f} kN, "
-        f"largest displacement {summary['displacement']['max'] * 1e3:.4g} mm",
+        f"  weight {reaction['weight'] / 1e3:z.2f} kN, reaction {reaction['total_vertical'] / 1e3:z.2f} kN, "
+        f"{_displacement(summary)}",
+        *_peak_lines(summary),
     ]
     if stress is not None:
         mean, p99, largest = (stress[name] / 1e6 for name in ("mean", "p99", "max"))
@@ -109,13 +110,7 @@ def run_lines(report: "RunReport", verbose: bool) -> list[str]:
             f"  began in static equilibrium: {static['steps']} steps of the search, balance {static['balance']:.1e}, "
             f"natural_map {static['natural_map']:.1e}"
         )
-    joints = summary["joints"]
-    if joints["count"]:
-        lines.append(
-            f"  {joints['count']} joints: {joints['out_of_kern']} of {joints['pressed']} compressed ones have their "
-            f"resultant outside the kern, largest opening {joints['largest_opening'] * 1e3:.3g} mm, "
-            f"largest sliding {joints['largest_sliding'] * 1e3:.3g} mm"
-        )
+    lines += _joint_lines(summary)
     lines += _profile_lines(summary["profile"])
     errors = {name: value for name, value in summary["errors"].items() if value is not None}
     lines.append("  errors: " + ", ".join(f"{name} {_short(value)}" for name, value in errors.items()))
@@ -125,6 +120,54 @@ def run_lines(report: "RunReport", verbose: bool) -> list[str]:
     pictures = [name for name in summary["files"] if name.endswith(".png")]
     shown = (*pictures, "report.html", "results.pvd", "summary.json")
     return [*lines, *(f"  {report.folder / name}" for name in shown)]
+
+
+def _displacement(summary: dict[str, Any]) -> str:
+    """Describe the largest displacement of a run, and the one that is left."""
+    from pipelines.reports.html import millimetres
+
+    found, least = summary["displacement"], summary["tolerance"]["length"]
+    largest, end = (f"{millimetres(found[name], least)}" for name in ("max", "end"))
+    if found["time"] is None or largest == end:
+        return f"largest displacement {largest}"
+    return f"largest displacement {largest} after {found['time']:.4g} s, {end} at the end"
+
+
+def _peak_lines(summary: dict[str, Any]) -> list[str]:
+    """Describe the peaks of a run that its end does not show."""
+    from pipelines.reports.peaks import passed_peaks, peak_text
+    from pipelines.results.peaks import PEAKS
+
+    passed, least = passed_peaks(summary), summary["tolerance"]["length"]
+    passed.pop("displacement", None)  # stated before
+    lines = [f"    {_uncapital(PEAKS[name])}: {peak_text(name, one, least)}" for name, one in passed.items()]
+    return [*(["  larger during the run than at its end:"] if lines else []), *lines]
+
+
+def _uncapital(text: str) -> str:
+    return text if text.startswith("Von") else text[:1].lower() + text[1:]
+
+
+def _joint_lines(summary: dict[str, Any]) -> list[str]:
+    """Describe the joints; slivers, and forces that are not the only ones possible, in lines of their own."""
+    from pipelines.reports.html import millimetres
+
+    joints, least = summary["joints"], summary["tolerance"]["length"]
+    if not joints["count"]:
+        return []
+    lines = [
+        f"  {joints['count']} joints: {joints['out_of_kern']} of {joints['pressed']} compressed ones have their "
+        f"resultant outside the kern, largest opening {millimetres(joints['largest_opening'], least)}, "
+        f"largest sliding {millimetres(joints['largest_sliding'], least)}"
+    ]
+    if (slivers := joints["slivers"])["count"]:
+        lines.append(
+            f"    {slivers['count']} of them are slivers, of no more than {100 * slivers['limit']:g} % of the faces of "
+            f"their stones; they carry {slivers['force'] / 1e3:.3g} kN, and are left out of kern and pressures"
+        )
+    if (text := summary["admissible"]["text"]) is not None:
+        lines.append(f"    {text}")
+    return lines
 
 
 def profile_lines(name: str) -> list[str]:

@@ -5,6 +5,7 @@ import csv
 import numpy as np
 import pytest
 
+from mechanics.results.joints import SLIVER
 from mechanics.stones.materials import Material
 from pipelines.results.joints_csv import JOINT_COLUMNS, write_joints
 from pipelines.results.stone_values import stone_results
@@ -59,6 +60,8 @@ def test_the_summary_tells_the_worst_joint_and_the_worst_stone(column):
         "largest_opening": pytest.approx(1e-4),
         "largest_sliding": pytest.approx(2e-3),
         "largest_pressure": pytest.approx(4500.0),
+        "slivers": dict.fromkeys(("count", "pressed", "force", "largest_force", "largest_pressure"), 0)
+        | {"limit": SLIVER},
     }
     stress = summary["stress"]
     assert stress["compression"]["value"] == pytest.approx(-4e6)

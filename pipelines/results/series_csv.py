@@ -1,0 +1,76 @@
+"""series_stones.csv and series_joints.csv: chosen stones, and the joints between them, step by step."""
+
+import csv
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from mechanics.results.result import Result
+from pipelines.arrays import Array
+
+__all__ = ["SERIES_COLUMNS", "write_series"]
+
+SERIES_COLUMNS: Mapping[str, Mapping[str, str]] = {
+    "series_stones.csv": {
+        "time": "[s]",
+        "stone": "code of the stone",
+        **dict.fromkeys(("x", "y", "z"), "centre of mass, in the frame of the site [m]"),
+        **dict.fromkeys(("dx", "dy", "dz"), "its displacement since the start [m]"),
+        **dict.fromkeys(("turn_x", "turn_y", "turn_z"), "rotation vector since the start [°]"),
+        **dict.fromkeys(("vx", "vy", "vz"), "velocity of the centre of mass [m/s]"),
+        **dict.fromkeys(("spin_x", "spin_y", "spin_z"), "angular velocity [°/s]"),
+    },
+    "series_joints.csv": {
+        "time": "[s]",
+        "joint": "its line in joints.csv, from 0",
+        "first": "code of one stone",
+        "second": "code of the other",
+        "opening": "largest growth of the gap since the start, at its corners [m]",
+        "sliding": "largest since the start, at its corners [m]",
+        "force_normal": "resultant across the joint, positive in compression [N]",
+        "force_shear": "resultant along the joint [N]",
+    },
+}
+"""Files, their columns, and the meaning of these."""
+
+
+def write_series(folder: Path, result: Result, origin: Array) -> None:
+    """Write the series of a result into a folder; nothing where no stones were chosen.
+
+    Parameters
+    ----------
+    folder : of the results
+    result : of the simulation
+    origin : (3,) of the scene, in the frame of the site [m]
+    """
+    series = result.series
+    if series is None:
+        return
+    codes = np.array([body.code for body in result.bodies])
+    steps, count = series.centre.shape[:2]
+    stones = np.concatenate(
+        [
+            series.centre + origin,
+            series.centre - series.start,
+            np.degrees(series.turn),
+            series.velocity[..., :3],
+            np.degrees(series.velocity[..., 3:]),
+        ],
+        axis=2,
+    ).reshape(steps * count, -1)
+    named = codes[np.tile(series.body, steps)]
+    _write(folder, "series_stones.csv", np.repeat(series.time, count), zip(named, strict=True), stones)
+    own = series.joints
+    joints = np.stack([own.opening, own.sliding, own.normal, own.shear], axis=2).reshape(-1, 4)
+    number = np.tile(own.joint, steps)
+    pair = zip(number, *codes[result.joints.bodies[number]].T, strict=True)
+    _write(folder, "series_joints.csv", np.repeat(series.time, len(own.joint)), pair, joints)
+
+
+def _write(folder: Path, name: str, time: Array, named: Iterable[Sequence[object]], values: Array) -> None:
+    with (folder / name).open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(SERIES_COLUMNS[name])
+        for instant, words, numbers in zip(time.tolist(), named, (values + 0.0).tolist(), strict=True):
+            writer.writerow([f"{instant:.12g}", *words, *(f"{one:.12g}" for one in numbers)])

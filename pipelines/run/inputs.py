@@ -1,0 +1,123 @@
+"""Inputs of a run, in words, as its report states them: survey, materials, laws, supports, loads, joints, settings."""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from archmodel.tables.entities import Entity
+from archmodel.tables.surveys import Measurement, Survey
+from mechanics.scene.scene import Fidelity, Scene
+from mechanics.stones.materials import Material
+from pipelines.run.assemble import Assembly
+from pipelines.run.closing_check import JointsReport, joints_report
+from pipelines.run.record import settings_of
+from pipelines.scene.array_tables import describe
+from pipelines.scene.file import SceneFile
+from pipelines.scene.selection import Groups
+
+__all__ = ["closing_lines", "run_inputs"]
+
+_MOST = 4  # surveys, gaps and overlaps that are named
+
+
+def run_inputs(
+    scene: SceneFile, assembly: Assembly, groups: Groups, session: Session
+) -> dict[str, tuple[str, ...]]:
+    """Return what went into a run: lines of text by title, codes under "Supports".
+
+    Parameters
+    ----------
+    scene, assembly : the scene as its author wrote it and as it was built
+    groups : the stones that its tables name
+    session : of the database from which the stones came
+    """
+    built, models = assembly.scene, assembly.models
+    materials = Counter(model.material for model in models)
+    return {
+        "Survey": tuple(_surveys(session, [model.record.code for model in models])),
+        "Stones": (
+            f"{len(models)}: "
+            + ", ".join(f"{n} {kind}" for kind, n in Counter(model.record.kind for model in models).items()),
+        ),
+        "Materials": tuple(_material(one, count) for one, count in materials.items()),
+        "Contact": tuple(_laws(scene, built, groups)),
+        "Supports": tuple(block.code for block in built.blocks if block.fidelity is Fidelity.FIXED),
+        "Loads": (
+            f"gravity ({', '.join(f'{one:z.4g}' for one in built.gravity)}) m/s²",
+            *(describe(entry, groups) for entry in (*scene.loads, *scene.throws)),
+        ),
+        "Joints of the survey": closing_lines(joints_report(assembly.closing, assembly.origin)),
+        "Time": (_named(settings_of(scene, built)["time"]),),
+        "Solver": (_named(settings_of(scene, built)["solver"]),),
+    }
+
+
+def closing_lines(report: JointsReport) -> tuple[str, ...]:
+    """Describe how the joints were closed, and what is left of gaps and overlaps."""
+    left = sum(report.left_open.values())
+    lines = [
+        f"{report.mode}: {report.count} closed, {left} left open; {1e3 * report.mean_width:z.1f} mm wide on average "
+        "as surveyed"
+    ]
+    if report.worst_stone is not None and report.max_displacement > 0.0:
+        lines.append(
+            f"corners moved by {1e3 * report.max_displacement:.1f} mm at most (stone {report.worst_stone}), volumes "
+            f"changed by {100 * report.max_volume_change:.1f} % at most"
+        )
+    lines += [f"{number} left open: {reason}" for reason, number in report.left_open.items()]
+    for name, places in (("gaps", report.gaps), ("overlaps", report.overlaps)):
+        if places:
+            shown = ", ".join(" and ".join(one.stones) for one in places[:_MOST])
+            lines.append(f"{len(places)} {name}: {shown}{', …' if len(places) > _MOST else ''}")
+    if report.alone:
+        lines.append(f"{len(report.alone)} stones without a joint, e.g. {report.alone[0]}")
+    return tuple(lines)
+
+
+def _surveys(session: Session, codes: Iterable[str]) -> Iterator[str]:
+    """Yield the surveys of the stones, with their files and the days on which they were taken in."""
+    wanted = set(codes)
+    rows = session.execute(select(Entity.code, Survey).join(Entity.measurement).join(Measurement.survey))
+    counts = Counter(survey for code, survey in rows if code in wanted)
+    for survey, count in counts.most_common(_MOST):
+        yield (
+            f"{survey.name}: {count} stones; {survey.path}, taken in on {survey.entry.recorded_at:%Y-%m-%d} "
+            f"(SHA-256 {survey.sha256[:12]}…)"
+        )
+    if len(counts) > _MOST:
+        yield f"and {len(counts) - _MOST} more"
+
+
+def _material(material: Material, count: int) -> str:
+    strengths = {"tensile": material.tensile_strength, "compressive": material.compressive_strength}
+    known = [f"{name} strength {value / 1e6:g} MPa" for name, value in strengths.items() if value is not None]
+    return ", ".join(
+        [
+            f"{material.name}, {count} stones: density {material.density:g} kg/m³",
+            f"Young's modulus {material.young / 1e9:g} GPa, Poisson's ratio {material.poisson:g}",
+            *known,
+        ]
+    )
+
+
+def _laws(scene: SceneFile, built: Scene, groups: Groups) -> Iterator[str]:
+    """Yield the general law with its friction, and those of particular joints."""
+    contact = dict(settings_of(scene, built)["contact"])
+    law = dict(contact.pop("law"))
+    yield f"{law.pop('type')}: {_named(law)}"
+    for one in scene.laws:
+        yield describe(one.entry, groups)
+    yield _named(contact)
+
+
+def _named(values: Mapping[str, object]) -> str:
+    known = {name: value for name, value in values.items() if value is not None}
+    return ", ".join(f"{name} {_shown(value)}" for name, value in known.items())
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:g}" if isinstance(value, float) else str(value)
