@@ -1,27 +1,51 @@
-"""Atomic replacement of result folders: all files appear or none, and only earlier results are replaced."""
+"""Atomic replacement of result folders: all files appear or none, and only earlier results are replaced.
 
+New results are written into a hidden folder beside the place, ``.NAME.moma-XXXXXXXX``, which then changes places with
+the earlier ones. Where the system exchanges two names at once, there is an old or a new complete folder at every
+instant. Elsewhere the earlier results wait as ``.NAME.moma-earlier`` between two renames; where a kill left them
+there, the next command puts them back. Hidden folders of programs that have ended are removed; those of living ones
+are locked.
+"""
+
+import ctypes
+import errno
 import json
 import os
 import shutil
+import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from moma.errors import UsageError
 
-__all__ = ["check_replaceable", "replacing"]
+if sys.platform != "win32":
+    import fcntl
 
-_INDEX = "summary.json"  # its "files" lists the files that a run wrote
+__all__ = ["RUN_INDEX", "check_replaceable", "replacing"]
+
+RUN_INDEX = "summary.json"
+"""Index of the results of a run."""
+
+_INDEXES = (RUN_INDEX, "check.json", "survey.json")  # their "files" list the files that MOMA wrote
+_MARK = ".moma-"  # in the names of hidden folders
+_EARLIER = f"{_MARK}earlier"
+_RANDOM = "?" * 8  # characters that tempfile adds to a name
+_EXCHANGE = 2  # RENAME_EXCHANGE of Linux
+_HERE = -100  # AT_FDCWD of Linux: paths are relative to the working directory
+_CANNOT = {errno.ENOSYS, errno.EINVAL, errno.ENOTSUP, errno.EOPNOTSUPP}  # file systems without exchange
 
 
-def check_replaceable(folder: Path, index: str = _INDEX) -> None:
-    """Refuse to replace a file, or a folder that holds anything other than earlier results.
+def check_replaceable(folder: Path, index: str = RUN_INDEX) -> None:
+    """Refuse to replace a file, or a folder that holds anything other than what MOMA wrote.
+
+    The results of a run are replaced by those of a run alone.
 
     Parameters
     ----------
     folder : the place
-    index : name of the JSON file whose "files" lists all results
+    index : name of the JSON file of the new results whose "files" lists all of them
 
     Raises
     ------
@@ -30,38 +54,125 @@ def check_replaceable(folder: Path, index: str = _INDEX) -> None:
     place, remedy = str(folder), "name another folder"
     if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
         raise UsageError("is not a folder", where=place, remedy=remedy)
+    _recover(folder)
     if not folder.exists():
         return
-    foreign = sorted({entry.name for entry in folder.iterdir()} - _own_files(folder, index))
+    known = {name: _own_files(folder, name) for name in _INDEXES}
+    foreign = sorted({entry.name for entry in folder.iterdir()} - set[str]().union(*known.values()))
     if foreign:
         shown = ", ".join(foreign[:3]) + (", …" if len(foreign) > 3 else "")
         raise UsageError(f"holds files that no run of MOMA wrote ({shown})", where=place, remedy=remedy)
+    if known[RUN_INDEX] and index != RUN_INDEX:
+        raise UsageError("holds the results of a run", where=place, remedy=remedy)
 
 
 @contextmanager
-def replacing(folder: Path, index: str = _INDEX) -> Iterator[Path]:
+def replacing(folder: Path, index: str = RUN_INDEX) -> Iterator[Path]:
     """Yield a fresh folder, which replaces `folder` when the block ends without an error.
 
-    If the block fails or is interrupted, `folder` stays as it was.
+    If the block fails, is interrupted or killed, `folder` stays as it was.
     """
     check_replaceable(folder, index)
-    parent = folder.absolute().parent
+    target = folder.absolute()
     try:
-        parent.mkdir(parents=True, exist_ok=True)
-        fresh = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=parent))
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with _locked(target.parent):
+            _clean(target.parent)
+            fresh = Path(tempfile.mkdtemp(prefix=f".{target.name}{_MARK}", dir=target.parent))
+            handle = _lock(fresh)
     except OSError as error:
         raise UsageError(
-            f"cannot be written: {error.strerror}", where=str(parent), remedy="name another folder"
+            f"cannot be written: {error.strerror}", where=str(target.parent), remedy="name another folder"
         ) from error
     try:
         yield fresh
         fresh.chmod(0o777 & ~_umask())  # mkdtemp makes it private
         check_replaceable(folder, index)
-        if folder.exists():
-            shutil.rmtree(folder)
-        fresh.rename(folder.absolute())
+        _put(fresh, target)
     finally:
         shutil.rmtree(fresh, ignore_errors=True)
+        if handle is not None:
+            os.close(handle)
+
+
+def _put(fresh: Path, target: Path) -> None:
+    """Give the fresh folder the name of the target; what had it has the name of the fresh one then, or is removed."""
+    if not target.exists() or not any(target.iterdir()):
+        fresh.rename(target)
+    elif not _exchanged(fresh, target):
+        earlier = target.with_name(f".{target.name}{_EARLIER}")
+        with _locked(target.parent):
+            target.rename(earlier)
+            fresh.rename(target)
+            shutil.rmtree(earlier)
+
+
+def _exchanged(one: Path, other: Path) -> bool:
+    """Exchange two names at once; return False where the system cannot."""
+    if not sys.platform.startswith("linux"):
+        return False
+    rename = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
+    if rename is None:
+        return False
+    if rename(_HERE, os.fsencode(one), _HERE, os.fsencode(other), _EXCHANGE) == 0:
+        return True
+    number = ctypes.get_errno()
+    if number in _CANNOT:
+        return False
+    raise OSError(number, os.strerror(number), str(other))
+
+
+def _recover(folder: Path) -> None:
+    """Put earlier results back that a kill left between two renames, or remove them where the new ones are there."""
+    target = folder.absolute()
+    earlier = target.with_name(f".{target.name}{_EARLIER}")
+    if not earlier.is_dir():
+        return
+    with suppress(OSError), _locked(target.parent):
+        if target.exists():
+            shutil.rmtree(earlier)
+        else:
+            earlier.rename(target)
+
+
+def _clean(parent: Path) -> None:
+    """Remove the hidden folders of programs that have ended before they were done."""
+    for left in parent.glob(f".*{_MARK}{_RANDOM}"):
+        handle = _lock(left)
+        if handle is not None:
+            shutil.rmtree(left, ignore_errors=True)
+            os.close(handle)
+
+
+def _lock(folder: Path) -> int | None:
+    """Lock a folder for as long as this program lives; return its handle, None if another program holds it.
+
+    Where the system has no locks, every folder is taken to be in use.
+    """
+    if sys.platform == "win32":
+        return None
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(handle)
+        return None
+    return handle
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Hold a lock on a folder, so that no other program finds a hidden folder before its owner has locked it."""
+    if sys.platform == "win32":
+        yield
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):  # a file system without locks
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)
 
 
 def _own_files(folder: Path, index: str) -> set[str]:

@@ -1,11 +1,14 @@
 """Results appear whole or not at all, and replace nothing but earlier results."""
 
 import json
+import subprocess
+import sys
 
 import pytest
 
 from moma.errors import UsageError
 from pipelines.results.folder import check_replaceable, replacing
+from tests.paths import ROOT
 
 
 def write(folder, name, text="x"):
@@ -69,3 +72,103 @@ def test_what_no_run_wrote_is_not_replaced(tmp_path):
         check_replaceable(home)
     with pytest.raises(UsageError, match="not a folder"):
         check_replaceable(home / "thesis.tex")
+
+
+def test_what_moma_wrote_with_another_command_is_replaced_but_not_the_results_of_a_run(tmp_path):
+    pictures = tmp_path / "garden"
+    pictures.mkdir()
+    write(pictures, "joints.png")
+    write(pictures, "check.json", json.dumps({"files": ["joints.png", "check.json"]}))
+    check_replaceable(pictures)
+    check_replaceable(pictures, "survey.json")
+    run = results(tmp_path / "out", "report.html")
+    with pytest.raises(UsageError, match="holds the results of a run; name another folder"):
+        check_replaceable(run, "check.json")
+    check_replaceable(run)
+
+
+KILLED = """
+import json, os, pathlib, signal, sys
+from pipelines.results import folder as module
+
+place, exchange = pathlib.Path(sys.argv[1]), sys.argv[2] == "True"
+if not exchange:
+    module._exchanged = lambda one, other: False
+
+
+def fill(folder, name):
+    (folder / name).write_text("x")
+    (folder / "summary.json").write_text(json.dumps({"files": [name, "summary.json"]}))
+
+
+def replace_and_die(folder, count):
+    child = os.fork()
+    if child == 0:
+        left = [count]
+
+        def hook(event, arguments):
+            if event.split(".")[0] in ("os", "shutil", "tempfile", "ctypes", "open", "fcntl"):
+                left[0] -= 1
+                if left[0] < 0:
+                    os.kill(os.getpid(), signal.SIGKILL)
+
+        sys.addaudithook(hook)
+        with module.replacing(folder) as fresh:
+            fill(fresh, "new.png")
+        os._exit(0)
+    return os.waitpid(child, 0)[1]
+
+
+count, ended, seen = 0, False, []
+while not ended:
+    own = place / str(count)
+    own.mkdir()
+    folder = own / "out"
+    folder.mkdir()
+    fill(folder, "old.png")
+    ended = replace_and_die(folder, count) == 0
+    if not exchange:  # between the two renames MOMA alone finds them
+        module.check_replaceable(folder)
+    found = sorted(one.name for one in folder.iterdir())
+    with module.replacing(folder) as fresh:
+        fill(fresh, "newer.png")
+    seen.append([found, sorted(one.name for one in own.iterdir()), sorted(one.name for one in folder.iterdir())])
+    count += 1
+print(json.dumps(seen))
+"""
+"""Replace results in child processes, the n-th of which kills itself before its n-th call to the file system."""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="names are exchanged on Linux alone")
+@pytest.mark.parametrize("exchange", [True, False])
+def test_a_kill_at_any_instant_leaves_old_or_new_results_and_the_next_run_cleans_up(tmp_path, exchange):
+    done = subprocess.run(
+        [sys.executable, "-c", KILLED, str(tmp_path), str(exchange)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    seen = json.loads(done.stdout)
+    assert len(seen) > 15
+    ways = {tuple(found) for found, _, _ in seen}
+    assert ways == {("old.png", "summary.json"), ("new.png", "summary.json")}
+    assert {tuple(left) for _, left, _ in seen} == {("out",)}
+    assert {tuple(after) for _, _, after in seen} == {("newer.png", "summary.json")}
+
+
+def test_the_hidden_folder_of_a_run_that_lives_is_left_alone(tmp_path):
+    with replacing(tmp_path / "out") as fresh:
+        write(fresh, "new.png")
+        with replacing(tmp_path / "out2") as other:
+            write(other, "new.png")
+        assert (fresh / "new.png").exists()
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["out", "out2"]
+
+
+def test_a_hidden_folder_of_the_user_is_left_alone(tmp_path):
+    (tmp_path / ".out-settings").mkdir()
+    with replacing(tmp_path / "out") as fresh:
+        write(fresh, "new.png")
+    assert (tmp_path / ".out-settings").exists()
