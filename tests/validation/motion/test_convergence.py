@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 from tests.validation.motion.test_rocking import SLENDER, angles, housner, rocking, slenderness
 from tests.validation.motion.test_rotation import body_rates, euler, plate
 from tests.validation.motion.test_sliding import low_block
-from tests.validation.scenes import G, dynamic, follow, ground, moved
+from tests.validation.scenes import G, dynamic, follow, ground, moved, tilted_gravity
 
 
 def order(steps, errors):
@@ -71,6 +71,31 @@ def test_a_drop_that_ends_in_a_slide_is_of_first_order_at_least():
         errors.append(np.sqrt(np.mean((ends - exact) ** 2)))
     assert errors[0] < 1e-4
     assert order(steps, errors) > 0.8
+
+
+def test_a_curved_slide_is_of_first_order():
+    """A block that starts across a slope with tan α = μ, and turns downhill; slope 0.9 to 1.1 over two octaves.
+
+    Friction is against the velocity at the end of the step, so its direction is ahead by h/2: the descent after 0.5 s
+    is 2.3 % short with h = 10 ms. The equation: v' = g sin α x - μ g cos α v/|v|, by scipy.
+    """
+    friction, across, time = 0.5, 1.0, 0.5
+    pull, drag = G * np.array([np.sin(np.arctan(friction)), friction * np.cos(np.arctan(friction))])
+
+    def slide(_, y):
+        speed = np.hypot(y[2], y[3])
+        return [y[2], y[3], pull - drag * y[2] / speed, -drag * y[3] / speed]
+
+    exact = solve_ivp(slide, (0, time), [0, 0, 0, across], rtol=1e-11, atol=1e-13).y[0, -1]
+    steps, errors = np.array([2e-2, 1e-2, 5e-3]), []
+    for step in steps:
+        block = moved(low_block((0.0, across, *[0.0] * 4)))
+        gravity = tilted_gravity(np.degrees(np.arctan(friction)))
+        scene = dynamic("curve", (ground(), block), friction=friction, gravity=gravity, step=step, duration=time)
+        path = follow(scene)
+        errors.append(exact - path.centre[-1, 1, 0] + path.centre[0, 1, 0])
+    assert errors[1] == pytest.approx(0.0232 * exact, rel=0.05)
+    assert 0.9 < order(steps, errors) < 1.1
 
 
 @pytest.mark.slow
