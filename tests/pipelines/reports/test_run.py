@@ -2,6 +2,7 @@
 
 import base64
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -104,13 +105,35 @@ def test_the_report_lists_the_worst_first(tmp_path):
     place += [words.index("Joints that opened most"), words.index("History")]
     joints = [
         [word for word in words[start:end] if word.startswith("S") and " – S" in word]
-        for start, end in zip(place[:-1], place[1:], strict=True)
+        for start, end in pairwise(place)
     ]
     assert joints == [
         ["S2 – S3", "S0 – S1"],
         ["S2 – S3", "S1 – S2", "S0 – S1"],
         ["S2 – S3", "S1 – S2"],  # the lowest has not opened
     ]
+
+
+def test_the_report_lists_the_most_stressed_stones_first(tmp_path):
+    """Pulled by 1, 3 and 2 MPa; the error of their stress grows the other way round."""
+    bodies = [
+        deformable_body(
+            f"D{k}", (2 * k, 0, 0), (2 * k + 1, 1, 1), lambda p, k=k: -1e6 * k * p[:, 2], 0.5, error=0.5 / k
+        )
+        for k in (1, 3, 2)
+    ]
+    result = result_of(bodies, pairs=(), forces=())
+    summary = summarise(result, version="1.2", seconds={})
+    write_report(tmp_path / "report.html", result, summary, stone_results(result), [])
+    words = Page(tmp_path / "report.html").text
+    titles = (
+        "Most stressed stones",
+        "Stones with the largest tension",
+        "Stones with the least certain stress",
+    )
+    place = [words.index(title) for title in (*titles, "History")]
+    listed = [[word for word in words[a:b] if word in ("D1", "D2", "D3")] for a, b in pairwise(place)]
+    assert listed == [["D3", "D2", "D1"], ["D3", "D2", "D1"], ["D1", "D2", "D3"]]
 
 
 @pytest.mark.parametrize(

@@ -83,7 +83,7 @@ def test_without_gravity_reactions_count_upwards_and_settlement_downwards():
 def test_settlement_is_along_gravity_and_of_the_stone_that_sank_most(down):
     """One stone falls for 0.1 s, by g t²/2; another is thrown against gravity as fast as it gains speed."""
     g, time = 9.81, 0.1
-    up = tuple(-g * time * np.array(down)) + (0.0, 0.0, 0.0)
+    up = (*(-g * time * one for one in down), 0.0, 0.0, 0.0)
     stones = [brick("falls", (0, 0, 2), (1, 1, 2.5)), brick("rises", (5, 0, 2), (6, 1, 2.5), velocity=up)]
     falling = scene(
         *stones,
