@@ -99,6 +99,29 @@ def test_a_run_in_full_names_the_worst_stones_and_joints(session: Session) -> No
     assert [row["code"] for row in describe_run(session, 1, count=1)["largest_stresses"]] == ["V2"]
 
 
+def test_the_worst_joints_are_those_of_the_run_itself_and_the_worst_of_all(filled: Database) -> None:
+    """Two runs of the same joints, opened the other way round."""
+    runs = [
+        replace(run_record({"V1": None, "V2": None, "V3": None}), joints=joints(opening, kern, use))
+        for opening, kern, use in (
+            ([1e-3, 2e-3, 3e-3], [2.0, 3.0, 4.0], [0.2, 0.3, 0.4]),
+            ([6e-3, 5e-3, 4e-3], [7.0, 6.0, 5.0], [0.7, 0.6, 0.5]),
+        )
+    ]
+    with filled.session() as session:
+        numbers = [store_run(session, one) for one in runs]
+    columns = {"largest_openings": "opening", "least_centred": "kern", "most_used_friction": "friction_use"}
+    with filled.session(read_only=True) as session:
+        for number, pairs in zip(
+            numbers, ((("V1", "V3"), ("V2", "V3")), (("V1", "V2"), ("V2", "V3"))), strict=True
+        ):
+            told, run = describe_run(session, number, count=2), runs[number - numbers[0]]
+            for name, column in columns.items():
+                assert [(row["first"], row["second"]) for row in told[name]] == [*pairs]
+                worst = sorted(getattr(run.joints, column), reverse=True)[:2]
+                assert [row[column] for row in told[name]] == worst
+
+
 def test_a_run_in_full_says_what_its_stones_were_simplified_to(session: Session) -> None:
     told = describe_run(session, 1)
     assert told["simplification"] == {

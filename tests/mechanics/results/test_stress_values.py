@@ -67,6 +67,7 @@ def test_the_worst_place_is_named_and_zones_are_parts_of_the_volume():
     assert values.utilisation_tension == pytest.approx(1.5)
     assert values.utilisation_compression == pytest.approx(1.5)
     assert values.von_mises_mean == pytest.approx((30e6 + 2e6 + 3e6 + 12e6) / 10)
+    assert values.von_mises_p99 == pytest.approx(30e6)  # in a tenth of the volume
 
 
 def test_what_governs_is_the_larger_utilisation():

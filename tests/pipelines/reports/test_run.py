@@ -2,7 +2,12 @@
 
 import base64
 from dataclasses import replace
+from itertools import pairwise
 
+import numpy as np
+import pytest
+
+from mechanics.dynamics.outcome import Outcome
 from mechanics.scene.scene import Fidelity
 from pipelines.reports.run import write_report
 from pipelines.results.stone_values import stone_results
@@ -37,6 +42,115 @@ def test_the_report_names_the_worst_stones_and_joints(strong, tmp_path):
     assert "10.0 %" in words  # error
     assert words[words.index("Joints that slid most") + 8] == "D1 – top"
     assert words[words.index("Joints that opened most") + 8] == "D1 – top"
+
+
+def row(words, title, head, first):
+    """The first row of the table under a title, by the heads of its columns."""
+    start = words.index(head, words.index(title))
+    end = words.index(first, start)
+    return dict(zip(words[start:end], words[end : 2 * end - start], strict=True))
+
+
+def test_the_report_gives_every_number_in_its_unit_under_its_head(tmp_path):
+    """A stone between 0.5 MPa of tension and 1.5 MPa of compression; joints of 1 m² that bear 3 kN and 800 N."""
+    strong = replace(LIMESTONE, tensile_strength=1e6, compressive_strength=4e6)
+    bodies = [
+        rigid_body("base", (0, 0, 0), (1, 1, 1), Fidelity.FIXED),
+        deformable_body(
+            "D1", (0, 0, 1), (1, 1, 3), lambda p: 1e6 * (p[:, 2] - 1.5), 0.5, (0, 0, -0.002), strong
+        ),
+        rigid_body("top", (0, 0, 3), (1, 1, 4), shift=(0, 0.003, -0.004)),
+    ]
+    pairs, forces = ((1, 0), (2, 1)), ((0.0, 0.0, 3000.0), (0.0, 600.0, 800.0))
+    result = result_of(bodies, pairs=pairs, forces=forces, material=strong)
+    stones = stone_results(result)
+    summary = summarise(result, version="1.2", seconds={"solve": 1.5})
+    write_report(tmp_path / "report.html", result, summary, stones, [])
+    words = Page(tmp_path / "report.html").text
+    for name, value in (
+        ("Weight carried", "20.00 kN"),
+        ("Reaction of the supports", "20.01 kN"),
+        ("Largest displacement", "5 mm"),
+        ("Von Mises stress, largest", "1.5000 MPa"),
+        ("Overlap", "2.0e-06"),
+        ("Energy", "not known"),
+        ("Unsolved steps", "1"),
+        ("solve", "1.50 s"),
+    ):
+        assert words[words.index(name) + 1] == value
+    stone = row(words, "Stones nearest to their strength", "Stone", "D1")
+    assert stone["Stress over strength"] == "0.5"
+    assert stone["Tension, largest"] == "0.5000 MPa"
+    assert stone["Compression, largest"] == "-1.5000 MPa"
+    assert stone["Pressure, mean"] == "0.1667 MPa"
+    upper = row(words, "Joints with the most eccentric resultants", "Joint", "D1 – top")
+    assert (upper["Over the kern"], upper["Over the edge"]) == ("1.2", "0.4")
+    assert (upper["Opening"], upper["Sliding"], upper["Friction used"]) == ("0.1 mm", "2 mm", "0.5")
+    assert upper["Pressure, mean"] == "0.8 kPa"
+
+
+def test_the_report_lists_the_worst_first(tmp_path):
+    """Of three joints the highest has slid and opened most, and the middle one bears nothing."""
+    stones = [rigid_body(f"S{k}", (0, 0, k), (1, 1, k + 1)) for k in range(4)]
+    pairs, forces = [(1, 0), (2, 1), (3, 2)], np.tile([0.0, 0.0, 900.0], (3, 1))
+    result = result_of(stones, pairs=pairs, forces=forces)
+    kern = np.array([0.6, np.nan, 1.8])
+    result = replace(result, joints=replace(result.joints, kern=kern))
+    summary = summarise(result, version="1.2", seconds={})
+    write_report(tmp_path / "report.html", result, summary, stone_results(result), [])
+    words = Page(tmp_path / "report.html").text
+    place = [
+        words.index(f"Joints {what}") for what in ("with the most eccentric resultants", "that slid most")
+    ]
+    place += [words.index("Joints that opened most"), words.index("History")]
+    joints = [
+        [word for word in words[start:end] if word.startswith("S") and " – S" in word]
+        for start, end in pairwise(place)
+    ]
+    assert joints == [
+        ["S2 – S3", "S0 – S1"],
+        ["S2 – S3", "S1 – S2", "S0 – S1"],
+        ["S2 – S3", "S1 – S2"],  # the lowest has not opened
+    ]
+
+
+def test_the_report_lists_the_most_stressed_stones_first(tmp_path):
+    """Pulled by 1, 3 and 2 MPa; the error of their stress grows the other way round."""
+    bodies = [
+        deformable_body(
+            f"D{k}", (2 * k, 0, 0), (2 * k + 1, 1, 1), lambda p, k=k: -1e6 * k * p[:, 2], 0.5, error=0.5 / k
+        )
+        for k in (1, 3, 2)
+    ]
+    result = result_of(bodies, pairs=(), forces=())
+    summary = summarise(result, version="1.2", seconds={})
+    write_report(tmp_path / "report.html", result, summary, stone_results(result), [])
+    words = Page(tmp_path / "report.html").text
+    titles = (
+        "Most stressed stones",
+        "Stones with the largest tension",
+        "Stones with the least certain stress",
+    )
+    place = [words.index(title) for title in (*titles, "History")]
+    listed = [[word for word in words[a:b] if word in ("D1", "D2", "D3")] for a, b in pairwise(place)]
+    assert listed == [["D3", "D2", "D1"], ["D3", "D2", "D1"], ["D1", "D2", "D3"]]
+
+
+@pytest.mark.parametrize(
+    ("outcome", "lead"),
+    [
+        ("equilibrium", "It stands"),
+        ("moving", "still moving"),
+        ("collapsed", "It falls"),
+        ("undecided", "Nothing can be said"),
+        ("interrupted", "interrupted before its time"),
+    ],
+)
+def test_the_report_begins_with_the_outcome(tmp_path, outcome, lead):
+    result = result_of([rigid_body("a", (0, 0, 0), (1, 1, 1))], Outcome(outcome), pairs=(), forces=())
+    summary = summarise(result, version="1.2", seconds={})
+    write_report(tmp_path / "report.html", result, summary, stone_results(result), [])
+    assert lead in " ".join(Page(tmp_path / "report.html").text[:6])
 
 
 def test_the_report_of_a_rigid_collapse_says_so(rigid, tmp_path):

@@ -1,6 +1,7 @@
 """joints.csv and the joints in summary.json."""
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -50,6 +51,19 @@ def test_every_joint_has_its_line(column, tmp_path):
     assert numbers["parted"] == 0.0
 
 
+def test_places_are_those_of_the_site_to_the_millimetre_and_eccentricities_are_distances(column, tmp_path):
+    """In national coordinates; a resultant 0.3 m beside the middle along one axis, 0.4 m along the other."""
+    origin = np.array([652_345.678, 6_862_789.123, 1_040.5])
+    eccentricity = np.array([[0.3, 0.4], [0.0, -0.2]])
+    joints = replace(column.joints, eccentricity=eccentricity)
+    write_joints(tmp_path / "joints.csv", replace(column, joints=joints), origin)
+    with (tmp_path / "joints.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["eccentricity"]) for row in rows] == pytest.approx([0.5, 0.2])
+    for row, centroid in zip(rows, column.joints.centroid + origin, strict=True):
+        assert [float(row[axis]) for axis in "xyz"] == pytest.approx(centroid, rel=0, abs=1e-3)
+
+
 def test_the_summary_tells_the_worst_joint_and_the_worst_stone(column):
     summary = summarise(column, version="1", seconds={})
     assert summary["joints"] == {
@@ -78,6 +92,9 @@ def test_a_stone_takes_the_worst_of_its_joints_and_its_stresses_to_the_database(
     assert elastic.values["joint_kern"] == pytest.approx(1.2)
     assert elastic.values["joint_pressure"] == pytest.approx(4500.0)
     assert top.values["joint_sliding"] == pytest.approx(2e-3)
+    assert (base.values["joint_opening"], elastic.values["joint_opening"]) == pytest.approx((0.0, 1e-4))
+    assert top.values["joint_friction_use"] == pytest.approx(0.5)
+    assert elastic.values["stress_error"] == pytest.approx(0.1)
     assert elastic.values["utilisation"] == pytest.approx(0.5)
     assert elastic.values["utilisation_tension"] == pytest.approx(0.0, abs=1e-9)
     assert elastic.values["mean_pressure"] == pytest.approx(2e6 / 3)
