@@ -53,6 +53,8 @@ def contact_problem(
         initial = gap - time.step * (1 - time.theta) * speed
         internal = internal.copy()
         internal[:, REST] = np.where(initial < -_TOUCH * size, initial, internal[:, REST])
+    pushed = np.full(len(contacts.bodies), time.relaxation)
+    pushed &= model.elastic[contacts.bodies].any(axis=1)
     approach = Approach(
         gap=gap,
         speed=speed,
@@ -61,7 +63,7 @@ def contact_problem(
         compliance=operator.diagonal[:, 0, 0],
         step=time.step,
         theta=time.theta,
-        push_out=model.elastic[contacts.bodies].any(axis=1) & time.relaxation,
+        push_out=pushed,
         first=first,
         state=internal,
     )
