@@ -1,6 +1,7 @@
 """Contacts of a configuration with their Delassus operator, made again once bodies have moved."""
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -116,6 +117,12 @@ class ContactSearch:
         with self._clock("assemble"):
             self._last = detection(model, predicted, contacts, self._compliance, self._elastic_scale)
         return self._last
+
+    def continued(self, model: Model) -> "ContactSearch":
+        """Return the search for other settings of time, which knows the last result."""
+        other = copy(self)
+        other._last = None if self._last is None else replace(self._last, model=model)
+        return other
 
     def _is_stale(self, last: Detection, model: Model, predicted: State) -> bool:
         if self._every_step or last.model is not model:

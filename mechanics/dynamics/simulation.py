@@ -1,5 +1,6 @@
 """The time loop of docs/theory.md: predict, detect, state the contact problem, solve, advance."""
 
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -92,7 +93,13 @@ class Simulation:
         time = self.model.scene.time
         free = replace(time, relaxation=False, theta=1.0 if time.relaxation else time.theta)
         model = replace(self.model, scene=replace(self.model.scene, time=free))
-        other = Simulation(model, self.start, self.clock, self._given_solver)
+        if free.theta == time.theta:
+            # ŵ is the same, and with it W
+            other = copy(self)
+            other.model, other._detect = model, self._detect.continued(model)
+            other._relax = Relaxation(model)
+        else:
+            other = Simulation(model, self.start, self.clock, self._given_solver)
         other.state, other._first = self.state, False
         rigid = bool(model.inertia.moving.any())
         other._memory = self._memory.without_forces() if rigid else self._memory
