@@ -75,7 +75,7 @@ class Detector:
     ----------
     surfaces : the bodies' polyhedra and face meshes
     fixed : (nb,) bodies that no contact moves; pairs of them are left out
-    alert : gap below which a contact is watched, relative to the smaller shape [-]
+    alert : gap below which a contact is watched, relative to the smaller stone [-]
     points, placement : how many contact points two rigid faces have at least where these describe them, and where
     distance : gap up to which some law acts, whatever the size of the stones [m]
     """
@@ -115,7 +115,9 @@ class Detector:
     def _touching(self, placed: Placed, reach: Array) -> Pairs:
         """Find the pairs of shapes nearer than their alert distance."""
         own = self.surfaces
-        margin = np.maximum(self.alert * own.shapes.size, self.distance) + reach
+        # a thin part of a stone is watched like the whole stone
+        size = own.size[own.body]
+        margin = np.maximum(self.alert * size, self.distance) + reach
         low, high = boxes(own.shapes.vptr, placed.shapes.vertex, margin)
         round_ = own.radius > 0
         around = placed.centre[own.body[round_]], (own.radius + margin)[round_, None]
@@ -124,7 +126,7 @@ class Detector:
         key = _pair_key(shapes, len(own.body))
         order = np.argsort(key)
         shapes, key = shapes[order], key[order]
-        limit = np.maximum(self.alert * own.shapes.size[shapes].min(axis=1), self.distance)
+        limit = np.maximum(self.alert * size[shapes].min(axis=1), self.distance)
         limit = limit + reach[shapes].sum(axis=1)
         balls = round_[shapes].any(axis=1)
         hint = self._hints.of(key)

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from mechanics.arrays import Array, Ints
 from mechanics.contact._kernels.facets import FacetMeshes
@@ -31,7 +32,7 @@ class Surfaces:
     sptr : (nb+1,) shapes of each body
     shapes : all shapes, in the axes of their bodies, from their centres of mass
     radius : (ns,) of balls, zero for polyhedra [m]
-    size : (nb,) smallest width of each body [m]
+    size : (nb,) smallest width of each body, that of all its parts together [m]
     plane : (nf,) a number that faces of one body share if they lie in one plane
     face_mesh : per face, its finite elements; None for rigid bodies
     meshes : the same, packed
@@ -118,7 +119,7 @@ def surfaces(
             face_area=np.array([_area(p) for p in polygons]),
         ),
         radius=radii,
-        size=np.minimum.reduceat(size, sptr[:-1]),
+        size=_widths(owner, sptr, vptr, vertex, size),
         plane=_planes(owner, np.diff(fptr), normal, np.array([p[0] for p in polygons])),
         face_mesh=tuple(face_mesh),
         meshes=packed_meshes(face_mesh),
@@ -129,6 +130,15 @@ def middles(vptr: Ints, vertex: Array) -> Array:
     """Return the mean of the vertices (ns, 3) of each shape."""
     mean: Array = np.add.reduceat(vertex, vptr[:-1]) / np.diff(vptr)[:, None]
     return mean
+
+
+def _widths(body: Ints, sptr: Ints, vptr: Ints, vertex: Array, size: Array) -> Array:
+    """Return the smallest width (nb,) of each body: of one shape its own, of several that of their convex hull [m]."""
+    width = size[sptr[:-1]]
+    for b in np.flatnonzero(np.bincount(body) > 1):
+        corners = vertex[vptr[sptr[b]] : vptr[sptr[b + 1]]]
+        width[b] = np.ptp(corners @ ConvexHull(corners).equations[:, :3].T, axis=0).min()
+    return width
 
 
 def _pointer(counts: Sequence[int]) -> Ints:

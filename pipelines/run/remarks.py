@@ -1,14 +1,17 @@
 """Remarks for the author of a scene: keys without effect, and limits of its stresses."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 from mechanics.scene.scene import Fidelity
 from pipelines.run.fidelity import Modelled
 from pipelines.scene.file import SceneFile
 from pipelines.scene.selection import STRESS, Groups
+from survey.geometry.solids import volume_of
+from survey.simplify.simplify import BlockyStone
 
-__all__ = ["remarks"]
+__all__ = ["remarks", "remarks_on_stones"]
 
+_MEASURED = ("points", "photograph")  # sources of faces that were measured, not imported with a solid
 _STRESS = 'ask for their stress by stress in [output], or give default = "deformable" in [bodies]'
 
 
@@ -27,6 +30,23 @@ def remarks(scene: SceneFile, groups: Groups, modelled: Mapping[str, Modelled]) 
         *_of_stress(scene, groups, modelled),
         *_of_ring(scene, modelled),
         *_of_surroundings(scene, modelled),
+    )
+
+
+def remarks_on_stones(stones: Sequence[BlockyStone]) -> tuple[str, ...]:
+    """Return a remark on the imported stones whose warped faces were made plane: by how much, and what it weighs."""
+    changed = [one for one in stones if one.face.provenance.source not in _MEASURED and not one.report.within]
+    if not changed:
+        return ()
+    moved = max(changed, key=lambda one: float(one.report.displacement.max()))
+    grown = max(changed, key=lambda one: abs(one.report.volume_change))
+    after = [volume_of(one.solid) for one in changed]
+    before = [new / (1.0 + one.report.volume_change) for new, one in zip(after, changed, strict=True)]
+    return (
+        f"the warped faces of {len(changed)} stone{'' if len(changed) == 1 else 's'} were made plane: corners moved by "
+        f"up to {1e3 * moved.report.displacement.max():.2g} mm (stone {moved.code}), volumes changed by up to "
+        f"{100 * grown.report.volume_change:+.2g} % (stone {grown.code}), by {1e3 * (sum(after) - sum(before)):+.2g} "
+        f"dm³ or {100 * (sum(after) / sum(before) - 1):+.2g} % together; moma check -v lists them",
     )
 
 

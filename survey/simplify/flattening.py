@@ -3,22 +3,28 @@
 Meshes cut a planar face in two, or into triangles, and coordinates rounded to a millimetre bend it. Faces that share
 an edge and lie in one plane, within a tolerance, are merged here. A corner of three faces is put at the intersection
 of their planes; corners of only one or two planes are dropped.
+
+A warped polygon, whose corners are in no plane, was folded along diagonals when it was read. Where three such polygons
+meet in every corner, the stone gets one plane for each of them: the mean plane of its corners, the same for both stones
+that share it.
 """
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Container
 from dataclasses import dataclass
 
 import numpy as np
 
 from survey.arrays import Array
+from survey.geometry.convexity import is_convex
 from survey.geometry.solids import Solid
 from survey.simplify.blockiness import face_vectors, from_edges
 
-__all__ = ["FlatSolid", "flatten"]
+__all__ = ["FlatSolid", "flatten", "unfold"]
 
 Face = tuple[int, ...]
 
+_WARP = 0.1  # of a stone's width: largest displacement of a corner that makes its warped faces plane
 _SAME_SIDE = 0.9  # least cosine between normals, which are poor in thin triangles: heights decide
 _PLANE = 1e-13  # of a solid's size: distance of a corner from its planes that is due to rounding
 _SHALLOWEST = 1e-4  # determinant of three unit normals below which their intersection is undetermined
@@ -53,7 +59,35 @@ def flatten(solid: Solid, tolerance: float) -> FlatSolid | None:
     in one corner
     """
     vectors = face_vectors(solid)
-    groups = _plane_groups(solid, vectors, tolerance)
+    return _with_planes(solid, vectors, _plane_groups(solid, vectors, tolerance), tolerance)
+
+
+def unfold(solid: Solid) -> FlatSolid | None:
+    """Make the folded faces of a stone plane, so that it is convex; its corners move by a tenth of its width at most.
+
+    Parameters
+    ----------
+    solid : closed, seen from outside, near the origin
+
+    Returns
+    -------
+    FlatSolid; None if no faces are folded, not every corner has three planes, or its corners would move farther
+    """
+    vectors = face_vectors(solid)
+    groups = _folded_groups(solid, vectors)
+    if len(groups) == len(solid.faces):
+        return None
+    normals = np.array([vectors[group].sum(axis=0) for group in groups])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
+    width = float(np.ptp(solid.vertices @ normals.T, axis=0).min())
+    found = _with_planes(solid, vectors, groups, _WARP * width)
+    # a curved face has corners that only divide its edge, and would lose them
+    kept = found is not None and len(found.solid.vertices) == len({i for face in solid.faces for i in face})
+    return found if found is not None and kept and is_convex(found.solid) else None
+
+
+def _with_planes(solid: Solid, vectors: Array, groups: list[list[int]], tolerance: float) -> FlatSolid | None:
+    """Give each group of faces one plane; None if corners would move by more than the tolerance [m]."""
     around: dict[int, list[int]] = defaultdict(list)
     for number, group in enumerate(groups):
         for i in sorted({i for face in group for i in solid.faces[face]}):
@@ -104,6 +138,20 @@ def _plane_groups(solid: Solid, vectors: Array, tolerance: float) -> list[list[i
                     group.append(other)
         groups.append(group)
     return groups
+
+
+def _folded_groups(solid: Solid, vectors: Array) -> list[list[int]]:
+    """Group faces across folds: shallow edges, at both ends of which more than three faces meet."""
+    count = Counter(i for face in solid.faces for i in face)
+    normals = vectors / np.maximum(np.linalg.norm(vectors, axis=1), 1e-300)[:, None]
+    owner = {edge: k for k, face in enumerate(solid.faces) for edge in _edges(face)}
+    group = list(range(len(solid.faces)))
+    for (p, q), k in owner.items():
+        other = owner.get((q, p), k)
+        if min(count[p], count[q]) > 3 and normals[k] @ normals[other] > _SAME_SIDE:
+            old, new = group[other], group[k]
+            group = [new if one == old else one for one in group]
+    return [[k for k, own in enumerate(group) if own == one] for one in dict.fromkeys(group)]
 
 
 def _edges(face: Face) -> list[tuple[int, int]]:

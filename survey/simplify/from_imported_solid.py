@@ -9,7 +9,7 @@ from survey.geometry.folds import fold, warp
 from survey.geometry.plane_network import settle
 from survey.geometry.solids import Solid, highest_corner
 from survey.simplify.blockiness import about, common_share, largest_skew, moved_corners, solid_volume
-from survey.simplify.flattening import FlatSolid, flatten
+from survey.simplify.flattening import FlatSolid, flatten, unfold
 from survey.simplify.prisms import as_prism, box_around
 from survey.simplify.result import BlockShape, SimpleSolid, Simplified, prism_shape
 from survey.simplify.squaring import SimplifyBounds
@@ -28,11 +28,16 @@ def simplify_solid(block: SurveyedBlock, bounds: SimplifyBounds) -> SimpleSolid:
     old, tolerance = about(block.solid, origin), bounds.least_tolerance
     _check_full(old)
     found = flatten(old, tolerance)
+    if found is None:
+        found = unfold(old)
     new = (
         None if found is None else _prism(found.solid, block.face.fit.normal, block.face.outline[0] - origin)
     )
     if found is not None and new is not None:
         shape, reason = prism_shape(len(new.faces) - 2), _describe(old, new, found)
+    elif found is not None and found.moved.max() > tolerance:
+        shape, new = BlockShape.POLYHEDRON, found.solid
+        reason = _describe(old, new, found)
     else:
         shape, new = BlockShape.POLYHEDRON, _general(old, tolerance)
         reason = _why_general(old, new)
@@ -104,7 +109,7 @@ def _size(solid: Solid) -> float:
 def _describe(old: Solid, new: Solid, found: FlatSolid) -> str:
     words = [f"{len(new.faces)} plane faces"]
     if len(old.faces) > len(new.faces):
-        words.append(f"{len(old.faces)} faces lie in their planes")
+        words.append(f"{len(old.faces)} faces lie in their planes, or were folded from them")
     if found.moved.max() > 0.0:
         words.append(f"corners moved by up to {found.moved.max() * 1e3:.2g} mm to make them plane")
     return "; ".join(words)

@@ -1,5 +1,7 @@
 """Simplification of imported solids."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,7 +11,8 @@ from scipy.spatial import ConvexHull
 from moma.errors import GeometryError
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.extrusion.imported_solids import block_of_solid
-from survey.geometry.solids import Solid
+from survey.formats.solids.reader import open_solids
+from survey.geometry.solids import Solid, planes_of_solid
 from survey.geometry.watertight import check_watertight, triangulate
 from survey.records.survey import SolidRecord
 from survey.simplify.simplify import BlockShape, BlockyStone, simplify
@@ -236,6 +239,76 @@ def test_what_a_rounded_hexahedron_shares_with_its_plane_one_is_its_blockiness()
         least = twin.volume(stone.solid) / hull - abs(twin.volume(inside) / hull - 1.0)
         assert least - 1e-9 <= stone.report.blockiness <= 1.0
         assert stone.report.blockiness > 1.0 - 6.0 * 0.0015 / min(np.ptp(corners, axis=0))
+
+
+def warped_pair(rng: np.random.Generator, warp: float) -> tuple[np.ndarray, np.ndarray]:
+    """Corners of two neighbouring hexahedra of a lattice, which share a face; each corner is moved up to `warp`."""
+    lattice = np.array([[[(x, y, z) for z in (0, 0.3)] for y in (0, 0.4)] for x in (0, 0.5, 1.0)])
+    lattice = lattice + rng.uniform(-warp, warp, lattice.shape)
+    order = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
+    one, other = (np.array([lattice[x + at, y, z] for x, y, z in order]) for at in (0, 1))
+    return one, other
+
+
+def read(tmp_path: Path, corners: np.ndarray, faces: tuple[tuple[int, ...], ...] = SIDES) -> SurveyedBlock:
+    """The stone as the reader of solids folds its faces."""
+    lines = [f"v {x:.9f} {y:.9f} {z:.9f}" for x, y, z in corners]
+    lines += ["f " + " ".join(str(i + 1) for i in face) for face in faces]
+    path = tmp_path / "stone.obj"
+    path.write_text("\n".join(["o A", *lines, ""]))
+    (record,) = open_solids(path).blocks
+    assert isinstance(record, SolidRecord)
+    return block_of_solid(record, None, "stone.obj")
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("warp", [0.003, 0.01, 0.02])
+def test_stones_with_warped_faces_are_one_convex_stone_and_share_a_plane(
+    tmp_path: Path, seed: int, warp: float
+) -> None:
+    """Corners out of place by up to 7 % of the width of 0.3 m: each face becomes the mean plane of its corners."""
+    pair = warped_pair(np.random.default_rng(seed), warp)
+    stones = []
+    for corners in pair:
+        block = read(tmp_path, corners)
+        assert len(block.solid.faces) > 6
+        stone = simplify(block)
+        assert stone.shape is BlockShape.HEXAHEDRON
+        assert twin.bend(stone.solid) < 1e-9
+        assert twin.highest(stone.solid) < 1e-9
+        moved = stone.report.displacement.max()
+        assert moved <= 0.1 * 0.34
+        assert stone.report.volume_change == pytest.approx(
+            twin.volume(stone.solid) / twin.volume(block.solid) - 1.0,
+            abs=1e-4,  # faces that rounding may have warped are not folded
+        )
+        assert abs(stone.report.volume_change) < warp / 0.3
+        stones.append(stone)
+    # the face of four corners that both have
+    shared = pair[0][[1, 2, 6, 5]]
+    planes = [
+        min(planes_of_solid(one.solid), key=lambda row: np.abs(shared @ row[:3] - row[3]).max())
+        for one in stones
+    ]
+    np.testing.assert_allclose(planes[0], -planes[1], atol=1e-9)
+
+
+def test_faces_warped_by_more_than_a_tenth_of_the_width_stay_folded(tmp_path: Path) -> None:
+    corners = box(0.5, 0.4, 0.3)
+    corners[6] += [0.0, 0.0, 0.25]
+    stone = simplify(read(tmp_path, corners))
+    assert stone.shape is BlockShape.POLYHEDRON
+    assert len(stone.solid.faces) > 6
+    assert stone.report.volume_change == 0.0
+
+
+def test_a_curved_face_of_several_strips_stays_curved(tmp_path: Path) -> None:
+    """Its sagitta is 4 % of its width, but its strips are faces, and meet those of a neighbour."""
+    arc = [(x, 1.0 + 0.04 * (1.0 - (x - 0.5) ** 2 * 4)) for x in np.linspace(1.0, 0.0, 6)]
+    corners, faces = prism_of(np.array([(0.0, 0.0), (1.0, 0.0), *arc]), 1.0)
+    stone = simplify(read(tmp_path, corners, faces))
+    assert len(stone.solid.faces) == len(faces)
+    assert stone.report.volume_change == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_solid_seen_from_inside_or_flat_is_refused_by_name() -> None:
