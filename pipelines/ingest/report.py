@@ -12,6 +12,7 @@ from pipelines.arrays import Array
 from pipelines.ingest.records import frame_record
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.convexity import is_convex
+from survey.quality.plausible import LENGTH, doubt_of
 from survey.records.snapping import Snapping
 from survey.records.survey import Reject
 from survey.stones import SurveyedStream
@@ -69,6 +70,8 @@ class FileReport:
     frame : transform of the survey into the frame of the site; None if it was surveyed there
     again : number of stones that were in the database and now have a new measurement
     solids : properties of the stones, in a file of solids
+    remarks : changes that made the outlines of measured faces polygons, by stone code
+    doubts : sizes that hardly any stone has, in words, by stone code
     """
 
     path: str
@@ -83,6 +86,8 @@ class FileReport:
     frame: dict[str, Any] | None = None
     again: int = 0
     solids: SolidsReport | None = None
+    remarks: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    doubts: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -111,6 +116,8 @@ class Tally:
     not_convex: list[str] = field(default_factory=list)
     remarks: dict[str, tuple[str, ...]] = field(default_factory=dict)
     decimals: int = 0
+    changed: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    doubts: dict[str, str] = field(default_factory=dict)
 
     def count(self, block: SurveyedBlock) -> None:
         """Count one more accepted stone."""
@@ -122,6 +129,10 @@ class Tally:
             self.shapes[block.code] = face.shape.text
         if face.provenance.source == "solid":
             self._count_solid(block)
+        elif face.remarks:
+            self.changed[block.code] = face.remarks
+        if (doubt := doubt_of(float(np.ptp(block.solid.vertices, axis=0).max()), LENGTH)) is not None:
+            self.doubts[block.code] = doubt.text
         if face.provenance.source == "points" and face.fit.rms >= self.rms:
             self.rms, self.worst = face.fit.rms, block.code
 
@@ -157,6 +168,8 @@ class Tally:
             frame=frame_record(self.stream.transform),
             again=self.again,
             solids=self._solids(),
+            remarks=self.changed,
+            doubts=self.doubts,
         )
 
 

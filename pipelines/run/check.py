@@ -30,6 +30,7 @@ from pipelines.run.closing_check import (
     simplification_report,
 )
 from pipelines.run.fidelity import Modelled, modelled
+from pipelines.run.plausibility import corner_warnings, impossible_values, unusual_values
 from pipelines.run.soundness import unsound_stones, unsupported
 from pipelines.scene.array_tables import describe
 from pipelines.scene.file import SceneFile, read_scene
@@ -75,7 +76,7 @@ def check_scene(
         models = select_stones(scene, session)
         scene = with_profile(scene, profile, models)
         groups = select_groups(scene, session, models)
-    problems: list[str] = []
+    problems = impossible_values(scene, models)
     assembly, needs = None, None
     progress(Progress("blocks", 0, None, f"closing the joints of {len(models)} stones"))
     try:
@@ -160,7 +161,11 @@ def _report(
         laws=tuple(describe(one.entry, groups) for one in scene.laws),
         loads=tuple(describe(entry, groups) for entry in (*scene.loads, *scene.throws)),
         problems=problems,
-        warnings=() if assembly is None else assembly.remarks,
+        warnings=(
+            *unusual_values(scene, models),
+            *corner_warnings(models),
+            *(() if assembly is None else assembly.remarks),
+        ),
     )
 
 

@@ -7,6 +7,7 @@ from enum import IntEnum
 
 from survey.faces.shapes import ShapeKind
 from survey.quality.contradictions import Contradiction
+from survey.quality.corners import Misplaced, Sign
 from survey.quality.precision import StoneQuality, SurveyQuality
 from survey.records.survey import Reject
 
@@ -35,6 +36,12 @@ _SHAPE_ACTIONS = {
     ShapeKind.ROUGH.value: "measure more points, on the dressed margin, and look for mortar or plants on the face",
 }
 
+_CORNER_ACTIONS = {
+    Sign.OVERLAP: "measure the corners of both again: one was measured on the other stone, or mistyped",
+    Sign.ANGLE: "measure this corner again, unless the stone is cut so",
+    Sign.SIZE: "measure its corners again, unless the stone is of that size",
+}
+
 
 class Urgency(IntEnum):
     """Reasons to measure a stone again, most urgent first."""
@@ -42,12 +49,15 @@ class Urgency(IntEnum):
     MISSING = 1
     UNCHECKED = 2
     BLUNDERS = 3
-    TILT = 4
-    SHAPE = 5
-    SCATTER = 6
-    SMOOTH = 7
-    KIND = 8
-    EDGE = 9
+    OVERLAP = 4
+    ANGLE = 5
+    SIZE = 6
+    TILT = 7
+    SHAPE = 8
+    SCATTER = 9
+    SMOOTH = 10
+    KIND = 11
+    EDGE = 12
 
 
 @dataclass(frozen=True)
@@ -75,8 +85,9 @@ class Remeasure:
 def list_remeasures(
     stones: Sequence[StoneQuality],
     rejects: Iterable[Reject],
-    contradictions: Iterable[Contradiction],
+    contradictions: Sequence[Contradiction],
     quality: SurveyQuality,
+    misplaced: Iterable[Misplaced] = (),
 ) -> tuple[Remeasure, ...]:
     """List the stones to measure again, most urgent first; a stone may have several reasons.
 
@@ -86,11 +97,20 @@ def list_remeasures(
     rejects : those that could not be made
     contradictions : stones whose proportions are not those of their kind
     quality : of the survey; where its stated sigma is wrong, stones are compared with the estimated one
+    misplaced : signs of corners out of place; the size of a stone of the wrong kind is none
     """
     found = [_missing(one) for one in rejects]
     scale = quality.sigma0 or 1.0
     for stone in stones:
         found += _reasons(stone, scale)
+    of_wrong_kind = {one.code for one in contradictions}
+    found += [
+        Remeasure(
+            one.code, one.line, Urgency[one.sign.name], one.severity, one.text, _CORNER_ACTIONS[one.sign]
+        )
+        for one in misplaced
+        if one.sign is not Sign.SIZE or one.code not in of_wrong_kind
+    ]
     found += [
         Remeasure(
             one.code,

@@ -29,6 +29,10 @@ def ingest_lines(report: "IngestReport", verbose: bool) -> list[str]:
             )
         if file.frame is not None:
             lines.append(f"  {_frame_line(file.frame)}")
+        changed = [f"  {code}: {'; '.join(texts)}" for code, texts in file.remarks.items()]
+        lines += changed if verbose else shorten(changed, 5, "  ", ", with -v")
+        doubts = [f"  doubtful: {code}: {text}" for code, text in file.doubts.items()]
+        lines += doubts if verbose else shorten(doubts, 5, "  ", ", with -v")
         if file.shapes:
             lines.append(f"  {len(file.shapes)} faces are not one plane: {some(list(file.shapes))}")
         if verbose:
@@ -232,6 +236,10 @@ def survey_report_lines(report: "SurveyReport", verbose: bool) -> list[str]:
     ]
     lines += _course_lines(report, verbose)
     lines += [f"  {one.code} is called a {one.kind}, but {one.text}" for one in study.contradictions[:_SHOWN]]
+    changed = [
+        f"  {one.code}: {'; '.join(one.remarks)}" for one in study.stones if one.remarks and one.measured
+    ]
+    lines += changed if verbose else shorten(changed, _SHOWN, "  ", ", with -v")
     again = [f"  {one.code or '(no code)'}: {one.reason}; {one.action}" for one in study.remeasures]
     lines.append("measure again:" if again else "nothing needs to be measured again")
     lines += again if verbose else shorten(again, _SHOWN, "  ", ", with -v")

@@ -193,7 +193,7 @@ def _stone_row(stone: StoneQuality, facade: str, off: Deviation | None) -> Row:
         "–" if stone.sigma0 is None else f"{stone.sigma0:.2f}",
         str(stone.redundancy),
         ", ".join((*stone.blunders, *stone.worn)) or "none",
-        stone.shape_text if stone.measured else stone.provenance,
+        "; ".join((stone.shape_text if stone.measured else stone.provenance, *stone.remarks)),
         f"{stone.tilt_sigma:.2f}°" if math.isfinite(stone.tilt_sigma) else "–",
         f"{stone.length:.3f} × {stone.height:.3f}"
         + (f" ± {stone.dimension_sigma:.3f} m" if math.isfinite(stone.dimension_sigma) else " m"),

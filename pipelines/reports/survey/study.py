@@ -15,8 +15,10 @@ from survey.formats.options import ReadingOptions
 from survey.formats.reading import open_survey
 from survey.quality.canon import Deviation, KindStandard, deviations, standards
 from survey.quality.contradictions import Contradiction, contradictions
+from survey.quality.corners import SeenFace, misplaced_corners
 from survey.quality.courses import CourseHeight, CourseLine, course_heights, measure_courses
 from survey.quality.facades import Facade, find_facades
+from survey.quality.plausible import LENGTH, doubt_of
 from survey.quality.precision import StoneQuality, SurveyQuality, appraise, judge_survey
 from survey.quality.remeasure import Remeasure, list_remeasures
 from survey.records.survey import Canon, DepthRule, Reject, SurveyHead
@@ -64,7 +66,7 @@ class SurveyStudy:
     courses : bed lines
     course_heights : from bed to bed
     remeasures : what to measure again, most urgent first
-    warnings : reasons why the database would refuse the survey
+    warnings : reasons why the database would refuse the survey, and sizes that hardly any stone has
     """
 
     name: str
@@ -172,8 +174,24 @@ def _judge(
         contradictions=odd,
         courses=lines,
         course_heights=course_heights(lines),
-        remeasures=list_remeasures(stones, rejects, odd, quality),
-        warnings=tuple(_unknown_kinds(quality.kinds)),
+        remeasures=list_remeasures(
+            stones, rejects, odd, quality, misplaced_corners([_seen(one) for one in stones if one.measured])
+        ),
+        warnings=(*_unknown_kinds(quality.kinds), *_doubtful_sizes(stones)),
+    )
+
+
+def _seen(stone: StoneQuality) -> SeenFace:
+    return SeenFace(
+        code=stone.code,
+        kind=stone.kind,
+        line=stone.line,
+        normal=stone.normal,
+        outline=stone.outline,
+        worn=stone.worn_corners,
+        area=stone.area,
+        length=stone.length,
+        height=stone.height,
     )
 
 
@@ -193,3 +211,14 @@ def _unknown_kinds(kinds: Mapping[str, int]) -> Iterator[str]:
             kind_named(kind)
         except UsageError as error:
             yield f"{count} stone{'s' if count > 1 else ''} of an {error}"
+
+
+def _doubtful_sizes(stones: Sequence[StoneQuality]) -> Iterator[str]:
+    """Yield a warning for the stones whose sizes hardly any stone has, and one for those that none has."""
+    found: dict[bool, list[str]] = {}
+    for stone in stones:
+        if (doubt := doubt_of(max(stone.length, stone.height, stone.depth or 0.0), LENGTH)) is not None:
+            found.setdefault(doubt.impossible, []).append(f"stone {stone.code}: {doubt.text}")
+    for texts in found.values():
+        more = f" (and {len(texts) - 1} more stones)" if len(texts) > 1 else ""
+        yield texts[0] + more

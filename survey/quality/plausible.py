@@ -1,0 +1,131 @@
+"""Sizes and properties that stones have, and the unit that a value outside was probably given in.
+
+Each range has two parts: what is usual, beyond which a value is doubted, and what is possible, beyond which it is not
+that of a stone. Both are in SI units, and come from handbooks of building stone and from the largest stones ever moved.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+__all__ = ["DENSITY", "FRICTION", "LENGTH", "POISSON", "YOUNG", "Doubt", "Range", "doubt_of"]
+
+
+@dataclass(frozen=True)
+class Range:
+    """Range of a quantity.
+
+    Attributes
+    ----------
+    quantity : its name
+    unit : its SI unit; empty for a number
+    usual : smallest and largest value that needs no second look
+    possible : smallest and largest value that a stone can have
+    reason : evidence
+    units : other units in which people give it, and their conversion to the SI unit
+    """
+
+    quantity: str
+    unit: str
+    usual: tuple[float, float]
+    possible: tuple[float, float]
+    reason: str
+    units: tuple[tuple[str, Callable[[float], float]], ...] = ()
+
+
+def _scaled(size: float) -> Callable[[float], float]:
+    return lambda value: value * size
+
+
+def _tangent(degrees: float) -> float:
+    return math.tan(math.radians(degrees)) if 0.0 < degrees < 90.0 else math.nan
+
+
+LENGTH = Range(
+    "length",
+    "m",
+    usual=(0.02, 8.0),  # from a tessera or a chip in a joint to the architraves of the largest temples
+    possible=(0.002, 30.0),  # from gravel to beyond the largest stones ever quarried
+    reason="the longest ever quarried, at Baalbek, has 20.5 m",
+    units=(
+        ("millimetres", _scaled(1e-3)),
+        ("centimetres", _scaled(1e-2)),
+        ("feet", _scaled(0.3048)),
+        ("inches", _scaled(0.0254)),
+    ),
+)
+
+DENSITY = Range(
+    "density",
+    "kg/m³",
+    usual=(1000.0, 3300.0),  # from tuff and adobe to basalt and gabbro
+    possible=(200.0, 8000.0),  # from the lightest pumice to iron ore, with room for clamps of metal
+    reason="tuff has 1000 to 1800, limestone and sandstone 1900 to 2700, basalt up to 3300",
+    units=(("g/cm³ (t/m³)", _scaled(1e3)), ("kN/m³", _scaled(1e3 / 9.81)), ("lb/ft³", _scaled(16.0185))),
+)
+
+YOUNG = Range(
+    "young",
+    "Pa",
+    usual=(5e7, 1.2e11),  # from adobe to dense basalt and quartzite
+    possible=(1e6, 1.2e12),  # from stiff clay to diamond
+    reason="adobe has 0.05 to 1 GPa, soft limestone and tuff 1 to 15, marble and granite 30 to 80",
+    units=(
+        ("GPa", _scaled(1e9)),
+        ("MPa (N/mm²)", _scaled(1e6)),
+        ("kPa", _scaled(1e3)),
+        ("psi", _scaled(6894.76)),
+    ),
+)
+
+POISSON = Range(
+    "poisson",
+    "",
+    usual=(0.0, 0.4),  # dry porous stone to clay-rich stone
+    possible=(0.0, 0.49),  # rock does not thicken when it is pulled, nor keep its volume as rubber does
+    reason="rocks have 0.1 to 0.35",
+)
+
+FRICTION = Range(
+    "friction",
+    "",
+    usual=(0.0, 1.5),  # from a joint without any friction, as a thought experiment, to 56°
+    possible=(0.0, 10.0),  # beyond the 80° of the roughest unworn rock joints, as a stand-in for no sliding
+    reason="dry joints of stone have 0.4 to 0.8, the roughest fractures of rock 5.7 (80°)",
+    units=(("degrees", _tangent), ("per cent", _scaled(1e-2))),
+)
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """A value outside the usual range.
+
+    Attributes
+    ----------
+    text : the value, the usual range, and the likely unit
+    impossible : no stone has such a value
+    """
+
+    text: str
+    impossible: bool
+
+
+def doubt_of(value: float, of: Range) -> Doubt | None:
+    """Compare a value in SI units with its range; None if it is usual.
+
+    Examples
+    --------
+    >>> doubt_of(2350.0, DENSITY)
+    >>> print(doubt_of(2.2, DENSITY).text.partition("; ")[2])
+    in g/cm³ (t/m³) it would be 2200 kg/m³
+    """
+    if of.usual[0] <= value <= of.usual[1]:
+        return None
+    impossible = not of.possible[0] <= value <= of.possible[1]
+    unit = f" {of.unit}" if of.unit else ""
+    found = "is not that of a stone" if impossible else "is unusual"
+    text = f"{of.quantity} {value:.4g}{unit} {found}: {of.reason}"
+    for name, meant in of.units if impossible else ():
+        if of.usual[0] <= meant(value) <= of.usual[1]:
+            return Doubt(f"{text}; in {name} it would be {meant(value):.4g}{unit}", impossible)
+    return Doubt(text, impossible)
