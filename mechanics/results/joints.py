@@ -84,8 +84,8 @@ def joint_corners(start: StartingJoints) -> JointCorners:
     a, b = start.bodies[joint].T
 
     def in_axes(body: Ints, point: Array) -> Array:
-        seen: Array = np.einsum("kji,kj->ki", state.rotation[body], point - state.centre[body])
-        return seen
+        place: Array = np.einsum("kji,kj->ki", state.rotation[body], point - state.centre[body])
+        return place
 
     return JointCorners(
         bodies=start.bodies,

@@ -22,9 +22,11 @@ from pipelines.arrays import Array
 from pipelines.draw.catalogue import PICTURES
 from pipelines.draw.offscreen.jobs import save_job
 from pipelines.draw.offscreen.surfaces import FIELDS, stone_fields, wall_surface
+from pipelines.results.peaks import peak_records
 
 __all__ = ["draw_apart", "draw_pictures", "missing", "package_of"]
 
+_PASSED = 1.05  # peak over the value at the end, from which a picture of the end states it [-]
 _LONGEST = 100  # characters of a caution in a heading, which has one line
 _TIMEOUT = 300.0  # [s]; software rendering of 10⁵ triangles takes a few
 _PACKAGES = {
@@ -125,6 +127,11 @@ def _heading(result: Result, name: str) -> list[str]:
     picture, ending = PICTURES[name], f"{_ENDINGS[result.outcome]} after {result.time:.3g} s"
     lines = [f"{result.scene.name}: {picture.title}, {ending}"]
     lines += [shorten(caution, _LONGEST, placeholder=" …") for caution in result.cautions[:1]]
+    passed = peak_records(result)["displacement"] if name == "displacement" else None
+    if passed is not None and passed["value"] > _PASSED * passed["end"]:
+        factor, unit = picture.unit_of(passed["value"])
+        where = f"{passed['stones'][0]} after {passed['time']:.3g} s"
+        lines.append(f"at the end; during the run up to {passed['value'] * factor:.4g} {unit} ({where})")
     largest = _largest(result, name) if picture.capped else None
     if largest is not None:
         value, place = largest
@@ -154,7 +161,7 @@ def _largest_pressure(result: Result) -> tuple[float, str] | None:
     number = int(np.where(joints.bearing, joints.pressure_mean, -np.inf).argmax())
     first, second = (result.bodies[body].code for body in joints.bodies[number])
     slivers = int((joints.pressed & joints.sliver).sum())
-    out = f"; {slivers} slivers left out" if slivers else ""
+    out = f"; without slivers ({slivers})" if slivers else ""
     return float(joints.pressure_mean[number]), f"between {first} and {second}{out}"
 
 

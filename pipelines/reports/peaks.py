@@ -16,15 +16,11 @@ _NO_FORCE = 1e-3  # of the weight [-]: a smaller reaction is not worth a line
 
 def passed_peaks(summary: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """Return the peaks that exceed the value at the end by more than a twentieth, and any tolerance, by name."""
-    known = {name: one for name, one in summary["peaks"].items() if one is not None}
-    least = summary["tolerance"]["length"]
-    same = known.get("displacement") == known.get("relative_displacement")
+    known, least = _distinct(summary), summary["tolerance"]["length"]
     return {
         name: one
         for name, one in known.items()
-        if one["value"] > _PASSED * max(one["end"], 0.0)
-        and one["value"] > _least(name, summary, least)
-        and not (same and name == "relative_displacement")
+        if one["value"] > _PASSED * max(one["end"], 0.0) and one["value"] > _least(name, summary, least)
     }
 
 
@@ -34,18 +30,26 @@ def peak_text(name: str, peak: Mapping[str, Any], least: float) -> str:
     return f"{value} after {when}{f', {where}' if where else ''}; {end} at the end"
 
 
-def _cells(name: str, peak: Mapping[str, Any], least: float) -> tuple[str, str, str, str]:
-    """Return the value, the time, the stone or joint, and the value at the end."""
-    value, end = (_number(name, peak[key], least) for key in ("value", "end"))
-    return value, f"{peak['time']:.4g} s", " – ".join(peak["stones"]), end
-
-
 def peak_rows(summary: Mapping[str, Any]) -> list[tuple[str, ...]]:
     """Return the rows of the table of all peaks."""
     least = summary["tolerance"]["length"]
-    return [
-        (PEAKS[name], *_cells(name, one, least)) for name, one in summary["peaks"].items() if one is not None
-    ]
+    return [(PEAKS[name], *_cells(name, one, least)) for name, one in _distinct(summary).items()]
+
+
+def _distinct(summary: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return the peaks that are known; relative displacements only where the supports move."""
+    known = {name: one for name, one in summary["peaks"].items() if one is not None}
+    if known.get("displacement") == known.get("relative_displacement"):
+        known.pop("relative_displacement", None)
+    return known
+
+
+def _cells(name: str, peak: Mapping[str, Any], least: float) -> tuple[str, str, str, str]:
+    """Return the value, the time, the stone or joint, and the value at the end."""
+    value, end = (_number(name, peak[key], least) for key in ("value", "end"))
+    if name in _LENGTHS and peak["value"] < least:
+        return value, "–", "–", end
+    return value, f"{peak['time']:.4g} s", " – ".join(peak["stones"]), end
 
 
 def _least(name: str, summary: Mapping[str, Any], length: float) -> float:

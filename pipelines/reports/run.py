@@ -188,9 +188,9 @@ def _notes(summary: Mapping[str, Any]) -> list[str]:
     notes, slivers = [], summary["joints"]["slivers"]
     if slivers["count"]:
         notes.append(
-            f"{slivers['count']} of {summary['joints']['count']} joints are slivers: their area is not above "
-            f"{100 * slivers['limit']:g} % of the faces of their stones. They carry {kilonewtons(slivers['force'])} "
-            f"({kilonewtons(slivers['largest_force'])} at most); pressure and kern, up to "
+            f"Slivers are joints whose area is not above {100 * slivers['limit']:g} % of the faces of their stones: "
+            f"{slivers['count']} of {summary['joints']['count']}. They carry {kilonewtons(slivers['force'])} "
+            f"({kilonewtons(slivers['largest_force'])} at most); their pressures, up to "
             f"{megapascals(slivers['largest_pressure'])}, say nothing of the masonry and are left out of the largest "
             "values, the tables and the scales of colours."
         )
@@ -217,7 +217,7 @@ def _error(key: str, result: Result, summary: Mapping[str, Any]) -> str:
     scene, value = result.scene, summary["errors"][key]
     tolerances = {"natural_map": scene.solver.tolerance, "balance": scene.time.balance_tolerance}
     if value is not None and key in tolerances and value <= tolerances[key]:
-        return f"{scientific(value)}, below the tolerance of {tolerances[key]:g}"
+        return f"{scientific(value)}, below tolerance {tolerances[key]:g}"
     return scientific(value)
 
 
@@ -297,7 +297,8 @@ def _worst(stones: Sequence[StoneResult], value: Callable[[StoneResult], float |
 def _joints(result: Result, summary: Mapping[str, Any]) -> list[_Section]:
     """List the joints with the most eccentric resultants, and those that slid or opened most."""
     joints = result.joints
-    seen = np.maximum(_SEEN * np.sqrt(joints.area), summary["tolerance"]["length"])
+    least = float(summary["tolerance"]["length"])
+    seen = np.maximum(_SEEN * np.sqrt(joints.area), least)
     eccentric = np.where(joints.bearing, joints.kern, -np.inf)
     slid = np.where(joints.sliding > seen, joints.sliding, -np.inf)
     opened = np.where(joints.opening > seen, joints.opening, -np.inf)
@@ -311,14 +312,16 @@ def _joints(result: Result, summary: Mapping[str, Any]) -> list[_Section]:
         "Friction used",
     )
     return [
-        _Section("Joints with the most eccentric resultants", head, _joint_rows(result, eccentric), _KERN),
-        _Section("Joints that slid most", head, _joint_rows(result, slid)),
-        _Section("Joints that opened most", head, _joint_rows(result, opened)),
+        _Section(
+            "Joints with the most eccentric resultants", head, _joint_rows(result, eccentric, least), _KERN
+        ),
+        _Section("Joints that slid most", head, _joint_rows(result, slid, least)),
+        _Section("Joints that opened most", head, _joint_rows(result, opened, least)),
     ]
 
 
-def _joint_rows(result: Result, order: Array) -> list[tuple[str, ...]]:
-    """Describe the joints with the largest finite values of `order`."""
+def _joint_rows(result: Result, order: Array, least: float) -> list[tuple[str, ...]]:
+    """Describe the joints with the largest finite values of `order`; movements below `least` [m] as such."""
     joints, codes = result.joints, [body.code for body in result.bodies]
     return [
         (
@@ -326,8 +329,8 @@ def _joint_rows(result: Result, order: Array) -> list[tuple[str, ...]]:
             ratio(float(joints.kern[number])),
             ratio(float(joints.edge[number])),
             "sliver" if joints.sliver[number] else kilopascals(float(joints.pressure_mean[number])),
-            millimetres(float(joints.opening[number])),
-            millimetres(float(joints.sliding[number])),
+            millimetres(float(joints.opening[number]), least),
+            millimetres(float(joints.sliding[number]), least),
             ratio(float(joints.friction_use[number])),
         )
         for number in np.argsort(-order, kind="stable")[:_MOST].tolist()

@@ -32,6 +32,7 @@ from pipelines.results.summary import as_json, summarise
 from pipelines.results.vtk import write_frames
 from pipelines.run.assemble import Assembly, assemble_stones
 from pipelines.run.inputs import run_inputs
+from pipelines.run.plausibility import corner_warnings, unusual_values
 from pipelines.run.record import run_record, versions
 from pipelines.run.soundness import caution_of, problems_of, refuse_unsound
 from pipelines.scene.file import SceneFile, read_scene
@@ -105,14 +106,18 @@ def run_scene(
             progress(Progress("blocks", 0, None, f"closing the joints of {len(models)} stones"))
             groups = select_groups(scene, session, models)
             assembly = assemble_stones(scene, models, groups)
-            assembly = replace(assembly, inputs=run_inputs(scene, assembly, groups, session))
+            assembly = replace(
+                assembly,
+                remarks=(*assembly.remarks, *unusual_values(scene, models), *corner_warnings(models)),
+                inputs=run_inputs(scene, assembly, groups, session),
+            )
         if meshes is not None:
             check_mesh_file(meshes, _elements(assembly))
         with _timed(seconds, "mesh"):
             built = build_model(assembly.scene, lambda done, total: progress(Progress("mesh", done, total)))
         progress(Progress("check", 0, None, "contacts at the start"))
         with _timed(seconds, "check"):
-            problems = problems_of(assembly, loose_blocks(*built))
+            problems = problems_of(scene, assembly, loose_blocks(*built))
         if not accept_unsound:
             refuse_unsound(problems, str(path))
         result = simulate(assembly.scene, progress, stop, built)

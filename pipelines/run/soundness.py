@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from mechanics.scene.scene import Fidelity, Scene
 from moma.errors import GeometryError, UnsoundSceneError
 from pipelines.run.assemble import Assembly
+from pipelines.run.plausibility import impossible_values
+from pipelines.scene.file import SceneFile
 from survey.geometry.solids import Solid
 from survey.geometry.watertight import check_watertight
 from survey.joints.settings import JointMode
@@ -15,15 +17,20 @@ _DEEP = 0.005  # overlap [m]; less is survey noise, which the contacts absorb
 _NAMED = 6  # most stones, or pairs of stones, that one problem names
 
 
-def problems_of(assembly: Assembly, loose: Sequence[str]) -> tuple[str, ...]:
+def problems_of(scene: SceneFile, assembly: Assembly, loose: Sequence[str]) -> tuple[str, ...]:
     """Return all problems of a scene; none if it is sound.
 
     Parameters
     ----------
+    scene : its file
     assembly : the scene, and how it came about
     loose : codes of the stones that no chain of touching stones ties to a fixed one (`loose_blocks`)
     """
-    return (*unsound_stones(assembly), *unsupported(assembly.scene, loose))
+    return (
+        *impossible_values(scene, assembly.models),
+        *unsound_stones(assembly),
+        *unsupported(assembly.scene, loose),
+    )
 
 
 def caution_of(problems: Sequence[str]) -> str:

@@ -98,7 +98,7 @@ def run_trade(
     progress(Progress("blocks", 0, None, "reading the stones and closing their joints"))
     with open_database(url, create=False) as database, database.session(read_only=True) as session:
         assembly = assemble(scene, session)
-    problems = problems_of(assembly, loose_blocks(*build_model(assembly.scene)))
+    problems = problems_of(scene, assembly, loose_blocks(*build_model(assembly.scene)))
     if not asked.accept_unsound:
         refuse_unsound(problems, str(path))
     width = typical_width(assembly.models)

@@ -166,8 +166,8 @@ def _joint_lines(summary: dict[str, Any]) -> list[str]:
     ]
     if (slivers := joints["slivers"])["count"]:
         lines.append(
-            f"    {slivers['count']} of them are slivers, of no more than {100 * slivers['limit']:g} % of the faces of "
-            f"their stones; they carry {slivers['force'] / 1e3:.3g} kN, and are left out of kern and pressures"
+            f"    slivers among them, of no more than {100 * slivers['limit']:g} % of the faces of their stones: "
+            f"{slivers['count']}, with {slivers['force'] / 1e3:z.3g} kN; kern and pressures leave them out"
         )
     if (text := summary["admissible"]["text"]) is not None:
         lines.append(f"    {text}")

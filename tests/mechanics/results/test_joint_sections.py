@@ -5,6 +5,8 @@ of the strength of materials, e.g. Timoshenko, Strength of Materials I, §53): a
 r/4, a triangle of height h: h/6 towards the corner and h/12 towards the side.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -135,3 +137,17 @@ def test_the_gap_of_tilted_faces_is_that_at_their_corners():
     gap = section.gap[0, : section.count[0]]
     assert gap.min() == pytest.approx(0.0, abs=1e-12)
     assert gap.max() == pytest.approx(2 * np.sin(np.radians(1.0)), rel=1e-9)
+
+
+@pytest.mark.parametrize("width", [1e-5, 3e-6, 2e-6])
+@pytest.mark.parametrize("away", [0.0, 1e3])
+def test_a_splinter_is_measured_without_a_warning(width, away):
+    """Its second moment can vanish, or turn negative, in rounding; then its kern is not known."""
+    faces = faces_of(rectangle(1, 1, (away, 0)), rectangle(1, 1, (away + 1 - width, 0)))
+    overlap = sections(faces, np.array([[0, 1]]))
+    flat = replace(overlap, moment=overlap.moment * [1.0, 0.0])
+    for section in (overlap, flat):
+        kern, edge = pressed_at(section, section.centroid[0] + [0.0, 0.2, 0.0])
+        assert np.isnan(kern) or kern >= 0.0
+        assert edge >= 0.0
+    assert np.isnan(pressed_at(flat, flat.centroid[0] + [width, 0.2, 0.0])[0])

@@ -9,6 +9,7 @@ import pytest
 
 from archmodel.database.session import open_database
 from archmodel.describe.entity import describe
+from archmodel.describe.runs import describe_run
 from archmodel.query.api import find_rows
 from archmodel.store.run_record import STONE_VALUES
 from mechanics.dynamics.outcome import Outcome
@@ -20,7 +21,7 @@ from pipelines.run import run as run_module
 from pipelines.run.assemble import assemble
 from pipelines.run.run import run_scene, write_results
 from pipelines.scene.file import parse_scene
-from pipelines.scene.selection import select_stones
+from pipelines.scene.selection import select_groups, select_stones
 from tests.moma.commands import answer, fails
 from tests.pipelines.results_by_hand import result_of, rigid_body
 from tests.pipelines.scenes import fails_at_line
@@ -101,6 +102,14 @@ def test_a_selection_that_fails_is_named_with_its_line(session, written, instead
     fails_at_line(line, said, lambda text: selected(text, session), LOW.replace(written, instead, 1))
 
 
+def test_a_series_of_no_stone_is_named_with_its_line(session):
+    text = LOW + '[output]\nseries = ["W02-99"]\n'
+    scene = parse_scene(text, "scene.toml")
+    models = select_stones(scene, session)
+    said = "series: 'W02-99' is not the code of a selected stone"
+    fails_at_line(len(text.splitlines()), said, lambda _: select_groups(scene, session, models), text)
+
+
 def test_a_stone_from_the_database_is_the_stone_that_was_surveyed(session):
     models = selected("[materials.a]\ndensity = 1\nyoung = 1\npoisson = 0\n", session)
     assert len(models) == 98
@@ -179,6 +188,42 @@ def test_results_that_cannot_be_stored_are_an_error_and_stay_in_their_folder(own
     assert summary["outcome"] == "equilibrium"
     assert sorted(summary["files"]) == sorted(one.name for one in (tmp_path / "out").iterdir())
     assert answer("runs", "--db", own_url) == []
+
+
+def test_a_run_keeps_its_peaks_its_series_and_its_inputs(own_url, tmp_path):
+    """Of W02-02 and of what it stands on, in files; of every stone, and of the run, in the database."""
+    asked = 'series = ["W02-02", "course = 1"]\npictures = []\n'
+    text = LOW.replace('deformable = ["W02-02"]\n', "") + f"theta = 1.0\n[output]\n{asked}"
+    (tmp_path / "low.toml").write_text(text, encoding="utf-8")
+    done = run_scene(tmp_path / "low.toml", own_url, tmp_path / "out")
+    summary = done.summary
+    lines = (tmp_path / "out/series_stones.csv").read_text(encoding="utf-8").splitlines()
+    assert len(lines) == 1 + summary["steps"] * (1 + summary["bodies"]["fixed"])
+    joints = (tmp_path / "out/series_joints.csv").read_text(encoding="utf-8").splitlines()
+    assert any("W02-02" in line for line in joints)
+    assert {"series_stones.csv", "series_joints.csv"} <= set(summary["files"])
+    page = (tmp_path / "out/report.html").read_text(encoding="utf-8")
+    for words in (
+        "window bay (synthetic)",
+        "density 2350 kg/m³",
+        "DryJoint: friction",
+        "W01-03",
+        "gravity (0, 0, -9.81)",
+    ):
+        assert words in page
+    assert summary["inputs"]["Joints of the survey"][0].startswith("close: ")
+    assert "numpy" in summary["versions"]
+    with open_database(own_url, create=False) as database, database.session(read_only=True) as session:
+        rows = find_rows(session, "entity", ["displacement_peak > 0"])
+        told = describe_run(session, done.run)
+    assert len(rows) == summary["bodies"]["rigid"]
+    for name, peak in (("displacement_max", "displacement_peak"), ("joint_pressure", "joint_pressure_peak")):
+        assert all(row[peak] >= row[name] * (1.0 - 1e-6) for row in rows)
+    peaks = {one["peak"]: one for one in told["peaks"]}
+    assert peaks["pressure"]["value"] == summary["peaks"]["pressure"]["value"]
+    assert " – " in peaks["pressure"]["stones"]
+    assert (peaks["shear"]["unit"], peaks["shear"]["stones"]) == ("N", None)
+    assert told["headline"] == summary["headline"]
 
 
 def test_a_picture_that_shows_nothing_is_a_warning(own_url, tmp_path):

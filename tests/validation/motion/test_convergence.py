@@ -91,7 +91,9 @@ def test_a_curved_slide_is_of_first_order():
     for step in steps:
         block = moved(low_block((0.0, across, *[0.0] * 4)))
         gravity = tilted_gravity(np.degrees(np.arctan(friction)))
-        scene = dynamic("curve", (ground(), block), friction=friction, gravity=gravity, step=step, duration=time)
+        scene = dynamic(
+            "curve", (ground(), block), friction=friction, gravity=gravity, step=step, duration=time
+        )
         path = follow(scene)
         errors.append(exact - path.centre[-1, 1, 0] + path.centre[0, 1, 0])
     assert errors[1] == pytest.approx(0.0232 * exact, rel=0.05)
