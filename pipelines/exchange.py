@@ -1,6 +1,7 @@
 """Exchange of a whole building between a database and one document."""
 
 import os
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
@@ -82,7 +83,8 @@ def _import_new(path: Path, file: Path) -> dict[str, int]:
         raise
     finally:
         for end in ("", "-wal", "-shm"):
-            part.with_name(part.name + end).unlink(missing_ok=True)
+            with suppress(OSError):  # a folder that is read-only refuses this too
+                part.with_name(part.name + end).unlink(missing_ok=True)
     return rows
 
 

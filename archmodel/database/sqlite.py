@@ -1,10 +1,12 @@
 """Databases in one SQLite file, or in memory."""
 
+import os
 import sqlite3
 import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
+from urllib.parse import quote
 
 from sqlalchemy import URL, Connection, Engine, create_engine, event
 from sqlalchemy.engine.interfaces import DBAPIConnection
@@ -60,12 +62,26 @@ class SqliteFile:
         """The URL, to be printed."""
         return self.url.render_as_string()
 
+    @property
+    def _reading(self) -> URL | None:
+        """URL for a file that can only be read, in a folder where SQLite cannot put its log; None if it can.
+
+        Without a log beside it, nobody is writing: the file is taken as it is, without locks. With one, the log holds
+        the latest rows and is read too.
+        """
+        if self.file is None or not self.file.exists() or os.access(self.file.parent, os.W_OK):
+            return None
+        logs = (self.file.with_name(f"{self.file.name}{end}") for end in ("-wal", "-shm"))
+        state = {} if any(log.exists() for log in logs) else {"immutable": "1"}
+        place = f"file:{quote(str(self.file.absolute()))}"
+        return URL.create("sqlite", database=place, query={"mode": "ro", "uri": "true", **state})
+
     def engine(self, create: bool) -> Engine:
         """Return an engine on the file, which may be missing if `create` allows it."""
         if self.file is not None:
             _check_file(self.file, create)
         engine = create_engine(
-            self.url, connect_args={"timeout": self.lock_timeout}, json_serializer=json_text
+            self._reading or self.url, connect_args={"timeout": self.lock_timeout}, json_serializer=json_text
         )
         event.listen(engine, "connect", _on_connect)
         event.listen(engine, "begin", _on_begin)
@@ -77,7 +93,7 @@ class SqliteFile:
         The file remembers it, so that this has an effect only once. It cannot be done within a transaction, hence
         the bare connection; and SQLite does not wait here for another program's write lock, hence the loop.
         """
-        if self.file is None:
+        if self.file is None or self._reading is not None:
             return
         connection = engine.raw_connection()
         deadline = time.monotonic() + self.lock_timeout
@@ -120,7 +136,12 @@ _COMPLAINTS = (
     ),
     (("is full",), "the disk is full", "make room on it and try again; nothing was changed"),
     (
-        ("readonly", "unable to open"),
+        ("unable to open database file",),
+        "the database cannot be opened, or its log FILE-wal cannot be read ({message})",
+        "check the permissions of the file and of its folder; copy it with its -wal file to a folder of your own",
+    ),
+    (
+        ("readonly",),
         "the database cannot be written ({message})",
         "check the permissions of the file and of its folder",
     ),

@@ -7,7 +7,7 @@ import gzip
 import json
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -62,9 +62,11 @@ def export_building(session: Session, path: str | Path) -> dict[str, int]:
             os.fsync(file.fileno())
         part.replace(path)
     except OSError as error:
-        raise ExchangeError(f"it cannot be written: {error.strerror}", where=str(path)) from error
+        what = f"it cannot be written: {error.strerror}"
+        raise ExchangeError(what, where=str(path), remedy="name a file in another folder") from error
     finally:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):  # a folder that is read-only refuses this too
+            part.unlink(missing_ok=True)
     return counts
 
 

@@ -12,6 +12,7 @@ from mechanics.results.forecast.plan import Plan, plan
 from mechanics.scene.scene import Fidelity, Scene
 from mechanics.stones.meshing.quality import MeshReport
 from moma.errors import GeometryError, MeshError
+from pipelines.draw.catalogue import PICTURES
 from pipelines.draw.closing_pictures import draw_closing
 from pipelines.draw.elevations.closing_shapes import ClosingShapes, Stages, closing_shapes
 from pipelines.results.folder import check_replaceable, replacing
@@ -31,6 +32,7 @@ from pipelines.run.closing_check import (
 )
 from pipelines.run.fidelity import Modelled, modelled
 from pipelines.run.plausibility import corner_warnings, impossible_values, unusual_values
+from pipelines.run.run import USUAL
 from pipelines.run.soundness import unsound_stones, unsupported
 from pipelines.scene.array_tables import describe
 from pipelines.scene.file import SceneFile, read_scene
@@ -41,6 +43,10 @@ from survey.geometry.solids import Solid
 __all__ = ["check_scene"]
 
 _INDEX = "check.json"
+# processor time of a run besides its simulation, on the machine of `cost_rates`:
+_PROGRAM = 4.0  # the program and its kernels are loaded, the report is written [s]
+_STONE = 3e-3  # a stone is read, its joints are closed, its results are written and stored [s]
+_PICTURE = 2.5  # a picture is drawn by a program of its own [s]
 
 
 def check_scene(
@@ -157,7 +163,11 @@ def _report(
         joints=None
         if assembly is None
         else joints_report(assembly.closing, assembly.origin, _hypotheses(assembly)),
-        cost=None if assembly is None or needs is None else _cost(needs, assembly.scene),
+        cost=None
+        if assembly is None or needs is None
+        else _cost(
+            needs, assembly.scene, len(USUAL if scene.output.pictures is None else scene.output.pictures)
+        ),
         laws=tuple(describe(one.entry, groups) for one in scene.laws),
         loads=tuple(describe(entry, groups) for entry in (*scene.loads, *scene.throws)),
         problems=problems,
@@ -198,8 +208,19 @@ def _mesh_quality(meshes: MeshReport) -> MeshQualityReport | None:
     )
 
 
-def _cost(needs: Plan, scene: Scene) -> Cost:
-    expected = expected_cost(needs, scene, machine_slowness())
+def _pictures(scene: SceneFile, needs: Plan) -> int:
+    """Count the pictures that a run would draw."""
+    names = USUAL if scene.output.pictures is None else scene.output.pictures
+    soft = needs.bodies[Fidelity.DEFORMABLE] > 0
+    return sum(soft or PICTURES[name].shows != "stress" for name in names)
+
+
+def _cost(needs: Plan, scene: Scene, pictures: int) -> Cost:
+    """Return the expected cost of the whole command, with so many pictures."""
+    slowness = machine_slowness()
+    expected = expected_cost(needs, scene, slowness)
+    beside = slowness * (_PROGRAM + _STONE * needs.amounts.stones + _PICTURE * pictures)
+    low, likely, high = (beside + one for one in expected.seconds)
     return Cost(
         pairs=len(needs.pairs),
         contacts=needs.contacts,
@@ -207,7 +228,8 @@ def _cost(needs: Plan, scene: Scene) -> Cost:
         memory=needs.memory,
         steps=max(1, round(scene.time.duration / scene.time.step)),
         step=scene.time.step,
-        seconds=expected.seconds,
-        longest=expected.longest,
+        seconds=(low, likely, high),
+        longest=beside + expected.longest,
+        unknown=expected.unknown,
         peak=expected.memory,
     )

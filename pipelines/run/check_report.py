@@ -82,8 +82,9 @@ class Cost:
     memory : of the largest arrays [bytes], estimated
     steps : at most
     step : [s]
-    seconds : of one processor until the scene rests: low, likely and high, on this machine
+    seconds : of one processor from the start of the command to its last picture: low, likely and high, on this machine
     longest : if it does not come to rest before its duration is over [s]
+    unknown : the reason why the time cannot be known before the run; empty if it can
     peak : memory of the whole program [bytes], estimated
     """
 
@@ -95,6 +96,7 @@ class Cost:
     step: float
     seconds: tuple[float, float, float]
     longest: float
+    unknown: str
     peak: int
 
 

@@ -40,9 +40,10 @@ from pipelines.scene.selection import select_groups, select_stones
 from pipelines.tuning.expected_errors import ProfileReport, profile_report
 from pipelines.tuning.profiles import with_profile
 
-__all__ = ["RunReport", "run_scene", "write_results"]
+__all__ = ["USUAL", "RunReport", "run_scene", "write_results"]
 
-_USUAL = ("von_mises", "displacement")  # pictures of a scene that does not name any
+USUAL = ("von_mises", "displacement")
+"""Pictures of a scene that does not name any."""
 
 
 @dataclass(frozen=True)
@@ -213,7 +214,7 @@ def _meshes(result: Result, assembly: Assembly) -> dict[str, VolumeMesh]:
 
 def _pictures(scene: SceneFile, result: Result) -> tuple[tuple[str, ...], list[str]]:
     """Return the pictures to draw, and a warning for each requested one that would show nothing."""
-    asked = _USUAL if scene.output.pictures is None else scene.output.pictures
+    asked = USUAL if scene.output.pictures is None else scene.output.pictures
     reasons = {name: missing(result, name) for name in asked}
     omitted = [f"no picture {name}: {reason}" for name, reason in reasons.items() if reason is not None]
     drawn = tuple(name for name, reason in reasons.items() if reason is None)

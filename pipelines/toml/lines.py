@@ -26,6 +26,10 @@ _TOKEN = re.compile(
 )
 
 
+_TWICE = ("Cannot overwrite", "Cannot declare", "Cannot redefine", "Duplicate", "Cannot mutate")
+"""Beginnings of the complaints of the standard reader about a key or table that was given before."""
+
+
 def key_lines(text: str) -> dict[Path, int]:
     """Return the line numbers, from 1, of the tables and keys of a valid TOML text.
 
@@ -33,6 +37,14 @@ def key_lines(text: str) -> dict[Path, int]:
     an inline table is on the line of the key of that table, so `line_of` falls back on it.
     """
     lines: dict[Path, int] = {}
+    for line, path in _paths(text):
+        for length in range(1, len(path) + 1):
+            lines.setdefault(path[:length], line)
+    return lines
+
+
+def _paths(text: str) -> Iterator[tuple[int, Path]]:
+    """Yield the line and the path of each header and key, in their order."""
     table: Path = ()
     counts: dict[Path, int] = {}
     for line, statement in _statements(text):
@@ -42,12 +54,9 @@ def key_lines(text: str) -> dict[Path, int]:
             if statement[:2] == ["[", "["]:
                 counts[table] = counts.get(table, 0) + 1
                 table = (*table, str(counts[table] - 1))
-            path = table
+            yield line, table
         else:
-            path = table + _dotted("".join(statement[: statement.index("=")]))
-        for length in range(1, len(path) + 1):
-            lines.setdefault(path[:length], line)
-    return lines
+            yield line, table + _dotted("".join(statement[: statement.index("=")]))
 
 
 def _numbered(header: Path, counts: Mapping[Path, int]) -> Path:
@@ -139,11 +148,26 @@ def parse_toml(text: str, path: str, error: type[UsageError], remedy: str) -> di
         place = re.search(r"\(at line (\d+), column \d+\)", message)
         line = int(place.group(1)) if place else max(1, len(text.rstrip().splitlines()))
         what = re.sub(r" \(at .*\)$", "", message)
+        if message.startswith(_TWICE):
+            raise error(_twice(text, line), where=f"{path}:{line}", remedy="keep one of them") from None
     except RecursionError:
         what, line = "lists or tables are nested too deeply", _fullest_line(text, "[{")
     except ValueError:
         what, line = "a number has thousands of digits", _fullest_line(text, "0123456789")
     raise error(f"not TOML: {what}", where=f"{path}:{line}", remedy=remedy) from None
+
+
+def _twice(text: str, line: int) -> str:
+    """Describe the key or table on a line that was given before."""
+    earlier: list[tuple[int, Path]] = []
+    for number, path in _paths(text):
+        if number > line:
+            break
+        earlier.append((number, path))
+    *before, (_, path) = earlier
+    first = next((number for number, one in before if one[: len(path)] == path), None)
+    name = ".".join(one for one in path if not one.isdecimal())
+    return f"{name} is given twice" + ("" if first is None else f", first in line {first}")
 
 
 def _fullest_line(text: str, characters: str) -> int:

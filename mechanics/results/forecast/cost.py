@@ -3,7 +3,8 @@
 The seconds of a stage are a sum over the amounts on which its algorithm depends (`Amounts`), each times the seconds of
 one unit on the machine named in cost_rates. Two numbers are unknown beforehand: the iterations of the contact problems,
 and the steps until a scene rests. The result is therefore a range: each stage has the factors by which measured runs
-lay above and below, and the number of steps has a least, a likely and a largest value.
+lay above and below, and the number of steps has a least, a likely and a largest value. Where a run ends as soon as it
+rests, nothing bounds these factors: its range reaches to a run of its whole duration whose contacts never converge.
 """
 
 import time
@@ -23,6 +24,16 @@ __all__ = ["ExpectedCost", "calibration", "expected_cost", "machine_slowness", "
 _RESTING = (5, 6, 40)  # from an equilibrium: the steps in which it must last, and the one that finds it
 _RELAXING = (5, 20, 80)  # of a kinetic relaxation
 _SETTLING = (5, 30, 300)  # of a run from rest that ends where it begins
+_SWEEP = 1.5e-7  # one sweep of projections over the contacts, for each [s]
+_HARDER = 15.0  # step of deformable stones whose contacts do not converge, over one that relaxes [-]
+
+
+_UNKNOWN: Mapping[str, str] = {
+    "settled": "whether it begins in equilibrium, and how hard its contacts are to solve, shows in the run",
+    "relaxing": "when it rests shows in the run",
+    "moving": "when it rests shows in the run",
+}
+"""Reasons why the time of a run cannot be known, by the kind of its steps."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +49,7 @@ class ExpectedCost:
         no stone may sleep, or a run ends as soon as they would
     by_stage : likely seconds of mesh, assemble, start, steps and stress, as far as the run has these stages
     steps : least, likely and largest number of steps
+    unknown : the reason why the time cannot be known before the run, in words; empty if it can
     """
 
     seconds: tuple[float, float, float]
@@ -46,6 +58,7 @@ class ExpectedCost:
     asleep: float | None
     by_stage: Mapping[str, float]
     steps: tuple[int, int, int]
+    unknown: str = ""
 
 
 def expected_cost(plan: Plan, scene: Scene, slowness: float = 1.0) -> ExpectedCost:
@@ -77,10 +90,13 @@ def expected_cost(plan: Plan, scene: Scene, slowness: float = 1.0) -> ExpectedCo
     by_stage["steps"] = steps[1] * one
     total = max(1, round(time_.duration / time_.step))
     moving = high + total * slowness * RATES[kind, "moving"](work)
+    unknown = "" if steps[0] == steps[2] else _UNKNOWN[_pace(time_)]
+    if unknown:
+        moving = high + total * slowness * _hardest(kind, scene, work)
     seconds_range = (
         low + steps[0] * one / step.below,
         likely + steps[1] * one,
-        high + steps[2] * one * step.above,
+        max(high + steps[2] * one * step.above, moving if unknown else 0.0),
     )
     return ExpectedCost(
         seconds_range,
@@ -89,7 +105,16 @@ def expected_cost(plan: Plan, scene: Scene, slowness: float = 1.0) -> ExpectedCo
         _asleep(kind, time_, likely, slowness * steps[1] * RATES["rigid", "asleep"](work)),
         by_stage,
         steps,
+        unknown,
     )
+
+
+def _hardest(kind: str, scene: Scene, work: Mapping[str, float]) -> float:
+    """Return the seconds of a step whose contacts do not converge."""
+    if kind == "elastic":
+        return _HARDER * max(RATES["elastic", "relaxing"](work), RATES["elastic", "moving"](work))
+    sweeps = scene.solver.max_iterations * work["contacts"] * _SWEEP
+    return max(sweeps, RATES["rigid", "moving"](work))
 
 
 def measures(amounts: Amounts) -> dict[str, float]:

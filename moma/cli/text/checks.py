@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from moma.cli.text.formats import shorten
 
 if TYPE_CHECKING:
-    from pipelines.run.check_report import CheckReport, MeshQualityReport
+    from pipelines.run.check_report import CheckReport, Cost, MeshQualityReport
     from pipelines.run.closing_check import JointsReport, SimplificationReport
 
 __all__ = ["check_lines", "duration"]
@@ -54,14 +54,24 @@ def check_lines(report: "CheckReport", verbose: bool, explain: bool = False) -> 
             f"  {cost.pairs} touching pairs, {cost.contacts} contact points at the start",
             f"  {cost.unknowns} unknowns, about {max(1, round(cost.memory / 2**20))} MiB of arrays",
             f"  at most {cost.steps} steps of {cost.step:g} s",
-            f"  expected: {duration(cost.seconds[1])} of one processor ({duration(cost.seconds[0])} to "
-            f"{duration(cost.seconds[2])}; {duration(cost.longest)} if nothing comes to rest), "
-            f"{max(1, round(cost.peak / 2**20))} MiB in all",
+            _expected(cost),
         ]
     lines += [f"problem: {problem}" for problem in report.problems]
     if not report.problems:
         lines.append("sound: it can be run")
     return lines
+
+
+def _expected(cost: "Cost") -> str:
+    """Describe the expected time and memory, and say where the time cannot be known."""
+    low, likely, high = map(duration, cost.seconds)
+    memory = f"{max(1, round(cost.peak / 2**20))} MiB in all"
+    if cost.unknown:
+        return (
+            f"  expected: {likely} of one processor if all goes well, but from {low} to {high} are possible: "
+            f"{cost.unknown}; {memory}"
+        )
+    return f"  expected: {likely} of one processor ({low} to {high}), {memory}"
 
 
 def _stress_lines(report: "CheckReport") -> list[str]:

@@ -67,6 +67,10 @@ def _paths(tables, above=()):
             "[scene]\nname = " + "[" * 3000 + "]" * 3000,
             r"wild\.toml:2: not TOML: lists or tables are nested too",
         ),
+        ("[a]\nx = 1\nx = 2\n", r"wild\.toml:3: a\.x is given twice, first in line 2; keep one of them"),
+        ("[a]\nx = 1\n[b]\n[a]\n", r"wild\.toml:4: a is given twice, first in line 1; keep"),
+        ("[[l]]\nx = 1\n[[l]]\nx = 1\nx = 2\n", r"wild\.toml:5: l\.x is given twice, first in line 4; keep"),
+        ("[a]\nx = {y = 1, y = 2}\n", r"wild\.toml:2: a\.x is given twice; keep one"),
         ("[scene]\nx = 1\ny = " + "1" * 5000, r"wild\.toml:3: not TOML: a number has thousands of digits"),
     ],
 )

@@ -137,3 +137,27 @@ def test_what_sleep_would_save_is_told_where_it_can():
         cubes(Fidelity.DEFORMABLE, 1, stop_at_equilibrium=False),
     ):
         assert expected_cost(plan(other), other).asleep is None
+
+
+@pytest.mark.parametrize(
+    ("time", "words"),
+    [
+        ({"stop_at_equilibrium": False, "duration": 0.5}, ""),
+        ({"duration": 0.004}, ""),  # shorter than any rest
+        ({"start": Start.EQUILIBRIUM}, "whether it begins in equilibrium"),
+        ({"relaxation": True}, "when it rests"),
+        ({}, "when it rests"),
+    ],
+)
+def test_where_the_end_cannot_be_known_it_is_said_and_the_range_reaches_to_contacts_that_never_converge(
+    time, words
+):
+    scene = cubes(Fidelity.RIGID, 20, **time)
+    cost = expected_cost(plan(scene), scene)
+    assert cost.unknown.startswith(words)
+    assert bool(cost.unknown) == bool(words)
+    easy = replace(scene, solver=replace(scene.solver, max_iterations=1))
+    harder = replace(scene, solver=replace(scene.solver, max_iterations=10**6))
+    low, _, high = expected_cost(plan(easy), easy).seconds
+    assert (expected_cost(plan(harder), harder).seconds[2] > 10.0 * high) == bool(words)
+    assert low == expected_cost(plan(harder), harder).seconds[0]
