@@ -78,6 +78,14 @@ def test_the_python_of_the_how_to_on_rigid_blocks_prints_what_it_says(place):
     assert printed == said
 
 
+def test_the_python_of_the_how_to_on_studies_prints_what_it_says(place):
+    page = "docs/howto/python.md"
+    done = execute([sys.executable, "-W", "error", "-c", "\n".join(blocks(page, "python"))], place)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "".join(blocks(page, "text"))
+    assert (place / "lintel.csv").read_text(encoding="utf-8").startswith("# time [s],x [m]")
+
+
 def test_what_the_how_to_on_surveys_shows_is_what_the_files_and_commands_say(place):
     page = "docs/howto/survey.md"
     said = [

@@ -66,8 +66,8 @@ def pier_that_moves_away():
 
 
 def _tilted(degrees):
-    table = TiltingTable.at_rate_degrees((0.0, 1.0, 0.0), 10.0, degrees)
-    return scene([ground(), *stack(3, 0.4, 0.4)], 0.7, loads=Loads(gravity=(table,)), duration=5.0)
+    table = TiltingTable.at_rate_degrees((0.0, 1.0, 0.0), 20.0, degrees)
+    return scene([ground(), *stack(3, 0.4, 0.4)], 0.7, loads=Loads(gravity=(table,)), duration=3.0)
 
 
 @stands

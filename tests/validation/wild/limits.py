@@ -22,7 +22,8 @@ def _drum(sides, part):
     angle = np.pi / sides
     towards = (np.cos(angle), np.sin(angle), 0.0)
     base, *drums = column(2, 1.0, 1.0, sides=sides)
-    return scene([base, *drums], 0.9, gravity=tilted(part * drum_limit(sides, 2.0), towards))
+    pull = tilted(part * drum_limit(sides, 2.0), towards)
+    return scene([base, *drums], 0.9, gravity=pull, duration=2.0)
 
 
 @stands

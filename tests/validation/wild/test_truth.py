@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from mechanics.scene.shapes import bond, semicircular_arch, wall
+from pipelines.tuning.profiles import PROFILES
 from tests.validation.statics.limit_analysis import multiplier, stands
-from tests.validation.wild import driven, imperfect, limits, motions, sizes, supports  # noqa: F401 they enter scenes
+from tests.validation.wild import limits, motions, supports
+from tests.validation.wild.matrix import SETTINGS, Mark, Setting, at, judged, rotating
 from tests.validation.wild.scene_list import SCENES, Truth
 
 MARGIN = 1.03
@@ -93,3 +95,42 @@ def test_the_barrier_of_a_column_is_no_higher_than_that_of_its_top_drum_or_of_th
     assert 0 < least <= min(whole, top) * (1 + 1e-12)
     if count == 1:
         assert least == pytest.approx(whole)
+
+
+@pytest.mark.parametrize(
+    ("truth", "outcome", "mark"),
+    [
+        (Truth.STANDS, "equilibrium", Mark.RIGHT),
+        (Truth.STANDS, "moving", Mark.OPEN),
+        (Truth.STANDS, "collapsed", Mark.WRONG),
+        (Truth.FALLS, "collapsed", Mark.RIGHT),
+        (Truth.FALLS, "moving", Mark.OPEN),
+        (Truth.FALLS, "equilibrium", Mark.WRONG),
+        (Truth.SLIDES, "moving", Mark.RIGHT),
+        (Truth.SLIDES, "collapsed", Mark.RIGHT),
+        (Truth.SLIDES, "equilibrium", Mark.WRONG),
+        *((truth, "undecided", Mark.UNDECIDED) for truth in Truth),
+    ],
+)
+def test_a_verdict_is_held_against_the_truth(truth, outcome, mark):
+    assert judged(truth, outcome) is mark
+
+
+def test_the_matrix_has_every_profile_and_three_steps_and_its_quick_part_every_scene():
+    assert len(SETTINGS) == len({str(one) for one in SETTINGS}) == len(PROFILES) * 2 * 2 * 3
+    quick = rotating(SCENES)
+    assert [name for name, _ in quick] == list(SCENES)
+    assert len({setting for _, setting in quick}) >= 12
+
+
+def test_a_scene_is_run_at_its_setting():
+    """In the profile's settings, with the asked halting and start, and the asked step times the scene's pace."""
+    entry = SCENES["stack_of_hundred_metres"]
+    found = at(entry, Setting("fast", True, True, 5e-3))
+    assert (found.time.relaxation, found.time.start, found.time.step) == (True, "equilibrium", 3 * 5e-3)
+    assert found.time.duration == entry.build().time.duration
+    assert found.solver.tolerance == PROFILES["fast"].rest.tolerance
+    assert {one.fidelity for one in found.blocks} == {"fixed", "rigid"}
+    elastic = at(SCENES["elastic_stack"], Setting("accurate", False, False, 1e-3))
+    assert {one.fidelity for one in elastic.blocks} == {"fixed", "deformable"}
+    assert not elastic.time.relaxation
