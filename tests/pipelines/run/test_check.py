@@ -187,11 +187,8 @@ def test_stones_that_lie_deep_in_each_other_are_a_problem(tmp_path, sunk, found)
 
     def face(course, z):
         corners = np.array([(0.0, 0.0, z), (0.6, 0.0, z), (0.6, 0.0, z + 0.3), (0.0, 0.0, z + 0.3)])
-        return (
-            course,
-            corners,
-            corners.mean(axis=0) + [[0.1, 0, 0], [-0.1, 0, 0.05], [0.0, 0, -0.1], [0.2, 0, 0.1]],
-        )
+        inside = np.array([(0.4, 0.0, 0.15), (0.2, 0.0, 0.2), (0.3, 0.0, 0.05), (0.5, 0.0, 0.25)])
+        return course, corners, inside + np.array([0.0, 0.0, z])
 
     stones = {"LOW": face(1, 0.0), "TOP": face(2, 0.3 - sunk)}
     (tmp_path / "two.moma").write_text(survey_text(stones, np.zeros(3)), encoding="utf-8")
