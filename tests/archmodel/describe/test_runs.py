@@ -152,6 +152,17 @@ def test_two_runs_differ_by_settings_stones_and_values(session: Session) -> None
     assert compare_runs(session, 1, 1)["stresses"] == []
 
 
+def test_stones_of_one_run_alone_are_counted_for_that_run(filled: Database) -> None:
+    """One run has V2 and V3 for itself, the other R1; both have V1."""
+    with filled.session() as session:
+        one = store_run(session, run_record({"V1": 1e5, "V2": 1e5, "V3": None}))
+        other = store_run(session, run_record({"V1": 1e5, "R1": None}))
+    with filled.session(read_only=True) as session:
+        told, turned = compare_runs(session, one, other), compare_runs(session, other, one)
+    assert (told["only_in_run"], told["only_against"]) == (2, 1)
+    assert (turned["only_in_run"], turned["only_against"]) == (1, 2)
+
+
 @pytest.mark.parametrize("number", [3, 0, -1, 10**30])
 def test_a_run_that_is_not_there_is_an_error_that_names_those_that_are(session: Session, number: int) -> None:
     with pytest.raises(UsageError, match=f"there is no run {number}; there are 1, 2$"):

@@ -1,19 +1,21 @@
 """`moma check`: its report on simplified stones, joints and meshes, and the folder of its pictures."""
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 
 from moma.cli.text.checks import check_lines, duration
 from moma.errors import UsageError
+from pipelines.ingest.ingest import ingest
 from pipelines.run.check import check_scene
 from pipelines.run.closing_check import joints_report, simplification_report
 from survey.joints.report import ClosingReport, Gap, Joint, Overlap
 from survey.joints.settings import JointMode
 from survey.simplify.simplify import simplify
 from survey.synthetic.buildings.walls import wall
+from tests.pipelines.scenes import survey_text
 
 PLACE, UP = np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.0, 1.0])
 SCENE = """
@@ -141,6 +143,60 @@ def test_pictures_and_the_report_lie_in_a_folder_of_their_own(scene, url, tmp_pa
     with pytest.raises(UsageError, match=r"notes\.txt"):
         check_scene(scene, url, folder)
     assert (folder / "notes.txt").read_text() == "mine"
+
+
+def test_only_deep_overlaps_of_measured_stones_are_to_be_looked_at():
+    """Closed joints of stones measured 4, 6 and 9 mm into each other, the last one with a stone that nobody saw."""
+    joints = tuple(
+        joint(stones, k, width, 0.2)
+        for k, (stones, width) in enumerate(
+            ((("A", "B"), -0.004), (("B", "C"), -0.006), (("C", "H"), -0.009), (("A", "D"), 0.02))
+        )
+    )
+    told = joints_report(replace(REPORT, joints=joints), np.zeros(3), frozenset({"H"}))
+    assert [(one.stones, one.width) for one in told.measured_overlaps] == [(("B", "C"), -0.006)]
+    every = joints_report(replace(REPORT, joints=joints), np.zeros(3))
+    assert [one.stones for one in every.measured_overlaps] == [("C", "H"), ("B", "C")]  # the deepest first
+
+
+def test_what_check_prints_has_units_and_is_sound_only_without_problems(scene, url):
+    report = replace(check_scene(scene, url), joints=joints_report(REPORT, np.zeros(3)))
+    lines = check_lines(report, verbose=False)
+    text = "\n".join(lines)
+    for words in (
+        "material limestone: 18 stones, ρ 2350 kg/m³, E 12 GPa, ν 0.2",
+        "2 closed on 1 planes, 0.40 m² in all; 18.0 mm wide on average as surveyed; 1 left open",
+        "closing moved corners by 6.0 mm at most (stone B), and changed volumes by 5.0 % at most",
+        "C and D open by 40.0 mm over 0.100 m² at (1.000, 2.000, 3.000): too wide",
+        "B and E lie 2.0 mm in each other (10 cm³)",
+        "1 stone without any joint: E",
+    ):
+        assert words in text
+    assert any(line.startswith("sound") for line in lines)
+    told = check_lines(replace(report, problems=("it falls", "it is open")), verbose=False)
+    assert [line for line in told if line.startswith("problem")] == [
+        "problem: it falls",
+        "problem: it is open",
+    ]
+    assert not any(line.startswith("sound") for line in told)
+
+
+@pytest.mark.parametrize(("sunk", "found"), [(0.002, []), (0.05, ["LOW and TOP lie 50 mm in each other"])])
+def test_stones_that_lie_deep_in_each_other_are_a_problem(tmp_path, sunk, found):
+    """A stone on another, measured 2 mm or 50 mm too low, with its joints as surveyed."""
+
+    def face(course, z):
+        corners = np.array([(0.0, 0.0, z), (0.6, 0.0, z), (0.6, 0.0, z + 0.3), (0.0, 0.0, z + 0.3)])
+        inside = np.array([(0.4, 0.0, 0.15), (0.2, 0.0, 0.2), (0.3, 0.0, 0.05), (0.5, 0.0, 0.25)])
+        return course, corners, inside + np.array([0.0, 0.0, z])
+
+    stones = {"LOW": face(1, 0.0), "TOP": face(2, 0.3 - sunk)}
+    (tmp_path / "two.moma").write_text(survey_text(stones, np.zeros(3)), encoding="utf-8")
+    url = f"sqlite:///{tmp_path / 'two.db'}"
+    ingest([tmp_path / "two.moma"], url)
+    (tmp_path / "two.toml").write_text(SCENE + '[joints]\nmode = "as-surveyed"\n', encoding="utf-8")
+    problems = check_scene(tmp_path / "two.toml", url).problems
+    assert [one.partition(";")[0] for one in problems if "in each other" in one] == found
 
 
 @pytest.mark.parametrize(

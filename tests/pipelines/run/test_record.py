@@ -13,8 +13,13 @@ from mechanics.scene.scene import Fidelity
 from pipelines.ingest.ingest import ingest
 from pipelines.run import run as run_module
 from pipelines.run.assemble import assemble
+from pipelines.run.record import surveyed_widths
 from pipelines.run.run import run_scene
 from pipelines.scene.file import read_scene
+from survey.joints.report import ClosingReport
+from survey.joints.report import Joint as SurveyedJoint
+from survey.joints.settings import JointMode
+from tests.pipelines.results_by_hand import joints_of
 from tests.pipelines.scenes import survey_text
 
 FAR = np.array([652_345.0, 6_862_789.0, 1_040.0])
@@ -221,6 +226,21 @@ def check_solids(session, number, assembly, codes):
         # the faces are rectangles
         assert (one.shape, one.blockiness, one.within_tolerance) == ("hexahedron", 1.0, True)
         assert one.worst_angle == pytest.approx(0.0, abs=1e-6)
+
+
+def test_the_surveyed_width_of_a_joint_is_that_of_the_same_stones_in_like_orientation():
+    """Stones a and b face each other across a bed and beside it; b and c were measured into each other; d is alone."""
+    up, along = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
+    surveyed = tuple(
+        SurveyedJoint(stones, number, width, 0.5, 1.0, np.zeros(3), normal, "")
+        for number, (stones, width, normal) in enumerate(
+            ((("a", "b"), 0.03, along), (("b", "a"), 0.01, up), (("b", "c"), -0.004, up))
+        )
+    )
+    closing = ClosingReport(JointMode.CLOSE, surveyed, {}, {}, ("d",), (), ())
+    joints = joints_of([(1, 0), (2, 1), (3, 2)], np.tile([0.0, 0.0, 900.0], (3, 1)), [1.0, 2.0, 3.0])
+    widths = surveyed_widths(joints, ["a", "b", "c", "d"], closing)
+    assert widths == pytest.approx([0.01, np.nan, np.nan], nan_ok=True)
 
 
 def test_a_result_leads_back_to_the_points_that_were_measured(ran):

@@ -11,6 +11,7 @@ from survey.extrusion.extrusion import extrude
 from survey.faces.faces import outline_face
 from survey.quality.precision import StoneQuality, appraise, judge_survey
 from survey.records.survey import BlockRecord
+from tests.survey.quality.plain_stones import rectangle
 
 DEPTH = Depth(0.4, 0.03, "guess", "kind", 3)
 FRONT = np.array([0.0, -10.0, 0.0])
@@ -69,6 +70,21 @@ def test_the_stated_sigma_is_judged_by_the_residuals_of_all_stones(ratio: float,
     if ratio <= 1.0:  # at twice the stated sigma the worst points are taken for blunders
         assert abs(quality.sigma0 - ratio) < 4.0 * ratio * quality.sigma0_sigma + 0.01
     assert quality.rms == pytest.approx(0.002 * quality.sigma0 * math.sqrt(17 / 20), rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("sigma0", "words"),
+    [
+        (1.0, ("is right", "1.00 ±")),
+        (2.0, ("too small", "2.00 ±", "4 mm would be right instead of 2 mm")),
+        (0.5, ("too large", "0.50 ±", "1 mm would be right instead of 2 mm")),
+    ],
+)
+def test_the_verdict_names_the_sigma_that_would_be_right(sigma0: float, words: tuple[str, ...]) -> None:
+    stones = [rectangle(f"{k}", "header", k, 0, 0.4, 0.3, sigma0=sigma0) for k in range(30)]
+    verdict = judge_survey(stones).verdict
+    assert all(one in verdict for one in words)
+    assert ("instead of" in verdict) == (sigma0 != 1.0)
 
 
 def test_the_histogram_of_good_residuals_is_the_normal_one() -> None:

@@ -46,6 +46,28 @@ def test_every_fault_has_its_reason(changes: dict[str, object], urgency: Urgency
     assert one.action
 
 
+@pytest.mark.parametrize(
+    ("below", "above", "urgency"),
+    [
+        ({"tilt_sigma": 0.49}, {"tilt_sigma": 0.51}, Urgency.TILT),
+        (
+            {"points": 100, "blunders": ("point",) * 20, "worn": ("corner",) * 5},
+            {"points": 100, "blunders": ("point",) * 20, "worn": ("corner",) * 6},
+            Urgency.BLUNDERS,
+        ),
+        # with a redundancy of 100 among 340 of the others: 1.27 and 1.54 times the scatter of the survey
+        ({"redundancy": 100, "sigma0": 1.4}, {"redundancy": 100, "sigma0": 2.0}, Urgency.SCATTER),
+        ({"sigma0": 0.4}, {"sigma0": 0.3}, Urgency.SMOOTH),
+        ({"redundancy": 7, "sigma0": 0.1}, {"redundancy": 8, "sigma0": 0.1}, Urgency.SMOOTH),
+    ],
+)
+def test_the_limit_from_which_a_stone_is_measured_again(
+    below: dict[str, object], above: dict[str, object], urgency: Urgency
+) -> None:
+    assert listed(rectangle("X", "header", 0, 0, 0.4, 0.3, **below)) == ()
+    assert [one.urgency for one in listed(rectangle("X", "header", 0, 0, 0.4, 0.3, **above))] == [urgency]
+
+
 def test_the_most_urgent_come_first_and_the_worst_of_a_sort_before_the_others() -> None:
     reject = Reject("R", SurveyError("it has 2 corners", where="file:7", remedy="measure 3"), (range(7, 9),))
     odd = Contradiction("ok3", "header", 12, "its face is 0.9 m long", 0.3, 8.0)
