@@ -74,6 +74,10 @@ class Law(Protocol):
     """A contact law: a frozen dataclass of its parameters, checked on construction (SceneError)."""
 
     @property
+    def friction(self) -> float:
+        """Coulomb's μ of a contact that sticks [-]."""
+
+    @property
     def reach(self) -> float:
         """Gap up to which the law acts, so that contacts are watched beyond the alert distance [m]; mostly 0."""
 
