@@ -84,7 +84,7 @@ def rows() -> list[Row]:
 
 def _stands(group: str, name: str, scene: Scene, joints: int, quick: bool = True) -> Row:
     """The first step of rigid stones that stand: what the ground bears is the weight."""
-    friction = scene.contact.law.friction  # type: ignore[attr-defined]
+    friction = scene.contact.law.friction
     return Row(
         group,
         name,

@@ -139,7 +139,7 @@ def _rests(group: str, name: str, blocks: Sequence[Block], joints: int, **more: 
     """Stones that stand: the weight arrives, they stay where they are, and nothing overlaps."""
     quick = more.pop("quick", True)
     scene = standing(blocks, **more)
-    friction = scene.contact.law.friction  # type: ignore[attr-defined]
+    friction = scene.contact.law.friction
     through = 2.0 * (1.0 + friction) * joints * VELOCITY_TOLERANCE
     fallen = 0.5 * G * scene.time.duration**2
 
