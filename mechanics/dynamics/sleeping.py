@@ -203,9 +203,10 @@ class Sleepers:
 
 def _resultants(state: State, contacts: Contacts, force: Array) -> Array:
     """Return forces and moments (nb, 6) about the centres of mass that contacts exert on their bodies [N], [N m]."""
-    points, bodies, count = material_points(contacts, state), contacts.bodies, len(state.centre)
-    total = wrenches(state, bodies[:, 0], points[:, 0], force, count)
-    total -= wrenches(state, bodies[:, 1], points[:, 1], force, count)
+    # sleepers are rigid, and rigid stones meet half-way between their material points
+    point, bodies, count = material_points(contacts, state).mean(axis=1), contacts.bodies, len(state.centre)
+    total = wrenches(state, bodies[:, 0], point, force, count)
+    total -= wrenches(state, bodies[:, 1], point, force, count)
     return total
 
 

@@ -55,6 +55,9 @@ def imbalance(
     contacts, those between sleeping stones.
     """
     points = material_points(contacts, replace(state, node=_undeformed(model, state)))
+    if model.rigid_only:
+        # rigid stones meet half-way between their material points, as in W: a gap or an overlap gives no moment
+        points = np.repeat(points.mean(axis=1, keepdims=True), 2, axis=1)
     count = len(model.mass)
     resultant = wrenches(state, contacts.bodies[:, 0], points[:, 0], force, count)
     resultant -= wrenches(state, contacts.bodies[:, 1], points[:, 1], force, count)

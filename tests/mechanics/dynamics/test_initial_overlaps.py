@@ -73,3 +73,13 @@ def test_corners_that_appear_later_touch_at_the_overlap_of_their_joint():
         run.step()
     assert run.state.centre[1, 0] > state.centre[1, 0] + 0.04
     assert run.state.centre[1, 2] == pytest.approx(state.centre[1, 2], abs=1e-7)
+
+
+@pytest.mark.parametrize("overlap", OVERLAPS)
+def test_friction_across_an_overlap_leaves_a_stone_in_balance(overlap):
+    """A stone on a slope: friction acts half-way between both faces, on both stones in the same point."""
+    stone = brick("S", (-0.3, -0.2, -overlap), (0.3, 0.2, 0.3))
+    one = scene(ground(), stone, gravity=(3.0, 0.0, -9.0), step=1e-3, duration=0.1)
+    result = simulate(one)
+    assert result.outcome is Outcome.EQUILIBRIUM
+    assert result.errors.balance < 1e-6
