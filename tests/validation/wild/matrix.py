@@ -72,7 +72,9 @@ def at(entry: Wild, setting: Setting) -> Scene:
     asked = replace(
         plain.time, relaxation=setting.relaxation, start=Start.EQUILIBRIUM if setting.static else Start.REST
     )
-    scene = overlaid_scene(replace(plain, time=asked), PROFILES[setting.profile].overlay(asked))
+    # forces act on rigid stones
+    pushed = frozenset[str]().union(*(force.stones for force in plain.loads.forces))
+    scene = overlaid_scene(replace(plain, time=asked), PROFILES[setting.profile].overlay(asked), pushed)
     return replace(scene, name=entry.name, time=replace(scene.time, step=entry.pace * setting.step))
 
 
