@@ -128,6 +128,17 @@ def test_only_stones_that_deform_in_both_are_compared_by_stress():
     assert apart["von_mises_p99"] is None  # of other stones, and not to be had of these alone
 
 
+def test_the_mean_stress_of_stones_counts_their_volume():
+    """2 m³ at 1 MPa beside 1 m³ at 4 MPa, 2 MPa on average, against 1 MPa in both."""
+    found = quantities(stack())
+    other = replace(found.stones["B"], volume=1.0)
+    reference, even = (
+        replace(found, stones={**found.stones, "A": replace(other, von_mises_mean=mean)})
+        for mean in (4e6, 1e6)
+    )
+    assert differences(even, reference)["von_mises_mean"] == pytest.approx(0.5)
+
+
 def test_movements_within_the_overlaps_of_rigid_stones_are_none():
     found, reference = quantities(stack(rigid=True, sunk=3e-8)), quantities(stack(rigid=True, sunk=1e-8))
     apart = differences(found, reference)
