@@ -59,6 +59,7 @@ def test_the_numbers_are_those_of_the_stones_as_a_whole():
     assert found.stones["A"].von_mises_mean is None
     assert set(found.stones) == {"A", "B"}
     assert found.displacement == pytest.approx(0.002)
+    assert found.settlement == pytest.approx(1e-5)  # that of the last step
     assert found.stress_error == pytest.approx(0.1)
 
 
