@@ -59,6 +59,7 @@ def test_the_numbers_are_those_of_the_stones_as_a_whole():
     assert found.stones["A"].von_mises_mean is None
     assert set(found.stones) == {"A", "B"}
     assert found.displacement == pytest.approx(0.002)
+    assert found.settlement == pytest.approx(1e-5)  # that of the last step
     assert found.stress_error == pytest.approx(0.1)
 
 
@@ -126,6 +127,17 @@ def test_only_stones_that_deform_in_both_are_compared_by_stress():
     assert apart["von_mises_max"] == pytest.approx(0.5)
     assert apart["von_mises_mean"] == pytest.approx(0.5)
     assert apart["von_mises_p99"] is None  # of other stones, and not to be had of these alone
+
+
+def test_the_mean_stress_of_stones_counts_their_volume():
+    """2 m³ at 1 MPa beside 1 m³ at 4 MPa, 2 MPa on average, against 1 MPa in both."""
+    found = quantities(stack())
+    other = replace(found.stones["B"], volume=1.0)
+    reference, even = (
+        replace(found, stones={**found.stones, "A": replace(other, von_mises_mean=mean)})
+        for mean in (4e6, 1e6)
+    )
+    assert differences(even, reference)["von_mises_mean"] == pytest.approx(0.5)
 
 
 def test_movements_within_the_overlaps_of_rigid_stones_are_none():

@@ -24,6 +24,14 @@ def test_stress_statistics_are_weighted_by_volume(mixed):
     assert statistics.mean < statistics.p99 <= statistics.max
 
 
+def test_stress_statistics_count_volume_not_nodes():
+    """3 MPa in 1 m³ of a fine mesh and 1 MPa in 3 m³ of a coarse one: 1.5 MPa on average."""
+    fine = deformable_body("fine", (0, 0, 0), (1, 1, 1), lambda p: np.full(len(p), 3e6), 0.25)
+    coarse = deformable_body("coarse", (2, 0, 0), (5, 1, 1), lambda p: np.full(len(p), 1e6), 1.0)
+    statistics = stress_statistics(result_of([fine, coarse], pairs=(), forces=()))
+    assert (statistics.mean, statistics.p99, statistics.max) == pytest.approx((1.5e6, 3e6, 3e6))
+
+
 def test_every_stone_has_its_result(mixed):
     base, elastic, top = stone_results(mixed)
     assert (base.code, base.fidelity, base.von_mises_max) == ("base", "fixed", None)

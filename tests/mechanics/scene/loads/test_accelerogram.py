@@ -172,3 +172,8 @@ def test_impossible_ground_motions_are_refused(directions, changed):
 def test_a_component_needs_a_direction():
     with pytest.raises(SceneError, match="direction"):
         Component((0.0, 0.0, 0.0), record(wave(1.0)))
+
+
+def test_the_peak_is_the_largest_acceleration_of_either_sign():
+    assert Accelerogram(0.01, np.array([0.0, 1.0, -3.0, 2.0]), "pulse", "by hand").peak == 3.0
+    assert Accelerogram(0.01, np.array([0.0, 1.0, -3.0, 4.0]), "pulse", "by hand").peak == 4.0

@@ -120,3 +120,4 @@ def test_loads_say_until_when_they_change():
     assert StoneForce(NORTH, History.constant([1.0, 0.0, 0.0])).until == 0.0
     assert ImposedMotion(NORTH, History.constant([1.0, 0.0, 0.0])).until == np.inf
     assert ImposedMotion(NORTH, spin=History([0.0, 1.0], [0.0, 1.0])).until == np.inf
+    assert ImposedMotion(NORTH, spin=History([0.0, 3.0], [1.0, 0.0])).until == 3.0
