@@ -66,11 +66,8 @@ def _solid_lines(solids: "SolidsReport", verbose: bool) -> list[str]:
             f"  coordinates have {solids.decimals} decimals: if they are rounded, --snap "
             f"{2.0 * 10.0**-solids.decimals:g} brings faces that match into one plane"
         )
-    if verbose:
-        lines += [f"  {code}: {'; '.join(texts)}" for code, texts in solids.remarks.items()]
-    elif solids.remarks:
-        lines.append(f"  remarks on {len(solids.remarks)} solids, with -v")
-    return lines
+    remarks = [f"  {code}: {'; '.join(texts)}" for code, texts in solids.remarks.items()]
+    return lines + (remarks if verbose else shorten(remarks, 5, "  ", ", with -v"))
 
 
 def _frame_line(frame: dict[str, Any]) -> str:
