@@ -117,7 +117,7 @@ def reading_options(
     """
     options = ReadingOptions(codes=codes)
     if kind is not None:
-        options = replace(options, kind=kind)
+        options = replace(options, kind=kind.lower())
     if header is not None:
         if not header.is_file():
             raise UsageError("no such file", where=str(header), remedy="name a header file with --header")

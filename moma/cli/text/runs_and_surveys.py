@@ -213,9 +213,9 @@ def _course_lines(report: "SurveyReport", verbose: bool) -> list[str]:
         deformed += found
         if (found or verbose) and one.slope is not None and one.slope_sigma is not None:
             place = f"{one.facade}, course {one.course}" + (f" of {one.zone}" if one.zone else "")
-            text = f"  {place}: {one.slope * 1e3:+.2f} ± {one.slope_sigma * 1e3:.2f} mm/m"
+            text = f"  {place}: {one.slope * 1e3:+z.2f} ± {one.slope_sigma * 1e3:.2f} mm/m"
             if one.sag is not None and one.sag_sigma is not None:
-                text += f", mid-span {one.sag * 1e3:+.1f} ± {one.sag_sigma * 1e3:.1f} mm"
+                text += f", mid-span {one.sag * 1e3:+z.1f} ± {one.sag_sigma * 1e3:.1f} mm"
             lines.append(f"{text}: {one.finding}")
     if courses:
         lines.insert(0, f"  {len(courses)} bed lines, {deformed} not level or not straight")

@@ -109,12 +109,12 @@ def plane_faces(
     if abs(change) > _VOLUME:
         return ScannedStone(
             None,
-            f"it keeps its {len(triangles)} facets: plane faces change its volume by {100.0 * change:+.1f} %",
+            f"it keeps its {len(triangles)} facets: plane faces change its volume by {100.0 * change:+z.1f} %",
         )
     away = float(np.abs(heights).min(axis=1).max()) * 1e3
     text = (
         f"{len(solid.faces)} plane faces recognised among {len(triangles)} facets; points lie up to {away:.1f} mm "
-        f"from them, the volume changes by {100.0 * change:+.1f} %"
+        f"from them, the volume changes by {100.0 * change:+z.1f} %"
     )
     return ScannedStone(Solid(code, solid.vertices + origin, solid.faces), text)
 
