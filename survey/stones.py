@@ -89,7 +89,7 @@ def _stones(
 def _made(item: BlockRecord | SolidRecord, head: SurveyHead) -> SurveyedBlock | Reject:
     try:
         if isinstance(item, SolidRecord):
-            return block_of_solid(item, head.viewpoint(None), head.path)
+            return block_of_solid(item, head.viewpoint(None), item.file or head.path)
         return _extruded(outline_face(item, head.viewpoint(item.station)), head)
     except MomaError as error:
         return _reject(item, head, error)
@@ -112,4 +112,5 @@ def _extruded(face: Face, head: SurveyHead) -> SurveyedBlock:
 
 
 def _reject(item: BlockRecord | SolidRecord, head: SurveyHead, error: MomaError) -> Reject:
-    return Reject(item.code, error.at(f"{head.path}:{item.line}: stone {item.code}"), item.spans)
+    path = (item.file if isinstance(item, SolidRecord) else "") or head.path
+    return Reject(item.code, error.at(f"{path}:{item.line}: stone {item.code}"), item.spans)

@@ -16,6 +16,7 @@ __all__ = [
     "Kind",
     "KindWhere",
     "ListFormat",
+    "Planes",
     "Profile",
     "ProfileName",
     "SceneArgument",
@@ -77,7 +78,7 @@ Profile = Annotated[
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")]
 Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Print more; show the traceback of an error.")]
 SurveyFiles = Annotated[
-    list[Path], typer.Argument(metavar="FILE…", help="Survey files; see docs/formats.md.")
+    list[Path], typer.Argument(metavar="FILE…", help="Survey files, or folders of them; see docs/formats.md.")
 ]
 Format = Annotated[SurveyFormat, typer.Option(help="Format of the survey files.")]
 Header = Annotated[
@@ -127,6 +128,14 @@ Snap = Annotated[
         "--snap",
         metavar="T",
         help="Bring matching faces of neighbouring solids within T metres into one plane, e.g. 0.002.",
+    ),
+]
+Planes = Annotated[
+    float | None,
+    typer.Option(
+        "--planes",
+        metavar="T",
+        help="Facets of a scanned solid within T metres of a plane are one face; 0: keep all; default: 0.005.",
     ),
 ]
 SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene file; see docs/scene.md.")]

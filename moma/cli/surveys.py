@@ -16,6 +16,7 @@ from moma.cli.options import (
     Json,
     Kind,
     KindWhere,
+    Planes,
     Sigma,
     Snap,
     Support,
@@ -40,6 +41,7 @@ def ingest(
     sigma: Sigma = None,
     unit: Unit = None,
     snap: Snap = None,
+    planes: Planes = None,
     kind_where: KindWhere = None,
     support: Support = None,
     keep_going: Annotated[
@@ -73,10 +75,10 @@ def ingest(
 
     if rejects is not None and not keep_going:
         raise UsageError("--rejects without --keep-going", remedy="give --keep-going too")
-    for name, given in (("--unit", unit), ("--snap", snap)):
+    for name, given in (("--unit", unit), ("--snap", snap), ("--planes", planes)):
         if given is not None and format is not SurveyFormat.SOLIDS:
             raise UsageError(f"{name} with format {format}", remedy="it is for --format solids")
-    options = reading_options(header, codes, kind, sigma, unit, snap)
+    options = reading_options(header, codes, kind, sigma, unit, snap, planes)
     rules = kind_rules(kind_where or (), support or ())
     with progress_bars() as listener:
         report = ingest_files(
@@ -113,7 +115,7 @@ def survey_report(
     from pipelines.reports.survey.report import INDEX, report_surveys
 
     options = reading_options(header, codes, kind, sigma)
-    folder = out or Path("out") / f"survey-{files[0].stem}"
+    folder = out or Path("out") / f"survey-{files[0].resolve().stem}"
     with progress_bars() as listener:
         report = report_surveys(files, folder, format.value, options, listener)
     for warning in report.study.warnings:

@@ -16,7 +16,7 @@ from archmodel.tables.entities import Entity, kind_named
 from mechanics.dynamics.progress import Listener, Progress, silent
 from moma.errors import NoDatabaseError, SurveyError, UsageError
 from pipelines.ingest.kind_rules import KindRule, apply_rules, check_kinds
-from pipelines.ingest.reading_options import check_survey_file
+from pipelines.ingest.reading_options import Source, survey_sources
 from pipelines.ingest.records import frame_record, stone_record
 from pipelines.ingest.rejects import check_targets, default_path, rejects_text
 from pipelines.ingest.relate import KnownSolids, relate
@@ -50,7 +50,7 @@ def ingest(
 
     Parameters
     ----------
-    paths : survey files
+    paths : survey files, or folders of them; all files of solids are one survey
     url : of the database, created if it does not exist
     format : name of their format
     progress : called after every stone
@@ -69,9 +69,8 @@ def ingest(
         the database is not touched
     DatabaseError : a stone or a file is in the database already; the database is unchanged
     """
-    surveys = [Path(path) for path in paths]
-    if not surveys:
-        raise UsageError("no survey file", remedy="name at least one")
+    sources = survey_sources(paths, format)
+    surveys = [one.path for one in sources]
     rejects = None if isinstance(keep_going, bool) else Path(keep_going)
     if rejects is not None and len(surveys) > 1:
         raise UsageError(
@@ -80,17 +79,16 @@ def ingest(
     if rules and format != "solids":
         remedy = "give it with --format solids; surveys give the kind of each stone"
         raise UsageError(f"a rule for solids with format {format}", where=rules[0].option, remedy=remedy)
-    _check_files(surveys)
     targets = [rejects or default_path(survey) for survey in surveys]
     if keep_going:
-        check_targets(targets, surveys)
+        check_targets(targets, [file for one in sources for file in one.files])
     with ExitStack() as held:
         _open_if_there(url, held)
         check_kinds(rules)
         spools = [held.enter_context(Spool()) for _ in surveys]
         tallies = [
-            _measure(path, spool, format, options, rules, bool(keep_going), progress)
-            for path, spool in zip(surveys, spools, strict=True)
+            _measure(source, spool, format, options, rules, bool(keep_going), progress)
+            for source, spool in zip(sources, spools, strict=True)
         ]
         if len(surveys) > 1:
             _check_codes(tallies, spools)
@@ -122,15 +120,6 @@ def _open_if_there(url: str, held: ExitStack) -> None:
         home_of(url).engine(create=True).dispose()  # fails if none could be created
 
 
-def _check_files(surveys: Sequence[Path]) -> None:
-    seen: set[Path] = set()
-    for path in surveys:
-        check_survey_file(path)
-        if path.resolve() in seen:
-            raise UsageError("is given twice", where=str(path), remedy="name each survey file once")
-        seen.add(path.resolve())
-
-
 def _check_codes(tallies: Sequence[Tally], spools: Sequence[Spool]) -> None:
     """Refuse files that give one code to two stones, before a database is created for them."""
     places: dict[str, str] = {}
@@ -153,7 +142,7 @@ def _listed_stations(tally: Tally, options: ReadingOptions | None) -> list[int]:
 
 
 def _measure(
-    path: Path,
+    source: Source,
     spool: Spool,
     format: str,
     options: ReadingOptions | None,
@@ -162,7 +151,8 @@ def _measure(
     progress: Listener,
 ) -> Tally:
     """Write the good stones of one file into a spool; raise at the first bad one, or keep it for the rejects."""
-    tally = Tally(path, survey_stones(open_survey(path, format, options)))
+    path = source.path
+    tally = Tally(path, survey_stones(open_survey(path, format, source.options(options))), source.files)
     stage, head, kinds = f"fit {path.name}", tally.stream.head, set[str]()
     for one in tally.stream.stones:
         made = one if isinstance(one, Reject) else _of_known_kind(apply_rules(one, rules), head.path, kinds)
@@ -187,7 +177,7 @@ def _store(session: Session, tally: Tally, stones: Iterator[StoneRecord], again:
         session,
         head.name,
         head.path,
-        _sha256(tally.path),
+        _sha256(tally.files),
         stones,
         stations={one.name: one.position.tolist() for one in head.stations},
         frame=frame_record(tally.stream.transform),
@@ -225,9 +215,13 @@ def _of_known_kind(block: SurveyedBlock, path: str, known: set[str]) -> Surveyed
     return block
 
 
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+def _sha256(files: Sequence[Path]) -> str:
+    """Compute the digest of a file, or of the digests of several."""
+    digests = []
+    for path in files:
+        with path.open("rb") as file:
+            digests.append(hashlib.file_digest(file, "sha256").hexdigest())
+    return digests[0] if len(digests) == 1 else hashlib.sha256("".join(sorted(digests)).encode()).hexdigest()
 
 
 @contextmanager

@@ -86,7 +86,7 @@ def kind_rules(texts: Sequence[str] = (), supports: Sequence[str] = ()) -> tuple
         if not colon or not kind.strip():
             remedy = 'write it as "KIND: EXPRESSION", e.g. "voussoir: z > 0.5"'
             raise UsageError(f"{text!r} names no kind", where="--kind-where", remedy=remedy)
-        rules.append(KindRule(kind.strip(), _checked(expression), "--kind-where"))
+        rules.append(KindRule(kind.strip().lower(), _checked(expression), "--kind-where"))
     return (*rules, *(KindRule(_SUPPORT, _checked(text), "--support") for text in supports))
 
 
@@ -215,7 +215,7 @@ def _compared(sign: str, one: Value, other: Value) -> bool | None:
 
 def _value(attribute: Token, token: Token, values: Mapping[str, Value]) -> Value:
     if attribute.text in _TEXTS:
-        return token.text
+        return token.text.lower() if attribute.text == "kind" else token.text
     return float(token.text) if token.role == "number" else values[token.text]
 
 

@@ -1,24 +1,92 @@
 """Reading options from what a user gives beside the names of survey files."""
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from moma.errors import UsageError
 from survey.formats.options import ReadingOptions
-from survey.formats.reading import with_header
+from survey.formats.reading import solid_files, with_header
 
-__all__ = ["UNITS", "check_survey_file", "reading_options"]
+__all__ = ["UNITS", "Source", "reading_options", "survey_sources"]
 
 UNITS: Mapping[str, float] = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "in": 0.0254}
 """Units in which solids may be given, by their length [m]."""
 
 
-def check_survey_file(path: Path) -> None:
-    """Refuse a path that is not a file, before anything is read."""
-    if not path.is_file():
-        what = "is a folder" if path.is_dir() else "no such file"
-        raise UsageError(what, where=str(path), remedy="name a survey file")
+_ENDINGS: Mapping[str, tuple[str, ...]] = {
+    "moma": (".moma",),
+    "csv": (".csv",),
+    "pnezd": (".txt", ".csv"),
+    "penzd": (".txt", ".csv"),
+}
+"""Endings of the files that are read of a folder, by format."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """One survey: a file, or several files of solids.
+
+    Attributes
+    ----------
+    path : the file, or the folder of all files
+    files : the files
+    """
+
+    path: Path
+    files: tuple[Path, ...]
+
+    def options(self, options: ReadingOptions | None) -> ReadingOptions:
+        """Return the options with which the survey is read."""
+        several = len(self.files) > 1 or self.path.is_dir()
+        return replace(options or ReadingOptions(), files=self.files if several else ())
+
+
+def survey_sources(paths: Sequence[str | Path], format: str) -> tuple[Source, ...]:
+    """Group files into surveys: all files of solids are one, of other formats each is one.
+
+    Parameters
+    ----------
+    paths : files, or folders of files
+    format : name of their format
+
+    Raises
+    ------
+    UsageError : there is no such file, one is named twice, or a folder has none
+    """
+    files: list[Path] = []
+    for path in map(Path, paths):
+        files += _files_in(path, format) if path.is_dir() else [path]
+    if not files:
+        raise UsageError("no survey file", remedy="name at least one")
+    seen: set[Path] = set()
+    for file in files:
+        if not file.is_file():
+            raise UsageError("no such file", where=str(file), remedy="name a survey file")
+        if file.resolve() in seen:
+            raise UsageError("is given twice", where=str(file), remedy="name each survey file once")
+        seen.add(file.resolve())
+    if format != "solids":
+        return tuple(Source(file, (file,)) for file in files)
+    if len(paths) == 1 or len({file.parent for file in files}) > 1:
+        return (Source(Path(paths[0]), tuple(files)),)
+    return (Source(files[0].parent, tuple(files)),)
+
+
+def _files_in(folder: Path, format: str) -> Sequence[Path]:
+    """List the survey files of a folder by name, files of rejects left out."""
+    if format == "solids":
+        return solid_files(folder)
+    endings = _ENDINGS.get(format, ())
+    found = sorted(
+        one
+        for one in folder.iterdir()
+        if one.suffix.lower() in endings and one.is_file() and not one.stem.endswith(".rejects")
+    )
+    if not found:
+        remedy = f"name a folder with files that end in {' or '.join(endings)}, or give --format"
+        raise UsageError(f"the folder has no files of format {format}", where=str(folder), remedy=remedy)
+    return found
 
 
 def reading_options(
@@ -28,6 +96,7 @@ def reading_options(
     sigma: float | None = None,
     unit: str | None = None,
     snap: float | None = None,
+    planes: float | None = None,
 ) -> ReadingOptions:
     """Gather the options of a reader; None keeps the default.
 
@@ -39,6 +108,7 @@ def reading_options(
     sigma : of a coordinate, where the file has none; it takes precedence over the header file [m]
     unit : one of `UNITS`, in which solids are given
     snap : tolerance within which faces of neighbouring solids are brought into one plane [m]
+    planes : distance within which the facets of a scanned solid are one plane face [m]
 
     Raises
     ------
@@ -47,7 +117,7 @@ def reading_options(
     """
     options = ReadingOptions(codes=codes)
     if kind is not None:
-        options = replace(options, kind=kind)
+        options = replace(options, kind=kind.lower())
     if header is not None:
         if not header.is_file():
             raise UsageError("no such file", where=str(header), remedy="name a header file with --header")
@@ -66,4 +136,12 @@ def reading_options(
             what, remedy = f"the tolerance is {snap:g} m", "give it in metres, e.g. 0.002; 0: none"
             raise UsageError(what, where="--snap", remedy=remedy)
         options = replace(options, snap=snap)
+    if planes is not None:
+        if not 0.0 <= planes < 0.1:
+            what, remedy = (
+                f"the tolerance is {planes:g} m",
+                "give it in metres, e.g. 0.005; 0 keeps every facet",
+            )
+            raise UsageError(what, where="--planes", remedy=remedy)
+        options = replace(options, planes=planes)
     return options

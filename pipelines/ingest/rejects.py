@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from moma.errors import UsageError
+from survey.formats.reading import SOLIDS
 from survey.records.survey import Reject
 
 __all__ = ["MARK", "check_targets", "default_path", "rejects_text"]
@@ -23,15 +24,13 @@ _STONE = re.compile(rb"\s*stone\b")
 
 def default_path(survey: Path) -> Path:
     """Return the default file for the rejects of a survey file: beside it, ``NAME.rejects.SUFFIX``."""
-    suffix = survey.suffix if survey.suffix.lower() not in _SOLIDS else ".txt"
-    return survey.with_name(f"{survey.stem}.rejects{suffix}")
-
-
-_SOLIDS = frozenset({".obj", ".ply", ".stl", ".msh"})
+    plain = survey.resolve() if survey.is_dir() else survey
+    suffix = ".txt" if survey.is_dir() or survey.suffix.lower() in SOLIDS else survey.suffix
+    return plain.with_name(f"{plain.stem}.rejects{suffix}")
 
 
 def check_targets(targets: Sequence[Path], surveys: Sequence[Path]) -> None:
-    """Check that files of rejects replace neither a survey, nor each other, nor any other file of the user.
+    """Check that files of rejects replace neither a survey nor any other file of the user.
 
     Parameters
     ----------
@@ -44,13 +43,10 @@ def check_targets(targets: Sequence[Path], surveys: Sequence[Path]) -> None:
         naming the file that would be lost
     """
     read = {survey.resolve() for survey in surveys}
-    for number, target in enumerate(targets):
+    for target in targets:
         if target.resolve() in read:
             remedy = "name another file with --rejects"
             raise UsageError("is the survey file itself", where=str(target), remedy=remedy)
-        if target in targets[:number]:
-            what = f"would hold the rejects of {surveys[targets.index(target)]} and of {surveys[number]}"
-            raise UsageError(what, where=str(target), remedy="ingest one file at a time")
         _check_replaceable(target)
 
 

@@ -104,6 +104,7 @@ class Tally:
 
     path: Path
     stream: SurveyedStream
+    files: Sequence[Path]
     stones: Counter[str] = field(default_factory=Counter)
     rejected: dict[str, int] = field(default_factory=dict)
     shapes: dict[str, str] = field(default_factory=dict)

@@ -50,7 +50,8 @@ def _doubts(scene: SceneFile, models: Sequence[StoneModel]) -> Iterator[tuple[st
     laws = [("contact",), *(one.entry.path for one in scene.laws)]
     values = [scene.contact.law, *(one.law for one in scene.laws)]
     for path, law in zip(laws, values, strict=True):
-        if (doubt := doubt_of(law.friction, FRICTION)) is not None:
+        friction = getattr(law, "friction", None)
+        if friction is not None and (doubt := doubt_of(friction, FRICTION)) is not None:
             yield f"{document.where(*path)}: {doubt.text}", doubt
 
 

@@ -24,6 +24,9 @@ class ReadingOptions:
     unit : length of the unit in which solids are given [m]
     flat : distance from a plane within which the corners of a polygon of a solid count as plane [m]; at least `snap`
     snap : tolerance within which matching faces of neighbouring solids are brought into one plane [m]; 0: none is
+    planes : distance of the facets of a scanned solid from a plane within which they are one face [m]; 0: every
+        facet is kept
+    files : files of solids that are one survey together; none: only the given one
     """
 
     codes: str | None = None
@@ -33,6 +36,8 @@ class ReadingOptions:
     unit: float = 1.0
     flat: float = 0.0
     snap: float = 0.0
+    planes: float = 0.005
+    files: tuple[Path, ...] = ()
 
     def head_for(self, path: Path) -> SurveyHead:
         """Make the head of a file without one of its own: that of the header file, under the file's own path."""

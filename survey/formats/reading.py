@@ -12,11 +12,13 @@ from survey.records.survey import Survey, SurveyStream
 
 __all__ = [
     "FORMATS",
+    "SOLIDS",
     "Reader",
     "ReadingOptions",
     "open_survey",
     "read_head",
     "read_survey",
+    "solid_files",
     "with_header",
 ]
 
@@ -29,6 +31,24 @@ def _open_solids(path: Path, options: ReadingOptions) -> SurveyStream:
 
     return open_solids(path, options)
 
+
+def solid_files(folder: Path) -> tuple[Path, ...]:
+    """List the files of solids of a folder, by name.
+
+    Raises
+    ------
+    UsageError
+        if there are none
+    """
+    found = sorted(one for one in folder.iterdir() if one.suffix.lower() in SOLIDS and one.is_file())
+    if not found:
+        remedy = f"name a folder with files that end in {', '.join(SOLIDS)}"
+        raise UsageError("the folder has no solids", where=str(folder), remedy=remedy)
+    return tuple(found)
+
+
+SOLIDS = (".obj", ".ply", ".stl", ".msh")
+"""Endings of files of solids."""
 
 FORMATS: Mapping[str, Reader] = {
     "moma": open_moma,

@@ -207,7 +207,7 @@ def _odd_angles(
             continue
         if _is_alone(flat, k, odd):
             corner = int(np.argmax(np.where(odd, np.abs(angles - 90.0), 0.0)))
-            at = ", ".join(f"{one + 0.0:.3f}" for one in face.outline[corner])
+            at = ", ".join(f"{one:z.3f}" for one in face.outline[corner])
             text = f"its angle at ({at}) is {angles[corner]:.0f}°, and no neighbour follows its sides there"
             yield Misplaced(face.code, face.line, Sign.ANGLE, abs(float(angles[corner]) - 90.0), text)
 

@@ -285,6 +285,7 @@ class SolidRecord:
     line : line of the file on which it begins, counted from 1; 0 in a binary file
     spans : lines of the file that it was read from
     remarks : changes that made it a solid with plane faces, in words
+    file : that it was read from; empty: the only one of the survey
     """
 
     code: str
@@ -295,6 +296,7 @@ class SolidRecord:
     line: int = 0
     spans: tuple[range, ...] = ()
     remarks: tuple[str, ...] = ()
+    file: str = ""
 
 
 @dataclass(frozen=True)

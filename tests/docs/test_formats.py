@@ -22,6 +22,7 @@ from survey.records.survey import Reject
 from tests.paths import ROOT
 from tests.pipelines.results_by_hand import deformable_body, result_of, rigid_body
 from tests.survey.joints.assemblies import dome, obj
+from tests.survey.scanned_stones import scanned_box, write_ply
 
 PAGE = (ROOT / "docs" / "formats.md").read_text(encoding="utf-8")
 
@@ -173,11 +174,15 @@ def test_every_format_is_explained():
 
 def test_the_commands_for_solids_do_what_they_say(tmp_path, monkeypatch):
     """On two rings of a dome, rounded to a millimetre, the lower of which stands on the ground."""
-    section = PAGE.split("\n## Closed solids")[1].split("\n# Result files")[0]
+    section = PAGE.split("\n## Closed solids")[1].split("\n## Plausible")[0]
     found = re.findall(r"^```sh\n(.*?)^```$", section, re.MULTILINE | re.DOTALL)
-    assert [line.split()[1] for text in found for line in text.splitlines()] == ["ingest", "ingest"]
+    assert [line.split()[1] for text in found for line in text.splitlines()] == ["ingest"] * 3
     stones = [Solid(one.code, one.vertices - np.array([0, 0, 0.49]), one.faces) for one in dome(2)]
     (tmp_path / "vault.obj").write_text(obj(stones, 3))
+    (tmp_path / "scans").mkdir()
+    for number in range(2):
+        points, triangles = scanned_box((0.5, 0.3, 0.24), 0.03, seed=number)
+        write_ply(tmp_path / f"scans/S{number}.ply", points + np.array([0.51 * number, 0.0, 0.0]), triangles)
     monkeypatch.chdir(tmp_path)
     printed = []
     for number, text in enumerate(found):
@@ -186,7 +191,9 @@ def test_the_commands_for_solids_do_what_they_say(tmp_path, monkeypatch):
             done = CliRunner().invoke(app, command)
             assert done.exit_code == 0, done.output
             printed.append(done.stdout)
-    assert "20 stones of survey 'vault' (20 ashlar)" in printed[0]
-    assert "0 convex, 20 not" in printed[0]
-    assert "contacts brought into" in printed[0]
-    assert "(10 support, 10 voussoir)" in printed[1]
+    assert "2 stones of survey 'scans' (2 ashlar)" in printed[0]
+    assert "6 plane faces recognised" in printed[0]
+    assert "20 stones of survey 'vault' (20 ashlar)" in printed[1]
+    assert "0 convex, 20 not" in printed[1]
+    assert "contacts brought into" in printed[1]
+    assert "(10 support, 10 voussoir)" in printed[2]

@@ -193,8 +193,8 @@ def _count(number: int, what: str) -> str:
 
 
 def _mm(length: float) -> str:
-    return f"{length * 1e3:.1f} mm"
+    return f"{length * 1e3:z.1f} mm"
 
 
 def _place(place: tuple[float, float, float]) -> str:
-    return f"({', '.join(f'{one:.3f}' for one in place)})"
+    return f"({', '.join(f'{one:z.3f}' for one in place)})"

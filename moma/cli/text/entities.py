@@ -118,12 +118,12 @@ def _structure(one: Values) -> str:
 def _neighbour(one: Values) -> str:
     if one["area"] is None:
         return f"{one['code']} (declared)"
-    gap = "" if one["gap"] is None else f", gap {one['gap'] * 1e3:.0f} mm"
+    gap = "" if one["gap"] is None else f", gap {one['gap'] * 1e3:z.0f} mm"
     return f"{one['code']} ({one['area']:.3g} m²{gap})"
 
 
 def _joint(one: Values) -> str:
-    width = "" if one["width"] is None else f", {one['width'] * 1e3:.1f} mm wide as surveyed"
+    width = "" if one["width"] is None else f", {one['width'] * 1e3:z.1f} mm wide as surveyed"
     pressure = "" if one["pressure_max"] is None else f", up to {one['pressure_max']:.3g} Pa"
     return (
         f"{one['neighbour']}: {one['force_normal']:.4g} N across, {one['force_shear']:.4g} N along, "

@@ -66,11 +66,8 @@ def _solid_lines(solids: "SolidsReport", verbose: bool) -> list[str]:
             f"  coordinates have {solids.decimals} decimals: if they are rounded, --snap "
             f"{2.0 * 10.0**-solids.decimals:g} brings faces that match into one plane"
         )
-    if verbose:
-        lines += [f"  {code}: {'; '.join(texts)}" for code, texts in solids.remarks.items()]
-    elif solids.remarks:
-        lines.append(f"  remarks on {len(solids.remarks)} solids, with -v")
-    return lines
+    remarks = [f"  {code}: {'; '.join(texts)}" for code, texts in solids.remarks.items()]
+    return lines + (remarks if verbose else shorten(remarks, 5, "  ", ", with -v"))
 
 
 def _frame_line(frame: dict[str, Any]) -> str:
@@ -259,9 +256,9 @@ def _course_lines(report: "SurveyReport", verbose: bool) -> list[str]:
         deformed += found
         if (found or verbose) and one.slope is not None and one.slope_sigma is not None:
             place = f"{one.facade}, course {one.course}" + (f" of {one.zone}" if one.zone else "")
-            text = f"  {place}: {one.slope * 1e3:+.2f} ± {one.slope_sigma * 1e3:.2f} mm/m"
+            text = f"  {place}: {one.slope * 1e3:+z.2f} ± {one.slope_sigma * 1e3:.2f} mm/m"
             if one.sag is not None and one.sag_sigma is not None:
-                text += f", mid-span {one.sag * 1e3:+.1f} ± {one.sag_sigma * 1e3:.1f} mm"
+                text += f", mid-span {one.sag * 1e3:+z.1f} ± {one.sag_sigma * 1e3:.1f} mm"
             lines.append(f"{text}: {one.finding}")
     if courses:
         lines.insert(0, f"  {len(courses)} bed lines, {deformed} not level or not straight")

@@ -108,7 +108,7 @@ def _control(files: Iterable[SurveyFile]) -> Iterator[dict[str, Any]]:
         rows = [
             (
                 name,
-                *(f"{value * 1e3:.1f} mm" for value in residual),
+                *(f"{value * 1e3:z.1f} mm" for value in residual),
                 "–" if math.isnan(test) else f"{test:.2f}",
                 "–" if math.isnan(limit) else f"{limit:.2f}",
                 "left out as a blunder" if name in fit.rejected else "",
@@ -121,7 +121,7 @@ def _control(files: Iterable[SurveyFile]) -> Iterator[dict[str, Any]]:
             "path": file.head.path,
             "sigma0": f"{fit.sigma0:.2f}",
             "redundancy": fit.redundancy,
-            "scale": f"{(fit.scale - 1.0) * 1e6:+.0f} ± {1e6 * math.sqrt(fit.covariance[6, 6]):.0f} mm per km",
+            "scale": f"{(fit.scale - 1.0) * 1e6:+z.0f} ± {1e6 * math.sqrt(fit.covariance[6, 6]):.0f} mm per km",
             "scale_differs": fit.scale_differs,
             "rows": rows,
         }
@@ -146,11 +146,11 @@ def _course_row(line: CourseLine, heights: Mapping[tuple[str, str | None, int], 
     return (
         f"{line.course}" if line.zone is None else f"{line.zone}, {line.course}",
         str(len(line.stones)),
-        f"{line.level:.3f} m",
+        f"{line.level:z.3f} m",
         _plus_minus(line.slope, line.slope_sigma, 1e3, "mm/m", 2) + _chance(line.slope_probability),
         _plus_minus(line.sag, line.sag_sigma, 1e3, "mm", 1) + _chance(line.sag_probability),
         _mm(line.rms),
-        f"{farthest * 1e3:.1f} mm, {code}",
+        f"{farthest * 1e3:z.1f} mm, {code}",
         _mm(line.scatter) if line.evidence != "none" else "–",
         "–" if height is None else f"{height.height:.4f} ± {height.sigma:.4f} m",
         line.finding,
@@ -165,7 +165,7 @@ def _kinds(study: SurveyStudy) -> list[Row]:
             f"{one.height:.3f} ± {one.height_scatter:.3f} m",
             one.source,
             ", ".join(
-                f"{odd.code} ({odd.length * 1e3:+.0f} mm long, {odd.height * 1e3:+.0f} mm high)"
+                f"{odd.code} ({odd.length * 1e3:+z.0f} mm long, {odd.height * 1e3:+z.0f} mm high)"
                 for odd in sorted(study.deviations, key=lambda odd: -odd.worst)[:_MOST]
                 if odd.kind == one.kind and odd.worst > 3.0
             )
@@ -197,7 +197,7 @@ def _stone_row(stone: StoneQuality, facade: str, off: Deviation | None) -> Row:
         f"{stone.tilt_sigma:.2f}°" if math.isfinite(stone.tilt_sigma) else "–",
         f"{stone.length:.3f} × {stone.height:.3f}"
         + (f" ± {stone.dimension_sigma:.3f} m" if math.isfinite(stone.dimension_sigma) else " m"),
-        "–" if off is None else f"{off.length * 1e3:+.0f} × {off.height * 1e3:+.0f} mm ({off.worst:.1f} σ)",
+        "–" if off is None else f"{off.length * 1e3:+z.0f} × {off.height * 1e3:+z.0f} mm ({off.worst:.1f} σ)",
         _depth(stone),
         f"{stone.depth_source} ({stone.depth_origin})",
     )
@@ -214,13 +214,13 @@ def _counts(counts: Mapping[str, int]) -> str:
 
 
 def _mm(value: float) -> str:
-    return "–" if not math.isfinite(value) else f"{value * 1e3:.2f} mm"
+    return "–" if not math.isfinite(value) else f"{value * 1e3:z.2f} mm"
 
 
 def _plus_minus(value: float | None, sigma: float | None, scale: float, unit: str, digits: int) -> str:
     if value is None or sigma is None:
         return "–"
-    return f"{value * scale:.{digits}f} ± {sigma * scale:.{digits}f} {unit}".rstrip()
+    return f"{value * scale:z.{digits}f} ± {sigma * scale:.{digits}f} {unit}".rstrip()
 
 
 def _chance(probability: float | None) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from archmodel.tables.entities import kind_named
 from mechanics.dynamics.progress import Listener, Progress, silent
 from moma.errors import UsageError
-from pipelines.ingest.reading_options import check_survey_file
+from pipelines.ingest.reading_options import Source, survey_sources
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.formats.options import ReadingOptions
 from survey.formats.reading import open_survey
@@ -91,7 +91,7 @@ def study_surveys(
 
     Parameters
     ----------
-    paths : survey files, of one format; together they are one survey
+    paths : survey files, or folders of them, of one format; together they are one survey
     format : its name
     options : defaults for what the files leave out
     progress : called now and then
@@ -101,28 +101,26 @@ def study_surveys(
     UsageError : no such file or format
     SurveyError : a file that cannot be read at all, or control points that contradict each other
     """
-    if not paths:
-        raise UsageError("no survey file", remedy="name at least one")
+    sources = survey_sources(paths, format)
     stones: list[StoneQuality] = []
     rejects: list[Reject] = []
     files = []
-    for path in map(Path, paths):
+    for source in sources:
         before = len(stones), len(rejects)
-        file = _read(path, format, options, stones, rejects, progress)
+        file = _read(source, format, options, stones, rejects, progress)
         files.append(replace(file, stones=len(stones) - before[0], rejects=len(rejects) - before[1]))
     return _judge(tuple(files), tuple(stones), tuple(rejects))
 
 
 def _read(
-    path: Path,
+    source: Source,
     format: str,
     options: ReadingOptions,
     stones: list[StoneQuality],
     rejects: list[Reject],
     progress: Listener,
 ) -> SurveyFile:
-    check_survey_file(path)
-    stream = open_survey(path, format, options)
+    stream = open_survey(source.path, format, source.options(options))
     survey = survey_stones(replace(stream, head=_with_some_depth(stream.head)))
     for number, one in enumerate(survey.stones, start=1):
         if isinstance(one, Reject):
@@ -130,7 +128,7 @@ def _read(
         else:
             stones.append(_appraised(one))
         if number % _INTERVAL == 0:
-            progress(Progress(f"fit {path.name}", number, number + _INTERVAL))
+            progress(Progress(f"fit {source.path.name}", number, number + _INTERVAL))
     head = replace(survey.head, depth_rules=stream.head.depth_rules)
     return SurveyFile(head, survey.transform, 0, 0)
 

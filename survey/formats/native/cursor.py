@@ -76,8 +76,11 @@ class Cursor:
         return self.matching(CODE, what, NAME_REMEDY)
 
     def kind(self) -> str:
-        """Consume the name of a kind of stone."""
-        return self.matching(KIND, "kind", "use lower-case letters, e.g. header")
+        """Consume the name of a kind of stone, in upper or lower case."""
+        word = self.word().lower()
+        if KIND.fullmatch(word) is None:
+            raise self.fail(f"kind {shown(word)} is not a kind", "use letters, e.g. header")
+        return word
 
     def name(self, what: str) -> str:
         """Consume a name: one word, or several in quotes."""

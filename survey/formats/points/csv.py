@@ -124,6 +124,7 @@ class _RowReader:
         if len(values) != self._count:
             raise self._fail(number, f"{len(values)} fields for {self._count} columns", "fill every column")
         code, kind, course, role, x, y, z = self._pick(values)
+        kind = kind.lower()
         is_vertex = _IS_VERTEX.get(role)
         if is_vertex is None:
             raise self._fail(number, f"role {shown(role)}", "write vertex or point")

@@ -14,6 +14,7 @@ from survey.arrays import Array
 from survey.formats.fields import FARTHEST
 from survey.formats.solids.body_groups import body_groups, signed_volume
 from survey.formats.solids.flat_faces import merge_flat, rounding
+from survey.formats.solids.scanned_stone import is_scanned, plane_faces
 from survey.geometry.folds import fold, warp
 from survey.geometry.solids import Solid
 from survey.geometry.watertight import check_watertight
@@ -58,14 +59,18 @@ class ClosedBody:
     solid : under the name of all bodies of the file's object
     folded : number of polygons that are not plane and were cut along folds
     doubled : number of duplicate faces of the file's object
+    scanned : of a scan, how its plane faces were recognised, or why not, in words; otherwise empty
     """
 
     solid: Solid
     folded: int = 0
     doubled: int = 0
+    scanned: str = ""
 
 
-def closed_bodies(raw: RawBody, flat: float = 0.0) -> Iterator[ClosedBody | GeometryError]:
+def closed_bodies(
+    raw: RawBody, flat: float = 0.0, planes: float = 0.0
+) -> Iterator[ClosedBody | GeometryError]:
     """Make the closed bodies of one name, each with its planar faces counter-clockwise seen from outside.
 
     Parameters
@@ -73,6 +78,7 @@ def closed_bodies(raw: RawBody, flat: float = 0.0) -> Iterator[ClosedBody | Geom
     raw : with finite vertices and valid indices
     flat : distance of corners from their mean plane within which a polygon counts as plane [m]; rounding to a few
         digits is always allowed for
+    planes : distance of the facets of a scan from a plane within which they are one face [m]; 0: every facet is kept
 
     Returns
     -------
@@ -94,7 +100,15 @@ def closed_bodies(raw: RawBody, flat: float = 0.0) -> Iterator[ClosedBody | Geom
     for group, volume in zip(groups, volumes, strict=True):
         outward = group if volume >= 0.0 else [one[::-1] for one in group]
         try:
-            yield replace(_closed(raw, vertices, outward, flat), doubled=doubled)
+            found = None
+            if planes > 0.0 and is_scanned(vertices, outward):
+                check_watertight(_solid(raw.name, vertices, outward))
+                found = plane_faces(raw.name, vertices, outward, planes)
+            if found is not None and found.solid is not None:
+                yield ClosedBody(found.solid, doubled=doubled, scanned=found.text)
+            else:
+                body = _closed(raw, vertices, outward, flat)
+                yield replace(body, doubled=doubled, scanned="" if found is None else found.text)
         except GeometryError as error:
             yield error
 

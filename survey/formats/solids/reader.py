@@ -9,7 +9,7 @@ tolerance are brought into common planes (`survey.joints.snapping.snapping`), wh
 """
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -43,20 +43,21 @@ _BODIES: Mapping[str, Callable[[Path], Iterator[RawBody]]] = {
 
 
 def open_solids(path: Path, options: ReadingOptions | None = None) -> SurveyStream:
-    """Open a file of closed solids, whose stones are then read one by one.
+    """Open closed solids, of one file or of several that are one survey, which are then read one by one.
 
     Parameters
     ----------
-    path : the file; its ending names the format
+    path : the file, whose ending names the format; of several files in `options`, their folder
     options : the code template of names; kind of stones whose names have none; the unit; the tolerance of snapping;
-        the head of another file
+        the head of another file; the files that are one survey
 
     Raises
     ------
     SurveyError
-        naming the file, and the line if it is text, if it is wrong as a whole
+        naming the file, and the line if it is text, if it is wrong as a whole; in a survey of several files such a
+        file is a Reject
     UsageError
-        if the ending is not known, or the code template has a field that solids do not have
+        if an ending is not known, or the code template has a field that solids do not have
     """
     options, path = options or ReadingOptions(), Path(path)
     template = CodeTemplate(options.codes or _CODES)
@@ -66,22 +67,44 @@ def open_solids(path: Path, options: ReadingOptions | None = None) -> SurveyStre
                 f"code template {template.text!r} has a {field}, which solids do not have",
                 remedy="write e.g. {block}:{kind}",
             )
-    bodies = _BODIES.get(path.suffix.lower())
-    if bodies is None:
-        raise UsageError(
-            f"ending {path.suffix!r} is not that of a format of solids",
-            where=str(path),
-            remedy=f"endings: {', '.join(_BODIES)}",
-        )
-    raw = bodies(path)
-    first = next(raw, None)
-    if first is None:
-        raise SurveyError("the file has no solids", where=str(path), remedy="export closed surfaces")
-    head, records = options.head_for(path), _Solids(path, template, options).records(first, raw)
+    for file in options.files or (path,):
+        if file.suffix.lower() not in _BODIES:
+            raise UsageError(
+                f"ending {file.suffix!r} is not that of a format of solids",
+                where=str(file),
+                remedy=f"endings: {', '.join(_BODIES)}",
+            )
+    head = options.head_for(path)
+    files = options.files
+    records = _of_all(files, template, options) if files else _records(path, template, options, set())
     if not options.snap > 0.0:
         return SurveyStream(head, records)
     snapped, snapping = _snapped(list(records), options.snap, str(path))
     return SurveyStream(head, iter(snapped), snapping)
+
+
+def _records(
+    file: Path, template: CodeTemplate, options: ReadingOptions, known: set[str]
+) -> Iterator[SolidRecord | Reject]:
+    """Read the solids of one file; `known` collects the codes."""
+    raw = _BODIES[file.suffix.lower()](file)
+    first = next(raw, None)
+    if first is None:
+        raise SurveyError("the file has no solids", where=str(file), remedy="export closed surfaces")
+    return _Solids(file, template, options, known).records(first, raw)
+
+
+def _of_all(
+    files: Sequence[Path], template: CodeTemplate, options: ReadingOptions
+) -> Iterator[SolidRecord | Reject]:
+    """Read the solids of several files; one that cannot be read is a reject, since the others can be."""
+    known: set[str] = set()
+    for file in files:
+        try:
+            for one in _records(file, template, options, known):
+                yield replace(one, file=str(file)) if isinstance(one, SolidRecord) else one
+        except SurveyError as error:
+            yield Reject(None, error)
 
 
 def _snapped(
@@ -122,9 +145,8 @@ def _check_volume(record: SolidRecord, solid: Solid) -> None:
 class _Solids:
     """Reader of the solids of a file."""
 
-    def __init__(self, path: Path, template: CodeTemplate, options: ReadingOptions) -> None:
-        self._path, self._template, self._options = path, template, options
-        self._known: set[str] = set()
+    def __init__(self, path: Path, template: CodeTemplate, options: ReadingOptions, known: set[str]) -> None:
+        self._path, self._template, self._options, self._known = path, template, options, known
 
     def records(self, first: RawBody, others: Iterator[RawBody]) -> Iterator[SolidRecord | Reject]:
         """Iterate over the bodies of a file."""
@@ -141,7 +163,8 @@ class _Solids:
             return
         unit = self._options.unit
         metric = replace(raw, vertices=raw.vertices * unit, resolution=raw.resolution * unit)
-        found = list(closed_bodies(metric, max(self._options.flat, self._options.snap)))
+        flat = max(self._options.flat, self._options.snap)
+        found = list(closed_bodies(metric, flat, self._options.planes))
         for number, body in enumerate(found, start=1):
             code = name if len(found) == 1 else f"{name}-{number}"
             if isinstance(body, GeometryError):
@@ -169,7 +192,7 @@ class _Solids:
 
 def _remarks(body: ClosedBody) -> tuple[str, ...]:
     """Describe the changes made to the faces."""
-    out = []
+    out = [body.scanned] if body.scanned else []
     if body.doubled:
         out.append(f"{body.doubled} faces were there twice")
     if body.folded:

@@ -307,7 +307,7 @@ def test_a_file_of_rejects_replaces_only_what_nobody_has_touched(desk):
     assert desk.left() == {"first.db", "second.db", rejects.name}
 
 
-def test_rejects_never_replace_the_survey_itself_or_each_other(desk):
+def test_rejects_never_replace_the_survey_itself(desk):
     path = desk.write(HEAD + moma(0) + moma(1, "heder"), "wall.moma")
     desk.ingest(path, "moma", "first", keep_going=True)
     rejects = desk.folder / "wall.rejects.moma"
@@ -316,9 +316,6 @@ def test_rejects_never_replace_the_survey_itself_or_each_other(desk):
         with pytest.raises(UsageError, match="is the survey file itself"):
             desk.ingest(survey, "moma", keep_going=survey)
         assert survey.read_bytes() == before
-    solids = [desk.write(obj(0), "wall.obj"), desk.write(obj(1), "wall.stl")]
-    with pytest.raises(UsageError, match=r"rejects of .*wall\.obj and of .*wall\.stl"):
-        ingest(solids, desk.url(), "solids", keep_going=True)
     with pytest.raises(UsageError, match="is a folder"):
         desk.ingest(path, "moma", keep_going=desk.folder)
     with pytest.raises(UsageError, match="one file of rejects for 2"):

@@ -10,6 +10,7 @@ from moma.cli.text.checks import check_lines, duration
 from moma.errors import UsageError
 from pipelines.ingest.ingest import ingest
 from pipelines.run.check import check_scene
+from pipelines.run.check_report import CheckReport
 from pipelines.run.closing_check import joints_report, simplification_report
 from survey.joints.report import ClosingReport, Gap, Joint, Overlap
 from survey.joints.settings import JointMode
@@ -71,6 +72,14 @@ def test_joints_are_counted_and_remaining_gaps_and_overlaps_have_site_coordinate
     assert told.gaps[0].place == (101.0, 202.0, 3.0)
     empty = joints_report(ClosingReport(JointMode.AS_SURVEYED, (), {}, {}, (), (), ()), np.zeros(3))
     assert (empty.count, empty.mean_width, empty.worst_stone) == (0, 0.0, None)
+
+
+def test_zero_is_never_negative():
+    gaps = (Gap(("A", "B"), -2e-5, 0.1, np.array([-1e-5, 0.0, 0.0]), "bent"),)
+    told = joints_report(ClosingReport(JointMode.CLOSE, (), {}, {}, (), gaps, ()), np.zeros(3))
+    report = CheckReport("s", {}, {"deformable": 0}, 0, (), (), (), None, None, told, None, (), (), ())
+    lines = "\n".join(check_lines(report, verbose=False))
+    assert "open by 0.0 mm over 0.100 m² at (0.000, 0.000, 0.000)" in lines
 
 
 def test_simplified_stones_are_reported_by_shape_and_against_the_tolerance_of_the_survey():

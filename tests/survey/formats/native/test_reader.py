@@ -109,7 +109,7 @@ def test_what_is_written_is_read_back_to_the_last_bit(tmp_path: Path, survey: Su
         (HEAD, 3, "no stones"),
         (HEAD + "ston A header\n", 3, "'ston'"),
         (HEAD + "stone A header 3\n", 3, "stone CODE KIND"),
-        (HEAD + "stone A Header\n", 3, "kind"),
+        (HEAD + "stone A 1header\n", 3, "kind"),
         (HEAD + "stone A header course one\n", 3, "course"),
         (HEAD + STONE + STONE, 8, "line 3"),
         (HEAD + STONE.replace("vertex 1 1 0", "vertex 1 1"), 6, "2 coordinates"),
