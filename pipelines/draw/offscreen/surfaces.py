@@ -121,7 +121,9 @@ def _stone_edges(body: BodyResult, triangles: Ints) -> Ints:
     """List the edges (ne, 2) where two triangles meet at an angle; those inside a flat face are left out."""
     a, b, c = body.reference[triangles].transpose(1, 0, 2)
     normals = np.cross(b - a, c - a)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    # a corner on an edge makes a triangle without area, which bends with nothing
+    normals = np.where(length > 0.0, normals / np.where(length > 0.0, length, 1.0), np.nan)
     sides = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     owner = np.repeat(np.arange(len(triangles)), 3)
     order = np.lexsort((sides[:, 1], sides[:, 0]))

@@ -1,6 +1,7 @@
 """Pictures of a result: surfaces, colours, and drawing processes that fail."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -28,6 +29,20 @@ def test_the_edges_drawn_are_those_of_the_stones_not_of_the_mesh(mixed):
     assert areas.sum() == pytest.approx(6 + 10 + 6)
     assert areas[surface.deformable].sum() == pytest.approx(10)
     assert areas[surface.fixed].sum() == pytest.approx(6)
+
+
+def test_a_corner_on_an_edge_draws_no_edge_and_causes_no_warning():
+    """A face fanned from a corner whose edge has another corner on it holds a triangle without area."""
+    cube = rigid_body("a", (0, 0, 0), (1, 1, 1))
+    first, *others = cube.faces
+    corners = np.vstack([cube.reference, cube.reference[list(first[:2])].mean(axis=0)])
+    bent = replace(
+        cube, reference=corners, position=corners, faces=((first[0], len(corners) - 1, *first[1:]), *others)
+    )
+    surface = wall_surface(result_of([bent], pairs=(), forces=()))
+    segments = surface.points[surface.edges]
+    assert np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1).sum() >= 11.0
+    assert len(surface.triangles) == 13
 
 
 def test_a_surface_survives_its_file(mixed, tmp_path):

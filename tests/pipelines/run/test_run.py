@@ -218,7 +218,7 @@ def test_a_run_keeps_its_peaks_its_series_and_its_inputs(own_url, tmp_path):
         told = describe_run(session, done.run)
     assert len(rows) == summary["bodies"]["rigid"]
     for name, peak in (("displacement_max", "displacement_peak"), ("joint_pressure", "joint_pressure_peak")):
-        assert all(row[peak] >= row[name] * (1.0 - 1e-6) for row in rows)
+        assert all(row[peak] >= row[name] * (1.0 - 1e-6) - 1e-12 for row in rows)
     peaks = {one["peak"]: one for one in told["peaks"]}
     assert peaks["pressure"]["value"] == summary["peaks"]["pressure"]["value"]
     assert " – " in peaks["pressure"]["stones"]
