@@ -44,9 +44,11 @@ __all__ = ["check_scene"]
 
 _INDEX = "check.json"
 # processor time of a run besides its simulation, on the machine of `cost_rates`:
-_PROGRAM = 4.0  # the program and its kernels are loaded, the report is written [s]
+_PROGRAM = 12.0  # the program and its kernels are loaded, the report is written [s]
 _STONE = 3e-3  # a stone is read, its joints are closed, its results are written and stored [s]
-_PICTURE = 2.5  # a picture is drawn by a program of its own [s]
+_PICTURE = 5.0  # a picture is drawn by a program of its own [s]
+_SPREAD = 2.0  # factor within which these lie [-]
+_LIBRARIES = 280_000_000  # memory of the libraries that read, draw and store [bytes]
 
 
 def check_scene(
@@ -220,7 +222,8 @@ def _cost(needs: Plan, scene: Scene, pictures: int) -> Cost:
     slowness = machine_slowness()
     expected = expected_cost(needs, scene, slowness)
     beside = slowness * (_PROGRAM + _STONE * needs.amounts.stones + _PICTURE * pictures)
-    low, likely, high = (beside + one for one in expected.seconds)
+    least, usual, most = expected.seconds
+    low, likely, high = beside / _SPREAD + least, beside + usual, _SPREAD * beside + most
     return Cost(
         pairs=len(needs.pairs),
         contacts=needs.contacts,
@@ -231,5 +234,5 @@ def _cost(needs: Plan, scene: Scene, pictures: int) -> Cost:
         seconds=(low, likely, high),
         longest=beside + expected.longest,
         unknown=expected.unknown,
-        peak=expected.memory,
+        peak=expected.memory + _LIBRARIES,
     )
