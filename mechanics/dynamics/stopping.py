@@ -8,9 +8,9 @@ from mechanics.arrays import Array, Bools
 from mechanics.dynamics.observers.equilibrium import (
     displacement,
     imbalance,
-    rotation_angle,
     seen_from_supports,
     speed,
+    tilt,
 )
 from mechanics.dynamics.outcome import Outcome, StaticStart
 from mechanics.dynamics.relaxation import relaxation_caution
@@ -29,7 +29,8 @@ _REST_SPEED = 1e-4  # of √(g · width), the speed of a fall over a body's own 
 _FALL_SPEED = 0.05  # of the same speed, above which a body falls [-]
 _TOPPLED = (
     np.pi / 4
-)  # rotation beyond which a stone that comes to rest has toppled [rad]; rocking returns from less
+)  # tilt from which a stone that left its place and rests has toppled [rad]: rocking tilts less
+_LEANS = np.radians(10.0)  # tilt from which one that has sunk by half of what is a collapse has toppled [rad]
 _DOUBT = (
     0.5  # velocity that unsolved steps may have added, over that of a motion, up to which it is proven [-]
 )
@@ -109,7 +110,7 @@ class Watch:
         self._speed = float(speeds[self._culprit])
         if self._quiet < LASTING:
             return Outcome.MOVING
-        fallen |= self._toppled(seen, limit)
+        fallen |= self._toppled(seen, sunk, limit)
         if fallen.any():
             self._blame(fallen, sunk, speeds)
             return Outcome.COLLAPSED
@@ -176,15 +177,15 @@ class Watch:
         sunk: Array = np.divide(along, size, out=np.zeros_like(size), where=size > 0)
         return sunk
 
-    def _toppled(self, seen: State, limit: Array) -> Bools:
-        """Return the bodies (nb,) that have turned and left their place; balls may roll."""
-        turned: Bools = rotation_angle(self._start, seen) > _TOPPLED
-        if not turned.any():
-            return turned
-        round_ = np.array([block.radius is not None for block in self._model.scene.blocks])
+    def _toppled(self, seen: State, sunk: Array, limit: Array) -> Bools:
+        """Return the bodies (nb,) that have tilted and left their place; balls may roll."""
+        tilted = tilt(self._model, self._start, seen)
+        leans: Bools = (tilted > _LEANS) & ~self._model.fixed
+        if not leans.any():
+            return leans
+        leans &= np.array([block.radius is None for block in self._model.scene.blocks])
         away = displacement(self._model, self._start, seen) > limit
-        toppled: Bools = turned & away & ~round_ & ~self._model.fixed
-        return toppled
+        return leans & np.where(tilted > _TOPPLED, away, sunk > 0.5 * limit)
 
     def _blame(self, bodies: Bools, sunk: Array, speeds: Array) -> None:
         """Remember the body that has sunk furthest over its width."""

@@ -27,6 +27,7 @@ from moma.errors import GeometryError, SceneError
 __all__ = ["Model", "build_model"]
 
 
+_PLANE = 1e-6  # largest height of a corner ahead of a face, over the size of its shape [-]; as for meshes
 _SAME_VOLUME = (
     1e-6  # largest difference of the volume of a stone's parts from that of its outline, relative [-]
 )
@@ -134,6 +135,7 @@ def build_model(scene: Scene, progress: Callable[[int, int], None] | None = None
         elastic_stones=packed,
         meshes=workshop.report(),
     )
+    _check_shapes(model)
     _check_loads(model)
     return model, _start(model, centres)
 
@@ -270,6 +272,35 @@ def _check(block: Block) -> None:
                 where=f"stone {block.code}",
                 remedy=f"simplify it until its faces have at most {MAX_CORNERS} corners together",
             )
+
+
+def _check_shapes(model: Model) -> None:
+    """Refuse a shape that is not convex, or has faces that are not plane: contacts are found by its planes."""
+    shapes, body, radius = model.surfaces.shapes, model.surfaces.body, model.surfaces.radius
+    count = np.diff(shapes.fptr)
+    owner = np.repeat(np.arange(len(body)), count)
+    corners = np.diff(shapes.cptr)
+    middle = np.add.reduceat(shapes.vertex[shapes.corner], shapes.cptr[:-1]) / corners[:, None]
+    each = np.diff(shapes.vptr)[owner]
+    face = np.repeat(np.arange(len(owner)), each)
+    vertex = np.arange(len(face)) - np.repeat(np.cumsum(each) - each - shapes.vptr[owner], each)
+    ahead = np.einsum("ij,ij->i", shapes.vertex[vertex] - middle[face], shapes.normal[face])
+    high = np.maximum.reduceat(ahead, np.cumsum(each) - each)
+    extent = np.maximum.reduceat(shapes.vertex, shapes.vptr[:-1]) - np.minimum.reduceat(
+        shapes.vertex, shapes.vptr[:-1]
+    )
+    out = np.where(radius[owner] > 0, 0.0, high / extent.max(axis=1)[owner])
+    worst = int(out.argmax())
+    if out[worst] > _PLANE:
+        number, shape = worst - int(shapes.fptr[owner[worst]]), int(owner[worst])
+        part = shape - int(model.surfaces.sptr[body[shape]])
+        of_part = f" of part {part}" if model.scene.blocks[body[shape]].parts else ""
+        raise GeometryError(
+            f"face {number}{of_part} is not plane, or the stone is not convex there: a corner lies {high[worst]:.2g} m "
+            "ahead of it",
+            where=f"stone {model.scene.blocks[body[shape]].code}",
+            remedy="simplify the stone (`simplify_solid` makes faces plane), or give convex parts",
+        )
 
 
 def _inertia(blocks: tuple[Block, ...], properties: list[MassProperties]) -> RigidInertia:

@@ -14,11 +14,11 @@ __all__ = [
     "Support",
     "displacement",
     "imbalance",
-    "rotation_angle",
     "seen_from_supports",
     "settlement",
     "speed",
     "support_reaction",
+    "tilt",
     "wrenches",
 ]
 
@@ -138,10 +138,17 @@ def displacement(model: Model, start: State, state: State) -> Array:
     return _with_nodes(model, largest, np.linalg.norm(state.node - start.node, axis=1))
 
 
-def rotation_angle(start: State, state: State) -> Array:
-    """Return the angle by which each body has turned since `start` (nb,), at most π [rad]."""
-    trace = np.einsum("bij,bij->b", state.rotation, start.rotation)
-    angle: Array = np.arccos(np.clip(0.5 * (trace - 1.0), -1.0, 1.0))
+def tilt(model: Model, start: State, state: State) -> Array:
+    """Return the angle between the vertical of each body at `start` and now (nb,) [rad]; zero without gravity."""
+    gravity = model.gravity(state.time)
+    g = float(np.linalg.norm(gravity))
+    if g == 0:
+        return np.zeros(len(model.mass))
+    now, then = (
+        state.rotation.transpose(0, 2, 1) @ (gravity / g),
+        start.rotation.transpose(0, 2, 1) @ (gravity / g),
+    )
+    angle: Array = np.arctan2(np.linalg.norm(np.cross(now, then), axis=1), (now * then).sum(axis=1))
     return angle
 
 

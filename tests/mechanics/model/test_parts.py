@@ -258,3 +258,23 @@ def test_results_show_the_outline_of_a_stone_of_parts():
     np.testing.assert_allclose(body.reference, block.vertices, atol=1e-13)
     np.testing.assert_allclose(body.position, block.vertices + np.array([0.5, 0, 0]), atol=1e-12)
     assert body.faces == block.faces
+
+
+def test_a_stone_that_is_not_convex_and_has_no_parts_is_refused_with_its_face():
+    """Contacts are found by the planes of faces: of a warped or dented stone they would be found in the air."""
+    warped = brick("warped", (0, 0, 0), (1, 1, 1))
+    corners = warped.vertices.copy()
+    corners[corners.sum(axis=1) == 3.0] += [0.0, 0.0, 0.02]
+    with pytest.raises(GeometryError, match=r"face \d is not plane.*0\.0\d+ m ahead") as caught:
+        build_model(scene(replace(warped, vertices=corners)))
+    assert caught.value.where == "stone warped"
+    middle = [0.5, 0.5, 1.0 - 5e-6]
+    top = next(face for face in warped.faces if (warped.vertices[list(face), 2] == 1.0).all())
+    fan = tuple((a, b, 8) for a, b in zip(top, (*top[1:], top[0]), strict=True))
+    dented = replace(
+        warped,
+        vertices=np.vstack([warped.vertices, middle]),
+        faces=(*(face for face in warped.faces if face is not top), *fan),
+    )
+    with pytest.raises(GeometryError, match="not convex there"):
+        build_model(scene(dented))

@@ -7,6 +7,10 @@ import numpy as np
 from mechanics.scene.scene import Block, Fidelity, Part
 from mechanics.scene.shapes import BOX_FACES, LIMESTONE, box, prism
 from mechanics.stones.polyhedra import mass_properties
+from survey.geometry.folds import fold
+from survey.geometry.solids import Solid
+from survey.geometry.stone_parts import stone_parts
+from survey.simplify.flattening import flatten, unfold
 
 
 def ground(half=10.0, depth=1.0, top=0.0):
@@ -48,6 +52,21 @@ def hexahedron(code, corners, **fields):
     return Block(code, np.asarray(corners, dtype=float), BOX_FACES, LIMESTONE, **fields)
 
 
+def as_imported(block):
+    """The stone as MOMA makes it of an imported solid: faces plane within 2 mm, or unfolded, else convex parts."""
+    faces = tuple(part for face in block.faces for part in fold(block.vertices, face, 1e-9))
+    solid = Solid(block.code, block.vertices, faces)
+    found = flatten(solid, 2e-3) or unfold(solid)
+    plane = solid if found is None else found.solid
+    parts = stone_parts(plane)
+    return replace(
+        block,
+        vertices=plane.vertices,
+        faces=plane.faces,
+        parts=tuple(Part(one.vertices, one.faces) for one in parts) if len(parts) > 1 else (),
+    )
+
+
 def warped_stack(count, width, height, warp, seed=1):
     """A stack whose beds are warped surfaces that two stones share: opposite corners up, the others down by `warp`.
 
@@ -62,7 +81,7 @@ def warped_stack(count, width, height, warp, seed=1):
         bend = warp * saddle * chance.choice([-1, 1]) if inner else np.zeros(4)
         twist = ring + (chance.uniform(-0.5, 0.5, (4, 2)) * warp)
         levels.append(np.column_stack([twist, k * height + bend]))
-    return tuple(hexahedron(f"S{k + 1}", np.vstack(levels[k : k + 2])) for k in range(count))
+    return tuple(as_imported(hexahedron(f"S{k + 1}", np.vstack(levels[k : k + 2]))) for k in range(count))
 
 
 def warped_sides(code, level, width, height, warp, seed):
@@ -77,17 +96,17 @@ def warped_sides(code, level, width, height, warp, seed):
     sides = []
     for k, (a, b, c, d) in enumerate(BOX_FACES[2:]):
         sides += [(a, b, c), (a, c, d)] if k % 2 else [(a, b, d), (b, c, d)]
-    return Block(code, np.vstack(rings), (*BOX_FACES[:2], *sides), LIMESTONE)
+    return as_imported(Block(code, np.vstack(rings), (*BOX_FACES[:2], *sides), LIMESTONE))
 
 
 def folded_box(code, low, high, fold, **fields):
-    """A box whose top has its middle pushed in by `fold`: not convex, given as one polyhedron [m]."""
+    """A box whose top has its middle pushed in by `fold`, as imported: not convex [m]."""
     plain = box(code, low, high)
     corners = plain.vertices
     middle = corners[4:].mean(axis=0) - [0.0, 0.0, fold]
     faces = [f for f in BOX_FACES if f != (4, 5, 6, 7)]
     faces += [(4, 5, 8), (5, 6, 8), (6, 7, 8), (7, 4, 8)]
-    return Block(code, np.vstack([corners, middle]), tuple(faces), LIMESTONE, **fields)
+    return as_imported(Block(code, np.vstack([corners, middle]), tuple(faces), LIMESTONE, **fields))
 
 
 def valley_box(code, low, high, fold, slivers=True, **fields):
