@@ -311,15 +311,15 @@ def _odd() -> list[SceneRow]:
     roof = box("roof", [-1, -1, 0.3], [1, 1, 0.5], fidelity=Fidelity.FIXED)
     hangs = standing((roof, box("stone", [0, 0, 0], [0.5, 0.4, 0.3])), law=MortarJoint(0.0, 1e5, 0.0))
     return [
-        SceneRow("overlap", "1 cm is pushed out at rest", overlap, _pushed_out),
+        SceneRow("overlap", "1 cm gives no push", overlap, _stays),
         SceneRow("weight", "none: nothing moves", weightless, _nothing_moves),
         SceneRow("cohesion", "a stone hangs by mortar, μ = 0", hangs, _hangs),
         SceneRow("conflict", "driven walls squeeze a stone", _squeezed(), _overlap_told, iterations=100),
     ]
 
 
-def _pushed_out(result: Result) -> float:
-    return float(np.abs(result.bodies[1].displacement[:, 2] - 0.01).max()) / 1e-5
+def _stays(result: Result) -> float:
+    return float(np.abs(result.bodies[1].displacement).max()) / 1e-9
 
 
 def _nothing_moves(result: Result) -> float:

@@ -24,7 +24,7 @@ _NEVER = 1e3
 
 
 def contact_problem(
-    model: Model, predicted: State, found: Detection, free: Kick, internal: Array, first: bool
+    model: Model, predicted: State, found: Detection, free: Kick, internal: Array, begin: State | None
 ) -> tuple[ContactProblem, Approach]:
     """State the problem u = W r̃ + (u_free - W s n), (u, r̃) in the shift and cone of its law, for r̃ = r + s n.
 
@@ -37,7 +37,7 @@ def contact_problem(
     found : their contacts
     free : velocities without contact impulses
     internal : (nc, STATE) internal variables of the laws
-    first : it is the first step of a run
+    begin : the state in which the run begins, in its first step; None in later ones
 
     Returns
     -------
@@ -48,13 +48,14 @@ def contact_problem(
     gap = gaps(contacts, predicted)
     speed = local_velocity(contacts, operator, predicted.velocity, predicted.node_velocity)[:, 0]
     size = model.surfaces.size[contacts.bodies].min(axis=1)
-    if first:
-        # the gap before the flight to the predicted configuration
-        initial = gap - time.step * (1 - time.theta) * speed
+    if begin is not None:
+        initial = gaps(contacts, begin)
+        elastic = model.elastic[contacts.bodies].any(axis=1)
+        # a ball dents a meshed face by what the mesh does not see of it
+        round_ = model.surfaces.radius[model.surfaces.sptr[:-1]][contacts.bodies].any(axis=1)
+        overlaps = (initial < -_TOUCH * size) & ~(round_ & elastic)
         internal = internal.copy()
-        internal[:, REST] = np.where(initial < -_TOUCH * size, initial, internal[:, REST])
-    pushed = np.full(len(contacts.bodies), time.relaxation)
-    pushed &= model.elastic[contacts.bodies].any(axis=1)
+        internal[:, REST] = np.where(overlaps, initial, internal[:, REST])
     approach = Approach(
         gap=gap,
         speed=speed,
@@ -63,8 +64,8 @@ def contact_problem(
         compliance=operator.diagonal[:, 0, 0],
         step=time.step,
         theta=time.theta,
-        push_out=pushed,
-        first=first,
+        push_out=time.relaxation,
+        first=begin is not None,
         state=internal,
     )
     terms = model.laws.terms(found.law, approach)

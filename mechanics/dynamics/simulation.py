@@ -132,7 +132,9 @@ class Simulation:
             with clock("assemble"):
                 warm, internal = self._memory.recall(found.contacts.key, found.place)
                 free = sleepers.hold(free_kick(model, start, predicted, self._compliance, h, theta))
-                problem, approach = contact_problem(model, predicted, found, free, internal, self._first)
+                problem, approach = contact_problem(
+                    model, predicted, found, free, internal, before if self._first else None
+                )
             with clock("solve"):
                 solution = self._solve(problem, start=shifted(problem, warm))
             with clock("advance"):

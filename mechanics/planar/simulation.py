@@ -181,7 +181,7 @@ class PlanarSimulation:
             compliance=operator.diagonal[:, 0, 0],
             step=time.step,
             theta=time.theta,
-            push_out=np.zeros(len(contacts), dtype=bool),
+            push_out=False,
             first=self._first,
             state=internal,
         )

@@ -232,7 +232,7 @@ def posed(one, step=2e-3, theta=1.0):
     compliance = compliances(model, step, theta)
     found = detection(model, state, contacts, compliance)
     free = free_kick(model, state, state, compliance, step, theta)
-    problem, _ = contact_problem(model, state, found, free, np.zeros((len(contacts), STATE)), first=True)
+    problem, _ = contact_problem(model, state, found, free, np.zeros((len(contacts), STATE)), state)
     return Posed(model, state, found, compliance, problem)
 
 

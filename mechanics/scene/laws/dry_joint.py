@@ -29,7 +29,7 @@ _DRIFT = 1e-4  # of √(a size), a = W r/h, the speed below which a contact at i
 def gap_bias(contacts: Approach) -> Array:
     """Return the shift g/h of u_N (n,), with which a contact closes at the next kick (docs/theory.md §3) [m/s]."""
     gap = contacts.gap - contacts.state[:, REST]
-    bias: Array = np.where(contacts.push_out, gap, np.maximum(gap, 0.0)) / contacts.step
+    bias: Array = (gap if contacts.push_out else np.maximum(gap, 0.0)) / contacts.step
     return bias
 
 

@@ -10,7 +10,7 @@ A new law is one class with the members of `Law`.
 from dataclasses import dataclass
 from typing import Protocol
 
-from mechanics.arrays import Array, Bools
+from mechanics.arrays import Array
 
 __all__ = ["BOND", "OPENING", "REST", "SLIDING", "SLIP", "STATE", "Approach", "Law", "Terms"]
 
@@ -32,7 +32,7 @@ class Approach:
     size : (n,) smallest width of the smaller body; tolerances scale with it [m]
     compliance : (n,) W_NN, change of u_N per unit of normal impulse [1/kg]
     step, theta : h [s] and θ; the gap is gap + h θ u_N at the end of the step, and gap + h u_N at the next kick
-    push_out : (n,) overlaps are pushed out, as they strain elastic stones, instead of only kept from growing
+    push_out : overlaps are pushed out (relaxation) instead of only kept from growing
     first : first step of the run, in which bonds are made
     state : (n, STATE) internal variables, as the law left them in the last step; zeros for new contacts.
         BOND intact fraction (1 whole, between: damaged, 0 never bonded, -1 broken), SLIDING 1 if it slid in the last
@@ -47,7 +47,7 @@ class Approach:
     compliance: Array
     step: float
     theta: float
-    push_out: Bools
+    push_out: bool
     first: bool
     state: Array
 

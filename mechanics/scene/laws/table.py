@@ -10,7 +10,7 @@ from mechanics.scene.laws.law import Approach, Law, Terms
 
 __all__ = ["LawTable", "law_table"]
 
-_PER_CONTACT = ("gap", "speed", "area", "size", "compliance", "push_out", "state")
+_PER_CONTACT = ("gap", "speed", "area", "size", "compliance", "state")
 
 
 @dataclass(frozen=True)
@@ -69,5 +69,6 @@ def _some(contacts: Approach, rows: Bools) -> Approach:
         **parts,
         step=contacts.step,
         theta=contacts.theta,
+        push_out=contacts.push_out,
         first=contacts.first,
     )

@@ -118,7 +118,7 @@ def test_velocity_after_a_step_is_w_r_plus_u_free(step):
     contacts, state = step.contacts, step.state
     free = step.free(state)
     internal = np.zeros((len(contacts), STATE))
-    problem, _ = contact_problem(step.model, state, step.found, free, internal, first=True)
+    problem, _ = contact_problem(step.model, state, step.found, free, internal, state)
     r = np.random.default_rng(2).normal(size=(len(contacts), 3))
     kick = step.kick(free, r)
     found = local_velocity(contacts, step.operator, kick.velocity, kick.node_velocity)

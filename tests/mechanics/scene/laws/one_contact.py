@@ -14,8 +14,7 @@ def approach(gap, speed=0.0, state=None, **changed):
         name: changed.pop(name) for name in ("area", "size", "compliance") if name in changed
     }
     full = {name: np.broadcast_to(np.asarray(value, dtype=float), gap.shape) for name, value in given.items()}
-    pushed = np.broadcast_to(np.asarray(changed.pop("push_out", False)), gap.shape)
-    settings = {"step": 1e-3, "theta": 0.5, "push_out": pushed, "first": False} | changed
+    settings = {"step": 1e-3, "theta": 0.5, "push_out": False, "first": False} | changed
     state = np.zeros((len(gap), STATE)) if state is None else np.array(state, dtype=float)
     return Approach(gap=gap, speed=np.broadcast_to(float(speed), gap.shape), state=state, **full, **settings)
 
