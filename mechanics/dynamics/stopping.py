@@ -27,16 +27,10 @@ LASTING = 5  # steps in a row that must be in balance
 MOVED = 0.01  # displacement over a stone's width that the reader of a verdict must know of [-]
 _REST_SPEED = 1e-4  # of √(g · width), the speed of a fall over a body's own width, below which it rests [-]
 _FALL_SPEED = 0.05  # of the same speed, above which a body falls [-]
-_TOPPLED = (
-    np.pi / 4
-)  # tilt from which a stone that left its place and rests has toppled [rad]: rocking tilts less
-_LEANS = np.radians(10.0)  # tilt from which one that has sunk by half of what is a collapse has toppled [rad]
-_DOUBT = (
-    0.5  # velocity that unsolved steps may have added, over that of a motion, up to which it is proven [-]
-)
-_RELEASED = (
-    50  # most steps in which a rest must show that it lasts without the forces by which it was reached
-)
+_TOPPLED = np.pi / 4  # tilt from which a stone at rest away from its place has toppled [rad]
+_LEANS = np.radians(10.0)  # tilt from which one that has sunk by half a collapse has toppled [rad]
+_DOUBT = 0.5  # velocity that unsolved steps may have added, over that of a proven motion [-]
+_RELEASED = 50  # most steps in which a rest must show that it lasts without its forces
 _STAYS = 1e-3  # displacement over the width within which a released stone stays where it rested [-]
 
 
