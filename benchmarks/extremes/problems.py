@@ -300,7 +300,7 @@ def _sticks() -> ContactProblem:
 
 
 def _senseless() -> list[Row]:
-    """What no solver can make sense of."""
+    """Return problems that no solver can make sense of."""
     return [
         *(
             Row(

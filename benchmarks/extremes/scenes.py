@@ -95,7 +95,7 @@ def _run(row: SceneRow, method: Method) -> Cell:
 
 
 def _told(result: Result) -> str:
-    """What the result says of itself, where it is not what was asked for."""
+    """Return the words of the result on itself, where it is not what was asked for."""
     lost = result.errors.unconverged_steps
     if lost:
         return f"{lost} of {result.steps} steps not converged"

@@ -118,10 +118,12 @@ class ContactSearch:
             self._last = detection(model, predicted, contacts, self._compliance, self._elastic_scale)
         return self._last
 
-    def continued(self, model: Model) -> "ContactSearch":
-        """Return the search for other settings of time, which knows the last result."""
+    def continued(self, model: Model, compliance: Sequence[Compliance]) -> "ContactSearch":
+        """Return the search for other settings of time; it knows the last result where ŵ is still the same."""
         other = copy(self)
-        other._last = None if self._last is None else replace(self._last, model=model)
+        other._compliance = compliance
+        if self._last is not None:
+            other._last = replace(self._last, model=model) if compliance is self._compliance else None
         return other
 
     def _is_stale(self, last: Detection, model: Model, predicted: State) -> bool:

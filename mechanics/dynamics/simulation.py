@@ -54,7 +54,6 @@ class Simulation:
         with self.clock("assemble"):
             self._compliance = compliances(model, self._step, self._theta)
         self._detect = ContactSearch(model, self._compliance, self.clock, fresh_contacts, elastic_scale)
-        self._given_solver = solver
         self._solve = solver or choose_solver(model.scene.solver, not model.rigid_only)
         self._relax = Relaxation(model)
         self._memory = Memory()
@@ -93,16 +92,14 @@ class Simulation:
         time = self.model.scene.time
         free = replace(time, relaxation=False, theta=1.0 if time.relaxation else time.theta)
         model = replace(self.model, scene=replace(self.model.scene, time=free))
-        if free.theta == time.theta:
-            # ŵ is the same, and with it W
-            other = copy(self)
-            other.model, other._detect = model, self._detect.continued(model)
-            other._relax = Relaxation(model)
-        else:
-            other = Simulation(model, self.start, self.clock, self._given_solver)
-        other.state, other._first = self.state, False
-        rigid = bool(model.inertia.moving.any())
-        other._memory = self._memory.without_forces() if rigid else self._memory
+        other = copy(self)
+        other.model, other._theta, other._relax, other._first = model, free.theta, Relaxation(model), False
+        if free.theta != time.theta:
+            with self.clock("assemble"):
+                other._compliance = compliances(model, self._step, free.theta)
+        other._detect = self._detect.continued(model, other._compliance)
+        # forces of elastic stones come from their strain, which stays
+        other._memory = self._memory.at_rest(0.0 if model.inertia.moving.any() else 1.0)
         other._sleepers = Sleepers(model, self.state, other._memory)
         return other
 

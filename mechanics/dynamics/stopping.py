@@ -83,11 +83,7 @@ class Watch:
         speeds = np.where(model.fixed, 0.0, speed(model, seen))
         pace = speeds / _fall(model, state)
         self._fastest = max(self._fastest, float(speeds.max()))
-        still = (
-            state.time >= model.scene.loads.until
-            and balance.max() <= model.scene.time.balance_tolerance
-            and pace.max() <= _REST_SPEED
-        )
+        still = state.time >= model.scene.loads.until and _rests(model, balance, pace)
         self._still = still and not solution.converged
         self._quiet = self._quiet + 1 if still and solution.converged else 0
         if self._quiet == 1:
@@ -201,22 +197,23 @@ def lasts(simulation: Simulation) -> bool:
     stones forget all contact forces, and must find those of their rest again without leaving it.
     """
     model, begin = simulation.model, simulation.state
-    settings, quiet = model.scene.time, 0
+    quiet = 0
     for _ in range(_RELEASED):
         step = simulation.step()
         seen = seen_from_supports(model, begin, step.after)
         if (displacement(model, begin, seen) > _STAYS * model.surfaces.size)[~model.fixed].any():
             return False
-        pace = (speed(model, seen) / _fall(model, step.after))[~model.fixed]
-        calm = (
-            step.solution.converged
-            and balance_of(model, step).max() <= settings.balance_tolerance
-            and pace.max(initial=0.0) <= _REST_SPEED
-        )
+        pace = np.where(model.fixed, 0.0, speed(model, seen)) / _fall(model, step.after)
+        calm = step.solution.converged and _rests(model, balance_of(model, step), pace)
         quiet = quiet + 1 if calm else 0
         if quiet >= LASTING:
             return True
     return False
+
+
+def _rests(model: Model, balance: Array, pace: Array) -> bool:
+    """Return whether all bodies are in balance and slow: `pace` (nb,) is their speed over that of a fall."""
+    return bool(balance.max() <= model.scene.time.balance_tolerance and pace.max() <= _REST_SPEED)
 
 
 def _fall(model: Model, state: State) -> Array:

@@ -81,12 +81,8 @@ class Memory:
         if self._place is not None and place is not None:
             self._place = np.vstack([self._place, place])
 
-    def without_forces(self) -> "Memory":
-        """Return the same contacts with their internal variables alone."""
-        return self.at_rest(0.0)
-
     def at_rest(self, factor: float) -> "Memory":
-        """Return the same forces for a step that is `factor` times as long, of bodies that have come to rest."""
+        """Return the forces for a step `factor` times as long, of bodies that have come to rest; none with 0."""
         d, other = self._dimension, Memory(self._dimension)
         other._key, other._place, other._values = self._key, self._place, self._values.copy()
         other._values[:, :d] *= factor
