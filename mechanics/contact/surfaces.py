@@ -10,7 +10,7 @@ from mechanics.arrays import Array, Ints
 from mechanics.contact._kernels.facets import FacetMeshes
 from mechanics.contact._kernels.narrow_phase import Polyhedra
 from mechanics.contact.face_meshes import FaceMesh, packed_meshes
-from mechanics.stones.polyhedra import face_plane, smallest_width
+from mechanics.stones.polyhedra import alike, face_planes_alike, smallest_widths
 
 __all__ = ["Placed", "Surfaces", "middles", "surfaces"]
 
@@ -83,23 +83,28 @@ def surfaces(
 ) -> Surfaces:
     """Pack shapes given by corners (body axes), faces, the body each belongs to, in order, and radii of balls."""
     vptr, fptr = _pointer([len(v) for v in vertices]), _pointer([len(group) for group in faces])
-    corners = [start + np.asarray(face) for start, group in zip(vptr, faces, strict=False) for face in group]
-    vertex = np.vstack(list(vertices))
-    polygons = [vertex[c] for c in corners]
-    normal = np.array([face_plane(p)[0] for p in polygons])
-    edges = [
-        _edges(group, vertex, normal, int(v), int(f)) for group, v, f in zip(faces, vptr, fptr, strict=False)
-    ]
-    packed = np.vstack(edges)
-    owner = np.asarray(body, dtype=np.int64)
-    sptr = _pointer(np.bincount(owner).tolist())
+    vertex, owner = np.concatenate(vertices).astype(float), np.asarray(body, dtype=np.int64)
+    cptr = _pointer([len(face) for group in faces for face in group])
+    eptr = _pointer(np.diff(cptr[fptr]) // 2)
+    sptr = _pointer(np.bincount(owner))
     radii = np.array(radius, dtype=float) if len(radius) else np.zeros(len(body))
-    size = np.array(
-        [
-            2.0 * r if r > 0 else smallest_width(v, group)
-            for v, group, r in zip(vertices, faces, radii, strict=True)
-        ]
-    )
+    corner = np.empty(cptr[-1], dtype=np.int64)
+    normal, face_area = np.empty((fptr[-1], 3)), np.empty(fptr[-1])
+    edge, size = np.empty((eptr[-1], 4), dtype=np.int64), np.empty(len(owner))
+    for group, rows in alike(vertices, faces):
+        first_vertex, first_face = vptr[rows][:, None], fptr[rows][:, None]
+        place = vertex[first_vertex + np.arange(len(vertices[rows[0]]))]
+        normals, areas = face_planes_alike(place, group)
+        own = first_face + np.arange(len(group))
+        normal[own], face_area[own] = normals, areas
+        loops = np.concatenate([np.asarray(face) for face in group])
+        corner[cptr[first_face] + np.arange(len(loops))] = first_vertex + loops
+        size[rows] = smallest_widths(place, normals)
+        ends = _edges(group, place, normals) + np.stack(
+            [first_vertex, first_vertex, first_face, first_face], axis=2
+        )
+        edge[eptr[rows][:, None] + np.arange(ends.shape[1])] = ends
+    size = np.where(radii > 0, 2.0 * radii, size)
     return Surfaces(
         body=owner,
         sptr=sptr,
@@ -107,20 +112,20 @@ def surfaces(
             vptr=vptr,
             vertex=vertex,
             fptr=fptr,
-            cptr=_pointer([len(c) for c in corners]),
-            corner=np.concatenate(corners).astype(np.int64),
+            cptr=cptr,
+            corner=corner,
             normal=normal,
-            eptr=_pointer([len(e) for e in edges]),
-            edge_a=np.ascontiguousarray(packed[:, 0]),
-            edge_b=np.ascontiguousarray(packed[:, 1]),
-            edge_face=np.ascontiguousarray(packed[:, 2:]),
+            eptr=eptr,
+            edge_a=np.ascontiguousarray(edge[:, 0]),
+            edge_b=np.ascontiguousarray(edge[:, 1]),
+            edge_face=np.ascontiguousarray(edge[:, 2:]),
             inside=middles(vptr, vertex),
             size=size,
-            face_area=np.array([_area(p) for p in polygons]),
+            face_area=face_area,
         ),
         radius=radii,
         size=_widths(owner, sptr, vptr, vertex, size),
-        plane=_planes(owner, np.diff(fptr), normal, np.array([p[0] for p in polygons])),
+        plane=_planes(owner, np.diff(fptr), normal, vertex[corner[cptr[:-1]]]),
         face_mesh=tuple(face_mesh),
         meshes=packed_meshes(face_mesh),
     )
@@ -141,13 +146,8 @@ def _widths(body: Ints, sptr: Ints, vptr: Ints, vertex: Array, size: Array) -> A
     return width
 
 
-def _pointer(counts: Sequence[int]) -> Ints:
+def _pointer(counts: Sequence[int] | Ints) -> Ints:
     return np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-
-
-def _area(polygon: Array) -> float:
-    local = polygon - polygon.mean(axis=0)
-    return float(0.5 * np.linalg.norm(np.cross(local, np.roll(local, -1, axis=0)).sum(axis=0)))
 
 
 def _planes(body: Ints, count: Ints, normal: Array, corner: Array) -> Ints:
@@ -163,20 +163,19 @@ def _planes(body: Ints, count: Ints, normal: Array, corner: Array) -> Ints:
     return plane
 
 
-def _edges(
-    faces: tuple[tuple[int, ...], ...], vertex: Array, normal: Array, first_vertex: int, first_face: int
-) -> Ints:
-    """List edges (ne, 4), two vertices and two faces, each once, directed along second normal × first normal."""
+def _edges(faces: tuple[tuple[int, ...], ...], vertex: Array, normal: Array) -> Ints:
+    """List the edges of shapes (n, nv, 3) with the same faces, two vertices and two faces (n, ne, 4), each once.
+
+    They are directed along second normal × first normal.
+    """
     face_of = {
         (a, b): n for n, face in enumerate(faces) for a, b in zip(face, (*face[1:], face[0]), strict=True)
     }
-    rows = []
-    for (a, b), one in sorted(face_of.items()):
-        if a > b:
-            continue
-        other = face_of[(b, a)]
-        along = vertex[first_vertex + b] - vertex[first_vertex + a]
-        turned = np.cross(normal[first_face + other], normal[first_face + one])
-        start, end = (a, b) if along @ turned >= 0 else (b, a)
-        rows.append((first_vertex + start, first_vertex + end, first_face + one, first_face + other))
-    return np.array(rows, dtype=np.int64)
+    sides = [(a, b, one, face_of[b, a]) for (a, b), one in sorted(face_of.items()) if a < b]
+    a, b, one, other = np.array(sides, dtype=np.int64).T
+    turned = np.cross(normal[:, other], normal[:, one])
+    forward = np.einsum("nei,nei->ne", vertex[:, b] - vertex[:, a], turned) >= 0
+    return np.stack(
+        [np.where(forward, a, b), np.where(forward, b, a), *np.broadcast_arrays(one, other, forward)[:2]],
+        axis=2,
+    )

@@ -21,16 +21,36 @@ from mechanics.scene.scene import Block, Fidelity, LawRule, Part, Scene
 from mechanics.scene.state import State
 from mechanics.stones.meshing.mesh import SolidMesh
 from mechanics.stones.meshing.quality import MeshReport
-from mechanics.stones.polyhedra import MassProperties, mass_properties, united
+from mechanics.stones.polyhedra import (
+    MassProperties,
+    alike,
+    mass_properties,
+    mass_properties_alike,
+    united,
+)
 from moma.errors import GeometryError, SceneError
 
-__all__ = ["Model", "build_model"]
+__all__ = ["Model", "Outline", "build_model"]
 
 
 _PLANE = 1e-6  # largest height of a corner ahead of a face, over the size of its shape [-]; as for meshes
 _SAME_VOLUME = (
     1e-6  # largest difference of the volume of a stone's parts from that of its outline, relative [-]
 )
+
+
+@dataclass(frozen=True)
+class Outline:
+    """Corners of all bodies as the scene gives them, from their centres of mass.
+
+    Attributes
+    ----------
+    first : (nb+1,) corners of each body
+    corner : (n, 3) in body axes [m]
+    """
+
+    first: Ints
+    corner: Array
 
 
 @dataclass(frozen=True)
@@ -49,7 +69,7 @@ class Model:
     mass : (nb,) [kg]
     volume : (nb,) [m³]
     surfaces : for contact detection
-    outline : per body its corners (n, 3) as the scene gives them, from the centre of mass, body axes [m]
+    outline : corners of the bodies as the scene gives them
     stones : per body its finite elements; None if it has none
     elastic_stones : the same, packed; equal stones together
     meshes : how the deformable stones were meshed
@@ -66,7 +86,7 @@ class Model:
     mass: Array
     volume: Array
     surfaces: Surfaces
-    outline: tuple[Array, ...]
+    outline: Outline
     stones: tuple[Deformable | None, ...]
     elastic_stones: ElasticStones
     meshes: MeshReport
@@ -100,9 +120,9 @@ def build_model(scene: Scene, progress: Callable[[int, int], None] | None = None
     blocks = scene.blocks
     for block in blocks:
         _check(block)
-    properties = [_mass_properties(block) for block in blocks]
+    volume, centroid, unit_inertia = _mass_properties(blocks)
     stones: list[Deformable | None] = []
-    centres = np.array([p.centroid for p in properties])
+    centres = centroid.copy()
     workshop = StoneWorkshop(blocks, scene.contact.alert_distance, scene.time.lumped_mass)
     for index, block in enumerate(blocks):
         if block.fidelity is Fidelity.DEFORMABLE:
@@ -113,7 +133,7 @@ def build_model(scene: Scene, progress: Callable[[int, int], None] | None = None
         if progress is not None:
             progress(index + 1, len(blocks))
     packed = elastic_stones(stones)
-    inertia = _inertia(blocks, properties)
+    inertia = _inertia(blocks, volume, unit_inertia)
     model = Model(
         scene=scene,
         fixed=np.array([block.fidelity is Fidelity.FIXED for block in blocks]),
@@ -128,9 +148,9 @@ def build_model(scene: Scene, progress: Callable[[int, int], None] | None = None
         inertia=inertia,
         flight=_flight(inertia, stones),
         mass=inertia.mass,
-        volume=np.array([p.volume for p in properties]),
+        volume=volume,
         surfaces=_surfaces(blocks, centres, stones, packed.start),
-        outline=tuple(block.vertices - centre for block, centre in zip(blocks, centres, strict=True)),
+        outline=_outline(blocks, centres),
         stones=tuple(stones),
         elastic_stones=packed,
         meshes=workshop.report(),
@@ -155,20 +175,41 @@ def _parts(block: Block) -> tuple[Part, ...]:
     return block.parts or (Part(block.vertices, block.faces),)
 
 
-def _mass_properties(block: Block) -> MassProperties:
-    if block.radius is not None:
-        return ball_properties(block)
+def _mass_properties(blocks: Sequence[Block]) -> tuple[Array, Array, Array]:
+    """Return volumes (nb,) [m³], centroids (nb, 3) [m] and inertias (nb, 3, 3) at unit density of all bodies [m⁵]."""
+    count = len(blocks)
+    volume, centroid, inertia = np.empty(count), np.empty((count, 3)), np.empty((count, 3, 3))
+    plain = [b for b, block in enumerate(blocks) if block.radius is None and not block.parts]
+    own = [blocks[b] for b in plain]
+    for faces, rows in alike([block.vertices for block in own], [block.faces for block in own]):
+        bodies = np.array(plain, dtype=np.int64)[rows]
+        corners, where = np.stack([own[row].vertices for row in rows]), [own[row].code for row in rows]
+        found = mass_properties_alike(corners, faces, [f"stone {code}" for code in where])
+        volume[bodies], centroid[bodies], inertia[bodies] = found
+    for b in sorted(set(range(count)).difference(plain)):
+        whole = ball_properties(blocks[b]) if blocks[b].radius is not None else _of_parts(blocks[b])
+        volume[b], centroid[b], inertia[b] = whole.volume, whole.centroid, whole.inertia
+    return volume, centroid, inertia
+
+
+def _of_parts(block: Block) -> MassProperties:
     where = f"stone {block.code}"
-    whole = united([mass_properties(part.vertices, part.faces, where) for part in _parts(block)])
-    if block.parts:
-        outline = mass_properties(block.vertices, block.faces, where).volume
-        if abs(outline - whole.volume) > _SAME_VOLUME * outline:
-            raise GeometryError(
-                f"its parts have {whole.volume:.6g} m³, its outline {outline:.6g} m³",
-                where=where,
-                remedy="give convex parts that fill it without overlap",
-            )
+    whole = united([mass_properties(part.vertices, part.faces, where) for part in block.parts])
+    outline = mass_properties(block.vertices, block.faces, where).volume
+    if abs(outline - whole.volume) > _SAME_VOLUME * outline:
+        raise GeometryError(
+            f"its parts have {whole.volume:.6g} m³, its outline {outline:.6g} m³",
+            where=where,
+            remedy="give convex parts that fill it without overlap",
+        )
     return whole
+
+
+def _outline(blocks: Sequence[Block], centres: Array) -> Outline:
+    count = np.array([len(block.vertices) for block in blocks])
+    first = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
+    corner = np.concatenate([block.vertices for block in blocks]) - np.repeat(centres, count, axis=0)
+    return Outline(first, corner)
 
 
 def _surfaces(
@@ -303,11 +344,10 @@ def _check_shapes(model: Model) -> None:
         )
 
 
-def _inertia(blocks: tuple[Block, ...], properties: list[MassProperties]) -> RigidInertia:
+def _inertia(blocks: tuple[Block, ...], volume: Array, unit_inertia: Array) -> RigidInertia:
     density = np.array([block.material.density for block in blocks])
     rigid = np.array([block.fidelity is Fidelity.RIGID for block in blocks])
-    mass = density * np.array([p.volume for p in properties])
-    inertia = density[:, None, None] * np.array([p.inertia for p in properties])
+    mass, inertia = density * volume, density[:, None, None] * unit_inertia
     return RigidInertia(
         mass,
         np.where(rigid, 1.0 / mass, 0.0),

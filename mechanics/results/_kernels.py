@@ -1,11 +1,11 @@
-"""Numba kernels of the observation of every step: motion of the joints, pressure on patches, largest values so far."""
+"""Numba kernels of the observation of a step: faces in contact, motion of joints, pressures, largest values so far."""
 
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-__all__ = ["JointCorners", "joint_motion", "keep_largest", "patch_pressures"]
+__all__ = ["JointCorners", "facing", "joint_motion", "keep_largest", "patch_pressures"]
 
 _ONE_PLANE = 0.999  # cosine of the angle between two contacts of one joint [-]
 
@@ -27,6 +27,49 @@ class JointCorners(NamedTuple):
     own: np.ndarray
     other: np.ndarray
     normal: np.ndarray
+
+
+@njit(cache=True)
+def facing(faces, body, point, direction):  # pragma: no cover - compiled
+    """Find the face of a body on which a point lies, among those that face a direction.
+
+    It is the one that looks best along the direction and lies nearest: the distance from a face is that from its plane
+    and that beyond its edges, over the width of the body.
+
+    Inputs
+    ------
+    faces : Faces
+    body : (n,) int64
+    point : (n, 3) float64 [m]
+    direction : (n, 3) float64 [-]
+
+    Outputs
+    -------
+    (n,) int64; the first face of the body where none faces the direction
+    """
+    found = np.empty(len(body), dtype=np.int64)
+    for i in range(len(body)):
+        p, d, most = point[i], direction[i], -np.inf
+        found[i] = faces.first[body[i]]
+        for f in range(faces.first[body[i]], faces.first[body[i] + 1]):
+            n, centre, corner = faces.normal[f], faces.centre[f], faces.corner[f]
+            looks = n[0] * d[0] + n[1] * d[1] + n[2] * d[2]
+            # no distance makes it better than one that looks better
+            if not looks > 0.0 or looks <= most:
+                continue
+            off = (p[0] - centre[0]) * n[0] + (p[1] - centre[1]) * n[1] + (p[2] - centre[2]) * n[2]
+            beyond, count = 0.0, faces.corners[f]
+            for k in range(count):
+                a, b = corner[k], corner[k + 1 if k + 1 < count else 0]
+                x, y, z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+                u, v, w = y * n[2] - z * n[1], z * n[0] - x * n[2], x * n[1] - y * n[0]
+                length = np.sqrt(u * u + v * v + w * w)
+                out = (p[0] - a[0]) * u + (p[1] - a[1]) * v + (p[2] - a[2]) * w
+                beyond = max(beyond, out / length if length > 0.0 else out)
+            fits = looks - (abs(off) + beyond) / faces.size[f]
+            if fits > most:
+                found[i], most = f, fits
+    return found
 
 
 @njit(cache=True)

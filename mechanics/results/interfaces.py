@@ -4,6 +4,7 @@ The joints of the start of a run keep their numbers, even after they have parted
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,8 +12,8 @@ from mechanics.arrays import Array, Bools, Ints
 from mechanics.contact.contacts import Contacts, material_points
 from mechanics.contact.detection import FLAT
 from mechanics.model.model import Model
+from mechanics.results._kernels import facing
 from mechanics.scene.state import State
-from mechanics.stones.convex_polygons import following
 
 __all__ = ["Faces", "Interfaces", "find_interfaces", "placed_faces"]
 
@@ -22,8 +23,7 @@ _HINGED = float(
 )  # cosine of the angle to which a joint of the start may open on its edge
 
 
-@dataclass(frozen=True)
-class Faces:
+class Faces(NamedTuple):
     """Flat faces of all stones at one instant.
 
     Attributes
@@ -33,7 +33,7 @@ class Faces:
     normal : (nf, 3) outward [-]
     centre : (nf, 3) mean of the corners [m]
     corner : (nf, m, 3) counter-clockwise seen from outside [m]
-    count : (nf,) corners of each face
+    corners : (nf,) number of those of each face
     size : (nf,) smallest width of the body [m]
     flat : (nf,) false for the facets of balls, which serve pictures only
     """
@@ -43,7 +43,7 @@ class Faces:
     normal: Array
     centre: Array
     corner: Array
-    count: Ints
+    corners: Ints
     size: Array
     flat: Bools
 
@@ -85,7 +85,7 @@ def placed_faces(model: Model, state: State) -> Faces:
         normal=np.einsum("fij,fj->fi", state.rotation[body], surfaces.shapes.normal),
         centre=np.where(meant, corner, 0.0).sum(axis=1) / count[:, None],
         corner=corner,
-        count=count,
+        corners=count,
         size=surfaces.size[body],
         flat=surfaces.radius[shape] == 0,
     )
@@ -103,7 +103,7 @@ def find_interfaces(faces: Faces, contacts: Contacts, state: State, known: Ints 
     point, normal = material_points(contacts, state), contacts.frame[:, 0]
     face = np.column_stack(
         [
-            _facing(faces, contacts.bodies[:, side], point[:, side], -normal if side == 0 else normal)
+            facing(faces, contacts.bodies[:, side], point[:, side], -normal if side == 0 else normal)
             for side in (0, 1)
         ]
     )
@@ -119,30 +119,3 @@ def find_interfaces(faces: Faces, contacts: Contacts, state: State, known: Ints 
     joint[valid] = order[np.searchsorted(every, key[valid], sorter=order)]
     pairs = np.column_stack([every // len(faces.body), every % len(faces.body)])
     return Interfaces(pairs.astype(np.int64), joint.astype(np.int64))
-
-
-def _facing(faces: Faces, body: Ints, point: Array, direction: Array) -> Ints:
-    """Return the face of a body on which a point lies, among those that face a direction (n, 3)."""
-    number = np.diff(faces.first)[body]
-    start = np.concatenate([[0], np.cumsum(number)[:-1]]) if len(number) else number
-    row = np.repeat(np.arange(len(body)), number)
-    face = np.arange(int(number.sum())) + np.repeat(faces.first[body] - start, number)
-    looks = np.einsum("fi,fi->f", faces.normal[face], direction[row])
-    away = np.where(looks > 0, looks - _distance(faces, face, point[row]) / faces.size[face], -np.inf)
-    order = np.lexsort((-away, row))
-    best: Ints = face[order][start]
-    return best
-
-
-def _distance(faces: Faces, face: Ints, point: Array) -> Array:
-    """Return the distances of points (n, 3) from the planes of faces (n,), plus those beyond their edges [m]."""
-    normal, corner, count = faces.normal[face], faces.corner[face], faces.count[face]
-    after = following(count, corner.shape[1])
-    along = corner[np.arange(len(face))[:, None], after] - corner
-    out = np.cross(along, normal[:, None])
-    length = np.linalg.norm(out, axis=2)
-    beyond = np.einsum("fki,fki->fk", point[:, None] - corner, out) / np.where(length > 0, length, 1.0)
-    beyond = np.where(np.arange(corner.shape[1]) < count[:, None], beyond, -np.inf).max(axis=1)
-    off = np.abs(np.einsum("fi,fi->f", point - faces.centre[face], normal))
-    distance: Array = off + np.maximum(beyond, 0.0)
-    return distance

@@ -10,6 +10,7 @@ presses everywhere, and the resultant is within the kern, if p ≥ 0 in all corn
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -48,14 +49,14 @@ class Section:
     gap: Array
     middle: Array
 
-    def polygon(self, joint: int) -> Array:
-        """Return the (k, 3) corners of one joint [m]."""
-        own = slice(0, int(self.count[joint]))
-        n, *flat = self.frame[joint]
-        corner: Array = (
-            self.centroid[joint] + self.corner[joint, own] @ flat + self.middle[joint, own, None] * n
-        )
-        return corner
+    def polygons(self) -> tuple[Array, ...]:
+        """Return the (k, 3) corners of each joint [m]."""
+        meant = np.arange(self.corner.shape[1]) < self.count[:, None]
+        joint = np.repeat(np.arange(len(self.count)), self.count)
+        flat, above = self.corner[meant], self.middle[meant]
+        corner = self.centroid[joint] + np.einsum("kd,kdi->ki", flat, self.frame[joint, 1:])
+        corner += above[:, None] * self.frame[joint, 0]
+        return tuple(corner[a:b] for a, b in pairwise([0, *np.cumsum(self.count).tolist()]))
 
 
 def sections(faces: Faces, pair: Ints) -> Section:
@@ -68,11 +69,11 @@ def sections(faces: Faces, pair: Ints) -> Section:
     own = np.einsum("jki,jdi->jkd", faces.corner[a] - origin[:, None], flat)
     other = np.einsum("jki,jdi->jkd", faces.corner[b] - origin[:, None], flat)
     # seen along n, the faces of the first bodies run clockwise
-    place, count = np.arange(own.shape[1]), faces.count[a]
+    place, count = np.arange(own.shape[1]), faces.corners[a]
     own = own[np.arange(len(a))[:, None], np.where(place < count[:, None], count[:, None] - 1 - place, 0)]
-    corner, left = overlaps(own, count, other, faces.count[b])
+    corner, left = overlaps(own, count, other, faces.corners[b])
     area, middle, second = moments(corner, left)
-    smaller = np.minimum(moments(own, count)[0], moments(other, faces.count[b])[0])
+    smaller = np.minimum(moments(own, count)[0], moments(other, faces.corners[b])[0])
     values, axes = np.linalg.eigh(second)
     axes = np.swapaxes(axes, 1, 2)[:, ::-1]
     axes[:, 1] *= np.sign(np.linalg.det(axes))[:, None]

@@ -140,7 +140,7 @@ def joint_results(
     return JointResult(
         bodies=bodies,
         parted=away & np.append(start.closed, np.zeros(count - len(start.face), dtype=bool)),
-        polygon=tuple(section.polygon(number) for number in range(count)),
+        polygon=section.polygons(),
         frame=section.frame,
         centroid=section.centroid,
         area=section.area,

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -36,6 +37,9 @@ _FACET_PARTS: Mapping[Element, tuple[tuple[int, ...], ...]] = {
 }
 
 
+_NO_CELLS = np.zeros((0, 4), dtype=np.int64)  # of all rigid stones together
+
+
 def surface_polygons(mesh: SolidMesh) -> tuple[tuple[int, ...], ...]:
     """Return outward polygons that cover the boundary, with a corner at each of its nodes."""
     parts = [mesh.facets[:, part] for part in _FACET_PARTS[mesh.element]]
@@ -44,22 +48,29 @@ def surface_polygons(mesh: SolidMesh) -> tuple[tuple[int, ...], ...]:
 
 def positions(model: Model, state: State) -> tuple[Array, ...]:
     """Return the points of each body: corners of rigid ones, nodes of deformable ones [m]."""
-    return tuple(
-        state.node[model.nodes_of(b)]
-        if stone is not None
-        else state.centre[b] + model.outline[b] @ state.rotation[b].T
-        for b, stone in enumerate(model.stones)
-    )
+    corner = np.repeat(state.centre, np.diff(model.outline.first), axis=0) + _arms(model, state)
+    return _by_body(model, corner, state.node)
 
 
 def velocities(model: Model, state: State) -> tuple[Array, ...]:
     """Return the velocities of the same points [m/s]."""
-    return tuple(
-        state.node_velocity[model.nodes_of(b)]
-        if stone is not None
-        else state.velocity[b, :3] + np.cross(state.velocity[b, 3:], model.outline[b] @ state.rotation[b].T)
-        for b, stone in enumerate(model.stones)
-    )
+    own = np.repeat(state.velocity, np.diff(model.outline.first), axis=0)
+    return _by_body(model, own[:, :3] + np.cross(own[:, 3:], _arms(model, state)), state.node_velocity)
+
+
+def _arms(model: Model, state: State) -> Array:
+    """Return the corners (n, 3) of all bodies from their centres of mass, world axes [m]."""
+    turn = np.repeat(state.rotation, np.diff(model.outline.first), axis=0)
+    arms: Array = np.einsum("vij,vj->vi", turn, model.outline.corner)
+    return arms
+
+
+def _by_body(model: Model, corner: Array, node: Array) -> tuple[Array, ...]:
+    """Return the rows of each body: of its corners, or of its nodes if it is deformable."""
+    own = [corner[a:b] for a, b in pairwise(model.outline.first.tolist())]
+    for b in np.flatnonzero(model.elastic).tolist():
+        own[b] = node[model.nodes_of(b)]
+    return tuple(own)
 
 
 class Observer:
@@ -101,10 +112,11 @@ class Observer:
         return tuple(self._body(b, state, *both, float(balance[b])) for b, both in enumerate(points))
 
     def _frame(self, state: State, contacts: ContactResult) -> Frame:
-        seen = [
-            self._stress(b, stone, state) if stone is not None and block.stress else (None, None)
-            for b, (block, stone) in enumerate(zip(self._model.scene.blocks, self._model.stones, strict=True))
-        ]
+        seen: list[tuple[Array | None, float | None]] = [(None, None)] * len(self._model.mass)
+        for b in np.flatnonzero(self._model.elastic).tolist():
+            stone = self._model.stones[b]
+            if stone is not None and self._model.scene.blocks[b].stress:
+                seen[b] = self._stress(b, stone, state)
         return Frame(
             time=state.time,
             positions=positions(self._model, state),
@@ -156,7 +168,7 @@ class Observer:
             position=now,
             faces=block.faces,
             element=None,
-            cells=np.zeros((0, 4), dtype=np.int64),
+            cells=_NO_CELLS,
             stress=None,
             von_mises=None,
             principal=None,

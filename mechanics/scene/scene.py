@@ -1,5 +1,6 @@
 """Scene: all input of a simulation, constant during a run."""
 
+from collections import Counter
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Annotated
@@ -333,7 +334,7 @@ class Scene:
         codes = [block.code for block in self.blocks]
         if not codes:
             raise SceneError("the scene has no blocks", where=self.name, remedy="select at least one stone")
-        repeated = sorted({code for code in codes if codes.count(code) > 1})
+        repeated = sorted(code for code, count in Counter(codes).items() if count > 1)
         if repeated:
             raise SceneError(f"block codes used twice: {', '.join(repeated)}", where=self.name)
         refuse_unless(

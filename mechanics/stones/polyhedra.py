@@ -10,15 +10,20 @@ from moma.errors import GeometryError
 
 __all__ = [
     "MassProperties",
+    "alike",
     "face_plane",
     "face_planes",
+    "face_planes_alike",
     "fan",
     "mass_properties",
+    "mass_properties_alike",
     "smallest_width",
+    "smallest_widths",
     "united",
 ]
 
 Faces = Sequence[Sequence[int]]
+Polygons = tuple[tuple[int, ...], ...]
 
 
 @dataclass(frozen=True)
@@ -59,32 +64,77 @@ def mass_properties(vertices: Array, faces: Faces, where: str | None = None) -> 
     >>> round(tetrahedron.volume, 4), tetrahedron.centroid.round(4).tolist()
     (0.1667, [0.25, 0.25, 0.25])
     """
+    volume, centroid, inertia = mass_properties_alike(vertices[None], faces, [where])
+    return MassProperties(float(volume[0]), centroid[0], inertia[0])
+
+
+def alike(vertices: Sequence[Array], faces: Sequence[Faces]) -> list[tuple[Polygons, Ints]]:
+    """Return the lists of faces of many polyhedra, each once, with the polyhedra (n,) that have it.
+
+    The stones of a bond or of a survey share a few, so what is computed list by list is computed on whole arrays.
+    """
+    members: dict[tuple[int, Polygons], list[int]] = {}
+    for row, (corners, group) in enumerate(zip(vertices, faces, strict=True)):
+        members.setdefault((len(corners), tuple(map(tuple, group))), []).append(row)
+    return [(group, np.array(rows, dtype=np.int64)) for (_, group), rows in members.items()]
+
+
+def mass_properties_alike(
+    vertices: Array, faces: Faces, where: Sequence[str | None]
+) -> tuple[Array, Array, Array]:
+    """Compute volumes (n,), centroids (n, 3) and inertias (n, 3, 3) of polyhedra with the same faces.
+
+    Parameters
+    ----------
+    vertices : (n, nv, 3) [m]
+    faces : of each
+    where : names each in messages
+
+    Raises
+    ------
+    GeometryError : as `mass_properties`, of the first that is wrong
+    """
     edges = [(f[i - 1], f[i]) for f in faces for i in range(len(f))]
     distinct = set(edges)
     if len(distinct) < len(edges) or any((b, a) not in distinct for a, b in edges):
         raise GeometryError(
             "the faces do not close",
-            where=where,
+            where=where[0],
             remedy="give each edge to exactly two faces, in opposite directions",
         )
-    origin = vertices.mean(axis=0)
-    corners = (vertices - origin)[fan(faces)]
+    origin = vertices.mean(axis=1)
+    # in one order of memory, so that no sum depends on the number of stones
+    corners = np.take(vertices - origin[:, None], fan(faces), axis=1)
     volumes = np.linalg.det(corners) / 6.0
-    volume = float(volumes.sum())
-    if not volume > 0:
+    volume = volumes.sum(axis=1)
+    if not (volume > 0).all():
+        first = int(np.argmin(volume > 0))
         raise GeometryError(
-            f"the faces enclose {volume:.3g} m³",
-            where=where,
+            f"the faces enclose {volume[first]:.3g} m³",
+            where=where[first],
             remedy="order the corners of each face counter-clockwise seen from outside",
         )
-    total = corners.sum(axis=1)
-    mean = np.einsum("t,ti->i", volumes, total) / (4.0 * volume)
-    second = np.einsum("t,tki,tkj->ij", volumes, corners, corners) + np.einsum(
-        "t,ti,tj->ij", volumes, total, total
+    total = corners.sum(axis=2)
+    mean = np.einsum("nt,nti->ni", volumes, total) / (4.0 * volume[:, None])
+    second = np.einsum("nt,ntki,ntkj->nij", volumes, corners, corners) + np.einsum(
+        "nt,nti,ntj->nij", volumes, total, total
     )
-    second = second / 20.0 - volume * np.outer(mean, mean)
-    inertia = np.trace(second) * np.eye(3) - second
-    return MassProperties(volume, origin + mean, inertia)
+    second = second / 20.0 - volume[:, None, None] * (mean[:, :, None] * mean[:, None, :])
+    inertia = np.trace(second, axis1=1, axis2=2)[:, None, None] * np.eye(3) - second
+    return volume, origin + mean, inertia
+
+
+def face_planes_alike(vertices: Array, faces: Faces) -> tuple[Array, Array]:
+    """Return unit normals (n, nf, 3) and areas (n, nf) [m²] of polyhedra (n, nv, 3) with the same faces."""
+    number = np.array([len(face) for face in faces])
+    normal = np.empty((len(vertices), len(faces), 3))
+    for count in np.unique(number):
+        rows = np.flatnonzero(number == count)
+        polygon = np.take(vertices, np.array([faces[int(row)] for row in rows]), axis=1)
+        local = polygon - polygon.mean(axis=2, keepdims=True)
+        normal[:, rows] = np.cross(local, np.roll(local, -1, axis=2)).sum(axis=2)
+    twice = np.linalg.norm(normal, axis=2)
+    return normal / twice[..., None], 0.5 * twice
 
 
 def united(parts: Sequence[MassProperties]) -> MassProperties:
@@ -125,6 +175,12 @@ def face_planes(vertices: Array, faces: Faces) -> tuple[Array, Array]:
 
 def smallest_width(vertices: Array, faces: Faces) -> float:
     """Return the smallest extent of a convex polyhedron along a face normal [m]."""
-    normals = np.array([face_plane(vertices[list(f)])[0] for f in faces])
-    heights = vertices @ normals.T
-    return float((heights.max(axis=0) - heights.min(axis=0)).min())
+    normals, _ = face_planes_alike(vertices[None], faces)
+    return float(smallest_widths(vertices[None], normals)[0])
+
+
+def smallest_widths(vertices: Array, normals: Array) -> Array:
+    """Return the smallest extents (n,) of convex polyhedra (n, nv, 3) along their face normals (n, nf, 3) [m]."""
+    heights = vertices @ normals.transpose(0, 2, 1)
+    width: Array = (heights.max(axis=1) - heights.min(axis=1)).min(axis=1)
+    return width

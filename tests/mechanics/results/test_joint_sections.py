@@ -32,7 +32,7 @@ def faces_of(lower, upper, height=0.0, turn=None):
         normal=np.array([[0.0, 0, 1], [0, 0, -1]]) @ turn.T,
         centre=np.array([one.mean(axis=0) for one in corners]) @ turn.T,
         corner=padded @ turn.T,
-        count=np.array([len(one) for one in corners]),
+        corners=np.array([len(one) for one in corners]),
         size=np.ones(2),
         flat=np.ones(2, dtype=bool),
     )
@@ -64,7 +64,7 @@ def test_the_polygon_of_shifted_bricks_is_what_they_share(turn):
     assert abs(section.frame[0, 1] @ axes) == pytest.approx([1, 0, 0], abs=1e-12)
     assert np.linalg.det(section.frame[0]) == pytest.approx(1.0)
     assert section.gap[0, : section.count[0]] == pytest.approx(0.002)
-    corners = section.polygon(0) @ axes
+    corners = section.polygons()[0] @ axes
     assert corners.min(axis=0) == pytest.approx([0.3, 0.1, 0.001])
     assert corners.max(axis=0) == pytest.approx([1.0, 0.5, 0.001])
 
@@ -129,7 +129,7 @@ def test_the_gap_of_tilted_faces_is_that_at_their_corners():
         normal,
         np.array([corner[0].mean(axis=0), corner[1].mean(axis=0)]),
         corner,
-        faces.count,
+        faces.corners,
         faces.size,
         faces.flat,
     )

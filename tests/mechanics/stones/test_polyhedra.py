@@ -5,7 +5,16 @@ import pytest
 from hypothesis import given, settings
 from scipy.spatial import ConvexHull
 
-from mechanics.stones.polyhedra import face_plane, fan, mass_properties, smallest_width
+from mechanics.stones.polyhedra import (
+    alike,
+    face_plane,
+    face_planes_alike,
+    fan,
+    mass_properties,
+    mass_properties_alike,
+    smallest_width,
+    smallest_widths,
+)
 from moma.errors import GeometryError
 from tests.mechanics.shapes import TETRAHEDRON_FACES, TURN, hexahedra
 from tests.pipelines.results_by_hand import BOX_FACES, box
@@ -97,3 +106,32 @@ def test_face_plane_looks_outwards_and_fan_cuts_each_face_into_n_minus_2():
         assert normal @ (origin - corners.mean(axis=0)) > 0.4
         assert np.linalg.norm(normal) == pytest.approx(1.0, rel=1e-14)
     assert fan(((0, 1, 2, 3, 4), (0, 2, 1))).tolist() == [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 2, 1]]
+
+
+def test_polyhedra_with_the_same_faces_are_computed_together_as_each_by_itself():
+    rng = np.random.default_rng(7)
+    boxes = [box((0, 0, 0), rng.uniform(0.1, 1.0, 3)) @ TURN.T + rng.uniform(-9, 9, 3) for _ in range(5)]
+    corners = [*boxes[:2], CORNER, *boxes[2:], 2.0 * CORNER @ TURN.T]
+    faces = [TETRAHEDRON_FACES if len(one) == 4 else BOX_FACES for one in corners]
+    groups = alike(corners, faces)
+    assert [rows.tolist() for _, rows in groups] == [[0, 1, 3, 4, 5], [2, 6]]
+    for group, rows in groups:
+        stack = np.stack([corners[row] for row in rows])
+        volume, centroid, inertia = mass_properties_alike(stack, group, [None] * len(rows))
+        normal, area = face_planes_alike(stack, group)
+        width = smallest_widths(stack, normal)
+        for n, row in enumerate(rows):
+            one = mass_properties(corners[row], faces[row])
+            assert (volume[n], width[n]) == (one.volume, smallest_width(corners[row], faces[row]))
+            np.testing.assert_array_equal(centroid[n], one.centroid)
+            np.testing.assert_array_equal(inertia[n], one.inertia)
+            planes = [face_plane(corners[row][list(face)])[0] for face in group]
+            np.testing.assert_allclose(normal[n], planes, atol=1e-15)
+            # the areas of a closed surface, times their normals, cancel
+            np.testing.assert_allclose(area[n] @ normal[n], 0.0, atol=1e-15 * area[n].sum())
+
+
+def test_the_stone_that_is_inside_out_is_named_among_equal_ones():
+    stones = np.stack([CORNER, CORNER[:, [1, 0, 2]], CORNER])
+    with pytest.raises(GeometryError, match="b: the faces enclose -"):
+        mass_properties_alike(stones, TETRAHEDRON_FACES, ["a", "b", "c"])
