@@ -8,7 +8,7 @@ from pipelines.run.assemble import Assembly
 from pipelines.run.plausibility import impossible_values
 from pipelines.scene.file import SceneFile
 from survey.geometry.solids import Solid
-from survey.geometry.watertight import check_watertight
+from survey.geometry.watertight import check_watertight, doubtful_solids
 from survey.joints.settings import JointMode
 
 __all__ = ["caution_of", "problems_of", "refuse_unsound", "unsound_stones", "unsupported"]
@@ -66,9 +66,11 @@ def unsound_stones(assembly: Assembly) -> list[str]:
 
 def _unsound_solids(scene: Scene) -> list[str]:
     problems = []
-    for block in scene.blocks:
+    solids = [Solid(block.code, block.vertices, block.faces) for block in scene.blocks]
+    convex = [not block.parts for block in scene.blocks]
+    for number in doubtful_solids(solids, convex):
         try:
-            check_watertight(Solid(block.code, block.vertices, block.faces), convex=not block.parts)
+            check_watertight(solids[number], convex=convex[number])
         except GeometryError as error:
             problems.append(str(error))
     return problems

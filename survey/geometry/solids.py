@@ -1,12 +1,23 @@
 """Closed solids with planar faces: the shape of a stone once its hidden half is known."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
-from survey.arrays import Array
+from survey.arrays import Array, Ints
 
-__all__ = ["Solid", "area_vector", "highest_corner", "planes_of_solid", "volume_of"]
+__all__ = [
+    "Solid",
+    "area_vector",
+    "area_vectors",
+    "highest_corner",
+    "highest_corners",
+    "planes_alike",
+    "planes_of_solid",
+    "volume_of",
+    "volumes_alike",
+]
 
 
 @dataclass(frozen=True)
@@ -32,29 +43,75 @@ def area_vector(polygon: Array) -> Array:
     return out
 
 
+def area_vectors(vertices: Array, faces: tuple[tuple[int, ...], ...]) -> Array:
+    """Return area times normal of all faces (…, nf, 3) of one solid or several, as `area_vector` does of one [m²].
+
+    Parameters
+    ----------
+    vertices : (…, nv, 3) of solids with the same faces [m]
+    faces : of each
+    """
+    vectors = np.empty((*vertices.shape[:-2], len(faces), 3))
+    for rows, corners in _faces_by_size(faces):
+        own = np.take(vertices, corners, axis=-2)
+        x, y, z = np.moveaxis(own - own[..., :1, :], -1, 0)
+        u, v, w = (np.concatenate([one[..., 1:], one[..., :1]], axis=-1) for one in (x, y, z))
+        across = np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1)
+        vectors[..., rows, :] = 0.5 * across.sum(axis=-2)
+    return vectors
+
+
+@lru_cache(maxsize=1024)
+def _faces_by_size(faces: tuple[tuple[int, ...], ...]) -> tuple[tuple[Ints, Ints], ...]:
+    """Return the faces (n,) with equal numbers of corners, and their corners (n, k).
+
+    The stones of a building share a few lists of faces.
+    """
+    number = np.array([len(face) for face in faces])
+    groups = [np.flatnonzero(number == count) for count in np.unique(number)]
+    return tuple((rows, np.array([faces[row] for row in rows.tolist()])) for rows in groups)
+
+
 def planes_of_solid(solid: Solid) -> Array:
     """Return the planes (nf, 4) of a solid's faces: outward unit normals [-], offsets d of n·x = d [m]."""
-    rows = np.empty((len(solid.faces), 4))
-    for row, face in zip(rows, solid.faces, strict=True):
-        polygon = solid.vertices[list(face)]
-        normal = area_vector(polygon)
-        row[:3] = normal / np.linalg.norm(normal)
-        row[3] = row[:3] @ polygon.mean(axis=0)
-    return rows
+    return planes_alike(solid.vertices, solid.faces)
+
+
+def planes_alike(vertices: Array, faces: tuple[tuple[int, ...], ...]) -> Array:
+    """Return the planes (…, nf, 4), as `planes_of_solid`, of solids (…, nv, 3) with the same faces."""
+    vectors = area_vectors(vertices, faces)
+    planes = np.empty((*vectors.shape[:-1], 4))
+    planes[..., :3] = vectors / np.sqrt(np.vecdot(vectors, vectors))[..., None]
+    for rows, corners in _faces_by_size(faces):
+        middle = np.take(vertices, corners, axis=-2).mean(axis=-2)
+        planes[..., rows, 3] = np.vecdot(planes[..., rows, :3], middle)
+    return planes
 
 
 def highest_corner(solid: Solid) -> float:
     """Return the largest height of a corner above the plane of a face; about zero if the solid is convex [m]."""
+    return float(highest_corners(solid.vertices, solid.faces))
+
+
+def highest_corners(vertices: Array, faces: tuple[tuple[int, ...], ...]) -> Array:
+    """Return the largest heights (…) of a corner, as `highest_corner`, of solids (…, nv, 3) with the same faces [m]."""
     # relative to a place among the corners: far from the origin, rounding would raise some
-    local = Solid(solid.code, solid.vertices - solid.vertices.mean(axis=0), solid.faces)
-    planes = planes_of_solid(local)
-    return float((local.vertices @ planes[:, :3].T - planes[:, 3]).max())
+    local = vertices - vertices.mean(axis=-2, keepdims=True)
+    planes = planes_alike(local, faces)
+    heights = local @ np.swapaxes(planes[..., :3], -1, -2) - planes[..., None, :, 3]
+    highest: Array = heights.max(axis=(-1, -2))
+    return highest
 
 
 def volume_of(solid: Solid) -> float:
     """Return the volume of a closed solid, by the divergence theorem; negative if seen from inside [m³]."""
-    centre = solid.vertices.mean(axis=0)
-    cones = (
-        (solid.vertices[face[0]] - centre) @ area_vector(solid.vertices[list(face)]) for face in solid.faces
-    )
-    return float(sum(cones)) / 3.0
+    return float(volumes_alike(solid.vertices, solid.faces))
+
+
+def volumes_alike(vertices: Array, faces: tuple[tuple[int, ...], ...]) -> Array:
+    """Return the volumes (…), as `volume_of`, of solids (…, nv, 3) with the same faces [m³]."""
+    tips = vertices[..., [face[0] for face in faces], :] - vertices.mean(axis=-2, keepdims=True)
+    cones = np.vecdot(tips, area_vectors(vertices, faces))
+    # one after the other, in the order of the faces
+    volume: Array = np.cumsum(cones, axis=-1)[..., -1] / 3.0
+    return volume

@@ -1,5 +1,6 @@
 """Closedness checks of solids with trimesh, which repairs nothing."""
 
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -8,9 +9,16 @@ from numpy.typing import NDArray
 
 from moma.errors import GeometryError
 from survey.arrays import Array
-from survey.geometry.solids import Solid, area_vector, highest_corner, volume_of
+from survey.geometry.solids import (
+    Solid,
+    area_vector,
+    highest_corner,
+    highest_corners,
+    volume_of,
+    volumes_alike,
+)
 
-__all__ = ["check_watertight", "triangulate"]
+__all__ = ["check_watertight", "doubtful_solids", "triangulate"]
 
 _CONVEX_TOLERANCE = 1e-9  # metres: height of a corner in front of a face plane
 _ON_A_SIDE = 1e-12  # of a triangle's size: distance within which a corner is on its side
@@ -45,6 +53,30 @@ def check_watertight(solid: Solid, *, convex: bool = False) -> None:
     tolerance = _CONVEX_TOLERANCE + 4.0 * np.spacing(np.abs(solid.vertices).max())
     if convex and (height := highest_corner(solid)) > tolerance:
         raise GeometryError(f"it is not convex: a corner is {height:.3g} m out", where=where, remedy=remedy)
+
+
+def doubtful_solids(solids: Sequence[Solid], convex: Sequence[bool]) -> list[int]:
+    """Return the solids that `check_watertight` may refuse, found at once among many that it does not.
+
+    Parameters
+    ----------
+    solids : to be checked
+    convex : whether convexity is checked as well, of each
+    """
+    alike: dict[tuple[int, tuple[tuple[int, ...], ...], bool], list[int]] = {}
+    for number, (solid, also) in enumerate(zip(solids, convex, strict=True)):
+        alike.setdefault((len(solid.vertices), solid.faces, also), []).append(number)
+    doubtful: list[int] = []
+    for (_, faces, also), members in alike.items():
+        rows, vertices = np.array(members), np.stack([solids[number].vertices for number in members])
+        sound = np.isfinite(vertices).all(axis=(1, 2)) & _closes(faces)
+        with np.errstate(invalid="ignore"):
+            sound &= volumes_alike(vertices, faces) > 0.0
+            if also:
+                tolerance = _CONVEX_TOLERANCE + 4.0 * np.spacing(np.abs(vertices).max(axis=(1, 2)))
+                sound &= highest_corners(vertices, faces) <= tolerance
+        doubtful += rows[~sound].tolist()
+    return sorted(doubtful)
 
 
 @lru_cache(maxsize=1024)
