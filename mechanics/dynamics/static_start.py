@@ -23,7 +23,7 @@ _STEPS = 10  # most steps of the search; few scenes need more than three
 _NATURAL_MAP = (
     0.1  # of the tolerance of η asked for [-]: Newton's last steps cost little, and spare the run its first
 )
-_VELOCITY = 0.03  # of the tolerance of velocities asked for [-], for the same reason
+_VELOCITY = 0.01  # of the tolerance of velocities asked for [-], for the same reason
 _ROUNDING = 1e-7  # least η in steps as long as these, because of rounding [-]
 _SETTLING = 5  # steps of the run's own length in which rigid stones close their last gaps
 _FALLS = 0.2  # displacement over the smallest width beyond which a stone falls rather than settles [-]

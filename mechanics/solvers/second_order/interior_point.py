@@ -43,6 +43,14 @@ _SHORT = 0.1
 _INSIDE = 10.0
 # complementarities, relative to where it began, at which Newton's method on the natural map tries to end it
 _TRIES = (1e-7, 1e-9, 1e-11)
+# the same between elastic stones, where it converges from farther away
+_ELASTIC_TRIES = (1e-4, 1e-6, 1e-8, 1e-10)
+# compliance of every contact with which Newton's method begins between elastic stones at rest, over the scale of W [-]
+_HELD = 1e-3
+# η from which a try between elastic stones is given up [-]
+_HOPELESS = 0.3
+# part of a step below which it leads nowhere, however far the solution [-]
+_NOWHERE = 1e-3
 # short steps in a row after which the path has stalled, and Newton's method is tried
 _STUCK = 5
 # η and velocity error in even units from which short steps count [-]
@@ -55,6 +63,8 @@ _GAIN = 0.9
 _WORTHLESS = 1e30
 # Newton's steps in one try
 _NEWTON = 12
+# and between elastic stones, where short steps lead on as well
+_ELASTIC_NEWTON = 20
 # tolerances of the tries over those asked for, since even units weigh light stones less [-]
 _FURTHER = (1.0, 1e-3)
 # compliance of the impulses that have no effect on any velocity, over the scale of W: without it they wander [-]
@@ -94,10 +104,12 @@ class InteriorPoint:
         best = end.looked(start.impulse, 0)
         if start.impulse.any() and not best.converged:
             best = end.ended(start.impulse, self.max_iterations)
+        elif end.elastic and not best.converged:
+            best = min(best, end.held(self.max_iterations), key=_left)
         return best if best.converged else self._along_path(end, best)
 
     def _along_path(self, end: "_End", best: ContactSolution) -> ContactSolution:
-        count, tries, short, idle = best.iterations, list(_TRIES), 0, 0
+        count, tries, short, idle = best.iterations, list(end.tries), 0, 0
         path = _Path(end.even)
         while short < _STUCK and idle < _IDLE and count < self.max_iterations:
             try:
@@ -113,7 +125,7 @@ class InteriorPoint:
             impulse = path.impulse * end.unit[:, None]
             found = end.looked(impulse, 0)
             slow = length < _SHORT and residual(end.even, path.impulse).within(*_NEARLY)
-            short = short + 1 if slow else 0
+            short = short + 1 if slow or length < _NOWHERE else 0
             near = bool(tries) and path.complementarity < tries[0]
             if not found.converged and (near or short == _STUCK):
                 tries = [one for one in tries if not path.complementarity < one]
@@ -137,6 +149,19 @@ class _End:
     def __init__(self, problem: ContactProblem, tolerance: float, velocity_tolerance: float) -> None:
         self.problem, self.limits = problem, (tolerance, velocity_tolerance)
         self.even, self.unit = equilibrated(problem)
+        self.elastic = problem.delassus.rigid is None
+        self.tries = _ELASTIC_TRIES if self.elastic else _TRIES
+
+    def held(self, most: int) -> ContactSolution:
+        """Begin as if every contact held, with a little compliance, and end it by Newton's method.
+
+        Elastic stones at rest under their weight leave few contacts: those open and slide that press least.
+        """
+        form, count = self.even.form(_NAME), len(self.unit)
+        theta = np.tile(_HELD * self.even.delassus.scale * np.eye(3), (count, 1, 1))
+        impulse = form.shifted(theta)(-self.even.biased.ravel()).reshape(-1, 3)
+        found = self.ended(impulse * self.unit[:, None], most - 1)
+        return replace(found, iterations=found.iterations + 1)
 
     def looked(self, impulse: Array, iterations: int) -> ContactSolution:
         """Return these impulses (nc, d) as a solution, judged in the problem's own units."""
@@ -151,8 +176,10 @@ class _End:
             if count >= most or found.converged:
                 break
             limits = further * self.limits[0], further * self.limits[1]
-            method = Newton if self.even.delassus.rigid is None else ProximalNewton
-            newton = method(*limits, _NEWTON)
+            if self.elastic:
+                newton: Newton | ProximalNewton = Newton(*limits, _ELASTIC_NEWTON, _HOPELESS)
+            else:
+                newton = ProximalNewton(*limits, _NEWTON)
             even = newton(self.even, ContactStart(found.impulse / unit, found.velocity))
             count += even.iterations
             found = min(found, self.looked(even.impulse * unit, 0), key=_left)

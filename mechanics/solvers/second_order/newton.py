@@ -40,7 +40,7 @@ _LEAST = 1e-12
 @dataclass(frozen=True)
 class Newton:
     """Newton's method for Φ(r) = r - P_K(r - ρ û(r)) = 0, with
-    ρ = 1/(mean of the contact's own diagonal).
+    ρ = 1/(mean of the contact's own diagonal, or the scale of W where that is less than any of them).
 
     With D the derivative of the projection P_K and S that of û by u, each step solves
 
@@ -57,11 +57,13 @@ class Newton:
     ----------
     tolerance, velocity_tolerance : as in `NSGS`
     max_iterations : limit of the steps, each of one factorisation
+    hopeless : η from which it gives up, as its steps would wander [-]
     """
 
     tolerance: float = 1e-6
     velocity_tolerance: float = 1e-5
     max_iterations: int = 100
+    hopeless: float = np.inf
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from the impulses of `start`.
@@ -99,6 +101,8 @@ class Newton:
             since = 0 if left.natural_map < _BETTER * best[0].natural_map else since
             if left.natural_map < best[0].natural_map:
                 best = left, here.impulse
+            if left.natural_map > self.hopeless:
+                break
         return _solution(*best, count, limits)
 
 
@@ -132,6 +136,10 @@ class _Map:
         self._problem, self._scale = problem, problem.delassus.scale
         own = problem.delassus.diagonal
         mean = np.einsum("cii->c", own) / max(own.shape[1], 1)
+        if self._scale < mean.min():
+            # W is measured against its elastic part: with the far larger motion of whole stones in ρ, impulses
+            # alone would tell which contacts are open
+            mean[:] = self._scale
         self._own = np.maximum(mean, _LEAST * self._scale)
 
     def __call__(self, impulse: Array) -> _Point:
