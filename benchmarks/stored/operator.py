@@ -42,6 +42,7 @@ class StoredDelassus:
     indices: NDArray[np.integer]
     indptr: NDArray[np.integer]
     rigid = None
+    joint_compliance = None
 
     def __post_init__(self) -> None:
         nc, entries = len(self.indptr) - 1, len(self.indices)

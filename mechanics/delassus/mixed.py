@@ -48,6 +48,7 @@ class MixedDelassus:
     scale: float
 
     rigid = None
+    joint_compliance = None
 
     @cached_property
     def _sides(self) -> Sides:

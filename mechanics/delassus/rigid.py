@@ -82,6 +82,7 @@ class RigidDelassus:
     inertia: Array
     schedule: Schedule
     threads: int = 1
+    joint_compliance = None
 
     @cached_property
     def rigid(self) -> RigidContacts:

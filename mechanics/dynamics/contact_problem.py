@@ -1,30 +1,88 @@
-"""From contacts and their laws to the contact problem of one step: a shift, a cone, and W."""
+"""From contacts and their laws to the contact problem of one step: a shift, a cone, and W.
 
-from dataclasses import replace
+Between rigid joints
+
+    0 ≤ u_N + g/h ⊥ r_N ≥ 0
+
+may have no solution, or one that no method finds: stones that real geometry clamps from several sides, through slivers
+and overlaps. A compliant joint is an elastic layer of stiffness 1/(ε h²), the same in all joints:
+
+    0 ≤ u_N + g/h + ε r_N ⊥ r_N ≥ 0,      u_T + ε (r_T - r_T of the last step) in Coulomb's law
+
+so that W + ε stands for W, and stones overlap by ε h r_N = ε h² F. The gap g is signed: where forces stay the same
+nothing moves, neither across the joint nor along it (docs/decisions/034-joint-compliance.md).
+"""
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mechanics.arrays import Array
 from mechanics.contact.contacts import gaps
 from mechanics.delassus.assembly import local_velocity
+from mechanics.delassus.compliant import CompliantDelassus
 from mechanics.dynamics.contact_search import Detection
 from mechanics.dynamics.stepping import Kick
 from mechanics.model.model import Model
-from mechanics.problem.problem import ContactProblem, ContactStart
+from mechanics.problem.problem import ContactProblem, ContactStart, Delassus, mean_diagonal
 from mechanics.scene.laws.law import REST, Approach, Terms
 from mechanics.scene.state import State
 from mechanics.stones.validation import SMALLEST
 
-__all__ = ["contact_problem", "shifted", "terms_of", "unshifted"]
+__all__ = ["JointCompliance", "contact_problem", "shifted", "terms_of", "unshifted"]
 
 
 _TOUCH = 1e-9  # overlap over a body's size that comes from rounding, and is no property of a joint [-]
 # bias of a law that does not act in a step, over the fastest free velocity: its own, infinity, is no number to solvers
 _NEVER = 1e3
+# overlap over that of the largest force, from which it comes from no force of a compliant joint [-]
+_UNEXPLAINED = 4.0
+# compliant steps after which rigid joints are tried again, at first; twice as many after each failure
+_FIRST_WAIT = 8
+
+
+@dataclass(frozen=True)
+class JointCompliance:
+    """Compliance of the joints of a run: none until a step with rigid joints could not be solved.
+
+    Attributes
+    ----------
+    value : ε of all joints once it has been needed, kept from then on; 0 until then [1/kg]
+    left : steps with compliant joints still to come, before rigid joints are tried again
+    wait : number of these after the next failure
+    """
+
+    value: float = 0.0
+    left: int = 0
+    wait: int = _FIRST_WAIT
+
+    @property
+    def rigid(self) -> bool:
+        """Whether the next step is tried with rigid joints."""
+        return self.left == 0
+
+    def needed(self, operator: Delassus, share: float) -> "JointCompliance":
+        """Return the state after a failure with rigid joints: ε is a share of the mean diagonal of W [-]."""
+        value = self.value or share * mean_diagonal(operator.diagonal)
+        return JointCompliance(value, self.wait, 2 * self.wait)
+
+    def used(self) -> "JointCompliance":
+        """Return the state after a step with compliant joints."""
+        return replace(self, left=self.left - 1)
+
+
+_RIGID = JointCompliance()
 
 
 def contact_problem(
-    model: Model, predicted: State, found: Detection, free: Kick, internal: Array, begin: State | None
+    model: Model,
+    predicted: State,
+    found: Detection,
+    free: Kick,
+    internal: Array,
+    begin: State | None,
+    joints: JointCompliance = _RIGID,
+    last: Array | None = None,
 ) -> tuple[ContactProblem, Approach]:
     """State the problem u = W r̃ + (u_free - W s n), (u, r̃) in the shift and cone of its law, for r̃ = r + s n.
 
@@ -38,6 +96,8 @@ def contact_problem(
     free : velocities without contact impulses
     internal : (nc, STATE) internal variables of the laws
     begin : the state in which the run begins, in its first step; None in later ones
+    joints : their compliance; the joints of this step are compliant where rigid ones are not to be tried
+    last : (nc, 3) r of the last step, zero for new contacts, from which compliant joints go on; None: zero [N s]
 
     Returns
     -------
@@ -64,10 +124,14 @@ def contact_problem(
         compliance=operator.diagonal[:, 0, 0],
         step=time.step,
         theta=time.theta,
-        push_out=time.relaxation,
+        # a compliant joint answers to its overlap; rigid ones between two such steps keep it
+        push_out=time.relaxation if joints.value == 0 else not joints.rigid,
         first=begin is not None,
         state=internal,
     )
+    before = np.zeros((len(gap), 3)) if last is None else last
+    if not joints.rigid:
+        approach = _explained(approach, joints.value, before)
     terms = model.laws.terms(found.law, approach)
     u_free = local_velocity(contacts, operator, free.velocity, free.node_velocity)
     if terms.adhesion.any():
@@ -82,7 +146,28 @@ def contact_problem(
         # a motion that has died out is too slow for its squares to be numbers
         u_free, terms = np.zeros_like(u_free), replace(terms, bias=np.zeros_like(terms.bias))
     problem = ContactProblem(operator, u_free, terms.bias, terms.friction, terms.cohesion, terms.adhesion)
-    return problem, approach
+    return problem if joints.rigid else _compliant(problem, joints.value, before), approach
+
+
+def _explained(approach: Approach, compliance: float, last: Array) -> Approach:
+    """Return the contacts where overlaps that come from no force count as closed, as those at the start of a run do."""
+    state = approach.state.copy()
+    deepest = _UNEXPLAINED * compliance * approach.step * float(last[:, 0].max(initial=0.0))
+    strange = approach.gap - state[:, REST] < -deepest
+    state[:, REST] = np.where(strange, approach.gap, state[:, REST])
+    return replace(approach, state=state)
+
+
+def _compliant(problem: ContactProblem, compliance: float, last: Array) -> ContactProblem:
+    """Return the problem with W + E; the gaps are signed already."""
+    assert problem.adhesion is not None
+    known = last.copy()
+    # of a shifted impulse r̃ = r + s n the joint feels r
+    known[:, 0] = problem.adhesion
+    each = np.full_like(last, compliance)
+    return replace(
+        problem, delassus=CompliantDelassus(problem.delassus, each), u_free=problem.u_free - each * known
+    )
 
 
 def terms_of(problem: ContactProblem) -> Terms:

@@ -5,19 +5,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from mechanics.arrays import Bools
-from mechanics.dynamics.contact_problem import contact_problem, shifted, unshifted
-from mechanics.dynamics.contact_search import ContactSearch
+from mechanics.arrays import Array, Bools
+from mechanics.dynamics.contact_problem import JointCompliance, contact_problem, shifted, unshifted
+from mechanics.dynamics.contact_search import ContactSearch, Detection
 from mechanics.dynamics.observers.energy import kinetic_energy
 from mechanics.dynamics.progress import Clock
 from mechanics.dynamics.relaxation import Relaxation, halted
 from mechanics.dynamics.sleeping import Sleepers
 from mechanics.dynamics.step import Step
-from mechanics.dynamics.stepping import advance, compliances, free_kick, kicked, predict
+from mechanics.dynamics.stepping import Kick, advance, compliances, free_kick, kicked, predict
 from mechanics.dynamics.warm_start import Memory
 from mechanics.model.model import Model
+from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
+from mechanics.scene.laws.law import Approach
 from mechanics.scene.state import State
-from mechanics.solvers.choice import Solver, choose_solver
+from mechanics.solvers.choice import Solver, Solvers, choose_solvers
 from moma.errors import SolverError
 
 __all__ = ["Simulation"]
@@ -54,7 +56,9 @@ class Simulation:
         with self.clock("assemble"):
             self._compliance = compliances(model, self._step, self._theta)
         self._detect = ContactSearch(model, self._compliance, self.clock, fresh_contacts, elastic_scale)
-        self._solve = solver or choose_solver(model.scene.solver, not model.rigid_only)
+        chosen = choose_solvers(model.scene.solver, not model.rigid_only)
+        self._solvers = chosen if solver is None else Solvers(solver)
+        self._joints = JointCompliance()
         self._relax = Relaxation(model)
         self._memory = Memory()
         self._sleepers = Sleepers(model, start, self._memory)
@@ -129,11 +133,8 @@ class Simulation:
             with clock("assemble"):
                 warm, internal = self._memory.recall(found.contacts.key, found.place)
                 free = sleepers.hold(free_kick(model, start, predicted, self._compliance, h, theta))
-                problem, approach = contact_problem(
-                    model, predicted, found, free, internal, before if self._first else None
-                )
-            with clock("solve"):
-                solution = self._solve(problem, start=shifted(problem, warm))
+            given = predicted, found, free, internal, before if self._first else None
+            problem, approach, solution = self._solved(given, warm)
             with clock("advance"):
                 r = unshifted(problem, solution.impulse)
                 kick = kicked(model, free, found, r, self._compliance)
@@ -144,6 +145,33 @@ class Simulation:
             return self._conclude(
                 Step(before, predicted, after, kick, found, approach, problem, solution, *asleep)
             )
+
+    def _solved(
+        self, given: tuple[State, Detection, Kick, Array, State | None], warm: ContactStart
+    ) -> tuple[ContactProblem, Approach, ContactSolution]:
+        """Return the problem of a step and its solution: with rigid joints, or compliant ones where these fail."""
+        clock, solvers, joints = self.clock, self._solvers, self._joints
+        best = None
+        if joints.rigid:
+            with clock("assemble"):
+                problem, approach = contact_problem(self.model, *given, joints)
+            with clock("solve"):
+                solve = solvers.usual if joints.value == 0 else solvers.brief
+                best = problem, approach, solve(problem, shifted(problem, warm))
+            share = self.model.scene.solver.joint_compliance
+            if best[2].converged or solvers.compliant is None or share == 0:
+                return best
+            joints = joints.needed(problem.delassus, share)
+        assert solvers.compliant is not None
+        with clock("assemble"):
+            problem, approach = contact_problem(self.model, *given, joints, warm.impulse)
+        with clock("solve"):
+            solution = solvers.compliant(problem, shifted(problem, warm))
+        if best is not None and not solution.converged:
+            # as far as rigid joints can be solved
+            return best
+        self._joints = joints.used()
+        return problem, approach, solution
 
     def _conclude(self, step: Step) -> Step:
         """Remember a step for the next one, and halt the bodies that relaxation or sleep halts after it."""

@@ -47,6 +47,7 @@ class PlanarDelassus:
     inertia: Array
     threads: int = 1
     rigid = None
+    joint_compliance = None
 
     @cached_property
     def diagonal(self) -> Array:

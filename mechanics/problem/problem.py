@@ -65,6 +65,8 @@ class Delassus(Protocol):
     scale : reference against which u is measured over r [1/kg]; as a rule the mean diagonal of W (`mean_diagonal`)
     form : W ready to be factorised, made at the first use; None where W is known by its products alone
     rigid : contacts in terms of bodies, where every body is rigid and in space; None for other operators
+    joint_compliance : (nc, d) diagonal of E where the operator is W + E (`CompliantDelassus`), which `rigid` leaves
+        out; None for others [1/kg]
     """
 
     @property
@@ -82,6 +84,10 @@ class Delassus(Protocol):
     @property
     def rigid(self) -> RigidContacts | None:
         """Contacts in terms of rigid bodies, or None."""
+
+    @property
+    def joint_compliance(self) -> Array | None:
+        """Diagonal of E (nc, d) [1/kg], or None."""
 
     def apply(self, impulse: Array) -> Array:
         """Return W r (nc, d) [m/s]."""
@@ -119,6 +125,7 @@ class ScaledDelassus:
     inner: Delassus
     unit: Array
     rigid = None
+    joint_compliance = None
     # by the choice of D
     scale = 1.0
 

@@ -285,6 +285,16 @@ class SolverSettings:
         int,
         Setting("Iterations after which a step is left as it is, and reported as not converged.", at_least=1),
     ] = 2000
+    joint_compliance: Annotated[
+        float,
+        Setting(
+            "Compliance of joints over that of stones in one step, where a step with rigid joints cannot be solved and "
+            "`method` is auto; 0: joints stay rigid.",
+            "-",
+            at_least=0,
+            at_most=0.1,
+        ),
+    ] = 1e-3
     threads: Annotated[
         int,
         Setting(

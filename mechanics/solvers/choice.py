@@ -1,6 +1,7 @@
 """Solver registry."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
@@ -12,10 +13,11 @@ from mechanics.solvers.second_order.cone_program import ConeProgram
 from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.newton import Newton
 from mechanics.solvers.strategies.auto import Auto
+from mechanics.solvers.strategies.compliant import Compliant
 from mechanics.solvers.strategies.rigid import moving_admm
 from moma.errors import SolverError
 
-__all__ = ["Solver", "choose_planar_solver", "choose_solver"]
+__all__ = ["Solver", "Solvers", "choose_planar_solver", "choose_solver", "choose_solvers"]
 
 
 class Solver(Protocol):
@@ -23,6 +25,27 @@ class Solver(Protocol):
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from `start`."""
+
+
+@dataclass(frozen=True)
+class Solvers:
+    """Solvers of the steps of a run.
+
+    Attributes
+    ----------
+    usual : of rigid joints
+    brief : of rigid joints, where they have failed before: it fails early; None where these are always tried
+    compliant : of compliant joints; None where joints stay rigid
+    """
+
+    usual: Solver
+    brief: Solver | None = None
+    compliant: Solver | None = None
+
+
+# iterations in which rigid joints must be solved after they have failed: those that cost no more than a step with
+# compliant ones
+_BRIEF = 80
 
 
 # methods for rigid and deformable bodies alike, by tolerance, velocity tolerance and iterations
@@ -43,6 +66,18 @@ def choose_solver(settings: SolverSettings, deformable: bool) -> Solver:
     if settings.method == Method.ADMM:
         return ADMM(*limits) if deformable else moving_admm(*limits)
     return Auto(*limits)
+
+
+def choose_solvers(settings: SolverSettings, deformable: bool) -> Solvers:
+    """Return the solvers of a run: compliant joints are a way out for the automatic choice alone."""
+    usual = choose_solver(settings, deformable)
+    if not isinstance(usual, Auto) or settings.joint_compliance == 0:
+        return Solvers(usual)
+    return Solvers(
+        replace(usual, thorough=False),
+        replace(usual, max_iterations=min(_BRIEF, usual.max_iterations)),
+        Compliant(usual.tolerance, usual.velocity_tolerance, usual.max_iterations),
+    )
 
 
 def choose_planar_solver(settings: SolverSettings) -> Solver:

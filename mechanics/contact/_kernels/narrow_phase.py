@@ -277,6 +277,9 @@ def clip(polygon, count, a, b, side, slack, kept):  # pragma: no cover - compile
     kx, ky, kz, kl = kept
     k = 0
     length = np.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2)
+    if length == 0.0:
+        # two corners of a face that are one in the plane have no side between them
+        return count
     ux, uy = (b[0] - a[0]) / length, (b[1] - a[1]) / length
     for p in range(count):
         q = p + 1 if p + 1 < count else 0

@@ -1,6 +1,6 @@
 """Numba kernels of Newton's method between rigid bodies: the function of Alart and Curnier, and the bodies' equations.
 
-With W = Hᵀ M⁻¹ H, the step A Δr + B (W + α) Δr = -F is, for v = M⁻¹ H Δr and D = A + α B,
+With W = Hᵀ M⁻¹ H, the step A Δr + B (W + α) Δr = -F is, for v = M⁻¹ H Δr and D = A + B α,
 
     (M + H D⁻¹ B Hᵀ) v = -H D⁻¹ F,     Δr = -D⁻¹ (F + B Hᵀ v)
 
@@ -91,12 +91,12 @@ def alart_curnier(r, u, mu, k, rho, error, first, second):  # pragma: no cover -
 
 @njit(cache=True)
 def inverse_blocks(first, second, alpha, inverse, gain):  # pragma: no cover - compiled
-    """Invert D = A + α B of each contact; return whether all can be inverted.
+    """Invert D = A + B α of each contact; return whether all can be inverted.
 
     Inputs
     ------
     first, second : (nc, 3, 3) float64, A [-] and B [kg]
-    alpha : float64, α [1/kg]
+    alpha : (nc, 3) float64, diagonal of α, compliance of the joint included [1/kg]
 
     Outputs
     -------
@@ -108,7 +108,7 @@ def inverse_blocks(first, second, alpha, inverse, gain):  # pragma: no cover - c
         a, b = first[c], second[c]
         for i in range(3):
             for j in range(3):
-                d[i, j] = a[i, j] + alpha * b[i, j]
+                d[i, j] = a[i, j] + alpha[c, j] * b[i, j]
         x, y, z, det = inverse_columns(row(d, 0), row(d, 1), row(d, 2))
         if det == 0.0:
             return False

@@ -4,7 +4,7 @@ W of rigid bodies is singular: four contacts hold a stone in place three times o
 derivative of the non-smooth Newton method of Alart & Curnier (1991), with α as small as η, as in the method of
 Levenberg and Marquardt (Fan & Yuan 2005): the steps stay near to where they began, and near the solution nothing is
 lost. A line search keeps them from going astray; where it has to shorten steps, α grows. The equations of each step are
-those of the bodies (mechanics/solvers/_kernels/body_newton.py).
+those of the bodies (mechanics/solvers/_kernels/body_newton.py). Of compliant joints, W + E for W, E adds to α there.
 """
 
 from dataclasses import dataclass
@@ -111,7 +111,7 @@ class _Run:
     @cached_property
     def _system(self) -> "_System":
         assert self._delassus.rigid is not None
-        return _System(self._delassus.rigid)
+        return _System(self._delassus.rigid, self._delassus.joint_compliance)
 
     def hold(self) -> None:
         """Begin as if every contact held.
@@ -162,8 +162,9 @@ class _Run:
 class _System:
     """Equations of the bodies' velocities: pattern, matrix, factors."""
 
-    def __init__(self, contacts: RigidContacts) -> None:
+    def __init__(self, contacts: RigidContacts, compliance: Array | None) -> None:
         self._contacts, inertia = contacts, contacts.inertia
+        self._compliance = np.zeros((len(contacts.body), 3)) if compliance is None else compliance
         moving = np.flatnonzero(inertia[:, 0] > 0)
         place = np.full(len(inertia), -1)
         place[moving] = np.arange(len(moving))
@@ -183,7 +184,7 @@ class _System:
     def step(self, first: Array, second: Array, error: Array, alpha: float) -> Array | None:
         """Return Δr (nc, 3); None if the equations are singular."""
         contacts, place = self._contacts, self._blocks.place
-        if not bodies.inverse_blocks(first, second, alpha, self._inverse, self._gain):
+        if not bodies.inverse_blocks(first, second, alpha + self._compliance, self._inverse, self._gain):
             return None
         bodies.body_matrix(contacts, self._gain, self._blocks, self._value)
         if not fronts.factorise(self._value, False, self._plan, self._factor, self._pivot):

@@ -76,11 +76,13 @@ class Alternating:
     ----------
     tolerance, velocity_tolerance : as in `NSGS`
     max_iterations : sweeps and iterations together
+    thorough : try also methods that take far longer than the others, and seldom help where these do not
     """
 
     tolerance: float = 1e-6
     velocity_tolerance: float = 1e-5
     max_iterations: int = 2000
+    thorough: bool = True
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from `start`; `why` names the method that solved it, and what the one before left."""
@@ -118,9 +120,12 @@ class Alternating:
                     ("Newton on the natural map", self._ending, True),
                     ("admm", self._last, True),
                 ]
+                if not self.thorough:
+                    interior = [interior[0], interior[2]]
                 later = later + interior if warm else interior + later
             yield from later
-        yield "sweeps", lambda most: NSGS(*limits, most, _LOOK, _DEPTH), True
+        if self.thorough or problem.delassus.form is None:
+            yield "sweeps", lambda most: NSGS(*limits, most, _LOOK, _DEPTH), True
 
     def _first(self, most: int) -> _Solver:
         limits, tight = (self.tolerance, self.velocity_tolerance), self._tight
