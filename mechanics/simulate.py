@@ -1,13 +1,15 @@
 """Run a scene from its start to its outcome, with its history and error measures."""
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import fields
+from typing import Any, Protocol
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from mechanics.arrays import Array
+from mechanics.carried import Carried, Carrier, Rows
 from mechanics.dynamics.energy_balance import EnergyBalance
 from mechanics.dynamics.observers.energy import kinetic_energy
 from mechanics.dynamics.observers.equilibrium import settlement, speed, support_reaction
@@ -20,11 +22,31 @@ from mechanics.dynamics.stopping import LASTING, Verdict, Watch, balance_of, las
 from mechanics.model.model import Model, build_model
 from mechanics.results.peaks import PeakTracker
 from mechanics.results.postprocess import Observer
-from mechanics.results.result import Energies, Errors, History, Result
+from mechanics.results.result import BodyResult, Energies, Errors, Frame, History, Result
 from mechanics.scene.scene import Scene, Start
 from mechanics.scene.state import State
 
-__all__ = ["simulate"]
+__all__ = ["Archive", "simulate"]
+
+
+class Archive(Protocol):
+    """Place where a run is kept while it goes on."""
+
+    @property
+    def every(self) -> int:
+        """Number of steps between two checkpoints; 0: only where the run is stopped."""
+
+    def earlier(self) -> Carried | None:
+        """Return the last checkpoint of the same scene, from which the run is to go on; None: from the start."""
+
+    def begin(self, bodies: tuple[BodyResult, ...], frames: Sequence[Frame]) -> None:
+        """Take the stones at the start, and the frames so far."""
+
+    def frame(self, frame: Frame) -> None:
+        """Take a further frame."""
+
+    def checkpoint(self, step: int, carried: Carried) -> None:
+        """Take what the run carries after a step; nothing of it may be kept without a copy."""
 
 
 def simulate(
@@ -32,6 +54,7 @@ def simulate(
     progress: Listener = silent,
     stop: Callable[[], bool] = lambda: False,
     built: tuple[Model, State] | None = None,
+    archive: Archive | None = None,
 ) -> Result:
     """Run a scene until it rests, has collapsed, or its duration is over.
 
@@ -41,6 +64,7 @@ def simulate(
     progress : called at every stage and step
     stop : asked after every step; where it says True, the run ends as interrupted
     built : what `build_model` made of the scene, if it is known; None: build it
+    archive : keeps checkpoints and frames, and knows from which checkpoint the run goes on; None: nothing is kept
 
     A block that stands on a fixed one is carried by its own weight:
 
@@ -62,65 +86,131 @@ def simulate(
     """
     # dense products of stones are small: more threads than those of the scene cost more than they gain
     with ThreadpoolController().limit(limits=scene.solver.threads, user_api="blas"):
-        return _simulate(scene, progress, stop, built)
+        return _simulate(scene, progress, stop, built, archive)
 
 
 def _simulate(
-    scene: Scene, report: Listener, stop: Callable[[], bool], built: tuple[Model, State] | None
+    scene: Scene,
+    report: Listener,
+    stop: Callable[[], bool],
+    built: tuple[Model, State] | None,
+    archive: Archive | None,
 ) -> Result:
-    clock, settings, static = Clock(), scene.time, None
+    clock, settings = Clock(), scene.time
     if built is None:
         with clock("mesh"):
             built = build_model(scene, lambda done, total: report(Progress("mesh", done, total)))
     model, start = built
-    simulation = Simulation(model, start, clock)
-    if settings.start == Start.EQUILIBRIUM:
-        report(Progress("static", 0, None, "searching for the static equilibrium"))
-        with clock("start"):
-            static, search = static_start(model, start, report)
-        if static.found:
-            simulation.take_over(search)
-    log, watch = _Log(model, start, simulation.state), Watch(model, start)
+    earlier = None if archive is None else archive.earlier()
+    run = _Run(model, start, clock)
+    if earlier is not None:
+        run.restore(earlier)
+    elif settings.start == Start.EQUILIBRIUM:
+        run.begin_in_equilibrium(report)
+    log, watch = run.log, run.watch
+    if archive is not None:
+        archive.begin(log.observer.bodies(start, np.zeros(len(model.mass))), log.frames)
     total = max(1, round(settings.duration / settings.step))
-    report(Progress("step", 0, total))
-    for count in range(1, total + 1):
-        step = simulation.step()
+    report(Progress("step", run.steps, total))
+    for count in range(run.steps + 1, total + 1):
+        run.steps = count
+        step = run.simulation.step()
         with clock("observe"):
             balance = log(step)
             outcome = watch(step, balance)
         if outcome is Outcome.EQUILIBRIUM and (settings.stop_at_equilibrium or count == total):
-            at_once = count == LASTING and not settings.relaxation and simulation.cold
+            at_once = count == LASTING and not settings.relaxation and run.simulation.cold
             with clock("confirm"):
-                confirmed = at_once or lasts(simulation.released())
+                confirmed = at_once or lasts(run.simulation.released())
             if not confirmed:
-                outcome, simulation = watch.disproved(), simulation.released()
+                outcome, run.simulation = watch.disproved(), run.simulation.released()
         text = f"balance {balance.max():.1e}, η {step.solution.natural_map:.1e}"
         report(Progress("step", count, total, text))
         done = settings.stop_at_equilibrium and outcome is not Outcome.MOVING
-        if not done and count < total and stop():
-            outcome, done = Outcome.INTERRUPTED, True
-        if done or count == total or (scene.frame_every and count % scene.frame_every == 0):
-            with clock("stress"):
-                log.frames.append(log.observer.frame(step))
-        if done:
+        stopped = not done and count < total and stop()
+        last = done or stopped or count == total
+        regular = bool(scene.frame_every) and count % scene.frame_every == 0
+        if regular:
+            _keep_frame(log, step, clock, archive)
+        if archive is not None and (stopped or (not last and archive.every and count % archive.every == 0)):
+            with clock("checkpoint"):
+                archive.checkpoint(count, run.carried())
+        if last and not regular:
+            _keep_frame(log, step, clock, archive)
+        if stopped:
+            outcome = Outcome.INTERRUPTED
+        if last:
             break
-    verdict = watch.verdict(outcome, step.after, static)
-    return _result(log, step, verdict, watch.rest_time, clock, static)
+    verdict = watch.verdict(outcome, step.after, run.static)
+    return _result(log, step, verdict, watch.rest_time, clock, run.static)
 
 
-class _Log:
+def _keep_frame(log: "_Log", step: Step, clock: Clock, archive: Archive | None) -> None:
+    with clock("stress"):
+        frame = log.observer.frame(step)
+        log.frames.append(frame)
+        if archive is not None:
+            archive.frame(frame)
+
+
+class _Run(Carrier):
+    """A run in progress: the simulation, and what is known of its steps so far."""
+
+    CARRIED = ("log", "static", "steps", "watch")
+    REBUILT = ("clock", "simulation")
+
+    def __init__(self, model: Model, start: State, clock: Clock) -> None:
+        self.clock, self.steps = clock, 0
+        self.static: StaticStart | None = None
+        self.simulation = Simulation(model, start, clock)
+        self.log, self.watch = _Log(model, start, start), Watch(model, start)
+
+    def begin_in_equilibrium(self, report: Listener) -> None:
+        """Begin where all stones bear the loads of the first instant, if there is such a state."""
+        simulation = self.simulation
+        report(Progress("static", 0, None, "searching for the static equilibrium"))
+        with self.clock("start"):
+            self.static, search = static_start(simulation.model, simulation.start, report)
+        if self.static.found:
+            simulation.take_over(search)
+            self.log = _Log(simulation.model, simulation.start, simulation.state)
+
+    def carried(self) -> dict[str, Any]:
+        """Return what a resumed run must know."""
+        own = {"simulation": self.simulation.carried(), "seconds": dict(self.clock.seconds)}
+        return super().carried() | own
+
+    def restore(self, carried: Carried) -> None:
+        """Go on where another run of the same scene stood."""
+        super().restore(carried)
+        self.simulation = self.simulation.resumed(carried["simulation"])
+        for stage, seconds in carried["seconds"].items():
+            self.clock.seconds[stage] = self.clock.seconds.get(stage, 0.0) + seconds
+
+
+class _Log(Carrier):
     """Record of a run: what the observers find in each step, and its frames."""
+
+    CARRIED = ("_rows", "balance", "energy", "frames", "observer", "peaks", "solvers", "unconverged")
+    REBUILT = ("_start", "model")
 
     def __init__(self, model: Model, start: State, first: State) -> None:
         self.model, self._start = model, start
         self.observer = Observer(model, start)
-        self.frames = [self.observer.first_frame(first)]
+        self.frames = Rows([self.observer.first_frame(first)])
         self.peaks = PeakTracker(model, start)
         self.balance = np.zeros(len(model.mass))
         self.energy = EnergyBalance(model, first)
         self.unconverged = 0
         self.solvers: Counter[str] = Counter()
-        self._rows: list[tuple[float, ...]] = []
+        self._rows: Rows[tuple[float, ...]] = Rows()
+
+    def restore(self, carried: Carried) -> None:
+        """Take over the record of another run of the same scene."""
+        super().restore(carried)
+        self.solvers = Counter(self.solvers)
+        if self.observer.joints is not None:
+            self.peaks.begin(self.observer.joints)
 
     def __call__(self, step: Step) -> Array:
         """Account for one step, and return the imbalance of each body (nb,)."""

@@ -109,14 +109,25 @@ class ContactSearch:
 
     def __call__(self, model: Model, predicted: State) -> Detection:
         """Return the contacts at a predicted configuration; `model` has sleeping bodies as fixed ones."""
-        if self._last is not None and not self._is_stale(self._last, model, predicted):
-            return self._last
+        if self._last is None or self._is_stale(self._last, model, predicted):
+            self._last = self._detection(model, predicted)
+        return self._last
+
+    def configuration(self, model: Model) -> State | None:
+        """Return the configuration of the last detection; None if another one will follow in any case."""
+        last = self._last
+        return None if last is None or last.model is not model else last.configuration
+
+    def repeat(self, model: Model, configuration: State | None) -> None:
+        """Detect again where another run of the same scene last did; None: nowhere."""
+        self._last = None if configuration is None else self._detection(model, configuration)
+
+    def _detection(self, model: Model, predicted: State) -> Detection:
         with self._clock("detect"):
             reach = model.scene.time.step * speed(model, predicted)
             contacts = replace(self._detector, fixed=model.fixed)(predicted, reach)
         with self._clock("assemble"):
-            self._last = detection(model, predicted, contacts, self._compliance, self._elastic_scale)
-        return self._last
+            return detection(model, predicted, contacts, self._compliance, self._elastic_scale)
 
     def continued(self, model: Model, compliance: Sequence[Compliance]) -> "ContactSearch":
         """Return the search for other settings of time; it knows the last result where ŵ is still the same."""

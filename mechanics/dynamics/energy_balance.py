@@ -12,6 +12,7 @@ bodies that turn leave a remainder of the order of their strain. W_ext holds the
 import numpy as np
 
 from mechanics.arrays import Array
+from mechanics.carried import Carrier
 from mechanics.delassus.assembly import local_velocity
 from mechanics.dynamics.observers.energy import elastic_energy, kinetic_energy, mass_norm
 from mechanics.dynamics.step import Step
@@ -22,7 +23,7 @@ from mechanics.scene.state import State
 __all__ = ["EnergyBalance"]
 
 
-class EnergyBalance:
+class EnergyBalance(Carrier):
     """Terms of the energy balance, summed over a run.
 
     Attributes
@@ -32,6 +33,9 @@ class EnergyBalance:
     unexplained : ΔE - external - contact + scheme, so far [J]
     reference : largest energy in any term so far, at least 10⁻⁹ of weight times smallest width [J]
     """
+
+    CARRIED = ("_energy", "contact", "external", "reference", "scheme", "unexplained")
+    REBUILT = ("_model",)
 
     def __init__(self, model: Model, state: State) -> None:
         self._model = model

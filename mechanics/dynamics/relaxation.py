@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from mechanics.carried import Carrier
 from mechanics.dynamics.observers.energy import kinetic_energy
 from mechanics.model.model import Model
 from mechanics.scene.state import State
@@ -11,7 +12,7 @@ from mechanics.scene.state import State
 __all__ = ["Relaxation", "halted", "relaxation_caution"]
 
 
-class Relaxation:
+class Relaxation(Carrier):
     """Kinetic damping: all bodies are halted each time their kinetic energy has passed a peak (Cundall 1976).
 
     Parameters
@@ -19,6 +20,9 @@ class Relaxation:
     model : a scene; nothing is halted without `relaxation` in its time settings, nor where stones begin in motion,
         as the first halt would take away what is to be followed
     """
+
+    CARRIED = ("_kinetic",)
+    REBUILT = ("_halts", "_model")
 
     def __init__(self, model: Model) -> None:
         self._model = model

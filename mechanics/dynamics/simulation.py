@@ -2,10 +2,12 @@
 
 from copy import copy
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from mechanics.arrays import Array, Bools
+from mechanics.carried import Carried, Carrier
 from mechanics.dynamics.contact_problem import JointCompliance, contact_problem, shifted, unshifted
 from mechanics.dynamics.contact_search import ContactSearch, Detection
 from mechanics.dynamics.observers.energy import kinetic_energy
@@ -25,7 +27,7 @@ from moma.errors import SolverError
 __all__ = ["Simulation"]
 
 
-class Simulation:
+class Simulation(Carrier):
     """A scene in motion; `step` advances it by one time step.
 
     Parameters
@@ -41,6 +43,9 @@ class Simulation:
     state : at the end of the last step
     cold : it began without the forces of another simulation
     """
+
+    CARRIED = ("_first", "_freed", "_joints", "_memory", "_relax", "_sleepers", "cold", "state")
+    REBUILT = ("_compliance", "_detect", "_solvers", "_step", "_theta", "clock", "model", "start")
 
     def __init__(
         self,
@@ -63,6 +68,7 @@ class Simulation:
         self._memory = Memory()
         self._sleepers = Sleepers(model, start, self._memory)
         self._first = True
+        self._freed = False
         self.cold = True
 
     @property
@@ -98,6 +104,7 @@ class Simulation:
         model = replace(self.model, scene=replace(self.model.scene, time=free))
         other = copy(self)
         other.model, other._theta, other._relax, other._first = model, free.theta, Relaxation(model), False
+        other._freed = True
         if free.theta != time.theta:
             with self.clock("assemble"):
                 other._compliance = compliances(model, self._step, free.theta)
@@ -105,6 +112,26 @@ class Simulation:
         # forces of elastic stones come from their strain, which stays
         other._memory = self._memory.at_rest(0.0 if model.inertia.moving.any() else 1.0)
         other._sleepers = Sleepers(model, self.state, other._memory)
+        return other
+
+    def carried(self) -> dict[str, Any]:
+        """Return what the next step needs to know.
+
+        Contacts, and W, were made at an earlier configuration; compliances hold the nodes that have touched so far.
+        Both are made again, in the same order, so that they have the same bits.
+        """
+        return super().carried() | {
+            "detected": self._detect.configuration(self._sleepers.model),
+            "condensed": tuple(one.condensed for one in self._compliance),
+        }
+
+    def resumed(self, carried: Carried) -> "Simulation":
+        """Return the simulation that goes on where another one of the same scene stood; self must not have moved."""
+        other = self.released() if carried["_freed"] else self
+        other.restore(carried)
+        for compliance, batches in zip(other._compliance, carried["condensed"], strict=True):
+            compliance.condense_again(batches)
+        other._detect.repeat(other._sleepers.model, carried["detected"])
         return other
 
     def step(self) -> Step:

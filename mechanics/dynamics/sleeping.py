@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from mechanics.arrays import Array, Bools
+from mechanics.carried import Carried, Carrier
 from mechanics.contact.contacts import Contacts, material_points
 from mechanics.delassus.assembly import world_impulse
 from mechanics.dynamics.observers.equilibrium import displacement, speed, wrenches
@@ -29,7 +30,7 @@ _CALMER = 0.5  # imbalance below which a stone falls asleep, over that from whic
 _RINGS = 2  # rings of stones that wake around one that wakes; doubled each time that they do not suffice
 
 
-class Sleepers:
+class Sleepers(Carrier):
     """The sleeping stones of a run; no stone sleeps in relaxations, nor in scenes with deformable stones.
 
     Parameters
@@ -44,6 +45,9 @@ class Sleepers:
     forces : contacts among sleeping stones, or of these with fixed ones, as they fell asleep; None if there are none
     """
 
+    CARRIED = ("_rings", "_steps", "_supports_rest", "_watched", "_wrench", "asleep", "forces")
+    REBUILT = ("_may_sleep", "_memory", "_whole", "model")
+
     def __init__(self, whole: Model, start: State, memory: Memory) -> None:
         time, count = whole.scene.time, len(whole.mass)
         self._whole, self._memory = whole, memory
@@ -54,6 +58,12 @@ class Sleepers:
         self._wrench = np.zeros((count, 6))
         self._watched, self._steps = start, 0
         self._supports_rest, self._rings = True, _RINGS
+
+    def restore(self, carried: Carried) -> None:
+        """Take over the sleeping stones of another run of the same scene, and hold these."""
+        super().restore(carried)
+        if self.asleep.any():
+            self._hold_asleep()
 
     @property
     def wrench(self) -> Array | None:
@@ -166,6 +176,10 @@ class Sleepers:
         self.forces = forces
         if forces is not None:
             self._wrench = _resultants(state, forces.contacts, forces.force)
+        self._hold_asleep()
+
+    def _hold_asleep(self) -> None:
+        """Make the scene as awake stones see it."""
         model, asleep = self._whole, self.asleep
         inertia = replace(
             model.inertia,

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.arrays import Array, Bools
+from mechanics.carried import Carrier
 from mechanics.dynamics.observers.equilibrium import (
     displacement,
     imbalance,
@@ -43,7 +44,7 @@ class Verdict:
     cautions: tuple[str, ...]
 
 
-class Watch:
+class Watch(Carrier):
     """Outcome of a run, judged after each step.
 
     *Equilibrium*: for five steps in a row, solved, and after all loads have ceased to change, every body that is not
@@ -62,6 +63,12 @@ class Watch:
     ----------
     rest_time : start of the present or last period of rest [s]
     """
+
+    CARRIED = (
+        "_culprit", "_doubt", "_fastest", "_quiet", "_speed", "_steps", "_still", "_sunk", "_unsolved", "_worst_error",
+        "rest_time",
+    )  # fmt: skip
+    REBUILT = ("_model", "_start")
 
     def __init__(self, model: Model, start: State) -> None:
         self._model, self._start = model, start

@@ -3,6 +3,7 @@
 import numpy as np
 
 from mechanics.arrays import Array, Ints
+from mechanics.carried import Carrier
 from mechanics.contact.contacts import PAIR_BIT
 from mechanics.problem.problem import ContactSolution, ContactStart
 from mechanics.scene.laws.law import BOND, REST, STATE
@@ -13,7 +14,7 @@ __all__ = ["Memory"]
 _OF_PLACES = [BOND, REST]  # internal variables that belong to places in a joint
 
 
-class Memory:
+class Memory(Carrier):
     """Impulses, velocities and internal variables by contact key.
 
     Bonds, and gaps that count as closed, belong to places in a joint. A face that slides a little, or is cut at another
@@ -24,6 +25,9 @@ class Memory:
     ----------
     dimension : d, of the impulses
     """
+
+    CARRIED = ("_key", "_place", "_values")
+    REBUILT = ("_dimension",)
 
     def __init__(self, dimension: int = 3) -> None:
         self._dimension = dimension
@@ -37,7 +41,7 @@ class Memory:
         Both are zero for new contacts, except for the internal variables in joints with bonds or gaps that count as
         closed if the places (nc, d) [m] are given.
         """
-        if key is self._key:
+        if np.array_equal(key, self._key):
             values = self._values
         else:
             values = np.zeros((len(key), self._values.shape[1]))

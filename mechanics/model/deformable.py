@@ -145,7 +145,7 @@ class Compliance:
         momentum = operators.mass @ stone.modes
         # V acts on rigid motion by its part α M alone
         self._whole = np.linalg.inv(stone.modes.T @ momentum) / (1.0 + h * stone.material.mass_damping)
-        self._nodes = np.zeros(0, dtype=np.int64)
+        self._nodes = self._batch = np.zeros(0, dtype=np.int64)
         self._condensed = np.zeros((0, 0))
 
     @property
@@ -190,9 +190,21 @@ class Compliance:
         places = _dofs(np.searchsorted(self._nodes, nodes))
         return self._condensed[np.ix_(places, places)]
 
+    @property
+    def condensed(self) -> Ints:
+        """(k, 2) condensed nodes, ascending, and the call that condensed each: the order decides on the last bits."""
+        return np.column_stack([self._nodes, self._batch])
+
+    def condense_again(self, condensed: Ints) -> None:
+        """Condense the nodes of another compliance of the same stone, in the same order."""
+        for batch in range(int(condensed[:, 1].max(initial=-1)) + 1):
+            self._condense(condensed[condensed[:, 1] == batch, 0])
+
     def _condense(self, new: Ints) -> None:
         """Add the rows and columns of new nodes."""
         nodes = np.union1d(self._nodes, new)
+        batch = np.full(len(nodes), self._batch.max(initial=-1) + 1)
+        batch[np.searchsorted(nodes, self._nodes)] = self._batch
         dofs, added = _dofs(nodes), _dofs(new)
         unit = np.zeros((len(self._modes), len(added)))
         unit[added, np.arange(len(added))] = 1.0
@@ -203,7 +215,7 @@ class Compliance:
         square[:, own] = columns
         square[np.ix_(own, old)] = columns[old].T
         square[np.ix_(own, own)] = 0.5 * (columns[own] + columns[own].T)
-        self._nodes, self._condensed = nodes, square
+        self._nodes, self._batch, self._condensed = nodes, batch, square
 
 
 def _dofs(nodes: Ints) -> Ints:

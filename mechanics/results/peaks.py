@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mechanics.arrays import Array, Bools
+from mechanics.carried import Carried, Carrier, Rows
 from mechanics.contact.contacts import material_points
 from mechanics.dynamics.observers.equilibrium import displacement, seen_from_supports
 from mechanics.dynamics.step import Step
@@ -21,7 +22,7 @@ from mechanics.stones.elasticity.tensors import principal, von_mises
 __all__ = ["PeakTracker"]
 
 
-class PeakTracker:
+class PeakTracker(Carrier):
     """Largest values so far, and the time series of chosen stones.
 
     Displacements are those of `displacement`, of stones that are not fixed; relative ones are seen from the supports.
@@ -33,6 +34,9 @@ class PeakTracker:
     model, start : the scene, and its stones before they carry load, from where displacements count
     """
 
+    CARRIED = ("_displacement", "_opening", "_pressure", "_reaction", "_relative", "_series", "_sliding")
+    REBUILT = ("_joints", "_least", "_model", "_moves", "_sign", "_start")
+
     def __init__(self, model: Model, start: State) -> None:
         count = len(model.mass)
         self._model, self._start, self._moves = model, start, ~model.fixed
@@ -43,9 +47,15 @@ class PeakTracker:
         self._least = SLIVER * largest_faces(model)
         self._sign = np.zeros(count)
         self._sign[model.fixed] = 1.0
-        self._reaction: list[tuple[float, Array]] = []
+        self._reaction: Rows[tuple[float, Array]] = Rows()
         self._joints: JointCorners | None = None
         self._series = Recorder(model, start) if model.scene.series else None
+
+    def restore(self, carried: Carried) -> None:
+        """Take over the largest values so far."""
+        super().restore(carried)
+        if not self._model.motions:
+            self._relative = self._displacement
 
     def begin(self, joints: StartingJoints) -> None:
         """Take the joints of the start."""

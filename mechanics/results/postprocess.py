@@ -7,7 +7,8 @@ from itertools import pairwise
 import numpy as np
 
 from mechanics.arrays import Array
-from mechanics.contact.contacts import material_points
+from mechanics.carried import Carried, Carrier
+from mechanics.contact.contacts import Contacts, material_points
 from mechanics.dynamics.step import Step
 from mechanics.model.deformable import Deformable
 from mechanics.model.model import Model
@@ -73,7 +74,7 @@ def _by_body(model: Model, corner: Array, node: Array) -> tuple[Array, ...]:
     return tuple(own)
 
 
-class Observer:
+class Observer(Carrier):
     """Observer of a run: frames during it; bodies, contacts and joints at its end.
 
     Parameters
@@ -81,8 +82,12 @@ class Observer:
     model, start : the scene, and its stones before they carry load, from where displacements count
     """
 
+    CARRIED = ("_touching",)
+    REBUILT = ("_joints", "_model", "_start")
+
     def __init__(self, model: Model, start: State) -> None:
         self._model, self._start = model, start
+        self._touching: Contacts | None = None
         self._joints: StartingJoints | None = None
 
     def first_frame(self, state: State) -> Frame:
@@ -91,7 +96,21 @@ class Observer:
 
     def begin(self, step: Step) -> StartingJoints:
         """Take the contacts of the first step as the joints of the start, and return these."""
-        self._joints = starting_joints(self._model, self._start, step.contacts)
+        return self._begin(step.contacts)
+
+    def restore(self, carried: Carried) -> None:
+        """Take over the contacts of the first step."""
+        super().restore(carried)
+        if self._touching is not None:
+            self._begin(self._touching)
+
+    @property
+    def joints(self) -> StartingJoints | None:
+        """The joints of the start; None before the first step."""
+        return self._joints
+
+    def _begin(self, contacts: Contacts) -> StartingJoints:
+        self._touching, self._joints = contacts, starting_joints(self._model, self._start, contacts)
         return self._joints
 
     def frame(self, step: Step) -> Frame:

@@ -4,6 +4,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mechanics.arrays import Array
+from mechanics.carried import Carrier, Rows
 from mechanics.dynamics.step import Step
 from mechanics.model._kernels import rigid_part
 from mechanics.model.model import Model
@@ -14,7 +15,7 @@ from mechanics.scene.state import State
 __all__ = ["Recorder"]
 
 
-class Recorder:
+class Recorder(Carrier):
     """Motion of the stones of `Scene.series`, and what the joints of the start between two of them carry.
 
     Parameters
@@ -22,12 +23,15 @@ class Recorder:
     model, start : the scene, and its stones before they carry load
     """
 
+    CARRIED = ("_of_joints", "_rows")
+    REBUILT = ("_body", "_joint", "_model", "_normal", "_pair", "_start")
+
     def __init__(self, model: Model, start: State) -> None:
         codes = [block.code for block in model.scene.blocks]
         self._model, self._start = model, start
         self._body = np.array([codes.index(code) for code in model.scene.series], dtype=np.int64)
-        self._rows: list[tuple[float, Array, Array, Array]] = []
-        self._of_joints: list[tuple[Array, Array, Array, Array]] = []
+        self._rows: Rows[tuple[float, Array, Array, Array]] = Rows()
+        self._of_joints: Rows[tuple[Array, Array, Array, Array]] = Rows()
         self._joint = np.zeros(0, dtype=np.int64)
         self._pair = np.zeros((0, 2), dtype=np.int64)
         self._normal = np.zeros((0, 3))

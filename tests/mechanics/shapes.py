@@ -68,6 +68,21 @@ def scene(*blocks, gravity=(0.0, 0.0, -9.81), friction=0.6, alert=0.05, **time):
     )
 
 
+def opening(**time):
+    """A wall of stones half a metre long with an opening of 0.75 m, a stone of the course above it over nothing."""
+    stones = []
+    for course in range(5):
+        edges = np.unique(np.clip(np.arange(-0.25 * (course % 2), 3.1, 0.5), 0.0, 2.75))
+        for k, (low, high) in enumerate(itertools.pairwise(edges)):
+            sides = ((low, min(high, 1.125)), (max(low, 1.875), high)) if course < 3 else ((low, high),)
+            stones += [
+                brick(f"{course}-{k}-{n}", (a, 0, 0.25 * course), (b, 0.25, 0.25 * course + 0.25))
+                for n, (a, b) in enumerate(sides)
+                if b > a
+            ]
+    return scene(ground(), *stones, duration=1.0, **time)
+
+
 def detected(one, points=4, placement=Placement.CORNERS):
     """Model, state at the start and the contacts in it."""
     model, state = build_model(one)

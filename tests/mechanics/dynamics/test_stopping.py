@@ -1,7 +1,6 @@
 """Verdicts: rests that last, falls without return, motions in between, and what unsolved steps leave open."""
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -10,24 +9,9 @@ from mechanics.dynamics.outcome import Outcome
 from mechanics.scene.scene import SolverSettings, Start
 from mechanics.scene.shapes import box
 from mechanics.simulate import simulate
-from tests.mechanics.shapes import brick, ground, moved, scene
+from tests.mechanics.shapes import brick, ground, moved, opening, scene
 
 G = 9.81
-
-
-def opening(**time):
-    """A wall of stones half a metre long with an opening of 0.75 m, a stone of the course above it over nothing."""
-    stones = []
-    for course in range(5):
-        edges = np.unique(np.clip(np.arange(-0.25 * (course % 2), 3.1, 0.5), 0.0, 2.75))
-        for k, (low, high) in enumerate(pairwise(edges)):
-            sides = ((low, min(high, 1.125)), (max(low, 1.875), high)) if course < 3 else ((low, high),)
-            stones += [
-                brick(f"{course}-{k}-{n}", (a, 0, 0.25 * course), (b, 0.25, 0.25 * course + 0.25))
-                for n, (a, b) in enumerate(sides)
-                if b > a
-            ]
-    return scene(ground(), *stones, duration=1.0, **time)
 
 
 @pytest.mark.parametrize("step", [1e-3, pytest.param(2e-3, marks=pytest.mark.slow), 5e-3])
