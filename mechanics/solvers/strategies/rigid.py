@@ -147,8 +147,10 @@ class Alternating:
         return _FURTHER * self.tolerance, _FURTHER * self.velocity_tolerance
 
     def _static(self, most: int) -> _Solver:
+        tolerance, velocity_tolerance = self._tight
         solver = ADMM(
-            *(min(_STILL, limit) for limit in self._tight),
+            min(_STILL, tolerance),
+            min(_STILL, velocity_tolerance),
             min(_STATIC_ITERATIONS, most),
             _STATIC_PENALTY,
             _STATIC_LOOK,
