@@ -126,11 +126,18 @@ class RigidDelassus:
         return BodyForm(self.rigid)
 
     def scaled(self, unit: Array) -> "RigidDelassus":
-        """Return D W D with the units (nc,) of the contacts on the diagonal of D; the pattern of factors is shared."""
+        """Return D W D with the units (nc,) of the contacts on the diagonal of D; the pattern of factors is shared.
+
+        The result, with its factors, is kept for the next call with the same units.
+        """
+        kept: tuple[Array, RigidDelassus] | None = self.__dict__.get("_scaled")
+        if kept is not None and np.array_equal(kept[0], unit):
+            return kept[1]
         other = replace(self, geometry=scaled_frames(self.geometry, unit))
         # the kernel of the diagonal takes frames to be of length one
         other.__dict__["diagonal"] = self.diagonal * (unit**2)[:, None, None]
         other.__dict__["form"] = self.form.scaled(unit)
+        self.__dict__["_scaled"] = unit, other
         return other
 
     def gauss_seidel(self, shift: Array, friction: Array, cohesion: Array) -> GaussSeidel:
