@@ -63,5 +63,5 @@ def disk_box(columns: int, rows: int, radius: float = 0.01, sweeps: int = 2000) 
         walls,
         law=DryJoint(friction=0.3),
         time=PlanarTime(step=1e-4),
-        solver=SolverSettings(tolerance=1e-300, max_iterations=sweeps),
+        solver=SolverSettings(tolerance=1e-30, max_iterations=sweeps),
     )

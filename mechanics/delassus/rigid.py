@@ -8,16 +8,18 @@ import numpy as np
 
 from mechanics.arrays import Array, Bools, Ints
 from mechanics.delassus._kernels import rigid as kernel
+from mechanics.delassus._kernels.strips import cut
 from mechanics.delassus.body_space import BodyForm, scaled_frames
-from mechanics.delassus.colouring import greedy_colours
 from mechanics.problem._kernels import Laws
 from mechanics.problem.problem import GaussSeidel, RigidContacts, mean_diagonal
 
 __all__ = ["RigidDelassus", "Schedule", "schedule"]
 
 
-# fewer contacts are swept in their own order by one thread: more threads would gain nothing
-_WORTH_COLOURS = 2000
+# fewer contacts are swept by one thread: more threads would gain nothing
+_WORTH_PARTS = 2000
+# contacts from which there are four parts, before that two: the contacts between them take a larger share
+_MANY = 16_000
 # change of a body's velocity, over the largest shift, below which its contacts sleep [-]
 _CALM = 1e-9
 
@@ -30,17 +32,17 @@ class Schedule:
     ----------
     order : (nc,) contacts in sweep order: those with the same candidate and antagonist follow one another
     group : (ng+1,) where, in that order, each such group begins
-    colour : (k+1,) where each colour begins among the groups; groups of one colour share no moving body. One
-        colour for few contacts, which are swept by one thread
+    part : (k+1,) where each part begins among the groups. All parts but the last share no moving body with each
+        other; the last holds the contacts between them. One part alone for few contacts, which are swept by one thread
     """
 
     order: Ints
     group: Ints
-    colour: Ints
+    part: Ints
 
 
 def schedule(bodies: Ints, moving: Bools) -> Schedule:
-    """Group the contacts (nc, 2) by candidate and antagonist, and colour the groups if they are many.
+    """Group the contacts (nc, 2) by candidate and antagonist, in the order of the bodies, cut into parts if many.
 
     Stones of several parts may be either to one another; they have two groups then.
     """
@@ -52,18 +54,14 @@ def schedule(bodies: Ints, moving: Bools) -> Schedule:
     order = np.argsort(pair, kind="stable")
     starts = np.flatnonzero(np.diff(pair[order], prepend=-1))
     sizes = np.diff(starts, append=count)
-    if count < _WORTH_COLOURS:
+    if count < _WORTH_PARTS:
         return Schedule(order, np.append(starts, count), np.array([0, len(starts)]))
-    colours = greedy_colours(bodies[order[starts]], moving)
-    by_colour = np.argsort(colours, kind="stable")
-    sizes, starts = sizes[by_colour], starts[by_colour]
+    # the order of the bodies, course by course as a rule, takes half the sweeps of any other
+    by_part, part, _ = cut(bodies[order[starts]], moving, 2 if count < _MANY else 4, 1, False)
+    sizes, starts = sizes[by_part], starts[by_part]
     group = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
     inside = np.arange(count) - np.repeat(group[:-1], sizes)
-    return Schedule(
-        order[np.repeat(starts, sizes) + inside],
-        group,
-        np.searchsorted(colours[by_colour], np.arange(colours.max() + 2)).astype(np.int64),
-    )
+    return Schedule(order[np.repeat(starts, sizes) + inside], group, part)
 
 
 @dataclass(frozen=True)
@@ -154,9 +152,9 @@ class RigidDelassus:
         def sweeps(impulse: Array, count: int) -> None:
             path, seen = np.zeros(len(self.inertia)), np.full((len(plan.group) - 1, 2), -np.inf)
             running = kernel.Running(impulse, self.rigid_change(impulse), path, seen)
-            if len(plan.colour) > 2 and threads > 1:
+            if len(plan.part) > 2 and threads > 1:
                 numba.set_num_threads(threads)
-                kernel.sweep_parallel(count, calm, running, laws, self.rigid, plan.group, plan.colour)
+                kernel.sweep_parallel(count, calm, running, laws, self.rigid, plan.group, plan.part)
             else:
                 kernel.sweep(count, calm, running, laws, self.rigid, plan.group)
 

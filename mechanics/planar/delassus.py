@@ -5,17 +5,19 @@ from functools import cached_property
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 
 from mechanics.arrays import Array, Ints
-from mechanics.delassus.colouring import greedy_colours
+from mechanics.delassus._kernels.strips import cut
 from mechanics.planar._kernels.sweep import (
+    Layout,
     apply,
     diagonals,
+    layout_of,
     records,
     relative_velocity,
     sweep,
+    sweep_parallel,
     velocity_change,
 )
 from mechanics.problem.forms import SparseForm
@@ -24,7 +26,12 @@ from mechanics.problem.problem import ScaledDelassus, mean_diagonal
 __all__ = ["PlanarDelassus", "PlanarGaussSeidel"]
 
 
-_GRAIN = 2000  # contacts of one colour from which several threads pay: some 20 µs of work for one
+# contacts of a part from which another thread pays: 0.1 ms of work
+_PART = 10_000
+# parts at most: the contacts between them are swept by one thread
+_PARTS = 4
+# strips of a part, swept in turn: a processor works on as many contacts at once
+_LANES = 4
 
 
 @dataclass(frozen=True)
@@ -71,11 +78,12 @@ class PlanarDelassus:
         return result
 
     @cached_property
-    def colouring(self) -> tuple[Ints, Ints]:
-        """Contacts sorted by colour (nc,), and where each colour begins there."""
-        colour = greedy_colours(self.bodies, self.inertia[:, 0] > 0)
-        start = np.concatenate([[0], np.cumsum(np.bincount(colour))]).astype(np.int64)
-        return np.argsort(colour, kind="stable"), start
+    def layout(self) -> Layout:
+        """Order of the sweeps; it depends on the contacts alone, never on the number of threads."""
+        parts = min(max(len(self.bodies) // _PART, 1), _PARTS)
+        order, start, rank = cut(self.bodies, self.inertia[:, 0] > 0, parts, _LANES, True)
+        made: Layout = layout_of(order, start, rank, self.bodies, self.inertia)
+        return made
 
     @cached_property
     def scale(self) -> float:
@@ -108,46 +116,38 @@ class PlanarDelassus:
 
     def gauss_seidel(self, shift: Array, friction: Array, cohesion: Array) -> "PlanarGaussSeidel":
         """Prepare sweeps on u = W r + shift with Coulomb's μ and the cohesion k, each (nc,)."""
-        order, start = self.colouring
-        record = records(order, shift, friction, cohesion, self.normal, self.lever, self.diagonal)
-        bodies = self.bodies[order].astype(np.uint32)
-        return PlanarGaussSeidel(order, start, record, bodies, self.inertia, self.threads)
+        layout = self.layout
+        record = records(layout, shift, friction, cohesion, self.normal, self.lever, self.diagonal)
+        return PlanarGaussSeidel(layout, record, self.threads)
 
 
 @dataclass(frozen=True)
 class PlanarGaussSeidel:
-    """Passes over the contacts, colour by colour, every second one backwards.
+    """Passes over the contacts, always in the same order.
 
-    Two contacts of a colour share no body that moves, so a colour may be swept by several threads; the result is the
-    same, bit by bit, for any number of them.
+    The contacts are cut into parts that share no body that moves, and the contacts between parts. Parts may be swept by
+    several threads; the result is the same, bit by bit, for any number of them.
 
     Attributes
     ----------
-    order : (nc,) contacts by colour
-    start : where each colour begins
+    layout : the order
     record : (nc, 16) what the kernel needs of each contact, in that order
-    bodies : (nc, 2) in that order
-    inertia : (nb, 2) inverse masses and moments of inertia
     threads : that may sweep at once, at most
     """
 
-    order: Ints
-    start: Ints
+    layout: Layout
     record: Array
-    bodies: NDArray[np.uint32]
-    inertia: Array
     threads: int = 1
 
     def __call__(self, impulse: Array, sweeps: int) -> None:
         """Sweep `impulse` (nc, 2) in place."""
-        arrays = impulse, self.order, self.record, self.bodies, self.inertia, self.start
         threads = min(self.threads, numba.config.NUMBA_NUM_THREADS)
-        if threads == 1:
-            sweep(sweeps, *arrays, len(impulse) + 1)
+        if threads == 1 or len(self.layout.start) == 3:
+            sweep(sweeps, impulse, self.record, self.layout)
             return
         before = numba.get_num_threads()
         numba.set_num_threads(threads)
         try:
-            sweep(sweeps, *arrays, _GRAIN)
+            sweep_parallel(sweeps, impulse, self.record, self.layout)
         finally:
             numba.set_num_threads(before)

@@ -6,7 +6,7 @@ A contact keeps its frame R and its two lever arms a and b; a body its inverse m
 
 `contacts` are `RigidContacts` (mechanics/problem/problem.py). `factors` (nc, 13) hold the upper triangle of W_αα⁻¹,
 W_NN, W_NT (2), and axes and eigenvalues of the Schur complement. Contacts with the same candidate and antagonist form a
-group; groups of one colour share no moving body.
+group; parts of them share no moving body.
 """
 
 from typing import NamedTuple
@@ -265,7 +265,7 @@ def _solve_group(first, last, running, laws, contacts):
         return 0.0, 0.0
     g = geometry[first]
     moved_i = moved_j = 0.0
-    # bodies that do not move are shared between groups of one colour: they are only read
+    # bodies that do not move are shared between parts: they are only read
     if inertia_i[0] > 0.0:
         moved_i = _moved(v[i], p, arm(g, 0))
         v[i, 0], v[i, 1], v[i, 2], v[i, 3], v[i, 4], v[i, 5] = p
@@ -287,7 +287,7 @@ def _visit(g, calm, running, laws, contacts, group):
     if path[i] - seen[g, 0] + path[j] - seen[g, 1] <= calm:
         return
     moved_i, moved_j = _solve_group(start, stop, running, laws, contacts)
-    # bodies that do not move have no path: groups of one colour may share them
+    # bodies that do not move have no path: parts may share them
     if moved_i > 0.0:
         path[i] += moved_i
     if moved_j > 0.0:
@@ -295,6 +295,13 @@ def _visit(g, calm, running, laws, contacts, group):
     # more than one contact: solved once more, the group would change again
     seen[g, 0] = path[i] - (moved_i if stop - start > 1 else 0.0)
     seen[g, 1] = path[j] - (moved_j if stop - start > 1 else 0.0)
+
+
+@njit(cache=True)
+def _pass(first, last, calm, running, laws, contacts, group):
+    """Visit the groups first:last in order."""
+    for g in range(first, last):
+        _visit(g, calm, running, laws, contacts, group)
 
 
 @njit(cache=True)
@@ -317,25 +324,25 @@ def sweep(count, calm, running, laws, contacts, group):  # pragma: no cover - co
     `running`, written
     """
     for _ in range(count):
-        for g in range(group.shape[0] - 1):
-            _visit(g, calm, running, laws, contacts, group)
+        _pass(0, group.shape[0] - 1, calm, running, laws, contacts, group)
 
 
 @njit(cache=True, parallel=True)
-def sweep_parallel(count, calm, running, laws, contacts, group, colour):  # pragma: no cover - compiled
-    """Make the passes of `sweep`, with the groups of each colour in parallel.
+def sweep_parallel(count, calm, running, laws, contacts, group, part):  # pragma: no cover - compiled
+    """Make the passes of `sweep`, with all parts but the last in parallel.
 
-    Groups of one colour share no moving body, so the result has the same bits as that of `sweep`.
+    These share no moving body, so the result has the same bits as that of `sweep`.
 
     Inputs
     ------
-    colour : (k+1,) int64, where each colour begins among the groups; the others as in `sweep`
+    part : (k+1,) int64, where each part begins among the groups; the others as in `sweep`
 
     Outputs
     -------
     `running`, written
     """
+    last = part.shape[0] - 2
     for _ in range(count):
-        for k in range(colour.shape[0] - 1):
-            for g in prange(colour[k], colour[k + 1]):
-                _visit(g, calm, running, laws, contacts, group)
+        for k in prange(last):
+            _pass(part[k], part[k + 1], calm, running, laws, contacts, group)
+        _pass(part[last], part[last + 1], calm, running, laws, contacts, group)

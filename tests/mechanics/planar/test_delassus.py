@@ -104,12 +104,12 @@ def test_where_a_contact_may_stay_open_or_jam_it_stays_open(bn, bt):
 
 
 def gauss_seidel_twin(arrays, shift, friction, cohesion, order, sweeps):
-    """Sweeps with the dense matrix, every second one backwards."""
+    """Sweeps with the dense matrix, always forwards."""
     ht, compliance = dense(*arrays)
     w = ht @ compliance @ ht.T
     r = np.zeros(2 * len(shift))
-    for n in range(sweeps):
-        for c in order if n % 2 == 0 else order[::-1]:
+    for _ in range(sweeps):
+        for c in order:
             own = slice(2 * c, 2 * c + 2)
             block = w[own, own]
             b = w[own] @ r + shift[c] - block @ r[own]
@@ -133,7 +133,7 @@ def test_sweeps_are_those_of_the_dense_twin(levers):
     friction = np.minimum(friction, 0.9 / np.maximum(coupling, 1e-3))
     r = np.zeros((25, 2))
     operator.gauss_seidel(shift, friction, cohesion)(r, 7)
-    twin = gauss_seidel_twin(arrays, shift, friction, cohesion, operator.colouring[0], 7)
+    twin = gauss_seidel_twin(arrays, shift, friction, cohesion, operator.layout.order, 7)
     np.testing.assert_allclose(r, twin, atol=1e-9)
     assert (r[:, 0] > 0).any()
     assert (r[:, 0] == 0).any()
@@ -175,20 +175,60 @@ def lattice(side):
     return PlanarDelassus(bodies[moves], normal[moves], lever[moves], inertia)
 
 
-def test_any_number_of_threads_and_any_grain_give_the_same_bits(monkeypatch):
+def test_any_number_of_threads_gives_the_same_bits(monkeypatch):
+    monkeypatch.setattr(delassus, "_PART", 1000)
     operator = lattice(60)
     count = len(operator.bodies)
+    assert len(operator.layout.start) == 6  # four parts
     shift, friction, cohesion = with_loads(1, count)
     before = numba.get_num_threads()
     results = []
     for number in (1, 2, 3):
-        run = replace(operator, threads=number).gauss_seidel(shift, friction, cohesion)
-        for grain in (1, int(np.median(np.diff(operator.colouring[1])))):
-            monkeypatch.setattr(delassus, "_GRAIN", grain)
-            r = np.zeros((count, 2))
-            run(r, 11)
-            results.append(r)
+        r = np.zeros((count, 2))
+        replace(operator, threads=number).gauss_seidel(shift, friction, cohesion)(r, 11)
+        results.append(r)
     assert (results[0][:, 0] > 0).sum() > 100
     for r in results[1:]:
         np.testing.assert_array_equal(r, results[0])
     assert numba.get_num_threads() == before
+
+
+def column(count):
+    """Disks of 1 kg on top of each other, the lowest on what does not move."""
+    above = np.arange(1, count + 1)
+    inertia = np.tile([1.0, 2.0], (count + 1, 1))
+    inertia[0] = 0.0
+    levers = np.tile([0.0, -1.0, 0.0, 1.0], (count, 1))
+    return PlanarDelassus(
+        np.column_stack([above, above - 1]), np.tile([0.0, 1.0], (count, 1)), levers, inertia
+    )
+
+
+def settling(operator, weight, sweeps):
+    """Largest error of the normal impulses after each sweep, from none, where only the lowest contact is pressed."""
+    count = len(operator.bodies)
+    shift, none = np.zeros((count, 2)), np.zeros(count)
+    shift[0, 0] = -weight
+    run, r, errors = operator.gauss_seidel(shift, none, none), np.zeros((count, 2)), []
+    for _ in range(sweeps):
+        run(r, 1)
+        errors.append(np.abs(r[:, 0] - weight * np.arange(count, 0, -1.0)).max())
+    return np.array(errors)
+
+
+@pytest.mark.parametrize("count", [2, 5, 10, 40])
+def test_the_rate_of_a_column_is_that_of_theory(count):
+    # W is tridiagonal, so Gauss–Seidel has the square of Jacobi's spectral radius cos(π/2n), in any order (Varga 1962)
+    errors = settling(column(count), 1.0, 60 * count)
+    last = np.flatnonzero(errors > 1e-9 * count)[-1]
+    rate = (errors[last] / errors[last // 2]) ** (1 / (last - last // 2))
+    assert rate == pytest.approx(np.cos(np.pi / (2 * count)) ** 2, rel=1e-4)
+
+
+def test_the_rate_is_the_same_in_parts(monkeypatch):
+    monkeypatch.setattr(delassus, "_PART", 10)
+    operator = column(40)
+    assert len(operator.layout.start) == 6
+    errors = settling(operator, 1.0, 2400)
+    rate = (errors[-1] / errors[-501]) ** (1 / 500)
+    assert rate == pytest.approx(np.cos(np.pi / 80) ** 2, rel=1e-4)

@@ -1,0 +1,109 @@
+"""Numba kernel that cuts a graph of bodies and contacts into strips."""
+
+import numpy as np
+from numba import njit
+
+__all__ = ["cut"]
+
+
+@njit(cache=True)
+def cut(bodies, moving, parts, lanes, along):  # pragma: no cover - compiled
+    """Order contacts so that parts of them share no moving body, and neighbours in the order rarely do.
+
+    The bodies are numbered breadth first from one end of each connected assembly (Cuthill & McKee 1969). Their numbers
+    are cut into parts × lanes strips of as many contacts each. Contacts between strips come last. A part takes one
+    contact from each of its strips in turn, so that a processor finds independent work.
+
+    Inputs
+    ------
+    bodies : (nc, 2) int64
+    moving : (nb,) bool
+    parts, lanes : int64
+    along : bool, whether contacts within a strip follow the numbers of their bodies; otherwise they keep their order
+
+    Outputs
+    -------
+    order : (nc,) int64, contacts
+    start : (parts + 2,) int64, where each part begins in that order, and the contacts between strips
+    rank : (nb,) int64, number of each moving body; -1 of the others
+    """
+    nc, strips = bodies.shape[0], parts * lanes
+    rank = _breadth_first(bodies, moving)
+    # contacts by the later one of their bodies
+    later, first = np.empty(nc, dtype=np.int64), np.zeros(rank.shape[0] + 1, dtype=np.int64)
+    for c in range(nc):
+        later[c] = max(rank[bodies[c, 0]], rank[bodies[c, 1]], 0)
+        first[later[c] + 1] += 1
+    first = np.cumsum(first)
+    # strip k holds the bodies whose contacts begin in its share of them all
+    strip = np.minimum(first * strips // max(nc, 1), strips - 1)
+    follow, put = np.arange(nc), first.copy()
+    count = np.zeros(strips + 1, dtype=np.int64)
+    own = np.empty(nc, dtype=np.int64)
+    for c in range(nc):
+        if along:
+            follow[put[later[c]]] = c
+            put[later[c]] += 1
+        a, b = rank[bodies[c, 0]], rank[bodies[c, 1]]
+        own[c] = strip[later[c]] if a < 0 or b < 0 or strip[a] == strip[b] else strips
+        count[own[c]] += 1
+    start, begin = np.zeros(parts + 2, dtype=np.int64), np.zeros(strips + 2, dtype=np.int64)
+    begin[1:] = np.cumsum(count)
+    listed, put = np.empty(nc, dtype=np.int64), begin.copy()
+    for c in follow:
+        listed[put[own[c]]] = c
+        put[own[c]] += 1
+    order, n = np.empty(nc, dtype=np.int64), 0
+    for part in range(parts):
+        longest = 0
+        for k in range(part * lanes, (part + 1) * lanes):
+            longest = max(longest, count[k])
+        for position in range(longest):
+            for k in range(part * lanes, (part + 1) * lanes):
+                if position < count[k]:
+                    order[n] = listed[begin[k] + position]
+                    n += 1
+        start[part + 1] = n
+    order[n:] = listed[n:]
+    start[parts + 1] = nc
+    return order, start, rank
+
+
+@njit(cache=True)
+def _breadth_first(bodies, moving):
+    """Number the moving bodies (nb,) breadth first from one end of each connected assembly; -1 for the others."""
+    nb = moving.shape[0]
+    begin = np.zeros(nb + 1, dtype=np.int64)
+    for i, j in bodies:
+        if moving[i] and moving[j]:
+            begin[i + 1] += 1
+            begin[j + 1] += 1
+    begin = np.cumsum(begin)
+    neighbour, put = np.empty(begin[nb], dtype=np.int64), begin.copy()
+    for i, j in bodies:
+        if moving[i] and moving[j]:
+            neighbour[put[i]], neighbour[put[j]] = j, i
+            put[i] += 1
+            put[j] += 1
+    rank, seen, queue = np.full(nb, -1), np.zeros(nb, dtype=np.int64), np.empty(nb, dtype=np.int64)
+    done = 0
+    for body in range(nb):
+        if not moving[body] or seen[body] > 0:
+            continue
+        # the last one that a search finds is at an end, from which the second search begins
+        source = body
+        for search in range(1, 3):
+            queue[done], head, tail = source, done, done + 1
+            seen[source] = search
+            while head < tail:
+                source = queue[head]
+                head += 1
+                for other in neighbour[begin[source] : begin[source + 1]]:
+                    if seen[other] < search:
+                        seen[other] = search
+                        queue[tail] = other
+                        tail += 1
+        for n in range(done, tail):
+            rank[queue[n]] = n
+        done = tail
+    return rank
