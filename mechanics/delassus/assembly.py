@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from mechanics.arrays import Array, Ints
 from mechanics.contact.contacts import Contacts, material_points
@@ -108,18 +107,22 @@ def _compliance_block(
     """Return T C Tᵀ of one body: C between the nodes that its contact sides touch, T their weights in local frames."""
     weights = contacts.weights[sides]
     nodes, column = np.unique(weights.indices, return_inverse=True)
+    # stones have few nodes beside: dense products are faster than sparse ones
+    own = np.zeros((len(sides), len(nodes)))
+    own[np.repeat(np.arange(len(sides)), np.diff(weights.indptr)), column] = weights.data
     turn = contacts.frame[sides // 2] @ state.rotation[b]
-    side = np.repeat(np.arange(len(sides)), np.diff(weights.indptr))
-    values = weights.data[:, None, None] * turn[side]
-    rows = 3 * side[:, None, None] + np.arange(3)[:, None] + np.zeros(3, dtype=np.int64)
-    columns = 3 * column[:, None, None] + np.zeros((3, 1), dtype=np.int64) + np.arange(3)
-    spread = csr_array(
-        (values.ravel(), (rows.ravel(), columns.ravel())), shape=(3 * len(sides), 3 * len(nodes))
-    )
-    half = spread @ compliance.between(nodes - model.elastic_stones.start[b])
-    block = spread @ half.T
+    half = _condensed(own, turn, compliance.between(nodes - model.elastic_stones.start[b]))
+    block = _condensed(own, turn, np.ascontiguousarray(half.T))
     symmetric: Array = 0.5 * (block + block.T)
     return symmetric
+
+
+def _condensed(weights: Array, turn: Array, values: Array) -> Array:
+    """Return T X (3s, m): X (3k, m) of k nodes, `weights` (s, k) and frames `turn` (s, 3, 3) of s sides."""
+    sides, nodes = weights.shape
+    spread = (weights @ values.reshape(nodes, -1)).reshape(sides, 3, -1)
+    result: Array = (turn @ spread).reshape(3 * sides, -1)
+    return result
 
 
 def local_velocity(

@@ -1,9 +1,10 @@
 """Factors of W + Θ, front by front (Duff & Reid 1983; Liu 1992).
 
 W is a sum of dense blocks, one for each stone that moves, between the contacts of that stone. All contacts of the same
-two stones are eliminated together, in the order of least degree, so the fronts are dense matrices of a size that
-suits BLAS, and nothing is sought among single entries. Θ has a block for each contact and need not be symmetric; rows
-are exchanged within a front (docs/decisions/009-factors-by-stones.md).
+two stones are eliminated together, in the order of least degree, and so are fronts that hold the same unknowns
+(supernodes; Ashcraft & Grimes 1989): the fronts are dense matrices of a size that suits BLAS, few numbers pass from one
+to the next, and nothing is sought among single entries. Θ has a block for each contact and need not be symmetric; rows
+are exchanged within a front (docs/decisions/009-factors-by-stones.md, 035-elastic-factors.md).
 """
 
 from collections.abc import Sequence
@@ -41,12 +42,12 @@ class Fronts:
     Attributes
     ----------
     layout : order, unknowns of each front, and places of its factors
-    cliques : of each front, the cliques that are assembled there, and where their unknowns lie in the front
-    children : of each front, the fronts whose updates it takes in, and where their unknowns lie in it
+    cliques : of each front, the cliques that are assembled there, and the runs of their unknowns (`add_into`)
+    children : of each front, the fronts whose updates it takes in, and the runs of their unknowns
     """
 
     layout: Layout
-    cliques: tuple[tuple[tuple[int, Ints, Ints], ...], ...]
+    cliques: tuple[tuple[tuple[int, Ints], ...], ...]
     children: tuple[tuple[tuple[int, Ints], ...], ...]
 
     @property
@@ -62,39 +63,39 @@ class Fronts:
         SolverError : if W + Θ is singular
         """
         layout = self.layout
-        factor, pivots = np.empty(self.size), np.empty(int(layout.pptr[-1]), dtype=np.int32)
+        factor, pivots = np.zeros(self.size), np.empty(int(layout.pptr[-1]), dtype=np.int32)
+        # symmetric, so that those by rows are those by columns
+        blocks = [np.asfortranarray(block.T) for block in cliques.blocks]
         updates: dict[int, Array] = {}
-        for f in layout.order:
-            front, k = self._assembled(int(f), cliques, theta, updates), int(layout.width[f])
-            m, at = len(front) - k, int(layout.fptr[f])
-            lu, exchanged, failed = dgetrf(front[:k, :k])
+        for f in layout.order.tolist():
+            k, at = int(layout.width[f]), int(layout.fptr[f])
+            m = int(layout.dptr[f + 1] - layout.dptr[f]) - k
+            # views of the factors, by columns
+            pivot = factor[at : at + k * (k + m)].reshape(k + m, k).T
+            below = factor[at + k * (k + m) : at + k * (k + 2 * m)].reshape(k, m).T
+            update = np.zeros((m, m)).T
+            for clique, runs in self.cliques[f]:
+                add_into(pivot, below, update, runs, blocks[clique])
+            for child, runs in self.children[f]:
+                add_into(pivot, below, update, runs, updates.pop(child))
+            _add_diagonal(pivot, theta[layout.dof[layout.dptr[f] : layout.dptr[f] + k : 3] // 3])
+            lu, exchanged, failed = dgetrf(pivot[:, :k], overwrite_a=True)
             if failed:
                 raise SolverError("W + Θ is singular", where="solver", remedy="use another method")
             pivots[layout.pptr[f] : layout.pptr[f + 1]] = exchanged
-            factor[at : at + k * k] = lu.T.ravel()
             if m:
-                across, _ = dgetrs(lu, exchanged, front[:k, k:])
-                below = front[k:, :k]
-                factor[at + k * k : at + k * (k + m)] = across.T.ravel()
-                factor[at + k * (k + m) : at + k * (k + 2 * m)] = below.T.ravel()
-                updates[int(f)] = front[k:, k:] - below @ across
+                across, _ = dgetrs(lu, exchanged, pivot[:, k:], overwrite_b=True)
+                # transposed, as the product is made by rows
+                update -= (across.T @ below.T).T
+                updates[f] = update
         return Factors(self, factor, pivots)
 
-    def _assembled(self, f: int, cliques: Cliques, theta: Array, updates: dict[int, Array]) -> Array:
-        layout = self.layout
-        unknown = layout.dof[layout.dptr[f] : layout.dptr[f + 1]]
-        front = np.zeros((len(unknown), len(unknown)), order="F")
-        for clique, own, place in self.cliques[f]:
-            add_into(front, place, own, cliques.blocks[clique])
-        for child, place in self.children[f]:
-            update = updates.pop(child)
-            add_into(front, place, np.arange(len(update)), update)
-        diagonal = theta[unknown[: layout.width[f] : 3] // 3]
-        first = 3 * np.arange(len(diagonal))
-        for i in range(3):
-            for j in range(3):
-                front[first + i, first + j] += diagonal[:, i, j]
-        return front
+
+def _add_diagonal(pivot: Array, theta: Array) -> None:
+    first = 3 * np.arange(len(theta))
+    for i in range(3):
+        for j in range(3):
+            pivot[first + i, first + j] += theta[:, i, j]
 
 
 @dataclass(frozen=True)
@@ -121,31 +122,74 @@ def fronts(pairs: Ints, cliques: Sequence[Ints]) -> Fronts:
     members = np.split(np.argsort(group, kind="stable"), np.cumsum(size)[:-1])
     around = [np.unique(group[contacts]) for contacts in cliques]
     order, later = _least_degree(count, size, around)
+    order, pivots, later = _merged(order, later, size)
     rank = np.empty(count, dtype=np.int64)
-    rank[order] = np.arange(count)
-    unknowns = [_unknowns([members[g] for g in (f, *later[f])]) for f in range(count)]
-    first = [int(groups[rank[groups].argmin()]) if len(groups) else -1 for groups in around]
-    own: list[list[tuple[int, Ints, Ints]]] = [[] for _ in range(count)]
-    for clique, f in enumerate(first):
-        if f >= 0:
-            place = _places(unknowns[f], _unknowns([cliques[clique]]))
-            by_place = np.argsort(place)
-            own[f].append((clique, by_place, place[by_place]))
-    children: list[list[tuple[int, Ints]]] = [[] for _ in range(count)]
+    for place, f in enumerate(order):
+        rank[pivots[f]] = place
+    width = np.array([3 * size[groups].sum() for groups in pivots], dtype=np.int64)
+    unknowns = [_unknowns([members[g] for g in (*pivots[f], *later[f])]) for f in range(len(pivots))]
+    own: list[list[tuple[int, Ints]]] = [[] for _ in pivots]
+    for clique, groups in enumerate(around):
+        if len(groups):
+            f = order[rank[groups].min()]
+            own[f].append((clique, _runs(_places(unknowns[f], _unknowns([cliques[clique]])), width[f])))
+    children: list[list[tuple[int, Ints]]] = [[] for _ in pivots]
     for f in order:
-        if len(later[f]):
-            parent = later[f][0]
-            children[parent].append((int(f), _places(unknowns[parent], unknowns[f][3 * size[f] :])))
+        if later[f]:
+            parent = order[rank[later[f]].min()]
+            place = _places(unknowns[parent], unknowns[f][width[f] :])
+            children[parent].append((int(f), _runs(place, width[parent])))
     lengths = np.array([len(u) for u in unknowns], dtype=np.int64)
     layout = Layout(
         order=order,
-        width=3 * size,
+        width=width,
         dptr=np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64),
         dof=np.concatenate([np.zeros(0, dtype=np.int64), *unknowns]),
-        fptr=np.concatenate([[0], np.cumsum(3 * size * (2 * lengths - 3 * size))]).astype(np.int64),
-        pptr=np.concatenate([[0], np.cumsum(3 * size)]).astype(np.int64),
+        fptr=np.concatenate([[0], np.cumsum(width * (2 * lengths - width))]).astype(np.int64),
+        pptr=np.concatenate([[0], np.cumsum(width)]).astype(np.int64),
     )
     return Fronts(layout, tuple(map(tuple, own)), tuple(map(tuple, children)))
+
+
+def _runs(place: Ints, width: int) -> Ints:
+    """Return runs of neighbours (nr, 3): place in the front, place in the block, and length.
+
+    `place` are the places of the block's unknowns in a front of `width` pivots; no run reaches beyond these.
+    """
+    order = np.argsort(place)
+    there = place[order]
+    begins = (np.diff(order, prepend=-2) != 1) | (np.diff(there, prepend=-2) != 1) | (there == width)
+    start = np.flatnonzero(begins)
+    return np.column_stack([there[start], order[start], np.diff(start, append=len(order))])
+
+
+def _merged(order: Ints, later: list[list[int]], size: Ints) -> tuple[Ints, list[list[int]], list[list[int]]]:
+    """Merge fronts with the parents that hold nothing else than what they leave: the factors stay as large as they are.
+
+    Return the order of the merged fronts, and of each its groups and those of its front that come later, in the order
+    of elimination.
+    """
+    pivots: dict[int, list[int]] = {}
+    rest = {int(f): int(size[later[f]].sum()) for f in order}
+    wide = {int(f): int(size[f]) for f in order}
+    children: dict[int, list[int]] = {int(f): [] for f in order}
+    for f in order.tolist():
+        pivots[f] = [f]
+        # as long as nothing else has joined it, wide ones first
+        for child in sorted(children[f], key=wide.__getitem__, reverse=True):
+            if rest[child] != wide[f] + rest[f]:
+                continue
+            pivots[f] = pivots.pop(child) + pivots[f]
+            wide[f] += wide.pop(child)
+            children[f] += children.pop(child)
+            children[f].remove(child)
+        if later[f]:
+            children[later[f][0]].append(f)
+    kept = list(pivots)
+    rank = np.empty(len(order), dtype=np.int64)
+    rank[order] = np.arange(len(order))
+    groups = [sorted(pivots[f], key=rank.__getitem__) for f in kept]
+    return np.arange(len(kept)), groups, [later[f] for f in kept]
 
 
 def _unknowns(members: Sequence[Ints]) -> Ints:

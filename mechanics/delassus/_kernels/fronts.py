@@ -28,13 +28,36 @@ class Layout(NamedTuple):
     pptr: NDArray[np.int64]
 
 
-@njit(cache=True)
-def add_into(front, place, own, block):  # pragma: no cover - compiled
-    """Let front[place, place] += block[own, own]; `place` and `own` (m,) int64."""
-    for j in range(place.shape[0]):
-        column, source = place[j], own[j]
-        for i in range(place.shape[0]):
-            front[place[i], column] += block[own[i], source]
+@njit(cache=True, nogil=True)
+def add_into(pivot, below, update, runs, block):  # pragma: no cover - compiled
+    """Add a block to a front.
+
+    Inputs
+    ------
+    runs : (nr, 3) int64, of each run of neighbouring unknowns its place in the front, its place in the block, and its
+        length; none reaches from the pivots into the rest
+    block : (n, n) float64, by columns
+
+    Outputs
+    -------
+    pivot, below, update : (k, k+m), (m, k) and (m, m) float64, by columns: the rows of the pivots, what is below the
+        pivots, and the rest
+    """
+    k = pivot.shape[0]
+    for s in range(runs.shape[0]):
+        left, across, columns = runs[s, 0], runs[s, 1], runs[s, 2]
+        for t in range(runs.shape[0]):
+            top, down, rows = runs[t, 0], runs[t, 1], runs[t, 2]
+            for j in range(columns):
+                if top < k:
+                    target = pivot[top : top + rows, left + j]
+                elif left < k:
+                    target = below[top - k : top - k + rows, left + j]
+                else:
+                    target = update[top - k : top - k + rows, left - k + j]
+                source = block[down : down + rows, across + j]
+                for i in range(rows):
+                    target[i] += source[i]
 
 
 @njit(cache=True)

@@ -153,8 +153,11 @@ def test_each_unknown_is_a_pivot_exactly_once_and_fronts_hold_what_comes_later(s
         assert (np.diff(later) >= 0).all()
         assert (later > when[pivots[f][0]]).all()
     # contacts of the same two stones go together
-    for pivot in pivots:
-        assert len(np.unique(np.sort(pairs[pivot // 3], axis=1), axis=0)) == 1
+    _, joint = np.unique(np.sort(pairs, axis=1), axis=0, return_inverse=True)
+    front_of = np.empty(len(pairs), dtype=int)
+    for f, pivot in enumerate(pivots):
+        front_of[pivot // 3] = f
+    assert all(len(np.unique(front_of[joint == j])) == 1 for j in range(joint.max() + 1))
     assert sum(len(parts) for parts in own.cliques) == len(cliques.contacts)
 
 
@@ -225,8 +228,10 @@ def test_w_of_stones_is_the_sum_of_its_cliques():
 # --- the kernels ---
 
 
-def add_twin(front, place, own, block):
+def add_twin(front, runs, block):
     result = front.copy()
+    place = np.concatenate([np.arange(there, there + length) for there, _, length in runs])
+    own = np.concatenate([np.arange(here, here + length) for _, here, length in runs])
     for i, row in enumerate(place):
         for j, column in enumerate(place):
             result[row, column] += block[own[i], own[j]]
@@ -254,13 +259,26 @@ def solve_twin(b, own, factors):
 
 
 def test_assembly_of_a_front_is_that_of_the_slow_twin():
+    """Four pivots and five others: runs among either, in the order of neither front nor block."""
     rng = np.random.default_rng(2)
     front = np.asfortranarray(rng.normal(size=(9, 9)))
-    place, own = rng.permutation(9)[:5], rng.permutation(6)[:5]
-    block = rng.normal(size=(6, 6))
-    expected = add_twin(front, place, own, block)
-    add_into(front, place, own, block)
-    np.testing.assert_allclose(front, expected, rtol=1e-15, atol=1e-15)
+    block = np.asfortranarray(rng.normal(size=(6, 6)))
+    runs = np.array([[5, 0, 2], [1, 2, 3], [8, 5, 1]])
+    expected = add_twin(front, runs, block)
+    pivot, below, update = (np.asfortranarray(part) for part in (front[:4], front[4:, :4], front[4:, 4:]))
+    add_into(pivot, below, update, runs, block)
+    np.testing.assert_allclose(
+        np.vstack([pivot, np.hstack([below, update])]), expected, rtol=1e-15, atol=1e-15
+    )
+
+
+@pytest.mark.parametrize("joint", [1, 4])
+def test_fronts_that_hold_the_same_unknowns_are_one(joint):
+    """A stone on three others on the ground: the joints of the lower ones first, then all of the upper one at once."""
+    pairs = np.repeat([[0, 1], [0, 2], [0, 3], [1, 4], [2, 4], [3, 4]], joint, axis=0)
+    cliques = cliques_of(np.random.default_rng(0), pairs)
+    own = fronts(pairs, cliques.contacts)
+    assert sorted(own.layout.width // (3 * joint)) == [1, 1, 1, 3]
 
 
 @pytest.mark.parametrize("seed", range(4))
