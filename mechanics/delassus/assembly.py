@@ -31,6 +31,7 @@ def rigid_delassus(model: Model, state: State, contacts: Contacts, schedule: Sch
         np.hstack([model.inertia.inverse_mass[:, None], turned[:, [0, 1, 2, 4, 5, 8]]]),
         schedule,
         model.scene.solver.threads,
+        state.centre,
     )
 
 

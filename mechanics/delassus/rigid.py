@@ -73,6 +73,7 @@ class RigidDelassus:
     body, geometry, inertia : as in `RigidContacts`
     schedule : order of the sweeps
     threads : largest number of threads that sweep at once; the result is the same to the last bit
+    centre : (nb, 3) of the bodies, by which factors are ordered; None if not known [m]
     """
 
     body: Ints
@@ -80,6 +81,7 @@ class RigidDelassus:
     inertia: Array
     schedule: Schedule
     threads: int = 1
+    centre: Array | None = None
     joint_compliance = None
 
     @cached_property
@@ -121,7 +123,7 @@ class RigidDelassus:
     @cached_property
     def form(self) -> BodyForm:
         """W for methods that factorise: six velocities for each body that moves, world axes."""
-        return BodyForm(self.rigid)
+        return BodyForm(self.rigid, self.centre)
 
     def scaled(self, unit: Array) -> "RigidDelassus":
         """Return D W D with the units (nc,) of the contacts on the diagonal of D; the pattern of factors is shared.
