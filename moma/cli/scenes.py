@@ -73,6 +73,14 @@ def run(
             help="Write the meshes of deformable stones for Gmsh, Code_Aster, Abaqus, …; see docs/runs.md.",
         ),
     ] = None,
+    resume: Annotated[
+        bool | None,
+        typer.Option(
+            "--resume/--restart",
+            help="Go on with the unfinished run in the folder, or give it up; without either, it is left alone.",
+            show_default=False,
+        ),
+    ] = None,
     accept_unsound: AcceptUnsound = False,
     profile: Profile = None,
     db: Db = DEFAULT_DB,
@@ -83,13 +91,23 @@ def run(
     from moma.cli.text.formats import as_json
     from moma.cli.text.runs_and_surveys import run_lines
     from pipelines.run.run import run_scene
+    from pipelines.run.unfinished import finished_run
+    from pipelines.scene.file import read_scene
 
     folder, stop = out or Path("out") / scene.stem, Interruption()
+    if resume and (summary := finished_run(folder, read_scene(scene).text)) is not None:
+        say(f"{folder}: the run there has finished; leave out --resume to run the scene again")
+        print(as_json(summary) if json else f"{summary['scene']}: {summary['headline']}")
+        return
     with progress_bars() as listener, stop.handled():
-        done = run_scene(scene, db, folder, stop.listening(listener), profile, meshes, accept_unsound, stop)
+        done = run_scene(
+            scene, db, folder, stop.listening(listener), profile, meshes, accept_unsound, stop, resume
+        )
     for warning in done.warnings:
         say(f"warning: {warning}")
     print(as_json(done.summary) if json else "\n".join(run_lines(done, verbose)))
+    if done.summary["outcome"] == "interrupted":
+        say(f"the same command with --resume goes on after step {done.summary['steps']}")
     if done.summary["outcome"] in ("undecided", "interrupted"):
         raise typer.Exit(1)
 

@@ -23,10 +23,13 @@ from moma.errors import UsageError
 if sys.platform != "win32":
     import fcntl
 
-__all__ = ["RUN_INDEX", "check_replaceable", "replacing"]
+__all__ = ["RUN_INDEX", "UNFINISHED", "check_replaceable", "locked", "replacing"]
 
 RUN_INDEX = "summary.json"
 """Index of the results of a run."""
+
+UNFINISHED = "unfinished"
+"""Folder within that of the results, of a run that goes on or has been stopped."""
 
 _INDEXES = (RUN_INDEX, "check.json", "survey.json")  # their "files" list the files that MOMA wrote
 _MARK = ".moma-"  # in the names of hidden folders
@@ -58,12 +61,14 @@ def check_replaceable(folder: Path, index: str = RUN_INDEX) -> None:
     if not folder.exists():
         return
     known = {name: _own_files(folder, name) for name in _INDEXES}
-    foreign = sorted({entry.name for entry in folder.iterdir()} - set[str]().union(*known.values()))
+    foreign = sorted(_entries(folder) - set[str]().union(*known.values()))
     if foreign:
         shown = ", ".join(foreign[:3]) + (", …" if len(foreign) > 3 else "")
         raise UsageError(f"holds files that no run of MOMA wrote ({shown})", where=place, remedy=remedy)
     if known[RUN_INDEX] and index != RUN_INDEX:
         raise UsageError("holds the results of a run", where=place, remedy=remedy)
+    if index != RUN_INDEX and (folder / UNFINISHED).exists():
+        raise UsageError("holds an unfinished run", where=place, remedy=remedy)
 
 
 @contextmanager
@@ -161,6 +166,31 @@ def _lock(folder: Path) -> int | None:
 
 
 @contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Hold a folder, which must exist, for this program, where the system has locks.
+
+    Raises
+    ------
+    UsageError : another program holds it
+    """
+    if sys.platform == "win32":
+        yield
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):  # a file system without locks
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise UsageError(
+                    "another program is running there", where=str(folder.parent), remedy="name another folder"
+                ) from None
+        yield
+    finally:
+        os.close(handle)
+
+
+@contextmanager
 def _locked(folder: Path) -> Iterator[None]:
     """Hold a lock on a folder, so that no other program finds a hidden folder before its owner has locked it."""
     if sys.platform == "win32":
@@ -173,6 +203,15 @@ def _locked(folder: Path) -> Iterator[None]:
         yield
     finally:
         os.close(handle)
+
+
+def _entries(folder: Path) -> set[str]:
+    """List the names in a folder, without the unfinished run and the link to its results."""
+    return {
+        entry.name
+        for entry in folder.iterdir()
+        if entry.name != UNFINISHED and not (entry.is_symlink() and os.readlink(entry).startswith(UNFINISHED))
+    }
 
 
 def _own_files(folder: Path, index: str) -> set[str]:

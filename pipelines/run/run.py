@@ -35,7 +35,9 @@ from pipelines.run.inputs import run_inputs
 from pipelines.run.plausibility import corner_warnings, unusual_values
 from pipelines.run.record import run_record, versions
 from pipelines.run.soundness import caution_of, problems_of, refuse_unsound
+from pipelines.run.unfinished import UnfinishedRun, unfinished_run
 from pipelines.scene.file import SceneFile, read_scene
+from pipelines.scene.fingerprint import fingerprint
 from pipelines.scene.selection import select_groups, select_stones
 from pipelines.tuning.expected_errors import ProfileReport, profile_report
 from pipelines.tuning.profiles import with_profile
@@ -73,6 +75,7 @@ def run_scene(
     meshes: str | Path | None = None,
     accept_unsound: bool = False,
     stop: Callable[[], bool] = lambda: False,
+    resume: bool | None = None,
 ) -> RunReport:
     """Run a scene file on the stones of a database, and write the results into a folder.
 
@@ -86,10 +89,12 @@ def run_scene(
     meshes : file for the volume meshes of the deformable stones; None: none
     accept_unsound : run a scene that `check_scene` finds unsound all the same; every result says so then
     stop : asked after every step; where it says True, the run ends there as interrupted, with results of what there is
+    resume : go on with the unfinished run in the folder, if there is one; False: give it up; None: refuse to run then
 
     Raises
     ------
-    UsageError : the folder holds other files, there is no such profile, or the meshes cannot be written
+    UsageError : the folder holds other files or an unfinished run, the scene is not that of the run to be resumed,
+        there is no such profile, or the meshes cannot be written
     UnsoundSceneError : the scene has problems that `check_scene` reports, and they are not accepted
     SceneError, GeometryError, MeshError, SolverError : see `assemble` and `mechanics.simulate`
     DatabaseError : the database cannot be read, or not written at the end; the folder is complete then
@@ -100,7 +105,10 @@ def run_scene(
     if meshes is not None:
         check_mesh_file(meshes)
     progress(Progress("blocks", 0, None, "reading the stones"))
-    with open_database(url, create=False) as database:
+    with (
+        open_database(url, create=False) as database,
+        unfinished_run(folder, scene.output.checkpoint, resume, progress) as unfinished,
+    ):
         with _timed(seconds, "blocks"), database.session(read_only=True) as session:
             as_of, models = latest_entry(session), select_stones(scene, session)
             scene = with_profile(scene, profile, models)
@@ -121,15 +129,18 @@ def run_scene(
             problems = problems_of(scene, assembly, loose_blocks(*built))
         if not accept_unsound:
             refuse_unsound(problems, str(path))
-        result = simulate(assembly.scene, progress, stop, built)
+        steps = max(1, round(assembly.scene.time.duration / assembly.scene.time.step))
+        unfinished.open(fingerprint(assembly.scene, *built, models), versions(), steps, bool(resume))
+        result = simulate(assembly.scene, progress, stop, built, unfinished)
         if problems:
             result = replace(result, cautions=(caution_of(problems), *result.cautions))
         seconds |= result.wall_time
         stones, reached = stone_results(result), profile_report(profile, scene, result)
         with replacing(folder) as fresh:
             summary, warnings = write_results(
-                result, stones, scene, assembly, fresh, seconds, progress, reached
+                result, stones, scene, assembly, fresh, seconds, progress, reached, unfinished
             )
+            unfinished.hand_over(fresh)
         if meshes is not None:
             write_meshes(meshes, _meshes(result, assembly))
         record = run_record(result, stones, scene, assembly, summary, as_of)
@@ -139,6 +150,8 @@ def run_scene(
         except DatabaseError as error:
             what = f"the results are in {folder}, but could not be stored: {error.what}"
             raise DatabaseError(what, where=error.where, remedy=error.remedy) from error
+        if result.outcome is not Outcome.INTERRUPTED:
+            unfinished.remove()
     return RunReport(folder, summary, warnings, run)
 
 
@@ -151,12 +164,13 @@ def write_results(
     seconds: dict[str, float],
     progress: Listener = silent,
     profile: ProfileReport | None = None,
+    unfinished: UnfinishedRun | None = None,
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Write all files of a run into an empty folder; return the summary and the warnings.
 
     Pictures that cannot be drawn on this machine cause a warning; everything else is written.
     """
-    warnings = list(assembly.remarks)
+    warnings = [*assembly.remarks, *(() if unfinished is None else unfinished.warnings)]
     # of a relaxation only the final equilibrium counts, whose steps are all solved
     relaxed = result.outcome is Outcome.EQUILIBRIUM and result.scene.time.relaxation
     if result.errors.unconverged_steps and not relaxed:
@@ -189,6 +203,7 @@ def write_results(
     summary["versions"] = dict(versions())
     write_report(folder / "report.html", result, summary, stones, warnings)
     (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
+    summary["resumed"] = [] if unfinished is None else unfinished.resumed
     summary["origin"] = assembly.origin.tolist()
     summary["warnings"] = warnings
     summary["files"] = sorted(["summary.json", *(entry.name for entry in folder.iterdir())])

@@ -122,6 +122,13 @@ class Output:
             "Pictures to draw, see below; if not given, displacement, and von_mises where a stone deforms."
         ),
     ] = None
+    checkpoint: Annotated[
+        int,
+        Setting(
+            "Number of steps between checkpoints, from which `moma run --resume` goes on; 0: only where Ctrl-C stops.",
+            at_least=0,
+        ),
+    ] = 100
     series: Annotated[
         Texts,
         Setting(

@@ -1,0 +1,235 @@
+"""A run in progress on the disk: its checkpoints, so that it can go on after Ctrl-C, a crash or a power cut."""
+
+import json
+import os
+import shutil
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from mechanics.carried import Carried
+from mechanics.dynamics.progress import Listener, Progress
+from mechanics.results.result import BodyResult, Frame
+from moma.errors import UsageError
+from pipelines.results.checkpoints import Checkpoint, Checkpoints, write_whole
+from pipelines.results.folder import RUN_INDEX, UNFINISHED, locked
+from pipelines.scene.fingerprint import changes
+
+__all__ = ["UnfinishedRun", "finished_run", "unfinished_run"]
+
+_INPUTS = "inputs.json"
+_SHARE = 0.04  # most of the time that checkpoints may take; those that would take more are left out [-]
+_NAMED = 4  # changes that an error names
+
+
+def finished_run(folder: Path, text: str) -> dict[str, Any] | None:
+    """Return the summary of a folder whose run has finished, None if it has not.
+
+    Raises
+    ------
+    UsageError : it is the run of another scene than that of `text`
+    """
+    if not (folder / RUN_INDEX).exists() or _checkpoints(folder).steps():
+        return None
+    try:
+        summary = json.loads((folder / RUN_INDEX).read_text(encoding="utf-8"))
+        same = (folder / "scene.toml").read_text(encoding="utf-8") == text
+    except (OSError, ValueError):
+        return None
+    if not same:
+        raise UsageError(
+            "the run there has finished, but is of another scene",
+            where=str(folder),
+            remedy="leave out --resume to replace its results",
+        )
+    return dict(summary)
+
+
+class UnfinishedRun:
+    """Archive of a run, in the folder of its results.
+
+    Checkpoints change no bit of a run, so they may be left out where steps are so fast that they would cost more than
+    the steps; the first one is always written.
+
+    Parameters
+    ----------
+    folder : of the results
+    every : steps between checkpoints, as the scene asks
+    found : the checkpoint from which the run goes on
+    notes : of the program and the runs before, kept in every checkpoint
+
+    Attributes
+    ----------
+    warnings : of checkpoints that were damaged, or could not be written
+    resumed : the earlier resumptions, and this one: each the step, and what had changed
+    """
+
+    def __init__(self, folder: Path, every: int) -> None:
+        self.every = every
+        self.warnings: list[str] = []
+        self.resumed: list[dict[str, Any]] = []
+        self._place = folder / UNFINISHED
+        self._checkpoints = Checkpoints(self._place)
+        self._found: Checkpoint | None = None
+        self._versions: Mapping[str, str] = {}
+        self._took, self._ended = 0.0, -float("inf")
+
+    @property
+    def steps(self) -> int:
+        """Steps that the run had done when it was resumed; 0 if it begins."""
+        return 0 if self._found is None else self._found.step
+
+    def open(
+        self, inputs: Mapping[str, str], versions: Mapping[str, str], duration: int, resume: bool
+    ) -> None:
+        """Find the checkpoint from which the run goes on, if it is to; otherwise make room for a new one.
+
+        Parameters
+        ----------
+        inputs : fingerprint of all that decides on the bits
+        versions : of the program and its libraries
+        duration : steps of the whole run
+        resume : go on, if there is a run to go on with
+
+        Raises
+        ------
+        UsageError : the scene has changed since, or no checkpoint can be read
+        """
+        self._versions = versions
+        if resume and self._checkpoints.steps():
+            self._go_on(inputs, versions, duration)
+            return
+        for path in self._place.iterdir():
+            path.unlink()
+        write_whole(self._place / _INPUTS, json.dumps(inputs, ensure_ascii=False).encode())
+
+    def _go_on(self, inputs: Mapping[str, str], versions: Mapping[str, str], duration: int) -> None:
+        found, wrong = self._checkpoints.read()
+        where = str(self._place)
+        try:
+            then = json.loads((self._place / _INPUTS).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            found, wrong = None, [*wrong, f"{_INPUTS} is damaged"]
+        if found is None:
+            raise UsageError(
+                f"no checkpoint can be read: {'; '.join(wrong)}",
+                where=where,
+                remedy="begin again with --restart",
+            )
+        forbidden, free = changes(then, inputs)
+        if found.step >= duration:
+            forbidden.append(f"duration: the run has done {found.step} steps, {duration} are asked for")
+        if forbidden:
+            more = f", and {len(forbidden) - _NAMED} more" if len(forbidden) > _NAMED else ""
+            raise UsageError(
+                f"the scene is not that of the unfinished run: {'; '.join(forbidden[:_NAMED])}{more}",
+                where=where,
+                remedy="undo the change, or begin again with --restart",
+            )
+        other = [
+            f"{name} {found.notes['versions'].get(name)}, now {versions.get(name)}"
+            for name in dict.fromkeys([*found.notes["versions"], *versions])
+            if found.notes["versions"].get(name) != versions.get(name)
+        ]
+        self.warnings += [f"{what}; the run went on after step {found.step}" for what in wrong]
+        if other:
+            self.warnings.append(
+                f"resumed after step {found.step} with other libraries ({', '.join(other)}): the last bits may differ"
+            )
+        self.resumed = [*found.notes["resumed"], {"step": found.step, "changed": [*free, *other]}]
+        self._found = found
+        if free:
+            write_whole(self._place / _INPUTS, json.dumps(inputs, ensure_ascii=False).encode())
+
+    def earlier(self) -> Carried | None:
+        """Return what the run carried when it was stopped; None if it begins."""
+        return None if self._found is None else self._found.carried
+
+    def begin(self, bodies: tuple[BodyResult, ...], frames: Sequence[Frame]) -> None:
+        """Begin or go on with the stones of the run."""
+
+    def frame(self, frame: Frame) -> None:
+        """Take a further frame."""
+
+    def checkpoint(self, step: int, carried: Carried) -> None:
+        """Write a checkpoint; a disk that is full is no reason to give up the run."""
+        began = time.perf_counter()
+        if began - self._ended < self._took / _SHARE and step % self.every == 0:
+            return
+        try:
+            self._checkpoints.write(step, carried, {"versions": self._versions, "resumed": self.resumed})
+        except OSError as error:
+            self.warnings.append(
+                f"the checkpoint after step {step} could not be written: {error.strerror or error}; "
+                "those before are kept"
+            )
+        self._ended = time.perf_counter()
+        self._took = self._ended - began
+
+    def hand_over(self, folder: Path) -> None:
+        """Give the checkpoints to the folder that will take the place of the present one, too."""
+        there = folder / UNFINISHED
+        there.mkdir()
+        for path in self._place.glob("[!.]*.*"):
+            if path.suffix not in (".h5", ".json"):
+                continue
+            try:
+                os.link(path, there / path.name)
+            except OSError:
+                shutil.copy2(path, there / path.name)
+
+    def remove(self) -> None:
+        """Remove the checkpoints of a run that is complete."""
+        shutil.rmtree(self._place, ignore_errors=True)
+
+
+@contextmanager
+def unfinished_run(
+    folder: Path, every: int, resume: bool | None, progress: Listener
+) -> Iterator[UnfinishedRun]:
+    """Yield the archive of a run in its folder, which no other program may use in the meantime.
+
+    Where the run fails before its first checkpoint, nothing of it is left.
+
+    Parameters
+    ----------
+    folder : of the results
+    every : steps between checkpoints
+    resume : go on with an unfinished run; False: give it up; None: refuse to give it up
+    progress : told how far an unfinished run is
+
+    Raises
+    ------
+    UsageError : there is an unfinished run, or another program runs there
+    """
+    place, made = folder / UNFINISHED, not folder.exists()
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(
+            f"cannot be written: {error.strerror}", where=str(folder), remedy="name another folder"
+        ) from error
+    with locked(place):
+        steps = _checkpoints(folder).steps()
+        if steps and resume is None:
+            raise UsageError(
+                f"holds an unfinished run, with a checkpoint after step {steps[0]}",
+                where=str(folder),
+                remedy="go on with --resume, or begin again with --restart",
+            )
+        if steps and resume:
+            progress(Progress("blocks", 0, None, f"the run will go on after step {steps[0]}"))
+        try:
+            yield UnfinishedRun(folder, every)
+        finally:
+            if not _checkpoints(folder).steps():
+                shutil.rmtree(place, ignore_errors=True)
+                if made:
+                    with suppress(OSError):
+                        folder.rmdir()
+
+
+def _checkpoints(folder: Path) -> Checkpoints:
+    return Checkpoints(folder / UNFINISHED)

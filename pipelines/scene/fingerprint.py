@@ -1,0 +1,130 @@
+"""Fingerprint of all that decides on the bits of a run, part by part, so that a change can be named."""
+
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+
+from mechanics.model.model import Model
+from mechanics.scene.scene import Scene
+from mechanics.scene.state import State
+from pipelines.scene.selection import StoneModel
+
+__all__ = ["changes", "fingerprint"]
+
+_STONE = "stone "
+_SHOWN = 9  # numbers up to which an array stands in full
+_DIGITS = 16  # of the digest of a larger one
+_FREE = ("name", "solver.threads", "time.duration")  # settings that change no bit of the steps done so far
+
+
+def fingerprint(
+    scene: Scene, model: Model, start: State, stones: Sequence[StoneModel] = ()
+) -> dict[str, str]:
+    """Return a text for each setting, load and stone of a scene as it was built, and for its mesh.
+
+    The solids of the `stones` in the database come first: where one changes, all others may be built otherwise.
+
+    >>> from mechanics.scene.scene import TimeSettings
+    >>> dict(_parts(TimeSettings(step=2e-3), "time"))["time.step"]
+    '0.002'
+    """
+    own = {one.name: getattr(scene, one.name) for one in fields(scene) if one.name != "blocks"}
+    recorded = (
+        (stone.record.code, [stone.record.solid_vertices, stone.record.solid_faces]) for stone in stones
+    )
+    found = {f"{_STONE}{code}: solid in the database": _digest(solid) for code, solid in recorded}
+    found |= dict(_parts(own, ""))
+    for block in scene.blocks:
+        values = ((one.name, getattr(block, one.name)) for one in fields(block) if one.name != "code")
+        found |= {f"{_STONE}{block.code}: {name}": _digest(value) for name, value in values}
+    built = (
+        start.centre,
+        start.node,
+        model.mass,
+        model.fixed,
+        [stone and stone.mesh for stone in model.stones],
+    )
+    return found | {
+        "order of the stones": _digest([one.code for one in scene.blocks]),
+        "meshes": _digest(built),
+    }
+
+
+def changes(then: Mapping[str, str], now: Mapping[str, str]) -> tuple[list[str], list[str]]:
+    """Return the differences that forbid to go on with a run, and those that do not, each in words."""
+    forbidden, free = [*_missing(then, now, "is gone"), *_missing(now, then, "is new")], list[str]()
+    for name in dict.fromkeys([*then, *now]):
+        before, after = then.get(name), now.get(name)
+        if before == after or (name.startswith(_STONE) and None in (before, after)):
+            continue
+        what = name if _is_digest(before) or _is_digest(after) else f"{name} {_or(before)}, now {_or(after)}"
+        (free if name in _FREE else forbidden).append(what)
+    return forbidden, free
+
+
+def _missing(some: Mapping[str, str], others: Mapping[str, str], what: str) -> list[str]:
+    """Name the stones of one scene that another does not have."""
+    one, other = ({name.partition(": ")[0] for name in names} for names in (some, others))
+    return [f"{name} {what}" for name in sorted(one - other) if name.startswith(_STONE)]
+
+
+def _or(text: str | None) -> str:
+    return "not given" if text is None else text
+
+
+def _is_digest(text: str | None) -> bool:
+    return text is not None and text.startswith("#")
+
+
+def _parts(value: Any, path: str) -> Iterator[tuple[str, str]]:
+    """Yield the path and the text of each part of a value made of dataclasses, collections, arrays and plain values."""
+    if is_dataclass(value):
+        yield f"{path}.type", type(value).__name__
+        value = {one.name: getattr(value, one.name) for one in fields(value)}
+    if isinstance(value, Mapping):
+        for name, one in value.items():
+            yield from _parts(one, f"{path}.{name}" if path else str(name))
+    elif isinstance(value, frozenset):
+        yield path, _text(sorted(value))
+    elif isinstance(value, list | tuple) and any(is_dataclass(one) for one in value):
+        for number, one in enumerate(value, 1):
+            yield from _parts(one, f"{path} {number}")
+    else:
+        yield path, _text(value)
+
+
+def _text(value: Any) -> str:
+    """Return a short value in full, the digest of a longer one."""
+    if isinstance(value, np.ndarray):
+        return repr(value.tolist()) if value.size <= _SHOWN else _digest(value)
+    if isinstance(value, list | tuple) and len(value) > _SHOWN:
+        return _digest(value)
+    return repr(value) if isinstance(value, float) else str(value)
+
+
+def _digest(value: Any) -> str:
+    digest = hashlib.sha256()
+    for part in _bytes(value):
+        digest.update(part)
+    return f"#{digest.hexdigest()[:_DIGITS]}"
+
+
+def _bytes(value: Any) -> Iterator[bytes]:
+    """Yield the content of a value with the types and sizes of its parts, so that no two values yield the same."""
+    if isinstance(value, np.ndarray):
+        yield f"{value.dtype.str}{value.shape}".encode()
+        yield np.ascontiguousarray(value).tobytes()
+    elif is_dataclass(value):
+        yield type(value).__name__.encode()
+        yield from _bytes([getattr(value, one.name) for one in fields(value)])
+    elif isinstance(value, list | tuple):
+        yield f"({len(value)}".encode()
+        for one in value:
+            yield from _bytes(one)
+    elif isinstance(value, frozenset):
+        yield from _bytes(sorted(value))
+    else:
+        yield f"{type(value).__name__} {value!r};".encode()
