@@ -37,6 +37,8 @@ _TOUCH = 1e-9  # overlap over a body's size that comes from rounding, and is no 
 _NEVER = 1e3
 # overlap over that of the largest force, from which it comes from no force of a compliant joint [-]
 _UNEXPLAINED = 4.0
+# factor on the compliance where a step cannot be solved with it either [-]
+_SOFTER = 10.0
 # compliant steps after which rigid joints are tried again, at first; twice as many after each failure
 _FIRST_WAIT = 8
 
@@ -65,6 +67,10 @@ class JointCompliance:
         """Return the state after a failure with rigid joints: ε is a share of the mean diagonal of W [-]."""
         value = self.value or share * mean_diagonal(operator.diagonal)
         return JointCompliance(value, self.wait, 2 * self.wait)
+
+    def softer(self) -> "JointCompliance":
+        """Return the state with joints ten times as compliant."""
+        return replace(self, value=_SOFTER * self.value)
 
     def used(self) -> "JointCompliance":
         """Return the state after a step with compliant joints."""

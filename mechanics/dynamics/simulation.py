@@ -26,6 +26,13 @@ from moma.errors import SolverError
 
 __all__ = ["Simulation"]
 
+# compliances of the joints that are tried in one step
+_SOFTEST = 3
+
+# predicted state, contacts, free motion, internal variables, and the state in which the run begins
+_Given = tuple[State, Detection, Kick, Array, State | None]
+_Solved = tuple[ContactProblem, Approach, ContactSolution]
+
 
 class Simulation(Carrier):
     """A scene in motion; `step` advances it by one time step.
@@ -173,32 +180,36 @@ class Simulation(Carrier):
                 Step(before, predicted, after, kick, found, approach, problem, solution, *asleep)
             )
 
-    def _solved(
-        self, given: tuple[State, Detection, Kick, Array, State | None], warm: ContactStart
-    ) -> tuple[ContactProblem, Approach, ContactSolution]:
+    def _solved(self, given: _Given, warm: ContactStart) -> _Solved:
         """Return the problem of a step and its solution: with rigid joints, or compliant ones where these fail."""
-        clock, solvers, joints = self.clock, self._solvers, self._joints
-        best = None
+        solvers, joints = self._solvers, self._joints
         if joints.rigid:
-            with clock("assemble"):
-                problem, approach = contact_problem(self.model, *given, joints)
-            with clock("solve"):
-                solve = solvers.usual if joints.value == 0 else solvers.brief
-                best = problem, approach, solve(problem, shifted(problem, warm))
-            share = self.model.scene.solver.joint_compliance
-            if best[2].converged or solvers.compliant is None or share == 0:
-                return best
-            joints = joints.needed(problem.delassus, share)
-        assert solvers.compliant is not None
-        with clock("assemble"):
+            first = self._try(given, joints, solvers.usual if joints.value == 0 else solvers.brief, warm)
+            if first[2].converged or solvers.compliant is None:
+                return first
+            joints = joints.needed(first[0].delassus, self.model.scene.solver.joint_compliance)
+        else:
+            first = None
+        used = joints.used()
+        for _ in range(_SOFTEST):
+            found = self._try(given, joints, solvers.compliant, warm)
+            if found[2].converged:
+                self._joints = used
+                return found
+            first, joints = first or found, joints.softer()
+        if not self._joints.rigid:
+            self._joints = used
+        assert first is not None
+        return first
+
+    def _try(
+        self, given: _Given, joints: JointCompliance, solver: Solver | None, warm: ContactStart
+    ) -> _Solved:
+        assert solver is not None
+        with self.clock("assemble"):
             problem, approach = contact_problem(self.model, *given, joints, warm.impulse)
-        with clock("solve"):
-            solution = solvers.compliant(problem, shifted(problem, warm))
-        if best is not None and not solution.converged:
-            # as far as rigid joints can be solved
-            return best
-        self._joints = joints.used()
-        return problem, approach, solution
+        with self.clock("solve"):
+            return problem, approach, solver(problem, shifted(problem, warm))
 
     def _conclude(self, step: Step) -> Step:
         """Remember a step for the next one, and halt the bodies that relaxation or sleep halts after it."""

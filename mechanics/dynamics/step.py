@@ -124,6 +124,15 @@ class Step:
         )
 
     @cached_property
+    def compression(self) -> Array:
+        """ε h r_N = ε h² F (nc,), overlap of the contacts of the problem by the compliance of their joints [m]."""
+        compliance = self.problem.delassus.joint_compliance
+        if compliance is None:
+            return np.zeros(len(self.found.contacts))
+        pressed: Array = np.maximum(self.active.impulse[:, 0], 0.0)
+        return compliance[:, 0] * self.duration * pressed
+
+    @cached_property
     def _all(self) -> ContactForces:
         return self.active if self.asleep is None else self.active.joined(self.asleep)
 

@@ -53,7 +53,8 @@ class Watch(Carrier):
     width, and is faster than 0.05 √(g · width); or it has come to rest after such a fall, or after toppling. A body
     that rocks lifts its centre, one that slides slowly keeps its support: both move, and may still come to rest.
     *Undecided*: steps that were not solved may have added as much velocity as the motion has. Without gravity g
-    counts as 1 m/s². Displacements and speeds are relative to the supports where these are driven.
+    counts as 1 m/s². Displacements and speeds are relative to the supports where these are driven. Steps with compliant
+    joints count as solved, and are told.
 
     Parameters
     ----------
@@ -76,6 +77,7 @@ class Watch(Carrier):
         self._doubt = self._worst_error = self._fastest = 0.0
         self._still = False
         self._culprit, self._sunk, self._speed = 0, 0.0, 0.0
+        self._compliant, self._deepest, self._depth, self._pair = 0, 0.0, 0.0, (0, 0)
         self.rest_time = 0.0
 
     def __call__(self, step: Step, balance: Array) -> Outcome:
@@ -86,6 +88,7 @@ class Watch(Carrier):
         self._unsolved += not solution.converged
         self._doubt += error
         self._worst_error = max(self._worst_error, error)
+        self._see_joints(step)
         seen = seen_from_supports(model, self._start, state)
         speeds = np.where(model.fixed, 0.0, speed(model, seen))
         pace = speeds / _fall(model, state)
@@ -122,7 +125,7 @@ class Watch(Carrier):
         """Return the outcome in words, from that of the last step, its state, and the static start."""
         if outcome is Outcome.MOVING and (self._still or self._doubt > _DOUBT * self._fastest):
             outcome = Outcome.UNDECIDED
-        cautions = []
+        cautions = self._gave_way()
         if outcome is Outcome.EQUILIBRIUM:
             cautions += self._moved(state)
             if self._doubt > _DOUBT * self._fastest:
@@ -150,6 +153,27 @@ class Watch(Carrier):
             f"{self._unsolved} of {self._steps} steps were not solved, with errors of up to "
             f"{_short(self._worst_error)}/s"
         )
+
+    def _see_joints(self, step: Step) -> None:
+        """Remember how far compliant joints let stones into each other."""
+        compression = step.compression
+        self._compliant += step.problem.delassus.joint_compliance is not None
+        self._depth = float(compression.max(initial=0.0))
+        if self._depth > self._deepest:
+            self._deepest = self._depth
+            first, second = step.found.contacts.bodies[int(compression.argmax())]
+            self._pair = int(first), int(second)
+
+    def _gave_way(self) -> list[str]:
+        """Return a caution that states the compliance of the joints, if any step needed it."""
+        if not self._compliant:
+            return []
+        one, other = (self._model.scene.blocks[body].code for body in self._pair)
+        end = f"{_short(self._depth)} at the end" if self._depth > 0 else "rigid again at the end"
+        return [
+            f"joints gave way elastically in {self._compliant} of {self._steps} steps, which rigid joints did not "
+            f"solve: stones overlap by at most {_short(self._deepest)} for it ({one} and {other}; {end})"
+        ]
 
     def _moved(self, state: State) -> list[str]:
         """Return a caution that names the stone that moved furthest over its width, if it is worth one."""

@@ -75,7 +75,7 @@ def choose_solvers(settings: SolverSettings, deformable: bool) -> Solvers:
         return Solvers(usual)
     return Solvers(
         replace(usual, thorough=False),
-        replace(usual, max_iterations=min(_BRIEF, usual.max_iterations)),
+        replace(usual, max_iterations=min(_BRIEF, usual.max_iterations), thorough=False),
         Compliant(usual.tolerance, usual.velocity_tolerance, usual.max_iterations),
     )
 

@@ -42,28 +42,30 @@ class Compliant:
         if problem.delassus.rigid is None:
             found = Elastic(self.tolerance, self.velocity_tolerance, self.max_iterations)(problem, start)
             return replace(found, why=f"compliant joints, {found.why}")
-        best = self._newton(problem, start, "Newton")
-        if not best.converged:
-            best = _better(best, self._softer(problem, start))
+        best = self._newton(problem, start, "Newton", self.max_iterations)
+        if not best.converged and best.iterations < self.max_iterations:
+            best = _better(best, self._softer(problem, start, self.max_iterations - best.iterations))
         if not best.converged and best.iterations < self.max_iterations:
             most = min(_INTERIOR, self.max_iterations - best.iterations)
             found = InteriorPoint(self.tolerance, self.velocity_tolerance, most)(problem, start)
             best = _better(best, self._judged(problem, found, "interior point"))
         return best
 
-    def _softer(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
+    def _softer(self, problem: ContactProblem, start: ContactStart, most: int) -> ContactSolution:
         operator, count = problem.delassus, 0
         assert isinstance(operator, CompliantDelassus)
         for factor in _HOMOTOPY:
             soft = CompliantDelassus(operator.inner, factor * operator.joint_compliance)
-            found = self._newton(replace(problem, delassus=soft), start, "Newton from softer joints")
+            found = self._newton(
+                replace(problem, delassus=soft), start, "Newton from softer joints", most - count
+            )
             start, count = ContactStart(found.impulse, found.velocity), count + found.iterations
         return replace(found, iterations=count)
 
-    def _newton(self, problem: ContactProblem, start: ContactStart, name: str) -> ContactSolution:
+    def _newton(self, problem: ContactProblem, start: ContactStart, name: str, most: int) -> ContactSolution:
         even, each = equilibrated(problem)
         unit = each[:, None]
-        solver = ProximalNewton(self.tolerance, self.velocity_tolerance, _NEWTON_STEPS)
+        solver = ProximalNewton(self.tolerance, self.velocity_tolerance, min(_NEWTON_STEPS, most))
         found = solver(even, ContactStart(start.impulse / unit, start.velocity * unit))
         found = replace(found, impulse=found.impulse * unit, velocity=found.velocity / unit)
         return self._judged(problem, found, name)
