@@ -56,7 +56,7 @@ class Simulation:
         self._detect = ContactSearch(model, self._compliance, self.clock, fresh_contacts, elastic_scale)
         self._solve = solver or choose_solver(model.scene.solver, not model.rigid_only)
         self._relax = Relaxation(model)
-        self._memory = Memory()
+        self._memory = Memory(follows=not model.scene.time.relaxation)
         self._sleepers = Sleepers(model, start, self._memory)
         self._first = True
         self.cold = True
@@ -80,6 +80,7 @@ class Simulation:
             other.state, time=own.time, velocity=own.velocity, node_velocity=own.node_velocity
         )
         self._memory = other._memory.at_rest(self._step / other._step)
+        self._memory.follows = not self.model.scene.time.relaxation
         self.cold = False
         self._sleepers = Sleepers(self.model, self.state, self._memory)
         self._first = False
