@@ -184,7 +184,8 @@ def terms_of(problem: ContactProblem) -> Terms:
 
 def shifted(problem: ContactProblem, start: ContactStart) -> ContactStart:
     """Return a warm start in r̃ = r + s n, in which the problem is stated, from one in r."""
-    return replace(start, impulse=_moved(problem, start.impulse, 1.0))
+    ahead = None if start.ahead is None else shifted(problem, start.ahead)
+    return replace(start, impulse=_moved(problem, start.impulse, 1.0), ahead=ahead)
 
 
 def unshifted(problem: ContactProblem, impulse: Array) -> Array:

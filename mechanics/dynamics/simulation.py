@@ -72,7 +72,7 @@ class Simulation(Carrier):
         self._solvers = chosen if solver is None else Solvers(solver)
         self._joints = JointCompliance()
         self._relax = Relaxation(model)
-        self._memory = Memory()
+        self._memory = Memory(follows=not model.scene.time.relaxation)
         self._sleepers = Sleepers(model, start, self._memory)
         self._first = True
         self._freed = False
@@ -97,6 +97,7 @@ class Simulation(Carrier):
             other.state, time=own.time, velocity=own.velocity, node_velocity=own.node_velocity
         )
         self._memory = other._memory.at_rest(self._step / other._step)
+        self._memory.follows = not self.model.scene.time.relaxation
         self.cold = False
         self._sleepers = Sleepers(self.model, self.state, self._memory)
         self._first = False

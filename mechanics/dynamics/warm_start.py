@@ -1,8 +1,10 @@
 """Warm start: impulses, velocities and internal variables of the contacts that persist from step to step."""
 
+from dataclasses import replace
+
 import numpy as np
 
-from mechanics.arrays import Array, Ints
+from mechanics.arrays import Array, Bools, Ints
 from mechanics.carried import Carrier
 from mechanics.contact.contacts import PAIR_BIT
 from mechanics.problem.problem import ContactSolution, ContactStart
@@ -11,6 +13,7 @@ from mechanics.scene.laws.law import BOND, REST, STATE
 __all__ = ["Memory"]
 
 
+_AHEAD = 1.0  # part of the last change that is expected again [-]
 _OF_PLACES = [BOND, REST]  # internal variables that belong to places in a joint
 
 
@@ -21,19 +24,28 @@ class Memory(Carrier):
     edge, gets contacts with new keys; where any contact has one of the two, these inherit the internal variables of the
     nearest earlier contact of the pair.
 
+    In a motion the forces and velocities of the last two steps are extrapolated to the next one, for contacts of both.
+
     Parameters
     ----------
     dimension : d, of the impulses
+
+    Attributes
+    ----------
+    follows : the steps follow a motion, and need not begin where the last one ended
     """
 
-    CARRIED = ("_key", "_place", "_values")
+    CARRIED = ("_before", "_key", "_key_before", "_motion", "_place", "_values", "follows")
     REBUILT = ("_dimension",)
 
-    def __init__(self, dimension: int = 3) -> None:
-        self._dimension = dimension
+    def __init__(self, dimension: int = 3, follows: bool = False) -> None:
+        self._dimension, self.follows = dimension, follows
         self._key = np.zeros(0, dtype=np.int64)
         self._values = np.zeros((0, 2 * dimension + STATE))
         self._place: Array | None = None
+        # the step before the last one, and the number of steps to come that count as part of a motion
+        self._key_before, self._before = self._key, self._values[:, : 2 * dimension]
+        self._motion = 0
 
     def recall(self, key: Ints, place: Array | None = None) -> tuple[ContactStart, Array]:
         """Return the warm start of the contacts of some keys (nc,), and their internal variables (nc, STATE).
@@ -47,13 +59,25 @@ class Memory(Carrier):
             values = np.zeros((len(key), self._values.shape[1]))
             order = np.argsort(self._key, kind="stable")
             if len(order):
-                at = order[np.minimum(np.searchsorted(self._key, key, sorter=order), len(order) - 1)]
-                known = self._key[at] == key
+                at, known = _places(self._key, key, order)
                 values[known] = self._values[at[known]]
                 if place is not None and self._place is not None:
                     self._inherit(values, np.flatnonzero(~known), key, place, order)
         d = self._dimension
-        return ContactStart(values[:, :d], values[:, d : 2 * d]), values[:, 2 * d :]
+        motion = self._motion if self.follows else None
+        last = ContactStart(values[:, :d], values[:, d : 2 * d], motion)
+        if motion and len(self._key_before):
+            last = replace(last, ahead=self._extrapolated(key, values[:, : 2 * d]))
+        return last, values[:, 2 * d :]
+
+    def _extrapolated(self, key: Ints, last: Array) -> ContactStart:
+        """Return r and û of the next step, linear through the last two where a contact was there in both."""
+        at, known = _places(self._key_before, key, np.argsort(self._key_before, kind="stable"))
+        # a contact that was new in the last step, or is now, has no line
+        known &= last.any(axis=1)
+        ahead, d = last.copy(), self._dimension
+        ahead[known] += _AHEAD * (last[known] - self._before[at[known]])
+        return ContactStart(ahead[:, :d], ahead[:, d:])
 
     def _inherit(self, values: Array, new: Ints, key: Ints, place: Array, order: Ints) -> None:
         """Copy the internal variables of the nearest old contacts of their pairs to new ones (rows of `values`)."""
@@ -75,7 +99,8 @@ class Memory(Carrier):
 
     def store(self, key: Ints, solution: ContactSolution, state: Array, place: Array | None = None) -> None:
         """Remember a step: its solution, with true impulses r, internal variables (nc, STATE) and places."""
-        self._key, self._place = key, place
+        self._key_before, self._before = self._key, self._values[:, : 2 * self._dimension]
+        self._key, self._place, self._motion = key, place, solution.motion
         self._values = np.hstack([solution.impulse, solution.velocity, state])
 
     def take_up(self, key: Ints, solution: Array, state: Array, place: Array | None = None) -> None:
@@ -87,8 +112,14 @@ class Memory(Carrier):
 
     def at_rest(self, factor: float) -> "Memory":
         """Return the forces for a step `factor` times as long, of bodies that have come to rest; none with 0."""
-        d, other = self._dimension, Memory(self._dimension)
+        d, other = self._dimension, Memory(self._dimension, self.follows)
         other._key, other._place, other._values = self._key, self._place, self._values.copy()
         other._values[:, :d] *= factor
         other._values[:, d : 2 * d] = 0.0
         return other
+
+
+def _places(among: Ints, key: Ints, order: Ints) -> tuple[Ints, Bools]:
+    """Return where each key (nc,) stands `among` others, which `order` sorts, and whether it is there at all."""
+    at: Ints = order[np.minimum(np.searchsorted(among, key, sorter=order), len(order) - 1)]
+    return at, among[at] == key

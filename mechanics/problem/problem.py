@@ -227,10 +227,15 @@ class ContactStart:
     ----------
     impulse : (nc, d) r [N s]
     velocity : (nc, d) û = u + (bias + μ‖u_T‖) n, the velocity that is dual to r [m/s]
+    motion : steps that still count as part of a motion, as the last solution had it (`ContactSolution`); None where it
+        is not a motion that the steps follow
+    ahead : r and û extrapolated from the last two steps, in a motion; None where only one is known
     """
 
     impulse: Array
     velocity: Array
+    motion: int | None = None
+    ahead: "ContactStart | None" = None
 
 
 @dataclass(frozen=True)
@@ -245,6 +250,8 @@ class ContactSolution:
     natural_map : η of `impulse`, as mechanics.problem.residual computes it
     converged : η, and the velocity error where a solver checks it, are within their tolerances
     why : method that found the solution and the reason for its choice; empty where there was no choice
+    motion : number of steps to come that count as part of a motion: contacts slide or open in it, and the forces of one
+        step no longer solve the next
     """
 
     impulse: Array
@@ -253,3 +260,4 @@ class ContactSolution:
     natural_map: float
     converged: bool
     why: str = ""
+    motion: int = 0

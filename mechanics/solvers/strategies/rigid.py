@@ -8,6 +8,7 @@ import numpy as np
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.problem.residual import residual
 from mechanics.solvers.first_order.admm import ADMM
+from mechanics.solvers.first_order.body_admm import BodyADMM
 from mechanics.solvers.first_order.nsgs import NSGS
 from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.newton import Newton
@@ -53,6 +54,15 @@ _INTERIOR = 60
 _LAST_PENALTY = 0.3
 # iterations of that ADMM
 _LAST_ITERATIONS = 300
+
+# iterations of ADMM on the velocities of bodies, which cost as much as the interior point
+_BODY_ITERATIONS = 1000
+# steps without any slip after which a motion counts as over
+_MOTION = 10
+# velocity of a contact that slides, over the one up to which contacts may break their laws [-]
+_SLIDES = 10.0
+# stages that solve steps in which next to nothing moves
+_RESTING = ("sweeps", "admm, small penalty")
 
 _Solver = Callable[[ContactProblem, ContactStart], ContactSolution]
 
@@ -100,19 +110,42 @@ class Alternating:
             if rest is not None:
                 return rest
         before = "warm start" if warm else f"cold start, {len(start.impulse):,} contacts"
-        for name, solve, from_best in self._stages(problem, warm):
+        if start.motion and problem.delassus.rigid is not None:
+            found = self._in_motion(self.max_iterations)(problem, start)
+            found = self._judged(problem, found, "admm of bodies: motion")
+            if found.converged:
+                motion = _MOTION if self._slides(problem, found) else start.motion - 1
+                return replace(found, motion=motion)
+            before = f"admm of bodies stood at η {found.natural_map:.0e}"
+            best = _better(best, found)
+            start = ContactStart(best.impulse, best.velocity, start.motion)
+        for name, solve, from_best in self._stages(problem, warm, start.motion == 0):
             count = self.max_iterations - best.iterations
             begin = ContactStart(best.impulse, best.velocity) if from_best else start
             found = self._judged(problem, solve(count)(problem, begin), f"{name}: {before}")
             before = f"{name} stood at η {found.natural_map:.0e}"
+            if name not in _RESTING and warm and start.motion is not None:
+                found = replace(found, motion=_MOTION)
             best = _better(best, found)
             # the stages after sweeps ask for W in a form that can be factorised, which takes as long as a sweep
             if best.converged or best.iterations >= self.max_iterations:
                 break
         return best
 
+    def _in_motion(self, most: int) -> _Solver:
+        solver = BodyADMM(self.tolerance, self.velocity_tolerance, min(_BODY_ITERATIONS, most))
+        return lambda p, s: solver(p, s if s.ahead is None else s.ahead)
+
+    def _slides(self, problem: ContactProblem, found: ContactSolution) -> bool:
+        """Return whether a contact that carries a force moves by more than the solution leaves undecided."""
+        carries = found.impulse.any(axis=1)
+        fastest = float(np.abs(problem.u_free).max())
+        return bool(
+            np.abs(found.velocity[carries]).max(initial=0.0) > _SLIDES * self.velocity_tolerance * fastest
+        )
+
     def _stages(
-        self, problem: ContactProblem, warm: bool
+        self, problem: ContactProblem, warm: bool, may_move: bool
     ) -> Iterator[tuple[str, Callable[[int], _Solver], bool]]:
         """Yield names, solvers by their largest number of iterations, and whether each begins with the best so far."""
         limits = self.tolerance, self.velocity_tolerance
@@ -123,6 +156,8 @@ class Alternating:
             yield "admm, small penalty", self._static, False
             later = [("admm, balanced penalty", self._moving, False)]
             if problem.delassus.rigid is not None:
+                if warm and may_move:
+                    yield "admm of bodies", self._in_motion, False
                 yield "Newton", self._newton, False
                 interior = [
                     ("interior point", self._interior, False),

@@ -1,0 +1,366 @@
+"""Numba kernels of L D Lᵀ factors of symmetric, positive definite matrices of 6 × 6 blocks, one row for each body.
+
+Bodies are numbered in the order of their elimination. Those that follow each other and reach nearly the same later ones
+share a panel: a dense matrix (6 w, 6 m) for the w bodies of its columns and the m bodies of its rows, of which the
+first w are its own. Its entry (6 i + b, 6 p + a) couples velocity b of its i-th body with velocity a of the p-th of its
+rows, so that loops run along the long side. Panels are made from left to right, each from those before it that reach it
+(George & Liu 1981; Ng & Peyton 1993). At the end the blocks of L are divided by those on its diagonal: D⁻¹ takes their
+place, and no solution waits for a triangle.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+__all__ = ["Panels", "factorise", "panels_of", "postorder", "solve"]
+
+
+class Panels(NamedTuple):
+    """Pattern of the factors.
+
+    Attributes
+    ----------
+    body : (np+1,) int64, first body of each panel
+    first : (np+1,) int64, where the rows of each panel begin in `row`
+    row : int64, bodies of the rows of each panel, in order, its own first
+    start : (np+1,) int64, where each panel begins among the values
+    """
+
+    body: NDArray[np.int64]
+    first: NDArray[np.int64]
+    row: NDArray[np.int64]
+    start: NDArray[np.int64]
+
+
+@njit(cache=True)
+def _columns(pairs, count):
+    """Return where the rows of each body's column begin, and the rows with their fill, in order, its own first."""
+    start = np.zeros(count + 1, dtype=np.int64)
+    for p in range(pairs.shape[0]):
+        start[min(pairs[p, 0], pairs[p, 1]) + 1] += 1
+    for k in range(count):
+        start[k + 1] += start[k]
+    later, fill = np.empty(pairs.shape[0], dtype=np.int64), start[:-1].copy()
+    for p in range(pairs.shape[0]):
+        k = min(pairs[p, 0], pairs[p, 1])
+        later[fill[k]] = max(pairs[p, 0], pairs[p, 1])
+        fill[k] += 1
+    first = np.zeros(count + 1, dtype=np.int64)
+    row = np.empty(8 * count + pairs.shape[0] + 1, dtype=np.int64)
+    mark = np.full(count, -1, dtype=np.int64)
+    # columns whose second row is k pass their rows on to it
+    child, sibling = np.full(count, -1, dtype=np.int64), np.full(count, -1, dtype=np.int64)
+    for k in range(count):
+        at = first[k]
+        if at + count - k > row.shape[0]:
+            longer = np.empty(2 * row.shape[0] + count, dtype=np.int64)
+            longer[:at] = row[:at]
+            row = longer
+        row[at], mark[k] = k, k
+        end = at + 1
+        for p in range(start[k], start[k + 1]):
+            if mark[later[p]] != k:
+                mark[later[p]] = k
+                row[end] = later[p]
+                end += 1
+        j = child[k]
+        while j >= 0:
+            for p in range(first[j] + 2, first[j + 1]):
+                if mark[row[p]] != k:
+                    mark[row[p]] = k
+                    row[end] = row[p]
+                    end += 1
+            j = sibling[j]
+        row[at + 1 : end] = np.sort(row[at + 1 : end])
+        first[k + 1] = end
+        if end > at + 1:
+            parent = row[at + 1]
+            sibling[k] = child[parent]
+            child[parent] = k
+    return first, row
+
+
+@njit(cache=True)
+def postorder(pairs, count):  # pragma: no cover - compiled
+    """Return the rank (count,) int64 of each body in an order of the same fill in which chains follow each other.
+
+    Inputs
+    ------
+    pairs : (n, 2) int64, bodies that couple, those of one row different
+    count : int64, nm
+    """
+    first, row = _columns(pairs, count)
+    child, sibling = np.full(count, -1, dtype=np.int64), np.full(count, -1, dtype=np.int64)
+    roots = -1
+    for k in range(count - 1, -1, -1):
+        if first[k + 1] > first[k] + 1:
+            parent = row[first[k] + 1]
+            sibling[k] = child[parent]
+            child[parent] = k
+        else:
+            sibling[k] = roots
+            roots = k
+    rank, stack = np.empty(count, dtype=np.int64), np.empty(count + 1, dtype=np.int64)
+    number, top = 0, 0
+    root = roots
+    while root >= 0:
+        stack[0], top = root, 1
+        while top > 0:
+            k = stack[top - 1]
+            if child[k] >= 0:
+                stack[top] = child[k]
+                # visited once: its place is taken by the next
+                child[k] = sibling[child[k]]
+                top += 1
+            else:
+                rank[k] = number
+                number += 1
+                top -= 1
+        root = sibling[root]
+    return rank
+
+
+@njit(cache=True)
+def panels_of(pairs, count, spare):  # pragma: no cover - compiled
+    """Return the pattern of the factors.
+
+    Inputs
+    ------
+    pairs : (n, 2) int64, bodies that couple, those of one row different; repetitions are allowed
+    count : int64, nm
+    spare : float64, zeros that a panel may hold for its bodies to be together, over its other blocks
+
+    Outputs
+    -------
+    Panels
+    """
+    first, row = _columns(pairs, count)
+    body = np.empty(count + 1, dtype=np.int64)
+    number, k = 0, 0
+    while k < count:
+        body[number] = k
+        number += 1
+        true = first[k + 1] - first[k]
+        width = 1
+        while k + 1 < count and first[k + 1] > first[k] + 1 and row[first[k] + 1] == k + 1:
+            rows = first[k + 2] - first[k + 1]
+            more = true + rows
+            # of the square of its own bodies the upper half is no loss
+            whole = width * (width + 1) // 2 + width * rows + rows
+            if whole > (1.0 + spare) * more:
+                break
+            true, width, k = more, width + 1, k + 1
+        k += 1
+    body[number] = count
+    body = body[: number + 1].copy()
+    begin, start = np.zeros(number + 1, dtype=np.int64), np.zeros(number + 1, dtype=np.int64)
+    for s in range(number):
+        last, width = body[s + 1] - 1, body[s + 1] - body[s]
+        height = width + first[last + 1] - first[last] - 1
+        begin[s + 1] = begin[s] + height
+        start[s + 1] = start[s] + 36 * width * height
+    rows = np.empty(begin[number], dtype=np.int64)
+    for s in range(number):
+        last, at = body[s + 1] - 1, begin[s]
+        for k in range(body[s], last):
+            rows[at] = k
+            at += 1
+        rows[at : begin[s + 1]] = row[first[last] : first[last + 1]]
+    return Panels(body, begin, rows, start)
+
+
+@njit(cache=True, fastmath={"contract"})
+def _subtract(source, p, line, spot, row, work):
+    """Take from the line of one velocity of a body what an earlier panel contributes.
+
+    `source` (6 w, n) is that panel, `p` = 6 (place of the body among its rows) + velocity; `spot` is the place of each
+    body among the rows of the line's panel.
+    """
+    w, first = source.shape[0], p // 6
+    rest = source[:, 6 * first :]
+    # loops from zero on: other indices might be negative, and would not be vectorised
+    n = rest.shape[1]
+    for x in range(n):
+        work[x] = 0.0
+    for c in range(0, w, 6):
+        f0, f1, f2 = source[c, p], source[c + 1, p], source[c + 2, p]
+        f3, f4, f5 = source[c + 3, p], source[c + 4, p], source[c + 5, p]
+        s0, s1, s2, s3, s4, s5 = rest[c], rest[c + 1], rest[c + 2], rest[c + 3], rest[c + 4], rest[c + 5]
+        for x in range(n):
+            work[x] += f0 * s0[x] + f1 * s1[x] + f2 * s2[x] + f3 * s3[x] + f4 * s4[x] + f5 * s5[x]
+    for q in range(n // 6):
+        at, come = 6 * spot[row[first + q]], 6 * q
+        for a in range(6):
+            line[at + a] -= work[come + a]
+
+
+@njit(cache=True, fastmath={"contract"})
+def _finish(panel):
+    """Turn an updated panel into one of the Cholesky factor; return whether it is positive definite."""
+    w, n = panel.shape
+    for b in range(w):
+        pivot, line = panel[b, b], panel[b]
+        if not (pivot > 0.0 and np.isfinite(pivot)):
+            return False
+        scale = 1.0 / np.sqrt(pivot)
+        for x in range(b, n):
+            line[x] *= scale
+        for d in range(b + 1, w):
+            factor, other, own = line[d], panel[d, d:], line[d:]
+            for x in range(n - d):
+                other[x] -= factor * own[x]
+    return True
+
+
+@njit(cache=True, fastmath={"contract"})
+def _divide(panel, inverse):
+    """Divide the blocks of a panel by those on its diagonal, which D⁻¹ replaces; `inverse` (6, 6) is overwritten."""
+    w, n = panel.shape
+    for k in range(0, w, 6):
+        for b in range(5, -1, -1):
+            line, scale = panel[k + b, k + 6 :], 1.0 / panel[k + b, k + b]
+            for d in range(6):
+                inverse[b, d] = 0.0
+            inverse[b, b] = scale
+            for x in range(n - k - 6):
+                line[x] *= scale
+            for d in range(b + 1, 6):
+                factor, other = panel[k + b, k + d] * scale, panel[k + d, k + 6 :]
+                for c in range(d, 6):
+                    inverse[b, c] -= factor * inverse[d, c]
+                for x in range(n - k - 6):
+                    line[x] -= factor * other[x]
+        for b in range(6):
+            for d in range(6):
+                total = 0.0
+                for c in range(max(b, d), 6):
+                    total += inverse[b, c] * inverse[d, c]
+                panel[k + b, k + d] = total
+
+
+@njit(cache=True)
+def factorise(panels, value):  # pragma: no cover - compiled
+    """Factorise A = L D Lᵀ in place.
+
+    Inputs
+    ------
+    panels : Panels
+    value : float64, the panels of A: its lower triangle, and zeros
+
+    Outputs
+    -------
+    value : the panels of L, with D⁻¹ in the blocks on their diagonals
+    bool, whether A is positive definite
+    """
+    body, first, row, start = panels.body, panels.first, panels.row, panels.start
+    number = body.shape[0] - 1
+    owner, spot = np.empty(body[number], dtype=np.int64), np.zeros(body[number], dtype=np.int64)
+    # finished panels wait in a list of the next panel that they reach
+    head, follower = np.full(number, -1, dtype=np.int64), np.full(number, -1, dtype=np.int64)
+    place = np.zeros(number, dtype=np.int64)
+    highest = 0
+    for s in range(number):
+        owner[body[s] : body[s + 1]] = s
+        highest = max(highest, first[s + 1] - first[s])
+    work, inverse = np.empty(6 * highest), np.empty((6, 6))
+    for s in range(number):
+        width, height = body[s + 1] - body[s], first[s + 1] - first[s]
+        panel = value[start[s] : start[s + 1]].reshape((6 * width, 6 * height))
+        for p in range(height):
+            spot[row[first[s] + p]] = p
+        j = head[s]
+        while j >= 0:
+            then = follower[j]
+            high = first[j + 1] - first[j]
+            source = value[start[j] : start[j + 1]].reshape((6 * (body[j + 1] - body[j]), 6 * high))
+            rows, q = row[first[j] : first[j + 1]], place[j]
+            while q < high and rows[q] < body[s + 1]:
+                for b in range(6):
+                    _subtract(source, 6 * q + b, panel[6 * (rows[q] - body[s]) + b], spot, rows, work)
+                q += 1
+            place[j] = q
+            if q < high:
+                follower[j] = head[owner[rows[q]]]
+                head[owner[rows[q]]] = j
+            j = then
+        if not _finish(panel):
+            return False
+        if height > width:
+            place[s] = width
+            up = owner[row[first[s] + width]]
+            follower[s] = head[up]
+            head[up] = s
+    for s in range(number):
+        shape = 6 * (body[s + 1] - body[s]), 6 * (first[s + 1] - first[s])
+        _divide(value[start[s] : start[s + 1]].reshape(shape), inverse)
+    return True
+
+
+@njit(cache=True, fastmath={"contract", "reassoc"})
+def solve(panels, value, x, work):  # pragma: no cover - compiled
+    """Solve L D Lᵀ x = b.
+
+    Inputs
+    ------
+    panels : Panels
+    value : as `factorise` leaves it
+    x : (6 nm,) float64, b, overwritten
+    work : float64, as long as the longest panel at least, overwritten
+
+    Outputs
+    -------
+    x : the solution
+    """
+    body, first, row, start = panels.body, panels.first, panels.row, panels.start
+    number = body.shape[0] - 1
+    for s in range(number):
+        width, height, at = body[s + 1] - body[s], first[s + 1] - first[s], 6 * body[s]
+        n = 6 * height
+        panel = value[start[s] : start[s + 1]].reshape((6 * width, n))
+        for i in range(n):
+            work[i] = 0.0
+        for k in range(0, 6 * width, 6):
+            for a in range(6):
+                x[at + k + a] -= work[k + a]
+            x0, x1, x2 = x[at + k], x[at + k + 1], x[at + k + 2]
+            x3, x4, x5 = x[at + k + 3], x[at + k + 4], x[at + k + 5]
+            left, rest = panel[k : k + 6, k + 6 : n], work[k + 6 : n]
+            p0, p1, p2, p3, p4, p5 = left[0], left[1], left[2], left[3], left[4], left[5]
+            for i in range(n - k - 6):
+                rest[i] += x0 * p0[i] + x1 * p1[i] + x2 * p2[i] + x3 * p3[i] + x4 * p4[i] + x5 * p5[i]
+        for p in range(width, height):
+            to, come = 6 * row[first[s] + p], 6 * p
+            for a in range(6):
+                x[to + a] -= work[come + a]
+    for s in range(number - 1, -1, -1):
+        width, height, at = body[s + 1] - body[s], first[s + 1] - first[s], 6 * body[s]
+        n = 6 * height
+        panel = value[start[s] : start[s + 1]].reshape((6 * width, n))
+        for p in range(width, height):
+            come, to = 6 * row[first[s] + p], 6 * p
+            for a in range(6):
+                work[to + a] = x[come + a]
+        for k in range(6 * width - 6, -1, -6):
+            left, rest = panel[k : k + 6, k + 6 : n], work[k + 6 : n]
+            p0, p1, p2, p3, p4, p5 = left[0], left[1], left[2], left[3], left[4], left[5]
+            s0 = s1 = s2 = s3 = s4 = s5 = 0.0
+            for i in range(n - k - 6):
+                w = rest[i]
+                s0 += w * p0[i]
+                s1 += w * p1[i]
+                s2 += w * p2[i]
+                s3 += w * p3[i]
+                s4 += w * p4[i]
+                s5 += w * p5[i]
+            t0, t1, t2 = x[at + k], x[at + k + 1], x[at + k + 2]
+            t3, t4, t5 = x[at + k + 3], x[at + k + 4], x[at + k + 5]
+            sums = s0, s1, s2, s3, s4, s5
+            for a in range(6):
+                d = panel[k + a]
+                done = (
+                    d[k] * t0 + d[k + 1] * t1 + d[k + 2] * t2 + d[k + 3] * t3 + d[k + 4] * t4 + d[k + 5] * t5
+                )
+                work[k + a] = done - sums[a]
+                x[at + k + a] = done - sums[a]
