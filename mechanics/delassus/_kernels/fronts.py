@@ -60,6 +60,37 @@ def add_into(pivot, below, update, runs, block):  # pragma: no cover - compiled
                     target[i] += source[i]
 
 
+@njit(cache=True, fastmath={"contract"})
+def _subtract(target, columns, x):
+    """Let target -= Σ x[j] columns[j], four columns at a time, which reads and writes target once for them."""
+    whole = len(x) - len(x) % 4
+    for j in range(0, whole, 4):
+        x0, x1, x2, x3 = x[j], x[j + 1], x[j + 2], x[j + 3]
+        c0, c1, c2, c3 = columns[j], columns[j + 1], columns[j + 2], columns[j + 3]
+        for i in range(len(target)):
+            target[i] -= x0 * c0[i] + x1 * c1[i] + x2 * c2[i] + x3 * c3[i]
+    for j in range(whole, len(x)):
+        x0, c0 = x[j], columns[j]
+        for i in range(len(target)):
+            target[i] -= x0 * c0[i]
+
+
+@njit(cache=True, fastmath={"contract"})
+def _triangles(x, lu):
+    """Solve L U x = x in place, `lu` (k, k) by columns; L has ones on its diagonal."""
+    k = len(x)
+    for j in range(k):
+        own, column = x[j], lu[j]
+        for i in range(j + 1, k):
+            x[i] -= column[i] * own
+    for j in range(k - 1, -1, -1):
+        column = lu[j]
+        x[j] /= column[j]
+        own = x[j]
+        for i in range(j):
+            x[i] -= column[i] * own
+
+
 @njit(cache=True)
 def solve(b, layout, pivots, factor):  # pragma: no cover - compiled
     """Solve (W + Θ) x = b.
@@ -83,41 +114,27 @@ def solve(b, layout, pivots, factor):  # pragma: no cover - compiled
     local = np.empty(longest)
     for n in range(order.shape[0]):
         f = order[n]
-        k, start = width[f], dptr[f]
-        m = dptr[f + 1] - start - k
+        k, at, unknown = width[f], fptr[f], dof[dptr[f] : dptr[f + 1]]
+        m = len(unknown) - k
+        own, rest = local[:k], local[k : k + m]
         for i in range(k + m):
-            local[i] = b[dof[start + i]]
-        at = fptr[f]
+            local[i] = b[unknown[i]]
         for i in range(k):
             p = pivots[pptr[f] + i]
             if p != i:
-                local[i], local[p] = local[p], local[i]
-        for j in range(k):
-            x = local[j]
-            for i in range(j + 1, k):
-                local[i] -= factor[at + j * k + i] * x
-        for j in range(k - 1, -1, -1):
-            local[j] /= factor[at + j * k + j]
-            x = local[j]
-            for i in range(j):
-                local[i] -= factor[at + j * k + i] * x
+                own[i], own[p] = own[p], own[i]
+        _triangles(own, factor[at : at + k * k].reshape((k, k)))
         at += k * k + k * m
-        for j in range(k):
-            x = local[j]
-            for i in range(m):
-                local[k + i] -= factor[at + j * m + i] * x
+        _subtract(rest, factor[at : at + k * m].reshape((k, m)), own)
         for i in range(k + m):
-            b[dof[start + i]] = local[i]
+            b[unknown[i]] = local[i]
     for n in range(order.shape[0] - 1, -1, -1):
         f = order[n]
-        k, start = width[f], dptr[f]
-        m = dptr[f + 1] - start - k
-        at = fptr[f] + k * k
+        k, at, unknown = width[f], fptr[f] + width[f] * width[f], dof[dptr[f] : dptr[f + 1]]
+        m = len(unknown) - k
+        own, rest = local[:k], local[k : k + m]
+        for i in range(k + m):
+            local[i] = b[unknown[i]]
+        _subtract(own, factor[at : at + k * m].reshape((m, k)), rest)
         for i in range(k):
-            local[i] = b[dof[start + i]]
-        for j in range(m):
-            x = b[dof[start + k + j]]
-            for i in range(k):
-                local[i] -= factor[at + j * k + i] * x
-        for i in range(k):
-            b[dof[start + i]] = local[i]
+            b[unknown[i]] = own[i]
