@@ -8,6 +8,7 @@ from mechanics.dynamics.stopping import LASTING
 from mechanics.planar.contacts import PlanarContacts
 from mechanics.planar.model import PlanarModel, PlanarState
 from mechanics.planar.simulation import PlanarStep
+from mechanics.planar.stepping import load_work
 
 __all__ = ["PlanarEnergy", "PlanarWatch", "disk_speed", "imbalance", "kinetic_energy", "world_force"]
 
@@ -78,10 +79,8 @@ class PlanarEnergy:
         """Account for one step."""
         model, theta = self._model, self._model.scene.time.theta
         before, after = step.kick.velocity, step.after.velocity
-        mean, free = theta * after + (1 - theta) * before, ~model.fixed
-        pushed = step.loads[free] * mean[free]
-        power = model.mass[free] * (pushed[:, 0] + pushed[:, 1]) + model.moment[free] * pushed[:, 2]
-        external = float(power.sum()) + step.driven
+        mean = theta * after + (1 - theta) * before
+        external = load_work(model, step.loads, mean) + step.driven
         scheme = (theta - 0.5) * 2.0 * kinetic_energy(model, after - before)
         energy = kinetic_energy(model, after)
         self.unexplained += energy - self._kinetic - external - step.work + scheme

@@ -58,6 +58,7 @@ class PlanarHistory:
     iterations : sweeps
     contacts : contact points that are watched
     penetration : deepest overlap at the end of the step over the width of the smaller disk [-]
+    lifted : work against the loads by moving disks apart that overlap too far; mostly potential energy [J]
     """
 
     time: Array
@@ -68,6 +69,7 @@ class PlanarHistory:
     iterations: Ints
     contacts: Ints
     penetration: Array
+    lifted: Array
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.law import Law
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.scene import LawRule, SolverSettings
+from mechanics.stones.settings import Setting, check_settings
 from moma.errors import SceneError
 
 __all__ = ["Disk", "PlanarScene", "PlanarTime", "Wall"]
@@ -128,6 +130,7 @@ class PlanarScene:
     gravity : (gx, gy) [m/s²]
     law : contact law where no rule says otherwise
     rules : laws between two groups of bodies, by their codes; of two that name the same pair, the later holds
+    largest_overlap : beyond it disks are moved apart after a step, at unchanged velocities; overlaps of the start stay
     alert_distance : gap below which a contact is watched, relative to the smaller radius [-]
     thickness : of the slice; masses and areas are for it [m]
     time, solver : settings; *auto* is Gauss–Seidel here: contacts of disks open and slide all the time, and a sweep
@@ -143,6 +146,15 @@ class PlanarScene:
     law: Law = field(default_factory=DryJoint)
     rules: tuple[LawRule, ...] = ()
     alert_distance: float = 0.05
+    largest_overlap: Annotated[
+        float,
+        Setting(
+            "Overlap over the smallest radius that no step leaves: disks are moved apart; infinite: they never are.",
+            "-",
+            above=0,
+            infinite=True,
+        ),
+    ] = 0.01
     thickness: float = 1.0
     time: PlanarTime = field(default_factory=PlanarTime)
     solver: SolverSettings = field(default_factory=SolverSettings)
@@ -165,6 +177,7 @@ class PlanarScene:
         ):
             if not ok:
                 raise SceneError(f"{quantity} = {value!r}", where=self.name, remedy=remedy)
+        check_settings(self.name, self)
         self._check_named(known)
 
     def _check_named(self, known: set[str]) -> None:

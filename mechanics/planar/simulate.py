@@ -95,12 +95,13 @@ class _Log:
                 solution.iterations,
                 len(step.contacts),
                 float(np.max(-step.gap / step.contacts.size, initial=0.0)),
+                step.lifted,
             )
         )
 
     def history(self) -> PlanarHistory:
         """Return one array for each quantity."""
-        time, kinetic, speed, balance, eta, iterations, contacts, penetration = np.array(self._rows).T
+        time, kinetic, speed, balance, eta, iterations, contacts, penetration, lifted = np.array(self._rows).T
         return PlanarHistory(
             time,
             kinetic,
@@ -110,6 +111,7 @@ class _Log:
             iterations.astype(np.int64),
             contacts.astype(np.int64),
             penetration,
+            lifted,
         )
 
 

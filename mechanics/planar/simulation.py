@@ -10,7 +10,8 @@ from mechanics.dynamics.warm_start import Memory
 from mechanics.planar.contacts import PlanarContacts, PlanarDetector
 from mechanics.planar.delassus import PlanarDelassus
 from mechanics.planar.model import PlanarModel, PlanarState
-from mechanics.planar.stepping import Drive, fly, load_velocity
+from mechanics.planar.overlaps import Apart, Overlaps
+from mechanics.planar.stepping import Drive, fly, load_velocity, load_work
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.scene.laws.law import Approach, Terms
 from mechanics.solvers.choice import choose_planar_solver
@@ -35,10 +36,11 @@ class PlanarStep:
     solution : of the contact problem; its impulses are r̃, shifted where a law has adhesion
     impulse : (nc, 2) r on the candidates, local frame [N s]
     internal : (nc, STATE) what the laws remember
-    gap : (nc,) at the end of the step [m]
+    gap : (nc,) at the end of the step, after the correction of overlaps [m]
     loads : (nb, 3) change of the velocities by the loads [m/s, rad/s]
     work : r·u_θ, the work of the contacts [J]
     driven : work that driven bodies put in through the contacts [J]
+    lifted : work against the loads by the correction of overlaps; mostly potential energy [J]
     """
 
     before: PlanarState
@@ -53,6 +55,7 @@ class PlanarStep:
     loads: Array
     work: float
     driven: float
+    lifted: float
 
 
 @dataclass(frozen=True)
@@ -94,10 +97,11 @@ class PlanarSimulation:
         self._detector = PlanarDetector(model)
         self._solver = choose_planar_solver(solver)
         self._memory = Memory(2)
+        self._overlaps = Overlaps(model.scene.largest_overlap * float(model.radius.min()))
         self._first = True
 
     def step(self) -> PlanarStep:
-        """Fly, detect, state the problem, solve, fly on.
+        """Fly, detect, state the problem, solve, fly on, and move apart what overlaps too far.
 
         Raises
         ------
@@ -110,6 +114,8 @@ class PlanarSimulation:
             free = self._driven(kick, kick.velocity + loads)
         with self.clock("detect"):
             contacts = self._detector(kick)
+        if self._first:
+            self._overlaps.begin(contacts)
         solved = self._solve(kick, free, contacts, self._memory)
         for _ in range(_LOOKS):
             with self.clock("detect"):
@@ -130,7 +136,10 @@ class PlanarSimulation:
                     where=model.scene.name,
                     remedy="use a smaller time step",
                 )
-            return self._finish(kick, after, loads, solved)
+        with self.clock("solve"):
+            apart = self._apart(after, solved)
+        with self.clock("advance"):
+            return self._finish(kick, apart, loads, solved)
 
     def _overlooked(self, kick: PlanarState, solved: _Solved) -> PlanarContacts | None:
         """Detect with a wider watch; return the contacts if the impulses make unwatched bodies overlap, otherwise None.
@@ -238,8 +247,15 @@ class PlanarSimulation:
         impulse[acting], velocity[acting] = part.impulse, part.velocity
         return replace(part, impulse=impulse, velocity=velocity)
 
-    def _finish(self, kick: PlanarState, after: PlanarState, loads: Array, solved: _Solved) -> PlanarStep:
+    def _apart(self, after: PlanarState, solved: _Solved) -> Apart:
+        """Return the end of the step, where disks that overlap too far are moved apart."""
+        time, contacts, operator = self.model.scene.time, solved.contacts, solved.operator
+        gap = contacts.gap + time.step * time.theta * operator.relative_velocity(after.velocity)[:, 0]
+        return self._overlaps(contacts, operator, solved.stated.terms, Apart(after, gap), time.step)
+
+    def _finish(self, kick: PlanarState, apart: Apart, loads: Array, solved: _Solved) -> PlanarStep:
         """Update the laws with the solution, store it for the next step, and account."""
+        after = apart.state
         time, model, contacts, stated = self.model.scene.time, self.model, solved.contacts, solved.stated
         operator, solution, impulse = solved.operator, solved.solution, solved.impulse
         u_before = operator.relative_velocity(kick.velocity)
@@ -258,8 +274,9 @@ class PlanarSimulation:
             solution=solution,
             impulse=impulse,
             internal=internal,
-            gap=contacts.gap + time.step * time.theta * u[:, 0],
+            gap=apart.gap,
             loads=loads,
             work=float(np.sum(impulse * (time.theta * u + (1 - time.theta) * u_before))),
             driven=-float(np.sum(impulse * driving)),
+            lifted=0.0 if apart.moved is None else -load_work(model, loads, apart.moved) / time.step,
         )

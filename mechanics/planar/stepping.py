@@ -16,7 +16,7 @@ from mechanics.planar.model import PlanarModel, PlanarState
 from mechanics.scene.loads.load import Motion
 from moma.errors import SceneError
 
-__all__ = ["Drive", "fly", "load_velocity", "space"]
+__all__ = ["Drive", "fly", "load_velocity", "load_work", "space"]
 
 
 class Drive:
@@ -109,3 +109,14 @@ def load_velocity(model: PlanarModel, state: PlanarState, step: float) -> Array:
             gained[bodies, :2] += step * model.inertia[bodies, :1] * force[:, :2]
             gained[bodies, 2] += step * model.inertia[bodies, 1] * moment[:, 2]
     return gained
+
+
+def load_work(model: PlanarModel, gained: Array, rate: Array) -> float:
+    """Compute the product of the loads' impulses, which change the velocities by `gained` (nb, 3), with `rate` (nb, 3).
+
+    With velocities it is a work [J]; with displacements, a work times the step.
+    """
+    free = ~model.fixed
+    pushed = gained[free] * rate[free]
+    power = model.mass[free] * (pushed[:, 0] + pushed[:, 1]) + model.moment[free] * pushed[:, 2]
+    return float(power.sum())

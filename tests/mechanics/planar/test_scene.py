@@ -41,6 +41,10 @@ def moves(*codes):
         (lambda: PlanarScene("s", (DISK, DISK)), "codes used twice: d"),
         (lambda: PlanarScene("s", (DISK,), (Wall("d", (0, 0), (1, 0)),)), "codes used twice: d"),
         (lambda: PlanarScene("s", (DISK,), alert_distance=-0.1), "alert_distance"),
+        (
+            lambda: PlanarScene("s", (DISK,), largest_overlap=0.0),
+            "s: largest_overlap = 0.0; give a number greater than 0",
+        ),
         (lambda: PlanarScene("s", (DISK,), thickness=0.0), "thickness"),
         (lambda: PlanarScene("s", (DISK,), gravity=(0.0, np.nan)), "gravity"),
         (lambda: PlanarScene("s", (DISK,), frame_every=-1), "frame_every"),

@@ -1,0 +1,119 @@
+"""Correction of overlaps after a step: disks are moved apart, and their velocities stay as they are.
+
+A step that is not solved to the end lets disks sink into each other by a little, which adds up from step to step. The
+correction is a contact problem of displacements instead of velocities. With the displacements M⁻¹ H p of the bodies,
+and w = W p those of the contacts,
+
+    0 ≤ w_N + g + a ⊥ p_N ≥ 0,   ‖p_T‖ ≤ μ p_N,   and p_T opposes w_T, at the limit, while sliding
+
+from p = 0, by sweeps until no overlap -(g + w_N) is above its limit. Velocities and impulses take no part, so no
+kinetic energy comes of it; disks that are lifted gain potential energy, which is accounted for.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mechanics.arrays import Array, Ints
+from mechanics.planar.contacts import PlanarContacts
+from mechanics.planar.delassus import PlanarDelassus
+from mechanics.planar.model import PlanarState
+from mechanics.scene.laws.law import Terms
+
+__all__ = ["Apart", "Overlaps"]
+
+
+# overlap over the largest allowed that a correction leaves, a in the equations: contacts stay closed [-]
+_LEFT = 0.5
+# overlap beyond that from which disks are moved apart, over the largest allowed; the rest is for what is not linear
+_BEYOND = 0.3
+# sweeps between two looks
+_LOOK = 10
+# sweeps of one correction at most; what is left then is left to the next step
+_SWEEPS = 1000
+
+
+@dataclass(frozen=True)
+class Apart:
+    """Places at the end of a step.
+
+    Attributes
+    ----------
+    state : of the bodies; a correction leaves its velocities as they are
+    gap : (nc,) of the step's contacts [m]
+    moved : (nb, 3) displacements [m] and turns [rad] of the correction; None without one
+    """
+
+    state: PlanarState
+    gap: Array
+    moved: Array | None = None
+
+
+class Overlaps:
+    """Overlaps of a run, and their correction.
+
+    Overlaps of the start are those of the scene, and may stay.
+
+    Parameters
+    ----------
+    allowed : largest overlap [m]; infinite: none is corrected
+    """
+
+    def __init__(self, allowed: float) -> None:
+        self._allowed = allowed
+        self._key: Ints = np.zeros(0, dtype=np.int64)
+        self._gap: Array = np.zeros(0)
+
+    def begin(self, contacts: PlanarContacts) -> None:
+        """Take up the overlaps of the start."""
+        deep = np.flatnonzero(contacts.gap < 0)
+        deep = deep[np.argsort(contacts.key[deep], kind="stable")]
+        self._key, self._gap = contacts.key[deep], contacts.gap[deep]
+
+    def __call__(
+        self,
+        contacts: PlanarContacts,
+        operator: PlanarDelassus,
+        terms: Terms,
+        end: Apart,
+        step: float,
+    ) -> Apart:
+        """Move disks apart where their overlap is too large at the end of a step.
+
+        Overlaps that a rebound undoes within another step are left to it.
+
+        Parameters
+        ----------
+        contacts, operator : of the step
+        terms : their laws; contacts that do not act in the step, as before a rebound, may overlap
+        end : of the step
+        step : h [s]
+        """
+        gap, state = end.gap, end.state
+        if not (-gap).max(initial=0.0) > (_LEFT + _BEYOND) * self._allowed:
+            return end
+        left = np.minimum(self._of_start(contacts.key), -_LEFT * self._allowed)
+        limit = left - _BEYOND * self._allowed
+        opening = np.maximum(operator.relative_velocity(state.velocity)[:, 0], 0.0)
+        ahead = np.where(terms.bias < 0, gap + step * opening, gap)
+        ahead[~np.isfinite(terms.bias)] = np.inf
+        if not (ahead < limit).any():
+            return end
+        shift, none = np.zeros((len(gap), 2)), np.zeros(len(gap))
+        shift[:, 0] = ahead - left
+        sweep, push = operator.gauss_seidel(shift, terms.friction, none), np.zeros((len(gap), 2))
+        for _ in range(_SWEEPS // _LOOK):
+            sweep(push, _LOOK)
+            apart = operator.apply(push)[:, 0]
+            if (ahead + apart >= limit).all():
+                break
+        moved = operator.velocity_change(push)
+        place = replace(state, centre=state.centre + moved[:, :2], angle=state.angle + moved[:, 2])
+        return Apart(place, gap + apart, moved)
+
+    def _of_start(self, key: Ints) -> Array:
+        """Return the gaps (nc,) at the start of contacts that overlapped then; zero for the others."""
+        if not len(self._key):
+            return np.zeros(len(key))
+        at = np.minimum(np.searchsorted(self._key, key), len(self._key) - 1)
+        return np.where(self._key[at] == key, self._gap[at], 0.0)

@@ -1,0 +1,125 @@
+"""Overlaps that unsolved steps leave do not add up, and no kinetic energy comes of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mechanics.dynamics.progress import Clock
+from mechanics.planar.model import build_planar_model
+from mechanics.planar.scene import Disk, PlanarScene, PlanarTime, Wall
+from mechanics.planar.simulate import simulate_planar
+from mechanics.planar.simulation import PlanarSimulation
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.loads.load import Loads
+from mechanics.scene.loads.motions import ImposedMotion
+from mechanics.scene.loads.time_series import History
+from mechanics.scene.scene import Method, SolverSettings
+from tests.mechanics.planar.shapes import G, grid_of_disks
+
+
+def pushed_bed(columns, rows, steps, sweeps, largest_overlap=0.01, speed=0.5):
+    """Disks of about half a metre that fall into a bed, while its left wall comes in; no step is solved."""
+    centres, radii = grid_of_disks(columns, rows, radius=0.5, spread=0.14)
+    width = float((centres[:, 0] + radii).max())
+    low = float((centres[:, 1] - radii).min())
+    walls = (
+        Wall("floor", (-5.0, low), (width + 5.0, low)),
+        Wall("left", (0.0, low - 0.1), (0.0, 10 * rows)),
+        Wall("right", (width, low - 0.1), (width, 10 * rows)),
+    )
+    push = ImposedMotion(frozenset({"left"}), History.constant([speed, 0.0, 0.0]))
+    return PlanarScene(
+        "pushed",
+        tuple(
+            Disk(f"d{n}", tuple(c), float(r), 2800.0)
+            for n, (c, r) in enumerate(zip(centres, radii, strict=True))
+        ),
+        walls,
+        law=DryJoint(0.4),
+        time=PlanarTime(0.025, 1.0, steps * 0.025, stop_at_equilibrium=False),
+        solver=SolverSettings(Method.NSGS, 1e-12, 1e-12, sweeps),
+        loads=Loads(motions=(push,)),
+        largest_overlap=largest_overlap,
+    )
+
+
+def overlaps(result):
+    """Deepest overlap of each step over the smallest radius, at least: widths differ by a third."""
+    radii = np.array([disk.radius for disk in result.scene.disks])
+    return result.history.penetration * 2 * radii.max() / radii.min()
+
+
+def test_overlaps_do_not_add_up_in_a_slow_flow():
+    kept = simulate_planar(pushed_bed(24, 10, 300, 20))
+    left = simulate_planar(pushed_bed(24, 10, 300, 20, np.inf))
+    assert kept.errors.unconverged_steps > 290
+    # of the width of the smaller disk: half of what it is of its radius
+    assert 2 * left.errors.penetration > 0.03
+    assert 2 * kept.errors.penetration <= 0.01
+    assert left.history.lifted.max() == 0.0
+    assert kept.history.lifted.sum() > 0
+    assert max(kept.errors.energy, left.errors.energy) < 1e-12
+
+
+@pytest.mark.slow
+def test_overlaps_do_not_add_up_in_five_thousand_steps():
+    kept = simulate_planar(pushed_bed(40, 12, 5000, 100, speed=0.1))
+    assert kept.errors.unconverged_steps > 4000
+    assert overlaps(kept).max() <= 0.012
+    assert 2 * kept.errors.penetration <= 0.01
+
+
+def advanced(scene, steps):
+    model, start = build_planar_model(scene)
+    simulation = PlanarSimulation(model, start, Clock())
+    return simulation, [simulation.step() for _ in range(steps)]
+
+
+def test_a_correction_moves_disks_and_leaves_their_velocities_as_they_are():
+    kept, steps = advanced(pushed_bed(24, 10, 300, 20), 150)
+    first = next(n for n, step in enumerate(steps) if step.lifted != 0.0)
+    _, others = advanced(pushed_bed(24, 10, 300, 20, np.inf), first + 1)
+    one, other = steps[first], others[first]
+    np.testing.assert_array_equal(one.after.velocity, other.after.velocity)
+    np.testing.assert_array_equal(one.impulse, other.impulse)
+    moved = one.after.centre - other.after.centre
+    nd = len(kept.model.radius)
+    assert not moved[nd:].any()
+    # what is lifted is the work against gravity
+    assert one.lifted == pytest.approx(G * float(np.sum(kept.model.mass[:nd] * moved[:nd, 1])), rel=1e-6)
+    assert (-one.gap).max() <= 0.008 * kept.model.radius.min()
+    assert (-other.gap).max() > 0.008 * kept.model.radius.min()
+    np.testing.assert_array_equal(kept.state.centre, steps[-1].after.centre)
+
+
+@pytest.mark.parametrize("restitution", [0.5, 1.0])
+def test_what_rebounds_is_not_moved(restitution):
+    # it comes 0.01 m in a step, a tenth of its radius: Newton's law acts once it overlaps, and sends it back by itself
+    ball = Disk("ball", (0.0, 0.135), 0.1, velocity=(0.0, -10.0, 0.0))
+    scene = PlanarScene(
+        "rebound",
+        (ball,),
+        (Wall("floor", (-1.0, 0.0), (1.0, 0.0)),),
+        law=DryJoint(0.0, restitution=restitution),
+        time=PlanarTime(1e-3, 1.0, 0.008, stop_at_equilibrium=False),
+    )
+    one, other = (simulate_planar(replace(scene, largest_overlap=most)) for most in (0.01, np.inf))
+    assert other.history.penetration.max() > 0.01
+    np.testing.assert_array_equal(one.position, other.position)
+    assert not one.history.lifted.any()
+
+
+def test_overlaps_of_the_start_stay_and_those_of_the_motion_do_not():
+    # four in a row overlap by a fifth, under a load that two sweeps do not carry
+    disks = tuple(Disk(f"d{n}", (0.0, 0.1 + 0.18 * n), 0.1) for n in range(4))
+    scene = PlanarScene(
+        "overlapping",
+        disks,
+        (Wall("floor", (-1.0, 0.0), (1.0, 0.0)),),
+        time=PlanarTime(1e-2, 1.0, 2.0, stop_at_equilibrium=False),
+        solver=SolverSettings(Method.NSGS, 1e-12, 1e-12, 1),
+    )
+    kept = simulate_planar(scene)
+    assert kept.errors.unconverged_steps > 5
+    assert 0.1 <= kept.errors.penetration <= 0.105
