@@ -6,7 +6,7 @@ what counts is the cost of an iteration: of two passes over the contacts and one
 M + H Σ⁻¹ Hᵀ, less than that of a Gauss–Seidel sweep (mechanics/solvers/_kernels/body_admm.py).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import coo_array, csc_array
