@@ -157,23 +157,22 @@ class Simulation:
         """Return the problem of a step and its solution: with rigid joints, or compliant ones where these fail."""
         solvers, joints = self._solvers, self._joints
         if joints.rigid:
-            first = self._try(given, joints, solvers.usual if joints.value == 0 else solvers.brief, warm)
-            if first[2].converged or solvers.compliant is None:
-                return first
-            joints = joints.needed(first[0].delassus, self.model.scene.solver.joint_compliance)
-        else:
-            first = None
-        used = joints.used()
+            alone = solvers.compliant is None or joints.left < 0
+            solver = solvers.usual if alone else solvers.early if joints.value == 0 else solvers.brief
+            found = self._try(given, joints, solver, warm)
+            if found[2].converged or alone:
+                self._joints = joints.passed()
+                return found
+            joints = joints.needed(found[0].delassus, self.model.scene.solver.joint_compliance)
+        after = joints.used()
         for _ in range(_SOFTEST):
             found = self._try(given, joints, solvers.compliant, warm)
             if found[2].converged:
-                self._joints = used
+                self._joints = after
                 return found
-            first, joints = first or found, joints.softer()
-        if not self._joints.rigid:
-            self._joints = used
-        assert first is not None
-        return first
+            joints = joints.softer()
+        self._joints = self._joints.failed()
+        return self._try(given, self._joints, solvers.usual, warm)
 
     def _try(
         self, given: _Given, joints: JointCompliance, solver: Solver | None, warm: ContactStart
