@@ -1,4 +1,4 @@
-"""Compliant joints: an elastic layer across the joint, no creep along it, and rigid ones wherever these can be solved."""
+"""Compliant joints: an elastic layer across the joint, no creep along it; rigid ones wherever these can be solved."""
 
 from dataclasses import replace
 
@@ -55,7 +55,7 @@ def test_a_block_sinks_by_its_weight_over_the_stiffness_of_its_four_points_and_n
 def test_a_constant_shear_below_friction_moves_nothing_in_a_thousand_steps():
     """At half of the friction angle the block shears its joint by ε h² F_T, once, and stays.
 
-    Its centre moves as much again, as it leans: the moment m g sin α · a/2 turns it by m g sin α · ε h²/(2 a), a/2 below.
+    Its centre moves as much again, as it leans by the moment m g sin α · a/2, half its width a above the joint.
     """
     slope, epsilon = 0.5 * np.arctan(0.6), 1e-3 / MASS
     simulation, _ = compliant(block(slope), epsilon)
@@ -80,7 +80,7 @@ def test_the_weight_of_a_stack_sinks_through_all_its_joints():
     """The joint under stone k of n carries n - k + 1 weights."""
     stones = [brick(f"S{k}", (0, 0, 0.5 * k), (0.5, 0.5, 0.5 * k + 0.5)) for k in range(4)]
     epsilon = 1e-3 / MASS
-    simulation, model = compliant(scene(ground(), *stones, step=STEP), epsilon)
+    simulation = compliant(scene(ground(), *stones, step=STEP), epsilon)[0]
     for _ in range(60):
         simulation.step()
     each = epsilon * STEP**2 * MASS * G / 4
