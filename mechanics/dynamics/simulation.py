@@ -46,7 +46,7 @@ class Simulation:
     Attributes
     ----------
     state : at the end of the last step
-    cold : it began without the forces of another simulation
+    cold : it has known no forces other than its own since it began at rest, and was not halted
     """
 
     def __init__(
@@ -79,6 +79,7 @@ class Simulation:
 
     def halt(self, time: float) -> None:
         """Bring all bodies to a halt, and set the clock of the scene to `time` [s]."""
+        self.cold = False
         self.state = replace(halted(self.state), time=time)
 
     def take_over(self, other: "Simulation") -> None:
@@ -90,8 +91,11 @@ class Simulation:
         self.state = replace(
             other.state, time=own.time, velocity=own.velocity, node_velocity=own.node_velocity
         )
-        self._memory = other._memory.at_rest(self._step / other._step)
-        self.cold = False
+        pace = self._step / other._step
+        self._memory = other._memory.at_rest(pace)
+        # stiffness 1/(ε h²) stays
+        self._joints = replace(other._joints, value=other._joints.value / pace**2)
+        self.cold = other.cold and pace == 1.0
         self._sleepers = Sleepers(self.model, self.state, self._memory)
         self._first = False
 
