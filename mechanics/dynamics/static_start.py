@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from mechanics.arrays import Array
-from mechanics.dynamics.observers.equilibrium import displacement, imbalance, speed
+from mechanics.dynamics.observers.equilibrium import displacement, imbalance
 from mechanics.dynamics.outcome import StaticStart
 from mechanics.dynamics.progress import Progress
 from mechanics.dynamics.relaxation import halted
@@ -18,7 +18,9 @@ from mechanics.solvers.second_order.interior_point import InteriorPoint
 
 __all__ = ["static_start"]
 
-_LONG = 1.0  # time step where stones deform [s]: inertia leaves a structure of 1 Hz less than 1/40 of its motion to come
+_LONG = (
+    1.0  # time step where stones deform [s]: inertia leaves a structure of 1 Hz less than 1/40 of its motion
+)
 _STEPS = 10  # most such steps; few scenes need more than three
 _RELAXED = 1e-2  # shortest time step in which rigid stones settle [s]: they fall by a millimetre in it
 _RELAXED_STEPS = 50  # most of these; joints that are open by a millimetre need some ten
@@ -38,16 +40,12 @@ def static_start(
 
     Where stones deform, in steps of 1 s, each from a halt, until every body is in balance: with θ = 1 such a step is
     the static problem (docs/theory.md §2), as M/h² is negligible beside K, but determines the motion that nothing else
-    holds. Between rigid stones a step from rest is the static problem whatever its length, so that the run's own will do,
-    and it is the one with which a run from rest begins. Where that leaves stones in motion, because their joints are
-    open or warped, they settle in a relaxation.
+    holds. Between rigid stones a step from rest is the static problem whatever its length, so that the run's own will
+    do, and it is the one with which a run from rest begins. Where that leaves stones in motion, because their joints
+    are open or warped, they settle in a relaxation.
     """
-    start = halted(start)
-    return (
-        _Search(model, start, report).elastic()
-        if not model.rigid_only
-        else _Search(model, start, report).rigid()
-    )
+    search = _Search(model, halted(start), report)
+    return search.rigid() if model.rigid_only else search.elastic()
 
 
 class _Search:
