@@ -50,8 +50,9 @@ class JointCompliance:
     Attributes
     ----------
     value : ε of all joints once it has been needed, kept from then on; 0 until then [1/kg]
-    left : steps with compliant joints still to come, before rigid joints are tried again
-    wait : number of these after the next failure
+    left : steps with compliant joints still to come, before rigid joints are tried again; negative: steps that are left
+        to rigid joints alone, as compliant ones have failed, too
+    wait : number of steps after the next failure of either
     """
 
     value: float = 0.0
@@ -61,7 +62,7 @@ class JointCompliance:
     @property
     def rigid(self) -> bool:
         """Whether the next step is tried with rigid joints."""
-        return self.left == 0
+        return self.left <= 0
 
     def needed(self, operator: Delassus, share: float) -> "JointCompliance":
         """Return the state after a failure with rigid joints: ε is a share of the mean diagonal of W [-]."""
@@ -75,6 +76,14 @@ class JointCompliance:
     def used(self) -> "JointCompliance":
         """Return the state after a step with compliant joints."""
         return replace(self, left=self.left - 1)
+
+    def failed(self) -> "JointCompliance":
+        """Return the state after a step that could not be solved at all."""
+        return replace(self, left=-self.wait, wait=2 * self.wait)
+
+    def passed(self) -> "JointCompliance":
+        """Return the state after a step with rigid joints."""
+        return replace(self, left=min(self.left + 1, 0))
 
 
 _RIGID = JointCompliance()

@@ -48,7 +48,7 @@ class Simulation(Carrier):
     Attributes
     ----------
     state : at the end of the last step
-    cold : it began without the forces of another simulation
+    cold : it has known no forces other than its own since it began at rest, and was not halted
     """
 
     CARRIED = ("_first", "_freed", "_joints", "_memory", "_relax", "_sleepers", "cold", "state")
@@ -85,6 +85,7 @@ class Simulation(Carrier):
 
     def halt(self, time: float) -> None:
         """Bring all bodies to a halt, and set the clock of the scene to `time` [s]."""
+        self.cold = False
         self.state = replace(halted(self.state), time=time)
 
     def take_over(self, other: "Simulation") -> None:
@@ -96,9 +97,12 @@ class Simulation(Carrier):
         self.state = replace(
             other.state, time=own.time, velocity=own.velocity, node_velocity=own.node_velocity
         )
-        self._memory = other._memory.at_rest(self._step / other._step)
+        pace = self._step / other._step
+        self._memory = other._memory.at_rest(pace)
         self._memory.follows = not self.model.scene.time.relaxation
-        self.cold = False
+        # stiffness 1/(ε h²) stays
+        self._joints = replace(other._joints, value=other._joints.value / pace**2)
+        self.cold = other.cold and pace == 1.0
         self._sleepers = Sleepers(self.model, self.state, self._memory)
         self._first = False
 
@@ -185,23 +189,22 @@ class Simulation(Carrier):
         """Return the problem of a step and its solution: with rigid joints, or compliant ones where these fail."""
         solvers, joints = self._solvers, self._joints
         if joints.rigid:
-            first = self._try(given, joints, solvers.usual if joints.value == 0 else solvers.brief, warm)
-            if first[2].converged or solvers.compliant is None:
-                return first
-            joints = joints.needed(first[0].delassus, self.model.scene.solver.joint_compliance)
-        else:
-            first = None
-        used = joints.used()
+            alone = solvers.compliant is None or joints.left < 0
+            solver = solvers.usual if alone else solvers.early if joints.value == 0 else solvers.brief
+            found = self._try(given, joints, solver, warm)
+            if found[2].converged or alone:
+                self._joints = joints.passed()
+                return found
+            joints = joints.needed(found[0].delassus, self.model.scene.solver.joint_compliance)
+        after = joints.used()
         for _ in range(_SOFTEST):
             found = self._try(given, joints, solvers.compliant, warm)
             if found[2].converged:
-                self._joints = used
+                self._joints = after
                 return found
-            first, joints = first or found, joints.softer()
-        if not self._joints.rigid:
-            self._joints = used
-        assert first is not None
-        return first
+            joints = joints.softer()
+        self._joints = self._joints.failed()
+        return self._try(given, self._joints, solvers.usual, warm)
 
     def _try(
         self, given: _Given, joints: JointCompliance, solver: Solver | None, warm: ContactStart

@@ -3,23 +3,27 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
-
+from mechanics.arrays import Array
 from mechanics.dynamics.observers.equilibrium import displacement, imbalance
 from mechanics.dynamics.outcome import StaticStart
 from mechanics.dynamics.progress import Progress
 from mechanics.dynamics.relaxation import halted
 from mechanics.dynamics.simulation import Simulation
+from mechanics.dynamics.step import Step
+from mechanics.dynamics.stopping import rests
 from mechanics.model.model import Model
 from mechanics.scene.scene import TimeSettings
 from mechanics.scene.state import State
-from mechanics.solvers.choice import Solver
 from mechanics.solvers.second_order.interior_point import InteriorPoint
 
 __all__ = ["static_start"]
 
-_STEP = 1.0  # time step of the search [s]: inertia leaves a structure of 1 Hz less than 1/40 of its motion to come
-_STEPS = 10  # most steps of the search; few scenes need more than three
+_LONG = (
+    1.0  # time step where stones deform [s]: inertia leaves a structure of 1 Hz less than 1/40 of its motion
+)
+_STEPS = 10  # most such steps; few scenes need more than three
+_RELAXED = 1e-2  # shortest time step in which rigid stones settle [s]: they fall by a millimetre in it
+_RELAXED_STEPS = 50  # most of these; joints that are open by a millimetre need some ten
 _NATURAL_MAP = (
     0.1  # of the tolerance of η asked for [-]: Newton's last steps cost little, and spare the run its first
 )
@@ -32,37 +36,93 @@ _FALLS = 0.2  # displacement over the smallest width beyond which a stone falls 
 def static_start(
     model: Model, start: State, report: Callable[[Progress], None]
 ) -> tuple[StaticStart, Simulation]:
-    """Take steps of 1 s, each from a halt, until every body is in balance under the loads of the first instant.
+    """Search for the equilibrium under the loads of the first instant; driven supports stay where they are.
 
-    With θ = 1 such a step is the static problem (docs/theory.md §2): M/h² is negligible beside K, but determines the
-    motion that nothing else holds. Driven supports stay where they are.
+    Where stones deform, in steps of 1 s, each from a halt, until every body is in balance: with θ = 1 such a step is
+    the static problem (docs/theory.md §2), as M/h² is negligible beside K, but determines the motion that nothing else
+    holds. Between rigid stones a step from rest is the static problem whatever its length, so that the run's own will
+    do, and it is the one with which a run from rest begins. Where that leaves stones in motion, because their joints
+    are open or warped, they settle in a relaxation.
     """
-    still, start = _still(model, _STEP), halted(start)
-    asked = model.scene.solver
-    solver: Solver | None = None
-    if not model.rigid_only:
-        solver = InteriorPoint(
-            _NATURAL_MAP * max(asked.tolerance, _ROUNDING), _VELOCITY * asked.velocity_tolerance
-        )
-    search = Simulation(still, start, solver=solver, elastic_scale=True)
-    limit = model.scene.time.balance_tolerance
-    iterations, count, balance, eta, found = 0, 0, np.inf, np.inf, False
-    while count < _STEPS and not found:
+    search = _Search(model, halted(start), report)
+    return search.rigid() if model.rigid_only else search.elastic()
+
+
+class _Search:
+    """Steps of one search.
+
+    Parameters
+    ----------
+    model, start, report : as `static_start` takes them, all at rest
+    """
+
+    def __init__(self, model: Model, start: State, report: Callable[[Progress], None]) -> None:
+        self._model, self._start, self._report = model, start, report
+        self._count = self._iterations = 0
+        self._balance: Array | None = None
+        self._eta = 0.0
+
+    def elastic(self) -> tuple[StaticStart, Simulation]:
+        """Search in steps that leave no time for inertia."""
+        asked = self._model.scene.solver
+        eta = max(asked.tolerance, _ROUNDING)
+        solver = InteriorPoint(_NATURAL_MAP * eta, _VELOCITY * asked.velocity_tolerance)
+        search = Simulation(_still(self._model, _LONG), self._start, solver=solver, elastic_scale=True)
+        found = settles = False
+        while self._count < _STEPS and not found and (settles or self._count == 0):
+            self._step(search, _STEPS)
+            # each step begins at rest, and the loads stay those of the first instant
+            search.halt(self._start.time)
+            settles = self._settles(search)
+            found = settles and self._eta <= eta and self._largest <= self._model.scene.time.balance_tolerance
+        if found and self._model.inertia.moving.any():
+            search = _set_down(self._model, search)
+        return self._told(found), search
+
+    def rigid(self) -> tuple[StaticStart, Simulation]:
+        """Search by one step from rest, then by a relaxation."""
+        own = self._model.scene.time.step
+        search = Simulation(_still(self._model, own), self._start)
+        if self._at_rest(self._step(search, 1)):
+            return self._told(True), search
+        if own < _RELAXED:
+            search = Simulation(_still(self._model, _RELAXED), self._start)
+        found, most = False, _RELAXED_STEPS
+        while self._count < most and not found and self._settles(search):
+            # the loads stay those of the first instant
+            search.state = replace(search.state, time=self._start.time)
+            found = self._at_rest(self._step(search, most))
+        if found:
+            search.halt(self._start.time)
+            search = _set_down(self._model, search)
+        return self._told(found), search
+
+    def _step(self, search: Simulation, most: int) -> Step:
+        """Take a step, and look at its balance under the loads of the first instant."""
         made = search.step()
-        # the loads stay those of the first instant
-        search.halt(start.time)
-        count += 1
-        iterations += made.solution.iterations
-        eta = made.solution.natural_map
-        after = replace(made.after, time=start.time)
-        balance = float(imbalance(still, after, made.contacts, made.force, made.kick.load).max())
-        report(Progress("static", count, _STEPS, f"balance {balance:.1e}, η {eta:.1e}"))
-        if not bool((displacement(still, start, after) < _FALLS * still.surfaces.size).all()):
-            break
-        found = eta <= max(asked.tolerance, _ROUNDING) and balance <= limit
-    if found and model.inertia.moving.any():
-        search = _set_down(model, search)
-    return StaticStart(found, count, iterations, eta, balance), search
+        after = replace(made.after, time=self._start.time)
+        self._balance = imbalance(search.model, after, made.contacts, made.force, made.kick.load)
+        self._count, self._iterations = self._count + 1, self._iterations + made.solution.iterations
+        self._eta = made.solution.natural_map
+        text = f"balance {self._largest:.1e}, η {self._eta:.1e}"
+        self._report(Progress("static", self._count, most, text))
+        return made
+
+    @property
+    def _largest(self) -> float:
+        return float("inf") if self._balance is None else float(self._balance.max())
+
+    def _at_rest(self, made: Step) -> bool:
+        assert self._balance is not None
+        return made.solution.converged and rests(self._model, made.after, self._balance)
+
+    def _settles(self, search: Simulation) -> bool:
+        """Return whether no stone has moved by more than a settlement."""
+        moved = displacement(self._model, self._start, search.state)
+        return bool((moved < _FALLS * self._model.surfaces.size).all())
+
+    def _told(self, found: bool) -> StaticStart:
+        return StaticStart(found, self._count, self._iterations, self._eta, self._largest)
 
 
 def _still(model: Model, step: float) -> Model:

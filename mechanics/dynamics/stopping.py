@@ -21,7 +21,7 @@ from mechanics.model.model import Model
 from mechanics.problem.residual import residual
 from mechanics.scene.state import State
 
-__all__ = ["LASTING", "MOVED", "Verdict", "Watch", "balance_of", "lasts"]
+__all__ = ["LASTING", "MOVED", "Verdict", "Watch", "balance_of", "lasts", "rests"]
 
 
 LASTING = 5  # steps in a row that must be in balance
@@ -240,6 +240,11 @@ def lasts(simulation: Simulation) -> bool:
         if quiet >= LASTING:
             return True
     return False
+
+
+def rests(model: Model, state: State, balance: Array) -> bool:
+    """Return whether all bodies are in balance (nb,) and slow, where no support is driven."""
+    return _rests(model, balance, np.where(model.fixed, 0.0, speed(model, state)) / _fall(model, state))
 
 
 def _rests(model: Model, balance: Array, pace: Array) -> bool:

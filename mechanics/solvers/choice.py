@@ -34,11 +34,13 @@ class Solvers:
     Attributes
     ----------
     usual : of rigid joints
-    brief : of rigid joints, where they have failed before: it fails early; None where these are always tried
+    early : of rigid joints, where compliant ones are a way out: it fails sooner
+    brief : the same where rigid joints have failed before: it takes no longer than a step with compliant joints
     compliant : of compliant joints; None where joints stay rigid
     """
 
     usual: Solver
+    early: Solver | None = None
     brief: Solver | None = None
     compliant: Solver | None = None
 
@@ -74,6 +76,7 @@ def choose_solvers(settings: SolverSettings, deformable: bool) -> Solvers:
     if not isinstance(usual, Auto) or settings.joint_compliance == 0:
         return Solvers(usual)
     return Solvers(
+        usual,
         replace(usual, thorough=False),
         replace(usual, max_iterations=min(_BRIEF, usual.max_iterations), thorough=False),
         Compliant(usual.tolerance, usual.velocity_tolerance, usual.max_iterations),

@@ -16,6 +16,8 @@ __all__ = ["Compliant"]
 _HOMOTOPY = (100.0, 30.0, 10.0, 3.0, 1.0)
 # steps of Newton's method with each
 _NEWTON_STEPS = 30
+# tolerances of Newton's method over those asked for: what they leave would be a creep [-]
+_FURTHER = 1e-3
 # iterations of the interior point
 _INTERIOR = 60
 
@@ -65,7 +67,8 @@ class Compliant:
     def _newton(self, problem: ContactProblem, start: ContactStart, name: str, most: int) -> ContactSolution:
         even, each = equilibrated(problem)
         unit = each[:, None]
-        solver = ProximalNewton(self.tolerance, self.velocity_tolerance, min(_NEWTON_STEPS, most))
+        further = _FURTHER * self.tolerance, _FURTHER * self.velocity_tolerance
+        solver = ProximalNewton(*further, min(_NEWTON_STEPS, most))
         found = solver(even, ContactStart(start.impulse / unit, start.velocity * unit))
         found = replace(found, impulse=found.impulse * unit, velocity=found.velocity / unit)
         return self._judged(problem, found, name)
