@@ -84,8 +84,8 @@ def simulate(
     SceneError, GeometryError, MeshError : if the scene cannot be built
     SolverError : if the motion is no longer finite
     """
-    # dense products of stones are small: more threads than those of the scene cost more than they gain
-    with ThreadpoolController().limit(limits=scene.solver.threads, user_api="blas"):
+    # dense products of stones are small, and those of several threads would not be the same to the last bit
+    with ThreadpoolController().limit(limits=1, user_api="blas"):
         return _simulate(scene, progress, stop, built, archive)
 
 

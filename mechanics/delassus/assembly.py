@@ -66,7 +66,8 @@ def mixed_delassus(
     total = (diagonal.reshape(-1, 2, 3, 3) + jacobian @ response).sum(axis=1)
     own_part = total - _rigid_share(model, state, contacts, kind) if elastic_scale else total
     scale = float(np.einsum("cii->", own_part) / max(3 * len(contacts), 1))
-    return MixedDelassus(body, kind, jacobian, response, slot, yptr, bptr, block, total, scale)
+    threads = model.scene.solver.threads
+    return MixedDelassus(body, kind, jacobian, response, slot, yptr, bptr, block, total, scale, threads)
 
 
 def _rigid_share(model: Model, state: State, contacts: Contacts, kind: Ints) -> Array:

@@ -19,10 +19,11 @@ class CondensedForm:
     ----------
     bodies : (nc, 2) of each contact
     cliques : W as a sum of blocks
+    threads : that factorise; the factors are the same to the last bit
     """
 
-    def __init__(self, bodies: Ints, cliques: Cliques) -> None:
-        self._bodies, self._cliques = bodies, cliques
+    def __init__(self, bodies: Ints, cliques: Cliques, threads: int = 1) -> None:
+        self._bodies, self._cliques, self._threads = bodies, cliques, threads
         self._relaxed: dict[float, Callable[[Array], Array]] = {}
 
     @property
@@ -48,7 +49,7 @@ class CondensedForm:
         ------
         SolverError : if W + Θ is singular
         """
-        return self._fronts.factorise(self._cliques, theta).solve
+        return self._fronts.factorise(self._cliques, theta, self._threads).solve
 
     def relaxed(self, sigma: float) -> Callable[[Array], Array]:
         """Return (W/σ + 1)⁻¹ as a function of b (3 nc,); its factors are kept for the next call."""

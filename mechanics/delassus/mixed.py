@@ -34,6 +34,7 @@ class MixedDelassus:
     block : flat symmetric compliance blocks of the elastic bodies, between their contact sides [1/kg]
     diagonal : (nc, 3, 3) W_αα [1/kg]
     scale : reference against which u is measured over r [1/kg]
+    threads : that factorise W
     """
 
     body: Ints
@@ -46,6 +47,7 @@ class MixedDelassus:
     block: Array
     diagonal: Array
     scale: float
+    threads: int = 1
 
     rigid = None
     joint_compliance = None
@@ -91,7 +93,7 @@ class MixedDelassus:
     @cached_property
     def form(self) -> CondensedForm:
         """W for methods that factorise."""
-        return CondensedForm(self.body, self.cliques)
+        return CondensedForm(self.body, self.cliques, self.threads)
 
     def scaled(self, unit: Array) -> ScaledDelassus:
         """Return D W D with the units (nc,) of the contacts on the diagonal of D."""

@@ -7,8 +7,10 @@ to the next, and nothing is sought among single entries. Θ has a block for each
 are exchanged within a front (docs/decisions/009-factors-by-stones.md, 035-elastic-factors.md).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +21,14 @@ from mechanics.delassus._kernels.fronts import Layout, add_into, solve
 from moma.errors import SolverError
 
 __all__ = ["Cliques", "Factors", "Fronts", "fronts"]
+
+
+# columns of a front that one thread takes at a time
+_PANEL = 192
+# pivots of a front, in contacts, beyond which it takes in no more: a wider one is eliminated by a single thread
+_WIDEST = 96
+# largest work of a subtree that one thread eliminates alone, over that of all [-]
+_SUBTREE = 0.1
 
 
 @dataclass(frozen=True)
@@ -55,40 +65,97 @@ class Fronts:
         """Number of entries of the factors."""
         return int(self.layout.fptr[-1])
 
-    def factorise(self, cliques: Cliques, theta: Array) -> "Factors":
-        """Factorise W + Θ; `theta` (nc, 3, 3) blocks on its diagonal.
+    def factorise(self, cliques: Cliques, theta: Array, threads: int = 1) -> "Factors":
+        """Factorise W + Θ; `theta` (nc, 3, 3) blocks on its diagonal. The result does not depend on the threads.
 
         Raises
         ------
         SolverError : if W + Θ is singular
         """
-        layout = self.layout
-        factor, pivots = np.zeros(self.size), np.empty(int(layout.pptr[-1]), dtype=np.int32)
+        run = _Elimination(self, cliques, theta)
+        if threads == 1:
+            for f in self.layout.order.tolist():
+                run.eliminate(f, map)
+        else:
+            trees, top = self._split
+            with ThreadPoolExecutor(threads) as pool:
+                list(pool.map(run.eliminate_all, trees))
+                for f in top:
+                    run.eliminate(f, pool.map)
+        return Factors(self, run.factor, run.pivots)
+
+    @cached_property
+    def _split(self) -> tuple[list[list[int]], list[int]]:
+        """Fronts of small subtrees, which need nothing of each other, largest first; and the fronts above them."""
+        width, whole = self.layout.width.astype(float), np.diff(self.layout.dptr).astype(float)
+        own = width**3 / 1.5 + 2.0 * width * (whole - width) * whole
+        work, above = own.copy(), np.full(len(own), -1)
+        for f in self.layout.order:
+            for child, _ in self.children[f]:
+                work[f] += work[child]
+                above[child] = f
+        small = work <= _SUBTREE * own.sum()
+        root = np.arange(len(own))
+        for f in self.layout.order[::-1]:
+            if small[f] and above[f] >= 0 and small[above[f]]:
+                root[f] = root[above[f]]
+        trees: dict[int, list[int]] = {}
+        for f in self.layout.order[small[self.layout.order]].tolist():
+            trees.setdefault(int(root[f]), []).append(f)
+        largest = sorted(trees, key=lambda f: -work[f])
+        return [trees[f] for f in largest], self.layout.order[~small[self.layout.order]].tolist()
+
+
+class _Elimination:
+    """One factorisation under way."""
+
+    def __init__(self, fronts: Fronts, cliques: Cliques, theta: Array) -> None:
+        self._fronts, self._theta = fronts, theta
         # symmetric, so that those by rows are those by columns
-        blocks = [np.asfortranarray(block.T) for block in cliques.blocks]
-        updates: dict[int, Array] = {}
-        for f in layout.order.tolist():
-            k, at = int(layout.width[f]), int(layout.fptr[f])
-            m = int(layout.dptr[f + 1] - layout.dptr[f]) - k
-            # views of the factors, by columns
-            pivot = factor[at : at + k * (k + m)].reshape(k + m, k).T
-            below = factor[at + k * (k + m) : at + k * (k + 2 * m)].reshape(k, m).T
-            update = np.zeros((m, m)).T
-            for clique, runs in self.cliques[f]:
-                add_into(pivot, below, update, runs, blocks[clique])
-            for child, runs in self.children[f]:
-                add_into(pivot, below, update, runs, updates.pop(child))
-            _add_diagonal(pivot, theta[layout.dof[layout.dptr[f] : layout.dptr[f] + k : 3] // 3])
-            lu, exchanged, failed = dgetrf(pivot[:, :k], overwrite_a=True)
-            if failed:
-                raise SolverError("W + Θ is singular", where="solver", remedy="use another method")
-            pivots[layout.pptr[f] : layout.pptr[f + 1]] = exchanged
-            if m:
-                across, _ = dgetrs(lu, exchanged, pivot[:, k:], overwrite_b=True)
-                # transposed, as the product is made by rows
-                update -= (across.T @ below.T).T
-                updates[f] = update
-        return Factors(self, factor, pivots)
+        self._blocks = [np.asfortranarray(block.T) for block in cliques.blocks]
+        self._updates: dict[int, Array] = {}
+        self.factor = np.zeros(fronts.size)
+        self.pivots = np.empty(int(fronts.layout.pptr[-1]), dtype=np.int32)
+
+    def eliminate_all(self, own: list[int]) -> None:
+        """Eliminate fronts one after the other."""
+        for f in own:
+            self.eliminate(f, map)
+
+    def eliminate(self, f: int, each: Callable[..., Iterable[None]]) -> None:
+        """Eliminate the pivots of a front, with `each` applied to parts of its columns, which are always the same."""
+        layout = self._fronts.layout
+        k, at = int(layout.width[f]), int(layout.fptr[f])
+        m = int(layout.dptr[f + 1] - layout.dptr[f]) - k
+        # views of the factors, by columns
+        pivot = self.factor[at : at + k * (k + m)].reshape(k + m, k).T
+        below = self.factor[at + k * (k + m) : at + k * (k + 2 * m)].reshape(k, m).T
+        update = np.zeros((m, m)).T
+        for clique, runs in self._fronts.cliques[f]:
+            add_into(pivot, below, update, runs, runs, self._blocks[clique])
+        for child, runs in self._fronts.children[f]:
+            add = partial(add_into, pivot, below, update, runs, block=self._updates.pop(child))
+            list(each(add, _parts(runs)))
+        _add_diagonal(pivot, self._theta[layout.dof[layout.dptr[f] : layout.dptr[f] + k : 3] // 3])
+        lu, exchanged, failed = dgetrf(pivot[:, :k], overwrite_a=True)
+        if failed:
+            raise SolverError("W + Θ is singular", where="solver", remedy="use another method")
+        self.pivots[layout.pptr[f] : layout.pptr[f + 1]] = exchanged
+
+        def reduce(first: int) -> None:
+            last = min(first + _PANEL, m)
+            across, _ = dgetrs(lu, exchanged, pivot[:, k + first : k + last], overwrite_b=True)
+            # transposed, as the product is made by rows
+            update[:, first:last] -= (across.T @ below.T).T
+
+        list(each(reduce, range(0, m, _PANEL)))
+        if m:
+            self._updates[f] = update
+
+
+def _parts(runs: Ints) -> list[Ints]:
+    """Return the runs in parts of some columns each."""
+    return np.split(runs, np.flatnonzero(np.diff(runs[:, 2].cumsum() // _PANEL)) + 1)
 
 
 def _add_diagonal(pivot: Array, theta: Array) -> None:
@@ -124,19 +191,19 @@ def fronts(pairs: Ints, cliques: Sequence[Ints]) -> Fronts:
     order, later = _least_degree(count, size, around)
     order, pivots, later = _merged(order, later, size)
     rank = np.empty(count, dtype=np.int64)
-    for place, f in enumerate(order):
-        rank[pivots[f]] = place
+    for f in order:
+        rank[pivots[f]] = f
     width = np.array([3 * size[groups].sum() for groups in pivots], dtype=np.int64)
     unknowns = [_unknowns([members[g] for g in (*pivots[f], *later[f])]) for f in range(len(pivots))]
     own: list[list[tuple[int, Ints]]] = [[] for _ in pivots]
     for clique, groups in enumerate(around):
         if len(groups):
-            f = order[rank[groups].min()]
+            f = int(rank[groups].min())
             own[f].append((clique, _runs(_places(unknowns[f], _unknowns([cliques[clique]])), width[f])))
     children: list[list[tuple[int, Ints]]] = [[] for _ in pivots]
     for f in order:
         if later[f]:
-            parent = order[rank[later[f]].min()]
+            parent = int(rank[later[f]].min())
             place = _places(unknowns[parent], unknowns[f][width[f] :])
             children[parent].append((int(f), _runs(place, width[parent])))
     lengths = np.array([len(u) for u in unknowns], dtype=np.int64)
@@ -177,7 +244,7 @@ def _merged(order: Ints, later: list[list[int]], size: Ints) -> tuple[Ints, list
         pivots[f] = [f]
         # as long as nothing else has joined it, wide ones first
         for child in sorted(children[f], key=wide.__getitem__, reverse=True):
-            if rest[child] != wide[f] + rest[f]:
+            if rest[child] != wide[f] + rest[f] or wide[child] + wide[f] > _WIDEST:
                 continue
             pivots[f] = pivots.pop(child) + pivots[f]
             wide[f] += wide.pop(child)

@@ -29,13 +29,14 @@ class Layout(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def add_into(pivot, below, update, runs, block):  # pragma: no cover - compiled
+def add_into(pivot, below, update, runs, columns, block):  # pragma: no cover - compiled
     """Add a block to a front.
 
     Inputs
     ------
     runs : (nr, 3) int64, of each run of neighbouring unknowns its place in the front, its place in the block, and its
         length; none reaches from the pivots into the rest
+    columns : (nc, 3) int64, those of the runs whose columns are added
     block : (n, n) float64, by columns
 
     Outputs
@@ -44,11 +45,11 @@ def add_into(pivot, below, update, runs, block):  # pragma: no cover - compiled
         pivots, and the rest
     """
     k = pivot.shape[0]
-    for s in range(runs.shape[0]):
-        left, across, columns = runs[s, 0], runs[s, 1], runs[s, 2]
+    for s in range(columns.shape[0]):
+        left, across, wide = columns[s, 0], columns[s, 1], columns[s, 2]
         for t in range(runs.shape[0]):
             top, down, rows = runs[t, 0], runs[t, 1], runs[t, 2]
-            for j in range(columns):
+            for j in range(wide):
                 if top < k:
                     target = pivot[top : top + rows, left + j]
                 elif left < k:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
+from mechanics.problem.residual import residual
 from mechanics.solvers.first_order.admm import ADMM
 from mechanics.solvers.second_order.interior_point import InteriorPoint
 
@@ -10,6 +11,10 @@ __all__ = ["Elastic"]
 
 # iterations of ADMM that cost as much as the interior-point method takes in all
 _ADMM = 400
+# the same from a start that is nearly a solution, which Newton's method ends by a handful of factorisations
+_NEARLY_ADMM = 60
+# η of such a start [-]
+_NEARLY = 1e-4
 
 
 @dataclass(frozen=True)
@@ -17,8 +22,9 @@ class Elastic:
     """ADMM from where the last step ended, and the interior-point method where it does not converge soon.
 
     ADMM factorises once for as long as contacts persist, so where little changes from step to step a few of its cheap
-    iterations suffice. The interior-point method factorises in each of some 30, whatever the state
-    (docs/decisions/010-interior-point.md has the measurements).
+    iterations suffice, and where they do not, Newton's method, with which the interior point begins, ends it. The
+    interior point factorises in each of some 30 iterations, whatever the state (docs/decisions/010-interior-point.md
+    and 035-elastic-factors.md have the measurements).
 
     Attributes
     ----------
@@ -34,7 +40,9 @@ class Elastic:
         """Solve from `start`; `why` names the method of the two that solved it."""
         limits = self.tolerance, self.velocity_tolerance
         warm = "warm start" if start.impulse.any() else f"cold start, {len(start.impulse):,} contacts"
-        first = ADMM(*limits, min(_ADMM, self.max_iterations))(problem, start)
+        near = start.impulse.any() and residual(problem, start.impulse).natural_map <= _NEARLY
+        most = min(_NEARLY_ADMM if near else _ADMM, self.max_iterations)
+        first = ADMM(*limits, most)(problem, start)
         first = replace(first, why=f"admm: {warm}")
         if first.converged or self.max_iterations <= first.iterations:
             return first

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import lu_solve
 
+from mechanics.delassus import multifrontal
 from mechanics.delassus._kernels.fronts import add_into, solve
 from mechanics.delassus.condensed import CondensedForm
 from mechanics.delassus.multifrontal import Cliques, fronts
@@ -182,6 +183,28 @@ def test_a_result_repeats_bit_for_bit():
     np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.parametrize("threads", [2, 3])
+def test_factors_do_not_depend_on_the_threads(monkeypatch, threads):
+    """A wall of 6 × 6 joints of one size: subtrees apart, then fronts of several panels together."""
+    monkeypatch.setattr(multifrontal, "_PANEL", 24)
+    at = np.arange(1, 37).reshape(6, 6)
+    below, left = np.vstack([np.zeros(6, dtype=np.int64), at[:-1]]), at[:, :-1]
+    joints = np.vstack(
+        [np.column_stack([below.ravel(), at.ravel()]), np.column_stack([left.ravel(), at[:, 1:].ravel()])]
+    )
+    rng, pairs = np.random.default_rng(9), np.repeat(joints, 3, axis=0)
+    cliques = cliques_of(rng, pairs)
+    theta = rng.normal(size=(len(pairs), 3, 3)) + 6.0 * np.eye(3)
+    own = fronts(pairs, cliques.contacts)
+    trees, top = own._split
+    assert len(trees) > threads
+    assert len(top) > threads
+    assert sorted([*top, *(f for tree in trees for f in tree)]) == sorted(own.layout.order)
+    one, several = (own.factorise(cliques, theta, count) for count in (1, threads))
+    np.testing.assert_array_equal(one.factor, several.factor)
+    np.testing.assert_array_equal(one.pivots, several.pivots)
+
+
 @pytest.mark.parametrize("contacts", [1, 7])
 def test_a_singular_matrix_is_refused(contacts):
     pairs = np.tile(np.array([[0, 1]]), (contacts, 1))
@@ -266,7 +289,8 @@ def test_assembly_of_a_front_is_that_of_the_slow_twin():
     runs = np.array([[5, 0, 2], [1, 2, 3], [8, 5, 1]])
     expected = add_twin(front, runs, block)
     pivot, below, update = (np.asfortranarray(part) for part in (front[:4], front[4:, :4], front[4:, 4:]))
-    add_into(pivot, below, update, runs, block)
+    for part in (runs[1:], runs[:1]):
+        add_into(pivot, below, update, runs, part, block)
     np.testing.assert_allclose(
         np.vstack([pivot, np.hstack([below, update])]), expected, rtol=1e-15, atol=1e-15
     )

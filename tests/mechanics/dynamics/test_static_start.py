@@ -127,6 +127,12 @@ def test_the_balance_of_an_elastic_wall_takes_a_handful_of_factorisations():
     assert static.iterations <= 6
 
 
+def test_it_is_the_same_to_the_last_bit_with_two_threads():
+    wall = wall_scene(3, 4, Element.TET10, Start.EQUILIBRIUM, 0.1, step=1e-3, theta=1.0, base=False)
+    one, two = (searched(replace(wall, solver=SolverSettings(threads=count)))[-1] for count in (1, 2))
+    np.testing.assert_array_equal(one.state.node, two.state.node)
+
+
 def test_it_is_the_same_in_a_turned_world():
     one = column(SOFT, HARD)
     other = transformed(replace(one, gravity=tuple(TURN @ one.gravity)), TURN, (3.0, -2.0, 5.0))

@@ -69,6 +69,19 @@ def test_where_admm_is_not_done_the_interior_point_method_goes_on(monkeypatch):
     assert 10 < answer.iterations < 110
 
 
+def test_from_nearly_a_solution_newtons_method_ends_what_admm_creeps_to():
+    problem = sliding()
+    exact = Elastic(1e-11, 1e-9)(problem, cold(problem))
+    rng = np.random.default_rng(0)
+    near = exact.impulse * (1.0 + 1e-5 * rng.normal(size=exact.impulse.shape))
+    start = ContactStart(near, exact.velocity)
+    assert 1e-9 < natural_map(problem, near) < 1e-4
+    assert not ADMM(1e-11, 1e-9, 200)(problem, start).converged
+    answer = Elastic(1e-11, 1e-9)(problem, start)
+    assert answer.converged
+    assert answer.iterations < 80
+
+
 def test_the_iterations_asked_for_bound_both_together():
     problem = sliding()
     few = Elastic(1e-14, 0.0, 5)(problem, cold(problem))
