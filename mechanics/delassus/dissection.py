@@ -59,7 +59,8 @@ def _lower(place: Array, part: Ints) -> Bools:
     below, up_to = along < middle, along <= middle
     # of the two cuts beside the middle course the one that divides more evenly
     uneven = np.abs(np.array([np.bincount(part, one) for one in (below, up_to)]) - 0.5 * size)
-    return np.where((uneven[0] <= uneven[1])[part], below, up_to)
+    lower: Bools = np.where((uneven[0] <= uneven[1])[part], below, up_to)
+    return lower
 
 
 def _between(pairs: Ints, side: Ints, part: Ints) -> Ints:

@@ -1,0 +1,207 @@
+"""A masonry tower in an earthquake: `python -m benchmarks.tower [--blocks N] [--steps N] [--build N] [--json]`.
+
+A generated tower of about N rigid blocks is built and comes to rest under its weight; then the strongest part of a
+record of 30 s in three directions shakes it. Both are synthetic (benchmarks/tower_masonry.py). The time of a step is
+processor time of this process, stage by stage, with all that a run observes in each step; from its mean follows what
+the whole record would take. `--build N` builds a tower of N blocks, counts its contacts, and makes one step.
+"""
+
+import argparse
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+
+from benchmarks.memory import peak_bytes
+from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
+from benchmarks.tower_masonry import earthquake, expected_contacts, strongest, tower, tower_blocks
+from mechanics.dynamics.contact_search import detector
+from mechanics.dynamics.energy_balance import EnergyBalance
+from mechanics.dynamics.observers.equilibrium import displacement, seen_from_supports
+from mechanics.dynamics.progress import Clock
+from mechanics.dynamics.simulation import Simulation
+from mechanics.dynamics.step import Step
+from mechanics.dynamics.stopping import Watch, balance_of
+from mechanics.model.model import Model, build_model
+from mechanics.results.peaks import PeakTracker
+from mechanics.results.postprocess import Observer
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.loads.load import Loads
+from mechanics.scene.scene import ContactSettings, Scene, SolverSettings, TimeSettings
+from mechanics.scene.state import State
+
+__all__ = ["main", "tower_scene"]
+
+
+_FRICTION = 0.6  # of all joints [-]
+_RECORD = 30.0  # duration of the whole record [s]
+_REST_STEPS = 10  # in which the tower comes to rest
+_GOAL = 1e-5  # natural map that every step is to reach [-]
+_BUILDING: Table = (
+    ("blocks", "blocks", "d"),
+    ("contacts", "contacts", "d"),
+    ("expected", "expected", "d"),
+    ("scene_s", "scene s", ".2f"),
+    ("model_s", "model s", ".2f"),
+    ("detect_contacts_s", "detection s", ".2f"),
+    ("first_s", "first step s", ".2f"),
+    ("first_eta", "its η", ".0e"),
+    ("memory_gb", "memory GB", ".2f"),
+)
+_SHAKING: Table = (
+    ("steps", "steps", "d"),
+    ("step_ms", "h ms", "g"),
+    ("median_s", "step s, median", ".3f"),
+    ("mean_s", "mean", ".3f"),
+    ("largest_s", "largest", ".3f"),
+    ("eta", "η worst", ".0e"),
+    ("above", "steps above 1e-5", "d"),
+    ("unconverged", "unconverged", "d"),
+    ("iterations", "iterations, mean", ".0f"),
+    ("contacts_shaking", "contacts", "d"),
+    ("moved_mm", "moved mm", ".3g"),
+    ("hours", "h for 30 s", ".1f"),
+    ("memory_gb", "memory GB", ".2f"),
+)
+_STAGES = ("advance", "detect", "assemble", "solve", "observe")
+
+
+class _ProcessorClock(Clock):
+    """Processor seconds by stage."""
+
+    @contextmanager
+    def __call__(self, stage: str) -> Iterator[None]:
+        """Add the time of a with-block to a stage."""
+        start = time.process_time()
+        try:
+            yield
+        finally:
+            self.seconds[stage] = self.seconds.get(stage, 0.0) + time.process_time() - start
+
+
+class _Observers:
+    """All that a run observes in each step (`mechanics.simulate`)."""
+
+    def __init__(self, model: Model, start: State) -> None:
+        self._model = model
+        self._observer, self._peaks = Observer(model, start), PeakTracker(model, start)
+        self._energy, self._watch = EnergyBalance(model, start), Watch(model, start)
+        self._begun = False
+
+    def __call__(self, step: Step) -> None:
+        if not self._begun:
+            self._peaks.begin(self._observer.begin(step))
+            self._begun = True
+        self._peaks(step)
+        self._energy(step)
+        self._watch(step, balance_of(self._model, step))
+
+
+def main() -> None:
+    """Build, shake and print."""
+    options = _options()
+    _shaken(tower_scene(40, options.step * 1e-3, 1), 1)  # compiles
+    start = time.process_time()
+    progress(f"a tower of about {options.build or options.blocks:,} blocks")
+    shape = tower(options.build or options.blocks)
+    scene = tower_scene(len(shape.low), options.step * 1e-3, options.steps)
+    row = {"scene_s": time.process_time() - start, "expected": expected_contacts(shape)}
+    row |= _shaken(scene, 0 if options.build else options.steps)
+    if options.json:
+        print_json([row])
+        return
+    print(f"{machine()}; {environment('moma-masonry', 'numba', 'numpy')}\n")
+    print_table([row], _BUILDING)
+    if not options.build:
+        print()
+        print_table([row], _SHAKING)
+        shares = ", ".join(f"{stage} {row[f'{stage}_s']:.3f} s" for stage in _STAGES)
+        print(f"\nmean step: {shares}")
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.tower", description=__doc__)
+    parser.add_argument("--blocks", type=int, default=11_500, help="about so many blocks (11500)")
+    parser.add_argument("--steps", type=int, default=300, help="steps of strong motion (300)")
+    parser.add_argument("--step", type=float, default=1.0, help="time step in milliseconds (1)")
+    parser.add_argument("--build", type=int, default=0, help="build about so many blocks, and make one step")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    return parser.parse_args()
+
+
+def tower_scene(blocks: int, step: float, steps: int) -> Scene:
+    """Return a tower of about `blocks` blocks, and so many steps of strong motion after it has come to rest."""
+    motion = strongest(earthquake(), max(step * steps, 0.01), _REST_STEPS * step)
+    return Scene(
+        f"synthetic tower of {blocks} blocks",
+        tower_blocks(tower(blocks)),
+        contact=ContactSettings(law=DryJoint(friction=_FRICTION)),
+        time=TimeSettings(step=step, theta=0.5, stop_at_equilibrium=False),
+        solver=SolverSettings(tolerance=min(_GOAL, SolverSettings().tolerance)),
+        loads=Loads(motions=(motion,)),
+    )
+
+
+def _shaken(scene: Scene, steps: int) -> Row:
+    """Return what building, rest, and so many steps of motion take; one step of rest alone without them."""
+    clock = _ProcessorClock()
+    with clock("model"):
+        model, start = build_model(scene)
+    with clock("contacts"):
+        contacts = len(detector(model)(start, np.zeros(len(model.mass))))
+    building = dict(clock.seconds)
+    simulation, observe = Simulation(model, start, clock), _Observers(model, start)
+    rest = []
+    for count in range(_REST_STEPS if steps else 1):
+        progress(f"rest: step {count + 1}")
+        rest.append(_timed(simulation, observe, clock))
+    before = dict(clock.seconds)
+    shaken = []
+    for count in range(steps):
+        shaken.append(_timed(simulation, observe, clock))
+        progress(f"motion: step {count + 1} of {steps}, {shaken[-1][0]:.2f} s, η {shaken[-1][1]:.0e}")
+    row = {
+        "blocks": len(model.mass) - 1,
+        "contacts": contacts,
+        "model_s": building["model"],
+        "detect_contacts_s": building["contacts"],
+        "first_s": rest[0][0],
+        "first_eta": rest[0][1],
+        "memory_gb": (peak_bytes() or 0) / 1e9,
+    }
+    if not steps:
+        return row
+    seconds, eta, converged, iterations, contacts_shaking = (
+        np.array(column) for column in zip(*shaken, strict=True)
+    )
+    seen = seen_from_supports(model, start, simulation.state)
+    row |= {
+        "steps": steps,
+        "step_ms": 1e3 * scene.time.step,
+        "median_s": float(np.median(seconds)),
+        "mean_s": float(seconds.mean()),
+        "largest_s": float(seconds.max()),
+        "eta": float(eta.max()),
+        "above": int((eta > _GOAL).sum()),
+        "unconverged": int((~converged).sum()),
+        "iterations": float(iterations.mean()),
+        "contacts_shaking": int(np.median(contacts_shaking)),
+        "moved_mm": 1e3 * float(displacement(model, start, seen).max()),
+        "hours": float(seconds.mean()) * _RECORD / scene.time.step / 3600.0,
+    }
+    return row | {f"{stage}_s": (clock.seconds[stage] - before[stage]) / steps for stage in _STAGES}
+
+
+def _timed(simulation: Simulation, observe: _Observers, clock: Clock) -> tuple[float, float, bool, int, int]:
+    """Return processor time [s], η, whether it is solved, iterations and contacts of one step."""
+    start = time.process_time()
+    step = simulation.step()
+    with clock("observe"):
+        observe(step)
+    spent, solution = time.process_time() - start, step.solution
+    return spent, solution.natural_map, solution.converged, solution.iterations, len(step.gap)
+
+
+if __name__ == "__main__":
+    guarded(main)
