@@ -1,4 +1,4 @@
-"""One stage of a benchmark in a process of its own, on one core."""
+"""One stage of a benchmark in a process of its own, on one core unless more threads are asked for."""
 
 import json
 import os
@@ -14,7 +14,7 @@ __all__ = ["run_child"]
 _THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
 
-def run_child(module: str, *arguments: object, where: str, error: type[MomaError]) -> Row:
+def run_child(module: str, *arguments: object, where: str, error: type[MomaError], threads: int = 1) -> Row:
     """The row that a module prints as JSON in its last line.
 
     Parameters
@@ -22,6 +22,7 @@ def run_child(module: str, *arguments: object, where: str, error: type[MomaError
     module : run as ``python -m``
     arguments : on its command line
     where, error : of the complaint, if it fails
+    threads : that numba and BLAS may use
 
     Raises
     ------
@@ -31,7 +32,7 @@ def run_child(module: str, *arguments: object, where: str, error: type[MomaError
     done = subprocess.run(
         [sys.executable, "-m", module, *map(str, arguments)],
         cwd=Path(__file__).resolve().parents[1],
-        env=os.environ | dict.fromkeys(_THREADS, "1"),
+        env=os.environ | dict.fromkeys(_THREADS, str(threads)),
         capture_output=True,
         text=True,
         check=False,

@@ -133,8 +133,8 @@ class PlanarScene:
     largest_overlap : beyond it disks are moved apart after a step, at unchanged velocities; overlaps of the start stay
     alert_distance : gap below which a contact is watched, relative to the smaller radius [-]
     thickness : of the slice; masses and areas are for it [m]
-    time, solver : settings; *auto* is Gauss–Seidel here: contacts of disks open and slide all the time, and a sweep
-        over them is cheap. *admm* solves further where they come to rest
+    time, solver : settings; *auto* sweeps, and goes on with ADMM and Newton where 500 sweeps do not solve a step. Fewer
+        `max_iterations` are sweeps alone, as slow flows of many disks are run
     loads : what acts besides gravity; the plane is z = 0 of their space, moments and turns are about z
     frame_every : keep a frame of the motion every so many steps; 0 keeps the first and last only
     """

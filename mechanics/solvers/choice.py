@@ -14,6 +14,7 @@ from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.newton import Newton
 from mechanics.solvers.strategies.auto import Auto
 from mechanics.solvers.strategies.compliant import Compliant
+from mechanics.solvers.strategies.planar import Planar
 from mechanics.solvers.strategies.rigid import moving_admm
 from moma.errors import SolverError
 
@@ -84,10 +85,9 @@ def choose_solvers(settings: SolverSettings, deformable: bool) -> Solvers:
 
 
 def choose_planar_solver(settings: SolverSettings) -> Solver:
-    """Return the solver for disks of the plane; *auto* sweeps.
+    """Return the solver for disks of the plane; *nsgs* makes plain sweeps.
 
-    A sweep over disks costs a tenth of an iteration of ADMM, and of an extrapolation: where they flow, many plain
-    sweeps are cheaper.
+    A sweep over disks costs a tenth of an extrapolation: where they flow, many plain sweeps are cheaper.
 
     Raises
     ------
@@ -100,6 +100,8 @@ def choose_planar_solver(settings: SolverSettings) -> Solver:
             remedy='use "newton" or "cone"',
         )
     limits = settings.tolerance, settings.velocity_tolerance, settings.max_iterations
-    if settings.method in (Method.AUTO, Method.NSGS):
+    if settings.method == Method.AUTO:
+        return Planar(*limits)
+    if settings.method == Method.NSGS:
         return NSGS(*limits, check_every=20, depth=0)
     return choose_solver(settings, deformable=False)
