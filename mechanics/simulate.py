@@ -40,10 +40,10 @@ class Archive(Protocol):
         """Return the last checkpoint of the same scene, from which the run is to go on; None: from the start."""
 
     def begin(self, bodies: tuple[BodyResult, ...], frames: Sequence[Frame]) -> None:
-        """Take the stones at the start, and the frames so far."""
+        """Take the stones at the start, and the frames so far: a list to which the run adds others."""
 
-    def frame(self, frame: Frame) -> None:
-        """Take a further frame."""
+    def frame(self) -> None:
+        """Note that there is a further frame."""
 
     def checkpoint(self, step: int, carried: Carried) -> None:
         """Take what the run carries after a step; nothing of it may be kept without a copy."""
@@ -147,10 +147,9 @@ def _simulate(
 
 def _keep_frame(log: "_Log", step: Step, clock: Clock, archive: Archive | None) -> None:
     with clock("stress"):
-        frame = log.observer.frame(step)
-        log.frames.append(frame)
+        log.frames.append(log.observer.frame(step))
         if archive is not None:
-            archive.frame(frame)
+            archive.frame()
 
 
 class _Run(Carrier):

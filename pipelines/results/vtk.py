@@ -1,6 +1,6 @@
 """Results for ParaView: stones and contact points as time series, joints at the end of the run."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +9,9 @@ from mechanics.results.contact_result import ContactResult, JointResult
 from mechanics.results.result import BodyResult, Frame, Result
 from mechanics.results.stress_values import utilisation
 from mechanics.scene.laws.status import STATUSES
-from mechanics.scene.scene import Fidelity
+from mechanics.scene.scene import Block, Fidelity
 from mechanics.stones.elasticity.tensors import principal, von_mises
-from pipelines.arrays import Array
+from pipelines.arrays import Array, Ints
 from pipelines.results.vtu import (
     CELL_TYPES,
     POLYGON,
@@ -24,10 +24,26 @@ from pipelines.results.vtu import (
     write_vtu,
 )
 
-__all__ = ["UNITS", "body_cells", "body_grid", "contact_grid", "joint_grid", "write_frames"]
+__all__ = [
+    "CONTACT_ARRAYS",
+    "FIDELITIES",
+    "UNITS",
+    "body_cells",
+    "body_grid",
+    "contact_grid",
+    "joint_grid",
+    "point_fields",
+    "status_numbers",
+    "write_frames",
+    "write_joint_grid",
+]
 
 
-_FIDELITIES = (Fidelity.FIXED, Fidelity.RIGID, Fidelity.DEFORMABLE)
+FIDELITIES = (Fidelity.FIXED, Fidelity.RIGID, Fidelity.DEFORMABLE)
+"""Models of stones by their number in the files."""
+
+CONTACT_ARRAYS = ("force", "pressure", "normal", "gap", "opening", "slide", "area")
+"""Values of contact points in the files, by their names in `ContactResult`."""
 
 UNITS: Mapping[str, str] = {
     **dict.fromkeys(("displacement", "gap", "slide", "opening", "sliding", "eccentricity"), "m"),
@@ -43,7 +59,7 @@ UNITS: Mapping[str, str] = {
 
 
 def write_frames(result: Result, folder: Path) -> None:
-    """Write every frame of stones and contacts with their indices `results.pvd` and `contacts.pvd`, and `joints.vtu`.
+    """Write every frame of stones and contacts with their indices `results.pvd` and `contacts.pvd`.
 
     Values that are not computed, such as stresses of rigid stones, are NaN.
     """
@@ -59,6 +75,10 @@ def write_frames(result: Result, folder: Path) -> None:
             series[kind].append((frame.time, name))
     for kind, datasets in series.items():
         write_pvd(folder / f"{kind}.pvd", datasets)
+
+
+def write_joint_grid(result: Result, folder: Path) -> None:
+    """Write `joints.vtu`, the joints at the end."""
     write_vtu(folder / "joints.vtu", joint_grid(result.joints))
 
 
@@ -108,19 +128,14 @@ def body_grid(result: Result, frame: Frame, cells: Cells) -> Grid:
     """
     bodies = result.bodies
     stone = np.repeat(np.arange(len(bodies)), [max(len(body.cells), 1) for body in bodies])
-    fidelity = np.array([_FIDELITIES.index(body.fidelity) for body in bodies])
+    fidelity = np.array([FIDELITIES.index(body.fidelity) for body in bodies])
     error = np.array([np.nan if one is None else one for one in frame.stress_errors])
-    before, now = np.concatenate([body.reference for body in bodies]), np.concatenate(frame.positions)
     return Grid(
-        points=now,
+        points=np.concatenate(frame.positions),
         cells=cells,
         point_data={
             name: values.astype(np.float32)
-            for name, values in (
-                ("displacement", now - before),
-                ("velocity", np.concatenate(frame.velocities)),
-                *_stresses(result, frame).items(),
-            )
+            for name, values in point_fields(bodies, result.scene.blocks, frame).items()
         },
         cell_data={
             "stone": stone.astype(np.int64),
@@ -131,7 +146,16 @@ def body_grid(result: Result, frame: Frame, cells: Cells) -> Grid:
     )
 
 
-def _stresses(result: Result, frame: Frame) -> dict[str, Array]:
+def point_fields(
+    bodies: Sequence[BodyResult], blocks: Sequence[Block], frame: Frame, stress: bool = True
+) -> dict[str, Array]:
+    """Compute the fields of the points of all stones in one frame; those of stresses only if they are wanted."""
+    before, now = np.concatenate([body.reference for body in bodies]), np.concatenate(frame.positions)
+    motion = {"displacement": now - before, "velocity": np.concatenate(frame.velocities)}
+    return motion | _stresses(blocks, frame) if stress else motion
+
+
+def _stresses(blocks: Sequence[Block], frame: Frame) -> dict[str, Array]:
     """Compute the fields derived from the stress of the points; NaN where there is no stress."""
     stress = np.concatenate(
         [
@@ -144,7 +168,7 @@ def _stresses(result: Result, frame: Frame) -> dict[str, Array]:
     values[known], directions = principal(stress[known])
     first[known], third[known] = directions[:, 0], directions[:, 2]
     used, start = np.full(len(stress), np.nan), 0
-    for block, place in zip(result.scene.blocks, frame.positions, strict=True):
+    for block, place in zip(blocks, frame.positions, strict=True):
         rows = slice(start, start := start + len(place))
         used[rows] = utilisation(values[rows], block.material)
     return {
@@ -161,19 +185,23 @@ def _stresses(result: Result, frame: Frame) -> dict[str, Array]:
 def contact_grid(contacts: ContactResult) -> Grid:
     """Make the grid of contact points: force [N], pressure [Pa], lengths [m], area [m²], status, bodies, joint."""
     count = len(contacts.gap)
-    status = np.array([STATUSES.index(str(one)) for one in contacts.status], dtype=np.int64)
     return Grid(
         points=contacts.point,
         cells=cells_of(VERTEX, [[index] for index in range(count)]),
         point_data={
-            **{name: getattr(contacts, name) for name in _CONTACT_ARRAYS},
-            "status": status,
+            **{name: getattr(contacts, name) for name in CONTACT_ARRAYS},
+            "status": status_numbers(contacts),
             "bodies": contacts.bodies.astype(np.int64),
             "joint": contacts.joint.astype(np.int64),
         },
         cell_data={},
         units=UNITS,
     )
+
+
+def status_numbers(contacts: ContactResult) -> Ints:
+    """Return the number of the status of each contact point in the files (nc,)."""
+    return np.array([STATUSES.index(str(one)) for one in contacts.status], dtype=np.int64)
 
 
 def joint_grid(joints: JointResult) -> Grid:
@@ -201,7 +229,6 @@ def joint_grid(joints: JointResult) -> Grid:
     )
 
 
-_CONTACT_ARRAYS = ("force", "pressure", "normal", "gap", "opening", "slide", "area")
 _JOINT_ARRAYS = (
     "area", "force", "moment", "centre_of_pressure", "eccentricity", "kern", "edge", "pressure_mean", "pressure_max",
     "gap", "opening", "sliding", "slipping", "open", "friction_use",

@@ -29,7 +29,8 @@ from pipelines.results.joints_csv import write_joints
 from pipelines.results.series_csv import write_series
 from pipelines.results.stone_values import stone_results
 from pipelines.results.summary import as_json, summarise
-from pipelines.results.vtk import write_frames
+from pipelines.results.vtk import write_frames, write_joint_grid
+from pipelines.results.vtkhdf import RESULTS, write_vtkhdf
 from pipelines.run.assemble import Assembly, assemble_stones
 from pipelines.run.inputs import run_inputs
 from pipelines.run.plausibility import corner_warnings, unusual_values
@@ -39,6 +40,7 @@ from pipelines.run.unfinished import UnfinishedRun, unfinished_run
 from pipelines.scene.file import SceneFile, read_scene
 from pipelines.scene.fingerprint import fingerprint
 from pipelines.scene.selection import select_groups, select_stones
+from pipelines.scene.settings import ParaView
 from pipelines.tuning.expected_errors import ProfileReport, profile_report
 from pipelines.tuning.profiles import with_profile
 
@@ -107,7 +109,7 @@ def run_scene(
     progress(Progress("blocks", 0, None, "reading the stones"))
     with (
         open_database(url, create=False) as database,
-        unfinished_run(folder, scene.output.checkpoint, resume, progress) as unfinished,
+        unfinished_run(folder, scene.output, resume, progress) as unfinished,
     ):
         with _timed(seconds, "blocks"), database.session(read_only=True) as session:
             as_of, models = latest_entry(session), select_stones(scene, session)
@@ -130,7 +132,13 @@ def run_scene(
         if not accept_unsound:
             refuse_unsound(problems, str(path))
         steps = max(1, round(assembly.scene.time.duration / assembly.scene.time.step))
-        unfinished.open(fingerprint(assembly.scene, *built, models), versions(), steps, bool(resume))
+        unfinished.open(
+            assembly.scene.blocks,
+            fingerprint(assembly.scene, *built, models),
+            versions(),
+            steps,
+            bool(resume),
+        )
         result = simulate(assembly.scene, progress, stop, built, unfinished)
         if problems:
             result = replace(result, cautions=(caution_of(problems), *result.cautions))
@@ -184,8 +192,12 @@ def write_results(
             f"{result.static.balance:.1e}; the run began at rest, all loads at once"
         )
     with _timed(seconds, "files"):
-        progress(Progress("write", 0, 3, "results.pvd"))
-        write_frames(result, folder)
+        progress(Progress("write", 0, 3, "results for ParaView"))
+        if scene.output.paraview is not ParaView.PVD:
+            write_vtkhdf(folder / RESULTS, result.bodies, result.scene.blocks, result.frames)
+        if scene.output.paraview is not ParaView.VTKHDF:
+            write_frames(result, folder)
+        write_joint_grid(result, folder)
         write_joints(folder / "joints.csv", result, assembly.origin)
         write_series(folder, result, assembly.origin)
     with _timed(seconds, "pictures"):

@@ -12,10 +12,13 @@ from typing import Any
 from mechanics.carried import Carried
 from mechanics.dynamics.progress import Listener, Progress
 from mechanics.results.result import BodyResult, Frame
+from mechanics.scene.scene import Block
 from moma.errors import UsageError
 from pipelines.results.checkpoints import Checkpoint, Checkpoints, write_whole
 from pipelines.results.folder import RUN_INDEX, UNFINISHED, locked
+from pipelines.results.vtkhdf import RESULTS, GrowingResults
 from pipelines.scene.fingerprint import changes
+from pipelines.scene.settings import Output, ParaView
 
 __all__ = ["UnfinishedRun", "finished_run", "unfinished_run"]
 
@@ -56,9 +59,7 @@ class UnfinishedRun:
     Parameters
     ----------
     folder : of the results
-    every : steps between checkpoints, as the scene asks
-    found : the checkpoint from which the run goes on
-    notes : of the program and the runs before, kept in every checkpoint
+    output : what the scene asks for
 
     Attributes
     ----------
@@ -66,8 +67,11 @@ class UnfinishedRun:
     resumed : the earlier resumptions, and this one: each the step, and what had changed
     """
 
-    def __init__(self, folder: Path, every: int) -> None:
-        self.every = every
+    def __init__(self, folder: Path, output: Output) -> None:
+        self.every = output.checkpoint
+        self._shown = folder / RESULTS if output.paraview is not ParaView.PVD else None
+        self._results: GrowingResults | None = None
+        self._blocks: tuple[Block, ...] = ()
         self.warnings: list[str] = []
         self.resumed: list[dict[str, Any]] = []
         self._place = folder / UNFINISHED
@@ -82,12 +86,18 @@ class UnfinishedRun:
         return 0 if self._found is None else self._found.step
 
     def open(
-        self, inputs: Mapping[str, str], versions: Mapping[str, str], duration: int, resume: bool
+        self,
+        blocks: tuple[Block, ...],
+        inputs: Mapping[str, str],
+        versions: Mapping[str, str],
+        duration: int,
+        resume: bool,
     ) -> None:
         """Find the checkpoint from which the run goes on, if it is to; otherwise make room for a new one.
 
         Parameters
         ----------
+        blocks : of the scene
         inputs : fingerprint of all that decides on the bits
         versions : of the program and its libraries
         duration : steps of the whole run
@@ -97,7 +107,7 @@ class UnfinishedRun:
         ------
         UsageError : the scene has changed since, or no checkpoint can be read
         """
-        self._versions = versions
+        self._versions, self._blocks = versions, blocks
         if resume and self._checkpoints.steps():
             self._go_on(inputs, versions, duration)
             return
@@ -148,10 +158,30 @@ class UnfinishedRun:
         return None if self._found is None else self._found.carried
 
     def begin(self, bodies: tuple[BodyResult, ...], frames: Sequence[Frame]) -> None:
-        """Begin or go on with the stones of the run."""
+        """Write the frames so far, for ParaView; earlier results keep their place until the run is complete."""
+        if self._shown is None:
+            return
+        with self._hampered():
+            self._results = GrowingResults(self._place / RESULTS, bodies, self._blocks, frames)
+            if not self._shown.exists():
+                with suppress(OSError):  # a system without links
+                    self._shown.unlink(missing_ok=True)
+                    self._shown.symlink_to(Path(UNFINISHED) / RESULTS)
 
-    def frame(self, frame: Frame) -> None:
-        """Take a further frame."""
+    def frame(self) -> None:
+        """Let the file for ParaView grow by what is new."""
+        if self._results is not None:
+            with self._hampered():
+                self._results.update()
+
+    @contextmanager
+    def _hampered(self) -> Iterator[None]:
+        """Go on without the file for ParaView where it cannot be written; it is written whole at the end."""
+        try:
+            yield
+        except (OSError, RuntimeError) as error:
+            self._results = None
+            self.warnings.append(f"{RESULTS} did not grow as the run went on: {error}")
 
     def checkpoint(self, step: int, carried: Carried) -> None:
         """Write a checkpoint; a disk that is full is no reason to give up the run."""
@@ -187,7 +217,7 @@ class UnfinishedRun:
 
 @contextmanager
 def unfinished_run(
-    folder: Path, every: int, resume: bool | None, progress: Listener
+    folder: Path, output: Output, resume: bool | None, progress: Listener
 ) -> Iterator[UnfinishedRun]:
     """Yield the archive of a run in its folder, which no other program may use in the meantime.
 
@@ -196,7 +226,7 @@ def unfinished_run(
     Parameters
     ----------
     folder : of the results
-    every : steps between checkpoints
+    output : what the scene asks for
     resume : go on with an unfinished run; False: give it up; None: refuse to give it up
     progress : told how far an unfinished run is
 
@@ -222,10 +252,12 @@ def unfinished_run(
         if steps and resume:
             progress(Progress("blocks", 0, None, f"the run will go on after step {steps[0]}"))
         try:
-            yield UnfinishedRun(folder, every)
+            yield UnfinishedRun(folder, output)
         finally:
             if not _checkpoints(folder).steps():
                 shutil.rmtree(place, ignore_errors=True)
+                if (shown := folder / RESULTS).is_symlink() and not shown.exists():
+                    shown.unlink()
                 if made:
                     with suppress(OSError):
                         folder.rmdir()

@@ -1,6 +1,7 @@
 """Settings of a scene file that no other package has a type for."""
 
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Annotated
 
 from mechanics.scene.scene import Block, ContactSize, Fidelity, Growth
@@ -9,7 +10,7 @@ from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.meshers.choice import Mesher
 from mechanics.stones.settings import Setting
 
-__all__ = ["Fidelities", "MaterialRule", "MeshSettings", "Output", "Selection"]
+__all__ = ["Fidelities", "MaterialRule", "MeshSettings", "Output", "ParaView", "Selection"]
 
 _COARSER = 2.0
 """Edges of the ring over those of the stones for whose sake it deforms: docs/accuracy.md, section 13."""
@@ -101,6 +102,14 @@ class MeshSettings:
         return _COARSER * self.size if self.ring_size is None else self.ring_size
 
 
+class ParaView(StrEnum):
+    """Files for ParaView."""
+
+    VTKHDF = "vtkhdf"
+    PVD = "pvd"
+    BOTH = "both"
+
+
 @dataclass(frozen=True)
 class Output:
     """Results to keep."""
@@ -122,6 +131,12 @@ class Output:
             "Pictures to draw, see below; if not given, displacement, and von_mises where a stone deforms."
         ),
     ] = None
+    paraview: Annotated[
+        ParaView,
+        Setting(
+            "Files for ParaView: vtkhdf: one, which grows as the run goes on; pvd: a file a frame, at the end; both."
+        ),
+    ] = ParaView.VTKHDF
     checkpoint: Annotated[
         int,
         Setting(

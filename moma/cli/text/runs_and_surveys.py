@@ -119,8 +119,8 @@ def run_lines(report: "RunReport", verbose: bool) -> list[str]:
         stages = summary["time"]["by_stage"].items()
         lines.append("  time: " + ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in stages))
     pictures = [name for name in summary["files"] if name.endswith(".png")]
-    shown = (*pictures, "report.html", "results.pvd", "summary.json")
-    return [*lines, *(f"  {report.folder / name}" for name in shown)]
+    shown = (*pictures, "report.html", "results.vtkhdf", "results.pvd", "summary.json")
+    return [*lines, *(f"  {report.folder / name}" for name in shown if name in summary["files"])]
 
 
 def _displacement(summary: dict[str, Any]) -> str:

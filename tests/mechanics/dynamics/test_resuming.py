@@ -49,10 +49,10 @@ class Kept:
         return copied(self._earlier)
 
     def begin(self, bodies, frames):
-        self.frames = list(frames)
+        self.frames, self._grows = list(frames), frames
 
-    def frame(self, frame):
-        self.frames.append(frame)
+    def frame(self):
+        self.frames.append(self._grows[-1])
 
     def checkpoint(self, step, carried):
         self.kept[step] = copied(carried)

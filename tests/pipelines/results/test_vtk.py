@@ -13,7 +13,7 @@ from mechanics.scene.scene import Block, Fidelity
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.meshers.mesher import mesh_block
 from pipelines.draw.offscreen.surfaces import wall_surface
-from pipelines.results.vtk import contact_grid, write_frames
+from pipelines.results.vtk import contact_grid, write_frames, write_joint_grid
 from pipelines.results.vtu import CELL_TYPES
 from tests.pipelines.results_by_hand import BOX_FACES, LIMESTONE, box, contacts_of, meshed_body, result_of
 
@@ -62,6 +62,7 @@ def test_paraview_files_hold_every_stone_and_each_frame_its_stress(mixed, tmp_pa
 def test_vtk_reads_the_files_as_closed_stones_contacts_and_joints(mixed, tmp_path):
     pyvista = pytest.importorskip("pyvista")
     write_frames(mixed, tmp_path)
+    write_joint_grid(mixed, tmp_path)
     grid = pyvista.read(tmp_path / "results_0001.vtu")
     sizes = grid.compute_cell_sizes()["Volume"]
     for index, body in enumerate(mixed.bodies):

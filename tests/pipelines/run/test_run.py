@@ -149,7 +149,7 @@ def test_a_run_writes_its_folder_and_keeps_its_results(own_url, tmp_path):
     assert summary["bodies"]["deformable"] == 1
     assert summary["errors"]["reaction"] < 1e-3
     assert sorted(summary["files"]) == sorted(one.name for one in (tmp_path / "out").iterdir())
-    assert {"report.html", "results.pvd", "joints.csv", "von_mises.png", "scene.toml"} <= set(
+    assert {"report.html", "results.vtkhdf", "joints.csv", "von_mises.png", "scene.toml"} <= set(
         summary["files"]
     )
     with open_database(own_url, create=False) as database, database.session(read_only=True) as session:
@@ -247,7 +247,7 @@ def test_without_pictures_the_rest_is_written_and_a_warning_says_what_to_install
     done = run_scene(tmp_path / "low.toml", own_url, tmp_path / "out")
     assert done.warnings[1:] == ("no pictures: libGL.so.1: not there; apt-get install libgl1",)
     assert "apt-get install libgl1" in (tmp_path / "out/report.html").read_text(encoding="utf-8")
-    assert (tmp_path / "out/results.pvd").exists()
+    assert (tmp_path / "out/results.vtkhdf").exists()
 
 
 def test_a_place_that_is_taken_is_refused_before_anything_runs(tmp_path, url, monkeypatch):

@@ -9,10 +9,12 @@ import time
 
 import numpy as np
 import pytest
+from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
+from vtkmodules.vtkIOHDF import vtkHDFReader
 
 from archmodel.database.session import open_database
 from moma.errors import DatabaseError, UsageError
-from pipelines.results import checkpoints
+from pipelines.results import checkpoints, vtkhdf
 from pipelines.run import run as run_module
 from pipelines.run import unfinished
 from pipelines.run.run import run_scene
@@ -38,6 +40,7 @@ stop_at_equilibrium = false
 [output]
 pictures = []
 frame_every = 6
+paraview = "both"
 series = ["W02-02", "W02-03"]
 checkpoint = 5
 """
@@ -70,6 +73,7 @@ SCENES = {
 def every_checkpoint(monkeypatch):
     """Steps of these scenes are so fast that most checkpoints would be left out."""
     monkeypatch.setattr(unfinished, "_SHARE", np.inf)
+    monkeypatch.setattr(vtkhdf, "_SHARE", np.inf)
 
 
 def written(place, text, name="scene.toml"):
@@ -81,7 +85,9 @@ def written(place, text, name="scene.toml"):
 def bits(folder):
     """The bytes of all tables and meshes, and all numbers of the summary except times of the machine."""
     files = {
-        path.name: path.read_bytes() for path in folder.iterdir() if path.suffix in (".csv", ".vtu", ".pvd")
+        path.name: path.read_bytes()
+        for path in folder.iterdir()
+        if path.suffix in (".csv", ".vtu", ".pvd", ".vtkhdf")
     }
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     own = {"resumed", "warnings"}
@@ -123,6 +129,14 @@ def killed_after(step, *arguments, **options):
     assert os.waitpid(child, 0)[1] == signal.SIGKILL
 
 
+def times(path):
+    """The instants that VTK's reader finds in a file."""
+    reader = vtkHDFReader()
+    reader.SetFileName(str(path))
+    reader.UpdateInformation()
+    return list(reader.GetOutputInformation(0).Get(vtkStreamingDemandDrivenPipeline.TIME_STEPS()))
+
+
 def names(folder):
     return sorted(path.name for path in (folder / "unfinished").glob("checkpoint-*"))
 
@@ -134,8 +148,10 @@ def test_a_killed_run_goes_on_after_its_last_checkpoint_and_so_does_one_killed_a
     out = tmp_path / "out"
     killed_after(23, scene, own_url, out)
     assert names(out) == ["checkpoint-00000015.h5", "checkpoint-00000020.h5"]
+    assert times(out / "results.vtkhdf") == pytest.approx([0.0, 0.03, 0.06, 0.09])
     killed_after(42, scene, own_url, out, resume=True)
     assert names(out) == ["checkpoint-00000035.h5", "checkpoint-00000040.h5"]
+    assert times(out / "results.vtkhdf") == pytest.approx(np.arange(7) * 0.03)
     heard = []
     done = run_scene(scene, own_url, out, resume=True, progress=heard.append)
     assert differing(tmp_path / "whole", out) == []
