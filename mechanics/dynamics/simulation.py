@@ -54,7 +54,9 @@ class Simulation:
         with self.clock("assemble"):
             self._compliance = compliances(model, self._step, self._theta)
         self._detect = ContactSearch(model, self._compliance, self.clock, fresh_contacts, elastic_scale)
-        self._solve = solver or choose_solver(model.scene.solver, not model.rigid_only)
+        self._solve = solver or choose_solver(
+            model.scene.solver, not model.rigid_only, model.scene.time.duration
+        )
         self._relax = Relaxation(model)
         self._memory = Memory(follows=not model.scene.time.relaxation)
         self._sleepers = Sleepers(model, start, self._memory)

@@ -3,6 +3,8 @@
 from collections.abc import Callable, Mapping
 from typing import Protocol
 
+import numpy as np
+
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.scene.scene import Method, SolverSettings
 from mechanics.solvers.first_order.admm import ADMM
@@ -16,6 +18,10 @@ from mechanics.solvers.strategies.rigid import moving_admm
 from moma.errors import SolverError
 
 __all__ = ["Solver", "choose_planar_solver", "choose_solver"]
+
+
+# largest error of a motion over the largest errors of velocity in its steps, added up [-]
+_ADDS_UP = 1.0
 
 
 class Solver(Protocol):
@@ -35,14 +41,16 @@ _EVERYWHERE: Mapping[Method, Callable[[float, float, int], Solver]] = {
 }
 
 
-def choose_solver(settings: SolverSettings, deformable: bool) -> Solver:
-    """Return the solver that the settings ask for."""
+def choose_solver(settings: SolverSettings, deformable: bool, duration: float = np.inf) -> Solver:
+    """Return the solver that the settings ask for, in a run of a duration [s], over which errors of motion add up."""
     limits = settings.tolerance, settings.velocity_tolerance, settings.max_iterations
     if settings.method in _EVERYWHERE:
         return _EVERYWHERE[settings.method](*limits)
     if settings.method == Method.ADMM:
         return ADMM(*limits) if deformable else moving_admm(*limits)
-    return Auto(*limits)
+    if settings.motion_error is None:
+        return Auto(*limits)
+    return Auto(*limits, motion_speed=settings.motion_error / (_ADDS_UP * duration))
 
 
 def choose_planar_solver(settings: SolverSettings) -> Solver:

@@ -6,7 +6,7 @@ what counts is the cost of an iteration: of two passes over the contacts and one
 M + H Σ⁻¹ Hᵀ, less than that of a Gauss–Seidel sweep (mechanics/solvers/_kernels/body_admm.py).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import coo_array, csc_array
@@ -19,7 +19,7 @@ from mechanics.solvers._kernels import body_admm as kernel
 from mechanics.solvers._kernels import body_cholesky as cholesky
 from moma.errors import SolverError
 
-__all__ = ["BodyADMM"]
+__all__ = ["BodyADMM", "Stage"]
 
 
 # overshoot of the impulses [-]
@@ -53,7 +53,7 @@ class Stage:
     extrapolated: bool
 
 
-STAGES = (Stage(0.02, 150, False), Stage(0.05, 250, True), Stage(0.2, 600, True))
+STAGES = (Stage(0.02, 150, False), Stage(0.05, 150, True), Stage(0.2, 250, True))
 
 
 @dataclass(frozen=True)

@@ -17,13 +17,17 @@ class Auto:
     ----------
     tolerance, velocity_tolerance : as in `NSGS`
     max_iterations : sweeps and iterations of all methods together
+    motion_speed : as in `Alternating`
     """
 
     tolerance: float = 1e-6
     velocity_tolerance: float = 1e-5
     max_iterations: int = 2000
+    motion_speed: float | None = None
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from `start`; return the best solution of all methods."""
-        strategy = Elastic if problem.delassus.rigid is None else Alternating
-        return strategy(self.tolerance, self.velocity_tolerance, self.max_iterations)(problem, start)
+        limits = self.tolerance, self.velocity_tolerance, self.max_iterations
+        if problem.delassus.rigid is None:
+            return Elastic(*limits)(problem, start)
+        return Alternating(*limits, self.motion_speed)(problem, start)
