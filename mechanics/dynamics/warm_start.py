@@ -13,7 +13,9 @@ from mechanics.scene.laws.law import BOND, REST, STATE
 __all__ = ["Memory"]
 
 
-_AHEAD = 1.0  # part of the last change that is expected again [-]
+_AHEAD = (
+    0.9  # part of the last change that is expected again [-]: forces without effect must not grow by habit
+)
 _OF_PLACES = [BOND, REST]  # internal variables that belong to places in a joint
 
 
@@ -73,9 +75,9 @@ class Memory(Carrier):
     def _extrapolated(self, key: Ints, last: Array) -> ContactStart:
         """Return r and û of the next step, linear through the last two where a contact was there in both."""
         at, known = _places(self._key_before, key, np.argsort(self._key_before, kind="stable"))
-        # a contact that was new in the last step, or is now, has no line
-        known &= last.any(axis=1)
         ahead, d = last.copy(), self._dimension
+        # one that closed or opened has no line
+        known &= last[:, :d].any(axis=1) == self._before[at, :d].any(axis=1)
         ahead[known] += _AHEAD * (last[known] - self._before[at[known]])
         return ContactStart(ahead[:, :d], ahead[:, d:])
 

@@ -4,6 +4,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Protocol
 
+import numpy as np
+
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.scene.scene import Method, SolverSettings
 from mechanics.solvers.first_order.admm import ADMM
@@ -19,6 +21,10 @@ from mechanics.solvers.strategies.rigid import moving_admm
 from moma.errors import SolverError
 
 __all__ = ["Solver", "Solvers", "choose_planar_solver", "choose_solver", "choose_solvers"]
+
+
+# largest error of a motion over the largest errors of velocity in its steps, added up [-]
+_ADDS_UP = 1.0
 
 
 class Solver(Protocol):
@@ -61,19 +67,21 @@ _EVERYWHERE: Mapping[Method, Callable[[float, float, int], Solver]] = {
 }
 
 
-def choose_solver(settings: SolverSettings, deformable: bool) -> Solver:
-    """Return the solver that the settings ask for."""
+def choose_solver(settings: SolverSettings, deformable: bool, duration: float = np.inf) -> Solver:
+    """Return the solver that the settings ask for, in a run of a duration [s], over which errors of motion add up."""
     limits = settings.tolerance, settings.velocity_tolerance, settings.max_iterations
     if settings.method in _EVERYWHERE:
         return _EVERYWHERE[settings.method](*limits)
     if settings.method == Method.ADMM:
         return ADMM(*limits) if deformable else moving_admm(*limits)
-    return Auto(*limits)
+    if settings.motion_error is None:
+        return Auto(*limits)
+    return Auto(*limits, motion_speed=settings.motion_error / (_ADDS_UP * duration))
 
 
-def choose_solvers(settings: SolverSettings, deformable: bool) -> Solvers:
-    """Return the solvers of a run: compliant joints are a way out for the automatic choice alone."""
-    usual = choose_solver(settings, deformable)
+def choose_solvers(settings: SolverSettings, deformable: bool, duration: float = np.inf) -> Solvers:
+    """Return the solvers of a run of a duration [s]: compliant joints are a way out for the automatic choice alone."""
+    usual = choose_solver(settings, deformable, duration)
     if not isinstance(usual, Auto) or settings.joint_compliance == 0:
         return Solvers(usual)
     return Solvers(

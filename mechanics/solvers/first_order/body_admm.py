@@ -19,7 +19,7 @@ from mechanics.solvers._kernels import body_admm as kernel
 from mechanics.solvers._kernels import body_cholesky as cholesky
 from moma.errors import SolverError
 
-__all__ = ["BodyADMM"]
+__all__ = ["BodyADMM", "Stage"]
 
 
 # overshoot of the impulses [-]
@@ -53,7 +53,7 @@ class Stage:
     extrapolated: bool
 
 
-STAGES = (Stage(0.02, 150, False), Stage(0.05, 250, True), Stage(0.2, 600, True))
+STAGES = (Stage(0.02, 150, False), Stage(0.05, 150, True), Stage(0.2, 250, True))
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.problem.residual import residual
 from mechanics.solvers.first_order.admm import ADMM
-from mechanics.solvers.first_order.body_admm import BodyADMM
+from mechanics.solvers.first_order.body_admm import BodyADMM, Stage
 from mechanics.solvers.first_order.nsgs import NSGS
 from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.newton import Newton
@@ -55,12 +55,20 @@ _LAST_PENALTY = 0.3
 # iterations of that ADMM
 _LAST_ITERATIONS = 300
 
-# iterations of ADMM on the velocities of bodies, which cost as much as the interior point
-_BODY_ITERATIONS = 1000
+# Newton's steps in which it follows forces that grow until a contact slips, and the iterations after them
+_FOLLOWING = 100
+_SORTING = (Stage(0.2, 100, extrapolated=True),)
 # steps without any slip after which a motion counts as over
 _MOTION = 10
 # velocity of a contact that slides, over the one up to which contacts may break their laws [-]
 _SLIDES = 10.0
+# and over the fastest u_free, at most [-]
+_SLOW = 1e-2
+# loosest tolerances of a motion: beyond, contacts no longer obey their laws [-]
+_LOOSEST, _LOOSEST_MAP = 0.05, 1e-2
+# velocity tolerance from which a step begins where the last one ended, with extrapolations at once [-]
+_LOOSE = 1e-3
+_LOOSE_STAGES = (Stage(0.1, 150, extrapolated=True), Stage(0.2, 450, extrapolated=True))
 # stages that solve steps in which next to nothing moves
 _RESTING = ("sweeps", "admm, small penalty")
 
@@ -91,12 +99,14 @@ class Alternating:
     tolerance, velocity_tolerance : as in `NSGS`
     max_iterations : sweeps and iterations together
     thorough : try also methods that take far longer than the others, and seldom help where these do not
+    motion_speed : velocity by which contacts may break their laws in the steps of a motion [m/s]; None: as in others
     """
 
     tolerance: float = 1e-6
     velocity_tolerance: float = 1e-5
     max_iterations: int = 2000
     thorough: bool = True
+    motion_speed: float | None = None
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from `start`; `why` names the method that solved it, and what the one before left."""
@@ -110,42 +120,80 @@ class Alternating:
             if rest is not None:
                 return rest
         before = "warm start" if warm else f"cold start, {len(start.impulse):,} contacts"
-        if start.motion and problem.delassus.rigid is not None:
-            found = self._in_motion(self.max_iterations)(problem, start)
-            found = self._judged(problem, found, "admm of bodies: motion")
-            if found.converged:
-                motion = _MOTION if self._slides(problem, found) else start.motion - 1
-                return replace(found, motion=motion)
-            before = f"admm of bodies stood at η {found.natural_map:.0e}"
-            best = _better(best, found)
-            start = ContactStart(best.impulse, best.velocity, start.motion)
-        for name, solve, from_best in self._stages(problem, warm, start.motion == 0):
+        follows = warm and start.motion is not None and problem.delassus.rigid is not None
+        moved = False
+        for name, solve, from_best in self._stages(problem, warm):
+            if follows and not moved and (start.motion or name not in _RESTING):
+                found, moved = replace(self, **self._limits(problem))._moved(problem, start), True
+                before = f"admm of bodies stood at η {found.natural_map:.0e}"
+                best = _better(best, found)
+                if best.converged or best.iterations >= self.max_iterations:
+                    break
+                start = ContactStart(best.impulse, best.velocity, start.motion)
             count = self.max_iterations - best.iterations
             begin = ContactStart(best.impulse, best.velocity) if from_best else start
             found = self._judged(problem, solve(count)(problem, begin), f"{name}: {before}")
             before = f"{name} stood at η {found.natural_map:.0e}"
-            if name not in _RESTING and warm and start.motion is not None:
-                found = replace(found, motion=_MOTION)
-            best = _better(best, found)
+            best = _better(best, replace(found, motion=_MOTION if moved else 0))
             # the stages after sweeps ask for W in a form that can be factorised, which takes as long as a sweep
             if best.converged or best.iterations >= self.max_iterations:
                 break
         return best
 
-    def _in_motion(self, most: int) -> _Solver:
-        solver = BodyADMM(self.tolerance, self.velocity_tolerance, min(_BODY_ITERATIONS, most))
-        return lambda p, s: solver(p, s if s.ahead is None else s.ahead)
+    def _moved(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
+        """Solve a step of a motion, from where the last two lead.
+
+        Rigid faces that close on each other under friction hold some contacts to velocities that differ by next to
+        nothing; then forces among them grow until one slips. Newton's method follows them there, ADMM sorts the others.
+        """
+        assert start.motion is not None
+        found = self._judged(
+            problem, self._bodies(self.max_iterations)(problem, start), "admm of bodies: motion"
+        )
+        best = found
+        while not found.converged and best.iterations < self.max_iterations:
+            for name, solve in (("Newton", self._following), ("admm of bodies", self._sorting)):
+                count = max(self.max_iterations - best.iterations, 1)
+                begin = ContactStart(found.impulse, found.velocity)
+                why = f"{name}: admm of bodies stood at η {found.natural_map:.0e}"
+                found = self._judged(problem, solve(count)(problem, begin), why)
+                best = _better(best, found)
+                if found.converged:
+                    break
+        still = best.converged and not self._slides(problem, best)
+        return replace(best, motion=max(start.motion - 1, 0) if still else _MOTION)
+
+    def _limits(self, problem: ContactProblem) -> dict[str, float]:
+        """Return the tolerances of a step of a motion."""
+        pace = float(np.abs(problem.u_free).max())
+        if self.motion_speed is None or pace == 0.0:
+            return {}
+        velocity = min(max(self.motion_speed / pace, self.velocity_tolerance), _LOOSEST)
+        # η tells next to nothing of a motion: the forces of the step before have one of 10⁻⁴
+        return {"velocity_tolerance": velocity, "tolerance": max(self.tolerance, min(velocity, _LOOSEST_MAP))}
+
+    def _bodies(self, most: int) -> _Solver:
+        if self.velocity_tolerance < _LOOSE:
+            solver = BodyADMM(self.tolerance, self.velocity_tolerance, most)
+            return lambda p, s: solver(p, s if s.ahead is None else s.ahead)
+        # errors of this size would be extrapolated with the rest
+        return BodyADMM(self.tolerance, self.velocity_tolerance, most, _LOOSE_STAGES)
+
+    def _following(self, most: int) -> _Solver:
+        return _even(ProximalNewton(self.tolerance, self.velocity_tolerance, min(_FOLLOWING, most)))
+
+    def _sorting(self, most: int) -> _Solver:
+        return BodyADMM(self.tolerance, self.velocity_tolerance, most, _SORTING)
 
     def _slides(self, problem: ContactProblem, found: ContactSolution) -> bool:
         """Return whether a contact that carries a force moves by more than the solution leaves undecided."""
         carries = found.impulse.any(axis=1)
         fastest = float(np.abs(problem.u_free).max())
-        return bool(
-            np.abs(found.velocity[carries]).max(initial=0.0) > _SLIDES * self.velocity_tolerance * fastest
-        )
+        limit = min(_SLIDES * self.velocity_tolerance, _SLOW) * fastest
+        return bool(np.abs(found.velocity[carries]).max(initial=0.0) > limit)
 
     def _stages(
-        self, problem: ContactProblem, warm: bool, may_move: bool
+        self, problem: ContactProblem, warm: bool
     ) -> Iterator[tuple[str, Callable[[int], _Solver], bool]]:
         """Yield names, solvers by their largest number of iterations, and whether each begins with the best so far."""
         limits = self.tolerance, self.velocity_tolerance
@@ -156,8 +204,6 @@ class Alternating:
             yield "admm, small penalty", self._static, False
             later = [("admm, balanced penalty", self._moving, False)]
             if problem.delassus.rigid is not None:
-                if warm and may_move:
-                    yield "admm of bodies", self._in_motion, False
                 yield "Newton", self._newton, False
                 interior = [
                     ("interior point", self._interior, False),
