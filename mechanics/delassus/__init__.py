@@ -2,5 +2,5 @@
 
 Public: `RigidDelassus`, `Schedule`, `schedule` (rigid); `MixedDelassus` (mixed); `rigid_delassus`, `mixed_delassus`,
 `local_velocity`, `world_impulse` (assembly); `BodyForm` (body_space); `CondensedForm` (condensed); `Cliques`, `fronts`
-(multifrontal); `greedy_colours` (colouring).
+(multifrontal); `greedy_colours` (colouring); `CompliantDelassus`, `CompliantForm` (compliant).
 """

@@ -1,4 +1,4 @@
 """Strategies: automatic choice among solvers, by the bodies and the observed convergence.
 
-Public: `Auto` (auto); `Alternating`, `moving_admm` (rigid); `Elastic` (elastic).
+Public: `Auto` (auto); `Alternating`, `moving_admm` (rigid); `Elastic` (elastic); `Compliant` (compliant).
 """

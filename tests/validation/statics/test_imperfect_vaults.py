@@ -1,7 +1,7 @@
 """Vaults as surveys leave them: every corner off by a millimetre, joints that gape, stones that overlap, slivers.
 
-The linear program of limit analysis decides on the vaults with true joints: 0.3 m thick they bear a third of their weight
-sideways, 0.08 m thick not even their weight. A millimetre changes neither.
+The linear program of limit analysis decides on the vaults with true joints: 0.3 m thick they bear a third of their
+weight sideways, 0.08 m thick not even their weight. A millimetre changes neither.
 """
 
 from dataclasses import replace
