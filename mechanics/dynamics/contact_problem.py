@@ -37,8 +37,6 @@ _TOUCH = 1e-9  # overlap over a body's size that comes from rounding, and is no 
 _NEVER = 1e3
 # overlap over that of the largest force, from which it comes from no force of a compliant joint [-]
 _UNEXPLAINED = 4.0
-# factor on the compliance where a step cannot be solved with it either [-]
-_SOFTER = 10.0
 # compliant steps after which rigid joints are tried again, at first; twice as many after each failure
 _FIRST_WAIT = 8
 
@@ -53,11 +51,13 @@ class JointCompliance:
     left : steps with compliant joints still to come, before rigid joints are tried again; negative: steps that are left
         to rigid joints alone, as compliant ones have failed, too
     wait : number of steps after the next failure of either
+    softness : factor on ε with which the last step with compliant joints was solved [-]
     """
 
     value: float = 0.0
     left: int = 0
     wait: int = _FIRST_WAIT
+    softness: float = 1.0
 
     @property
     def rigid(self) -> bool:
@@ -69,13 +69,13 @@ class JointCompliance:
         value = self.value or share * mean_diagonal(operator.diagonal)
         return JointCompliance(value, self.wait, 2 * self.wait)
 
-    def softer(self) -> "JointCompliance":
-        """Return the state with joints ten times as compliant."""
-        return replace(self, value=_SOFTER * self.value)
+    def softer(self, factor: float) -> "JointCompliance":
+        """Return the state with joints that many times as compliant."""
+        return replace(self, value=factor * self.value)
 
-    def used(self) -> "JointCompliance":
+    def used(self, softness: float) -> "JointCompliance":
         """Return the state after a step with compliant joints."""
-        return replace(self, left=self.left - 1)
+        return replace(self, left=self.left - 1, softness=softness)
 
     def failed(self) -> "JointCompliance":
         """Return the state after a step that could not be solved at all."""

@@ -26,9 +26,6 @@ from moma.errors import SolverError
 
 __all__ = ["Simulation"]
 
-# compliances of the joints that are tried in one step
-_SOFTEST = 3
-
 # predicted state, contacts, free motion, internal variables, and the state in which the run begins
 _Given = tuple[State, Detection, Kick, Array, State | None]
 _Solved = tuple[ContactProblem, Approach, ContactSolution]
@@ -189,31 +186,40 @@ class Simulation(Carrier):
         """Return the problem of a step and its solution: with rigid joints, or compliant ones where these fail."""
         solvers, joints = self._solvers, self._joints
         if joints.rigid:
-            alone = solvers.compliant is None or joints.left < 0
+            alone = not solvers.compliant or joints.left < 0
             solver = solvers.usual if alone else solvers.early if joints.value == 0 else solvers.brief
-            found = self._try(given, joints, solver, warm)
+            found = self._try(given, joints, solver, warm, warm)
             if found[2].converged or alone:
                 self._joints = joints.passed()
                 return found
             joints = joints.needed(found[0].delassus, self.model.scene.solver.joint_compliance)
-        after = joints.used()
-        for _ in range(_SOFTEST):
-            found = self._try(given, joints, solvers.compliant, warm)
-            if found[2].converged:
-                self._joints = after
-                return found
-            joints = joints.softer()
+        begin = warm
+        for factor, solver in solvers.compliant:
+            if factor < joints.softness:
+                # so soft they could not be solved in the last step
+                continue
+            problem, approach, solution = self._try(given, joints.softer(factor), solver, warm, begin)
+            if solution.converged:
+                self._joints = joints.used(factor)
+                return problem, approach, solution
+            begin = ContactStart(unshifted(problem, solution.impulse), solution.velocity)
         self._joints = self._joints.failed()
-        return self._try(given, self._joints, solvers.usual, warm)
+        return self._try(given, self._joints, solvers.usual, warm, warm)
 
     def _try(
-        self, given: _Given, joints: JointCompliance, solver: Solver | None, warm: ContactStart
+        self,
+        given: _Given,
+        joints: JointCompliance,
+        solver: Solver | None,
+        warm: ContactStart,
+        begin: ContactStart,
     ) -> _Solved:
+        """State the problem after a step with the impulses of `warm`, and solve it from `begin`."""
         assert solver is not None
         with self.clock("assemble"):
             problem, approach = contact_problem(self.model, *given, joints, warm.impulse)
         with self.clock("solve"):
-            return problem, approach, solver(problem, shifted(problem, warm))
+            return problem, approach, solver(problem, shifted(problem, begin))
 
     def _conclude(self, step: Step) -> Step:
         """Remember a step for the next one, and halt the bodies that relaxation or sleep halts after it."""

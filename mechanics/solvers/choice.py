@@ -43,18 +43,21 @@ class Solvers:
     usual : of rigid joints
     early : of rigid joints, where compliant ones are a way out: it fails sooner
     brief : the same where rigid joints have failed before: it takes no longer than a step with compliant joints
-    compliant : of compliant joints; None where joints stay rigid
+    compliant : of compliant joints: factors on their compliance, and the solvers with which these are tried one after
+        the other; empty where joints stay rigid
     """
 
     usual: Solver
     early: Solver | None = None
     brief: Solver | None = None
-    compliant: Solver | None = None
+    compliant: tuple[tuple[float, Solver], ...] = ()
 
 
 # iterations in which rigid joints must be solved after they have failed: those that cost no more than a step with
 # compliant ones
 _BRIEF = 80
+# factors on the compliance of joints, where a step cannot be solved with it either
+_SOFTNESS = (1.0, 3.0, 10.0)
 
 
 # methods for rigid and deformable bodies alike, by tolerance, velocity tolerance and iterations
@@ -84,11 +87,12 @@ def choose_solvers(settings: SolverSettings, deformable: bool, duration: float =
     usual = choose_solver(settings, deformable, duration)
     if not isinstance(usual, Auto) or settings.joint_compliance == 0:
         return Solvers(usual)
+    quick = Compliant(usual.tolerance, usual.velocity_tolerance, usual.max_iterations)
     return Solvers(
         usual,
         replace(usual, thorough=False),
         replace(usual, max_iterations=min(_BRIEF, usual.max_iterations), thorough=False),
-        Compliant(usual.tolerance, usual.velocity_tolerance, usual.max_iterations),
+        (*((factor, quick) for factor in _SOFTNESS), (_SOFTNESS[-1], replace(quick, thorough=True))),
     )
 
 

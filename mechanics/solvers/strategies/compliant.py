@@ -14,6 +14,8 @@ __all__ = ["Compliant"]
 
 # factors of E, from soft joints to those asked for: each solution leads Newton's method to the next
 _HOMOTOPY = (100.0, 30.0, 10.0, 3.0, 1.0)
+# factor above which also a solution that is not quite one leads on [-]
+_TOO_SOFT = 10.0
 # steps of Newton's method with each
 _NEWTON_STEPS = 30
 # tolerances of Newton's method over those asked for: what they leave would be a creep [-]
@@ -27,41 +29,54 @@ class Compliant:
     """Newton's method, from softer joints where it fails, then the interior point; with deformable stones as `Elastic`.
 
     With E the matrix W + E is regular, however many points stones share, so the method that solves it is fast; from
-    contacts far from those of the solution it wanders, and softer joints bring it near.
+    contacts far from those of the solution it wanders, and softer joints bring it near. Where it is not solved, the
+    solution is that of the hardest joints that were: a start for joints a little softer.
 
     Attributes
     ----------
     tolerance, velocity_tolerance : as in `NSGS`
     max_iterations : of all together
+    thorough : try the interior point, too, which takes as long as all the others
     """
 
     tolerance: float = 1e-6
     velocity_tolerance: float = 1e-5
     max_iterations: int = 2000
+    thorough: bool = False
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
-        """Solve from `start`; return the best solution of all methods."""
+        """Solve from `start`."""
         if problem.delassus.rigid is None:
             found = Elastic(self.tolerance, self.velocity_tolerance, self.max_iterations)(problem, start)
             return replace(found, why=f"compliant joints, {found.why}")
-        best = self._newton(problem, start, "Newton", self.max_iterations)
-        if not best.converged and best.iterations < self.max_iterations:
-            best = _better(best, self._softer(problem, start, self.max_iterations - best.iterations))
-        if not best.converged and best.iterations < self.max_iterations:
-            most = min(_INTERIOR, self.max_iterations - best.iterations)
-            found = InteriorPoint(self.tolerance, self.velocity_tolerance, most)(problem, start)
-            best = _better(best, self._judged(problem, found, "interior point"))
-        return best
+        found = self._newton(problem, start, "Newton", self.max_iterations)
+        if not found.converged and found.iterations < self.max_iterations:
+            found = self._softer(problem, start, found.iterations)
+        left = self.max_iterations - found.iterations
+        if not found.converged and self.thorough and left > 0:
+            path = InteriorPoint(self.tolerance, self.velocity_tolerance, min(_INTERIOR, left))(
+                problem, start
+            )
+            path = replace(path, iterations=path.iterations + found.iterations)
+            found = self._judged(problem, path, "interior point")
+        return found
 
-    def _softer(self, problem: ContactProblem, start: ContactStart, most: int) -> ContactSolution:
-        operator, count = problem.delassus, 0
+    def _softer(self, problem: ContactProblem, start: ContactStart, count: int) -> ContactSolution:
+        """Return the solution by way of softer joints, after `count` iterations."""
+        operator = problem.delassus
         assert isinstance(operator, CompliantDelassus)
         for factor in _HOMOTOPY:
             soft = CompliantDelassus(operator.inner, factor * operator.joint_compliance)
-            found = self._newton(
-                replace(problem, delassus=soft), start, "Newton from softer joints", most - count
-            )
-            start, count = ContactStart(found.impulse, found.velocity), count + found.iterations
+            most = self.max_iterations - count
+            found = self._newton(replace(problem, delassus=soft), start, "Newton from softer joints", most)
+            count += found.iterations
+            if found.converged or factor > _TOO_SOFT:
+                start = ContactStart(found.impulse, found.velocity)
+            if count >= self.max_iterations:
+                break
+        if not found.converged or factor > _HOMOTOPY[-1]:
+            best = replace(found, impulse=start.impulse, velocity=start.velocity)
+            found = self._judged(problem, best, found.why)
         return replace(found, iterations=count)
 
     def _newton(self, problem: ContactProblem, start: ContactStart, name: str, most: int) -> ContactSolution:
@@ -77,9 +92,3 @@ class Compliant:
         left = residual(problem, found.impulse)
         within = left.within(self.tolerance, self.velocity_tolerance)
         return replace(found, natural_map=left.natural_map, converged=within, why=f"compliant joints, {name}")
-
-
-def _better(one: ContactSolution, other: ContactSolution) -> ContactSolution:
-    """Return the one that is solved or has the smaller η, with the iterations of both."""
-    best = min(one, other, key=lambda solution: (not solution.converged, solution.natural_map))
-    return replace(best, iterations=one.iterations + other.iterations)

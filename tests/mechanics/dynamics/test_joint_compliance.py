@@ -160,19 +160,39 @@ def test_joints_that_cannot_be_solved_either_way_are_left_to_the_rigid_methods()
     model, start = build_model(regular())
     simulation = Simulation(model, start)
     own = simulation._solvers
-    failing = Failing(own.compliant)
-    simulation._solvers = replace(own, early=Failing(own.early), brief=Failing(own.brief), compliant=failing)
+    failing = Failing(own.compliant[0][1])
+    simulation._solvers = replace(
+        own,
+        early=Failing(own.early),
+        brief=Failing(own.brief),
+        compliant=((1.0, failing), (3.0, failing), (10.0, failing)),
+    )
     steps = [simulation.step() for _ in range(9)]
     assert all(step.solution.converged for step in steps)
     # three compliances in the first step, none in the eight that follow
     assert failing.calls == 3
 
 
+def test_joints_that_must_be_softer_stay_so_until_rigid_ones_are_tried():
+    model, start = build_model(regular())
+    simulation = Simulation(model, start)
+    own = simulation._solvers
+    (_, quick), *softer = own.compliant
+    failing = Failing(quick)
+    simulation._solvers = replace(
+        own, early=Failing(own.early), brief=Failing(own.brief), compliant=((1.0, failing), *softer)
+    )
+    values = [simulation.step().problem.delassus.joint_compliance[0, 0] for _ in range(9)]
+    np.testing.assert_allclose(values, 3.0 * simulation._joints.value)
+    # in the first step, and after the eight that follow it
+    assert failing.calls == 2
+
+
 @pytest.mark.parametrize("method", [one for one in Method if one is not Method.AUTO])
 def test_a_method_that_is_asked_for_gets_rigid_joints(method):
     one = regular()
     model, start = build_model(replace(one, solver=replace(one.solver, method=method)))
-    assert Simulation(model, start)._solvers.compliant is None
+    assert Simulation(model, start)._solvers.compliant == ()
 
 
 def test_the_verdict_tells_how_far_joints_gave_way(monkeypatch):
