@@ -38,8 +38,7 @@ def stress_error(mesh: SolidMesh, material: Material, displacement: Array, nodal
     smooth = rule.value @ nodal_stress[mesh.cells]
     compliance = np.linalg.inv(material.stiffness)
     error, energy = (
-        float(np.einsum("cq,cqi,ij,cqj->", rule.volume, s, compliance, s, optimize=True))
-        for s in (smooth - raw, raw)
+        float(rule.volume.ravel() @ ((s @ compliance) * s).sum(axis=-1).ravel()) for s in (smooth - raw, raw)
     )
     return float(np.sqrt(error / (energy + error))) if energy + error > 0 else 0.0
 
