@@ -101,11 +101,12 @@ class _Observers:
 def main() -> None:
     """Build, shake and print."""
     options = _options()
-    _shaken(tower_scene(40, options.step * 1e-3, 1), 1)  # compiles
+    _shaken(tower_scene(40, options.step * 1e-3, 1, SolverSettings()), 1)  # compiles
     start = time.process_time()
     progress(f"a tower of about {options.build or options.blocks:,} blocks")
     shape = tower(options.build or options.blocks)
-    scene = tower_scene(len(shape.low), options.step * 1e-3, options.steps)
+    solver = SolverSettings(tolerance=options.tolerance, velocity_tolerance=options.velocity_tolerance)
+    scene = tower_scene(options.build or options.blocks, options.step * 1e-3, options.steps, solver)
     row = {"scene_s": time.process_time() - start, "expected": expected_contacts(shape)}
     row |= _shaken(scene, 0 if options.build else options.steps)
     if options.json:
@@ -125,12 +126,16 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--blocks", type=int, default=11_500, help="about so many blocks (11500)")
     parser.add_argument("--steps", type=int, default=300, help="steps of strong motion (300)")
     parser.add_argument("--step", type=float, default=1.0, help="time step in milliseconds (1)")
+    parser.add_argument("--tolerance", type=float, default=1e-5, help="natural map of every step (1e-5)")
+    parser.add_argument(
+        "--velocity-tolerance", type=float, default=1e-2, help="error of velocities, as in [solver] (1e-2)"
+    )
     parser.add_argument("--build", type=int, default=0, help="build about so many blocks, and make one step")
     parser.add_argument("--json", action="store_true", help="print JSON")
     return parser.parse_args()
 
 
-def tower_scene(blocks: int, step: float, steps: int) -> Scene:
+def tower_scene(blocks: int, step: float, steps: int, solver: SolverSettings) -> Scene:
     """Return a tower of about `blocks` blocks, and so many steps of strong motion after it has come to rest."""
     motion = strongest(earthquake(), max(step * steps, 0.01), _REST_STEPS * step)
     return Scene(
@@ -138,7 +143,7 @@ def tower_scene(blocks: int, step: float, steps: int) -> Scene:
         tower_blocks(tower(blocks)),
         contact=ContactSettings(law=DryJoint(friction=_FRICTION)),
         time=TimeSettings(step=step, theta=0.5, stop_at_equilibrium=False),
-        solver=SolverSettings(tolerance=min(_GOAL, SolverSettings().tolerance)),
+        solver=solver,
         loads=Loads(motions=(motion,)),
     )
 

@@ -38,6 +38,8 @@ _MOST = 1e6
 _MEMORY = 5
 # gain that a step must bring, over what it promises [-]
 _GAIN = 1e-4
+# most numbers in the fronts of a factorisation, 3 GB; beyond, the method gives up and another one must solve
+_ROOM = 400_000_000
 # shortest part of a step [-]
 _SHORTEST = 1e-3
 
@@ -177,12 +179,16 @@ class _System:
         self._plan = fronts.analyse(indices, indptr)
         nc = len(contacts.body)
         self._inverse, self._gain = np.empty((2, nc, 3, 3))
-        self._value, self._factor = np.empty((len(indices), 3, 3)), np.empty(self._plan.aptr[-1])
+        self._fits = int(self._plan.aptr[-1]) <= _ROOM
+        self._value = np.empty((len(indices), 3, 3))
+        self._factor = np.empty(self._plan.aptr[-1] if self._fits else 0)
         self._pivot = np.empty(6 * len(moving), dtype=np.int64)
         self._work = np.empty(int(self._plan.whole.max()))
 
     def step(self, first: Array, second: Array, error: Array, alpha: float) -> Array | None:
-        """Return Δr (nc, 3); None if the equations are singular."""
+        """Return Δr (nc, 3); None if the equations are singular, or their factors too large."""
+        if not self._fits:
+            return None
         contacts, place = self._contacts, self._blocks.place
         if not bodies.inverse_blocks(first, second, alpha + self._compliance, self._inverse, self._gain):
             return None

@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 from mechanics.dynamics.simulation import Simulation
 from mechanics.model.model import build_model
 from mechanics.problem.problem import ContactProblem, ContactStart
-from mechanics.scene.scene import Scene
+from mechanics.scene.scene import Scene, SolverSettings
 from mechanics.solvers._kernels import body_newton as bodies
+from mechanics.solvers.choice import choose_solver
 from mechanics.solvers.first_order.nsgs import NSGS
 from mechanics.solvers.second_order.proximal_newton import ProximalNewton, _System
 from mechanics.stones.materials import Material
@@ -61,7 +62,7 @@ def test_equations_of_the_bodies_are_those_of_the_contacts():
     rng, nc = np.random.default_rng(1), len(problem.friction)
     first, second = rng.normal(size=(2, nc, 3, 3)) + 3.0 * np.eye(3)
     error, alpha = rng.normal(size=(nc, 3)), 0.7
-    step = _System(problem.delassus.rigid).step(first, second, error, alpha)
+    step = _System(problem.delassus.rigid, None).step(first, second, error, alpha)
     inertia, lift = dense_lift(problem)
     compliance = lift.T @ np.linalg.solve(inertia, lift) + alpha * np.eye(3 * nc)
     big_first, big_second = np.zeros((2, nc, 3, nc, 3))
@@ -76,10 +77,10 @@ def test_blocks_are_inverted_one_by_one():
     rng = np.random.default_rng(2)
     first, second = rng.normal(size=(2, 20, 3, 3))
     inverse, gain = np.empty((2, 20, 3, 3))
-    assert bodies.inverse_blocks(first, second, 0.3, inverse, gain)
+    assert bodies.inverse_blocks(first, second, np.full((20, 3), 0.3), inverse, gain)
     assert inverse == pytest.approx(np.linalg.inv(first + 0.3 * second), rel=1e-9)
     assert gain == pytest.approx(inverse @ second, rel=1e-9)
-    assert not bodies.inverse_blocks(0 * first, 0 * second, 0.3, inverse, gain)
+    assert not bodies.inverse_blocks(0 * first, 0 * second, np.full((20, 3), 0.3), inverse, gain)
 
 
 def test_a_column_of_100_takes_a_few_steps_from_nothing():
@@ -140,3 +141,14 @@ def test_derivatives_of_alart_and_curniers_function(seed, mu, k):
             behind = projected_form(r[0] - change[0], u[0] - change[1], mu, k, rho[0])
             # kinks are met by chance alone
             assert matrix[:, j] == pytest.approx((ahead - behind) / (2 * tiny), abs=1e-5)
+
+
+def test_a_scene_whose_factors_have_no_room_is_left_to_other_methods(monkeypatch):
+    problem = first_problem(column([0.5, 0.3, 0.4], [2000.0, 1500.0, 2500.0]))
+    assert ProximalNewton()(problem, nothing(problem)).converged
+    monkeypatch.setattr("mechanics.solvers.second_order.proximal_newton._ROOM", 10)
+    given_up = ProximalNewton()(problem, nothing(problem))
+    assert not given_up.converged
+    assert not given_up.impulse.any()
+    solved = choose_solver(SolverSettings(), False)(problem, nothing(problem))
+    assert solved.converged
