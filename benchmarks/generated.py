@@ -1,15 +1,16 @@
-"""Scenes of any size, made when they are needed: running-bond walls, and boxes of disks."""
+"""Scenes of any size, made when they are needed: running-bond walls, columns, arches, and boxes of disks."""
 
 from itertools import pairwise
 
 import numpy as np
 
 from benchmarks.scenes import BlockScene
+from mechanics.arrays import Array
 from mechanics.planar.scene import Disk, PlanarScene, PlanarTime, Wall
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import SolverSettings
 
-__all__ = ["box_faces", "disk_box", "running_bond"]
+__all__ = ["box_faces", "disk_box", "rigid_scenes", "running_bond"]
 
 # length, height and depth of a brick [m]
 _BRICK = (0.30, 0.10, 0.15)
@@ -41,6 +42,57 @@ def running_bond(bricks: int, courses: int, friction: float = 0.5, density: floa
     support[0] = True
     faces = (_FACES,) * len(cells)
     return BlockScene(f"wall_{bricks}x{courses}", corners, faces, support, friction, density, 9.81)
+
+
+def rigid_scenes() -> tuple[BlockScene, ...]:
+    """Columns, semicircular arches and running-bond walls, on which rigid engines are compared; small ones first."""
+    scenes = {f"column_{n}": _column(n) for n in (10, 50)} | {f"arch_{n}": _arch(n) for n in (15, 45)}
+    scenes |= {f"wall_{n}x{n}": _wall(n) for n in (10, 20, 40)}
+    named = (_around(name, *cells) for name, cells in scenes.items())
+    return tuple(sorted(named, key=lambda scene: len(scene.vertices)))
+
+
+def _column(count: int) -> tuple[list[Array], int]:
+    """Blocks of 0.5 × 0.5 × 0.25 m one upon the other on a slab; corners of each, and how many are fixed."""
+    blocks = [_ring_box((-0.5, 0.5), (-0.5, 0.5), (-0.2, 0.0))]
+    half = (-0.25, 0.25)
+    return blocks + [_ring_box(half, half, (0.25 * k, 0.25 * (k + 1))) for k in range(count)], 1
+
+
+def _arch(count: int) -> tuple[list[Array], int]:
+    """Voussoirs 0.3 m thick and 0.5 m deep on a semicircle of 2 m, on two abutments."""
+    blocks = [_ring_box((x - 0.25, x + 0.25), (-0.35, 0.35), (-0.3, 0.0)) for x in (-2.0, 2.0)]
+    for low, high in pairwise(np.linspace(np.pi, 0.0, count + 1)):
+        ring = [(r, y) for r, y in ((1.85, -0.25), (1.85, 0.25), (2.15, 0.25), (2.15, -0.25))]
+        blocks.append(
+            np.array([(r * np.cos(a), y, r * np.sin(a)) for a in (low, high) for r, y in ring], dtype=float)
+        )
+    return blocks, 2
+
+
+def _wall(count: int) -> tuple[list[Array], int]:
+    """Courses of bricks of 0.30 × 0.15 × 0.10 m, as many as a course has, half bricks at the edges, on a slab."""
+    length, height, depth = _BRICK
+    blocks = [_ring_box((-0.1, count * length + 0.1), (-0.1, depth + 0.1), (-0.2, 0.0))]
+    for course in range(count):
+        joints = np.arange(count + 1) * length
+        if course % 2:
+            joints = np.concatenate([[0.0], joints[:-1] + length / 2, [count * length]])
+        z = course * height, (course + 1) * height
+        blocks += [_ring_box(x, (0.0, depth), z) for x in pairwise(joints.tolist())]
+    return blocks, 1
+
+
+def _ring_box(x: tuple[float, float], y: tuple[float, float], z: tuple[float, float]) -> Array:
+    """Corners (8, 3) of a box, the lower ones first, each four counter-clockwise seen from above."""
+    return np.array([(x[i], y[j], k) for k in z for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))])
+
+
+def _around(name: str, blocks: list[Array], fixed: int) -> BlockScene:
+    """Blocks of which the first ones are fixed, with corners as of `_ring_box`."""
+    faces = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
+    support = np.arange(len(blocks)) < fixed
+    return BlockScene(name, tuple(blocks), (faces,) * len(blocks), support, 0.5, 2400.0, 9.81)
 
 
 def disk_box(columns: int, rows: int, radius: float = 0.01, sweeps: int = 2000) -> PlanarScene:

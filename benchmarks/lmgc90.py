@@ -1,18 +1,32 @@
-"""MOMA and LMGC90 side by side: `python -m benchmarks.lmgc90 --scenes DIR [--json]`.
+"""MOMA and LMGC90 side by side: `python -m benchmarks.lmgc90 [--write] [--json]`.
 
 Same blocks, friction, law (gap Signorini and Coulomb, inelastic), time step and θ; every run is a process of its
-own with one thread, the two programs in turns. See benchmarks/README.md for what the columns mean.
+own with one thread, the two programs in turns. Without `--scenes` the scenes of `rigid_scenes` are made on the way;
+`--write` puts the tables into benchmarks/README.md, which says what their columns mean.
 """
 
 import argparse
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
+from benchmarks.generated import rigid_scenes
+from benchmarks.report import (
+    Row,
+    Table,
+    commit,
+    environment,
+    guarded,
+    machine,
+    print_json,
+    progress,
+    table_lines,
+    write_between,
+)
 from benchmarks.runs import Run, Runner, fastest, figures
-from benchmarks.scenes import list_scenes
+from benchmarks.scenes import list_scenes, write_scene
 from moma.errors import UsageError
 
 __all__ = ["main"]
@@ -76,27 +90,47 @@ def main() -> None:
         raise UsageError(
             f"{options.steps} steps", where="--steps", remedy="give 2 or more: the first and a settled one"
         )
-    rows: list[Row] = []
-    for path in list_scenes(Path(options.scenes), tuple(options.only)):
-        rows += _Pair(path, options).rows()
+    with tempfile.TemporaryDirectory() as folder:
+        rows = [
+            row
+            for path in list_scenes(_scenes(options, Path(folder)), tuple(options.only))
+            for row in _Pair(path, options).rows()
+        ]
     if options.json:
         print_json(rows)
         return
     for row in rows:
         row |= {f"{key}_ms": None if row[key] is None else 1e3 * row[key] for key in _TIMES}
-    print(
-        f"{machine()}; {rows[0]['versions']}; θ = {options.theta}, h = {options.step} s, {options.steps} steps\n"
-    )
-    print_table(rows, _TIMES_TABLE if options.relaxation is None else (*_TIMES_TABLE, *_RELAXED))
-    print()
-    print_table(rows, _EXACT_TABLE)
+    setting = f"θ = {options.theta}, h = {options.step} s, {options.steps} steps"
+    if options.relaxation is not None:
+        setting += f"; LMGC90 as shipped (relaxation 0.1), and with relaxation {options.relaxation:g}"
+    lines = [
+        f"Measured at {commit()}: {machine()}; {rows[0]['versions']}; {setting}.",
+        "",
+        *table_lines(rows, _TIMES_TABLE if options.relaxation is None else (*_TIMES_TABLE, *_RELAXED)),
+        "",
+        *table_lines(rows, _EXACT_TABLE),
+    ]
+    print("\n".join(lines))
+    if options.write:
+        write_between("lmgc90", lines)
+
+
+def _scenes(options: argparse.Namespace, folder: Path) -> Path:
+    """The folder of the scenes: that of `--scenes`, or an empty one into which they are written."""
+    if options.scenes is not None:
+        return Path(options.scenes)
+    for scene in rigid_scenes():
+        write_scene(scene, folder / f"{scene.name}.npz")
+    return folder
 
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.lmgc90", description=__doc__)
-    parser.add_argument("--scenes", required=True, help="folder with .npz scenes")
+    parser.add_argument("--scenes", help="folder with .npz scenes (made on the way)")
     parser.add_argument("--only", nargs="+", default=[], metavar="NAME", help="these scenes alone")
     parser.add_argument("--json", action="store_true", help="print an array of objects, one for each row")
+    parser.add_argument("--write", action="store_true", help="put the tables into benchmarks/README.md")
     parser.add_argument("--steps", type=int, default=60, help="time steps of each run (60)")
     parser.add_argument("--settled", type=int, default=20, help="steps at the end that count as settled (20)")
     parser.add_argument("--step", type=float, default=1e-3, help="time step in seconds (0.001)")
@@ -122,7 +156,10 @@ def _options() -> argparse.Namespace:
         "--lmgc90-python", default=sys.executable, help="interpreter that has compas_lmgc90 (this one)"
     )
     parser.add_argument(
-        "--relaxation", type=float, help="also time LMGC90 with this relaxation; the package fixes 0.1"
+        "--relaxation",
+        type=float,
+        default=1.0,
+        help="time LMGC90 with this relaxation too (1); the package fixes 0.1",
     )
     parser.add_argument("--ours-only", action="store_true", help="leave LMGC90 out")
     return parser.parse_args()

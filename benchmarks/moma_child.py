@@ -17,16 +17,13 @@ from mechanics.scene.scene import Scene
 
 __all__ = ["main"]
 
-# iterations that every method of the solver has had its turn with
-_WARM = 100
-
 
 def main() -> None:
-    """Compile on a run of its own, then run, and write cpu, sweeps, motion and the contacts of some steps to OUT."""
+    """Run once untimed, then again, and write cpu, sweeps, motion and the contacts of some steps to OUT."""
     options = _options()
     blocks = read_scene(Path(options.scene))
     scene = engine_scene(blocks, options.step, options.theta, options.tolerance, options.sweeps)
-    _warm_up(engine_scene(blocks, options.step, options.theta, options.tolerance, _WARM))
+    _warm_up(scene, options)
     simulation = _simulation(scene, options.fresh)
     state = simulation.state
     place = [(state.centre, state.rotation.transpose(0, 2, 1))]
@@ -72,10 +69,10 @@ def _simulation(scene: Scene, fresh: bool = False) -> Simulation:
     return Simulation(*build_model(scene), fresh_contacts=fresh)
 
 
-def _warm_up(scene: Scene) -> None:
-    """Three steps with a few iterations: every kernel is compiled, or loaded, before the clock runs."""
-    simulation = _simulation(scene)
-    for _ in range(3):
+def _warm_up(scene: Scene, options: argparse.Namespace) -> None:
+    """Run the same steps: every kernel that any of them needs is compiled, or loaded, before the clock runs."""
+    simulation = _simulation(scene, options.fresh)
+    for _ in range(options.steps):
         simulation.step()
 
 

@@ -25,12 +25,14 @@ class Siconos:
         elif table.exists():
             with table.open(newline="", encoding="utf-8") as file:
                 self._rows = [row for row in csv.DictReader(file) if float(row["tol"]) == options.tolerance]
-            self.source = f"{table.name}, measured on another machine"
+            self.source = f"{table.name}, one cold call each on another machine"
 
     def figures(self, path: Path) -> Row:
         """The fastest method that solved the problem, and the fastest NSGS."""
         methods = self._live(path) if self._options.siconos_python else self._stored(path.stem)
-        solved = sorted((one for one in methods if one["solved"]), key=lambda one: one["cpu"])
+        solved = sorted(
+            (one for one in methods if one["solved"]), key=lambda one: one["cpu"] or one["cpu_first"]
+        )
         sweeping = [one for one in solved if one["method"].startswith("NSGS")]
         best, nsgs = next(iter(solved), None), next(iter(sweeping), None)
         return {
@@ -38,9 +40,11 @@ class Siconos:
             "siconos_tried": len(methods),
             "siconos_best": best and best["method"],
             "siconos_best_cpu": best and best["cpu"],
+            "siconos_best_cpu_first": best and best["cpu_first"],
             "siconos_best_iterations": best and best["iterations"],
             "siconos_nsgs": nsgs and nsgs["method"],
             "siconos_nsgs_cpu": nsgs and nsgs["cpu"],
+            "siconos_nsgs_cpu_first": nsgs and nsgs["cpu_first"],
             "siconos_nsgs_iterations": nsgs and nsgs["iterations"],
         }
 
@@ -50,7 +54,8 @@ class Siconos:
                 "method": row["solver"],
                 "solved": row["solved"] == "1",
                 "iterations": int(row["iterations"] or 0),
-                "cpu": float(row["cpu_s"] or "nan"),
+                "cpu": None,  # a file tells one cold call
+                "cpu_first": float(row["cpu_s"] or "nan"),
             }
             for row in self._rows
             if row["problem"] == name

@@ -3,19 +3,34 @@
 import json
 import os
 import platform
+import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from moma.errors import MomaError
+from moma.errors import MomaError, UsageError
 
-__all__ = ["Row", "Table", "environment", "guarded", "machine", "print_json", "print_table", "progress"]
+__all__ = [
+    "Row",
+    "Table",
+    "commit",
+    "environment",
+    "guarded",
+    "machine",
+    "print_json",
+    "print_table",
+    "progress",
+    "table_lines",
+    "write_between",
+]
 
 Row = dict[str, Any]
 # per column: key of the row, heading, format
 Table = Sequence[tuple[str, str, str]]
+
+_ROOT = Path(__file__).resolve().parents[1]
 
 
 def print_json(rows: Sequence[Row]) -> None:
@@ -33,13 +48,52 @@ def _plain(value: Any) -> Any:
 
 def print_table(rows: Sequence[Row], table: Table) -> None:
     """Markdown, aligned; – where a row has no value."""
+    print("\n".join(table_lines(rows, table)))
+
+
+def table_lines(rows: Sequence[Row], table: Table) -> list[str]:
+    """Lines of a table in Markdown, aligned; – where a row has no value."""
     cells = [[heading for _, heading, _ in table]]
     cells += [[_cell(row.get(key), form) for key, _, form in table] for row in rows]
     widths = [max(len(line[k]) for line in cells) for k in range(len(table))]
-    for n, line in enumerate(cells):
-        print("| " + " | ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)) + " |")
-        if n == 0:
-            print("|" + "|".join("-" * (width + 2) for width in widths) + "|")
+    lines = [
+        "| " + " | ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)) + " |"
+        for line in cells
+    ]
+    return [lines[0], "|" + "|".join("-" * (width + 2) for width in widths) + "|", *lines[1:]]
+
+
+def write_between(name: str, lines: Sequence[str], path: Path = _ROOT / "benchmarks" / "README.md") -> None:
+    """Replace what stands in a file between the comments `<!-- NAME -->` and `<!-- /NAME -->`.
+
+    Raises
+    ------
+    UsageError : if the file does not have both, once each and in this order
+    """
+    text = path.read_text(encoding="utf-8")
+    begin, end = f"<!-- {name} -->", f"<!-- /{name} -->"
+    head, found, rest = text.partition(begin)
+    _, closed, tail = rest.partition(end)
+    if not found or not closed or begin in tail or end in tail:
+        raise UsageError(
+            f"no place for the tables of {name}", where=str(path), remedy=f"put {begin} and {end} there"
+        )
+    path.write_text("\n".join([head + begin, "", *lines, "", end + tail]), encoding="utf-8")
+
+
+def commit() -> str:
+    """Short name of the commit that is measured, and whether files have changed since."""
+
+    def git(*arguments: str) -> str:
+        done = subprocess.run(["git", *arguments], cwd=_ROOT, capture_output=True, text=True, check=False)
+        return done.stdout.strip() if done.returncode == 0 else ""
+
+    name = git("rev-parse", "--short=9", "HEAD")
+    if not name:
+        return "no commit"
+    return f"commit {name}" + (
+        " with changes" if git("status", "--porcelain", "--untracked-files=no") else ""
+    )
 
 
 def _cell(value: Any, form: str) -> str:

@@ -1,5 +1,6 @@
-"""Output on stderr, beside the results: warnings and errors."""
+"""Output on stderr, beside the results, warnings and errors; and how short commands end soon."""
 
+import gc
 import sys
 import traceback
 import warnings
@@ -12,7 +13,7 @@ import typer
 
 from moma.errors import MomaError
 
-__all__ = ["reporting", "say"]
+__all__ = ["reporting", "say", "short_lived"]
 
 P = ParamSpec("P")
 
@@ -44,6 +45,18 @@ def reporting(command: Callable[P, None]) -> Callable[P, None]:
             raise typer.Exit(1) from None
 
     return run
+
+
+@contextmanager
+def short_lived() -> Iterator[None]:
+    """Collect no garbage in a with-block of a second: loading a mapping makes many objects, of which all live on."""
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collecting:
+            gc.enable()
 
 
 @contextmanager

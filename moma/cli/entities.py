@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from moma.cli.console import reporting, say
+from moma.cli.console import reporting, say, short_lived
 from moma.cli.options import DEFAULT_DB, Db, Json, ListFormat, Verbose
 from moma.errors import UsageError
 
@@ -42,22 +42,23 @@ def query(
     verbose: Verbose = False,
 ) -> None:
     """List the entities of a kind that satisfy conditions."""
-    from archmodel.database.session import open_database
-    from moma.cli.text.query import Question, answer
+    with short_lived():
+        from archmodel.database.session import open_database
+        from moma.cli.text.query import Question, answer
 
-    if json and format not in (None, ListFormat.JSON):
-        raise UsageError(f"--json and --format {format} request two formats", remedy="give one of them")
-    wanted = ListFormat.JSON if json else format or ListFormat.TABLE
-    if flat and wanted is not ListFormat.GEOJSON:
-        raise UsageError("--flat is for faces", remedy="give --format geojson too")
-    names = None if columns is None else [name.strip() for name in columns.split(",")]
-    question = Question(kind, tuple(where or ()), run, names, everything=verbose, flat=flat)
-    with open_database(db, create=False) as database, database.session(read_only=True) as session:
-        text, note = answer(session, question, str(wanted))
-    if text:
-        print(text)
-    if note:
-        say(note)
+        if json and format not in (None, ListFormat.JSON):
+            raise UsageError(f"--json and --format {format} request two formats", remedy="give one of them")
+        wanted = ListFormat.JSON if json else format or ListFormat.TABLE
+        if flat and wanted is not ListFormat.GEOJSON:
+            raise UsageError("--flat is for faces", remedy="give --format geojson too")
+        names = None if columns is None else [name.strip() for name in columns.split(",")]
+        question = Question(kind, tuple(where or ()), run, names, everything=verbose, flat=flat)
+        with open_database(db, create=False) as database, database.session(read_only=True) as session:
+            text, note = answer(session, question, str(wanted))
+        if text:
+            print(text)
+        if note:
+            say(note)
 
 
 @reporting

@@ -1,5 +1,6 @@
 """Progress of long commands on stderr, and Ctrl-C that ends a run after its step."""
 
+import gc
 import signal
 import sys
 import threading
@@ -170,20 +171,28 @@ def _bars() -> "Iterator[Listener]":
 
 @contextmanager
 def _announced() -> Iterator[None]:
-    """Announce the compilation of kernels, which takes a minute when they are first used and is done once."""
+    """Announce the compilation of kernels, which takes a minute when they are first used and is done once.
+
+    A compiler makes millions of small objects that live: looking for garbage among them takes a tenth of its time, so
+    none is collected meanwhile.
+    """
     from numba.core import event
 
-    compiled = 0
+    compiled, depth, collecting = 0, 0, gc.isenabled()
 
     class Compiling(event.Listener):  # type: ignore[misc]
         def on_start(self, event: Any) -> None:
-            nonlocal compiled
-            compiled += 1
+            nonlocal compiled, depth
+            compiled, depth = compiled + 1, depth + 1
+            gc.disable()
             if compiled == _KERNELS:
                 say("compiling kernels, once after an installation or an update; this takes a minute or two")
 
         def on_end(self, event: Any) -> None:
-            pass
+            nonlocal depth
+            depth -= 1
+            if depth == 0 and collecting:
+                gc.enable()
 
     with event.install_listener("numba:compile", Compiling()):
         yield

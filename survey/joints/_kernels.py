@@ -98,20 +98,22 @@ def _fit(points, hands, sound, scale, usual, straightness, plane, value):
         x, y, s = points[i, 0] / scale, points[i, 1] / scale, 0.5 * hands[i]
         design[i, 0], design[i, 1], design[i, 2] = 1.0, x, y
         design[i, 3], design[i, 4], design[i, 5] = s, s * x, s * y
-    unknowns = 4
-    solution, left = _huber(design, points[:, 2], sound, 4, prior, usual)
+    # of no literal type, for each of which numba would compile the callees once more
+    few, many = np.int64(4), np.int64(6)
+    unknowns = few
+    solution, left = _huber(design, points[:, 2], sound, few, prior, usual)
     if above >= _OWN and number - above >= _OWN:
-        open_, less = _huber(design, points[:, 2], sound, 6, prior, usual)
+        open_, less = _huber(design, points[:, 2], sound, many, prior, usual)
         wedge = math.sqrt(open_[4] ** 2 + open_[5] ** 2) / scale
         if wedge > _WEDGE and less < 0.1 * left and less < (_PLANE * straightness) ** 2:
-            unknowns, solution = 6, open_
+            unknowns, solution = many, open_
     value[2], value[3], total = _left_over(design, points[:, 2], sound, solution, straightness)
     if value[3] > 0.0:
         # corners that are far off, the more so at an end, tilt the plane; the least sum of residuals finds them
         flat = _least_sum(design, points[:, 2], sound)
         _, off, less = _left_over(design, points[:, 2], sound, flat, straightness)
         if off < value[3] or (off == value[3] and less < total):
-            unknowns, start = 4, flat
+            unknowns, start = few, flat
         else:
             start = solution
         near = sound.copy()
@@ -154,7 +156,7 @@ def _least_sum(design, heights, sound):
     for i in range(k):
         weights[i] = 1.0 if sound[i] else 0.0
     for _ in range(10 * _ROUNDS):
-        solution[:4] = np.linalg.solve(*_normal(design, heights, weights, 4))
+        solution[:4] = np.linalg.solve(*_normal(design, heights, weights, np.int64(4)))
         for i in range(k):
             if sound[i]:
                 weights[i] = 1.0 / max(abs(heights[i] - _value(design[i], solution)), _SHARP)

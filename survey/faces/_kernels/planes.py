@@ -61,7 +61,7 @@ def weighted_plane(points, accepted, frame, work):
     total weight of the accepted points, Σ 1/σ² [1/m²]; 0 if they lie on one line
     """
     local, root = points
-    n, m, total = root.shape[0], 0, 0.0
+    n, m, total = root.shape[0], np.int64(0), 0.0
     for i in range(n):
         if accepted[i]:
             total += root[i] ** 2

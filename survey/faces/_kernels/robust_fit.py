@@ -186,7 +186,7 @@ def _without_outliers(points, known, view, frame, work):
             other[i] = starts[rank, i] <= _CRITICAL
             count += other[i]
         if count > _FEWEST:
-            rival = _grow(other, _FEWEST, points, known, view, frame, work)
+            rival = _grow(other, np.int64(_FEWEST), points, known, view, frame, work)
             if rival < score:
                 score = rival
                 accepted[:] = other

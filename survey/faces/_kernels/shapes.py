@@ -172,7 +172,7 @@ def fit_two_planes(u, v, z, root):
                 continue
             spread = there[2, 2] - there[0, 2] ** 2 / there[0, 0]
             size = 3 if count > 3 and spread > _FLATTEST**2 * count else 2
-            if not (_solve(there, size, second) and _solve(here, 3, first)):
+            if not (_solve(there, size, second) and _solve(here, np.int64(3), first)):
                 continue
             rival, within = _unexplained(along, across, z, root, moved, zero, second)
             other, inner = _unexplained(along, across, z, root, moved, first, second)

@@ -150,7 +150,7 @@ def _shared(first, n, second, m, convex, buffers):
         sign = _triangle(first, i, one)
         for j in range(1, m - 1):
             turn = sign * _triangle(second, j, two)
-            part, px, py = _clip(one, 3, two, 3, work, other)
+            part, px, py = _clip(one, np.int64(3), two, np.int64(3), work, other)
             area, mx, my = area + turn * part, mx + turn * px, my + turn * py
     return area, mx, my
 
@@ -259,7 +259,7 @@ def touching_faces(pairs, solid, planes, limits, out_pairs, out):
     row, total = np.empty(8), 0
     for pair in range(pairs.shape[0]):
         one, two = pairs[pair]
-        groups, count = out[total:], 0
+        groups, count = out[total:], np.int64(0)
         groups[:GROUPS] = 0.0
         for i in range(solid_starts[one], solid_starts[one + 1]):
             for j in range(solid_starts[two], solid_starts[two + 1]):

@@ -90,7 +90,7 @@ def count_near(tree, size, order, wanted):
     nothing = np.empty((0, 2), np.int64)
     counts = np.zeros(order.shape[0], np.int64)
     for leaf in range(order.shape[0]):
-        counts[leaf] = _near(leaf, tree, size, order, wanted, nothing, 0)
+        counts[leaf] = _near(leaf, tree, size, order, wanted, nothing, np.int64(0))
     return counts
 
 

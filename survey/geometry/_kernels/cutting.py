@@ -55,6 +55,8 @@ def cut_out(planes, centre, reach, near, solid):
     """
     vertices, loops, sizes, of_face = solid
     count, faces = _box(centre, reach, vertices, loops, sizes, of_face)
+    # of no literal type, for each of which numba would compile the callees once more
+    count, faces = np.int64(count), np.int64(faces)
     distance = np.empty(vertices.shape[0])
     for p in range(planes.shape[0]):
         status, count, faces = _cut(planes, p, near, solid, count, faces, distance)

@@ -173,7 +173,7 @@ def common_volume(vertices, corners, starts, planes):
     -------
     volume : float [m³]; returned
     """
-    apex = _middle(vertices, corners, 0, len(corners))
+    apex = _middle(vertices, corners, np.int64(0), len(corners))
     total = 0.0
     for f in range(len(starts) - 1):
         middle = _middle(vertices, corners, starts[f], starts[f + 1])

@@ -61,8 +61,8 @@ def square(flat, worn, limits):
         return polygon[:m].copy(), source, width, depth
     little = min(tolerance, limits[1] * width)
     # corners half-way along a side first: neither of two short pieces of a side is a good one to extend
-    m = _reduce(flat, worn, polygon, labels, m, 3, Bounds(little, little, _STRAIGHT))
-    m = _reduce(flat, worn, polygon, labels, m, 4, Bounds(shift, restored, 0.0))
+    m = _reduce(flat, worn, polygon, labels, m, np.int64(3), Bounds(little, little, _STRAIGHT))
+    m = _reduce(flat, worn, polygon, labels, m, np.int64(4), Bounds(shift, restored, 0.0))
     first = 0
     for k in range(m):
         if _apart(polygon[k], flat[0]) < _apart(polygon[first], flat[0]):

@@ -53,6 +53,36 @@ def test_the_command_line_loads_no_heavy_package():
     assert heavy.isdisjoint(done.stdout.split())
 
 
+def test_a_query_loads_no_package_that_it_does_not_ask(tmp_path):
+    url = f"sqlite:///{tmp_path / 'wall.db'}"
+    made = (
+        "from archmodel.database.session import open_database; import sys; open_database(sys.argv[1]).close()"
+    )
+    subprocess.run([sys.executable, "-c", made, url], capture_output=True, check=True)
+    code = "import sys, atexit, moma.cli; atexit.register(lambda: print(*sys.modules)); moma.cli.main()"
+    done = subprocess.run(
+        [sys.executable, "-c", code, "query", "stone", "--db", url],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    loaded = done.stdout.split()
+    heavy = {
+        "scipy",
+        "numba",
+        "pyvista",
+        "matplotlib",
+        "gmsh",
+        "jinja2",
+        "trimesh",
+        "alembic",
+        "h5py",
+        "skfem",
+    }
+    assert "sqlalchemy" in loaded
+    assert heavy.isdisjoint(loaded)
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_explains_itself(command):
     done = invoke(command, "--help")

@@ -78,7 +78,8 @@ def lay_points(stone, sizes):
     points = np.empty((512, 3))
     owner = np.empty(512, dtype=np.int64)
     ends = np.empty(4, dtype=np.int64)
-    count = 0
+    # of no literal type, for each of which numba would compile the callees once more
+    count, inside = np.int64(0), np.int64(-1)
     for k in range(len(corners)):
         points, owner, count = _add(points, owner, count, corners[k, 0], corners[k, 1], corners[k, 2], k)
     ends[0] = count
@@ -97,7 +98,7 @@ def lay_points(stone, sizes):
         middle = np.zeros(3)
         for k in range(len(corners)):
             middle += corners[k] / len(corners)
-        points, owner, count = _add(points, owner, count, middle[0], middle[1], middle[2], -1)
+        points, owner, count = _add(points, owner, count, middle[0], middle[1], middle[2], inside)
     ends[3] = count
     return points[:count], ends, owner[:count]
 
@@ -266,5 +267,5 @@ def _inside(points, owner, count, stone, sizes):
                         deep = planes[w, 3] - planes[w, 0] * x - planes[w, 1] * y - planes[w, 2] * z
                         inside = deep >= _INSIDE * h - _ON_PLANE
                     if inside and _free(points, 0, count, x, y, z, _APART * h):
-                        points, owner, count = _add(points, owner, count, x, y, z, -1)
+                        points, owner, count = _add(points, owner, count, x, y, z, np.int64(-1))
     return points, owner, count
