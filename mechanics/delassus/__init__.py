@@ -1,6 +1,6 @@
 """Delassus operators: rigid bodies in space, rigid with deformable ones, and their forms for factorisation.
 
 Public: `RigidDelassus`, `Schedule`, `schedule` (rigid); `MixedDelassus` (mixed); `rigid_delassus`, `mixed_delassus`,
-`local_velocity`, `world_impulse` (assembly); `BodyForm` (body_space); `CondensedForm` (condensed); `dissection`;
-`Cliques`, `fronts` (multifrontal); `CompliantDelassus`, `CompliantForm` (compliant).
+`local_velocity`, `world_impulse` (assembly); `BodyForm` (body_space); `CondensedForm` (condensed);
+`dissection` (dissection); `Cliques`, `fronts` (multifrontal); `CompliantDelassus`, `CompliantForm` (compliant).
 """
