@@ -186,7 +186,7 @@ def _sweeps(case: _Case, count: int, friction: float | None = None) -> tuple[tup
 
 def _wall(bricks: int, courses: int, threads: int) -> _Case:
     blocks = running_bond(bricks, courses)
-    scene = engine_scene(blocks, 1e-3, 0.5, 1e-300, _STEP_SWEEPS, sweeping=True)
+    scene = engine_scene(blocks, 1e-3, 0.5, 1e-30, _STEP_SWEEPS, sweeping=True)
     scene = replace(scene, solver=replace(scene.solver, threads=threads))
     model, state = build_model(scene)
     usual = replace(model, scene=replace(scene, solver=SolverSettings()))

@@ -190,6 +190,14 @@ def test_the_page_has_a_place_for_each_table(name):
 
 
 @pytest.mark.slow
+def test_two_threads_are_compared_with_one():
+    (row,) = rows("threads", "--only", "sweeps in the plane", "--size", 12, "--repeats", 1, "--turns", 1)
+    assert row["contacts"] > 300
+    assert row["same_bits"] == "yes"
+    assert row["ratio"] == pytest.approx(row["wall_1"] / row["wall_2"])
+
+
+@pytest.mark.slow
 def test_cost_is_given_for_each_size():
     first, *_ = found = rows("scaling", "--largest", 350, "--threads", 2)
     assert [row["kind"] for row in found] == ["wall", "disks", "disks"]
