@@ -49,6 +49,8 @@ _ELASTIC_TRIES = (1e-4, 1e-6, 1e-8, 1e-10)
 _HELD = 1e-3
 # η from which a try between elastic stones is given up [-]
 _HOPELESS = 0.3
+# η over the tolerance from which a try that ended by rounding is the last [-]
+_ROUNDING = 10.0
 # part of a step below which it leads nowhere, however far the solution [-]
 _NOWHERE = 1e-3
 # short steps in a row after which the path has stalled, and Newton's method is tried
@@ -110,7 +112,7 @@ class InteriorPoint:
             best = end.ended(start.impulse, self.max_iterations)
         elif end.elastic and not best.converged:
             best = min(best, end.held(self.max_iterations), key=_left)
-        return best if best.converged else self._along_path(end, best)
+        return best if best.converged or end.rounded else self._along_path(end, best)
 
     def _along_path(self, end: "_End", best: ContactSolution) -> ContactSolution:
         count, tries, short, idle, dead = best.iterations, list(end.tries), 0, 0, 0
@@ -139,7 +141,7 @@ class InteriorPoint:
                 found = min(found, ended, key=_left)
             idle = 0 if tries or found.natural_map < _GAIN * best.natural_map else idle + 1
             best = min(best, found, key=_left)
-            if best.converged:
+            if best.converged or end.rounded:
                 break
         return replace(best, iterations=count)
 
@@ -154,7 +156,7 @@ class _End:
     def __init__(self, problem: ContactProblem, tolerance: float, velocity_tolerance: float) -> None:
         self.problem, self.limits = problem, (tolerance, velocity_tolerance)
         self.even, self.unit = equilibrated(problem)
-        self.elastic = problem.delassus.rigid is None
+        self.elastic, self.rounded = problem.delassus.rigid is None, False
         self.tries = _ELASTIC_TRIES if self.elastic else _TRIES
 
     def held(self, most: int) -> ContactSolution:
@@ -189,6 +191,9 @@ class _End:
             count += even.iterations
             found = min(found, self.looked(even.impulse * unit, 0), key=_left)
             if not even.converged:
+                # it stopped by itself near a solution, where a path would come to the same
+                near = found.natural_map <= _ROUNDING * self.limits[0]
+                self.rounded = self.elastic and near and even.iterations < _ELASTIC_NEWTON
                 break
         return replace(found, iterations=count)
 

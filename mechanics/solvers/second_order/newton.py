@@ -31,6 +31,10 @@ _MEMORY = 5
 _DARING = 10
 # iterates in a row without a better η, after which it stops
 _PATIENCE = 40
+# η from which every step gains until rounding wins [-]
+_SETTLED = 1e-5
+# iterations in a row after which it has, each of an η that is no better than the best, nor larger than _NOISE times it
+_ROUNDED, _NOISE = 4, 10.0
 # η over the best so far that counts as better [-]
 _BETTER = 0.7
 # smallest diagonal of a contact over the scale of W [-]
@@ -57,7 +61,8 @@ class Newton:
     ----------
     tolerance, velocity_tolerance : as in `NSGS`
     max_iterations : limit of the steps, each of one factorisation
-    hopeless : η from which it gives up, as its steps would wander [-]
+    hopeless : η from which it gives up, as its steps would wander; if finite, it also stops near a solution once
+        rounding keeps η from falling [-]
     """
 
     tolerance: float = 1e-6
@@ -75,7 +80,7 @@ class Newton:
         system, limits = problem.form("Newton").shifted, (self.tolerance, self.velocity_tolerance)
         if len(start.impulse) == 0:
             return ContactSolution(start.impulse, start.velocity, 0, 0.0, True)
-        natural, daring, count, since = _Map(problem), 0, 0, 0
+        natural, daring, count, since, still = _Map(problem), 0, 0, 0, 0
         # the start is not projected on the cones: that would break the balance, which tells the states apart
         here, left = natural(start.impulse), residual(problem, start.impulse)
         best, merits = (left, start.impulse), deque([here.size], _MEMORY)
@@ -99,9 +104,11 @@ class Newton:
             merits.append(here.size)
             left = residual(problem, here.impulse)
             since = 0 if left.natural_map < _BETTER * best[0].natural_map else since
+            eta = best[0].natural_map
+            still = still + 1 if since and left.natural_map < min(_NOISE * eta, _SETTLED) else 0
             if left.natural_map < best[0].natural_map:
                 best = left, here.impulse
-            if left.natural_map > self.hopeless:
+            if left.natural_map > self.hopeless or (still >= _ROUNDED and np.isfinite(self.hopeless)):
                 break
         return _solution(*best, count, limits)
 
