@@ -75,7 +75,7 @@ _TABLE: Table = (
 
 def main() -> None:
     """Solve every problem and print."""
-    options = _options()
+    options, measured = _options(), commit()
     with tempfile.TemporaryDirectory() as made:
         folder = Path(options.problems or made)
         if options.problems is None:
@@ -108,7 +108,7 @@ def main() -> None:
         row |= {f"{key}_ms": None if row[key] is None else 1e3 * row[key] for key in keys}
         row |= {key: "yes" if row[key] else "no" for key in ("solved", "solved_eta")}
     lines = [
-        f"Measured at {commit()}: {machine()}; {rows[0]['versions']}; {options.solver}, "
+        f"Measured at {measured}: {machine()}; {rows[0]['versions']}; {options.solver}, "
         f"tolerance {options.tolerance:g}.",
         f"Siconos: {known.source}.",
         "",

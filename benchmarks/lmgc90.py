@@ -85,7 +85,7 @@ _TIGHTER = 10**0.5
 
 def main() -> None:
     """Run the scenes and print."""
-    options = _options()
+    options, measured = _options(), commit()
     if options.steps < 2:
         raise UsageError(
             f"{options.steps} steps", where="--steps", remedy="give 2 or more: the first and a settled one"
@@ -105,7 +105,7 @@ def main() -> None:
     if options.relaxation is not None:
         setting += f"; LMGC90 as shipped (relaxation 0.1), and with relaxation {options.relaxation:g}"
     lines = [
-        f"Measured at {commit()}: {machine()}; {rows[0]['versions']}; {setting}.",
+        f"Measured at {measured}: {machine()}; {rows[0]['versions']}; {setting}.",
         "",
         *table_lines(rows, _TIMES_TABLE if options.relaxation is None else (*_TIMES_TABLE, *_RELAXED)),
         "",
