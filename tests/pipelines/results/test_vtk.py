@@ -92,6 +92,7 @@ def test_a_series_has_every_field_at_every_time(mixed, tmp_path):
 def test_vtk_finds_the_units(mixed, tmp_path):
     vtk = pytest.importorskip("vtkmodules.all")
     write_frames(mixed, tmp_path)
+    write_joint_grid(mixed, tmp_path)
     for name, fields in {
         "results_0001.vtu": {
             "stress": "Pa",
