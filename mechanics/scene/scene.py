@@ -281,15 +281,6 @@ class SolverSettings:
             infinite=True,
         ),
     ] = 1e-5
-    motion_error: Annotated[
-        float | None,
-        Setting(
-            "Displacement by which the motion of rigid stones may be wrong in the end because of the solver; "
-            "without it, all steps keep to both tolerances. Steps at rest always do.",
-            "m",
-            above=0,
-        ),
-    ] = None
     max_iterations: Annotated[
         int,
         Setting("Iterations after which a step is left as it is, and reported as not converged.", at_least=1),
@@ -312,6 +303,15 @@ class SolverSettings:
             at_least=1,
         ),
     ] = 1
+    motion_error: Annotated[
+        float | None,
+        Setting(
+            "Displacement by which the motion of rigid stones may be wrong in the end because of the solver; "
+            "without it, all steps keep to both tolerances. Steps at rest always do.",
+            "m",
+            above=0,
+        ),
+    ] = None
 
     def __post_init__(self) -> None:
         check_settings("solver", self)

@@ -64,12 +64,15 @@ class BodyADMM:
     ----------
     tolerance, velocity_tolerance, max_iterations : as in `ADMM`
     stages : in turn, as long as it is not solved
+    further : tolerances of the first stage over those asked for: the next steps begin where the last ones lead, and
+        gain from what these go further [-]
     """
 
     tolerance: float = 1e-6
     velocity_tolerance: float = 1e-5
     max_iterations: int = 1000
     stages: tuple[Stage, ...] = STAGES
+    further: float = 1.0
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from `start`; return the best of all looks.
@@ -86,7 +89,7 @@ class BodyADMM:
         run = _Run(problem, contacts, start, self)
         best = run.look()
         most = min(self.max_iterations, sum(stage.iterations for stage in self.stages))
-        while best[0] > 1.0 and run.iterations < most:
+        while best[0] > run.goal and run.iterations < most:
             run.iterate()
             best = min(best, run.look(), key=lambda look: look[0])
         left = residual(problem, best[1])
@@ -144,6 +147,12 @@ class _Run:
             raise SolverError("W is not a number", where="ADMM of bodies", remedy="use another method")
         return kernel.Factors(self._panels, value)
 
+    @property
+    def goal(self) -> float:
+        """Errors over their tolerances at which the iteration ends [-]."""
+        settings = self._settings
+        return settings.further if self.iterations < settings.stages[0].iterations else 1.0
+
     def iterate(self) -> None:
         """Make iterations until the next look."""
         if self.iterations == self._until:
@@ -190,7 +199,7 @@ class _Run:
         eta = whole / max(size, 1e-300)
         excess = max(eta / settings.tolerance, largest * scale / self._pace / settings.velocity_tolerance)
         if np.isfinite(self._change) and excess > 0:
-            self._limit = self._change * _EARLY / excess
+            self._limit = self._change * _EARLY * self.goal / excess
         velocity = self._touching.sigma[:, None] * (self._iterate.z - self._iterate.x)
         return float(excess), self._local(self._iterate.z), self._local(velocity)
 

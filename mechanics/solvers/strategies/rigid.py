@@ -58,8 +58,10 @@ _LAST_ITERATIONS = 300
 # Newton's steps in which it follows forces that grow until a contact slips, and the iterations after them
 _FOLLOWING = 100
 _SORTING = (Stage(0.2, 100, extrapolated=True),)
-# steps without any slip after which a motion counts as over
-_MOTION = 10
+# steps without any slip after which methods for rest are tried again; where they fail, they cost as much as one step
+_MOTION = 20
+# tolerances over those asked for to which the steps of a motion go as long as that is cheap [-]
+_MOTION_FURTHER = 0.1
 # velocity of a contact that slides, over the one up to which contacts may break their laws [-]
 _SLIDES = 10.0
 # and over the fastest u_free, at most [-]
@@ -161,7 +163,8 @@ class Alternating:
                 if found.converged:
                     break
         still = best.converged and not self._slides(problem, best)
-        return replace(best, motion=max(start.motion - 1, 0) if still else _MOTION)
+        # methods for rest have just failed where the step was not yet part of a motion
+        return replace(best, motion=start.motion - 1 if still and start.motion else _MOTION)
 
     def _limits(self, problem: ContactProblem) -> dict[str, float]:
         """Return the tolerances of a step of a motion."""
@@ -174,7 +177,7 @@ class Alternating:
 
     def _bodies(self, most: int) -> _Solver:
         if self.velocity_tolerance < _LOOSE:
-            solver = BodyADMM(self.tolerance, self.velocity_tolerance, most)
+            solver = BodyADMM(self.tolerance, self.velocity_tolerance, most, further=_MOTION_FURTHER)
             return lambda p, s: solver(p, s if s.ahead is None else s.ahead)
         # errors of this size would be extrapolated with the rest
         return BodyADMM(self.tolerance, self.velocity_tolerance, most, _LOOSE_STAGES)
