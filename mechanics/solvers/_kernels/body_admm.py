@@ -82,14 +82,14 @@ class Acceleration(NamedTuple):
     ----------
     image, step : (depth + 1, 3 nc) float64, G(x) and G(x) - x [N s]
     gram : (depth + 1, depth + 1) float64, products of the steps
-    count : (3,) int64: how many there are, the row of the last, and how often they were forgotten
+    tally : (3,) int64: how many there are, the row of the last, and how often they were forgotten
     size : (1,) float64, ‖G(x) - x‖² of the last [N² s²]
     """
 
     image: NDArray[np.float64]
     step: NDArray[np.float64]
     gram: NDArray[np.float64]
-    count: NDArray[np.int64]
+    tally: NDArray[np.int64]
     size: NDArray[np.float64]
 
 
@@ -310,14 +310,14 @@ def _extrapolate(x, image, memory):
     size = 0.0
     for i in range(x.shape[0]):
         size += (image[i] - x[i]) ** 2
-    if memory.count[0] > 0 and not size <= _WORSE * _WORSE * memory.size[0]:
-        memory.count[0] = 0
-        memory.count[2] += 1
+    if memory.tally[0] > 0 and not size <= _WORSE * _WORSE * memory.size[0]:
+        memory.tally[0] = 0
+        memory.tally[2] += 1
     memory.size[0] = size
-    last = (memory.count[1] + 1) % depth
-    memory.count[1] = last
-    known = min(memory.count[0] + 1, depth)
-    memory.count[0] = known
+    last = (memory.tally[1] + 1) % depth
+    memory.tally[1] = last
+    known = min(memory.tally[0] + 1, depth)
+    memory.tally[0] = known
     kept, step = memory.image[last], memory.step[last]
     for i in range(x.shape[0]):
         kept[i] = image[i]

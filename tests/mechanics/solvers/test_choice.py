@@ -19,6 +19,7 @@ from mechanics.solvers.second_order.cone_program import ConeProgram
 from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.newton import Newton
 from mechanics.solvers.strategies.auto import Auto
+from mechanics.solvers.strategies.planar import Planar
 from mechanics.solvers.strategies.rigid import Alternating
 from moma.errors import SolverError
 from tests.mechanics.dense_operator import products_alone
@@ -206,9 +207,9 @@ def test_the_scene_chooses_the_solver(method, deformable, expected):
 
 
 @pytest.mark.parametrize("method", [one for one in Method if one is not Method.INTERIOR_POINT])
-def test_disks_of_the_plane_are_swept_where_nothing_else_is_asked_for(method):
+def test_disks_of_the_plane_have_a_strategy_of_their_own_where_nothing_else_is_asked_for(method):
     solver = choose_planar_solver(SolverSettings(method, 1e-5, 1e-3, 77))
-    other = NSGS if method is Method.AUTO else type(choose_solver(SolverSettings(method), False))
+    other = Planar if method is Method.AUTO else type(choose_solver(SolverSettings(method), False))
     assert isinstance(solver, other)
     assert solver.max_iterations == 77
 
