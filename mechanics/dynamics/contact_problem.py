@@ -61,7 +61,7 @@ class JointCompliance:
 
     @property
     def rigid(self) -> bool:
-        """Whether the next step is tried with rigid joints."""
+        """True where the next step is tried with rigid joints."""
         return self.left <= 0
 
     def needed(self, operator: Delassus, share: float) -> "JointCompliance":
