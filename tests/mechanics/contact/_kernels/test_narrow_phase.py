@@ -33,6 +33,14 @@ def clipped(ring, a, b, side=99, slack=1e-9):
     return np.column_stack(polygon[:3])[:count], polygon.label[:count].tolist()
 
 
+def test_a_side_without_length_cuts_nothing():
+    """Two corners of a face that is seen edge-on may fall together in the plane."""
+    ring = np.array([(0.0, 0.0, 0.1), (1.0, 0.0, 0.2), (1.0, 1.0, 0.3), (0.0, 1.0, 0.4)])
+    found, labels = clipped(ring, (0.25, 0.5), (0.25, 0.5))
+    np.testing.assert_array_equal(found, ring)
+    assert labels == [0, 1, 2, 3]
+
+
 def assert_same_ring(found, expected, atol):
     """The same corners in the same order round, wherever it begins; corners that fall together count once."""
 
