@@ -34,7 +34,7 @@ _ENUMS: Mapping[str, Any] = {
 _TABLES: Mapping[str, tuple[str, ...]] = {
     "contact": ("points", "placement"),
     "time": ("step", "theta"),
-    "solver": ("method", "tolerance", "velocity_tolerance", "max_iterations"),
+    "solver": ("method", "tolerance", "velocity_tolerance", "motion_error", "max_iterations"),
 }
 
 
@@ -53,7 +53,7 @@ class Overlay:
         `contact_size` [-]
     points, placement : contact points of two flat faces
     step, theta : of the time integration [s], [-]
-    method, tolerance, velocity_tolerance, max_iterations : of the solver
+    method, tolerance, velocity_tolerance, motion_error, max_iterations : of the solver
     """
 
     fidelity: Fidelity | None = None
@@ -66,6 +66,7 @@ class Overlay:
     method: Method | None = None
     tolerance: float | None = None
     velocity_tolerance: float | None = None
+    motion_error: float | None = None
     max_iterations: int | None = None
 
 

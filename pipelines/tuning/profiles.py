@@ -55,6 +55,7 @@ _FAST = Profile(
         tolerance=1e-5,
         # with a looser one, rigid stones in steps of this length miss a balance of 10⁻⁴ and never come to rest
         velocity_tolerance=1e-5,
+        motion_error=1e-4,
         max_iterations=2000,
     ),
     step=0.002,
@@ -73,6 +74,7 @@ _BALANCED = Profile(
         method=Method.AUTO,
         tolerance=1e-6,
         velocity_tolerance=1e-4,
+        motion_error=1e-5,
         max_iterations=3000,
     ),
     step=0.001,
@@ -92,6 +94,7 @@ _ACCURATE = Profile(
         method=Method.AUTO,
         tolerance=1e-7,
         velocity_tolerance=1e-5,
+        motion_error=1e-6,
         max_iterations=5000,
     ),
     step=0.0005,

@@ -126,7 +126,7 @@ class Alternating:
         moved = False
         for name, solve, from_best in self._stages(problem, warm):
             if follows and not moved and (start.motion or name not in _RESTING):
-                found, moved = replace(self, **self._limits(problem))._moved(problem, start), True
+                found, moved = self._in_motion(problem)._moved(problem, start), True
                 before = f"admm of bodies stood at η {found.natural_map:.0e}"
                 best = _better(best, found)
                 if best.converged or best.iterations >= self.max_iterations:
@@ -166,14 +166,15 @@ class Alternating:
         # methods for rest have just failed where the step was not yet part of a motion
         return replace(best, motion=start.motion - 1 if still and start.motion else _MOTION)
 
-    def _limits(self, problem: ContactProblem) -> dict[str, float]:
-        """Return the tolerances of a step of a motion."""
+    def _in_motion(self, problem: ContactProblem) -> "Alternating":
+        """Return the strategy with the tolerances of a step of a motion."""
         pace = float(np.abs(problem.u_free).max())
         if self.motion_speed is None or pace == 0.0:
-            return {}
+            return self
         velocity = min(max(self.motion_speed / pace, self.velocity_tolerance), _LOOSEST)
         # η tells next to nothing of a motion: the forces of the step before have one of 10⁻⁴
-        return {"velocity_tolerance": velocity, "tolerance": max(self.tolerance, min(velocity, _LOOSEST_MAP))}
+        natural_map = max(self.tolerance, min(velocity, _LOOSEST_MAP))
+        return replace(self, velocity_tolerance=velocity, tolerance=natural_map)
 
     def _bodies(self, most: int) -> _Solver:
         if self.velocity_tolerance < _LOOSE:
