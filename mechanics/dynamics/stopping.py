@@ -66,8 +66,8 @@ class Watch(Carrier):
     """
 
     CARRIED = (
-        "_culprit", "_doubt", "_fastest", "_quiet", "_speed", "_steps", "_still", "_sunk", "_unsolved", "_worst_error",
-        "rest_time",
+        "_compliant", "_culprit", "_deepest", "_depth", "_doubt", "_fastest", "_pair", "_quiet", "_speed", "_steps",
+        "_still", "_sunk", "_unsolved", "_worst_error", "rest_time",
     )  # fmt: skip
     REBUILT = ("_model", "_start")
 

@@ -23,6 +23,7 @@ from scipy.sparse import csr_array
 
 from mechanics.carried import Carried, Rows
 from mechanics.contact.contacts import Contacts
+from mechanics.dynamics.contact_problem import JointCompliance
 from mechanics.dynamics.outcome import StaticStart
 from mechanics.dynamics.step import ContactForces
 from mechanics.results.contact_result import ContactResult
@@ -34,7 +35,17 @@ __all__ = ["Checkpoint", "Checkpoints", "DamagedError", "write_whole"]
 
 _RECORDS = {
     one.__name__: one
-    for one in (ContactForces, ContactResult, Contacts, Frame, Largest, State, StaticStart, Terms)
+    for one in (
+        ContactForces,
+        ContactResult,
+        Contacts,
+        Frame,
+        JointCompliance,
+        Largest,
+        State,
+        StaticStart,
+        Terms,
+    )
 }
 _HEAD = 512  # bytes that HDF5 leaves to its users; the least that it allows
 _VALUES = "values"
