@@ -2,5 +2,5 @@
 
 Public: `RigidDelassus`, `Schedule`, `schedule` (rigid); `MixedDelassus` (mixed); `rigid_delassus`, `mixed_delassus`,
 `local_velocity`, `world_impulse` (assembly); `BodyForm` (body_space); `CondensedForm` (condensed);
-`dissection` (dissection); `Cliques`, `fronts` (multifrontal); `CompliantDelassus`, `CompliantForm` (compliant).
+`elimination` (elimination); `Cliques`, `fronts` (multifrontal); `CompliantDelassus`, `CompliantForm` (compliant).
 """

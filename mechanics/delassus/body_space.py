@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import block_diag, coo_array, csc_array, csr_array
+from scipy.sparse import block_diag, csc_array, csr_array
 from scipy.sparse.linalg import SuperLU, splu
 
 from mechanics.arrays import Array, Ints
 from mechanics.delassus._kernels import bodies as kernel
 from mechanics.delassus._kernels.rigid import apply
-from mechanics.delassus.dissection import dissection
+from mechanics.delassus.elimination import elimination
 from mechanics.problem.forms import SparseForm
 from mechanics.problem.problem import RigidContacts
 from moma.errors import SolverError
@@ -25,8 +25,6 @@ _ROUNDS = 2
 _ROUNDING = 1e-14
 # smallest pivot over the largest of its column that is still taken, so that the order of elimination stays [-]
 _THRESHOLD = 0.01
-# bodies from which dissection fills in less than least degree
-_MANY = 1000
 # largest part of the right side that a solution may leave [-]
 _LOST = 1e-9
 
@@ -44,11 +42,9 @@ class BodyForm(SparseForm):
     Parameters
     ----------
     contacts : frames, lever arms and inverse inertias
-    centre : (nb, 3) of the bodies; None if not known [m]
     """
 
-    def __init__(self, contacts: RigidContacts, centre: Array | None = None) -> None:
-        self._centre = centre
+    def __init__(self, contacts: RigidContacts) -> None:
         self._contacts = contacts._replace(geometry=np.ascontiguousarray(contacts.geometry))
         inertia = contacts.inertia
         self._moving = np.flatnonzero(inertia[:, 0] > 0)
@@ -62,7 +58,7 @@ class BodyForm(SparseForm):
         """Return D W D with the units (nc,) on the diagonal of D; the pattern is shared."""
         other = BodyForm.__new__(BodyForm)
         other._contacts = self._contacts._replace(geometry=scaled_frames(self._contacts.geometry, unit))
-        other._centre, other._moving, other._mass, other._relaxed = self._centre, self._moving, self._mass, {}
+        other._moving, other._mass, other._relaxed = self._moving, self._mass, {}
         other.__dict__["_pattern"] = self._pattern
         return other
 
@@ -100,10 +96,7 @@ class BodyForm(SparseForm):
     def _pattern(self) -> kernel.Pattern:
         own = self._places(self._moving)[self._contacts.body]
         pairs = own[(own >= 0).all(axis=1)]
-        if self._centre is None or len(self._moving) < _MANY:
-            rank = _least_degree(pairs, len(self._moving))
-        else:
-            rank = dissection(pairs, self._centre[self._moving])
+        rank = elimination(pairs, self._moving, self._contacts.centre)
         order = self._moving[np.argsort(rank)]
         side, count = np.ascontiguousarray(self._places(order)[self._contacts.body]), len(order)
         row = np.concatenate([np.arange(count), rank[pairs[:, 0]], rank[pairs[:, 1]]])
@@ -219,18 +212,3 @@ def scaled_frames(geometry: Array, unit: Array) -> Array:
     scaled = geometry.copy()
     scaled[:, :9] *= unit[:, None]
     return scaled
-
-
-def _least_degree(pairs: Ints, count: int) -> Ints:
-    """Return the rank (count,) of each body in SuperLU's order of least degree: fewest neighbours left, first out."""
-    ones, each = np.ones(len(pairs)), np.arange(count)
-    row, column = np.concatenate([pairs[:, 0], each]), np.concatenate([pairs[:, 1], each])
-    graph = coo_array((np.concatenate([ones, np.zeros(count)]), (row, column)), shape=(count, count)).tocsc()
-    graph = graph + graph.T
-    # diagonally dominant, so that no rows are exchanged
-    graph.setdiag(graph.sum(axis=0) + 1.0)
-    lu = splu(
-        csc_array(graph), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-    )
-    rank: Ints = lu.perm_c.astype(np.int64)
-    return rank

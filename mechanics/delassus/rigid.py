@@ -87,7 +87,8 @@ class RigidDelassus:
     @cached_property
     def rigid(self) -> RigidContacts:
         """Contacts in terms of rigid bodies."""
-        return RigidContacts(self.body, self.geometry, self.inertia)
+        centre = np.zeros((0, 3)) if self.centre is None else self.centre
+        return RigidContacts(self.body, self.geometry, self.inertia, centre)
 
     @cached_property
     def diagonal(self) -> Array:
@@ -123,7 +124,7 @@ class RigidDelassus:
     @cached_property
     def form(self) -> BodyForm:
         """W for methods that factorise: six velocities for each body that moves, world axes."""
-        return BodyForm(self.rigid, self.centre)
+        return BodyForm(self.rigid)
 
     def scaled(self, unit: Array) -> "RigidDelassus":
         """Return D W D with the units (nc,) of the contacts on the diagonal of D; the pattern of factors is shared.

@@ -46,11 +46,13 @@ class RigidContacts(NamedTuple):
         world axes
     inertia : (nb, 7) float64, inverse mass [1/kg] and upper triangle of the inverse inertia [1/(kg m²)], world axes;
         zero for bodies that no impulse moves
+    centre : (nb, 3) float64, centres of mass, by which factors are ordered; (0, 3) where not known [m]
     """
 
     body: Ints
     geometry: Array
     inertia: Array
+    centre: Array
 
 
 class Delassus(Protocol):

@@ -82,7 +82,7 @@ class Acceleration(NamedTuple):
     ----------
     image, step : (depth + 1, 3 nc) float64, G(x) and G(x) - x [N s]
     gram : (depth + 1, depth + 1) float64, products of the steps
-    tally : (3,) int64: how many there are, the row of the last, and how often they were forgotten
+    tally : (2,) int64: how many there are, and the row of the last
     size : (1,) float64, ‖G(x) - x‖² of the last [N² s²]
     """
 
@@ -312,7 +312,6 @@ def _extrapolate(x, image, memory):
         size += (image[i] - x[i]) ** 2
     if memory.tally[0] > 0 and not size <= _WORSE * _WORSE * memory.size[0]:
         memory.tally[0] = 0
-        memory.tally[2] += 1
     memory.size[0] = size
     last = (memory.tally[1] + 1) % depth
     memory.tally[1] = last

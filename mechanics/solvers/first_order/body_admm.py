@@ -9,10 +9,9 @@ M + H Σ⁻¹ Hᵀ, less than that of a Gauss–Seidel sweep (mechanics/solvers/
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array, csc_array
-from scipy.sparse.linalg import splu
 
 from mechanics.arrays import Array, Ints
+from mechanics.delassus.elimination import elimination
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, RigidContacts
 from mechanics.problem.residual import project_on_cone, residual
 from mechanics.solvers._kernels import body_admm as kernel
@@ -106,7 +105,7 @@ class _Run:
         self._problem, self._settings = problem, settings
         self._frame = np.ascontiguousarray(contacts.geometry[:, :9]).reshape(-1, 3, 3)
         moving = np.flatnonzero(contacts.inertia[:, 0] > 0)
-        self._order, side, self._panels = _eliminated(contacts.body, moving, len(contacts.inertia))
+        self._order, side, self._panels = _eliminated(contacts, moving)
         self._inertia = contacts.inertia[self._order]
         self._mass = kernel.masses(contacts.inertia, self._order)
         self._free = self._world(problem.u_free)
@@ -209,36 +208,21 @@ def _acceleration(depth: int, size: int) -> kernel.Acceleration:
         np.empty((depth, size)),
         np.empty((depth, size)),
         np.zeros((depth, depth)),
-        np.zeros(3, dtype=np.int64),
+        np.zeros(2, dtype=np.int64),
         np.zeros(1),
     )
 
 
-def _eliminated(body: Ints, moving: Ints, count: int) -> tuple[Ints, Ints, cholesky.Panels]:
+def _eliminated(contacts: RigidContacts, moving: Ints) -> tuple[Ints, Ints, cholesky.Panels]:
     """Return the moving bodies in the order of their elimination, the contacts' places in it, and the panels."""
-    place = np.full(count, -1)
+    place = np.full(len(contacts.inertia), -1)
     place[moving] = np.arange(len(moving))
-    side = place[body]
+    side = place[contacts.body]
     inner = side[(side >= 0).all(axis=1)]
     pairs = np.unique(np.sort(inner, axis=1), axis=0) if len(inner) else inner
-    rank = _least_degree(pairs, len(moving))
+    rank = elimination(pairs, moving, contacts.centre)
     rank = cholesky.postorder(np.ascontiguousarray(rank[pairs]), len(moving))[rank]
     panels = cholesky.panels_of(np.ascontiguousarray(rank[pairs]), len(moving), _SPARE)
     order = np.empty_like(moving)
     order[rank] = moving
     return order, np.where(side >= 0, rank[side], -1), panels
-
-
-def _least_degree(pairs: Ints, count: int) -> Ints:
-    """Return the rank (count,) of each body in SuperLU's order of least degree: fewest neighbours left, first out."""
-    ones, each = np.ones(len(pairs)), np.arange(count)
-    row, column = np.concatenate([pairs[:, 0], each]), np.concatenate([pairs[:, 1], each])
-    graph = coo_array((np.concatenate([ones, np.zeros(count)]), (row, column)), shape=(count, count)).tocsc()
-    graph = graph + graph.T
-    # diagonally dominant, so that no rows are exchanged
-    graph.setdiag(graph.sum(axis=0) + 1.0)
-    lu = splu(
-        csc_array(graph), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-    )
-    rank: Ints = lu.perm_c.astype(np.int64)
-    return rank

@@ -118,7 +118,7 @@ class Alternating:
         warm = bool(start.impulse.any())
         if warm and problem.delassus.rigid is not None:
             limits = self.tolerance, self.velocity_tolerance
-            rest = settled(problem, start, limits, self._static(self.max_iterations))
+            rest = settled(problem, start, limits, self._still(self.max_iterations))
             if rest is not None:
                 return rest
         before = "warm start" if warm else f"cold start, {len(start.impulse):,} contacts"
@@ -205,7 +205,8 @@ class Alternating:
         if warm or problem.delassus.form is None:
             yield "sweeps", self._first, False
         if problem.delassus.form is not None:
-            yield "admm, small penalty", self._static, False
+            # stones that move leave nothing that could add up
+            yield "admm, small penalty", self._static if warm else self._still, False
             later = [("admm, balanced penalty", self._moving, False)]
             if problem.delassus.rigid is not None:
                 yield "Newton", self._newton, False
@@ -236,11 +237,13 @@ class Alternating:
     def _tight(self) -> tuple[float, float]:
         return _FURTHER * self.tolerance, _FURTHER * self.velocity_tolerance
 
-    def _static(self, most: int) -> _Solver:
+    def _still(self, most: int) -> _Solver:
         tolerance, velocity_tolerance = self._tight
+        return self._static(most, (min(_STILL, tolerance), min(_STILL, velocity_tolerance)))
+
+    def _static(self, most: int, limits: tuple[float, float] | None = None) -> _Solver:
         solver = ADMM(
-            min(_STILL, tolerance),
-            min(_STILL, velocity_tolerance),
+            *(limits or self._tight),
             min(_STATIC_ITERATIONS, most),
             _STATIC_PENALTY,
             _STATIC_LOOK,

@@ -1,16 +1,34 @@
-"""Elimination order of the bodies of a scene: geometric nested dissection (George 1973)."""
+"""Elimination order of the bodies of a scene: least degree, or geometric nested dissection (George 1973)."""
 
 import numpy as np
+from scipy.sparse import coo_array, csc_array
+from scipy.sparse.linalg import splu
 
 from mechanics.arrays import Array, Bools, Ints
 
-__all__ = ["dissection"]
+__all__ = ["dissection", "elimination", "least_degree"]
 
 
+# bodies from which dissection fills in less than least degree
+_MANY = 1000
 # bodies of a part that is not divided further
 _LEAF = 8
 # levels, at most: names of parts, with a digit of base three for each, are numbers of 64 bits
 _LEVELS = 36
+
+
+def elimination(pairs: Ints, moving: Ints, centre: Array) -> Ints:
+    """Return the rank (nm,) of each body that moves.
+
+    Parameters
+    ----------
+    pairs : (m, 2) of those that touch, by their places in `moving`
+    moving : (nm,) bodies
+    centre : (nb, 3) of all bodies [m]; (0, 3) where they are not known
+    """
+    if len(centre) == 0 or len(moving) < _MANY:
+        return least_degree(pairs, len(moving))
+    return dissection(pairs, centre[moving])
 
 
 def dissection(pairs: Ints, place: Array) -> Ints:
@@ -72,3 +90,18 @@ def _between(pairs: Ints, side: Ints, part: Ints) -> Ints:
     fewer = number[0] < number[1]
     chosen = [one[fewer[np.searchsorted(parts, part[one])] == (low == 0)] for low, one in enumerate(touching)]
     return np.concatenate(chosen)
+
+
+def least_degree(pairs: Ints, count: int) -> Ints:
+    """Return the rank (count,) of each body in SuperLU's order of least degree: fewest neighbours left, first out."""
+    ones, each = np.ones(len(pairs)), np.arange(count)
+    row, column = np.concatenate([pairs[:, 0], each]), np.concatenate([pairs[:, 1], each])
+    graph = coo_array((np.concatenate([ones, np.zeros(count)]), (row, column)), shape=(count, count)).tocsc()
+    graph = graph + graph.T
+    # diagonally dominant, so that no rows are exchanged
+    graph.setdiag(graph.sum(axis=0) + 1.0)
+    lu = splu(
+        csc_array(graph), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+    )
+    rank: Ints = lu.perm_c.astype(np.int64)
+    return rank
