@@ -34,6 +34,7 @@ _WORDS = {
     "theta": "θ {:g}",
     "method": "{}",
     "tolerance": "η {:.0e}",
+    "motion_error": "motion to {:.0e} m",
 }
 """Changes of an overlay in words."""
 
@@ -43,6 +44,7 @@ _LINEAR = 4.0  # time of linear over quadratic elements of as many unknowns: con
 _LOOSER = 100.0  # factor on tolerances of looser variants [-]
 _TIGHTER = 0.01  # factor on tolerances of tighter variants [-]
 _LOOSEST = 1e-2  # largest tolerance; beyond it, contacts no longer obey their laws [-]
+_MOTION_ERRORS = (1e-5, 1e-4, 1e-3)  # of the motion of rigid stones [m]
 _PROFILE = "profile"  # first word of the names of profiles
 
 
@@ -91,7 +93,8 @@ def grid(
 
     Where a stone deforms, or has to, it is tried rigid and with finite elements of several kinds and sizes, hexahedra
     only if they suit the stones. Of rigid stones, other contact points are tried; of all, other tolerances and methods
-    of the solver. Time steps are varied where motion is followed, not where equilibrium is sought by relaxation.
+    of the solver. Time steps, and the error of the motion that the solver may leave, are varied where motion is
+    followed, not where equilibrium is sought by relaxation.
     """
     moving = [block for block in blocks if block.fidelity is not Fidelity.FIXED]
     models = _models(scene, moving, width, stress)
@@ -164,13 +167,15 @@ def _of_solver(scene: SceneFile, model: Setting) -> Iterator[Setting]:
 
 
 def _of_time(scene: SceneFile, model: Setting) -> Iterator[Setting]:
-    """Yield other time steps, and other damping of the scheme, where motion is followed."""
+    """Yield other time steps, errors of the motion and damping of the scheme, where motion is followed."""
     time = scene.time
     if model.overlay not in _PLAIN or time.relaxation:
         return
     for factor in (4.0, 2.0, 0.5, 0.25):
         if factor * time.step <= time.duration:
             yield _variant(model, replace(model.overlay, step=factor * time.step), 1.0 / factor)
+    for error in _MOTION_ERRORS if model.element is None else ():
+        yield _variant(model, replace(model.overlay, motion_error=error), 0.5)
     for theta in () if time.stop_at_equilibrium else (0.5, 0.6, 1.0):
         if theta != time.theta:
             yield _variant(model, replace(model.overlay, theta=theta), 1.0)

@@ -31,6 +31,7 @@ overlays = st.builds(
     method=st.none() | st.sampled_from(list(Method)),
     tolerance=st.none() | st.floats(1e-14, 0.5),
     velocity_tolerance=st.none() | st.floats(1e-14, 0.5),
+    motion_error=st.none() | st.floats(1e-9, 1.0),
     max_iterations=st.none() | st.integers(1, 10**6),
 )
 
@@ -83,11 +84,12 @@ def test_hexahedra_are_left_out_where_they_do_not_suit():
 
 
 def test_steps_are_varied_only_where_motion_is_followed():
-    assert not any("h " in name for name in tried(REST, blocks(Fidelity.RIGID)))
+    assert not any("h " in name or "motion" in name for name in tried(REST, blocks(Fidelity.RIGID)))
     moving = tried(PLAIN + "[time]\nstep = 1e-3\nduration = 2e-3\n", blocks(Fidelity.RIGID))
     steps = {one.step for one in moving.values()}
     assert {2e-3, 5e-4, 2.5e-4} < steps
     assert 4e-3 not in steps  # longer than the run
+    assert {"motion to 1e-05 m", "motion to 1e-03 m"} < set(moving)
     assert not any("θ" in name for name in moving)
     motion = tried(PLAIN + "[time]\nstop_at_equilibrium = false\ntheta = 0.6\n", blocks(Fidelity.RIGID))
     assert {"θ 0.5", "θ 1"} <= set(motion)
