@@ -128,7 +128,8 @@ def gravity_of(motion: str, steps: int) -> Array:
     """Gravity (steps, 3) in the middle of each step, in the frame of the support [m/s²]."""
     component, acceleration = _MOTIONS[motion]
     gravity = np.tile([0.0, 0.0, -_GRAVITY], (steps, 1))
-    gravity[:, component] -= acceleration((np.arange(steps) + 0.5) * _STEP)
+    middle: Array = _STEP * np.arange(0.5, steps)
+    gravity[:, component] -= acceleration(middle)
     return gravity
 
 

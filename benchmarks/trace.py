@@ -9,6 +9,8 @@ from mechanics.arrays import Array, Bools, Ints
 
 __all__ = ["Touch", "Trace", "read_trace"]
 
+_ARRAYS = ("cpu", "sweeps", "centre", "frame", "contacts", "solved", "compliant")
+
 
 @dataclass(frozen=True)
 class Touch:
@@ -65,6 +67,5 @@ def read_trace(path: Path) -> Trace:
             int(n): Touch(*(data[f"{key}_{n}"] for key in ("body", "point", "frame", "gap", "force")))
             for n in data["kept"]
         }
-        motion = (data[key] for key in ("cpu", "sweeps", "centre", "frame"))
-        steps = (data[key] for key in ("contacts", "solved", "compliant"))
-        return Trace(*motion, kept, str(data["program"]), *steps)
+        arrays = {key: data[key] for key in _ARRAYS}
+        return Trace(kept=kept, program=str(data["program"]), **arrays)
