@@ -5,6 +5,7 @@ per process and ends the process where it is used wrongly; so each run is one pr
 
 The package drives LMGC90's Fortran routines, which its library also exports: `--relaxation` calls them one by one, in
 the order of the package's own step, with another relaxation of the sweeps than the 0.1 that the package fixes.
+`--gravity` gives each step a gravity of its own, as the scene is felt in the frame of a support that shakes.
 """
 
 import argparse
@@ -30,27 +31,36 @@ def main() -> None:
     library = ctypes.CDLL(_lmgc90.__file__)
     step = solver.lmgc90.compute_one_step
     if options.relaxation is not None:
-        step = _Driven(library, options.relaxation)
+        step = _Driven(library, options.relaxation, options.tolerance)
+    gravity = None if options.gravity is None else np.load(options.gravity)
     result = solver.lmgc90.get_initial_state()
-    place = [_place(result.init_bodies, result.init_body_frames)]
-    cpu, sweeps, kept = [], [], {}
+    centre = [np.array(result.init_bodies)]
+    frame = [_frames(result.init_body_frames)]
+    cpu, sweeps, contacts, kept = [], [], [], {}
     for n in range(1, options.steps + 1):
+        if gravity is not None:
+            library["__bulk_behaviour_MOD_set_gravity"]((ctypes.c_double * 3)(*gravity[n - 1]))
         start = time.process_time()
         result = step()
         cpu.append(time.process_time() - start)
-        sweeps.append(_sweeps(library))
-        if result is None:  # routine by routine there is nothing to read back: such a run tells times alone
+        done, touching = _sweeps(library)
+        sweeps.append(done)
+        contacts.append(touching)
+        centre.append(_centres(library, len(centre[0])))
+        if result is None:  # routine by routine there are no axes and no contacts to read back
             continue
-        place.append(_place(result.bodies, result.body_frames))
+        frame.append(_frames(result.body_frames))
         if n == 1 or n > options.steps - options.keep:
             kept[n] = _contacts(result)
-    centre, frame = (np.array(one) for one in zip(*place, strict=True))
     program = f"compas_lmgc90 {version('compas_lmgc90')}"
     np.savez(
         options.out,
         program=program,
         cpu=cpu,
         sweeps=sweeps,
+        contacts=contacts,
+        solved=np.array(sweeps) < _CHECK_EVERY * _CHECKS,
+        compliant=np.zeros(len(sweeps), dtype=bool),
         centre=centre,
         frame=frame,
         kept=list(kept),
@@ -67,6 +77,10 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--step", type=float, required=True)
     parser.add_argument("--theta", type=float, required=True)
     parser.add_argument("--relaxation", type=float)
+    parser.add_argument(
+        "--tolerance", type=float, default=_TOLERANCE, help="of the sweeps, with --relaxation"
+    )
+    parser.add_argument("--gravity", help=".npy (steps, 3): gravity in each step, in its middle [m/s²]")
     return parser.parse_args()
 
 
@@ -95,9 +109,21 @@ def _solver(options: argparse.Namespace) -> Any:
     return solver
 
 
-def _place(centres: Any, frames: Any) -> tuple[Any, Any]:
-    """Points (nb, 3) and principal axes in rows (nb, 3, 3) of the bodies."""
-    return np.array(centres), np.array(frames).reshape(-1, 3, 3)
+def _frames(frames: Any) -> Any:
+    """Principal axes in rows (nb, 3, 3) of the bodies."""
+    return np.array(frames).reshape(-1, 3, 3)
+
+
+def _centres(library: ctypes.CDLL, bodies: int) -> Any:
+    """Centres of mass (nb, 3) of the bodies, as the library holds them."""
+    found, six, name = (ctypes.c_double * 6)(), ctypes.c_int(6), b"Coor_"
+    ask, centres = library["__rbdy3_MOD_get_vector_rbdy3"], np.empty((bodies, 3))
+    for body in range(bodies):
+        # Fortran counts from 1, and passes the length of the text behind the other arguments
+        number = ctypes.c_int(body + 1)
+        ask(name, ctypes.byref(number), found, ctypes.byref(six), ctypes.c_size_t(len(name)))
+        centres[body] = found[:3]
+    return centres
 
 
 def _contacts(result: Any) -> dict[str, Any]:
@@ -116,24 +142,24 @@ def _flat(kept: dict[int, dict[str, Any]]) -> dict[str, Any]:
     return {f"{key}_{n}": value for n, contacts in kept.items() for key, value in contacts.items()}
 
 
-def _sweeps(library: ctypes.CDLL) -> int:
-    """How many sweeps the last step took; -1 where the library does not say."""
+def _sweeps(library: ctypes.CDLL) -> tuple[int, int]:
+    """Sweeps and contacts of the last step; -1 where the library does not say."""
     try:
         ask = library["__nlgs_3d_MOD_get_nlgs3d_loop"]
     except AttributeError:
-        return -1
+        return -1, -1
     count, contacts = ctypes.c_int(), ctypes.c_int()
     errors = [ctypes.byref(ctypes.c_double()) for _ in range(3)]
     ask(ctypes.byref(count), *errors, ctypes.byref(contacts))
-    return count.value
+    return count.value, contacts.value
 
 
 class _Driven:
     """The package's step, routine by routine, with another relaxation."""
 
-    def __init__(self, library: ctypes.CDLL, relaxation: float) -> None:
+    def __init__(self, library: ctypes.CDLL, relaxation: float, tolerance: float) -> None:
         self._library = library
-        self._relaxation = ctypes.c_double(relaxation)
+        self._relaxation, self._tolerance = ctypes.c_double(relaxation), ctypes.c_double(tolerance)
         self._first = True
 
     def _call(self, module: str, routine: str, *arguments: Any) -> int:
@@ -173,8 +199,8 @@ class _Driven:
         iterate, check, finish = (ctypes.c_int(n) for n in (1, 2, 3))
         # Fortran passes the length of the text behind the other arguments
         setting = self._library["__nlgs_3d_MOD_set_nlgs_parameter"]
-        tolerance = ctypes.c_double(_TOLERANCE)
-        setting(_NORM, ctypes.byref(tolerance), ctypes.byref(self._relaxation), ctypes.c_size_t(len(_NORM)))
+        tolerance, relaxation = ctypes.byref(self._tolerance), ctypes.byref(self._relaxation)
+        setting(_NORM, tolerance, relaxation, ctypes.c_size_t(len(_NORM)))
         call("nlgs_3d", "prep_nlgs", ctypes.c_int(1))
         for _ in range(_CHECKS):
             for _ in range(_CHECK_EVERY):

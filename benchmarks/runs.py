@@ -17,7 +17,7 @@ from benchmarks.scenes import read_scene
 from benchmarks.trace import Trace, read_trace
 from moma.errors import MissingLibraryError, SolverError, UsageError
 
-__all__ = ["Run", "Runner", "fastest", "figures"]
+__all__ = ["Run", "Runner", "fastest", "figures", "lmgc90_program", "moma_program", "run_side"]
 
 _INSTALL = (
     "pip install compas_lmgc90, or name an interpreter that has it with --lmgc90-python, or use --ours-only"
@@ -64,41 +64,19 @@ class Runner:
         options = self._options
         more = ["--tolerance", repr(tolerance), "--sweeps", str(options.sweeps)]
         more += ["--fresh"] if fresh else []
-        trace = self._child([sys.executable, "-m", "benchmarks.moma_child"], more, "MOMA")
-        return self._run(trace)
+        return self._run(self._child(moma_program(), more, "MOMA"))
 
     def lmgc90(self, relaxation: float | None = None) -> Run:
         """LMGC90 as its package drives it; or times alone, with another relaxation."""
-        python, child = (
-            _with_package(self._options.lmgc90_python),
-            Path(__file__).with_name("lmgc90_child.py"),
-        )
         more = [] if relaxation is None else ["--relaxation", repr(relaxation)]
-        return self._run(self._child([python, str(child)], more, "LMGC90"))
+        return self._run(self._child(lmgc90_program(self._options.lmgc90_python), more, "LMGC90"))
 
     def _child(self, program: list[str], more: list[str], name: str) -> Trace:
         """Run one side in its own process, single-threaded."""
         options = self._options
-        progress(f"{self._path.stem}: {name} {' '.join(more)}")
-        with tempfile.TemporaryDirectory() as folder:
-            out = Path(folder) / "trace.npz"
-            common = ["--steps", str(options.steps), "--keep", str(min(options.settled, options.steps - 1))]
-            common += ["--step", repr(options.step), "--theta", repr(options.theta)]
-            done = subprocess.run(
-                [*program, str(self._path.resolve()), str(out), *common, *more],
-                cwd=Path(__file__).resolve().parents[1],
-                env=os.environ | _single_threaded(),
-                capture_output=True,
-                text=True,
-                check=False,
-            )
-            if not out.exists():
-                said = (done.stderr or done.stdout).strip().splitlines()
-                raise SolverError(
-                    f"{name} ended with code {done.returncode}: {said[-1] if said else 'no word'}",
-                    where=self._path.stem,
-                )
-            return read_trace(out)
+        common = ["--steps", str(options.steps), "--keep", str(min(options.settled, options.steps - 1))]
+        common += ["--step", repr(options.step), "--theta", repr(options.theta)]
+        return run_side(name, program, self._path, common + more)
 
     def _run(self, trace: Trace) -> Run:
         settled = min(self._options.settled, len(trace.cpu) - 1)
@@ -111,6 +89,43 @@ class Runner:
             verdict=self.judge(trace) if trace.kept else None,
             program=trace.program,
         )
+
+
+def moma_program() -> list[str]:
+    """How a child of ours begins its command line."""
+    return [sys.executable, "-m", "benchmarks.moma_child"]
+
+
+def lmgc90_program(python: str) -> list[str]:
+    """How LMGC90's child begins its command line, with an interpreter that has the package."""
+    return [_with_package(python), str(Path(__file__).with_name("lmgc90_child.py"))]
+
+
+def run_side(name: str, program: list[str], scene: Path, options: list[str]) -> Trace:
+    """Run one program on a scene in a process of its own with one thread; return what it leaves.
+
+    Raises
+    ------
+    SolverError : if it leaves nothing
+    """
+    progress(f"{scene.stem}: {name} {' '.join(options)}")
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "trace.npz"
+        done = subprocess.run(
+            [*program, str(scene.resolve()), str(out), *options],
+            cwd=Path(__file__).resolve().parents[1],
+            env=os.environ | _single_threaded(),
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if not out.exists():
+            said = (done.stderr or done.stdout).strip().splitlines()
+            raise SolverError(
+                f"{name} ended with code {done.returncode}: {said[-1] if said else 'no word'}",
+                where=scene.stem,
+            )
+        return read_trace(out)
 
 
 def figures(run: Run | None) -> Row:

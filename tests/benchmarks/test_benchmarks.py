@@ -183,7 +183,7 @@ def test_tables_are_written_between_their_marks_with_the_commit(tmp_path):
         write_between("u", lines, page)
 
 
-@pytest.mark.parametrize("name", ["lmgc90", "fc3d, own", "fc3d, stored"])
+@pytest.mark.parametrize("name", ["lmgc90", "moving", "fc3d, own", "fc3d, stored"])
 def test_the_page_has_a_place_for_each_table(name):
     text = (ROOT / "benchmarks" / "README.md").read_text(encoding="utf-8")
     assert text.count(f"<!-- {name} -->") == text.count(f"<!-- /{name} -->") == 1
