@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
-from mechanics.scene.scene import Method, SolverSettings
+from mechanics.scene.scene import Method, SolverSettings, TimeSettings
 from mechanics.solvers.first_order.admm import ADMM
 from mechanics.solvers.first_order.apgd import APGD
 from mechanics.solvers.first_order.nsgs import NSGS
@@ -82,10 +82,13 @@ def choose_solver(settings: SolverSettings, deformable: bool, duration: float = 
     return Auto(*limits, motion_speed=settings.motion_error / (_ADDS_UP * duration))
 
 
-def choose_solvers(settings: SolverSettings, deformable: bool, duration: float = np.inf) -> Solvers:
-    """Return the solvers of a run of a duration [s]: compliant joints are a way out for the automatic choice alone."""
-    usual = choose_solver(settings, deformable, duration)
-    if not isinstance(usual, Auto) or settings.joint_compliance == 0:
+def choose_solvers(settings: SolverSettings, deformable: bool, time: TimeSettings) -> Solvers:
+    """Return the solvers of a run: compliant joints are a way out for the automatic choice between rigid stones.
+
+    They are one on the way to a rest alone: where a motion is followed they would decide it.
+    """
+    usual = choose_solver(settings, deformable, time.duration)
+    if deformable or not isinstance(usual, Auto) or settings.joint_compliance == 0 or not time.relaxation:
         return Solvers(usual)
     quick = Compliant(usual.tolerance, usual.velocity_tolerance, usual.max_iterations)
     return Solvers(

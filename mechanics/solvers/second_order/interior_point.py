@@ -55,10 +55,6 @@ _ROUNDING = 10.0
 _NOWHERE = 1e-3
 # short steps in a row after which the path has stalled, and Newton's method is tried
 _STUCK = 5
-# part of a step below which nothing is gained any more [-]
-_DEAD = 0.01
-# such steps in a row after which the path has ended, wherever it stands: the laws contradict each other, or nearly
-_LOST = 5
 # η and velocity error in even units from which short steps count [-]
 _NEARLY = (1e-3, 1e-3)
 # iterations after the last try that may gain nothing
@@ -115,9 +111,9 @@ class InteriorPoint:
         return best if best.converged or end.rounded else self._along_path(end, best)
 
     def _along_path(self, end: "_End", best: ContactSolution) -> ContactSolution:
-        count, tries, short, idle, dead = best.iterations, list(end.tries), 0, 0, 0
+        count, tries, short, idle = best.iterations, list(end.tries), 0, 0
         path = _Path(end.even)
-        while short < _STUCK and idle < _IDLE and dead < _LOST and count < self.max_iterations:
+        while short < _STUCK and idle < _IDLE and count < self.max_iterations:
             try:
                 # where the laws contradict each other impulses grow without bound, until they are no numbers
                 with np.errstate(all="ignore"):
@@ -126,7 +122,6 @@ class InteriorPoint:
                 # rounding has won
                 break
             count += 1
-            dead = dead + 1 if length < _DEAD else 0
             if not (np.isfinite(path.complementarity) and np.abs(path.impulse).max() < _WORTHLESS):
                 break
             impulse = path.impulse * end.unit[:, None]

@@ -14,7 +14,6 @@ from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.newton import Newton
 from mechanics.solvers.second_order.proximal_newton import ProximalNewton
 from mechanics.solvers.second_order.scaling import equilibrated
-from mechanics.solvers.strategies.settled import settled
 
 __all__ = ["Alternating", "moving_admm"]
 
@@ -35,8 +34,6 @@ _STATIC_PATIENCE = 3.0
 _STATIC_LOOK = 5
 # tolerances over those asked for: going further costs little and spares the next steps any work [-]
 _FURTHER = 0.03
-# η and velocities to which that ADMM goes, if not further: what it leaves adds up from step to step [-]
-_STILL = 1e-10
 # steps within which Newton's method has converged, or wanders: between rigid stones most often where much slides
 _NEWTON_STEPS = 20
 # Newton's steps from where the interior point stood: with many contacts at the edge between stick and slip, as in a
@@ -88,13 +85,12 @@ def moving_admm(tolerance: float, velocity_tolerance: float, max_iterations: int
 class Alternating:
     """Methods in turn until one has solved the problem; the best result counts.
 
-    Stones at rest keep the forces of the last step (`settled`). Gauss–Seidel propagates information one stone per
-    sweep, so it comes first only where the forces of the last step are known. ADMM with a small penalty solves the
-    motion of all stones at once, and needs a dozen iterations as long as few contacts open or slide. Newton's method
-    finds the contacts that do by a few factorisations. From a cold start the interior point comes next, which converges
-    whatever the height, the masses and the redundancy; in a motion, ADMM with a balanced penalty first. Methods that
-    factorise work in units in which all contacts yield alike (`equilibrated`). docs/decisions/006-alternating-solver.md
-    and 022-tall-and-heavy.md have the measurements.
+    Gauss–Seidel propagates information one stone per sweep, so it comes first only where the forces of the last step
+    are known. ADMM with a small penalty solves the motion of all stones at once, and needs a dozen iterations as long
+    as few contacts open or slide. Newton's method finds the contacts that do by a few factorisations. From a cold start
+    the interior point comes next, which converges whatever the height, the masses and the redundancy; in a motion, ADMM
+    with a balanced penalty first. Methods that factorise work in units in which all contacts yield alike
+    (`equilibrated`). docs/decisions/006-alternating-solver.md and 022-tall-and-heavy.md have the measurements.
 
     Attributes
     ----------
@@ -116,11 +112,6 @@ class Alternating:
         if len(start.impulse) == 0:
             return replace(best, natural_map=0.0, converged=True)
         warm = bool(start.impulse.any())
-        if warm and problem.delassus.rigid is not None:
-            limits = self.tolerance, self.velocity_tolerance
-            rest = settled(problem, start, limits, self._still(self.max_iterations))
-            if rest is not None:
-                return rest
         before = "warm start" if warm else f"cold start, {len(start.impulse):,} contacts"
         follows = warm and start.motion is not None and problem.delassus.rigid is not None
         moved = False
@@ -205,8 +196,7 @@ class Alternating:
         if warm or problem.delassus.form is None:
             yield "sweeps", self._first, False
         if problem.delassus.form is not None:
-            # stones that move leave nothing that could add up
-            yield "admm, small penalty", self._static if warm else self._still, False
+            yield "admm, small penalty", self._static, False
             later = [("admm, balanced penalty", self._moving, False)]
             if problem.delassus.rigid is not None:
                 yield "Newton", self._newton, False
@@ -237,13 +227,9 @@ class Alternating:
     def _tight(self) -> tuple[float, float]:
         return _FURTHER * self.tolerance, _FURTHER * self.velocity_tolerance
 
-    def _still(self, most: int) -> _Solver:
-        tolerance, velocity_tolerance = self._tight
-        return self._static(most, (min(_STILL, tolerance), min(_STILL, velocity_tolerance)))
-
-    def _static(self, most: int, limits: tuple[float, float] | None = None) -> _Solver:
+    def _static(self, most: int) -> _Solver:
         solver = ADMM(
-            *(limits or self._tight),
+            *self._tight,
             min(_STATIC_ITERATIONS, most),
             _STATIC_PENALTY,
             _STATIC_LOOK,
