@@ -107,7 +107,14 @@ def test_a_swarm_that_collides_keeps_its_momentum(theta, restitution):
         for i in range(36)
     ]
     simulation = start(
-        disks, (), DryJoint(0.4, restitution=restitution), theta=theta, step=2e-3, gravity=(0.0, 0.0)
+        disks,
+        (),
+        DryJoint(0.4, restitution=restitution),
+        theta=theta,
+        step=2e-3,
+        gravity=(0.0, 0.0),
+        # a correction of overlaps moves disks that turn about each other, without their velocities
+        largest_overlap=np.inf,
     )
     model = simulation.model
 
