@@ -93,7 +93,8 @@ class MixedDelassus:
     @cached_property
     def form(self) -> CondensedForm:
         """W for methods that factorise."""
-        return CondensedForm(self.body, self.cliques, self.threads)
+        # by one thread, as bits of factors made by several have differed
+        return CondensedForm(self.body, self.cliques)
 
     def scaled(self, unit: Array) -> ScaledDelassus:
         """Return D W D with the units (nc,) of the contacts on the diagonal of D."""
