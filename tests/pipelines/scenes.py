@@ -11,7 +11,24 @@ from pipelines.arrays import Array
 from pipelines.run.assemble import Assembly, assemble
 from pipelines.scene.file import parse_scene
 
-__all__ = ["assembled", "fails_at_line", "survey_text"]
+__all__ = ["TWO_COURSES", "TWO_COURSES_MIXED", "assembled", "fails_at_line", "survey_text"]
+
+# the two lowest courses of the sample, the first fixed
+TWO_COURSES = """
+[scene]
+name = "Two courses"
+[select]
+where = ["course <= 2"]
+[materials.limestone]
+density = 2350.0
+young = 12e9
+poisson = 0.2
+[bodies]
+default = "rigid"
+fixed = ["course = 1"]
+"""
+# the same with one deformable stone
+TWO_COURSES_MIXED = TWO_COURSES.replace("fixed =", 'deformable = ["W02-02"]\nfixed =')
 
 
 def assembled(url: str, text: str) -> Assembly:

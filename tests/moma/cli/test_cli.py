@@ -14,6 +14,7 @@ from moma.cli.options import SurveyFormat
 from survey.formats.reading import FORMATS
 from tests.moma.commands import answer, fails, invoke, prints
 from tests.paths import ROOT
+from tests.pipelines.scenes import TWO_COURSES
 
 SAMPLE = ROOT / "data/samples/window"
 COMMANDS = ("ingest", "survey-report", "query", "show", "check", "run")
@@ -204,26 +205,11 @@ def test_show_tells_what_it_is_and_what_was_measured(database):
         assert words in text
 
 
-RIGID = """
-[scene]
-name = "Low"
-[select]
-where = ["course <= 2"]
-[materials.limestone]
-density = 2350.0
-young = 12e9
-poisson = 0.2
-[bodies]
-default = "rigid"
-fixed = ["course = 1"]
-"""
-
-
 @pytest.fixture
 def scene(tmp_path):
     """A scene that takes a second."""
     path = tmp_path / "low.toml"
-    path.write_text(RIGID, encoding="utf-8")
+    path.write_text(TWO_COURSES, encoding="utf-8")
     return path
 
 
@@ -255,7 +241,7 @@ def test_check_tells_the_plan(scene, database):
     ],
 )
 def test_an_unsound_scene_ends_in_1_with_its_problem(scene, database, written, instead, said):
-    scene.write_text(RIGID.replace(written, instead), encoding="utf-8")
+    scene.write_text(TWO_COURSES.replace(written, instead), encoding="utf-8")
     done = invoke("check", scene, "--db", database)
     assert done.exit_code == 1
     assert any(said in line for line in done.stdout.splitlines() if line.startswith("problem: "))
@@ -264,10 +250,10 @@ def test_an_unsound_scene_ends_in_1_with_its_problem(scene, database, written, i
 
 @pytest.mark.parametrize("command", ["check", "run"])
 def test_a_wrong_scene_is_wrong_use(command, scene, database):
-    scene.write_text(RIGID.replace("density", "densty"), encoding="utf-8")
+    scene.write_text(TWO_COURSES.replace("density", "densty"), encoding="utf-8")
     assert "low.toml:7: unknown key 'densty'" in fails(2, command, scene, "--db", database)
     assert "no such scene file" in fails(2, command, scene.with_name("none.toml"), "--db", database)
-    scene.write_text(RIGID.replace("course <= 2", "course > 99"), encoding="utf-8")
+    scene.write_text(TWO_COURSES.replace("course <= 2", "course > 99"), encoding="utf-8")
     assert "no stone is selected" in fails(2, command, scene, "--db", database)
 
 
@@ -275,7 +261,7 @@ def test_run_tells_how_it_ended_and_query_knows_it(scene, tmp_path):
     url = f"sqlite:///{tmp_path / 'own.db'}"
     prints("ingest", SAMPLE / "window.moma", "--db", url)
     text = prints("run", scene, "--db", url, "--out", tmp_path / "out", "-v")
-    assert text.startswith("Low: equilibrium after ")
+    assert text.startswith("Two courses: equilibrium after ")
     assert str(tmp_path / "out/report.html") in text
     rows = answer("query", "entity", "--where", "fidelity = rigid", "--db", url)
     assert rows

@@ -8,27 +8,19 @@ from pipelines.ingest.ingest import ingest
 from pipelines.tuning.measured_errors import ERRORS
 from tests.moma.commands import answer, invoke, prints
 from tests.paths import ROOT
+from tests.pipelines.scenes import TWO_COURSES_MIXED
 
 SURVEY = ROOT / "data/samples/window/window.moma"
-SCENE = """
-[scene]
-name = "Two courses"
-[select]
-where = ["course <= 2"]
-[materials.limestone]
-density = 2350.0
-young = 12e9
-poisson = 0.2
-[bodies]
-default = "rigid"
-deformable = ["W02-02"]
-fixed = ["course = 1"]
+SCENE = (
+    TWO_COURSES_MIXED
+    + """\
 [time]
 step = 0.05
 start = "equilibrium"
 [output]
 pictures = []
 """
+)
 
 
 @pytest.fixture(scope="module")

@@ -19,25 +19,18 @@ from moma.cli.progress import Interruption, progress_bars
 from pipelines.ingest.ingest import ingest
 from tests.moma.commands import invoke
 from tests.paths import ROOT
+from tests.pipelines.scenes import TWO_COURSES
 
-SCENE = """
-[scene]
-name = "Two courses"
-[select]
-where = ["course <= 2"]
-[materials.limestone]
-density = 2350.0
-young = 12e9
-poisson = 0.2
-[bodies]
-default = "rigid"
-fixed = ["course = 1"]
+SCENE = (
+    TWO_COURSES
+    + """\
 [time]
 duration = 600.0
 stop_at_equilibrium = false
 [output]
 pictures = []
 """
+)
 
 
 @pytest.fixture

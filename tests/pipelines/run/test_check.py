@@ -16,28 +16,15 @@ from survey.joints.report import ClosingReport, Gap, Joint, Overlap
 from survey.joints.settings import JointMode
 from survey.simplify.simplify import simplify
 from survey.synthetic.buildings.walls import wall
-from tests.pipelines.scenes import survey_text
+from tests.pipelines.scenes import TWO_COURSES, survey_text
 
 PLACE, UP = np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.0, 1.0])
-SCENE = """
-[scene]
-name = "Low courses"
-[select]
-where = ["course <= 2"]
-[materials.limestone]
-density = 2350.0
-young = 12e9
-poisson = 0.2
-[bodies]
-default = "rigid"
-fixed = ["course = 1"]
-"""
 
 
 @pytest.fixture
 def scene(tmp_path):
     path = tmp_path / "low.toml"
-    path.write_text(SCENE)
+    path.write_text(TWO_COURSES)
     return path
 
 
@@ -112,7 +99,7 @@ def test_the_report_has_the_stones_and_joints_of_the_scene(scene, url):
 
 
 def test_the_report_has_the_quality_of_the_meshes(scene, url):
-    scene.write_text(SCENE.replace('"rigid"', '"deformable"') + "[mesh]\nsize = 0.4\n")
+    scene.write_text(TWO_COURSES.replace('"rigid"', '"deformable"') + "[mesh]\nsize = 0.4\n")
     quality = check_scene(scene, url).mesh_quality
     assert quality is not None
     assert 0.0 < quality.smallest_jacobian <= 1.0
@@ -122,7 +109,7 @@ def test_the_report_has_the_quality_of_the_meshes(scene, url):
 
 
 def test_what_is_left_open_is_listed_with_reasons_and_is_a_problem_where_nothing_closes(scene, url):
-    scene.write_text(SCENE + "[joints]\nmax_displacement = 0.001\n")
+    scene.write_text(TWO_COURSES + "[joints]\nmax_displacement = 0.001\n")
     report = check_scene(scene, url)
     assert report.joints is not None
     assert len(report.joints.gaps) >= 18
@@ -132,7 +119,7 @@ def test_what_is_left_open_is_listed_with_reasons_and_is_a_problem_where_nothing
     every = check_lines(report, verbose=True)
     assert sum(" over " in line and " open by " in line for line in every) == len(report.joints.gaps)
     assert any("max_displacement" in one for one in report.problems)
-    scene.write_text(SCENE + '[joints]\nmode = "as-surveyed"\n')
+    scene.write_text(TWO_COURSES + '[joints]\nmode = "as-surveyed"\n')
     report = check_scene(scene, url)
     assert not any("could be closed" in one for one in report.problems)
     assert report.joints is not None
@@ -203,7 +190,7 @@ def test_stones_that_lie_deep_in_each_other_are_a_problem(tmp_path, sunk, found)
     (tmp_path / "two.moma").write_text(survey_text(stones, np.zeros(3)), encoding="utf-8")
     url = f"sqlite:///{tmp_path / 'two.db'}"
     ingest([tmp_path / "two.moma"], url)
-    (tmp_path / "two.toml").write_text(SCENE + '[joints]\nmode = "as-surveyed"\n', encoding="utf-8")
+    (tmp_path / "two.toml").write_text(TWO_COURSES + '[joints]\nmode = "as-surveyed"\n', encoding="utf-8")
     problems = check_scene(tmp_path / "two.toml", url).problems
     assert [one.partition(";")[0] for one in problems if "in each other" in one] == found
 

@@ -24,26 +24,17 @@ from pipelines.scene.file import parse_scene
 from pipelines.scene.selection import select_groups, select_stones
 from tests.moma.commands import answer, fails
 from tests.pipelines.results_by_hand import result_of, rigid_body
-from tests.pipelines.scenes import fails_at_line
+from tests.pipelines.scenes import TWO_COURSES_MIXED, fails_at_line
 
-LOW = """
-[scene]
-name = "Two courses"
-[select]
-where = ["course <= 2"]
-[materials.limestone]
-density = 2350.0
-young = 12e9
-poisson = 0.2
-[bodies]
-default = "rigid"
-deformable = ["W02-02"]
-fixed = ["course = 1"]
+LOW = (
+    TWO_COURSES_MIXED
+    + """\
 [mesh]
 size = 0.3
 [time]
 step = 0.005
 """
+)
 
 
 def selected(text, session):

@@ -19,19 +19,11 @@ from pipelines.run import run as run_module
 from pipelines.run import unfinished
 from pipelines.run.run import run_scene
 from tests.moma.commands import answer, fails, invoke, prints
+from tests.pipelines.scenes import TWO_COURSES
 
-SCENE = """
-[scene]
-name = "Two courses"
-[select]
-where = ["course <= 2"]
-[materials.limestone]
-density = 2350.0
-young = 12e9
-poisson = 0.2
-[bodies]
-default = "rigid"
-fixed = ["course = 1"]
+SCENE = (
+    TWO_COURSES
+    + """\
 [time]
 step = 0.005
 theta = 0.5
@@ -44,6 +36,7 @@ paraview = "both"
 series = ["W02-02", "W02-03"]
 checkpoint = 5
 """
+)
 TILTED = "\n[gravity]\ndirection = [0.6, 0.1, -1.0]\n"
 ELASTIC = SCENE.replace("fixed =", 'deformable = ["W02-02"]\nfixed =').replace(
     "[time]", "[mesh]\nsize = 0.3\n[time]"

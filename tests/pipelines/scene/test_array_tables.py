@@ -17,7 +17,7 @@ from pipelines.run.check import check_scene
 from pipelines.scene.file import parse_scene
 from pipelines.scene.laws import law_rules
 from tests.paths import ROOT
-from tests.pipelines.scenes import assembled, fails_at_line
+from tests.pipelines.scenes import TWO_COURSES, assembled, fails_at_line
 
 STONE = "[materials.stone]\ndensity = 2000\nyoung = 1e10\npoisson = 0.2\n"
 MORTAR = '[[laws]]\ntype = "mortar"\nfriction = 0.5\ntension = 1e5\nshear = 2e5\n'
@@ -262,24 +262,9 @@ def test_the_examples_of_the_documentation_are_valid():
     assert (len(scene.meshes), len(scene.laws), len(scene.loads)) == (3, 2, 2)
 
 
-LOW = """
-[scene]
-name = "Two courses"
-[select]
-where = ["course <= 2"]
-[materials.limestone]
-density = 2350.0
-young = 12e9
-poisson = 0.2
-[bodies]
-default = "rigid"
-fixed = ["course = 1"]
-"""
-
-
 @pytest.fixture
 def build(url):
-    return lambda text: assembled(url, LOW + text).scene
+    return lambda text: assembled(url, TWO_COURSES + text).scene
 
 
 def test_laws_and_loads_find_their_stones(build):
@@ -423,7 +408,7 @@ def test_a_mesh_of_no_stone_is_named_with_its_line(build):
 def test_check_reports_the_meshes(url, tmp_path):
     path = tmp_path / "scene.toml"
     path.write_text(
-        LOW + "deformable = ['W02-01', 'W02-02', 'W02-03']\n[mesh]\nsize = 0.4\n"
+        TWO_COURSES + "deformable = ['W02-01', 'W02-02', 'W02-03']\n[mesh]\nsize = 0.4\n"
         "[[meshes]]\nstones = ['W02-02']\nelement = 'hex8'\n"
     )
     uses = {(one.element, one.size, one.stones) for one in check_scene(path, url).meshes}
@@ -434,7 +419,7 @@ def test_check_reports_laws_and_loads(url, tmp_path):
     (tmp_path / "a.csv").write_text("0 0\n1 2\n2 0\n")
     path = tmp_path / "scene.toml"
     path.write_text(
-        LOW
+        TWO_COURSES
         + MORTAR
         + 'between = [["W01-01"], ["course = 2"]]\n'
         + '[[loads]]\ntype = "ground_motion"\nstones = ["course = 1"]\nx = "a.csv"\nunit = "m/s2"\n'
