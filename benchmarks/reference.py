@@ -1,4 +1,4 @@
-"""What Siconos reaches on a stored problem: live, or as the file siconos.csv beside the problems says."""
+"""Results of Siconos on a stored problem: live, or as the file siconos.csv beside the problems says."""
 
 import argparse
 import csv

@@ -1,4 +1,4 @@
-"""What every benchmark prints: a table or JSON, and on which machine."""
+"""Output of every benchmark: a table or JSON, and the machine."""
 
 import json
 import os

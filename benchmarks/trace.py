@@ -1,4 +1,4 @@
-"""What one run of one program leaves for the judge: times, motion, and the contacts of some steps."""
+"""Traces that one run of one program leaves for the judge: times, motion, and the contacts of some steps."""
 
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -81,7 +81,7 @@ def replacing(folder: Path, index: str = RUN_INDEX) -> Iterator[Path]:
     target = folder.absolute()
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        with _locked(target.parent):
+        with locked(target.parent, wait=True):
             _clean(target.parent)
             fresh = Path(tempfile.mkdtemp(prefix=f".{target.name}{_MARK}", dir=target.parent))
             handle = _lock(fresh)
@@ -106,7 +106,7 @@ def _put(fresh: Path, target: Path) -> None:
         fresh.rename(target)
     elif not _exchanged(fresh, target):
         earlier = target.with_name(f".{target.name}{_EARLIER}")
-        with _locked(target.parent):
+        with locked(target.parent, wait=True):
             target.rename(earlier)
             fresh.rename(target)
             shutil.rmtree(earlier)
@@ -133,7 +133,7 @@ def _recover(folder: Path) -> None:
     earlier = target.with_name(f".{target.name}{_EARLIER}")
     if not earlier.is_dir():
         return
-    with suppress(OSError), _locked(target.parent):
+    with suppress(OSError), locked(target.parent, wait=True):
         if target.exists():
             shutil.rmtree(earlier)
         else:
@@ -166,12 +166,19 @@ def _lock(folder: Path) -> int | None:
 
 
 @contextmanager
-def locked(folder: Path) -> Iterator[None]:
+def locked(folder: Path, *, wait: bool = False) -> Iterator[None]:
     """Hold a folder, which must exist, for this program, where the system has locks.
+
+    Results are published with the folder around them held, so that no other program finds a hidden
+    folder before its owner has locked it.
+
+    Parameters
+    ----------
+    wait : wait for another program that holds it
 
     Raises
     ------
-    UsageError : another program holds it
+    UsageError : another program holds it, and `wait` is false
     """
     if sys.platform == "win32":
         yield
@@ -180,26 +187,11 @@ def locked(folder: Path) -> Iterator[None]:
     try:
         with suppress(OSError):  # a file system without locks
             try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
             except BlockingIOError:
                 raise UsageError(
                     "another program is running there", where=str(folder.parent), remedy="name another folder"
                 ) from None
-        yield
-    finally:
-        os.close(handle)
-
-
-@contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    """Hold a lock on a folder, so that no other program finds a hidden folder before its owner has locked it."""
-    if sys.platform == "win32":
-        yield
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        with suppress(OSError):  # a file system without locks
-            fcntl.flock(handle, fcntl.LOCK_EX)
         yield
     finally:
         os.close(handle)
