@@ -178,17 +178,16 @@ class _End:
             if count >= most or found.converged:
                 break
             limits = further * self.limits[0], further * self.limits[1]
+            begin, rounded = ContactStart(found.impulse / unit, found.velocity), False
             if self.elastic:
-                newton: Newton | ProximalNewton = Newton(*limits, _ELASTIC_NEWTON, _HOPELESS)
+                even, rounded = Newton(*limits, _ELASTIC_NEWTON, _HOPELESS).ended(self.even, begin)
             else:
-                newton = ProximalNewton(*limits, _NEWTON)
-            even = newton(self.even, ContactStart(found.impulse / unit, found.velocity))
+                even = ProximalNewton(*limits, _NEWTON)(self.even, begin)
             count += even.iterations
             found = min(found, self.looked(even.impulse * unit, 0), key=_left)
             if not even.converged:
-                # it stopped by itself near a solution, where a path would come to the same
-                near = found.natural_map <= _ROUNDING * self.limits[0]
-                self.rounded = self.elastic and near and even.iterations < _ELASTIC_NEWTON
+                # a path would come to the same
+                self.rounded = rounded and found.natural_map <= _ROUNDING * self.limits[0]
                 break
         return replace(found, iterations=count)
 
