@@ -93,8 +93,7 @@ class MixedDelassus:
     @cached_property
     def form(self) -> CondensedForm:
         """W for methods that factorise."""
-        # by one thread, as bits of factors made by several have differed
-        return CondensedForm(self.body, self.cliques)
+        return CondensedForm(self.body, self.cliques, self.threads)
 
     def scaled(self, unit: Array) -> ScaledDelassus:
         """Return D W D with the units (nc,) of the contacts on the diagonal of D."""
