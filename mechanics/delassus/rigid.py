@@ -50,7 +50,8 @@ def schedule(bodies: Ints, moving: Bools) -> Schedule:
     if count == 0:
         empty = np.zeros(0, dtype=np.int64)
         return Schedule(empty, np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64))
-    pair = 2 * (bodies.min(axis=1) * len(moving) + bodies.max(axis=1)) + (bodies[:, 0] > bodies[:, 1])
+    one, other = bodies.T
+    pair = 2 * (np.minimum(one, other) * len(moving) + np.maximum(one, other)) + (one > other)
     order = np.argsort(pair, kind="stable")
     starts = np.flatnonzero(np.diff(pair[order], prepend=-1))
     sizes = np.diff(starts, append=count)

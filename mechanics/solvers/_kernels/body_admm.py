@@ -38,6 +38,8 @@ __all__ = [
 
 # regularisation of the extrapolation's normal equations over their trace [-]
 _REGULAR = 1e-10
+# numbers of a vector that are combined at once
+_PIECE = 1024
 # growth of the change of an iteration from which earlier ones mislead [-]
 _WORSE = 2.0
 
@@ -366,20 +368,19 @@ def _product(a, b):
 def _extrapolate(x, image, memory):
     """Write the next iterate (3 nc,) into x, from G(x): that of the combination of iterates with the least step."""
     depth = memory.image.shape[0]
-    size = 0.0
-    for i in range(x.shape[0]):
-        size += (image[i] - x[i]) ** 2
-    if memory.tally[0] > 0 and not size <= _WORSE * _WORSE * memory.size[0]:
-        memory.tally[0] = 0
-    memory.size[0] = size
     last = (memory.tally[1] + 1) % depth
-    memory.tally[1] = last
-    known = min(memory.tally[0] + 1, depth)
-    memory.tally[0] = known
     kept, step = memory.image[last], memory.step[last]
+    size = 0.0
     for i in range(x.shape[0]):
         kept[i] = image[i]
         step[i] = image[i] - x[i]
+        size += step[i] ** 2
+    if memory.tally[0] > 0 and not size <= _WORSE * _WORSE * memory.size[0]:
+        memory.tally[0] = 0
+    memory.size[0] = size
+    memory.tally[1] = last
+    known = min(memory.tally[0] + 1, depth)
+    memory.tally[0] = known
     for k in range(known):
         other = (last - k) % depth
         memory.gram[last, other] = memory.gram[other, last] = _product(step, memory.step[other])
@@ -405,12 +406,15 @@ def _extrapolate(x, image, memory):
     total = 0.0
     for k in range(known - 1):
         total += weight[k]
-    for i in range(x.shape[0]):
-        x[i] = (1.0 - total) * kept[i]
-    for k in range(known - 1):
-        other, part = memory.image[(last - 1 - k) % depth], weight[k]
-        for i in range(x.shape[0]):
-            x[i] += part * other[i]
+    # by pieces that stay in the fastest memory
+    for start in range(0, x.shape[0], _PIECE):
+        piece, own = x[start : start + _PIECE], kept[start : start + _PIECE]
+        for i in range(piece.shape[0]):
+            piece[i] = (1.0 - total) * own[i]
+        for k in range(known - 1):
+            other, part = memory.image[(last - 1 - k) % depth][start : start + _PIECE], weight[k]
+            for i in range(piece.shape[0]):
+                piece[i] += part * other[i]
 
 
 @njit(cache=True)

@@ -32,6 +32,8 @@ _FEW = 1000
 _FIRST_LOOK = 10
 # fewest iterations between two looks
 _LEAST_LOOK = 5
+# and most, over the iterations so far: changes of velocities foretell the residual for so long alone [-]
+_LATE_LOOK = 0.2
 # part of the change at which the residual is expected to be small enough, at which it is looked at [-]
 _EARLY = 0.8
 # iterates from which is extrapolated
@@ -137,7 +139,7 @@ class _Run:
         x -= start.velocity * self._touching.soft[:, None]
         x = kernel.to_world(self._geometry, x)
         self._iterate = kernel.Iterate(x, np.empty_like(x), np.empty_like(x), np.zeros(6 * len(moving)))
-        self._length = float(np.linalg.norm(self._touching.arm[:, :3], axis=1).mean())
+        self._length = float(np.sqrt((self._touching.arm[:, :3] ** 2) @ np.ones(3)).mean())
         self._factors: kernel.Factors | None = None
         self._memory = _acceleration(0, 0)
         self._until = 0
@@ -166,7 +168,8 @@ class _Run:
         least = min(_LEAST_LOOK, most)
         self._advance(least, 0.0)
         if self._change > self._limit:
-            self._advance(most - least, self._limit)
+            later = max(int(_LATE_LOOK * self.iterations), _LEAST_LOOK)
+            self._advance(min(most - least, later), self._limit)
 
     def _advance(self, count: int, limit: float) -> None:
         made, self._change = kernel.advance(
@@ -229,9 +232,11 @@ def _eliminated(contacts: RigidContacts, moving: Ints) -> tuple[Ints, Ints, chol
     place[moving] = np.arange(len(moving))
     side = place[contacts.body]
     # contacts of the same two bodies follow each other
-    first = np.flatnonzero((np.diff(side, axis=0, prepend=-2) != 0).any(axis=1))
-    inner = side[first][(side[first] >= 0).all(axis=1)]
-    pairs = np.unique(inner.min(axis=1) * len(moving) + inner.max(axis=1))
+    new = np.ones(len(side), dtype=bool)
+    new[1:] = (side[1:, 0] != side[:-1, 0]) | (side[1:, 1] != side[:-1, 1])
+    inner = side[new]
+    inner = inner[(inner[:, 0] >= 0) & (inner[:, 1] >= 0)]
+    pairs = np.unique(np.minimum(*inner.T) * len(moving) + np.maximum(*inner.T))
     if len(moving) < _FEW:
         rank, panels = _pattern_of_few(pairs.tobytes(), len(moving))
     else:
