@@ -242,7 +242,11 @@ def _push(iterate, load, touching):
                 size = np.sqrt(dot(t, t))
                 height, radius = onto_cone(along, size, friction[c], cohesion[c])
                 shrink = radius / size if size > 0.0 else 0.0
-                z = shrink * t[0] + height * n[0], shrink * t[1] + height * n[1], shrink * t[2] + height * n[2]
+                z = (
+                    shrink * t[0] + height * n[0],
+                    shrink * t[1] + height * n[1],
+                    shrink * t[2] + height * n[2],
+                )
                 lag = friction[c] * (1.0 - shrink) * size
                 g0 = 2.0 * z[0] - p[0] - lag * n[0]
                 g1 = 2.0 * z[1] - p[1] - lag * n[1]
