@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numba
 import numpy as np
@@ -126,6 +127,11 @@ class RigidDelassus:
     def form(self) -> BodyForm:
         """W for methods that factorise: six velocities for each body that moves, world axes."""
         return BodyForm(self.rigid)
+
+    @cached_property
+    def memo(self) -> dict[str, Any]:
+        """What solvers have made of W alone, by name; it can be made again with the same bits."""
+        return {}
 
     def scaled(self, unit: Array) -> "RigidDelassus":
         """Return D W D with the units (nc,) of the contacts on the diagonal of D; the pattern of factors is shared.

@@ -13,7 +13,7 @@ import numpy as np
 
 from mechanics.arrays import Array, Ints
 from mechanics.delassus.elimination import elimination
-from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, RigidContacts
+from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, Delassus, RigidContacts
 from mechanics.problem.residual import residual
 from mechanics.solvers._kernels import body_admm as kernel
 from mechanics.solvers._kernels import body_cholesky as cholesky
@@ -28,6 +28,8 @@ _OVER = 1.6
 _SPARE = 0.2
 # bodies below which the order of elimination depends on their pairs alone, and is kept while these stay
 _FEW = 1000
+# numbers in factors that are kept until contacts are detected again, at most: 32 MB
+_KEPT = 4_000_000
 # iterations before the first look at the residual
 _FIRST_LOOK = 10
 # fewest iterations between two looks
@@ -114,42 +116,35 @@ class _Run:
     def __init__(
         self, problem: ContactProblem, contacts: RigidContacts, start: ContactStart, settings: BodyADMM
     ) -> None:
-        self._problem, self._settings = problem, settings
-        self._geometry = np.ascontiguousarray(contacts.geometry)
-        moving = np.flatnonzero(contacts.inertia[:, 0] > 0)
-        self._order, side, self._panels = _eliminated(contacts, moving)
-        self._inertia = contacts.inertia[self._order]
-        self._mass = kernel.masses(contacts.inertia, self._order)
-        self._free: Array = kernel.to_world(self._geometry, problem.u_free)
-        compliance = np.einsum("cii->c", problem.delassus.diagonal) / 3.0
-        normal = np.ascontiguousarray(contacts.geometry[:, :3])
+        self._problem, self._settings, self._bodies = (
+            problem,
+            settings,
+            _bodies_of(problem.delassus, contacts),
+        )
+        bodies = self._bodies
+        self._free: Array = kernel.to_world(bodies.geometry, problem.u_free)
         self._touching = kernel.Touching(
-            side,
-            normal,
-            np.ascontiguousarray(contacts.geometry[:, 9:]),
-            self._free + problem.bias[:, None] * normal,
+            bodies.side,
+            bodies.normal,
+            bodies.arm,
+            self._free + problem.bias[:, None] * bodies.normal,
             problem.friction,
             problem.cohesion,
-            np.zeros(len(side)) if problem.adhesion is None else problem.adhesion,
-            1.0 / (settings.stages[0].penalty * compliance),
+            np.zeros(len(bodies.side)) if problem.adhesion is None else problem.adhesion,
+            bodies.soft(settings.stages[0].penalty),
         )
-        self._compliance, self._stages = compliance, list(settings.stages)
+        self._stages = list(settings.stages)
         self._pace = float(np.abs(problem.u_free).max()) or float(np.abs(problem.bias).max()) or 1.0
         x = kernel.projected(start.impulse, problem.friction, problem.cohesion)
         x -= start.velocity * self._touching.soft[:, None]
-        x = kernel.to_world(self._geometry, x)
-        self._iterate = kernel.Iterate(x, np.empty_like(x), np.empty_like(x), np.zeros(6 * len(moving)))
-        self._length = float(np.sqrt((self._touching.arm[:, :3] ** 2) @ np.ones(3)).mean())
+        x = kernel.to_world(bodies.geometry, x)
+        self._iterate = kernel.Iterate(
+            x, np.empty_like(x), np.empty_like(x), np.zeros(6 * len(bodies.inertia))
+        )
         self._factors: kernel.Factors | None = None
         self._memory = _acceleration(0, 0)
         self._until = 0
         self.iterations, self.excess, self._change, self._limit = 0, np.inf, np.inf, 0.0
-
-    def _factorised(self) -> kernel.Factors:
-        value: Array = kernel.assemble(self._touching, self._mass, self._panels)
-        if not cholesky.factorise(self._panels, value):
-            raise SolverError("W is not a number", where="ADMM of bodies", remedy="use another method")
-        return kernel.Factors(self._panels, value)
 
     @property
     def goal(self) -> float:
@@ -173,7 +168,14 @@ class _Run:
 
     def _advance(self, count: int, limit: float) -> None:
         made, self._change = kernel.advance(
-            self._iterate, count, limit, _OVER, self._length, self._touching, self._factors, self._memory
+            self._iterate,
+            count,
+            limit,
+            _OVER,
+            self._bodies.length,
+            self._touching,
+            self._factors,
+            self._memory,
         )
         self.iterations += made
 
@@ -181,19 +183,18 @@ class _Run:
         """Go on with the penalty of a stage; y keeps its velocities."""
         self._until += stage.iterations
         self._memory = _acceleration(_DEPTH if stage.extrapolated else 0, self._iterate.x.size)
-        soft = 1.0 / (stage.penalty * self._compliance)
+        soft = self._bodies.soft(stage.penalty)
         if self.iterations:
             self._broken()
             x, z = self._iterate.x, self._iterate.z
             x[:] = z + (x - z) * (soft / self._touching.soft)[:, None]
-        if self._factors is None or self.iterations:
-            self._touching = self._touching._replace(soft=soft)
-            self._factors = self._factorised()
+        self._touching = self._touching._replace(soft=soft)
+        self._factors = self._bodies.factors(stage.penalty, self._touching)
 
     def _broken(self) -> tuple[float, float, float]:
         iterate, scale = self._iterate, self._problem.delassus.scale
         found: tuple[float, float, float] = kernel.broken_laws(
-            iterate.x, self._touching, self._free, self._inertia, 1.0 / scale, iterate.z
+            iterate.x, self._touching, self._free, self._bodies.inertia, 1.0 / scale, iterate.z
         )
         return found
 
@@ -212,8 +213,64 @@ class _Run:
     def best(self) -> tuple[Array, Array]:
         """Return the impulses and the velocities û (nc, 3) of the best look, local frames."""
         x, z, soft = self._best
-        velocity = kernel.to_local(self._geometry, (z - x) / soft[:, None])
-        return kernel.to_local(self._geometry, z), velocity
+        velocity = kernel.to_local(self._bodies.geometry, (z - x) / soft[:, None])
+        return kernel.to_local(self._bodies.geometry, z), velocity
+
+
+class _Bodies:
+    """What of a problem depends on W alone: the order of elimination, and factors by their penalty.
+
+    As long as no stone has moved so far that its contacts are detected again, all steps share it.
+
+    Attributes
+    ----------
+    geometry : (nc, 15) as in `RigidContacts`
+    side, normal, arm : as in `Touching`
+    inertia : (nm, 7) of the moving bodies, in the order of elimination
+    length : mean distance of contacts from the centres of mass [m]
+    """
+
+    def __init__(self, delassus: Delassus, contacts: RigidContacts) -> None:
+        moving = np.flatnonzero(contacts.inertia[:, 0] > 0)
+        order, self.side, self._panels = _eliminated(contacts, moving)
+        self.geometry = np.ascontiguousarray(contacts.geometry)
+        self.normal = np.ascontiguousarray(contacts.geometry[:, :3])
+        self.arm = np.ascontiguousarray(contacts.geometry[:, 9:])
+        self.inertia = contacts.inertia[order]
+        self._mass: Array = kernel.masses(contacts.inertia, order)
+        self._compliance = np.einsum("cii->c", delassus.diagonal) / 3.0
+        self.length = float(np.sqrt((self.arm[:, :3] ** 2) @ np.ones(3)).mean())
+        self._factors: dict[float, kernel.Factors] = {}
+
+    def soft(self, penalty: float) -> Array:
+        """Return 1/σ (nc,) for a penalty over the mean diagonals of W_αα [kg]."""
+        return 1.0 / (penalty * self._compliance)
+
+    def factors(self, penalty: float, touching: kernel.Touching) -> kernel.Factors:
+        """Return the factors of M + H Σ⁻¹ Hᵀ for the σ of `touching`, which follow from the penalty.
+
+        Raises
+        ------
+        SolverError : if W is not a number
+        """
+        known = self._factors.get(penalty)
+        if known is not None:
+            return known
+        value: Array = kernel.assemble(touching, self._mass, self._panels)
+        if not cholesky.factorise(self._panels, value):
+            raise SolverError("W is not a number", where="ADMM of bodies", remedy="use another method")
+        found = kernel.Factors(self._panels, value)
+        if len(value) <= _KEPT:
+            self._factors[penalty] = found
+        return found
+
+
+def _bodies_of(delassus: Delassus, contacts: RigidContacts) -> _Bodies:
+    """Return the bodies of an operator, which remembers them if it can."""
+    memo: dict[str, _Bodies] = getattr(delassus, "memo", {})
+    if "bodies" not in memo:
+        memo["bodies"] = _Bodies(delassus, contacts)
+    return memo["bodies"]
 
 
 def _acceleration(depth: int, size: int) -> kernel.Acceleration:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mechanics.arrays import Array
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.problem.residual import residual
 from mechanics.solvers.first_order.admm import ADMM
@@ -149,11 +150,11 @@ class Alternating:
         return best
 
     def _kept(self, problem: ContactProblem, start: ContactStart, follows: bool) -> ContactSolution | None:
-        """Return the forces of the last step if they are a solution still, or balanced again where nothing slides.
+        """Return the forces of the last step if they are a solution still, or balanced again where nothing moves.
 
         Forces that balance up to a tolerance, kept from step to step, push stones a little in each, until gaps of an
         ångström fill the tolerance. A few iterations on the velocities of the bodies balance them far better than
-        sweeps, so that the next steps find them balanced. In contacts that slide no forces are sought: they would hold
+        sweeps, so that the next steps find them balanced. No forces are sought where any contact moves: they might hold
         stones that nothing carries.
         """
         limits = self.tolerance, self.velocity_tolerance
@@ -164,13 +165,13 @@ class Alternating:
             kept = ContactSolution(impulse, left.dual, 0, left.natural_map, True, "sweeps: warm start")
             if left.velocity <= calm:
                 return kept
-        if not (follows and left.within(_NEAR * limits[0], _NEAR * limits[1])) or self._slides(
-            problem, start
-        ):
+        if not (follows and left.within(_NEAR * limits[0], _NEAR * limits[1])):
             return kept
         small = _CLOSED * self.velocity_tolerance * float(np.abs(problem.u_free).max())
         closed = replace(problem, bias=np.where(np.abs(problem.bias) <= small, 0.0, problem.bias))
         if kept is not None and residual(closed, start.impulse).velocity <= calm:
+            return kept
+        if not self._rests(problem, start.impulse):
             return kept
         solver = BodyADMM(_EXACT * limits[0], _EXACT * limits[1], self.max_iterations, _BALANCING)
         found = solver(closed, ContactStart(start.impulse, np.zeros_like(start.velocity)))
@@ -228,12 +229,19 @@ class Alternating:
     def _sorting(self, most: int) -> _Solver:
         return BodyADMM(self.tolerance, self.velocity_tolerance, most, _SORTING)
 
-    def _slides(self, problem: ContactProblem, found: ContactSolution | ContactStart) -> bool:
+    def _slides(self, problem: ContactProblem, found: ContactSolution) -> bool:
         """Return whether a contact that carries a force moves by more than the solution leaves undecided."""
         carries = found.impulse.any(axis=1)
-        fastest = float(np.abs(problem.u_free).max())
-        limit = min(_SLIDES * self.velocity_tolerance, _SLOW) * fastest
-        return bool(np.abs(found.velocity[carries]).max(initial=0.0) > limit)
+        return bool(np.abs(found.velocity[carries]).max(initial=0.0) > self._pace(problem))
+
+    def _rests(self, problem: ContactProblem, impulse: Array) -> bool:
+        """Return whether impulses let no contact move, neither one that carries a force nor one that opens."""
+        u = problem.delassus.apply(impulse) + problem.u_free
+        return bool(np.abs(u).max() <= self._pace(problem))
+
+    def _pace(self, problem: ContactProblem) -> float:
+        """Return the velocity up to which a contact rests [m/s]."""
+        return min(_SLIDES * self.velocity_tolerance, _SLOW) * float(np.abs(problem.u_free).max())
 
     def _stages(
         self, problem: ContactProblem, warm: bool, motion: bool
@@ -291,7 +299,15 @@ class Alternating:
 
     def _ended(self, most: int) -> _Solver:
         solver = BodyADMM(*self._tight, most, _ENDING)
-        return lambda p, s: solver(p, ContactStart(s.impulse, np.zeros_like(s.velocity)))
+
+        def solve(problem: ContactProblem, start: ContactStart) -> ContactSolution:
+            found = solver(problem, ContactStart(start.impulse, np.zeros_like(start.velocity)))
+            if self._rests(problem, found.impulse):
+                return found
+            # forces that press moving stones against each other would slow all steps that follow: Newton's are smaller
+            return replace(found, impulse=start.impulse, velocity=start.velocity)
+
+        return solve
 
     def _newton(self, most: int) -> _Solver:
         return _even(ProximalNewton(*self._tight, min(_NEWTON_STEPS, most)))
