@@ -23,6 +23,8 @@ __all__ = ["BodyADMM", "Stage"]
 
 # overshoot of the impulses [-]
 _OVER = 1.6
+# velocities of a body
+_VELOCITIES = 6
 # zeros that a panel of the factors may hold, over its other blocks [-]
 _SPARE = 0.2
 # iterations before the first look at the residual
@@ -222,7 +224,7 @@ def _eliminated(contacts: RigidContacts, moving: Ints) -> tuple[Ints, Ints, chol
     pairs = np.unique(np.sort(inner, axis=1), axis=0) if len(inner) else inner
     rank = elimination(pairs, moving, contacts.centre)
     rank = cholesky.postorder(np.ascontiguousarray(rank[pairs]), len(moving))[rank]
-    panels = cholesky.panels_of(np.ascontiguousarray(rank[pairs]), len(moving), _SPARE)
+    panels = cholesky.panels_of(np.ascontiguousarray(rank[pairs]), len(moving), _SPARE, _VELOCITIES)
     order = np.empty_like(moving)
     order[rank] = moving
     return order, np.where(side >= 0, rank[side], -1), panels
