@@ -50,6 +50,7 @@ class MixedDelassus:
     threads: int = 1
 
     rigid = None
+    plane = None
     joint_compliance = None
 
     @cached_property

@@ -84,6 +84,7 @@ class RigidDelassus:
     schedule: Schedule
     threads: int = 1
     centre: Array | None = None
+    plane = None
     joint_compliance = None
 
     @cached_property

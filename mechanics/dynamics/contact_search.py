@@ -62,6 +62,7 @@ def detector(model: Model) -> Detector:
         settings.points,
         settings.placement,
         max(law.reach for law in model.laws.laws),
+        model.scene.solver.threads,
     )
 
 

@@ -24,6 +24,8 @@ __all__ = ["BodyADMM", "Stage"]
 
 # overshoot of the impulses [-]
 _OVER = 1.6
+# velocities of a body
+_VELOCITIES = 6
 # zeros that a panel of the factors may hold, over its other blocks [-]
 _SPARE = 0.2
 # bodies below which the order of elimination depends on their pairs alone, and is kept while these stay
