@@ -246,7 +246,8 @@ class _Bodies:
 
     def soft(self, penalty: float) -> Array:
         """Return 1/σ (nc,) for a penalty over the mean diagonals of W_αα [kg]."""
-        return 1.0 / (penalty * self._compliance)
+        soft: Array = 1.0 / (penalty * self._compliance)
+        return soft
 
     def factors(self, penalty: float, touching: kernel.Touching) -> kernel.Factors:
         """Return the factors of M + H Σ⁻¹ Hᵀ for the σ of `touching`, which follow from the penalty.
@@ -311,7 +312,7 @@ def _pattern(pairs: Ints, moving: Ints, centre: Array) -> tuple[Ints, cholesky.P
     both = np.column_stack([pairs // count, pairs % count])
     rank = elimination(both, moving, centre)
     rank = cholesky.postorder(np.ascontiguousarray(rank[both]), count)[rank]
-    return rank, cholesky.panels_of(np.ascontiguousarray(rank[both]), count, _SPARE)
+    return rank, cholesky.panels_of(np.ascontiguousarray(rank[both]), count, _SPARE, _VELOCITIES)
 
 
 @lru_cache(maxsize=1)
