@@ -185,7 +185,7 @@ class Detector:
         inner = self.placement == Placement.INERTIA
 
         def part(a: int, b: int) -> tuple[Ints, Array, Array, Array]:
-            some = Pairs(*(one[a:b] for one in pairs))
+            some = Pairs._make(one[a:b] for one in pairs)
             found, frame, nearest, area = interface_points(
                 some, self.points, inner, FLAT, THIN, placed.shapes
             )
