@@ -24,7 +24,9 @@ __all__ = ["ContactSearch", "Detection", "detection", "detector"]
 # displacements since the last detection, over the smallest width, from which contacts are detected again [-]:
 _MOVED_RIGID = 1e-6  # rigid stones: at rest nothing changes, in motion W is that of the very instant
 _MOVED_LOOSE = 2.5e-5  # the same where the motion may be wrong by much more in each step
-_PER_SPEED = 2.5e-4  # that displacement over the speed of such an error, over the one that gravity gives in a step [-]
+_PER_SPEED = (
+    2.5e-4  # that displacement over the speed of such an error, over the one that gravity gives in a step [-]
+)
 _MOVED = 1e-3  # deformable stones, whose Delassus operator is expensive
 _MOVED_SETTLED = 1e-6  # deformable stones that come to rest, so that the last detection does not lag behind
 _SLOWED = 1e-2  # they come to rest where one step moves them by less than this part of that displacement [-]

@@ -218,7 +218,7 @@ class _Run:
 
 
 class _Bodies:
-    """What of a problem depends on W alone: the order of elimination, and factors by their penalty.
+    """Parts of a problem that depend on W alone: the order of elimination, and factors by their penalty.
 
     As long as no stone has moved so far that its contacts are detected again, all steps share it.
 
@@ -244,7 +244,8 @@ class _Bodies:
 
     def soft(self, penalty: float) -> Array:
         """Return 1/σ (nc,) for a penalty over the mean diagonals of W_αα [kg]."""
-        return 1.0 / (penalty * self._compliance)
+        soft: Array = 1.0 / (penalty * self._compliance)
+        return soft
 
     def factors(self, penalty: float, touching: kernel.Touching) -> kernel.Factors:
         """Return the factors of M + H Σ⁻¹ Hᵀ for the σ of `touching`, which follow from the penalty.
