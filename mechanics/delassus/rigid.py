@@ -131,7 +131,7 @@ class RigidDelassus:
 
     @cached_property
     def memo(self) -> dict[str, Any]:
-        """What solvers have made of W alone, by name; it can be made again with the same bits."""
+        """Results of solvers from W alone, by name; they can be made again with the same bits."""
         return {}
 
     def scaled(self, unit: Array) -> "RigidDelassus":

@@ -220,7 +220,7 @@ class _Run:
 
 
 class _Bodies:
-    """What of a problem depends on W alone: the order of elimination, and factors by their penalty.
+    """Parts of a problem that depend on W alone: the order of elimination, and factors by their penalty.
 
     As long as no stone has moved so far that its contacts are detected again, all steps share it.
 
