@@ -128,6 +128,8 @@ class _Run:
         self._iterate = kernel.Iterate(x, np.empty_like(x), np.empty_like(x), np.zeros(6 * len(moving)))
         self._length = float(np.linalg.norm(self._touching.arm[:, :3], axis=1).mean())
         self._factors: kernel.Factors | None = None
+        # by penalty, for stages whose penalties recur
+        self._known: dict[float, kernel.Factors] = {}
         self._memory = _acceleration(0, 0)
         self._until = 0
         self.iterations, self._change, self._limit = 0, np.inf, 0.0
@@ -182,7 +184,9 @@ class _Run:
             x[:] = z + (x - z) * (self._touching.sigma / sigma)[:, None]
         if self._factors is None or self.iterations:
             self._touching = self._touching._replace(sigma=sigma)
-            self._factors = self._factorised()
+            if stage.penalty not in self._known:
+                self._known[stage.penalty] = self._factorised()
+            self._factors = self._known[stage.penalty]
 
     def _broken(self) -> tuple[float, float, float]:
         iterate, scale = self._iterate, self._problem.delassus.scale
