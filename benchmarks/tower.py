@@ -209,7 +209,7 @@ def _shaken(scene: Scene, steps: int, most: float) -> Row:
         progress(f"rest: step {count + 1}")
         rest.append(_timed(simulation, observe, clock))
     before = dict(clock.seconds)
-    shaken = []
+    shaken: list[tuple[float, float, bool, int, int]] = []
     for count in range(steps):
         if sum(one[0] for one in shaken) > most:
             break
