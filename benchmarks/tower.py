@@ -132,7 +132,7 @@ def main() -> None:
     if options.json:
         print_json(rows)
         return
-    print(f"commit {measured}; {machine()}; {environment('moma-masonry', 'numba', 'numpy')}\n")
+    print(f"{measured}; {machine()}; {environment('moma-masonry', 'numba', 'numpy')}\n")
     print_table(rows, _BUILDING)
     if not options.build:
         for table in (_SHAKING, _SHARES):
