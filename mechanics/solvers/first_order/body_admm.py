@@ -144,6 +144,8 @@ class _Run:
             x, np.empty_like(x), np.empty_like(x), np.zeros(6 * len(bodies.inertia))
         )
         self._factors: kernel.Factors | None = None
+        # by penalty, for stages whose penalties recur
+        self._known: dict[float, kernel.Factors] = {}
         self._memory = _acceleration(0, 0)
         self._until = 0
         self.iterations, self.excess, self._change, self._limit = 0, np.inf, np.inf, 0.0
@@ -191,7 +193,9 @@ class _Run:
             x, z = self._iterate.x, self._iterate.z
             x[:] = z + (x - z) * (soft / self._touching.soft)[:, None]
         self._touching = self._touching._replace(soft=soft)
-        self._factors = self._bodies.factors(stage.penalty, self._touching)
+        if stage.penalty not in self._known:
+            self._known[stage.penalty] = self._bodies.factors(stage.penalty, self._touching)
+        self._factors = self._known[stage.penalty]
 
     def _broken(self) -> tuple[float, float, float]:
         iterate, scale = self._iterate, self._problem.delassus.scale

@@ -80,6 +80,14 @@ _CLOSED = 0.9
 _EXACT = 1e-6
 # iterations from where ADMM with a small penalty stood, as it nearly always is close when it gives up
 _ENDING = (Stage(1e-3, 60, extrapolated=True),)
+# bodies from which Newton's steps in a motion, which factorise anew each, cost more than iterations with kept factors
+_MANY = 1000
+# their penalties in turn: with the larger one contacts sort themselves out, with the smaller one forces that change
+# steadily, by so much in each iteration, arrive 25 times as soon
+_TURNS = 20 * (Stage(0.5, 100, extrapolated=False), Stage(0.02, 50, extrapolated=False))
+# and the one with which the forces of rest are found from nothing: it goes as far as methods for rest do, so that the
+# next steps need none
+_COLD_STAGES = (Stage(1e-3, 300, extrapolated=False),)
 # stages that solve steps in which next to nothing moves
 _RESTING = ("sweeps", "admm, small penalty")
 
@@ -130,9 +138,12 @@ class Alternating:
             kept = self._kept(problem, start, follows)
             if kept is not None:
                 return kept
+        motion = start.motion is not None
+        many = motion and _moving(problem) >= _MANY
+        rests = ("sweeps",) if many else _RESTING
         moved = False
-        for name, solve, from_best in self._stages(problem, warm, start.motion is not None):
-            if follows and not moved and (start.motion or name not in _RESTING):
+        for name, solve, from_best in self._stages(problem, warm, motion, many):
+            if follows and not moved and (start.motion or name not in rests):
                 found, moved = self._in_motion(problem)._moved(problem, start), True
                 before = f"admm of bodies stood at η {found.natural_map:.0e}"
                 best = _better(best, found)
@@ -190,11 +201,13 @@ class Alternating:
         nothing; then forces among them grow until one slips. Newton's method follows them there, ADMM sorts the others.
         """
         assert start.motion is not None
-        found = self._bodies(self.max_iterations)(problem, start)
+        many = _moving(problem) >= _MANY
+        found = self._bodies(self.max_iterations, many)(problem, start)
         found = replace(found, why="admm of bodies: motion")
         best = found
+        methods = [("Newton", self._following), ("admm of bodies", self._sorting)]
         while not found.converged and best.iterations < self.max_iterations:
-            for name, solve in (("Newton", self._following), ("admm of bodies", self._sorting)):
+            for name, solve in [("admm of bodies", self._turning)] if many else methods:
                 count = max(self.max_iterations - best.iterations, 1)
                 begin = ContactStart(found.impulse, found.velocity)
                 why = f"{name}: admm of bodies stood at η {found.natural_map:.0e}"
@@ -216,18 +229,25 @@ class Alternating:
         natural_map = max(self.tolerance, min(velocity, _LOOSEST_MAP))
         return replace(self, velocity_tolerance=velocity, tolerance=natural_map)
 
-    def _bodies(self, most: int) -> _Solver:
+    def _bodies(self, most: int, many: bool) -> _Solver:
         if self.velocity_tolerance < _LOOSE:
             solver = BodyADMM(self.tolerance, self.velocity_tolerance, most, further=_MOTION_FURTHER)
             return lambda p, s: solver(p, s if s.ahead is None else s.ahead)
         # errors of this size would be extrapolated with the rest
-        return BodyADMM(self.tolerance, self.velocity_tolerance, most, _LOOSE_STAGES)
+        stages = _TURNS if many else _LOOSE_STAGES
+        return BodyADMM(self.tolerance, self.velocity_tolerance, most, stages)
 
     def _following(self, most: int) -> _Solver:
         return _even(ProximalNewton(self.tolerance, self.velocity_tolerance, min(_FOLLOWING, most)))
 
     def _sorting(self, most: int) -> _Solver:
         return BodyADMM(self.tolerance, self.velocity_tolerance, most, _SORTING)
+
+    def _turning(self, most: int) -> _Solver:
+        return BodyADMM(self.tolerance, self.velocity_tolerance, most, _TURNS)
+
+    def _cold(self, most: int) -> _Solver:
+        return BodyADMM(*self._tight, most, _COLD_STAGES)
 
     def _slides(self, problem: ContactProblem, found: ContactSolution) -> bool:
         """Return whether a contact that carries a force moves by more than the solution leaves undecided."""
@@ -244,10 +264,12 @@ class Alternating:
         return min(_SLIDES * self.velocity_tolerance, _SLOW) * float(np.abs(problem.u_free).max())
 
     def _stages(
-        self, problem: ContactProblem, warm: bool, motion: bool
+        self, problem: ContactProblem, warm: bool, motion: bool, many: bool
     ) -> Iterator[tuple[str, Callable[[int], _Solver], bool]]:
         """Yield names, solvers by their largest number of iterations, and whether each begins with the best so far."""
         limits = self.tolerance, self.velocity_tolerance
+        if many and not warm:
+            yield "admm of bodies", self._cold, False
         # from nothing, sweeps would leave much of the friction where they happen to begin
         if warm or problem.delassus.form is None:
             yield "sweeps", self._first, False
@@ -255,7 +277,7 @@ class Alternating:
             yield "admm, small penalty", self._static, False
             later = [("admm, balanced penalty", self._moving, False)]
             if problem.delassus.rigid is not None:
-                if motion and not warm:
+                if motion and not (warm or many):
                     yield "admm of bodies", self._ended, True
                 yield "Newton", self._newton, False
                 interior = [
@@ -330,6 +352,12 @@ class Alternating:
         left = residual(problem, found.impulse)
         within = left.within(self.tolerance, self.velocity_tolerance)
         return replace(found, natural_map=left.natural_map, converged=within, why=why)
+
+
+def _moving(problem: ContactProblem) -> int:
+    """Return the number of rigid bodies that move."""
+    contacts = problem.delassus.rigid
+    return 0 if contacts is None else int(np.count_nonzero(contacts.inertia[:, 0]))
 
 
 def _even(solver: _Solver) -> _Solver:
