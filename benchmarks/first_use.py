@@ -2,7 +2,7 @@
 
 The sample is taken in and run with an empty cache of kernels, and again with the full one; the difference is what
 compiling takes. ``--record`` renews the lists of kernels in ``pipelines/kernels``, after a change of what kernels are
-called with.
+called with (Linux).
 """
 
 import json
@@ -21,7 +21,9 @@ __all__ = ["main"]
 _SAMPLE = Path("data/samples/window")
 
 _RECORDING = """
-import json, sys
+import json, os, sys
+# on one processor no second process compiles what is to be recorded
+os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:1])
 from moma.cli import app
 from pipelines.kernels.uses import recording
 with recording() as uses:
