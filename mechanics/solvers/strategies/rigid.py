@@ -238,7 +238,8 @@ class Alternating:
         return BodyADMM(self.tolerance, self.velocity_tolerance, most, stages)
 
     def _following(self, most: int) -> _Solver:
-        return _even(ProximalNewton(self.tolerance, self.velocity_tolerance, min(_FOLLOWING, most)))
+        # in units in which contacts yield alike, what is solved is nearly so in others
+        return _even(ProximalNewton(*self._tight, min(_FOLLOWING, most)))
 
     def _sorting(self, most: int) -> _Solver:
         return BodyADMM(self.tolerance, self.velocity_tolerance, most, _SORTING)
