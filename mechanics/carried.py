@@ -1,14 +1,28 @@
 """State that one step of a run hands to the next, as plain values that a checkpoint can hold."""
 
 from collections.abc import Mapping
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, Protocol, TypeVar
 
-__all__ = ["Carried", "Carrier", "Rows"]
+__all__ = ["Carried", "Carrier", "Checkpointing", "Rows"]
 
 T = TypeVar("T")
 
 Carried = Mapping[str, Any]
 """State by the names of attributes: numbers, texts, arrays, records and tuples of these, `Rows`, further mappings."""
+
+
+class Checkpointing(Protocol):
+    """Place where the checkpoints of a run are kept."""
+
+    @property
+    def every(self) -> int:
+        """Number of steps between two checkpoints; 0: only where the run is stopped."""
+
+    def earlier(self) -> Carried | None:
+        """Return the last checkpoint of the same scene, from which the run is to go on; None: from the start."""
+
+    def checkpoint(self, step: int, carried: Carried) -> None:
+        """Take what the run carries after a step; nothing of it may be kept without a copy."""
 
 
 class Rows(list[T]):

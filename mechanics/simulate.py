@@ -9,7 +9,7 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from mechanics.arrays import Array
-from mechanics.carried import Carried, Carrier, Rows
+from mechanics.carried import Carried, Carrier, Checkpointing, Rows
 from mechanics.dynamics.energy_balance import EnergyBalance
 from mechanics.dynamics.observers.energy import kinetic_energy
 from mechanics.dynamics.observers.equilibrium import settlement, speed, support_reaction
@@ -29,24 +29,14 @@ from mechanics.scene.state import State
 __all__ = ["Archive", "simulate"]
 
 
-class Archive(Protocol):
+class Archive(Checkpointing, Protocol):
     """Place where a run is kept while it goes on."""
-
-    @property
-    def every(self) -> int:
-        """Number of steps between two checkpoints; 0: only where the run is stopped."""
-
-    def earlier(self) -> Carried | None:
-        """Return the last checkpoint of the same scene, from which the run is to go on; None: from the start."""
 
     def begin(self, bodies: tuple[BodyResult, ...], frames: Sequence[Frame]) -> None:
         """Take the stones at the start, and the frames so far: a list to which the run adds others."""
 
     def frame(self) -> None:
         """Note that there is a further frame."""
-
-    def checkpoint(self, step: int, carried: Carried) -> None:
-        """Take what the run carries after a step; nothing of it may be kept without a copy."""
 
 
 def simulate(

@@ -3,6 +3,7 @@
 import numpy as np
 
 from mechanics.arrays import Array
+from mechanics.carried import Carrier
 from mechanics.dynamics.outcome import Outcome
 from mechanics.dynamics.stopping import LASTING
 from mechanics.planar.contacts import PlanarContacts
@@ -56,7 +57,7 @@ def imbalance(model: PlanarModel, step: PlanarStep) -> Array:
     return np.where(model.fixed[:nd], 0.0, np.maximum(force, moment) / pull)
 
 
-class PlanarEnergy:
+class PlanarEnergy(Carrier):
     """Energy balance; energy that no term explains is an error of the program.
 
     ΔE = W_ext + W_contact - D_scheme with W_contact = r·u_θ and D_scheme = (θ - ½) ‖Δv‖²_M holds exactly in the plane.
@@ -67,6 +68,9 @@ class PlanarEnergy:
     unexplained : ΔE - external - contact + scheme, so far [J]
     reference : the largest energy that was in play so far, at least 10⁻⁹ of weight times smallest radius [J]
     """
+
+    CARRIED = ("_kinetic", "contact", "external", "reference", "scheme", "unexplained")
+    REBUILT = ("_model",)
 
     def __init__(self, model: PlanarModel, start: PlanarState) -> None:
         self._model = model
@@ -96,13 +100,16 @@ class PlanarEnergy:
         return abs(self.unexplained) / self.reference if self.reference > 0 else 0.0
 
 
-class PlanarWatch:
+class PlanarWatch(Carrier):
     """Watch of the outcome after each step.
 
     *Equilibrium*: for five steps in a row, each solved to its tolerance, every disk that is not fixed is in balance
     (unbalanced force and moment below the scene's tolerance) and slower than 10⁻⁴ √(g · its width). Without gravity g
     counts as 1 m/s². Nothing rests while walls move, or loads change.
     """
+
+    CARRIED = ("_loads", "_quiet")
+    REBUILT = ("_model", "_slow")
 
     def __init__(self, model: PlanarModel) -> None:
         self._model = model
@@ -124,4 +131,9 @@ class PlanarWatch:
             and not velocity[model.fixed].any()
         )
         self._quiet = self._quiet + 1 if quiet else 0
+        return self.outcome
+
+    @property
+    def outcome(self) -> Outcome:
+        """Outcome so far."""
         return Outcome.EQUILIBRIUM if self._quiet >= LASTING else Outcome.MOVING

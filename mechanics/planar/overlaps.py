@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechanics.arrays import Array, Ints
+from mechanics.carried import Carrier
 from mechanics.planar.contacts import PlanarContacts
 from mechanics.planar.delassus import PlanarDelassus
 from mechanics.planar.model import PlanarState
@@ -49,7 +50,7 @@ class Apart:
     moved: Array | None = None
 
 
-class Overlaps:
+class Overlaps(Carrier):
     """Overlaps of a run, and their correction.
 
     Overlaps of the start are those of the scene, and may stay.
@@ -58,6 +59,9 @@ class Overlaps:
     ----------
     allowed : largest overlap [m]; infinite: none is corrected
     """
+
+    CARRIED = ("_gap", "_key")
+    REBUILT = ("_allowed",)
 
     def __init__(self, allowed: float) -> None:
         self._allowed = allowed

@@ -10,7 +10,7 @@ from mechanics.dynamics.outcome import Outcome
 from mechanics.planar.scene import PlanarScene
 from mechanics.results.result import Errors
 
-__all__ = ["PlanarContactResult", "PlanarFrame", "PlanarHistory", "PlanarResult"]
+__all__ = ["PlanarContactResult", "PlanarFrame", "PlanarHistory", "PlanarInstant", "PlanarResult"]
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,26 @@ class PlanarFrame:
 
     time: float
     position: Array
+
+
+@dataclass(frozen=True)
+class PlanarInstant:
+    """The bodies, contacts and forces at the end of a step, for observers.
+
+    Attributes
+    ----------
+    step : its number, from 1
+    time : [s]
+    position : (nb, 3) x, y [m] and angle [rad] of disks, then walls
+    velocity : (nb, 3) vx, vy [m/s] and ω [rad/s]
+    contacts : the contact points, with the mean forces over the step
+    """
+
+    step: int
+    time: float
+    position: Array
+    velocity: Array
+    contacts: PlanarContactResult
 
 
 @dataclass(frozen=True)
@@ -79,7 +99,7 @@ class PlanarResult:
     Attributes
     ----------
     scene : what was simulated
-    outcome : equilibrium or moving
+    outcome : equilibrium, moving, or interrupted where its user stopped it
     steps, time : time steps done, and simulated time [s]
     position : (nb, 3) x, y [m] and angle [rad] of disks, then walls
     velocity : (nb, 3) vx, vy [m/s] and ω [rad/s]

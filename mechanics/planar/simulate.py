@@ -1,32 +1,50 @@
-"""Run a scene of the plane from its start to its outcome, with its history and error measures."""
+"""Run a scene of the plane from its start to its outcome."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
-import numpy as np
+from threadpoolctl import ThreadpoolController
 
+from mechanics.carried import Checkpointing
 from mechanics.dynamics.outcome import Outcome
-from mechanics.dynamics.progress import Clock, Progress
-from mechanics.dynamics.stopping import LASTING
-from mechanics.planar.model import PlanarModel, PlanarState, build_planar_model
-from mechanics.planar.observers import (
-    PlanarEnergy,
-    PlanarWatch,
-    disk_speed,
-    imbalance,
-    kinetic_energy,
-    world_force,
-)
-from mechanics.planar.result import PlanarContactResult, PlanarFrame, PlanarHistory, PlanarResult
+from mechanics.dynamics.progress import Listener, Progress, silent
+from mechanics.planar.result import PlanarFrame, PlanarInstant, PlanarResult
+from mechanics.planar.run import PlanarRun
 from mechanics.planar.scene import PlanarScene
-from mechanics.planar.simulation import PlanarSimulation, PlanarStep
-from mechanics.results.result import Errors
-from mechanics.scene.laws.status import contact_status
 
-__all__ = ["simulate_planar"]
+__all__ = ["PlanarObserver", "simulate_planar"]
 
 
-def simulate_planar(scene: PlanarScene, progress: Callable[[Progress], None] | None = None) -> PlanarResult:
-    """Run a scene of the plane until it rests or its duration is over.
+@dataclass(frozen=True)
+class PlanarObserver:
+    """Observer of a run, to which nothing need be kept in memory.
+
+    Attributes
+    ----------
+    every : number of steps between two instants; the last one of the run is handed out too
+    take : called with each; in a resumed run, with those after its checkpoint
+    """
+
+    every: int
+    take: Callable[[PlanarInstant], None]
+
+
+def simulate_planar(
+    scene: PlanarScene,
+    progress: Listener = silent,
+    stop: Callable[[], bool] = lambda: False,
+    archive: Checkpointing | None = None,
+    observers: Sequence[PlanarObserver] = (),
+) -> PlanarResult:
+    """Run a scene of the plane until it rests or its duration is over; `PlanarRun` goes step by step.
+
+    Parameters
+    ----------
+    scene : the scene
+    progress : called at every step
+    stop : asked after every step; where it says True, the run ends as interrupted
+    archive : keeps checkpoints, and knows from which the run goes on; None: nothing is kept
+    observers : see the bodies, contacts and forces of some steps
 
     Raises
     ------
@@ -43,123 +61,42 @@ def simulate_planar(scene: PlanarScene, progress: Callable[[Progress], None] | N
     >>> round(result.reaction / result.weight, 6)
     1.0
     """
-    report = progress or (lambda _: None)
-    clock = Clock()
-    model, start = build_planar_model(scene)
-    simulation = PlanarSimulation(model, start, clock)
-    log, watch = _Log(model, start), PlanarWatch(model)
-    frames = [_frame(start)]
-    outcome, step = Outcome.MOVING, None
-    total = max(1, round(scene.time.duration / scene.time.step))
-    for count in range(1, total + 1):
-        step = simulation.step()
-        with clock("observe"):
-            balance = imbalance(model, step)
-            outcome = watch(step, balance)
-            log(step, float(balance.max()))
-        report(Progress("step", count, total, f"η {step.solution.natural_map:.1e}"))
-        done = count == total or (scene.time.stop_at_equilibrium and outcome is Outcome.EQUILIBRIUM)
-        if done or (scene.frame_every and count % scene.frame_every == 0):
-            frames.append(_frame(step.after))
-        if done:
-            break
-    assert step is not None
-    return _result(model, step, outcome, log, tuple(frames), clock)
+    # products of several threads would not be the same to the last bit
+    with ThreadpoolController().limit(limits=1, user_api="blas"):
+        run = PlanarRun(scene)
+        earlier = None if archive is None else archive.earlier()
+        if earlier is not None:
+            run.restore(earlier)
+        return _simulated(run, progress, stop, archive, observers)
 
 
-def _frame(state: PlanarState) -> PlanarFrame:
-    return PlanarFrame(state.time, np.column_stack([state.centre, state.angle]))
-
-
-class _Log:
-    """Record of the observations of each step."""
-
-    def __init__(self, model: PlanarModel, start: PlanarState) -> None:
-        self._model = model
-        self.energy = PlanarEnergy(model, start)
-        self.unconverged = 0
-        self._rows: list[tuple[float, ...]] = []
-
-    def __call__(self, step: PlanarStep, balance: float) -> None:
-        """Account for one step."""
-        model, solution, velocity = self._model, step.solution, step.after.velocity
-        self.energy(step)
-        self.unconverged += not solution.converged
-        self._rows.append(
-            (
-                step.after.time,
-                kinetic_energy(model, velocity),
-                float(disk_speed(model, velocity).max()),
-                balance,
-                solution.natural_map,
-                solution.iterations,
-                len(step.contacts),
-                float(np.max(-step.gap / step.contacts.size, initial=0.0)),
-                step.lifted,
-            )
-        )
-
-    def history(self) -> PlanarHistory:
-        """Return one array for each quantity."""
-        time, kinetic, speed, balance, eta, iterations, contacts, penetration, lifted = np.array(self._rows).T
-        return PlanarHistory(
-            time,
-            kinetic,
-            speed,
-            balance,
-            eta,
-            iterations.astype(np.int64),
-            contacts.astype(np.int64),
-            penetration,
-            lifted,
-        )
-
-
-def _result(
-    model: PlanarModel,
-    last: PlanarStep,
-    outcome: Outcome,
-    log: _Log,
-    frames: tuple[PlanarFrame, ...],
-    clock: Clock,
+def _simulated(
+    run: PlanarRun,
+    report: Listener,
+    stop: Callable[[], bool],
+    archive: Checkpointing | None,
+    observers: Sequence[PlanarObserver],
 ) -> PlanarResult:
-    scene, contacts, history = model.scene, last.contacts, log.history()
-    force = world_force(contacts, last.impulse, scene.time.step)
-    gravity = np.asarray(scene.gravity, dtype=float)
-    g = float(np.hypot(*gravity))
-    up = -gravity / g if g > 0 else np.array([0.0, 1.0])
-    sides = model.fixed[contacts.bodies].astype(float)
-    reaction = float(np.sum((sides[:, 1] - sides[:, 0]) * (force[:, 0] * up[0] + force[:, 1] * up[1])))
-    weight = float(model.mass[~model.fixed].sum()) * g
-    errors = Errors(
-        natural_map=float(history.natural_map[-LASTING:].max()),
-        penetration=float(history.penetration.max()),
-        balance=float(history.balance[-1]),
-        reaction=abs(reaction - weight) / weight if weight > 0 else 0.0,
-        energy=log.energy.error,
-        unconverged_steps=log.unconverged,
-    )
-    result = PlanarContactResult(
-        bodies=contacts.bodies,
-        point=contacts.point,
-        normal=contacts.normal,
-        force=force,
-        gap=last.gap,
-        area=contacts.area,
-        status=contact_status(last.internal, last.terms, last.solution.impulse),
-    )
-    return PlanarResult(
-        scene=scene,
-        outcome=outcome,
-        steps=len(history.time),
-        time=last.after.time,
-        position=frames[-1].position,
-        velocity=last.after.velocity,
-        contacts=result,
-        errors=errors,
-        reaction=reaction,
-        weight=weight,
-        frames=frames,
-        history=history,
-        wall_time=dict(clock.seconds),
-    )
+    while not run.done:
+        step = run.step()
+        report(Progress("step", run.steps, run.total, f"η {step.solution.natural_map:.1e}"))
+        stopped = not run.done and stop()
+        last = run.done or stopped
+        due = [one for one in observers if last or run.steps % one.every == 0]
+        if due:
+            instant = run.instant()
+            for one in due:
+                one.take(instant)
+        regular = archive is not None and archive.every and run.steps % archive.every == 0 and not last
+        if archive is not None and (stopped or regular):
+            archive.checkpoint(run.steps, run.carried())
+        if stopped:
+            return _with_its_end(run.result(Outcome.INTERRUPTED))
+    return _with_its_end(run.result())
+
+
+def _with_its_end(result: PlanarResult) -> PlanarResult:
+    """Return a result whose frames include its last instant."""
+    if result.frames[-1].time == result.time:
+        return result
+    return replace(result, frames=(*result.frames, PlanarFrame(result.time, result.position)))

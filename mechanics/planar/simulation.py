@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechanics.arrays import Array, Bools, Ints
+from mechanics.carried import Carrier
 from mechanics.dynamics.progress import Clock
 from mechanics.dynamics.warm_start import Memory
 from mechanics.planar.contacts import PlanarContacts, PlanarDetector
@@ -81,7 +82,7 @@ class _Solved:
     velocity: Array
 
 
-class PlanarSimulation:
+class PlanarSimulation(Carrier):
     """A scene of the plane in motion; `step` takes it one time step on.
 
     Attributes
@@ -89,6 +90,9 @@ class PlanarSimulation:
     model : what does not change
     start, state : where it began, and where it is
     """
+
+    CARRIED = ("_first", "_memory", "_overlaps", "state")
+    REBUILT = ("_detector", "_drive", "_solver", "clock", "model", "start")
 
     def __init__(self, model: PlanarModel, start: PlanarState, clock: Clock) -> None:
         solver = model.scene.solver

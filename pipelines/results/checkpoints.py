@@ -26,6 +26,8 @@ from mechanics.contact.contacts import Contacts
 from mechanics.dynamics.contact_problem import JointCompliance
 from mechanics.dynamics.outcome import StaticStart
 from mechanics.dynamics.step import ContactForces
+from mechanics.planar.model import PlanarState
+from mechanics.planar.result import PlanarFrame
 from mechanics.results.contact_result import ContactResult
 from mechanics.results.result import Frame, Largest
 from mechanics.scene.laws.law import Terms
@@ -42,6 +44,8 @@ _RECORDS = {
         Frame,
         JointCompliance,
         Largest,
+        PlanarFrame,
+        PlanarState,
         State,
         StaticStart,
         Terms,

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from mechanics.model.model import Model
+from mechanics.planar.scene import PlanarScene
 from mechanics.scene.scene import Scene
 from mechanics.scene.state import State
 from pipelines.scene.selection import StoneModel
 
-__all__ = ["changes", "fingerprint"]
+__all__ = ["changes", "fingerprint", "planar_fingerprint"]
 
 _STONE = "stone "
 _SHOWN = 9  # numbers up to which an array stands in full
@@ -51,6 +52,14 @@ def fingerprint(
         "order of the stones": _digest([one.code for one in scene.blocks]),
         "meshes": _digest(built),
     }
+
+
+def planar_fingerprint(scene: PlanarScene) -> dict[str, str]:
+    """Return a text for each setting, load and body of a scene of the plane."""
+    own = {one.name: getattr(scene, one.name) for one in fields(scene) if one.name not in ("disks", "walls")}
+    bodies = [(f"disk {disk.code}", _digest(disk)) for disk in scene.disks]
+    bodies += [(f"wall {wall.code}", _digest(wall)) for wall in scene.walls]
+    return dict(_parts(own, "")) | dict(bodies) | {"order of the bodies": _digest(scene.codes)}
 
 
 def changes(then: Mapping[str, str], now: Mapping[str, str]) -> tuple[list[str], list[str]]:

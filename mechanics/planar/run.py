@@ -1,0 +1,262 @@
+"""A run of a scene of the plane, step by step: its observations, what it carries, and its result."""
+
+from typing import Any
+
+import numpy as np
+
+from mechanics.arrays import Array
+from mechanics.carried import Carried, Carrier, Rows
+from mechanics.dynamics.outcome import Outcome
+from mechanics.dynamics.progress import Clock
+from mechanics.dynamics.stopping import LASTING
+from mechanics.planar.model import PlanarModel, PlanarState, build_planar_model
+from mechanics.planar.observers import (
+    PlanarEnergy,
+    PlanarWatch,
+    disk_speed,
+    imbalance,
+    kinetic_energy,
+    world_force,
+)
+from mechanics.planar.result import (
+    PlanarContactResult,
+    PlanarFrame,
+    PlanarHistory,
+    PlanarInstant,
+    PlanarResult,
+)
+from mechanics.planar.scene import PlanarScene
+from mechanics.planar.simulation import PlanarSimulation, PlanarStep
+from mechanics.results.result import Errors
+from mechanics.scene.laws.status import contact_status
+from moma.errors import SceneError
+
+__all__ = ["PlanarRun"]
+
+
+class PlanarRun(Carrier):
+    """A run in progress.
+
+    `step` takes it one time step on until it is `done`; `instant` and `result` tell of the last step. `carried` is what
+    another run of the same scene needs to go on from here, to the last bit (`restore`); the steps that it has made
+    change nothing of what it carried before.
+
+    Parameters
+    ----------
+    scene : it
+
+    Attributes
+    ----------
+    model : constant data of the scene
+    steps, total : steps done, and at most
+    frames : the motion so far: the start, and each `frame_every`-th step
+
+    Examples
+    --------
+    >>> from mechanics.planar.scene import Disk, PlanarScene, PlanarTime
+    >>> drop = PlanarScene("drop", (Disk("disk", (0.0, 0.0), 0.1),), time=PlanarTime(0.01, 0.5, 0.1))
+    >>> run = PlanarRun(drop)
+    >>> for _ in range(5):
+    ...     step = run.step()
+    >>> other = PlanarRun(drop)
+    >>> other.restore(run.carried())
+    >>> while not other.done:
+    ...     step = other.step()
+    >>> other.steps, round(float(other.instant().velocity[0, 1]), 3)
+    (10, -0.981)
+    """
+
+    CARRIED = ("_log", "_watch", "simulation", "steps")
+    REBUILT = ("_clock", "_last", "model", "total")
+
+    def __init__(self, scene: PlanarScene) -> None:
+        self._clock = Clock()
+        self.model, start = build_planar_model(scene)
+        self.simulation = PlanarSimulation(self.model, start, self._clock)
+        self._log, self._watch = _Log(self.model, start), PlanarWatch(self.model)
+        self.steps, self.total = 0, max(1, round(scene.time.duration / scene.time.step))
+        self._last: PlanarStep | None = None
+
+    @property
+    def outcome(self) -> Outcome:
+        """Outcome so far: equilibrium or moving."""
+        return self._watch.outcome
+
+    @property
+    def done(self) -> bool:
+        """Its duration is over, or it rests and is to stop there."""
+        rests = self.model.scene.time.stop_at_equilibrium and self.outcome is Outcome.EQUILIBRIUM
+        return rests or self.steps >= self.total
+
+    @property
+    def frames(self) -> tuple[PlanarFrame, ...]:
+        """The motion so far."""
+        return tuple(self._log.frames)
+
+    def step(self) -> PlanarStep:
+        """Make one time step.
+
+        Raises
+        ------
+        SceneError : if a motion leaves the plane
+        SolverError : if the motion is no longer finite
+        """
+        step = self.simulation.step()
+        self.steps += 1
+        with self._clock("observe"):
+            balance = imbalance(self.model, step)
+            self._watch(step, balance)
+            self._log(step, float(balance.max()))
+        every = self.model.scene.frame_every
+        if every and self.steps % every == 0:
+            self._log.frames.append(_frame(step.after))
+        self._last = step
+        return step
+
+    def instant(self) -> PlanarInstant:
+        """Return the end of the last step, with its contacts and forces.
+
+        Raises
+        ------
+        SceneError : if no step has been made since the run began, or was restored
+        """
+        last = self._made()
+        contacts = _contacts(last, self.model.scene.time.step)
+        after = last.after
+        return PlanarInstant(self.steps, after.time, _position(after), after.velocity, contacts)
+
+    def result(self, outcome: Outcome | None = None) -> PlanarResult:
+        """Return the result so far, as of the last step.
+
+        Parameters
+        ----------
+        outcome : other than the run's own, as where it is stopped
+
+        Raises
+        ------
+        SceneError : if no step has been made since the run began, or was restored
+        """
+        return _result(self.model, self._made(), outcome or self.outcome, self._log, self._clock)
+
+    def carried(self) -> dict[str, Any]:
+        """Return what another run of the same scene needs to go on from here; arrays are shared, not copied."""
+        return super().carried() | {"seconds": dict(self._clock.seconds)}
+
+    def restore(self, carried: Carried) -> None:
+        """Go on where another run of the same scene stood."""
+        super().restore(carried)
+        for stage, seconds in carried["seconds"].items():
+            self._clock.seconds[stage] = self._clock.seconds.get(stage, 0.0) + seconds
+
+    def _made(self) -> PlanarStep:
+        if self._last is None:
+            raise SceneError("no step has been made", where=self.model.scene.name, remedy="make a step first")
+        return self._last
+
+
+def _position(state: PlanarState) -> Array:
+    return np.column_stack([state.centre, state.angle])
+
+
+def _frame(state: PlanarState) -> PlanarFrame:
+    return PlanarFrame(state.time, _position(state))
+
+
+def _contacts(step: PlanarStep, duration: float) -> PlanarContactResult:
+    contacts = step.contacts
+    return PlanarContactResult(
+        bodies=contacts.bodies,
+        point=contacts.point,
+        normal=contacts.normal,
+        force=world_force(contacts, step.impulse, duration),
+        gap=step.gap,
+        area=contacts.area,
+        status=contact_status(step.internal, step.terms, step.solution.impulse),
+    )
+
+
+class _Log(Carrier):
+    """Record of the observations of each step, and the frames of the motion."""
+
+    CARRIED = ("_rows", "energy", "frames", "unconverged")
+    REBUILT = ("_model",)
+
+    def __init__(self, model: PlanarModel, start: PlanarState) -> None:
+        self._model = model
+        self.energy = PlanarEnergy(model, start)
+        self.unconverged = 0
+        self.frames = Rows([_frame(start)])
+        self._rows: Rows[tuple[float, ...]] = Rows()
+
+    def __call__(self, step: PlanarStep, balance: float) -> None:
+        """Account for one step."""
+        model, solution, velocity = self._model, step.solution, step.after.velocity
+        self.energy(step)
+        self.unconverged += not solution.converged
+        self._rows.append(
+            (
+                step.after.time,
+                kinetic_energy(model, velocity),
+                float(disk_speed(model, velocity).max()),
+                balance,
+                solution.natural_map,
+                solution.iterations,
+                len(step.contacts),
+                float(np.max(-step.gap / step.contacts.size, initial=0.0)),
+                step.lifted,
+            )
+        )
+
+    def history(self) -> PlanarHistory:
+        """Return one array for each quantity."""
+        time, kinetic, speed, balance, eta, iterations, contacts, penetration, lifted = np.array(self._rows).T
+        return PlanarHistory(
+            time,
+            kinetic,
+            speed,
+            balance,
+            eta,
+            iterations.astype(np.int64),
+            contacts.astype(np.int64),
+            penetration,
+            lifted,
+        )
+
+
+def _result(
+    model: PlanarModel,
+    last: PlanarStep,
+    outcome: Outcome,
+    log: _Log,
+    clock: Clock,
+) -> PlanarResult:
+    scene, history, contacts = model.scene, log.history(), _contacts(last, model.scene.time.step)
+    gravity = np.asarray(scene.gravity, dtype=float)
+    g = float(np.hypot(*gravity))
+    up = -gravity / g if g > 0 else np.array([0.0, 1.0])
+    sides, force = model.fixed[contacts.bodies].astype(float), contacts.force
+    reaction = float(np.sum((sides[:, 1] - sides[:, 0]) * (force[:, 0] * up[0] + force[:, 1] * up[1])))
+    weight = float(model.mass[~model.fixed].sum()) * g
+    errors = Errors(
+        natural_map=float(history.natural_map[-LASTING:].max()),
+        penetration=float(history.penetration.max()),
+        balance=float(history.balance[-1]),
+        reaction=abs(reaction - weight) / weight if weight > 0 else 0.0,
+        energy=log.energy.error,
+        unconverged_steps=log.unconverged,
+    )
+    return PlanarResult(
+        scene=scene,
+        outcome=outcome,
+        steps=len(history.time),
+        time=last.after.time,
+        position=_position(last.after),
+        velocity=last.after.velocity,
+        contacts=contacts,
+        errors=errors,
+        reaction=reaction,
+        weight=weight,
+        frames=tuple(log.frames),
+        history=history,
+        wall_time=dict(clock.seconds),
+    )
