@@ -91,7 +91,7 @@ class PlanarDetector:
 
     def _neighbours_of(self, ends: Array) -> EndNeighbours:
         """Find the walls that share ends, again only where walls move."""
-        if self._neighbours is None or self._model.scene.loads.motions:
+        if self._neighbours is None or self._model.walls_move:
             self._neighbours = end_neighbours(ends)
         return self._neighbours
 

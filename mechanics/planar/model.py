@@ -37,9 +37,9 @@ class PlanarModel:
     ----------
     scene : it
     radius : (nd,) [m]
-    mass, moment : (nb,) mass and moment of inertia ½ m R² of a disk, in the slice; zero of a wall [kg, kg m²]
+    mass, moment : (nb,) mass and moment of inertia ½ m R² of a disk, in the slice; no wall turns [kg, kg m²]
     fixed : (nb,) bodies that impulses do not move
-    inertia : (nb, 2) 1/mass and 1/moment, zero for fixed bodies
+    inertia : (nb, 2) 1/mass and 1/moment, zero for fixed bodies and of what does not turn
     half : (nw, 2) from the middle of a wall to its second end, at angle 0 [m]
     laws : contact laws, and between which bodies they hold
     """
@@ -52,6 +52,11 @@ class PlanarModel:
     inertia: Array
     half: Array
     laws: LawTable
+
+    @property
+    def walls_move(self) -> bool:
+        """Whether walls change their places: they are driven, or have a mass."""
+        return bool(self.scene.loads.motions) or not self.fixed[len(self.radius) :].all()
 
     def ends(self, state: PlanarState) -> Array:
         """Return the ends of the walls (nw, 2, 2) [m]."""
@@ -73,11 +78,14 @@ def build_planar_model(scene: PlanarScene) -> tuple[PlanarModel, PlanarState]:
     density = np.array([disk.density for disk in disks], dtype=float)
     walls = np.array([(wall.start, wall.end) for wall in scene.walls], dtype=float).reshape(-1, 2, 2)
     none = np.zeros(nw)
-    mass = np.append(density * scene.thickness * np.pi * radius**2, none)
+    of_walls = np.array([wall.mass for wall in scene.walls], dtype=float)
+    mass = np.append(density * scene.thickness * np.pi * radius**2, of_walls)
     moment = 0.5 * mass * np.append(radius, none) ** 2
-    fixed = np.array([disk.fixed for disk in disks] + [True] * nw)
+    fixed = np.append([disk.fixed for disk in disks], of_walls == 0.0)
     inertia = np.zeros((len(fixed), 2))
-    inertia[~fixed] = np.column_stack([1.0 / mass[~fixed], 1.0 / moment[~fixed]])
+    inertia[~fixed, 0] = 1.0 / mass[~fixed]
+    turns = ~fixed & (moment > 0)
+    inertia[turns, 1] = 1.0 / moment[turns]
     half = 0.5 * (walls[:, 1] - walls[:, 0])
     model = PlanarModel(scene, radius, mass, moment, fixed, inertia, half, _laws(scene))
     start = PlanarState(
