@@ -37,9 +37,10 @@ class PlanarModel:
     ----------
     scene : it
     radius : (nd,) [m]
-    mass, moment : (nb,) mass and moment of inertia ½ m R² of a disk, in the slice; no wall turns [kg, kg m²]
+    mass, moment : (nb,) in the slice; the moment of inertia is ½ m R² of a disk, and of a wall that of a rod, although
+        none turns: its contacts have no lever [kg, kg m²]
     fixed : (nb,) bodies that impulses do not move
-    inertia : (nb, 2) 1/mass and 1/moment, zero for fixed bodies and of what does not turn
+    inertia : (nb, 2) 1/mass and 1/moment, zero for fixed bodies
     half : (nw, 2) from the middle of a wall to its second end, at angle 0 [m]
     laws : contact laws, and between which bodies they hold
     """
@@ -80,13 +81,11 @@ def build_planar_model(scene: PlanarScene) -> tuple[PlanarModel, PlanarState]:
     none = np.zeros(nw)
     of_walls = np.array([wall.mass for wall in scene.walls], dtype=float)
     mass = np.append(density * scene.thickness * np.pi * radius**2, of_walls)
-    moment = 0.5 * mass * np.append(radius, none) ** 2
+    half = 0.5 * (walls[:, 1] - walls[:, 0])
+    moment = mass * np.append(0.5 * radius**2, (half**2).sum(axis=1) / 3.0)
     fixed = np.append([disk.fixed for disk in disks], of_walls == 0.0)
     inertia = np.zeros((len(fixed), 2))
-    inertia[~fixed, 0] = 1.0 / mass[~fixed]
-    turns = ~fixed & (moment > 0)
-    inertia[turns, 1] = 1.0 / moment[turns]
-    half = 0.5 * (walls[:, 1] - walls[:, 0])
+    inertia[~fixed] = np.column_stack([1.0 / mass[~fixed], 1.0 / moment[~fixed]])
     model = PlanarModel(scene, radius, mass, moment, fixed, inertia, half, _laws(scene))
     start = PlanarState(
         0.0,
