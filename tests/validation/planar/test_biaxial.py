@@ -27,6 +27,7 @@ def first_sliding(friction, expected, step=1e-2, steps=40):
             f"{row}-{column}",
             (2.0 * RADIUS * column + RADIUS * (1 - row % 2), np.sqrt(3.0) * RADIUS * row),
             RADIUS,
+            density=10.0,
         )
         for row in range(ROWS)
         for column in range(COLUMNS - 1 + row % 2)
@@ -35,9 +36,9 @@ def first_sliding(friction, expected, step=1e-2, steps=40):
     low, top, far = -RADIUS, high + RADIUS, wide + RADIUS
     walls = (
         Wall("floor", (-9.0, low), (wide + 9.0, low)),
-        Wall("top", (-9.0, top), (wide + 9.0, top), mass=1e4),
-        Wall("left", (-RADIUS, low - 9.0), (-RADIUS, top + 9.0), mass=1e4),
-        Wall("right", (far, low - 9.0), (far, top + 9.0), mass=1e4),
+        Wall("top", (-9.0, top), (wide + 9.0, top), mass=1e3),
+        Wall("left", (-RADIUS, low - 9.0), (-RADIUS, top + 9.0), mass=1e3),
+        Wall("right", (far, low - 9.0), (far, top + 9.0), mass=1e3),
     )
     ratios, times = expected * np.array([0.96, 1.04]), np.array([0.0, steps * step])
     press = History(times, np.column_stack([0 * ratios, -SIDE * wide * ratios, 0 * ratios]))
