@@ -18,7 +18,9 @@ class Sample:
     density: Annotated[float, Setting("Of the disks.", "kg/m³", above=0)] = 2800.0
     falling_friction: Annotated[
         float,
-        Setting("Friction while disks are deposited; less makes the sample denser.", "-", at_least=0, at_most=2),
+        Setting(
+            "Friction while disks are deposited; less makes the sample denser.", "-", at_least=0, at_most=2
+        ),
     ] = 0.4
     seed: Annotated[int, Setting("Of sizes and places; another seed is another sample.", at_least=0)] = 1
     layers: Annotated[int, Setting("Marker layers of pictures and measures.", at_least=1, at_most=50)] = 6
@@ -39,11 +41,12 @@ class Material:
 
     friction: Annotated[float, Setting("Between disks.", "-", at_least=0, at_most=2)] = 0.4
     wall_friction: Annotated[
-        float | None, Setting("Between disks and walls; without it, that between disks.", "-", at_least=0, at_most=2)
+        float | None,
+        Setting("Between disks and walls; without it, that between disks.", "-", at_least=0, at_most=2),
     ] = None
-    cohesion: Annotated[
-        float, Setting("Pull γ of each contact between disks; 0: none.", "N", at_least=0)
-    ] = 0.0
+    cohesion: Annotated[float, Setting("Pull γ of each contact between disks; 0: none.", "N", at_least=0)] = (
+        0.0
+    )
     cohesion_range: Annotated[
         float, Setting("Gap within which it acts, over the smallest radius.", "-", above=0, at_most=1)
     ] = 0.05
