@@ -71,7 +71,7 @@ def _frame(axes: "Axes", fields: Fields, radius: Array, walls: Array) -> None:
     place = fields.position[: len(radius), :2]
     low, high = place.min(axis=0), place.max(axis=0)
     margin = 0.02 * np.ptp(place[:, 0])
-    axes.add_collection(LineCollection(walls, colors="black", linewidths=1.0))
+    axes.add_collection(LineCollection(list(walls), colors="black", linewidths=1.0))
     axes.set_xlim(low[0] - margin, high[0] + margin)
     axes.set_ylim(low[1] - margin, high[1] + margin)
     axes.set_aspect("equal")
@@ -127,7 +127,9 @@ def _forces(axes: "Axes", fields: Fields, radius: Array, layer: Ints) -> str:
     strongest = float(chains[:, 4].max())
     width = _STRONGEST * chains[:, 4] / strongest
     axes.add_collection(
-        LineCollection(chains[:, :4].reshape(-1, 2, 2), linewidths=width, colors="#8a3b12", capstyle="round")
+        LineCollection(
+            list(chains[:, :4].reshape(-1, 2, 2)), linewidths=width, colors="#8a3b12", capstyle="round"
+        )
     )
     return f"Force chains, strongest {strongest / 1e3:.3g} kN"
 
