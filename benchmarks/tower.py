@@ -1,9 +1,10 @@
-"""A masonry tower in an earthquake: `python -m benchmarks.tower [--blocks N] [--steps N] [--build N] [--json]`.
+"""A masonry tower in an earthquake: `python -m benchmarks.tower [--blocks N …] [--steps N] [--build N] [--json]`.
 
-A generated tower of about N rigid blocks is built and comes to rest under its weight; then the strongest part of a
-record of 30 s in three directions shakes it. Both are synthetic (benchmarks/tower_masonry.py). The time of a step is
+Generated towers of about N rigid blocks are built and come to rest under their weight; then the strongest part of a
+record of 30 s in three directions shakes them. Both are synthetic (benchmarks/tower_masonry.py). The time of a step is
 processor time of this process, stage by stage, with all that a run observes in each step; from its mean follows what
-the whole record would take. `--build N` builds a tower of N blocks, counts its contacts, and makes one step.
+the whole record would take, and from several towers how it grows. `--seconds` ends a motion early; the table has the
+steps that were made. `--build N` builds a tower of N blocks, counts its contacts, and makes one step.
 """
 
 import argparse
@@ -14,7 +15,17 @@ from contextlib import contextmanager
 import numpy as np
 
 from benchmarks.memory import peak_bytes
-from benchmarks.report import Row, Table, environment, guarded, machine, print_json, print_table, progress
+from benchmarks.report import (
+    Row,
+    Table,
+    commit,
+    environment,
+    guarded,
+    machine,
+    print_json,
+    print_table,
+    progress,
+)
 from benchmarks.tower_masonry import earthquake, expected_contacts, strongest, tower, tower_blocks
 from mechanics.dynamics.contact_search import detector
 from mechanics.dynamics.energy_balance import EnergyBalance
@@ -50,6 +61,7 @@ _BUILDING: Table = (
     ("memory_gb", "memory GB", ".2f"),
 )
 _SHAKING: Table = (
+    ("blocks", "blocks", "d"),
     ("steps", "steps", "d"),
     ("step_ms", "h ms", "g"),
     ("median_s", "step s, median", ".3f"),
@@ -63,6 +75,14 @@ _SHAKING: Table = (
     ("moved_mm", "moved mm", ".3g"),
     ("hours", "h for 30 s", ".1f"),
     ("memory_gb", "memory GB", ".2f"),
+)
+_SHARES: Table = (
+    ("blocks", "blocks", "d"),
+    ("advance_s", "advance s", ".3f"),
+    ("detect_s", "detect s", ".3f"),
+    ("assemble_s", "assemble s", ".3f"),
+    ("solve_s", "solve s", ".3f"),
+    ("observe_s", "observe s", ".3f"),
 )
 _STAGES = ("advance", "detect", "assemble", "solve", "observe")
 
@@ -100,32 +120,56 @@ class _Observers:
 
 def main() -> None:
     """Build, shake and print."""
-    options = _options()
-    _shaken(tower_scene(40, options.step * 1e-3, 1, SolverSettings()), 1)  # compiles
-    start = time.process_time()
-    progress(f"a tower of about {options.build or options.blocks:,} blocks")
-    shape = tower(options.build or options.blocks)
-    solver = SolverSettings(tolerance=options.tolerance, velocity_tolerance=options.velocity_tolerance)
-    scene = tower_scene(options.build or options.blocks, options.step * 1e-3, options.steps, solver)
-    row = {"scene_s": time.process_time() - start, "expected": expected_contacts(shape)}
-    row |= _shaken(scene, 0 if options.build else options.steps)
+    options, measured = _options(), commit()
+    solver = SolverSettings(
+        tolerance=options.tolerance,
+        velocity_tolerance=options.velocity_tolerance,
+        max_iterations=options.iterations,
+    )
+    _shaken(tower_scene(40, options.step * 1e-3, 1, SolverSettings()), 1, options.seconds)  # compiles
+    sizes = [options.build] if options.build else options.blocks
+    rows = [_measured(size, options, solver) for size in sizes]
     if options.json:
-        print_json([row])
+        print_json(rows)
         return
-    print(f"{machine()}; {environment('moma-masonry', 'numba', 'numpy')}\n")
-    print_table([row], _BUILDING)
+    print(f"{measured}; {machine()}; {environment('moma-masonry', 'numba', 'numpy')}\n")
+    print_table(rows, _BUILDING)
     if not options.build:
-        print()
-        print_table([row], _SHAKING)
-        shares = ", ".join(f"{stage} {row[f'{stage}_s']:.3f} s" for stage in _STAGES)
-        print(f"\nmean step: {shares}")
+        for table in (_SHAKING, _SHARES):
+            print()
+            print_table(rows, table)
+        if len(rows) > 1:
+            blocks, seconds = (np.log([row[key] for row in rows]) for key in ("blocks", "mean_s"))
+            print(f"\nmean step ~ blocks to the power of {np.polyfit(blocks, seconds, 1)[0]:.2f}")
+
+
+def _measured(blocks: int, options: argparse.Namespace, solver: SolverSettings) -> Row:
+    """Return what a tower of about so many blocks takes."""
+    progress(f"a tower of about {blocks:,} blocks")
+    start = time.process_time()
+    shape = tower(blocks)
+    scene = tower_scene(blocks, options.step * 1e-3, options.steps, solver)
+    row = {"scene_s": time.process_time() - start, "expected": expected_contacts(shape)}
+    return row | _shaken(scene, 0 if options.build else options.steps, options.seconds)
 
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.tower", description=__doc__)
-    parser.add_argument("--blocks", type=int, default=11_500, help="about so many blocks (11500)")
+    parser.add_argument(
+        "--blocks",
+        type=int,
+        nargs="+",
+        default=[500, 1500, 4000, 11_500],
+        help="about so many blocks (500 to 11500)",
+    )
     parser.add_argument("--steps", type=int, default=300, help="steps of strong motion (300)")
-    parser.add_argument("--step", type=float, default=1.0, help="time step in milliseconds (1)")
+    parser.add_argument("--step", type=float, default=5.0, help="time step in milliseconds (5)")
+    parser.add_argument(
+        "--seconds", type=float, default=3600.0, help="processor time after which a motion ends early (3600)"
+    )
+    parser.add_argument(
+        "--iterations", type=int, default=5000, help="limit of the iterations of a step (5000)"
+    )
     parser.add_argument("--tolerance", type=float, default=1e-5, help="natural map of every step (1e-5)")
     parser.add_argument(
         "--velocity-tolerance", type=float, default=1e-2, help="error of velocities, as in [solver] (1e-2)"
@@ -148,8 +192,11 @@ def tower_scene(blocks: int, step: float, steps: int, solver: SolverSettings) ->
     )
 
 
-def _shaken(scene: Scene, steps: int) -> Row:
-    """Return what building, rest, and so many steps of motion take; one step of rest alone without them."""
+def _shaken(scene: Scene, steps: int, most: float) -> Row:
+    """Return what building, rest, and so many steps of motion, or `most` seconds of it, take.
+
+    Without steps of motion, one step of rest alone.
+    """
     clock = _ProcessorClock()
     with clock("model"):
         model, start = build_model(scene)
@@ -162,8 +209,10 @@ def _shaken(scene: Scene, steps: int) -> Row:
         progress(f"rest: step {count + 1}")
         rest.append(_timed(simulation, observe, clock))
     before = dict(clock.seconds)
-    shaken = []
+    shaken: list[tuple[float, float, bool, int, int]] = []
     for count in range(steps):
+        if sum(one[0] for one in shaken) > most:
+            break
         shaken.append(_timed(simulation, observe, clock))
         progress(f"motion: step {count + 1} of {steps}, {shaken[-1][0]:.2f} s, η {shaken[-1][1]:.0e}")
     row = {
@@ -182,7 +231,7 @@ def _shaken(scene: Scene, steps: int) -> Row:
     )
     seen = seen_from_supports(model, start, simulation.state)
     row |= {
-        "steps": steps,
+        "steps": len(shaken),
         "step_ms": 1e3 * scene.time.step,
         "median_s": float(np.median(seconds)),
         "mean_s": float(seconds.mean()),
@@ -195,7 +244,7 @@ def _shaken(scene: Scene, steps: int) -> Row:
         "moved_mm": 1e3 * float(displacement(model, start, seen).max()),
         "hours": float(seconds.mean()) * _RECORD / scene.time.step / 3600.0,
     }
-    return row | {f"{stage}_s": (clock.seconds[stage] - before[stage]) / steps for stage in _STAGES}
+    return row | {f"{stage}_s": (clock.seconds[stage] - before[stage]) / len(shaken) for stage in _STAGES}
 
 
 def _timed(simulation: Simulation, observe: _Observers, clock: Clock) -> tuple[float, float, bool, int, int]:

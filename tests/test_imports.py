@@ -43,8 +43,9 @@ def test_the_import_rule_holds():
             ("numpy", "sqlalchemy", "numba", "gmsh", "pyvista", "vtkmodules", "scipy", "matplotlib"),
         ),
         ("mechanics.simulate", ("sqlalchemy", "typer", "vtkmodules")),
-        ("archmodel.database.session", ("alembic", "psycopg", "numba", "typer", "scipy")),
-        ("archmodel.query.api", ("numba", "typer", "vtkmodules", "scipy")),
+        ("archmodel.database.session", ("numpy", "alembic", "psycopg", "numba", "typer", "scipy")),
+        ("archmodel.query.api", ("numpy", "numba", "typer", "vtkmodules", "scipy")),
+        ("moma.cli.text.query", ("numpy", "sqlalchemy.dialects.postgresql")),
         (
             "survey.formats.reading",
             ("sqlalchemy", "numba", "typer", "vtkmodules", "trimesh", "meshio", "scipy"),

@@ -9,6 +9,7 @@ from sqlalchemy.exc import DBAPIError
 from sqlalchemy.pool import ConnectionPoolEntry
 
 from archmodel.tables.base import json_text
+from archmodel.tables.layout import metadata
 from moma.errors import DatabaseError, MissingLibraryError
 
 __all__ = ["HOW_TO_WRITE", "WRITE_LOCK", "PostgresqlServer"]
@@ -60,6 +61,7 @@ class PostgresqlServer:
 
     def engine(self, create: bool) -> Engine:
         """Return an engine on the database, which must exist: MOMA makes tables, not databases."""
+        _restrict_indexes()
         ours = {"connect_timeout": "10", "application_name": "moma"}
         arguments = {name: value for name, value in ours.items() if name not in self.url.query}
         try:
@@ -104,6 +106,18 @@ class PostgresqlServer:
         return DatabaseError(
             f"the database refused: {message}", where=self.place, remedy="nothing was changed"
         )
+
+
+def _restrict_indexes() -> None:
+    """Give indexes over some rows the condition that they have on SQLite.
+
+    Stated where the tables are declared, it would make every command load the drivers of PostgreSQL.
+    """
+    for table in metadata.tables.values():
+        for index in table.indexes:
+            where = index.dialect_options["sqlite"]["where"]
+            if where is not None:
+                index.dialect_kwargs["postgresql_where"] = where
 
 
 def _on_begin(connection: Connection) -> None:

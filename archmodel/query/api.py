@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import ColumnElement, select
+from sqlalchemy import ColumnElement, or_, select
 from sqlalchemy.orm import Session, object_session
 
 from archmodel.arrays import Array
@@ -13,7 +13,6 @@ from archmodel.query.compile import column_named, condition, condition_in
 from archmodel.query.grammar import attributes_in, parse
 from archmodel.query.names import refuse_unknown_run
 from archmodel.query.scope import Context, Scope
-from archmodel.store.hypotheses import not_withdrawn
 from archmodel.tables.entities import Entity, kind_named, kinds, refuse_unknown_kinds
 from moma.errors import DatabaseError, QueryError
 
@@ -172,7 +171,7 @@ def _asked(
     refuse_unknown_run(scope.context)
     conditions = [condition_in(scope, parse(expression)) for expression in expressions]
     refuse_unknown_kinds(session)
-    return scope, [*conditions, not_withdrawn(scope.entity.c)]
+    return scope, [*conditions, _not_withdrawn(scope.entity.c)]
 
 
 def _columns(scope: Scope, names: Sequence[str]) -> list[ColumnElement[Any]]:
@@ -200,3 +199,8 @@ def _of_kind(scope: Scope, kind: str) -> list[ColumnElement[bool]]:
     if cls is Entity:
         return []
     return [scope.entity.c.kind.in_([name for name, sub in kinds().items() if issubclass(sub, cls)])]
+
+
+def _not_withdrawn(entity: Any) -> ColumnElement[bool]:
+    """Return the condition that an entity, as a table or an alias of it, is not a withdrawn hypothesis."""
+    return or_(~entity.hypothesis, entity.x.is_not(None))

@@ -7,9 +7,8 @@ more, and queries do not find it; its statements stay in its history.
 
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
-from sqlalchemy import ColumnElement, insert, or_, select, update
+from sqlalchemy import insert, select, update
 from sqlalchemy.orm import Session
 
 from archmodel.store.bulk import batches
@@ -23,7 +22,7 @@ from archmodel.tables.knowledge import Correction
 from archmodel.tables.surveys import Measurement, Survey
 from moma.errors import DatabaseError, UsageError
 
-__all__ = ["not_withdrawn", "store_hypotheses", "withdraw_hypotheses"]
+__all__ = ["store_hypotheses", "withdraw_hypotheses"]
 
 _GIVEN_UP = ("course", "zone", *(name for name in MEASURED if name != "hypothesis"))
 """Columns that become unknown when a hypothesis is withdrawn."""
@@ -95,11 +94,6 @@ def withdraw_hypotheses(session: Session, entry: Entry, entities: Iterable[int])
         outcome += Outcome(withdrawn=len(held), unchanged=len(found) - len(held))
         _end_geometry(session, entry, held)
     return outcome
-
-
-def not_withdrawn(entity: Any) -> ColumnElement[bool]:
-    """Return the condition that an entity, as a table or an alias of it, is not a withdrawn hypothesis."""
-    return or_(~entity.hypothesis, entity.x.is_not(None))
 
 
 def _check(session: Session, stones: Sequence[StoneRecord]) -> None:

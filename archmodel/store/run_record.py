@@ -7,10 +7,7 @@ value, and becomes null.
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
-from archmodel.arrays import Array, Bools, Ints
+from archmodel.arrays import Array, Bools, Ints, Texts
 
 __all__ = [
     "STONE_VALUES",
@@ -159,7 +156,7 @@ class ContactArrays:
     gap: Array
     opening: Array
     slide: Array
-    status: NDArray[np.str_]
+    status: Texts
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,6 @@ from functools import lru_cache
 from json import JSONEncoder
 from typing import Any, cast, get_args
 
-import numpy as np
 from sqlalchemy import JSON, Column, DateTime, LargeBinary, String, Table
 from sqlalchemy.engine import Dialect
 from sqlalchemy.orm import DeclarativeBase, MappedColumn, Mapper, mapped_column
@@ -82,12 +81,16 @@ class ArrayType(TypeDecorator[Array]):
         """Convert an array to bytes."""
         if value is None:
             return None
+        import numpy as np
+
         return np.asarray(value, dtype="<f8").reshape(self.shape).tobytes()
 
     def process_result_value(self, value: bytes | None, dialect: Dialect) -> Array | None:
         """Convert bytes to a read-only array."""
         if value is None:
             return None
+        import numpy as np
+
         return np.frombuffer(value, dtype="<f8").astype(np.float64, copy=False).reshape(self.shape)
 
 

@@ -111,5 +111,4 @@ def held_at(table: type[Recorded], entry: int | None = None) -> ColumnElement[bo
 
 def held_index(name: str, *columns: str) -> Index:
     """Return a unique index over the rows that are held now."""
-    now = text("superseded_id IS NULL")
-    return Index(name, *columns, unique=True, sqlite_where=now, postgresql_where=now)
+    return Index(name, *columns, unique=True, sqlite_where=text("superseded_id IS NULL"))

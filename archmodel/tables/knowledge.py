@@ -160,7 +160,6 @@ class Statement(Recorded, Base):
             "structure_id",
             "kind",
             sqlite_where=text("structure_id IS NOT NULL"),
-            postgresql_where=text("structure_id IS NOT NULL"),
         ),
     )
 

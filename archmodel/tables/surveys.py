@@ -1,6 +1,5 @@
 """Survey files, measurements of entities, and the solids that stood for them in runs."""
 
-import numpy as np
 from sqlalchemy import ForeignKey, Index
 from sqlalchemy.orm import Mapped, mapped_column, relationship
 
@@ -120,6 +119,8 @@ class Measurement(Recorded, Base):
     @property
     def residuals(self) -> Array:
         """Distances (np,) of the measured points from the fitted plane, positive towards the observer [m]."""
+        import numpy as np
+
         return np.asarray((self.points - self.centroid) @ self.normal)
 
 

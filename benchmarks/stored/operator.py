@@ -42,6 +42,7 @@ class StoredDelassus:
     indices: NDArray[np.integer]
     indptr: NDArray[np.integer]
     rigid = None
+    plane = None
     joint_compliance = None
 
     def __post_init__(self) -> None:

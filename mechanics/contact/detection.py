@@ -7,14 +7,17 @@ elsewhere a deformable stone touches in single points.
 All tolerances are fractions of the stones' own sizes.
 """
 
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from mechanics.arrays import Array, Bools, Ints
 from mechanics.contact._kernels.balls import ball_points
-from mechanics.contact._kernels.broad_phase import boxes, close_pairs, place
+from mechanics.contact._kernels.broad_phase import boxes, close_pairs, place, single_points
 from mechanics.contact._kernels.narrow_phase import (
     EDGES,
     FACE_FIRST,
@@ -34,6 +37,8 @@ __all__ = ["FLAT", "THIN", "Detector"]
 
 
 FLAT = float(np.cos(np.radians(5.0)))  # cosine of the angle within which faces lie flat on one another
+# pairs of a part from which another thread pays: 0.5 ms of work
+_PART = 500
 THIN = 1e-6  # flat faces that overlap by less than this part of the smaller one do not touch
 
 
@@ -78,6 +83,7 @@ class Detector:
     alert : gap below which a contact is watched, relative to the smaller stone [-]
     points, placement : how many contact points two rigid faces have at least where these describe them, and where
     distance : gap up to which some law acts, whatever the size of the stones [m]
+    threads : that look at pairs at once, at most; the result is the same to the last bit
     """
 
     surfaces: Surfaces
@@ -86,6 +92,7 @@ class Detector:
     points: int = 4
     placement: Placement = Placement.CORNERS
     distance: float = 0.0
+    threads: int = 1
     _hints: _Hints = field(default_factory=_Hints, repr=False)
     _cells: list[FaceCells] = field(default_factory=list, repr=False)
 
@@ -130,7 +137,13 @@ class Detector:
         limit = limit + reach[shapes].sum(axis=1)
         balls = round_[shapes].any(axis=1)
         hint = self._hints.of(key)
-        kind, feature, axis = separating_axes(shapes, np.where(balls, -np.inf, limit), hint, placed.shapes)
+        near = np.where(balls, -np.inf, limit)
+
+        def part(a: int, b: int) -> tuple[Ints, Ints, Array]:
+            axes: tuple[Ints, Ints, Array] = separating_axes(shapes[a:b], near[a:b], hint[a:b], placed.shapes)
+            return axes
+
+        kind, feature, axis = self._in_parts(len(shapes), part)
         self._hints.key, self._hints.face = key, hint
         return Pairs(shapes, limit, balls, kind, feature, axis)
 
@@ -148,29 +161,48 @@ class Detector:
     ) -> Contacts:
         """Make contacts in single points: those of polyhedra, except the `weighted` pairs, and those of balls."""
         own = self.surfaces
-        found, frame, nearest, area = interface_points(
-            pairs._replace(kind=np.where(weighted, SEPARATED, pairs.kind)),
-            self.points, self.placement == Placement.INERTIA, FLAT, THIN, placed.shapes,
-        )  # fmt: skip
-        # the antagonist owns the reference face; edges lie on the faces that look along the axis
-        faces = (pairs.kind[found[:, 0]] != EDGES)[:, None]
-        feature = np.where(faces, pairs.feature[found[:, 0]][:, ::-1], -1)
+        found, frame, nearest, area = self._interfaces(
+            pairs._replace(kind=np.where(weighted, SEPARATED, pairs.kind)), placed
+        )
+        count = len(found)
         if balls is not None:
             found, frame = np.concatenate([found, balls.place]), np.concatenate([frame, balls.frame])
             nearest, area = np.concatenate([nearest, balls.nearest]), np.concatenate([area, balls.area])
-            feature = np.concatenate([feature, np.full((len(balls.place), 2), -1)])
-        pair, first = found[:, 0], found[:, 1]
-        rows = np.arange(len(pair))
-        shapes = pairs.shapes[pair]
-        sides = np.column_stack([shapes[rows, first], shapes[rows, 1 - first]])
-        body = own.body[sides]
-        arm = np.einsum("csji,csj->csi", placed.rotation[body], nearest - placed.centre[body])
-        key = _pair_key(shapes, len(own.body)) + found[:, 2]
-        weights = csr_array((2 * len(pair), nodes))
-        if nodes:
-            weights, outside = surface_weights(own, placed, sides, feature, frame[:, 0], arm, nodes)
-            return take(Contacts(body, key, frame, area, arm, weights), np.flatnonzero(outside))
-        return Contacts(body, key, frame, area, arm, weights)
+        body, arm = single_points(pairs.shapes, found, nearest, own.body, placed.centre, placed.rotation)
+        pair = found[:, 0]
+        key = _pair_key(pairs.shapes, len(own.body))[pair] + found[:, 2]
+        if not nodes:
+            return Contacts(body, key, frame, area, arm, csr_array((2 * len(pair), 0)))
+        # the antagonist owns the reference face; edges lie on the faces that look along the axis, balls on none
+        faces = (pairs.kind[pair] != EDGES) & (np.arange(len(pair)) < count)
+        feature = np.where(faces[:, None], pairs.feature[pair][:, ::-1], -1)
+        sides = pairs.shapes[pair[:, None], np.column_stack([found[:, 1], 1 - found[:, 1]])]
+        weights, outside = surface_weights(own, placed, sides, feature, frame[:, 0], arm, nodes)
+        return take(Contacts(body, key, frame, area, arm, weights), np.flatnonzero(outside))
+
+    def _interfaces(self, pairs: Pairs, placed: Placed) -> tuple[Ints, Array, Array, Array]:
+        """Return the contact points of all pairs, as `interface_points` does of some."""
+        inner = self.placement == Placement.INERTIA
+
+        def part(a: int, b: int) -> tuple[Ints, Array, Array, Array]:
+            some = Pairs._make(one[a:b] for one in pairs)
+            found, frame, nearest, area = interface_points(
+                some, self.points, inner, FLAT, THIN, placed.shapes
+            )
+            found[:, 0] += a
+            return found, frame, nearest, area
+
+        return self._in_parts(len(pairs.kind), part)
+
+    def _in_parts(self, count: int, work: Callable[[int, int], tuple[Any, ...]]) -> tuple[Any, ...]:
+        """Return what `work` makes of all pairs, of which each thread takes a part from one to another, in order."""
+        parts = min(self.threads, count // _PART)
+        if parts < 2:
+            return work(0, count)
+        end = [count * k // parts for k in range(parts + 1)]
+        with ThreadPoolExecutor(parts) as pool:
+            found = list(pool.map(work, end[:-1], end[1:]))
+        return tuple(np.concatenate(one) for one in zip(*found, strict=True))
 
     def _balls(self, pairs: Pairs, placed: Placed) -> _Singles:
         """Find the single points of the pairs in which a ball takes part."""

@@ -22,7 +22,8 @@ def rigid_delassus(model: Model, state: State, contacts: Contacts, schedule: Sch
     Both bodies meet in one common point, half-way between their material points, so that equal and opposite
     impulses leave the angular momentum of the scene as it is, whatever the gap.
     """
-    point = material_points(contacts, state).mean(axis=1)
+    points = material_points(contacts, state)
+    point = 0.5 * (points[:, 0] + points[:, 1])
     arm = point[:, None] - state.centre[contacts.bodies]
     turned = inverse_inertia_world(model.inertia, state.rotation).reshape(-1, 9)
     return RigidDelassus(

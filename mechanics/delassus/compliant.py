@@ -57,6 +57,7 @@ class CompliantDelassus:
 
     inner: Delassus
     joint_compliance: Array
+    plane = None
 
     @property
     def rigid(self) -> RigidContacts | None:

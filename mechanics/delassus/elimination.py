@@ -24,7 +24,7 @@ def elimination(pairs: Ints, moving: Ints, centre: Array) -> Ints:
     ----------
     pairs : (m, 2) of those that touch, by their places in `moving`
     moving : (nm,) bodies
-    centre : (nb, 3) of all bodies [m]; (0, 3) where they are not known
+    centre : (nb, 3) of all bodies, (nb, 2) in the plane [m]; without rows where they are not known
     """
     if len(centre) == 0 or len(moving) < _MANY:
         return least_degree(pairs, len(moving))
@@ -40,10 +40,14 @@ def dissection(pairs: Ints, place: Array) -> Ints:
     Parameters
     ----------
     pairs : (m, 2) bodies that touch
-    place : (n, 3) of the bodies [m]
+    place : (n, 3) of the bodies, (n, 2) in the plane [m]
     """
     # lengths count in neighbours along each axis, as stones are longer than they are high
-    apart = np.abs(place[pairs[:, 0]] - place[pairs[:, 1]]).mean(axis=0) if len(pairs) else np.zeros(3)
+    apart = (
+        np.abs(place[pairs[:, 0]] - place[pairs[:, 1]]).mean(axis=0)
+        if len(pairs)
+        else np.zeros(place.shape[1])
+    )
     steps = place / np.where(apart > 0.0, apart, 1.0)
     name, left = np.zeros(len(place), dtype=np.int64), np.ones(len(place), dtype=bool)
     for _ in range(_LEVELS):

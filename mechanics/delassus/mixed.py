@@ -50,6 +50,7 @@ class MixedDelassus:
     threads: int = 1
 
     rigid = None
+    plane = None
     joint_compliance = None
 
     @cached_property
@@ -93,8 +94,7 @@ class MixedDelassus:
     @cached_property
     def form(self) -> CondensedForm:
         """W for methods that factorise."""
-        # by one thread, as bits of factors made by several have differed
-        return CondensedForm(self.body, self.cliques)
+        return CondensedForm(self.body, self.cliques, self.threads)
 
     def scaled(self, unit: Array) -> ScaledDelassus:
         """Return D W D with the units (nc,) of the contacts on the diagonal of D."""

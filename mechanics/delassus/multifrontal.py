@@ -144,7 +144,8 @@ class _Elimination:
 
         def reduce(first: int) -> None:
             last = min(first + _PANEL, m)
-            across, _ = dgetrs(lu, exchanged, pivot[:, k + first : k + last], overwrite_b=True)
+            # SciPy's wrapper counts the exchanges from 1 while LAPACK runs, in the array itself: one for each thread
+            across, _ = dgetrs(lu, exchanged.copy(), pivot[:, k + first : k + last], overwrite_b=True)
             # transposed, as the product is made by rows
             update[:, first:last] -= (across.T @ below.T).T
 

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numba
 import numpy as np
@@ -50,7 +51,8 @@ def schedule(bodies: Ints, moving: Bools) -> Schedule:
     if count == 0:
         empty = np.zeros(0, dtype=np.int64)
         return Schedule(empty, np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64))
-    pair = 2 * (bodies.min(axis=1) * len(moving) + bodies.max(axis=1)) + (bodies[:, 0] > bodies[:, 1])
+    one, other = bodies.T
+    pair = 2 * (np.minimum(one, other) * len(moving) + np.maximum(one, other)) + (one > other)
     order = np.argsort(pair, kind="stable")
     starts = np.flatnonzero(np.diff(pair[order], prepend=-1))
     sizes = np.diff(starts, append=count)
@@ -82,6 +84,7 @@ class RigidDelassus:
     schedule: Schedule
     threads: int = 1
     centre: Array | None = None
+    plane = None
     joint_compliance = None
 
     @cached_property
@@ -125,6 +128,11 @@ class RigidDelassus:
     def form(self) -> BodyForm:
         """W for methods that factorise: six velocities for each body that moves, world axes."""
         return BodyForm(self.rigid)
+
+    @cached_property
+    def memo(self) -> dict[str, Any]:
+        """Results of solvers from W alone, by name; they can be made again with the same bits."""
+        return {}
 
     def scaled(self, unit: Array) -> "RigidDelassus":
         """Return D W D with the units (nc,) of the contacts on the diagonal of D; the pattern of factors is shared.

@@ -122,7 +122,7 @@ def contact_problem(
     contacts, operator, time = found.contacts, found.operator, model.scene.time
     gap = gaps(contacts, predicted)
     speed = local_velocity(contacts, operator, predicted.velocity, predicted.node_velocity)[:, 0]
-    size = model.surfaces.size[contacts.bodies].min(axis=1)
+    size = np.minimum(*model.surfaces.size[contacts.bodies.T])
     if begin is not None:
         initial = gaps(contacts, begin)
         elastic = model.elastic[contacts.bodies].any(axis=1)

@@ -23,6 +23,10 @@ __all__ = ["ContactSearch", "Detection", "detection", "detector"]
 
 # displacements since the last detection, over the smallest width, from which contacts are detected again [-]:
 _MOVED_RIGID = 1e-6  # rigid stones: at rest nothing changes, in motion W is that of the very instant
+_MOVED_LOOSE = 2.5e-5  # the same where the motion may be wrong by much more in each step
+_PER_SPEED = (
+    2.5e-4  # that displacement over the speed of such an error, over the one that gravity gives in a step [-]
+)
 _MOVED = 1e-3  # deformable stones, whose Delassus operator is expensive
 _MOVED_SETTLED = 1e-6  # deformable stones that come to rest, so that the last detection does not lag behind
 _SLOWED = 1e-2  # they come to rest where one step moves them by less than this part of that displacement [-]
@@ -60,6 +64,7 @@ def detector(model: Model) -> Detector:
         settings.points,
         settings.placement,
         max(law.reach for law in model.laws.laws),
+        model.scene.solver.threads,
     )
 
 
@@ -143,6 +148,19 @@ class ContactSearch:
         width = float(model.surfaces.size.min())
         moved = float(displacement(model, last.configuration, predicted).max()) / width
         if model.rigid_only:
-            return moved > _MOVED_RIGID
+            return moved > _rigid_limit(model)
         pace = model.scene.time.step * float(speed(model, predicted).max()) / width
         return moved > _MOVED or (moved > _MOVED_SETTLED and pace < _SLOWED * moved)
+
+
+def _rigid_limit(model: Model) -> float:
+    """Return the displacement over the smallest width from which contacts of rigid stones are detected again [-].
+
+    Where a motion may be wrong by some distance in the end, errors of the solver move resting stones a little in each
+    step; the directions of their contacts need not be better than their forces.
+    """
+    time, error = model.scene.time, model.scene.solver.motion_error
+    fall = float(np.linalg.norm(model.scene.gravity)) * time.step * time.duration
+    if error is None or time.relaxation or fall == 0.0:
+        return _MOVED_RIGID
+    return float(np.clip(_PER_SPEED * error / fall, _MOVED_RIGID, _MOVED_LOOSE))

@@ -74,11 +74,15 @@ class Memory(Carrier):
 
     def _extrapolated(self, key: Ints, last: Array) -> ContactStart:
         """Return r and û of the next step, linear through the last two where a contact was there in both."""
-        at, known = _places(self._key_before, key, np.argsort(self._key_before, kind="stable"))
-        ahead, d = last.copy(), self._dimension
+        d = self._dimension
+        if np.array_equal(key, self._key_before):
+            before, known = self._before, np.ones(len(key), dtype=bool)
+        else:
+            at, known = _places(self._key_before, key, np.argsort(self._key_before, kind="stable"))
+            before = self._before[at]
         # one that closed or opened has no line
-        known &= last[:, :d].any(axis=1) == self._before[at, :d].any(axis=1)
-        ahead[known] += _AHEAD * (last[known] - self._before[at[known]])
+        known &= _any(last[:, :d]) == _any(before[:, :d])
+        ahead = last + (_AHEAD * known)[:, None] * (last - before)
         return ContactStart(ahead[:, :d], ahead[:, d:])
 
     def _inherit(self, values: Array, new: Ints, key: Ints, place: Array, order: Ints) -> None:
@@ -119,6 +123,12 @@ class Memory(Carrier):
         other._values[:, :d] *= factor
         other._values[:, d : 2 * d] = 0.0
         return other
+
+
+def _any(values: Array) -> Bools:
+    """Return the rows (n,) of values (n, d) that have any other than zero."""
+    any_: Bools = np.einsum("cd,cd->c", values, values) > 0.0
+    return any_
 
 
 def _places(among: Ints, key: Ints, order: Ints) -> tuple[Ints, Bools]:

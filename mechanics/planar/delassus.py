@@ -21,7 +21,7 @@ from mechanics.planar._kernels.sweep import (
     velocity_change,
 )
 from mechanics.problem.forms import SparseForm
-from mechanics.problem.problem import ScaledDelassus, mean_diagonal
+from mechanics.problem.problem import PlaneContacts, ScaledDelassus, mean_diagonal
 
 __all__ = ["PlanarDelassus", "PlanarGaussSeidel"]
 
@@ -46,6 +46,7 @@ class PlanarDelassus:
         contact point [m]
     inertia : (nb, 2) inverse mass and inverse moment of inertia; zero for fixed and driven bodies [1/kg, 1/(kg m²)]
     threads : that may sweep at once, at most; the result is the same to the last bit
+    centre : (nb, 2) of the bodies, by which factors are ordered; None if not known [m]
     """
 
     bodies: Ints
@@ -53,8 +54,15 @@ class PlanarDelassus:
     lever: Array
     inertia: Array
     threads: int = 1
+    centre: Array | None = None
     rigid = None
     joint_compliance = None
+
+    @property
+    def plane(self) -> PlaneContacts:
+        """Contacts in terms of rigid bodies."""
+        centre = np.zeros((0, 2)) if self.centre is None else self.centre
+        return PlaneContacts(self.bodies, self.normal, self.lever, self.inertia, centre)
 
     @cached_property
     def diagonal(self) -> Array:

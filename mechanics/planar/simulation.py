@@ -156,7 +156,7 @@ class PlanarSimulation(Carrier):
         if not np.isfinite(ahead).all() or 2.0 * ahead.max() <= scene.alert_distance * radius.min():
             return None
         wider = self._detector(kick, ahead)
-        gap = wider.gap + h * self._operator(wider).relative_velocity(solved.velocity)[:, 0]
+        gap = wider.gap + h * self._operator(kick, wider).relative_velocity(solved.velocity)[:, 0]
         new = ~np.isin(wider.key, solved.contacts.key)
         return wider if (gap[new] < 0).any() else None
 
@@ -210,14 +210,14 @@ class PlanarSimulation(Carrier):
         problem = ContactProblem(operator, u_free, bias, terms.friction, terms.cohesion)
         return _Stated(problem, acting, approach, terms, law)
 
-    def _operator(self, contacts: PlanarContacts) -> PlanarDelassus:
+    def _operator(self, kick: PlanarState, contacts: PlanarContacts) -> PlanarDelassus:
         inertia, threads = self.model.inertia, self.model.scene.solver.threads
-        return PlanarDelassus(contacts.bodies, contacts.normal, contacts.lever, inertia, threads)
+        return PlanarDelassus(contacts.bodies, contacts.normal, contacts.lever, inertia, threads, kick.centre)
 
     def _solve(self, kick: PlanarState, free: Array, contacts: PlanarContacts, start: Memory) -> _Solved:
         """State the problem of these contacts, and solve it from the impulses in `start`."""
         with self.clock("assemble"):
-            operator = self._operator(contacts)
+            operator = self._operator(kick, contacts)
             stated = self._state_laws(kick, contacts, operator, free, self._memory.recall(contacts.key)[1])
         with self.clock("solve"):
             solution = self._solution(stated, start.recall(contacts.key)[0])

@@ -23,6 +23,7 @@ __all__ = [
     "ContactStart",
     "Delassus",
     "GaussSeidel",
+    "PlaneContacts",
     "RigidContacts",
     "ScaledDelassus",
     "mean_diagonal",
@@ -55,11 +56,30 @@ class RigidContacts(NamedTuple):
     centre: Array
 
 
+class PlaneContacts(NamedTuple):
+    """Contacts between rigid bodies of the plane, from which W = Hᵀ M⁻¹ H follows.
+
+    Attributes
+    ----------
+    body : (nc, 2) int64, candidate and antagonist
+    normal : (nc, 2) float64, n; t is n turned by +90° [-]
+    lever : (nc, 4) float64, a × n and a × t of the candidate, then of the antagonist [m]
+    inertia : (nb, 2) float64, inverse mass and moment of inertia; zero for bodies that no impulse moves
+    centre : (nb, 2) float64, by which factors are ordered; (0, 2) where not known [m]
+    """
+
+    body: Ints
+    normal: Array
+    lever: Array
+    inertia: Array
+    centre: Array
+
+
 class Delassus(Protocol):
     """W = Hᵀ ŵ H, the relative velocities that impulses cause; d is 3, or 2 in the plane.
 
-    Products, sweeps and the diagonal are known of every operator. `form` and `rigid` are capabilities that not every
-    operator has; solvers ask for them and never for a class.
+    Products, sweeps and the diagonal are known of every operator. `form`, `rigid` and `plane` are capabilities that not
+    every operator has; solvers ask for them and never for a class.
 
     Attributes
     ----------
@@ -67,6 +87,7 @@ class Delassus(Protocol):
     scale : reference against which u is measured over r [1/kg]; as a rule the mean diagonal of W (`mean_diagonal`)
     form : W ready to be factorised, made at the first use; None where W is known by its products alone
     rigid : contacts in terms of bodies, where every body is rigid and in space; None for other operators
+    plane : the same in the plane
     joint_compliance : (nc, d) diagonal of E where the operator is W + E (`CompliantDelassus`), which `rigid` leaves
         out; None for others [1/kg]
     """
@@ -86,6 +107,10 @@ class Delassus(Protocol):
     @property
     def rigid(self) -> RigidContacts | None:
         """Contacts in terms of rigid bodies, or None."""
+
+    @property
+    def plane(self) -> PlaneContacts | None:
+        """Contacts in terms of rigid bodies of the plane, or None."""
 
     @property
     def joint_compliance(self) -> Array | None:
@@ -127,6 +152,7 @@ class ScaledDelassus:
     inner: Delassus
     unit: Array
     rigid = None
+    plane = None
     joint_compliance = None
     # by the choice of D
     scale = 1.0

@@ -298,7 +298,8 @@ class SolverSettings:
     threads: Annotated[
         int,
         Setting(
-            "Threads that sweep rigid scenes of many contacts; the results are the same to the last bit.",
+            "Threads that find and sweep the contacts of large rigid scenes, and factorise deformable ones; the "
+            "results are the same to the last bit.",
             at_least=1,
         ),
     ] = 1

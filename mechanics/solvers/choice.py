@@ -24,7 +24,7 @@ __all__ = ["Solver", "Solvers", "choose_planar_solver", "choose_solver", "choose
 
 
 # largest error of a motion over the largest errors of velocity in its steps, added up [-]
-_ADDS_UP = 4.0
+_ADDS_UP = 8.0
 
 
 class Solver(Protocol):

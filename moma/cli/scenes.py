@@ -90,6 +90,7 @@ def run(
     """Simulate a scene; write tables, pictures and a report, and store the results in the database."""
     from moma.cli.text.formats import as_json
     from moma.cli.text.runs_and_surveys import run_lines
+    from pipelines.kernels.beside import compiling_beside
     from pipelines.run.run import run_scene
     from pipelines.run.unfinished import finished_run
     from pipelines.scene.file import read_scene
@@ -99,7 +100,7 @@ def run(
         say(f"{folder}: the run there has finished; leave out --resume to run the scene again")
         print(as_json(summary) if json else f"{summary['scene']}: {summary['headline']}")
         return
-    with progress_bars() as listener, stop.handled():
+    with compiling_beside("run"), progress_bars() as listener, stop.handled():
         done = run_scene(
             scene, db, folder, stop.listening(listener), profile, meshes, accept_unsound, stop, resume
         )

@@ -72,6 +72,7 @@ def ingest(
     from pipelines.ingest.ingest import ingest as ingest_files
     from pipelines.ingest.kind_rules import kind_rules
     from pipelines.ingest.reading_options import reading_options
+    from pipelines.kernels.beside import compiling_beside
 
     if rejects is not None and not keep_going:
         raise UsageError("--rejects without --keep-going", remedy="give --keep-going too")
@@ -80,7 +81,7 @@ def ingest(
             raise UsageError(f"{name} with format {format}", remedy="it is for --format solids")
     options = reading_options(header, codes, kind, sigma, unit, snap, planes)
     rules = kind_rules(kind_where or (), support or ())
-    with progress_bars() as listener:
+    with compiling_beside("ingest"), progress_bars() as listener:
         report = ingest_files(
             files,
             db,

@@ -51,4 +51,14 @@ def test_the_benchmark_reports_every_step_of_motion(monkeypatch, capsys):
     (row,) = json.loads(capsys.readouterr().out)
     assert row["contacts"] == row["expected"]
     assert (row["steps"], row["above"], row["unconverged"]) == (2, 0, 0)
-    assert row["hours"] == pytest.approx(row["mean_s"] * 30.0 / 1e-3 / 3600)
+    assert row["hours"] == pytest.approx(row["mean_s"] * 30.0 / 5e-3 / 3600)
+
+
+def test_the_benchmark_ends_a_motion_early_and_says_after_how_many_steps(monkeypatch, capsys):
+    monkeypatch.setattr(
+        sys, "argv", ["tower", "--blocks", "100", "300", "--steps", "5", "--seconds", "0", "--json"]
+    )
+    benchmark.main()
+    rows = json.loads(capsys.readouterr().out)
+    assert [row["steps"] for row in rows] == [1, 1]
+    assert rows[0]["blocks"] < rows[1]["blocks"]

@@ -17,6 +17,7 @@ class DenseDelassus:
     w: np.ndarray
     products_alone: bool = False
     rigid = None
+    plane = None
     joint_compliance = None
 
     @cached_property

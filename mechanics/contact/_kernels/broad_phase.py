@@ -5,7 +5,7 @@ from numba import njit
 
 from mechanics._kernels.vectors import row, write_row
 
-__all__ = ["boxes", "close_pairs", "place", "points_of"]
+__all__ = ["boxes", "close_pairs", "place", "points_of", "single_points"]
 
 _MANY_CELLS = 64  # a box that spans more cells than this is compared with all others instead
 
@@ -216,6 +216,38 @@ def close_pairs(low, high, owner, fixed):  # pragma: no cover - compiled
                     pairs = _push(pairs, count, i, j)
                     count += 1
     return pairs[:count]
+
+
+@njit(cache=True)
+def single_points(shapes, place, point, owner, centre, rotation):  # pragma: no cover - compiled
+    """Turn single contact points into the axes of their bodies.
+
+    Inputs
+    ------
+    shapes : (np, 2) int64, of each pair
+    place : (nc, 3) int64, pair, candidate (0 or 1 of the pair), name within the pair
+    point : (nc, 2, 3) float64, on candidate and antagonist [m]
+    owner : (ns,) int64, body of each shape
+    centre : (nb, 3) float64 [m]
+    rotation : (nb, 3, 3) float64 [-]
+
+    Outputs
+    -------
+    body : (nc, 2) int64, candidate and antagonist
+    arm : (nc, 2, 3) float64, from the centres of mass in body axes [m]
+    """
+    nc = place.shape[0]
+    body, arm = np.empty((nc, 2), dtype=np.int64), np.empty_like(point)
+    for c in range(nc):
+        pair, first = shapes[place[c, 0]], place[c, 1]
+        for s in range(2):
+            b = owner[pair[first if s == 0 else 1 - first]]
+            body[c, s] = b
+            r, o = rotation[b], centre[b]
+            x, y, z = point[c, s, 0] - o[0], point[c, s, 1] - o[1], point[c, s, 2] - o[2]
+            for i in range(3):
+                arm[c, s, i] = r[0, i] * x + r[1, i] * y + r[2, i] * z
+    return body, arm
 
 
 @njit(cache=True)

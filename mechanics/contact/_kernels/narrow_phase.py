@@ -198,7 +198,7 @@ def _deepest_edges(i, j, floor, shapes):
     return best, first, second, axis
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def separating_axes(pair, limit, hint, shapes):  # pragma: no cover - compiled
     """Find the best separating axis of each pair of convex polyhedra (separating-axis theorem).
 
@@ -496,7 +496,7 @@ def _room_needed(kind, feature, cptr, points):
     return largest, total
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def interface_points(pairs, points, inner, flat, thin, shapes):  # pragma: no cover - compiled
     """Find the contact points of each pair in touch: corners of the overlap of two faces, or the feet of two edges.
 

@@ -79,13 +79,12 @@ def _apart(p, q, a, b):
 @njit(cache=True)
 def _add_block(w, g, s, inertia):
     """Add one side's part of W_αα: R (1/m + [a]ᵀ I⁻¹ [a]) Rᵀ."""
-    a, j = arm(g, s), np.empty((3, 3))
+    a = arm(g, s)
+    j = cross(a, (g[0], g[1], g[2])), cross(a, (g[3], g[4], g[5])), cross(a, (g[6], g[7], g[8]))
     for k in range(3):
-        write_row(j, k, cross(a, (g[3 * k], g[3 * k + 1], g[3 * k + 2])))
-    for k in range(3):
-        turned = _turned(inertia, row(j, k))
+        turned = _turned(inertia, j[k])
         for n in range(3):
-            w[n, k] += dot(row(j, n), turned)
+            w[n, k] += dot(j[n], turned)
         w[k, k] += inertia[0]
 
 

@@ -35,17 +35,23 @@ def gap_bias(contacts: Approach) -> Array:
 
 def at_limit(terms: Terms, impulse: Array) -> Bools:
     """Return the contacts (n,) under pressure, or held by cohesion, at the limit of their cone."""
-    tangential = np.linalg.norm(impulse[:, 1:], axis=1)
+    tangential = _length(impulse[:, 1:])
     limit = terms.friction * impulse[:, 0] + terms.cohesion
     on_cone: Bools = (tangential >= _ON_CONE * limit) & ((tangential > 0) | (impulse[:, 0] > 0))
     return on_cone
 
 
+def _length(vectors: Array) -> Array:
+    """Return the lengths (n,) of vectors (n, d)."""
+    length: Array = np.sqrt(np.einsum("ci,ci->c", vectors, vectors))
+    return length
+
+
 def slid(contacts: Approach, terms: Terms, impulse: Array, velocity: Array) -> Bools:
     """Return the contacts (n,) that slid in the step with r̃ (n, d) [N s] and u (n, d) [m/s]."""
-    acceleration = contacts.compliance * np.linalg.norm(impulse, axis=1) / contacts.step
+    acceleration = contacts.compliance * _length(impulse) / contacts.step
     drift = _DRIFT * np.sqrt(acceleration * contacts.size)
-    moved: Bools = at_limit(terms, impulse) & (np.linalg.norm(velocity[:, 1:], axis=1) > drift)
+    moved: Bools = at_limit(terms, impulse) & (_length(velocity[:, 1:]) > drift)
     return moved
 
 

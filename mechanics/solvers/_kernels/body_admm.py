@@ -22,10 +22,24 @@ from mechanics.delassus._kernels.sides import inverse_columns
 from mechanics.problem._kernels import onto_cone
 from mechanics.solvers._kernels.body_cholesky import Panels, solve
 
-__all__ = ["Acceleration", "Factors", "Iterate", "Touching", "advance", "assemble", "broken_laws", "masses"]
+__all__ = [
+    "Acceleration",
+    "Factors",
+    "Iterate",
+    "Touching",
+    "advance",
+    "assemble",
+    "broken_laws",
+    "masses",
+    "projected",
+    "to_local",
+    "to_world",
+]
 
 # regularisation of the extrapolation's normal equations over their trace [-]
 _REGULAR = 1e-10
+# numbers of a vector that are combined at once
+_PIECE = 1024
 # growth of the change of an iteration from which earlier ones mislead [-]
 _WORSE = 2.0
 
@@ -40,7 +54,7 @@ class Touching(NamedTuple):
     arm : (nc, 6) float64, from the two centres of mass [m]
     shift : (nc, 3) float64, u_free + bias n [m/s]
     friction, cohesion, adhesion : (nc,) float64, μ [-], k and s [N s]
-    sigma : (nc,) float64, σ [1/kg]
+    soft : (nc,) float64, 1/σ [kg]
     """
 
     side: NDArray[np.int64]
@@ -50,7 +64,7 @@ class Touching(NamedTuple):
     friction: NDArray[np.float64]
     cohesion: NDArray[np.float64]
     adhesion: NDArray[np.float64]
-    sigma: NDArray[np.float64]
+    soft: NDArray[np.float64]
 
 
 class Iterate(NamedTuple):
@@ -164,7 +178,7 @@ def assemble(touching, mass, panels):  # pragma: no cover - compiled
         i, j = side[c, 0], side[c, 1]
         between[:] = 0.0
         while c < nc and side[c, 0] == i and side[c, 1] == j:
-            arms, weight = touching.arm[c], 1.0 / touching.sigma[c]
+            arms, weight = touching.arm[c], touching.soft[c]
             a, b = (arms[0], arms[1], arms[2]), (arms[3], arms[4], arms[5])
             if i >= 0:
                 _add_product(own[i], a, a, weight)
@@ -210,23 +224,37 @@ def _push(iterate, load, touching):
     """Write z and q of an iterate, and H q into `load` (6 nm,)."""
     x, kept, q = iterate.x, iterate.z, iterate.q
     side, normal, arm, shift = touching.side, touching.normal, touching.arm, touching.shift
-    friction, cohesion, sigma = touching.friction, touching.cohesion, touching.sigma
+    friction, cohesion, soft_of = touching.friction, touching.cohesion, touching.soft
     load[:] = 0.0
     nc, c = side.shape[0], 0
     while c < nc:
         i, j = side[c, 0], side[c, 1]
         f0 = f1 = f2 = m0 = m1 = m2 = w0 = w1 = w2 = 0.0
         while c < nc and side[c, 0] == i and side[c, 1] == j:
-            n, p, soft = row(normal, c), row(x, c), 1.0 / sigma[c]
-            z = _onto(p, n, friction[c], cohesion[c])
+            n, p, soft = row(normal, c), row(x, c), soft_of[c]
+            along = dot(p, n)
+            t = p[0] - along * n[0], p[1] - along * n[1], p[2] - along * n[2]
+            most = friction[c] * along + cohesion[c]
+            if along >= 0.0 and most >= 0.0 and dot(t, t) <= most * most:
+                # sticks: z = x and y = 0, as for most contacts of a wall
+                z, g0, g1, g2 = p, p[0], p[1], p[2]
+            else:
+                size = np.sqrt(dot(t, t))
+                height, radius = onto_cone(along, size, friction[c], cohesion[c])
+                shrink = radius / size if size > 0.0 else 0.0
+                z = (
+                    shrink * t[0] + height * n[0],
+                    shrink * t[1] + height * n[1],
+                    shrink * t[2] + height * n[2],
+                )
+                lag = friction[c] * (1.0 - shrink) * size
+                g0 = 2.0 * z[0] - p[0] - lag * n[0]
+                g1 = 2.0 * z[1] - p[1] - lag * n[1]
+                g2 = 2.0 * z[2] - p[2] - lag * n[2]
             kept[c, 0], kept[c, 1], kept[c, 2] = z
-            y = p[0] - z[0], p[1] - z[1], p[2] - z[2]
-            along = dot(y, n)
-            t = y[0] - along * n[0], y[1] - along * n[1], y[2] - along * n[2]
-            lag = friction[c] * np.sqrt(dot(t, t))
-            g0 = z[0] - y[0] - shift[c, 0] * soft - lag * n[0]
-            g1 = z[1] - y[1] - shift[c, 1] * soft - lag * n[1]
-            g2 = z[2] - y[2] - shift[c, 2] * soft - lag * n[2]
+            g0 -= shift[c, 0] * soft
+            g1 -= shift[c, 1] * soft
+            g2 -= shift[c, 2] * soft
             q[c, 0], q[c, 1], q[c, 2] = g0, g1, g2
             f0 += g0
             f1 += g1
@@ -261,7 +289,7 @@ def _push(iterate, load, touching):
 def _pull(iterate, image, v, over, touching):
     """Write the next iterate's x into `image` (nc, 3), from the velocities v (6 nm,)."""
     x, z, q = iterate.x, iterate.z, iterate.q
-    side, arm, sigma = touching.side, touching.arm, touching.sigma
+    side, arm, soft_of = touching.side, touching.arm, touching.soft
     nc, c = side.shape[0], 0
     while c < nc:
         i, j = side[c, 0], side[c, 1]
@@ -274,7 +302,7 @@ def _pull(iterate, image, v, over, touching):
             w0, w1, w2, w3, w4, w5 = of[0], of[1], of[2], of[3], of[4], of[5]
         v0, v1, v2 = v0 - w0, v1 - w1, v2 - w2
         while c < nc and side[c, 0] == i and side[c, 1] == j:
-            a, soft = arm[c], 1.0 / sigma[c]
+            a, soft = arm[c], soft_of[c]
             r0 = q[c, 0] - soft * (v0 + v4 * a[2] - v5 * a[1] - w4 * a[5] + w5 * a[4])
             r1 = q[c, 1] - soft * (v1 + v5 * a[0] - v3 * a[2] - w5 * a[3] + w3 * a[5])
             r2 = q[c, 2] - soft * (v2 + v3 * a[1] - v4 * a[0] - w3 * a[4] + w4 * a[3])
@@ -282,6 +310,43 @@ def _pull(iterate, image, v, over, touching):
             image[c, 1] = x[c, 1] + over * (r1 - z[c, 1])
             image[c, 2] = x[c, 2] + over * (r2 - z[c, 2])
             c += 1
+
+
+@njit(cache=True)
+def to_world(geometry, local):  # pragma: no cover - compiled
+    """Return vectors (nc, 3) of contacts in world axes.
+
+    Inputs
+    ------
+    geometry : (nc, 15) float64, rows n, t1, t2 of the frames first
+    local : (nc, 3) float64, in these frames
+    """
+    world = np.empty_like(local)
+    for c in range(local.shape[0]):
+        f, (x, y, z) = geometry[c], row(local, c)
+        for i in range(3):
+            world[c, i] = f[i] * x + f[3 + i] * y + f[6 + i] * z
+    return world
+
+
+@njit(cache=True)
+def to_local(geometry, world):  # pragma: no cover - compiled
+    """Return vectors (nc, 3) of contacts in their frames, from world axes: the reverse of `to_world`."""
+    local = np.empty_like(world)
+    for c in range(world.shape[0]):
+        f, (x, y, z) = geometry[c], row(world, c)
+        for k in range(3):
+            local[c, k] = f[3 * k] * x + f[3 * k + 1] * y + f[3 * k + 2] * z
+    return local
+
+
+@njit(cache=True)
+def projected(impulse, friction, cohesion):  # pragma: no cover - compiled
+    """Return the nearest impulses (nc, 3) in the cones, local frames [N s]."""
+    result = np.empty_like(impulse)
+    for c in range(impulse.shape[0]):
+        write_row(result, c, _onto(row(impulse, c), (1.0, 0.0, 0.0), friction[c], cohesion[c]))
+    return result
 
 
 @njit(cache=True)
@@ -307,20 +372,19 @@ def _product(a, b):
 def _extrapolate(x, image, memory):
     """Write the next iterate (3 nc,) into x, from G(x): that of the combination of iterates with the least step."""
     depth = memory.image.shape[0]
-    size = 0.0
-    for i in range(x.shape[0]):
-        size += (image[i] - x[i]) ** 2
-    if memory.tally[0] > 0 and not size <= _WORSE * _WORSE * memory.size[0]:
-        memory.tally[0] = 0
-    memory.size[0] = size
     last = (memory.tally[1] + 1) % depth
-    memory.tally[1] = last
-    known = min(memory.tally[0] + 1, depth)
-    memory.tally[0] = known
     kept, step = memory.image[last], memory.step[last]
+    size = 0.0
     for i in range(x.shape[0]):
         kept[i] = image[i]
         step[i] = image[i] - x[i]
+        size += step[i] ** 2
+    if memory.tally[0] > 0 and not size <= _WORSE * _WORSE * memory.size[0]:
+        memory.tally[0] = 0
+    memory.size[0] = size
+    memory.tally[1] = last
+    known = min(memory.tally[0] + 1, depth)
+    memory.tally[0] = known
     for k in range(known):
         other = (last - k) % depth
         memory.gram[last, other] = memory.gram[other, last] = _product(step, memory.step[other])
@@ -346,12 +410,15 @@ def _extrapolate(x, image, memory):
     total = 0.0
     for k in range(known - 1):
         total += weight[k]
-    for i in range(x.shape[0]):
-        x[i] = (1.0 - total) * kept[i]
-    for k in range(known - 1):
-        other, part = memory.image[(last - 1 - k) % depth], weight[k]
-        for i in range(x.shape[0]):
-            x[i] += part * other[i]
+    # by pieces that stay in the fastest memory
+    for start in range(0, x.shape[0], _PIECE):
+        piece, own = x[start : start + _PIECE], kept[start : start + _PIECE]
+        for i in range(piece.shape[0]):
+            piece[i] = (1.0 - total) * own[i]
+        for k in range(known - 1):
+            other, part = memory.image[(last - 1 - k) % depth][start : start + _PIECE], weight[k]
+            for i in range(piece.shape[0]):
+                piece[i] += part * other[i]
 
 
 @njit(cache=True)

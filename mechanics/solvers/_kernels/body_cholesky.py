@@ -1,4 +1,6 @@
-"""Numba kernels of L D Lᵀ factors of symmetric, positive definite matrices of 6 × 6 blocks, one row for each body.
+"""Numba kernels of L D Lᵀ factors of symmetric, positive definite matrices of blocks, one row for each body.
+
+Blocks are 6 × 6 in space, and 3 × 3 in the plane. The formulas below are those of space.
 
 Bodies are numbered in the order of their elimination. Those that follow each other and reach nearly the same later ones
 share a panel: a dense matrix (6 w, 6 m) for the w bodies of its columns and the m bodies of its rows, of which the
@@ -26,12 +28,14 @@ class Panels(NamedTuple):
     first : (np+1,) int64, where the rows of each panel begin in `row`
     row : int64, bodies of the rows of each panel, in order, its own first
     start : (np+1,) int64, where each panel begins among the values
+    size : int64, velocities of a body: 6, or 3 in the plane
     """
 
     body: NDArray[np.int64]
     first: NDArray[np.int64]
     row: NDArray[np.int64]
     start: NDArray[np.int64]
+    size: int
 
 
 @njit(cache=True)
@@ -123,7 +127,7 @@ def postorder(pairs, count):  # pragma: no cover - compiled
 
 
 @njit(cache=True)
-def panels_of(pairs, count, spare):  # pragma: no cover - compiled
+def panels_of(pairs, count, spare, size):  # pragma: no cover - compiled
     """Return the pattern of the factors.
 
     Inputs
@@ -131,6 +135,7 @@ def panels_of(pairs, count, spare):  # pragma: no cover - compiled
     pairs : (n, 2) int64, bodies that couple, those of one row different; repetitions are allowed
     count : int64, nm
     spare : float64, zeros that a panel may hold for its bodies to be together, over its other blocks
+    size : int64, velocities of a body: 6, or 3 in the plane
 
     Outputs
     -------
@@ -160,7 +165,7 @@ def panels_of(pairs, count, spare):  # pragma: no cover - compiled
         last, width = body[s + 1] - 1, body[s + 1] - body[s]
         height = width + first[last + 1] - first[last] - 1
         begin[s + 1] = begin[s] + height
-        start[s + 1] = start[s] + 36 * width * height
+        start[s + 1] = start[s] + size * size * width * height
     rows = np.empty(begin[number], dtype=np.int64)
     for s in range(number):
         last, at = body[s + 1] - 1, begin[s]
@@ -168,32 +173,41 @@ def panels_of(pairs, count, spare):  # pragma: no cover - compiled
             rows[at] = k
             at += 1
         rows[at : begin[s + 1]] = row[first[last] : first[last + 1]]
-    return Panels(body, begin, rows, start)
+    return Panels(body, begin, rows, start, size)
 
 
 @njit(cache=True, fastmath={"contract"})
-def _subtract(source, p, line, spot, row, work):
+def _subtract(source, p, size, line, spot, row, work):
     """Take from the line of one velocity of a body what an earlier panel contributes.
 
-    `source` (6 w, n) is that panel, `p` = 6 (place of the body among its rows) + velocity; `spot` is the place of each
-    body among the rows of the line's panel.
+    `source` (6 w, n) is that panel, `p` = 6 (place of the body among its rows) + velocity, 6 the `size` of a body;
+    `spot` is the place of each body among the rows of the line's panel.
     """
-    w, first = source.shape[0], p // 6
-    rest = source[:, 6 * first :]
+    w, first = source.shape[0], p // size
+    rest, whole = source[:, size * first :], w - w % 6
     # loops from zero on: other indices might be negative, and would not be vectorised
     n = rest.shape[1]
     for x in range(n):
         work[x] = 0.0
-    for c in range(0, w, 6):
+    for c in range(0, whole, 6):
         f0, f1, f2 = source[c, p], source[c + 1, p], source[c + 2, p]
         f3, f4, f5 = source[c + 3, p], source[c + 4, p], source[c + 5, p]
         s0, s1, s2, s3, s4, s5 = rest[c], rest[c + 1], rest[c + 2], rest[c + 3], rest[c + 4], rest[c + 5]
         for x in range(n):
             work[x] += f0 * s0[x] + f1 * s1[x] + f2 * s2[x] + f3 * s3[x] + f4 * s4[x] + f5 * s5[x]
-    for q in range(n // 6):
-        at, come = 6 * spot[row[first + q]], 6 * q
-        for a in range(6):
+    # three are left of an odd number of bodies in the plane
+    if whole < w:
+        f0, f1, f2 = source[whole, p], source[whole + 1, p], source[whole + 2, p]
+        s0, s1, s2 = rest[whole], rest[whole + 1], rest[whole + 2]
+        for x in range(n):
+            work[x] += f0 * s0[x] + f1 * s1[x] + f2 * s2[x]
+    for q in range(n // size):
+        at, come = size * spot[row[first + q]], size * q
+        for a in range(3):
             line[at + a] -= work[come + a]
+        if size == 6:
+            for a in range(3, 6):
+                line[at + a] -= work[come + a]
 
 
 @njit(cache=True, fastmath={"contract"})
@@ -216,26 +230,30 @@ def _finish(panel):
 
 @njit(cache=True, fastmath={"contract"})
 def _divide(panel, inverse):
-    """Divide the blocks of a panel by those on its diagonal, which D⁻¹ replaces; `inverse` (6, 6) is overwritten."""
+    """Divide the blocks of a panel by those on its diagonal, which D⁻¹ replaces; `inverse` (6, 6) is overwritten.
+
+    In the plane two bodies share a block, and the last of an odd number has its own.
+    """
     w, n = panel.shape
     for k in range(0, w, 6):
-        for b in range(5, -1, -1):
-            line, scale = panel[k + b, k + 6 :], 1.0 / panel[k + b, k + b]
-            for d in range(6):
+        m = min(6, w - k)
+        for b in range(m - 1, -1, -1):
+            line, scale = panel[k + b, k + m :], 1.0 / panel[k + b, k + b]
+            for d in range(m):
                 inverse[b, d] = 0.0
             inverse[b, b] = scale
-            for x in range(n - k - 6):
+            for x in range(n - k - m):
                 line[x] *= scale
-            for d in range(b + 1, 6):
-                factor, other = panel[k + b, k + d] * scale, panel[k + d, k + 6 :]
-                for c in range(d, 6):
+            for d in range(b + 1, m):
+                factor, other = panel[k + b, k + d] * scale, panel[k + d, k + m :]
+                for c in range(d, m):
                     inverse[b, c] -= factor * inverse[d, c]
-                for x in range(n - k - 6):
+                for x in range(n - k - m):
                     line[x] -= factor * other[x]
-        for b in range(6):
-            for d in range(6):
+        for b in range(m):
+            for d in range(m):
                 total = 0.0
-                for c in range(max(b, d), 6):
+                for c in range(max(b, d), m):
                     total += inverse[b, c] * inverse[d, c]
                 panel[k + b, k + d] = total
 
@@ -254,7 +272,7 @@ def factorise(panels, value):  # pragma: no cover - compiled
     value : the panels of L, with D⁻¹ in the blocks on their diagonals
     bool, whether A is positive definite
     """
-    body, first, row, start = panels.body, panels.first, panels.row, panels.start
+    body, first, row, start, size = panels.body, panels.first, panels.row, panels.start, panels.size
     number = body.shape[0] - 1
     owner, spot = np.empty(body[number], dtype=np.int64), np.zeros(body[number], dtype=np.int64)
     # finished panels wait in a list of the next panel that they reach
@@ -264,21 +282,23 @@ def factorise(panels, value):  # pragma: no cover - compiled
     for s in range(number):
         owner[body[s] : body[s + 1]] = s
         highest = max(highest, first[s + 1] - first[s])
-    work, inverse = np.empty(6 * highest), np.empty((6, 6))
+    work, inverse = np.empty(size * highest), np.empty((6, 6))
     for s in range(number):
         width, height = body[s + 1] - body[s], first[s + 1] - first[s]
-        panel = value[start[s] : start[s + 1]].reshape((6 * width, 6 * height))
+        panel = value[start[s] : start[s + 1]].reshape((size * width, size * height))
         for p in range(height):
             spot[row[first[s] + p]] = p
         j = head[s]
         while j >= 0:
             then = follower[j]
             high = first[j + 1] - first[j]
-            source = value[start[j] : start[j + 1]].reshape((6 * (body[j + 1] - body[j]), 6 * high))
+            shape = size * (body[j + 1] - body[j]), size * high
+            source = value[start[j] : start[j + 1]].reshape(shape)
             rows, q = row[first[j] : first[j + 1]], place[j]
             while q < high and rows[q] < body[s + 1]:
-                for b in range(6):
-                    _subtract(source, 6 * q + b, panel[6 * (rows[q] - body[s]) + b], spot, rows, work)
+                for b in range(size):
+                    line = panel[size * (rows[q] - body[s]) + b]
+                    _subtract(source, size * q + b, size, line, spot, rows, work)
                 q += 1
             place[j] = q
             if q < high:
@@ -293,7 +313,7 @@ def factorise(panels, value):  # pragma: no cover - compiled
             follower[s] = head[up]
             head[up] = s
     for s in range(number):
-        shape = 6 * (body[s + 1] - body[s]), 6 * (first[s + 1] - first[s])
+        shape = size * (body[s + 1] - body[s]), size * (first[s + 1] - first[s])
         _divide(value[start[s] : start[s + 1]].reshape(shape), inverse)
     return True
 
@@ -306,22 +326,22 @@ def solve(panels, value, x, work):  # pragma: no cover - compiled
     ------
     panels : Panels
     value : as `factorise` leaves it
-    x : (6 nm,) float64, b, overwritten
+    x : (6 nm,) float64, or (3 nm,) in the plane, b, overwritten
     work : float64, as long as the longest panel at least, overwritten
 
     Outputs
     -------
     x : the solution
     """
-    body, first, row, start = panels.body, panels.first, panels.row, panels.start
+    body, first, row, start, size = panels.body, panels.first, panels.row, panels.start, panels.size
     number = body.shape[0] - 1
     for s in range(number):
-        width, height, at = body[s + 1] - body[s], first[s + 1] - first[s], 6 * body[s]
-        n = 6 * height
-        panel = value[start[s] : start[s + 1]].reshape((6 * width, n))
+        width, height, at = body[s + 1] - body[s], first[s + 1] - first[s], size * body[s]
+        w, n = size * width, size * height
+        panel, whole = value[start[s] : start[s + 1]].reshape((w, n)), w - w % 6
         for i in range(n):
             work[i] = 0.0
-        for k in range(0, 6 * width, 6):
+        for k in range(0, whole, 6):
             for a in range(6):
                 x[at + k + a] -= work[k + a]
             x0, x1, x2 = x[at + k], x[at + k + 1], x[at + k + 2]
@@ -330,19 +350,49 @@ def solve(panels, value, x, work):  # pragma: no cover - compiled
             p0, p1, p2, p3, p4, p5 = left[0], left[1], left[2], left[3], left[4], left[5]
             for i in range(n - k - 6):
                 rest[i] += x0 * p0[i] + x1 * p1[i] + x2 * p2[i] + x3 * p3[i] + x4 * p4[i] + x5 * p5[i]
+        if whole < w:
+            k = whole
+            for a in range(3):
+                x[at + k + a] -= work[k + a]
+            x0, x1, x2 = x[at + k], x[at + k + 1], x[at + k + 2]
+            left, rest = panel[k : k + 3, k + 3 : n], work[k + 3 : n]
+            p0, p1, p2 = left[0], left[1], left[2]
+            for i in range(n - k - 3):
+                rest[i] += x0 * p0[i] + x1 * p1[i] + x2 * p2[i]
         for p in range(width, height):
-            to, come = 6 * row[first[s] + p], 6 * p
-            for a in range(6):
+            to, come = size * row[first[s] + p], size * p
+            for a in range(3):
                 x[to + a] -= work[come + a]
+            if size == 6:
+                for a in range(3, 6):
+                    x[to + a] -= work[come + a]
     for s in range(number - 1, -1, -1):
-        width, height, at = body[s + 1] - body[s], first[s + 1] - first[s], 6 * body[s]
-        n = 6 * height
-        panel = value[start[s] : start[s + 1]].reshape((6 * width, n))
+        width, height, at = body[s + 1] - body[s], first[s + 1] - first[s], size * body[s]
+        w, n = size * width, size * height
+        panel, whole = value[start[s] : start[s + 1]].reshape((w, n)), w - w % 6
         for p in range(width, height):
-            come, to = 6 * row[first[s] + p], 6 * p
-            for a in range(6):
+            come, to = size * row[first[s] + p], size * p
+            for a in range(3):
                 work[to + a] = x[come + a]
-        for k in range(6 * width - 6, -1, -6):
+            if size == 6:
+                for a in range(3, 6):
+                    work[to + a] = x[come + a]
+        if whole < w:
+            k = whole
+            left, rest = panel[k : k + 3, k + 3 : n], work[k + 3 : n]
+            p0, p1, p2 = left[0], left[1], left[2]
+            s0 = s1 = s2 = 0.0
+            for i in range(n - k - 3):
+                s0 += rest[i] * p0[i]
+                s1 += rest[i] * p1[i]
+                s2 += rest[i] * p2[i]
+            t0, t1, t2, ends = x[at + k], x[at + k + 1], x[at + k + 2], (s0, s1, s2)
+            for a in range(3):
+                d = panel[k + a]
+                done = d[k] * t0 + d[k + 1] * t1 + d[k + 2] * t2
+                work[k + a] = done - ends[a]
+                x[at + k + a] = done - ends[a]
+        for k in range(whole - 6, -1, -6):
             left, rest = panel[k : k + 6, k + 6 : n], work[k + 6 : n]
             p0, p1, p2, p3, p4, p5 = left[0], left[1], left[2], left[3], left[4], left[5]
             s0 = s1 = s2 = s3 = s4 = s5 = 0.0

@@ -7,13 +7,14 @@ M + H Σ⁻¹ Hᵀ, less than that of a Gauss–Seidel sweep (mechanics/solvers/
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from mechanics.arrays import Array, Ints
 from mechanics.delassus.elimination import elimination
-from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, RigidContacts
-from mechanics.problem.residual import project_on_cone, residual
+from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, Delassus, RigidContacts
+from mechanics.problem.residual import residual
 from mechanics.solvers._kernels import body_admm as kernel
 from mechanics.solvers._kernels import body_cholesky as cholesky
 from moma.errors import SolverError
@@ -23,12 +24,20 @@ __all__ = ["BodyADMM", "Stage"]
 
 # overshoot of the impulses [-]
 _OVER = 1.6
+# velocities of a body
+_VELOCITIES = 6
 # zeros that a panel of the factors may hold, over its other blocks [-]
 _SPARE = 0.2
+# bodies below which the order of elimination depends on their pairs alone, and is kept while these stay
+_FEW = 1000
+# numbers in factors that are kept until contacts are detected again, at most: 32 MB
+_KEPT = 4_000_000
 # iterations before the first look at the residual
 _FIRST_LOOK = 10
 # fewest iterations between two looks
 _LEAST_LOOK = 5
+# and most, over the iterations so far: changes of velocities foretell the residual for so long alone [-]
+_LATE_LOOK = 0.2
 # part of the change at which the residual is expected to be small enough, at which it is looked at [-]
 _EARLY = 0.8
 # iterates from which is extrapolated
@@ -86,65 +95,60 @@ class BodyADMM:
                 "bodies are not all rigid", where="ADMM of bodies", remedy='use the method "admm"'
             )
         run = _Run(problem, contacts, start, self)
-        best = run.look()
+        run.look()
         most = min(self.max_iterations, sum(stage.iterations for stage in self.stages))
-        while best[0] > run.goal and run.iterations < most:
+        while run.excess > run.goal and run.iterations < most:
             run.iterate()
-            best = min(best, run.look(), key=lambda look: look[0])
-        left = residual(problem, best[1])
+            run.look()
+        impulse, velocity = run.best()
+        left = residual(problem, impulse)
         within = left.within(self.tolerance, self.velocity_tolerance)
-        return ContactSolution(best[1], best[2], run.iterations, left.natural_map, within)
+        return ContactSolution(impulse, velocity, run.iterations, left.natural_map, within)
 
 
 class _Run:
-    """Iterates of one solution."""
+    """Iterates of one solution.
+
+    Attributes
+    ----------
+    iterations : so far
+    excess : the larger of both errors of the best look over their tolerances [-]
+    """
 
     def __init__(
         self, problem: ContactProblem, contacts: RigidContacts, start: ContactStart, settings: BodyADMM
     ) -> None:
-        self._problem, self._settings = problem, settings
-        self._frame = np.ascontiguousarray(contacts.geometry[:, :9]).reshape(-1, 3, 3)
-        moving = np.flatnonzero(contacts.inertia[:, 0] > 0)
-        self._order, side, self._panels = _eliminated(contacts, moving)
-        self._inertia = contacts.inertia[self._order]
-        self._mass = kernel.masses(contacts.inertia, self._order)
-        self._free = self._world(problem.u_free)
-        compliance = np.einsum("cii->c", problem.delassus.diagonal) / 3.0
-        normal = np.ascontiguousarray(self._frame[:, 0])
+        self._problem, self._settings, self._bodies = (
+            problem,
+            settings,
+            _bodies_of(problem.delassus, contacts),
+        )
+        bodies = self._bodies
+        self._free: Array = kernel.to_world(bodies.geometry, problem.u_free)
         self._touching = kernel.Touching(
-            side,
-            normal,
-            np.ascontiguousarray(contacts.geometry[:, 9:]),
-            self._free + problem.bias[:, None] * normal,
+            bodies.side,
+            bodies.normal,
+            bodies.arm,
+            self._free + problem.bias[:, None] * bodies.normal,
             problem.friction,
             problem.cohesion,
-            np.zeros(len(side)) if problem.adhesion is None else problem.adhesion,
-            settings.stages[0].penalty * compliance,
+            np.zeros(len(bodies.side)) if problem.adhesion is None else problem.adhesion,
+            bodies.soft(settings.stages[0].penalty),
         )
-        self._compliance, self._stages = compliance, list(settings.stages)
+        self._stages = list(settings.stages)
         self._pace = float(np.abs(problem.u_free).max()) or float(np.abs(problem.bias).max()) or 1.0
-        impulse = project_on_cone(start.impulse, problem.friction, problem.cohesion)
-        x = self._world(impulse) - self._world(start.velocity) / self._touching.sigma[:, None]
-        self._iterate = kernel.Iterate(x, np.empty_like(x), np.empty_like(x), np.zeros(6 * len(moving)))
-        self._length = float(np.linalg.norm(self._touching.arm[:, :3], axis=1).mean())
+        x = kernel.projected(start.impulse, problem.friction, problem.cohesion)
+        x -= start.velocity * self._touching.soft[:, None]
+        x = kernel.to_world(bodies.geometry, x)
+        self._iterate = kernel.Iterate(
+            x, np.empty_like(x), np.empty_like(x), np.zeros(6 * len(bodies.inertia))
+        )
         self._factors: kernel.Factors | None = None
+        # by penalty, for stages whose penalties recur
+        self._known: dict[float, kernel.Factors] = {}
         self._memory = _acceleration(0, 0)
         self._until = 0
-        self.iterations, self._change, self._limit = 0, np.inf, 0.0
-
-    def _world(self, local: Array) -> Array:
-        world: Array = np.einsum("cki,ck->ci", self._frame, local)
-        return world
-
-    def _local(self, world: Array) -> Array:
-        local: Array = np.einsum("cki,ci->ck", self._frame, world)
-        return local
-
-    def _factorised(self) -> kernel.Factors:
-        value: Array = kernel.assemble(self._touching, self._mass, self._panels)
-        if not cholesky.factorise(self._panels, value):
-            raise SolverError("W is not a number", where="ADMM of bodies", remedy="use another method")
-        return kernel.Factors(self._panels, value)
+        self.iterations, self.excess, self._change, self._limit = 0, np.inf, np.inf, 0.0
 
     @property
     def goal(self) -> float:
@@ -163,11 +167,19 @@ class _Run:
         least = min(_LEAST_LOOK, most)
         self._advance(least, 0.0)
         if self._change > self._limit:
-            self._advance(most - least, self._limit)
+            later = max(int(_LATE_LOOK * self.iterations), _LEAST_LOOK)
+            self._advance(min(most - least, later), self._limit)
 
     def _advance(self, count: int, limit: float) -> None:
         made, self._change = kernel.advance(
-            self._iterate, count, limit, _OVER, self._length, self._touching, self._factors, self._memory
+            self._iterate,
+            count,
+            limit,
+            _OVER,
+            self._bodies.length,
+            self._touching,
+            self._factors,
+            self._memory,
         )
         self.iterations += made
 
@@ -175,32 +187,97 @@ class _Run:
         """Go on with the penalty of a stage; y keeps its velocities."""
         self._until += stage.iterations
         self._memory = _acceleration(_DEPTH if stage.extrapolated else 0, self._iterate.x.size)
-        sigma = stage.penalty * self._compliance
+        soft = self._bodies.soft(stage.penalty)
         if self.iterations:
             self._broken()
             x, z = self._iterate.x, self._iterate.z
-            x[:] = z + (x - z) * (self._touching.sigma / sigma)[:, None]
-        if self._factors is None or self.iterations:
-            self._touching = self._touching._replace(sigma=sigma)
-            self._factors = self._factorised()
+            x[:] = z + (x - z) * (soft / self._touching.soft)[:, None]
+        self._touching = self._touching._replace(soft=soft)
+        if stage.penalty not in self._known:
+            self._known[stage.penalty] = self._bodies.factors(stage.penalty, self._touching)
+        self._factors = self._known[stage.penalty]
 
     def _broken(self) -> tuple[float, float, float]:
         iterate, scale = self._iterate, self._problem.delassus.scale
         found: tuple[float, float, float] = kernel.broken_laws(
-            iterate.x, self._touching, self._free, self._inertia, 1.0 / scale, iterate.z
+            iterate.x, self._touching, self._free, self._bodies.inertia, 1.0 / scale, iterate.z
         )
         return found
 
-    def look(self) -> tuple[float, Array, Array]:
-        """Return the larger of both errors over their tolerances, the impulses and the velocities û (nc, 3)."""
+    def look(self) -> None:
+        """Measure the iterate, and remember it if it is the best so far."""
         settings, scale = self._settings, self._problem.delassus.scale
         whole, largest, size = self._broken()
         eta = whole / max(size, 1e-300)
         excess = max(eta / settings.tolerance, largest * scale / self._pace / settings.velocity_tolerance)
         if np.isfinite(self._change) and excess > 0:
             self._limit = self._change * _EARLY * self.goal / excess
-        velocity = self._touching.sigma[:, None] * (self._iterate.z - self._iterate.x)
-        return float(excess), self._local(self._iterate.z), self._local(velocity)
+        if self.iterations == 0 or excess < self.excess:
+            x, z, _, _ = self._iterate
+            self.excess, self._best = float(excess), (x.copy(), z.copy(), self._touching.soft)
+
+    def best(self) -> tuple[Array, Array]:
+        """Return the impulses and the velocities û (nc, 3) of the best look, local frames."""
+        x, z, soft = self._best
+        velocity = kernel.to_local(self._bodies.geometry, (z - x) / soft[:, None])
+        return kernel.to_local(self._bodies.geometry, z), velocity
+
+
+class _Bodies:
+    """Parts of a problem that depend on W alone: the order of elimination, and factors by their penalty.
+
+    As long as no stone has moved so far that its contacts are detected again, all steps share it.
+
+    Attributes
+    ----------
+    geometry : (nc, 15) as in `RigidContacts`
+    side, normal, arm : as in `Touching`
+    inertia : (nm, 7) of the moving bodies, in the order of elimination
+    length : mean distance of contacts from the centres of mass [m]
+    """
+
+    def __init__(self, delassus: Delassus, contacts: RigidContacts) -> None:
+        moving = np.flatnonzero(contacts.inertia[:, 0] > 0)
+        order, self.side, self._panels = _eliminated(contacts, moving)
+        self.geometry = np.ascontiguousarray(contacts.geometry)
+        self.normal = np.ascontiguousarray(contacts.geometry[:, :3])
+        self.arm = np.ascontiguousarray(contacts.geometry[:, 9:])
+        self.inertia = contacts.inertia[order]
+        self._mass: Array = kernel.masses(contacts.inertia, order)
+        self._compliance = np.einsum("cii->c", delassus.diagonal) / 3.0
+        self.length = float(np.sqrt((self.arm[:, :3] ** 2) @ np.ones(3)).mean())
+        self._factors: dict[float, kernel.Factors] = {}
+
+    def soft(self, penalty: float) -> Array:
+        """Return 1/σ (nc,) for a penalty over the mean diagonals of W_αα [kg]."""
+        soft: Array = 1.0 / (penalty * self._compliance)
+        return soft
+
+    def factors(self, penalty: float, touching: kernel.Touching) -> kernel.Factors:
+        """Return the factors of M + H Σ⁻¹ Hᵀ for the σ of `touching`, which follow from the penalty.
+
+        Raises
+        ------
+        SolverError : if W is not a number
+        """
+        known = self._factors.get(penalty)
+        if known is not None:
+            return known
+        value: Array = kernel.assemble(touching, self._mass, self._panels)
+        if not cholesky.factorise(self._panels, value):
+            raise SolverError("W is not a number", where="ADMM of bodies", remedy="use another method")
+        found = kernel.Factors(self._panels, value)
+        if len(value) <= _KEPT:
+            self._factors[penalty] = found
+        return found
+
+
+def _bodies_of(delassus: Delassus, contacts: RigidContacts) -> _Bodies:
+    """Return the bodies of an operator, which remembers them if it can."""
+    memo: dict[str, _Bodies] = getattr(delassus, "memo", {})
+    if "bodies" not in memo:
+        memo["bodies"] = _Bodies(delassus, contacts)
+    return memo["bodies"]
 
 
 def _acceleration(depth: int, size: int) -> kernel.Acceleration:
@@ -218,11 +295,31 @@ def _eliminated(contacts: RigidContacts, moving: Ints) -> tuple[Ints, Ints, chol
     place = np.full(len(contacts.inertia), -1)
     place[moving] = np.arange(len(moving))
     side = place[contacts.body]
-    inner = side[(side >= 0).all(axis=1)]
-    pairs = np.unique(np.sort(inner, axis=1), axis=0) if len(inner) else inner
-    rank = elimination(pairs, moving, contacts.centre)
-    rank = cholesky.postorder(np.ascontiguousarray(rank[pairs]), len(moving))[rank]
-    panels = cholesky.panels_of(np.ascontiguousarray(rank[pairs]), len(moving), _SPARE)
+    # contacts of the same two bodies follow each other
+    new = np.ones(len(side), dtype=bool)
+    new[1:] = (side[1:, 0] != side[:-1, 0]) | (side[1:, 1] != side[:-1, 1])
+    inner = side[new]
+    inner = inner[(inner[:, 0] >= 0) & (inner[:, 1] >= 0)]
+    pairs = np.unique(np.minimum(*inner.T) * len(moving) + np.maximum(*inner.T))
+    if len(moving) < _FEW:
+        rank, panels = _pattern_of_few(pairs.tobytes(), len(moving))
+    else:
+        rank, panels = _pattern(pairs, moving, contacts.centre)
     order = np.empty_like(moving)
     order[rank] = moving
     return order, np.where(side >= 0, rank[side], -1), panels
+
+
+def _pattern(pairs: Ints, moving: Ints, centre: Array) -> tuple[Ints, cholesky.Panels]:
+    """Return the rank of each moving body and the panels, from pairs i n + j (m,) of the n bodies, in order."""
+    count = len(moving)
+    both = np.column_stack([pairs // count, pairs % count])
+    rank = elimination(both, moving, centre)
+    rank = cholesky.postorder(np.ascontiguousarray(rank[both]), count)[rank]
+    return rank, cholesky.panels_of(np.ascontiguousarray(rank[both]), count, _SPARE, _VELOCITIES)
+
+
+@lru_cache(maxsize=1)
+def _pattern_of_few(pairs: bytes, count: int) -> tuple[Ints, cholesky.Panels]:
+    """Return the same by least degree, which no place of a body changes: nearly all steps of a motion share it."""
+    return _pattern(np.frombuffer(pairs, dtype=np.int64), np.arange(count), np.zeros((0, 3)))

@@ -32,7 +32,8 @@ __all__ = ["InteriorPoint"]
 _NAME = "interior point"
 # friction below which a contact has no cone, only a side [-]
 _SMOOTH = 1e-9
-# compliance that holds the tangential impulse of contacts without friction at zero, over the scale of W [-]
+# compliance that holds impulses as they are: tangential ones of contacts without friction, and those of open contacts,
+# over the scale of W [-]
 _RIGID = 1e9
 # part of the way to the boundary that a step goes [-]
 _BACK_OFF = 0.98
@@ -47,6 +48,8 @@ _TRIES = (1e-7, 1e-9, 1e-11)
 _ELASTIC_TRIES = (1e-4, 1e-6, 1e-8, 1e-10)
 # compliance of every contact with which Newton's method begins between elastic stones at rest, over the scale of W [-]
 _HELD = 1e-3
+# impulse over the largest from which a contact counts as one that bears [-]
+_BEARS = 1e-6
 # η from which a try between elastic stones is given up [-]
 _HOPELESS = 0.3
 # η over the tolerance from which a try that ended by rounding is the last [-]
@@ -104,10 +107,11 @@ class InteriorPoint:
         end = _End(problem, self.tolerance, self.velocity_tolerance)
         # also without impulses: where no load acts, none are needed
         best = end.looked(start.impulse, 0)
-        if start.impulse.any() and not best.converged:
-            best = end.ended(start.impulse, self.max_iterations)
-        elif end.elastic and not best.converged:
-            best = min(best, end.held(self.max_iterations), key=_left)
+        if not best.converged:
+            if end.elastic and best.natural_map > _HOPELESS:
+                best = min(best, end.held(start.impulse, self.max_iterations), key=_left)
+            elif start.impulse.any():
+                best = end.ended(start.impulse, self.max_iterations)
         return best if best.converged or end.rounded else self._along_path(end, best)
 
     def _along_path(self, end: "_End", best: ContactSolution) -> ContactSolution:
@@ -154,15 +158,22 @@ class _End:
         self.elastic, self.rounded = problem.delassus.rigid is None, False
         self.tries = _ELASTIC_TRIES if self.elastic else _TRIES
 
-    def held(self, most: int) -> ContactSolution:
-        """Begin as if every contact held, with a little compliance, and end it by Newton's method.
+    def held(self, start: Array, most: int) -> ContactSolution:
+        """Begin as if each contact with an impulse in `start`, all where none has, held with a little compliance.
 
-        Elastic stones at rest under their weight leave few contacts: those open and slide that press least.
+        Elastic stones at rest under their weight leave few contacts: those open and slide that press least. In a
+        second step from rest all that bears holds: the impulses of the first are right, but W is so large that whole
+        stones fly off by the next to nothing that these lack. Newton's method ends it.
         """
-        form, count = self.even.form(_NAME), len(self.unit)
-        theta = np.tile(_HELD * self.even.delassus.scale * np.eye(3), (count, 1, 1))
-        impulse = form.shifted(theta)(-self.even.biased.ravel()).reshape(-1, 3)
-        found = self.ended(impulse * self.unit[:, None], most - 1)
+        even, unit = self.even, self.unit[:, None]
+        form, scale, impulse = even.form(_NAME), even.delassus.scale, start / unit
+        size = np.sqrt((impulse**2).sum(axis=1))
+        # all of them where none has an impulse
+        bears = size >= _BEARS * size.max()
+        theta = scale * np.where(bears, _HELD, _RIGID)[:, None, None] * np.eye(3)
+        left = even.delassus.apply(impulse) + even.biased
+        impulse += form.shifted(theta)(-left.ravel()).reshape(-1, 3)
+        found = self.ended(impulse * unit, most - 1)
         return replace(found, iterations=found.iterations + 1)
 
     def looked(self, impulse: Array, iterations: int) -> ContactSolution:
@@ -178,17 +189,16 @@ class _End:
             if count >= most or found.converged:
                 break
             limits = further * self.limits[0], further * self.limits[1]
+            begin, rounded = ContactStart(found.impulse / unit, found.velocity), False
             if self.elastic:
-                newton: Newton | ProximalNewton = Newton(*limits, _ELASTIC_NEWTON, _HOPELESS)
+                even, rounded = Newton(*limits, _ELASTIC_NEWTON, _HOPELESS).ended(self.even, begin)
             else:
-                newton = ProximalNewton(*limits, _NEWTON)
-            even = newton(self.even, ContactStart(found.impulse / unit, found.velocity))
+                even = ProximalNewton(*limits, _NEWTON)(self.even, begin)
             count += even.iterations
             found = min(found, self.looked(even.impulse * unit, 0), key=_left)
             if not even.converged:
-                # it stopped by itself near a solution, where a path would come to the same
-                near = found.natural_map <= _ROUNDING * self.limits[0]
-                self.rounded = self.elastic and near and even.iterations < _ELASTIC_NEWTON
+                # a path would come to the same
+                self.rounded = rounded and found.natural_map <= _ROUNDING * self.limits[0]
                 break
         return replace(found, iterations=count)
 

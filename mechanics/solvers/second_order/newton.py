@@ -77,14 +77,24 @@ class Newton:
         ------
         SolverError : if W is known by its products alone
         """
+        return self.ended(problem, start)[0]
+
+    def ended(self, problem: ContactProblem, start: ContactStart) -> tuple[ContactSolution, bool]:
+        """Solve from the impulses of `start`; return also whether rounding alone kept η from falling further.
+
+        Raises
+        ------
+        SolverError : if W is known by its products alone
+        """
         system, limits = problem.form("Newton").shifted, (self.tolerance, self.velocity_tolerance)
         if len(start.impulse) == 0:
-            return ContactSolution(start.impulse, start.velocity, 0, 0.0, True)
+            return ContactSolution(start.impulse, start.velocity, 0, 0.0, True), False
         natural, daring, count, since, still = _Map(problem), 0, 0, 0, 0
         # the start is not projected on the cones: that would break the balance, which tells the states apart
         here, left = natural(start.impulse), residual(problem, start.impulse)
         best, merits = (left, start.impulse), deque([here.size], _MEMORY)
-        while not left.within(*limits) and count < self.max_iterations and since < _PATIENCE:
+        rounded = False
+        while not (left.within(*limits) or rounded) and count < self.max_iterations and since < _PATIENCE:
             count, since = count + 1, since + 1
             try:
                 theta, right = natural.linear(here, min(left.natural_map, 1.0))
@@ -108,9 +118,10 @@ class Newton:
             still = still + 1 if since and left.natural_map < min(_NOISE * eta, _SETTLED) else 0
             if left.natural_map < best[0].natural_map:
                 best = left, here.impulse
-            if left.natural_map > self.hopeless or (still >= _ROUNDED and np.isfinite(self.hopeless)):
+            if left.natural_map > self.hopeless:
                 break
-        return _solution(*best, count, limits)
+            rounded = still >= _ROUNDED and np.isfinite(self.hopeless)
+        return _solution(*best, count, limits), rounded
 
 
 def _solution(left: Residual, impulse: Array, count: int, limits: tuple[float, float]) -> ContactSolution:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mechanics.arrays import Array
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.problem.residual import residual
 from mechanics.solvers.first_order.admm import ADMM
@@ -64,10 +65,29 @@ _SLIDES = 10.0
 # and over the fastest u_free, at most [-]
 _SLOW = 1e-2
 # loosest tolerances of a motion: beyond, contacts no longer obey their laws [-]
-_LOOSEST, _LOOSEST_MAP = 0.05, 1e-2
+_LOOSEST, _LOOSEST_MAP = 0.025, 1e-2
 # velocity tolerance from which a step begins where the last one ended, with extrapolations at once [-]
 _LOOSE = 1e-3
 _LOOSE_STAGES = (Stage(0.1, 150, extrapolated=True), Stage(0.2, 450, extrapolated=True))
+# measures of the residual over their tolerances, up to which forces of the last step are balanced again [-]
+_NEAR = 30.0
+_BALANCING = (Stage(1e-3, 20, extrapolated=True),)
+# velocities over the tolerance that stones at rest may have, before their forces are balanced again [-]
+_CALM = 0.01
+# part of the tolerance on velocities up to which a gap counts as closed then: by less than an ångström, as a rule [-]
+_CLOSED = 0.9
+# tolerances over those asked for to which they are balanced: the rest of the run may well be a thousand steps [-]
+_EXACT = 1e-6
+# iterations from where ADMM with a small penalty stood, as it nearly always is close when it gives up
+_ENDING = (Stage(1e-3, 60, extrapolated=True),)
+# bodies from which Newton's steps in a motion, which factorise anew each, cost more than iterations with kept factors
+_MANY = 1000
+# their penalties in turn: with the larger one contacts sort themselves out, with the smaller one forces that change
+# steadily, by so much in each iteration, arrive 25 times as soon
+_TURNS = 20 * (Stage(0.5, 100, extrapolated=False), Stage(0.02, 50, extrapolated=False))
+# and the one with which the forces of rest are found from nothing: it goes as far as methods for rest do, so that the
+# next steps need none
+_COLD_STAGES = (Stage(1e-3, 300, extrapolated=False),)
 # stages that solve steps in which next to nothing moves
 _RESTING = ("sweeps", "admm, small penalty")
 
@@ -114,9 +134,16 @@ class Alternating:
         warm = bool(start.impulse.any())
         before = "warm start" if warm else f"cold start, {len(start.impulse):,} contacts"
         follows = warm and start.motion is not None and problem.delassus.rigid is not None
+        if warm and not (follows and start.motion):
+            kept = self._kept(problem, start, follows)
+            if kept is not None:
+                return kept
+        motion = start.motion is not None
+        many = motion and _moving(problem) >= _MANY
+        rests = ("sweeps",) if many else _RESTING
         moved = False
-        for name, solve, from_best in self._stages(problem, warm):
-            if follows and not moved and (start.motion or name not in _RESTING):
+        for name, solve, from_best in self._stages(problem, warm, motion, many):
+            if follows and not moved and (start.motion or name not in rests):
                 found, moved = self._in_motion(problem)._moved(problem, start), True
                 before = f"admm of bodies stood at η {found.natural_map:.0e}"
                 best = _better(best, found)
@@ -133,6 +160,40 @@ class Alternating:
                 break
         return best
 
+    def _kept(self, problem: ContactProblem, start: ContactStart, follows: bool) -> ContactSolution | None:
+        """Return the forces of the last step if they are a solution still, or balanced again where nothing moves.
+
+        Forces that balance up to a tolerance, kept from step to step, push stones a little in each, until gaps of an
+        ångström fill the tolerance. A few iterations on the velocities of the bodies balance them far better than
+        sweeps, so that the next steps find them balanced. No forces are sought where any contact moves: they might hold
+        stones that nothing carries.
+        """
+        limits = self.tolerance, self.velocity_tolerance
+        left, calm = residual(problem, start.impulse), _CALM * self.velocity_tolerance
+        kept = None
+        if left.within(*limits):
+            impulse = start.impulse.copy()
+            kept = ContactSolution(impulse, left.dual, 0, left.natural_map, True, "sweeps: warm start")
+            if left.velocity <= calm:
+                return kept
+        if not (follows and left.within(_NEAR * limits[0], _NEAR * limits[1])):
+            return kept
+        small = _CLOSED * self.velocity_tolerance * float(np.abs(problem.u_free).max())
+        closed = replace(problem, bias=np.where(np.abs(problem.bias) <= small, 0.0, problem.bias))
+        if kept is not None and residual(closed, start.impulse).velocity <= calm:
+            return kept
+        if not self._rests(problem, start.impulse):
+            return kept
+        solver = BodyADMM(_EXACT * limits[0], _EXACT * limits[1], self.max_iterations, _BALANCING)
+        found = solver(closed, ContactStart(start.impulse, np.zeros_like(start.velocity)))
+        balanced = residual(problem, found.impulse)
+        if not balanced.within(*limits):
+            return kept
+        why = f"admm of bodies: forces of the last step left velocities of {left.velocity:.0e}"
+        return ContactSolution(
+            found.impulse, balanced.dual, found.iterations, balanced.natural_map, True, why
+        )
+
     def _moved(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve a step of a motion, from where the last two lead.
 
@@ -140,12 +201,13 @@ class Alternating:
         nothing; then forces among them grow until one slips. Newton's method follows them there, ADMM sorts the others.
         """
         assert start.motion is not None
-        found = self._judged(
-            problem, self._bodies(self.max_iterations)(problem, start), "admm of bodies: motion"
-        )
+        many = _moving(problem) >= _MANY
+        found = self._bodies(self.max_iterations, many)(problem, start)
+        found = replace(found, why="admm of bodies: motion")
         best = found
+        methods = [("Newton", self._following), ("admm of bodies", self._sorting)]
         while not found.converged and best.iterations < self.max_iterations:
-            for name, solve in (("Newton", self._following), ("admm of bodies", self._sorting)):
+            for name, solve in [("admm of bodies", self._turning)] if many else methods:
                 count = max(self.max_iterations - best.iterations, 1)
                 begin = ContactStart(found.impulse, found.velocity)
                 why = f"{name}: admm of bodies stood at η {found.natural_map:.0e}"
@@ -167,12 +229,13 @@ class Alternating:
         natural_map = max(self.tolerance, min(velocity, _LOOSEST_MAP))
         return replace(self, velocity_tolerance=velocity, tolerance=natural_map)
 
-    def _bodies(self, most: int) -> _Solver:
+    def _bodies(self, most: int, many: bool) -> _Solver:
         if self.velocity_tolerance < _LOOSE:
             solver = BodyADMM(self.tolerance, self.velocity_tolerance, most, further=_MOTION_FURTHER)
             return lambda p, s: solver(p, s if s.ahead is None else s.ahead)
         # errors of this size would be extrapolated with the rest
-        return BodyADMM(self.tolerance, self.velocity_tolerance, most, _LOOSE_STAGES)
+        stages = _TURNS if many else _LOOSE_STAGES
+        return BodyADMM(self.tolerance, self.velocity_tolerance, most, stages)
 
     def _following(self, most: int) -> _Solver:
         return _even(ProximalNewton(self.tolerance, self.velocity_tolerance, min(_FOLLOWING, most)))
@@ -180,18 +243,33 @@ class Alternating:
     def _sorting(self, most: int) -> _Solver:
         return BodyADMM(self.tolerance, self.velocity_tolerance, most, _SORTING)
 
+    def _turning(self, most: int) -> _Solver:
+        return BodyADMM(self.tolerance, self.velocity_tolerance, most, _TURNS)
+
+    def _cold(self, most: int) -> _Solver:
+        return BodyADMM(*self._tight, most, _COLD_STAGES)
+
     def _slides(self, problem: ContactProblem, found: ContactSolution) -> bool:
         """Return whether a contact that carries a force moves by more than the solution leaves undecided."""
         carries = found.impulse.any(axis=1)
-        fastest = float(np.abs(problem.u_free).max())
-        limit = min(_SLIDES * self.velocity_tolerance, _SLOW) * fastest
-        return bool(np.abs(found.velocity[carries]).max(initial=0.0) > limit)
+        return bool(np.abs(found.velocity[carries]).max(initial=0.0) > self._pace(problem))
+
+    def _rests(self, problem: ContactProblem, impulse: Array) -> bool:
+        """Return whether impulses let no contact move, neither one that carries a force nor one that opens."""
+        u = problem.delassus.apply(impulse) + problem.u_free
+        return bool(np.abs(u).max() <= self._pace(problem))
+
+    def _pace(self, problem: ContactProblem) -> float:
+        """Return the velocity up to which a contact rests [m/s]."""
+        return min(_SLIDES * self.velocity_tolerance, _SLOW) * float(np.abs(problem.u_free).max())
 
     def _stages(
-        self, problem: ContactProblem, warm: bool
+        self, problem: ContactProblem, warm: bool, motion: bool, many: bool
     ) -> Iterator[tuple[str, Callable[[int], _Solver], bool]]:
         """Yield names, solvers by their largest number of iterations, and whether each begins with the best so far."""
         limits = self.tolerance, self.velocity_tolerance
+        if many and not warm:
+            yield "admm of bodies", self._cold, False
         # from nothing, sweeps would leave much of the friction where they happen to begin
         if warm or problem.delassus.form is None:
             yield "sweeps", self._first, False
@@ -199,6 +277,8 @@ class Alternating:
             yield "admm, small penalty", self._static, False
             later = [("admm, balanced penalty", self._moving, False)]
             if problem.delassus.rigid is not None:
+                if motion and not (warm or many):
+                    yield "admm of bodies", self._ended, True
                 yield "Newton", self._newton, False
                 interior = [
                     ("interior point", self._interior, False),
@@ -239,6 +319,18 @@ class Alternating:
         # velocities of sweeps end near a solution, but lead a small penalty astray
         return _even(lambda p, s: solver(p, ContactStart(s.impulse, np.zeros_like(s.velocity))))
 
+    def _ended(self, most: int) -> _Solver:
+        solver = BodyADMM(*self._tight, most, _ENDING)
+
+        def solve(problem: ContactProblem, start: ContactStart) -> ContactSolution:
+            found = solver(problem, ContactStart(start.impulse, np.zeros_like(start.velocity)))
+            if self._rests(problem, found.impulse):
+                return found
+            # forces that press moving stones against each other would slow all steps that follow: Newton's are smaller
+            return replace(found, impulse=start.impulse, velocity=start.velocity)
+
+        return solve
+
     def _newton(self, most: int) -> _Solver:
         return _even(ProximalNewton(*self._tight, min(_NEWTON_STEPS, most)))
 
@@ -260,6 +352,12 @@ class Alternating:
         left = residual(problem, found.impulse)
         within = left.within(self.tolerance, self.velocity_tolerance)
         return replace(found, natural_map=left.natural_map, converged=within, why=why)
+
+
+def _moving(problem: ContactProblem) -> int:
+    """Return the number of rigid bodies that move."""
+    contacts = problem.delassus.rigid
+    return 0 if contacts is None else int(np.count_nonzero(contacts.inertia[:, 0]))
 
 
 def _even(solver: _Solver) -> _Solver:

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 from archmodel.query.api import asked_columns, attributes, find_faces, find_rows
 from archmodel.query.attributes import Attribute
-from archmodel.query.geojson import feature_collection, flattened
 from moma.cli.text.formats import USUAL_COLUMNS, as_csv, as_geojson, as_json, as_table, shown_columns
 
 if TYPE_CHECKING:
@@ -44,6 +43,8 @@ def answer(session: "Session", question: Question, format: str) -> tuple[str, st
     asked = (question.kind, question.where, question.run, names)
     if format == "geojson":
         faces = find_faces(session, *asked)
+        from archmodel.query.geojson import feature_collection, flattened  # and with it numpy
+
         return as_geojson(feature_collection(flattened(faces) if question.flat else faces)), ""
     rows = find_rows(session, *asked)
     if format == "json":

@@ -189,7 +189,8 @@ def _without_outliers(points, known, view, frame, work):
             rival = _grow(other, np.int64(_FEWEST), points, known, view, frame, work)
             if rival < score:
                 score = rival
-                accepted[:] = other
+                for i in range(n):
+                    accepted[i] = other[i]
     if score == np.inf:  # too narrow to search
         accepted[:] = True
     return accepted

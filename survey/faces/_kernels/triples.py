@@ -104,10 +104,12 @@ def _keep(truncated, distances, scores, best):
             break
     while last > 1 and scores[last - 1] > truncated:
         scores[last] = scores[last - 1]
-        best[last, :] = best[last - 1]
+        for m in range(n):
+            best[last, m] = best[last - 1, m]
         last -= 1
     scores[last] = truncated
-    best[last, :] = distances
+    for m in range(n):
+        best[last, m] = distances[m]
 
 
 @njit(cache=True)
@@ -156,7 +158,8 @@ def search_triples(points, size, known, view):
                 near += abs(d) < scores[0]
             if near >= size:
                 scores[0] = smallest(distances, size)
-                best[0, :] = distances
+                for m in range(n):
+                    best[0, m] = distances[m]
             if known and truncated < scores[STARTS]:
                 _keep(truncated, distances, scores, best)
     return best

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from mechanics.contact import detection
 from mechanics.contact.contacts import gaps, material_points
 from mechanics.contact.detection import Detector
 from mechanics.dynamics.simulation import Simulation
@@ -325,3 +326,28 @@ def test_wherever_a_box_lies_on_another_the_keys_are_unique_and_the_area_is_the_
         assert contacts.area.sum() == pytest.approx(other.area.sum(), rel=1e-9)
     else:  # beside one another: some upright face parts them by more than the lying ones do
         assert gaps(contacts, state).max() > gap - 1e-3 * 0.6
+
+
+@pytest.mark.parametrize("fidelity", [Fidelity.RIGID, SOFT])
+def test_any_number_of_threads_finds_the_same_contacts_in_the_same_order(monkeypatch, fidelity):
+    stones = [
+        brick(f"{x} {z}", (x + 0.5 * (z % 2), 0, z), (x + 1 + 0.5 * (z % 2), 1, z + 1), fidelity)
+        for x in range(3)
+        for z in range(4)
+    ]
+    turned = [moved(stone, wedge((1, 2, 3), 0.1 * n)) for n, stone in enumerate(stones)]
+    model, state = build_model(scene(ground(), *turned))
+    reach = np.zeros(len(model.mass))
+    parts = []
+    monkeypatch.setattr(detection, "_PART", 4)
+    runs = [Detector(model.surfaces, model.fixed, 0.1, threads=threads) for threads in (1, 2, 5)]
+    pooled = detection.ThreadPoolExecutor
+    monkeypatch.setattr(detection, "ThreadPoolExecutor", lambda count: parts.append(count) or pooled(count))
+    # the second time with the faces that kept pairs apart the first time
+    whole, *others = [(find(state, reach), find(state, reach)) for find in runs]
+    assert {2, 5} == set(parts)
+    for other in others:
+        for one, same in zip(whole, other, strict=True):
+            assert len(one) > 50
+            for name in ("bodies", "key", "frame", "area", "arm"):
+                np.testing.assert_array_equal(getattr(one, name), getattr(same, name))

@@ -306,6 +306,7 @@ def test_inner_points_carry_area_centroid_and_second_moments_exactly(seed, point
 def test_a_single_point_is_the_centroid_of_the_overlap(seed, inner, degrees):
     stack = Stack(seed, degrees)
     large_enough(stack)
+    assume(stack.common[:, 2].max() <= 0.1)  # all corners are watched; otherwise the deepest one counts
     whole, first, _ = moments(stack.common[:, :2])
     place, _, nearest, area = stack.points(points=1, inner=inner)
     assert len(place) == 1

@@ -1,4 +1,4 @@
-"""Factors of matrices of 6 × 6 blocks, against numpy."""
+"""Factors of matrices of 6 × 6 blocks, and of 3 × 3 blocks in the plane, against numpy."""
 
 import numpy as np
 import pytest
@@ -9,65 +9,66 @@ from mechanics.solvers._kernels.body_cholesky import factorise, panels_of, posto
 
 
 def blocks_of(panels, value):
-    """Return views of the 6 × 6 blocks by (column's body, row's body)."""
-    views = {}
+    """Return views of the blocks by (column's body, row's body)."""
+    views, size = {}, panels.size
     for s in range(len(panels.body) - 1):
         rows = panels.row[panels.first[s] : panels.first[s + 1]]
-        shape = 6 * (panels.body[s + 1] - panels.body[s]), 6 * len(rows)
+        shape = size * (panels.body[s + 1] - panels.body[s]), size * len(rows)
         panel = value[panels.start[s] : panels.start[s + 1]].reshape(shape)
         for i, k in enumerate(range(panels.body[s], panels.body[s + 1])):
             for p, r in enumerate(rows):
-                views[k, int(r)] = panel[6 * i : 6 * i + 6, 6 * p : 6 * p + 6]
+                views[k, int(r)] = panel[size * i : size * (i + 1), size * p : size * (p + 1)]
     return views
 
 
-def random_matrix(pairs, count, rng):
-    """Return a dense, positive definite matrix (6 count, 6 count) with blocks at the pairs."""
-    dense = np.zeros((6 * count, 6 * count))
+def random_matrix(pairs, count, rng, size=6):
+    """Return a dense, positive definite matrix (size count, size count) with blocks at the pairs."""
+    dense = np.zeros((size * count, size * count))
     for i, j in pairs:
-        block = rng.normal(size=(6, 6))
-        dense[6 * i : 6 * i + 6, 6 * j : 6 * j + 6] = block
-        dense[6 * j : 6 * j + 6, 6 * i : 6 * i + 6] = block.T
+        block = rng.normal(size=(size, size))
+        dense[size * i : size * (i + 1), size * j : size * (j + 1)] = block
+        dense[size * j : size * (j + 1), size * i : size * (i + 1)] = block.T
     return dense + np.diag(1.0 + np.abs(dense).sum(axis=1))
 
 
-def factors(dense, pairs, count, spare):
+def factors(dense, pairs, count, spare, size=6):
     """Return panels and factors of a dense matrix, and whether it was positive definite."""
-    panels = panels_of(pairs, count, spare)
+    panels = panels_of(pairs, count, spare, size)
     value = np.zeros(panels.start[-1])
     for (k, r), view in blocks_of(panels, value).items():
         if r >= k:
-            view[:] = dense[6 * k : 6 * k + 6, 6 * r : 6 * r + 6]
+            view[:] = dense[size * k : size * (k + 1), size * r : size * (r + 1)]
     return panels, value, factorise(panels, value)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(
     count=st.integers(1, 14),
     density=st.floats(0, 1),
     spare=st.sampled_from([0.0, 0.3, 5.0]),
     seed=st.integers(0, 99),
+    size=st.sampled_from([3, 6]),
 )
-def test_solutions_are_those_of_numpy_whatever_the_pattern_and_the_panels(count, density, spare, seed):
+def test_solutions_are_those_of_numpy_whatever_the_pattern_and_the_panels(count, density, spare, seed, size):
     rng = np.random.default_rng(seed)
     every = np.array([(i, j) for i in range(count) for j in range(i)], dtype=np.int64).reshape(-1, 2)
     pairs = every[rng.random(len(every)) < density]
     rank = postorder(pairs, count)
     np.testing.assert_array_equal(np.sort(rank), np.arange(count))
     pairs = rank[pairs].reshape(-1, 2)
-    dense = random_matrix(pairs, count, rng)
-    panels, value, regular = factors(dense, pairs, count, spare)
+    dense = random_matrix(pairs, count, rng, size)
+    panels, value, regular = factors(dense, pairs, count, spare, size)
     assert regular
-    right = rng.normal(size=6 * count)
+    right = rng.normal(size=size * count)
     found = right.copy()
-    solve(panels, value, found, np.empty(6 * count))
+    solve(panels, value, found, np.empty(size * count))
     np.testing.assert_allclose(found, np.linalg.solve(dense, right), rtol=1e-9, atol=1e-12)
 
 
 def test_a_chain_of_bodies_fills_nothing_in():
     count = 30
     pairs = np.column_stack([np.arange(count - 1), np.arange(1, count)])
-    panels = panels_of(pairs, count, 0.0)
+    panels = panels_of(pairs, count, 0.0, 6)
     # two blocks a column, but one in the last
     assert sum(r >= k for k, r in blocks_of(panels, np.zeros(panels.start[-1]))) == 2 * count - 1
 

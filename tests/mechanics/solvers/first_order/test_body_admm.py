@@ -99,6 +99,7 @@ class _Unknown:
     """W without its bodies."""
 
     rigid = None
+    plane = None
 
     def __init__(self, delassus):
         self.diagonal = delassus.diagonal

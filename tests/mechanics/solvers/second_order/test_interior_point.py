@@ -253,19 +253,36 @@ def test_few_iterations_are_counted_and_the_best_is_given_back():
         assert answer.natural_map == natural_map(problem, answer.impulse)
 
 
-def test_of_many_failures_the_best_is_given_back(monkeypatch):
-    """Newton's method is tried ever nearer to the solution, and fails: the path's own iterates count."""
+def failing(monkeypatch, rounded=False):
+    """Let every try of Newton's method fail; return η of the impulses from which each began."""
     tried = []
 
     class Failing:
         def __init__(self, *settings):
             self.settings = settings
 
-        def __call__(self, problem, start):
+        def ended(self, problem, start):
             tried.append(natural_map(problem, start.impulse))
-            return ContactSolution(2.0 * start.impulse, start.velocity, 2, 0.0, False)
+            return ContactSolution(2.0 * start.impulse, start.velocity, 2, 0.0, False), rounded
 
     monkeypatch.setattr(interior_point, "Newton", Failing)
+    return tried
+
+
+@pytest.mark.parametrize("rounded", [False, True])
+def test_near_a_solution_a_path_follows_unless_rounding_ended_newtons_method(monkeypatch, rounded):
+    """η of the start is within ten times the tolerance: that Newton's method gives up there proves nothing."""
+    problem = problem_of("elastic on rigid")
+    near = 1.000003 * InteriorPoint(1e-9, 1e-7)(problem, cold(problem)).impulse
+    assert 1e-6 < natural_map(problem, near) < 1e-5
+    failing(monkeypatch, rounded)
+    answer = InteriorPoint(1e-6, 1e-4)(problem, ContactStart(near, np.zeros_like(near)))
+    assert answer.converged is not rounded
+
+
+def test_of_many_failures_the_best_is_given_back(monkeypatch):
+    """Newton's method is tried ever nearer to the solution, and fails: the path's own iterates count."""
+    tried = failing(monkeypatch)
     problem = problem_of("elastic on rigid")
     answer = InteriorPoint(1e-30, 1e-30)(problem, cold(problem))
     assert len(tried) >= 3

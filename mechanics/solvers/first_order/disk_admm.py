@@ -1,0 +1,144 @@
+"""ADMM between rigid bodies of the plane: compiled, with its own factors in blocks of 3 × 3.
+
+The iteration of `ADMM`, with a penalty of each contact's own compliance. An iteration is one pass over the contacts and
+one solution with the factors of M + H Σ⁻¹ Hᵀ (mechanics/solvers/_kernels/disk_admm.py).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mechanics.arrays import Array, Ints
+from mechanics.delassus.elimination import elimination
+from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart, PlaneContacts
+from mechanics.problem.residual import Residual, project_on_cone, residual
+from mechanics.solvers._kernels import body_cholesky as cholesky
+from mechanics.solvers._kernels import disk_admm as kernel
+from moma.errors import SolverError
+
+__all__ = ["DiskADMM"]
+
+
+# overshoot of the impulses [-]
+_OVER = 1.6
+# zeros that a panel of the factors may hold, over its other blocks [-]
+_SPARE = 0.2
+# velocities of a body
+_VELOCITIES = 3
+
+
+@dataclass(frozen=True)
+class DiskADMM:
+    """Alternating directions between bodies of the plane until η and the velocity error are within their tolerances.
+
+    Attributes
+    ----------
+    tolerance, velocity_tolerance, max_iterations : as in `ADMM`
+    penalty : σ of a contact over the mean diagonal of its W_αα; larger values bear with contacts that open and slide,
+        smaller ones find the forces of disks that stay in touch sooner [-]
+    check_every : iterations between two looks at η
+    """
+
+    tolerance: float = 1e-6
+    velocity_tolerance: float = 1e-5
+    max_iterations: int = 2000
+    penalty: float = 0.1
+    check_every: int = 20
+
+    def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
+        """Solve from `start`, whose velocity û lets the iteration continue where it stopped; return the best look.
+
+        Raises
+        ------
+        SolverError : if W is not that of rigid bodies of the plane
+        """
+        contacts = problem.delassus.plane
+        if contacts is None:
+            raise SolverError(
+                "bodies are not those of the plane", where="ADMM of disks", remedy='use the method "admm"'
+            )
+        limits = self.tolerance, self.velocity_tolerance
+        impulse = project_on_cone(start.impulse, problem.friction, problem.cohesion)
+        left = residual(problem, impulse)
+        best, iterations = (left, impulse, start.velocity), 0
+        if left.within(*limits) or self.max_iterations == 0:
+            return _solution(best, iterations, limits)
+        run = _Run(problem, contacts, self.penalty, impulse, start.velocity)
+        while not left.within(*limits) and iterations < self.max_iterations:
+            count = min(self.check_every, self.max_iterations - iterations)
+            run.advance(count)
+            iterations += count
+            left = residual(problem, run.impulse)
+            if left.natural_map <= best[0].natural_map or left.within(*limits):
+                best = left, run.impulse.copy(), run.velocity
+        return _solution(best, iterations, limits)
+
+
+def _solution(
+    best: tuple[Residual, Array, Array], iterations: int, limits: tuple[float, float]
+) -> ContactSolution:
+    left, impulse, velocity = best
+    return ContactSolution(impulse, velocity, iterations, left.natural_map, left.within(*limits))
+
+
+class _Run:
+    """Iterates of one solution."""
+
+    def __init__(
+        self,
+        problem: ContactProblem,
+        contacts: PlaneContacts,
+        penalty: float,
+        impulse: Array,
+        velocity: Array,
+    ) -> None:
+        order, side, panels = _eliminated(contacts)
+        self._sigma = penalty * np.einsum("cii->c", problem.delassus.diagonal) / 2.0
+        self._touching = kernel.DiskTouching(
+            side,
+            contacts.normal,
+            contacts.lever,
+            problem.biased,
+            problem.friction,
+            problem.cohesion,
+            1.0 / self._sigma,
+        )
+        x = impulse - velocity / self._sigma[:, None]
+        count = _VELOCITIES * len(order)
+        self._iterate = kernel.DiskIterate(x, np.empty_like(x), np.empty_like(x), np.zeros(count))
+        mass = np.ascontiguousarray(1.0 / contacts.inertia[order])
+        value: Array = kernel.assemble_disks(self._touching, mass, panels)
+        if not cholesky.factorise(panels, value):
+            raise SolverError("W is not a number", where="ADMM of disks", remedy="use another method")
+        self._factors = kernel.DiskFactors(panels, value)
+
+    @property
+    def impulse(self) -> Array:
+        """Impulses in their cones (nc, 2) [N s]."""
+        return self._iterate.z
+
+    @property
+    def velocity(self) -> Array:
+        """û = -σ y (nc, 2) [m/s]."""
+        velocity: Array = self._sigma[:, None] * (self._iterate.z - self._iterate.x)
+        return velocity
+
+    def advance(self, count: int) -> None:
+        """Make iterations."""
+        kernel.advance_disks(self._iterate, count, _OVER, self._touching, self._factors)
+
+
+def _eliminated(contacts: PlaneContacts) -> tuple[Ints, Ints, cholesky.Panels]:
+    """Return the moving bodies in the order of their elimination, the contacts' places in it, and the panels."""
+    moving = np.flatnonzero(contacts.inertia[:, 0] > 0)
+    place = np.full(len(contacts.inertia), -1)
+    place[moving] = np.arange(len(moving))
+    side = place[contacts.body]
+    inner = side[(side >= 0).all(axis=1)]
+    pairs = np.unique(np.sort(inner, axis=1), axis=0) if len(inner) else inner
+    rank = elimination(pairs, moving, contacts.centre)
+    rank = cholesky.postorder(np.ascontiguousarray(rank[pairs]), len(moving))[rank]
+    panels = cholesky.panels_of(np.ascontiguousarray(rank[pairs]), len(moving), _SPARE, _VELOCITIES)
+    order = np.empty_like(moving)
+    order[rank] = moving
+    return order, np.where(side >= 0, rank[side], -1), panels

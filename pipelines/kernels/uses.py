@@ -1,0 +1,107 @@
+"""Kernels that commands call, with the types of their arguments: what a first use has to compile.
+
+The list ``usual.json`` was recorded from the sample by ``python -m benchmarks.first_use``. It only saves time: a kernel
+that it does not name is compiled where it is called, one that is no longer called like that is compiled in vain.
+"""
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core import event
+
+__all__ = ["COMMANDS", "LISTS", "KernelUse", "kernels_of", "recording"]
+
+COMMANDS = ("ingest", "run")
+"""Commands with a list, in their usual order."""
+
+LISTS = Path(__file__).with_name("usual.json")
+"""File of the lists, by command."""
+
+
+@dataclass(frozen=True)
+class KernelUse:
+    """One kernel, and the types that it is called with.
+
+    Attributes
+    ----------
+    module, name : of the compiled function
+    types : of its arguments, as plain JSON: "float64" for a number, ["float64", 2, "C"] for an array, with "readonly"
+        added where it is; {"of": [...]} for a tuple, {"named": "module:Class", "of": [...]} for a named one
+    """
+
+    module: str
+    name: str
+    types: tuple[Any, ...]
+
+    def compile(self) -> None:
+        """Compile the kernel, or load it if the cache of kernels has it."""
+        kernel = getattr(import_module(self.module), self.name)
+        kernel.compile(tuple(_decoded(one) for one in self.types))
+
+
+def kernels_of(command: str) -> tuple[KernelUse, ...]:
+    """Return the kernels of a command in the order of their first calls."""
+    recorded = json.loads(LISTS.read_text(encoding="utf-8"))
+    return tuple(KernelUse(one["module"], one["name"], tuple(one["types"])) for one in recorded[command])
+
+
+@contextmanager
+def recording() -> Iterator[list[KernelUse]]:
+    """Collect the kernels that Python code calls, and that are compiled, within a with-block."""
+    listener = _Recorder()
+    event.register("numba:compile", listener)
+    try:
+        yield listener.uses
+    finally:
+        event.unregister("numba:compile", listener)
+
+
+class _Recorder(event.Listener):  # type: ignore[misc]
+    """Listener to compilations; those within another are of kernels that kernels call."""
+
+    def __init__(self) -> None:
+        self.uses: list[KernelUse] = []
+        self._depth = 0
+
+    def on_start(self, event: Any) -> None:
+        """Take down a kernel that Python code calls."""
+        if self._depth == 0:
+            function = event.data["dispatcher"].py_func
+            types = tuple(_encoded(one) for one in event.data["args"])
+            self.uses.append(KernelUse(function.__module__, function.__qualname__, types))
+        self._depth += 1
+
+    def on_end(self, event: Any) -> None:
+        """Leave a compilation."""
+        self._depth -= 1
+
+
+def _encoded(kind: Any) -> Any:
+    if isinstance(kind, numba.types.Array):
+        return [str(kind.dtype), kind.ndim, kind.layout, *([] if kind.mutable else ["readonly"])]
+    if isinstance(kind, numba.types.BaseTuple):
+        parts: dict[str, Any] = {"of": [_encoded(one) for one in kind.types]}
+        named = getattr(kind, "instance_class", tuple)
+        return parts if named is tuple else {"named": f"{named.__module__}:{named.__qualname__}", **parts}
+    return str(kind)
+
+
+def _decoded(text: Any) -> Any:
+    if isinstance(text, str):
+        return getattr(numba.types, "boolean" if text == "bool" else text)
+    if isinstance(text, list):
+        return numba.types.Array(_decoded(text[0]), text[1], text[2], readonly=len(text) > 3)
+    parts = [_decoded(one) for one in text["of"]]
+    if "named" not in text:
+        return numba.types.Tuple(parts)
+    module, _, name = text["named"].partition(":")
+    named = getattr(import_module(module), name)
+    if all(one == parts[0] for one in parts):
+        return numba.types.NamedUniTuple(parts[0], len(parts), named)
+    return numba.types.NamedTuple(parts, named)

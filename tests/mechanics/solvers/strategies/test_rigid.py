@@ -1,0 +1,113 @@
+"""Walls at rest and in motion: forces that hold them are kept, and what does not change is not made again."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.generated import running_bond
+from benchmarks.scenes import engine_scene
+from mechanics.contact.contacts import gaps
+from mechanics.delassus.rigid import RigidDelassus
+from mechanics.dynamics.simulation import Simulation
+from mechanics.model.model import build_model
+from mechanics.problem.problem import ContactStart
+from mechanics.scene.loads.load import Loads
+from mechanics.scene.scene import SolverSettings
+from mechanics.solvers.first_order.body_admm import BodyADMM
+from mechanics.solvers.strategies.rigid import Alternating
+
+FREE = 9.81 * 1e-3  # velocity that gravity gives in a step of 1 ms [m/s]
+
+
+class Tilt:
+    """Gravity as on a support that is accelerated along the wall."""
+
+    until = np.inf
+
+    def __init__(self, share):
+        self.share = share
+
+    def __call__(self, time, gravity):
+        return gravity + np.linalg.norm(gravity) * np.array([self.share(time), 0.0, 0.0])
+
+
+def wall(bricks, share=None, **solver):
+    """A square wall in running bond on a slab; `share` of gravity along it as a function of time."""
+    scene = engine_scene(running_bond(bricks, bricks), step=1e-3, theta=0.5, tolerance=1e-6, sweeps=2000)
+    loads = Loads() if share is None else Loads((Tilt(share),))
+    time = replace(scene.time, duration=0.05)
+    return replace(scene, loads=loads, time=time, solver=SolverSettings(**solver))
+
+
+def followed(scene, count):
+    simulation = Simulation(*build_model(scene))
+    return [simulation.step() for _ in range(count)]
+
+
+@pytest.fixture(scope="module")
+def rest():
+    """Wall of 10 courses of 10 bricks on a slab for 80 steps of 1 ms."""
+    return followed(wall(10), 80)
+
+
+def test_a_settled_wall_keeps_its_forces(rest):
+    # balanced once more, to far below the tolerance, they need no iteration in any later step
+    work = np.array([step.solution.iterations for step in rest[1:]])
+    assert all(step.solution.converged for step in rest)
+    assert np.count_nonzero(work) <= 4
+    assert not work[20:].any()
+
+
+def test_a_settled_wall_neither_speeds_up_nor_opens(rest):
+    for step in rest[1:]:
+        assert np.abs(step.after.velocity[:, :3]).max() <= 1e-6 * FREE
+    last = rest[-1]
+    # contacts may break their law by 10⁻⁵ g h, which is an ångström in a step: gaps stay far below
+    assert np.abs(gaps(last.contacts, last.after)).max() <= 1e-6 * FREE * 1e-3
+
+
+def test_forces_are_not_sought_where_a_contact_moves(rest):
+    last = rest[-1]
+    problem = last.problem
+    warm = ContactStart(last.solution.impulse, last.solution.velocity, 0)
+    # all stones fly up, by ten times what the tolerance leaves undecided
+    lifted = replace(problem, u_free=problem.u_free + np.array([1e-3 * FREE, 0.0, 0.0]))
+    solver = Alternating()
+    assert solver._kept(lifted, warm, follows=True) is None
+    kept = solver._kept(problem, warm, follows=True)
+    assert kept is not None
+    assert kept.iterations == 0
+    np.testing.assert_array_equal(kept.impulse, warm.impulse)
+
+
+def test_a_tilted_wall_needs_no_newton_step_to_stay_at_rest():
+    # ADMM with a small penalty gives up a breath from the solution
+    first = followed(wall(20, lambda time: 0.2), 1)[0]
+    assert first.solution.converged
+    assert first.solution.why.startswith("admm of bodies")
+
+
+def test_factors_that_are_kept_give_the_same_bits():
+    step = followed(wall(6, lambda time: 0.3 * np.sin(30.0 * time)), 12)[-1]
+    own = step.problem.delassus
+    assert "bodies" in own.memo
+    start = ContactStart(0.9 * step.solution.impulse, step.solution.velocity)
+    fresh = RigidDelassus(own.body, own.geometry, own.inertia, own.schedule, own.threads, own.centre)
+    one = BodyADMM()(step.problem, start)
+    other = BodyADMM()(replace(step.problem, delassus=fresh), start)
+    assert one.iterations > 0
+    np.testing.assert_array_equal(one.impulse, other.impulse)
+
+
+def test_contacts_of_a_wall_that_only_trembles_are_kept_where_its_motion_may_be_wrong():
+    def shaken(time):
+        return 0.3 * np.sin(30.0 * time)
+
+    loose = followed(wall(8, shaken, motion_error=1e-4), 50)
+    found = {id(step.found) for step in loose}
+    assert all(step.solution.converged for step in loose)
+    assert len(found) <= 10
+    # nothing slides in truth
+    moved = loose[-1].after.centre - loose[0].before.centre
+    assert np.abs(moved).max() <= 1e-4

@@ -1,0 +1,50 @@
+"""The lists of kernels that a first use compiles, against the kernels themselves."""
+
+import inspect
+from importlib import import_module
+
+import numba
+import numpy as np
+import pytest
+from numba import njit
+
+from pipelines.kernels.uses import COMMANDS, _decoded, _encoded, kernels_of, recording
+
+USES = {
+    f"{command}-{use.name}-{at}": use for command in COMMANDS for at, use in enumerate(kernels_of(command))
+}
+
+
+@pytest.mark.parametrize("use", USES.values(), ids=USES)
+def test_a_listed_kernel_exists_and_takes_the_listed_arguments(use):
+    kernel = getattr(import_module(use.module), use.name)
+    assert len(inspect.signature(kernel.py_func).parameters) == len(use.types)
+    for given in use.types:
+        kind = _decoded(given)
+        assert _encoded(kind) == given
+        if isinstance(kind, numba.types.BaseNamedTuple):
+            assert len(kind.instance_class._fields) == len(kind.types)
+
+
+def test_no_kernel_is_listed_twice_for_a_command():
+    for command in COMMANDS:
+        listed = kernels_of(command)
+        assert all(use not in listed[:place] for place, use in enumerate(listed))
+
+
+def test_kernels_that_python_calls_are_recorded_with_their_types():
+    @njit
+    def inner(numbers):
+        return numbers[0, 0]
+
+    @njit
+    def outer(numbers, pair, asked):
+        return inner(numbers) + pair[0] if asked else pair[1][0]
+
+    readonly = np.zeros((2, 3))
+    readonly.flags.writeable = False
+    with recording() as uses:
+        outer(readonly, (1, np.arange(6)[::2]), True)
+    (use,) = uses
+    assert use.types == (["float64", 2, "C", "readonly"], {"of": ["int64", ["int64", 1, "A"]]}, "bool")
+    assert tuple(_decoded(one) for one in use.types) == outer.signatures[0]
