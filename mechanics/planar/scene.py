@@ -9,7 +9,7 @@ import numpy as np
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.law import Law
 from mechanics.scene.loads.load import Loads
-from mechanics.scene.scene import LawRule, SolverSettings
+from mechanics.scene.scene import LawRule, Method, SolverSettings
 from mechanics.stones.settings import Setting, check_settings
 from moma.errors import SceneError
 
@@ -142,6 +142,7 @@ class PlanarScene:
     thickness : of the slice; masses and areas are for it [m]
     time, solver : settings; *auto* sweeps, and goes on with ADMM and Newton where 500 sweeps do not solve a step. Fewer
         `max_iterations` are sweeps alone, as slow flows of many disks are run
+    min_sweeps : sweeps of each step at least, with the method nsgs
     loads : what acts besides gravity; the plane is z = 0 of their space, moments and turns are about z
     frame_every : keep a frame of the motion every so many steps; 0 keeps the first and last only
     """
@@ -165,6 +166,7 @@ class PlanarScene:
     thickness: float = 1.0
     time: PlanarTime = field(default_factory=PlanarTime)
     solver: SolverSettings = field(default_factory=SolverSettings)
+    min_sweeps: int = 0
     loads: Loads = field(default_factory=Loads)
     frame_every: int = 0
 
@@ -180,6 +182,13 @@ class PlanarScene:
             ("gravity", self.gravity, np.isfinite(self.gravity).all(), "give two numbers"),
             ("alert_distance", self.alert_distance, 0 <= self.alert_distance < np.inf, "give 0 or more"),
             ("thickness", self.thickness, 0 < self.thickness < np.inf, "give metres greater than 0"),
+            (
+                "min_sweeps",
+                self.min_sweeps,
+                self.min_sweeps == 0
+                or (0 < self.min_sweeps <= self.solver.max_iterations and self.solver.method is Method.NSGS),
+                "give 0, or up to max_iterations with the method nsgs",
+            ),
             ("frame_every", self.frame_every, self.frame_every >= 0, "give 0 or a number of steps"),
         ):
             if not ok:

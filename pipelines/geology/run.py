@@ -87,9 +87,11 @@ def planar_scene(scene: GeologyScene, sample: PreparedSample) -> PlanarScene:
         solver=SolverSettings(
             Method.NSGS,
             tolerance=solver.tolerance,
+            velocity_tolerance=np.inf,
             max_iterations=solver.max_iterations,
             threads=solver.threads,
         ),
+        min_sweeps=solver.min_iterations,
         loads=setup.loads,
     )
 
