@@ -182,29 +182,36 @@ class Observation:
             np.savez(file, **arrays)
         fresh.replace(path)
 
-    def rows(self) -> dict[str, dict[str, Array]]:
-        """Return the columns of all rows so far, by cell, in the order of steps."""
+    def rows(self, every: int) -> dict[str, dict[str, Array]]:
+        """Return the columns of the rows of each `every`-th step and the last, by cell, in the order of steps."""
         return {
-            name: read_rows(self._folder / f"cell-{number:03d}.csv")
+            name: read_rows(self._folder / f"cell-{number:03d}.csv", every)
             for number, name in enumerate(self._groups)
         }
 
-    def instants(self) -> list[Fields]:
-        """Return the instants so far, in the order of steps."""
-        found = []
-        for path in sorted(self._folder.glob("fields-*.npz")):
+    def instants(self, every: int) -> list[Fields]:
+        """Return the instants of each `every`-th step and the last, in the order of steps."""
+        found, paths = [], sorted(self._folder.glob("fields-*.npz"))
+        for path in paths:
+            if int(path.stem.partition("-")[2]) % every and path != paths[-1]:
+                continue
             with np.load(path) as data:
                 arrays = {name: data[name] for name in data.files}
             found.append(Fields(**arrays | {"step": int(arrays["step"]), "time": float(arrays["time"])}))
         return found
 
 
-def read_rows(path: Path) -> dict[str, Array]:
-    """Return the columns of a file of rows; of rows of one step the last, and none that a kill cut short."""
+def read_rows(path: Path, every: int = 1) -> dict[str, Array]:
+    """Return the columns of a file of rows; of rows of one step the last, and none that a kill cut short.
+
+    A run that was stopped leaves a row of the instant at which it was; it is left out if there is a later one, and its
+    step is no multiple of `every`.
+    """
     rows: dict[int, list[float]] = {}
     with path.open(encoding="utf-8", newline="") as file:
         for values in list(csv.reader(file))[1:]:
             if len(values) == len(CELL_COLUMNS):
-                rows[int(values[0])] = [float(value) for value in values]
-    table = np.array([rows[step] for step in sorted(rows)]).reshape(-1, len(CELL_COLUMNS))
-    return dict(zip(CELL_COLUMNS, table.T, strict=True))
+                rows[int(values[0])] = [float(value) for value in values[1:]]
+    steps = sorted(step for step in rows if step % every == 0 or step == max(rows))
+    table = np.array([rows[step] for step in steps]).reshape(-1, len(CELL_COLUMNS) - 1)
+    return dict(zip(CELL_COLUMNS, [np.array(steps), *table.T], strict=True))

@@ -184,7 +184,7 @@ def _write(
         f"{np.median(history.natural_map):.1e}, largest {history.natural_map.max():.1e}; "
         f"{share:.0%} of {result.steps} steps above {scene.solver.tolerance:g}"
     )
-    rows = observation.rows()
+    rows = observation.rows(scene.output.every)
     cells = {}
     for number, (name, columns) in enumerate(rows.items()):
         cells[name] = f"cell-{number:03d}.csv"
@@ -192,7 +192,7 @@ def _write(
             writer = csv.writer(file)
             writer.writerow(CELL_COLUMNS)
             writer.writerows(zip(*(map(repr, column.tolist()) for column in columns.values()), strict=True))
-    instants = observation.instants()
+    instants = observation.instants(scene.output.fields_every)
     _write_fields(folder, instants, sample)
     duration = scene.time.step * scene.time.steps
     if scene.output.figures:
