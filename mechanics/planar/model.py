@@ -56,7 +56,7 @@ class PlanarModel:
 
     @property
     def walls_move(self) -> bool:
-        """Whether walls change their places: they are driven, or have a mass."""
+        """Truth of walls that change their places: they are driven, or have a mass."""
         return bool(self.scene.loads.motions) or not self.fixed[len(self.radius) :].all()
 
     def ends(self, state: PlanarState) -> Array:

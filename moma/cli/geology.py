@@ -10,7 +10,7 @@ from moma.cli.console import reporting, say
 from moma.cli.options import Json, SceneArgument
 from moma.cli.progress import Interruption, progress_bars
 
-__all__ = ["geology"]
+__all__ = ["Experiment", "geology"]
 
 
 class Experiment(StrEnum):
