@@ -11,8 +11,10 @@ from pipelines.geology.file import EXPERIMENTS, parse_geology, read_geology
 from pipelines.geology.observe import CELL_COLUMNS, read_rows
 from pipelines.geology.run import run_geology
 from pipelines.geology.sample import prepare
-from tests.moma.commands import answer, fails
+from tests.docs.test_docs import commands
+from tests.moma.commands import answer, fails, prints
 from tests.paths import ROOT
+from tests.pipelines.scenes import small_geology
 
 SAMPLES = ROOT / "data/samples/geology"
 SMALL = """
@@ -148,3 +150,13 @@ def test_a_cell_outside_the_sample_is_refused_at_its_line(tmp_path):
 
 def test_the_command_knows_all_experiments():
     assert {one.value for one in Experiment} == set(EXPERIMENTS)
+
+
+def test_the_commands_of_the_how_to_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    small_geology(tmp_path / "data/samples/geology")
+    asked = commands("docs/howto/geology.md")
+    assert {command[2] for command in asked} == set(EXPERIMENTS)
+    for command in asked:
+        assert "results in" in prints(*command[1:])
+    assert (tmp_path / "out/geology/fault/cells.png").stat().st_size > 10_000
