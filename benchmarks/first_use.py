@@ -1,7 +1,7 @@
 """First use of MOMA: ``python -m benchmarks.first_use [--record]``; see benchmarks/README.md.
 
 The sample is taken in and run with an empty cache of kernels, and again with the full one; the difference is what
-compiling takes. ``--record`` renews the lists of kernels in ``pipelines/kernels``, after a change of what kernels are
+compiling takes. ``--record`` renews the lists of kernels in ``moma/kernels``, after a change of what kernels are
 called with (Linux).
 """
 
@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 
 from benchmarks.report import machine
-from pipelines.kernels.uses import COMMANDS, LISTS
+from moma.kernels.uses import COMMANDS, LISTS
 
 __all__ = ["main"]
 
@@ -25,7 +25,7 @@ import json, os, sys
 # on one processor no second process compiles what is to be recorded
 os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:1])
 from moma.cli import app
-from pipelines.kernels.uses import recording
+from moma.kernels.uses import recording
 with recording() as uses:
     app(sys.argv[2:], prog_name="moma", standalone_mode=False)
 with open(sys.argv[1], "w") as file:

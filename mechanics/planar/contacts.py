@@ -91,7 +91,7 @@ class PlanarDetector:
 
     def _neighbours_of(self, ends: Array) -> EndNeighbours:
         """Find the walls that share ends, again only where walls move."""
-        if self._neighbours is None or self._model.scene.loads.motions:
+        if self._neighbours is None or self._model.walls_move:
             self._neighbours = end_neighbours(ends)
         return self._neighbours
 
@@ -111,6 +111,8 @@ class PlanarDetector:
         lever[:, 2] = np.where(on_wall, arm[:, 0] * normal[:, 1] - arm[:, 1] * normal[:, 0], 0.0)
         along = arm[:, 0] * normal[:, 0] + arm[:, 1] * normal[:, 1]
         lever[:, 3] = np.where(on_wall, along, other + 0.5 * gap)
+        # what pushes a wall with a mass does not turn it
+        lever[~self._model.fixed[second] & on_wall, 2:] = 0.0
         size = 2.0 * np.where(on_wall, radius[first], np.minimum(radius[first], other))
         key = (first * len(self._model.fixed) + second) * 3 + names[:, 2]
         return PlanarContacts(

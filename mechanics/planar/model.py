@@ -37,7 +37,8 @@ class PlanarModel:
     ----------
     scene : it
     radius : (nd,) [m]
-    mass, moment : (nb,) mass and moment of inertia ½ m R² of a disk, in the slice; zero of a wall [kg, kg m²]
+    mass, moment : (nb,) in the slice; the moment of inertia is ½ m R² of a disk, and of a wall that of a rod, although
+        none turns: its contacts have no lever [kg, kg m²]
     fixed : (nb,) bodies that impulses do not move
     inertia : (nb, 2) 1/mass and 1/moment, zero for fixed bodies
     half : (nw, 2) from the middle of a wall to its second end, at angle 0 [m]
@@ -52,6 +53,11 @@ class PlanarModel:
     inertia: Array
     half: Array
     laws: LawTable
+
+    @property
+    def walls_move(self) -> bool:
+        """Truth of walls that change their places: they are driven, or have a mass."""
+        return bool(self.scene.loads.motions) or not self.fixed[len(self.radius) :].all()
 
     def ends(self, state: PlanarState) -> Array:
         """Return the ends of the walls (nw, 2, 2) [m]."""
@@ -73,12 +79,13 @@ def build_planar_model(scene: PlanarScene) -> tuple[PlanarModel, PlanarState]:
     density = np.array([disk.density for disk in disks], dtype=float)
     walls = np.array([(wall.start, wall.end) for wall in scene.walls], dtype=float).reshape(-1, 2, 2)
     none = np.zeros(nw)
-    mass = np.append(density * scene.thickness * np.pi * radius**2, none)
-    moment = 0.5 * mass * np.append(radius, none) ** 2
-    fixed = np.array([disk.fixed for disk in disks] + [True] * nw)
+    of_walls = np.array([wall.mass for wall in scene.walls], dtype=float)
+    mass = np.append(density * scene.thickness * np.pi * radius**2, of_walls)
+    half = 0.5 * (walls[:, 1] - walls[:, 0])
+    moment = mass * np.append(0.5 * radius**2, (half**2).sum(axis=1) / 3.0)
+    fixed = np.append([disk.fixed for disk in disks], of_walls == 0.0)
     inertia = np.zeros((len(fixed), 2))
     inertia[~fixed] = np.column_stack([1.0 / mass[~fixed], 1.0 / moment[~fixed]])
-    half = 0.5 * (walls[:, 1] - walls[:, 0])
     model = PlanarModel(scene, radius, mass, moment, fixed, inertia, half, _laws(scene))
     start = PlanarState(
         0.0,

@@ -42,19 +42,21 @@ def disk_speed(model: PlanarModel, velocity: Array) -> Array:
 
 
 def imbalance(model: PlanarModel, step: PlanarStep) -> Array:
-    """Compute the unbalanced force of each disk over its weight, or unbalanced moment over weight × radius (nd,) [-].
+    """Compute the unbalanced force of each body over its weight, or unbalanced moment over weight × radius (nb,) [-].
 
     Unbalanced forces change the velocity, so M Δv/h is the unbalanced force. Without gravity the largest contact
-    force replaces the weight. Zero for fixed disks.
+    force replaces the weight. Zero for fixed bodies.
     """
     nd, h = len(model.radius), model.scene.time.step
-    change = (step.after.velocity - step.kick.velocity)[:nd]
-    force = model.mass[:nd] * np.hypot(change[:, 0], change[:, 1]) / h
-    moment = model.moment[:nd] * np.abs(change[:, 2]) / h / model.radius
-    pull = model.mass[:nd] * np.hypot(*model.scene.gravity)
+    change = step.after.velocity - step.kick.velocity
+    force = model.mass * np.hypot(change[:, 0], change[:, 1]) / h
+    force[:nd] = np.maximum(force[:nd], model.moment[:nd] * np.abs(change[:nd, 2]) / h / model.radius)
+    pull = model.mass * np.hypot(*model.scene.gravity)
     if not pull.any():
-        pull = np.full(nd, np.abs(step.impulse).max(initial=0.0) / h or 1.0)
-    return np.where(model.fixed[:nd], 0.0, np.maximum(force, moment) / pull)
+        pull = np.full(len(force), np.abs(step.impulse).max(initial=0.0) / h or 1.0)
+    unbalanced = np.zeros(len(force))
+    np.divide(force, pull, out=unbalanced, where=~model.fixed)
+    return unbalanced
 
 
 class PlanarEnergy(Carrier):
@@ -103,9 +105,9 @@ class PlanarEnergy(Carrier):
 class PlanarWatch(Carrier):
     """Watch of the outcome after each step.
 
-    *Equilibrium*: for five steps in a row, each solved to its tolerance, every disk that is not fixed is in balance
-    (unbalanced force and moment below the scene's tolerance) and slower than 10⁻⁴ √(g · its width). Without gravity g
-    counts as 1 m/s². Nothing rests while walls move, or loads change.
+    *Equilibrium*: for five steps in a row, each solved to its tolerance, every body that is not fixed is in balance
+    (unbalanced force and moment below the scene's tolerance) and slower than 10⁻⁴ √(g · its width), as are walls with a
+    mass. Without gravity g counts as 1 m/s². Nothing rests while walls are driven, or loads change.
     """
 
     CARRIED = ("_loads", "_quiet")
@@ -119,7 +121,7 @@ class PlanarWatch(Carrier):
         self._loads: Array | None = None
 
     def __call__(self, step: PlanarStep, balance: Array) -> Outcome:
-        """Return the outcome so far, given the imbalance of each disk (nd,)."""
+        """Return the outcome so far, given the imbalance of each body (nb,)."""
         model, velocity = self._model, step.after.velocity
         last, self._loads = self._loads, step.loads
         change = np.inf if last is None else np.abs(step.loads - last).max()
@@ -129,6 +131,7 @@ class PlanarWatch(Carrier):
             and balance.max() <= model.scene.time.balance_tolerance
             and bool((disk_speed(model, velocity) <= self._slow).all())
             and not velocity[model.fixed].any()
+            and bool((np.abs(velocity[len(model.radius) :]) <= self._slow.min()).all())
         )
         self._quiet = self._quiet + 1 if quiet else 0
         return self.outcome

@@ -9,7 +9,7 @@ import numpy as np
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.law import Law
 from mechanics.scene.loads.load import Loads
-from mechanics.scene.scene import LawRule, SolverSettings
+from mechanics.scene.scene import LawRule, Method, SolverSettings
 from mechanics.stones.settings import Setting, check_settings
 from moma.errors import SceneError
 
@@ -58,7 +58,10 @@ class Disk:
 
 @dataclass(frozen=True)
 class Wall:
-    """A straight segment, met from both sides; fixed unless a load moves it (`Loads.motions`).
+    """A straight segment, met from both sides; fixed unless a load moves it (`Loads.motions`), or it has a mass.
+
+    A wall with a mass moves by what pushes it, without turning: with a force on it, it is a piston or a platen. Disks
+    stop it, other walls do not.
 
     A polyline is several walls that share end points. What rolls along it meets no end between two of them. What comes
     farther than its radius in a step may get through a wall if its law has restitution, which acts on closed contacts.
@@ -67,11 +70,13 @@ class Wall:
     ----------
     code : its name, unique in a scene
     start, end : (x, y) of its ends [m]
+    mass : in the slice; 0: it is fixed [kg]
     """
 
     code: str
     start: tuple[float, float]
     end: tuple[float, float]
+    mass: float = 0.0
 
     def __post_init__(self) -> None:
         where = f"wall {self.code!r}"
@@ -79,7 +84,9 @@ class Wall:
             raise SceneError(
                 f"ends {self.start!r} and {self.end!r}", where=where, remedy="give x and y of each"
             )
-        _check_finite(where, *self.start, *self.end)
+        _check_finite(where, *self.start, *self.end, self.mass)
+        if self.mass < 0:
+            raise SceneError(f"mass = {self.mass!r}", where=where, remedy="give kg, or 0 for a fixed wall")
         if tuple(self.start) == tuple(self.end):
             raise SceneError("has no length", where=where, remedy="give two different ends")
 
@@ -135,6 +142,7 @@ class PlanarScene:
     thickness : of the slice; masses and areas are for it [m]
     time, solver : settings; *auto* sweeps, and goes on with ADMM and Newton where 500 sweeps do not solve a step. Fewer
         `max_iterations` are sweeps alone, as slow flows of many disks are run
+    min_sweeps : sweeps of each step at least, with the method nsgs
     loads : what acts besides gravity; the plane is z = 0 of their space, moments and turns are about z
     frame_every : keep a frame of the motion every so many steps; 0 keeps the first and last only
     """
@@ -158,6 +166,7 @@ class PlanarScene:
     thickness: float = 1.0
     time: PlanarTime = field(default_factory=PlanarTime)
     solver: SolverSettings = field(default_factory=SolverSettings)
+    min_sweeps: int = 0
     loads: Loads = field(default_factory=Loads)
     frame_every: int = 0
 
@@ -173,6 +182,13 @@ class PlanarScene:
             ("gravity", self.gravity, np.isfinite(self.gravity).all(), "give two numbers"),
             ("alert_distance", self.alert_distance, 0 <= self.alert_distance < np.inf, "give 0 or more"),
             ("thickness", self.thickness, 0 < self.thickness < np.inf, "give metres greater than 0"),
+            (
+                "min_sweeps",
+                self.min_sweeps,
+                self.min_sweeps == 0
+                or (0 < self.min_sweeps <= self.solver.max_iterations and self.solver.method is Method.NSGS),
+                "give 0, or up to max_iterations with the method nsgs",
+            ),
             ("frame_every", self.frame_every, self.frame_every >= 0, "give 0 or a number of steps"),
         ):
             if not ok:
@@ -190,12 +206,15 @@ class PlanarScene:
             if missing:
                 raise SceneError(f"{what} names {missing[0]!r}, which is not there", where=self.name)
         free = {disk.code for disk in self.disks if not disk.fixed}
-        driven: set[str] = set()
+        free |= {wall.code for wall in self.walls if wall.mass > 0}
+        disks, driven = {disk.code for disk in self.disks}, set[str]()
         for motion in self.loads.motions:
             for code in sorted(motion.stones):
                 if code in free:
+                    what = "disk" if code in disks else "wall"
+                    remedy = "fix it" if code in disks else "give it no mass"
                     raise SceneError(
-                        "has an imposed motion, but is not fixed", where=f"disk {code!r}", remedy="fix it"
+                        "has an imposed motion, but is not fixed", where=f"{what} {code!r}", remedy=remedy
                     )
                 if code in driven:
                     raise SceneError(f"{code!r} has two imposed motions", where=self.name)

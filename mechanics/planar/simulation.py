@@ -99,7 +99,7 @@ class PlanarSimulation(Carrier):
         self.model, self.start, self.state, self.clock = model, start, start, clock
         self._drive = Drive(model, start)
         self._detector = PlanarDetector(model)
-        self._solver = choose_planar_solver(solver)
+        self._solver = choose_planar_solver(solver, model.scene.min_sweeps)
         self._memory = Memory(2)
         self._overlaps = Overlaps(model.scene.largest_overlap * float(model.radius.min()))
         self._first = True

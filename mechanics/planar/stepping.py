@@ -107,7 +107,8 @@ def load_velocity(model: PlanarModel, state: PlanarState, step: float) -> Array:
             bodies = np.array(sorted(place[code] for code in load.stones), dtype=np.int64)
             force, moment = load(state.time, *space(state, bodies))
             gained[bodies, :2] += step * model.inertia[bodies, :1] * force[:, :2]
-            gained[bodies, 2] += step * model.inertia[bodies, 1] * moment[:, 2]
+            turn = np.where(bodies < len(model.radius), moment[:, 2], 0.0)  # walls do not turn
+            gained[bodies, 2] += step * model.inertia[bodies, 1] * turn
     return gained
 
 

@@ -99,8 +99,8 @@ def choose_solvers(settings: SolverSettings, deformable: bool, time: TimeSetting
     )
 
 
-def choose_planar_solver(settings: SolverSettings) -> Solver:
-    """Return the solver for disks of the plane; *nsgs* makes plain sweeps.
+def choose_planar_solver(settings: SolverSettings, min_sweeps: int = 0) -> Solver:
+    """Return the solver for disks of the plane; *nsgs* makes plain sweeps, at least `min_sweeps` in each step.
 
     A sweep over disks costs a tenth of an extrapolation: where they flow, many plain sweeps are cheaper.
 
@@ -118,5 +118,5 @@ def choose_planar_solver(settings: SolverSettings) -> Solver:
     if settings.method == Method.AUTO:
         return Planar(*limits)
     if settings.method == Method.NSGS:
-        return NSGS(*limits, check_every=20, depth=0)
+        return NSGS(*limits, check_every=20, depth=0, min_iterations=min_sweeps)
     return choose_solver(settings, deformable=False)

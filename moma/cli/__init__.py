@@ -6,6 +6,7 @@ import typer
 
 from moma.cli.database import export, import_, migrate
 from moma.cli.entities import query, schema, show
+from moma.cli.geology import geology
 from moma.cli.knowledge import record
 from moma.cli.proposals import propose
 from moma.cli.relations import load_path, relate
@@ -60,6 +61,7 @@ _COMMANDS = (
     check,
     run,
     trade,
+    geology,
     runs,
     export,
     import_,

@@ -90,7 +90,7 @@ def run(
     """Simulate a scene; write tables, pictures and a report, and store the results in the database."""
     from moma.cli.text.formats import as_json
     from moma.cli.text.runs_and_surveys import run_lines
-    from pipelines.kernels.beside import compiling_beside
+    from moma.kernels.beside import compiling_beside
     from pipelines.run.run import run_scene
     from pipelines.run.unfinished import finished_run
     from pipelines.scene.file import read_scene

@@ -69,10 +69,10 @@ def ingest(
     """Ingest survey files into the database: all of them, or none if anything is wrong."""
     from moma.cli.text.formats import as_json
     from moma.cli.text.runs_and_surveys import ingest_lines
+    from moma.kernels.beside import compiling_beside
     from pipelines.ingest.ingest import ingest as ingest_files
     from pipelines.ingest.kind_rules import kind_rules
     from pipelines.ingest.reading_options import reading_options
-    from pipelines.kernels.beside import compiling_beside
 
     if rejects is not None and not keep_going:
         raise UsageError("--rejects without --keep-going", remedy="give --keep-going too")

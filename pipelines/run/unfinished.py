@@ -26,6 +26,8 @@ _INPUTS = "inputs.json"
 _SHARE = 0.04  # most of the time that checkpoints may take; those that would take more are left out [-]
 _NAMED = 4  # changes that an error names
 
+_KEPT = (".h5", ".json", ".csv", ".npz")  # files of an unfinished run: checkpoints, inputs, observations
+
 
 def finished_run(folder: Path, text: str) -> dict[str, Any] | None:
     """Return the summary of a folder whose run has finished, None if it has not.
@@ -199,11 +201,11 @@ class UnfinishedRun:
         self._took = self._ended - began
 
     def hand_over(self, folder: Path) -> None:
-        """Give the checkpoints to the folder that will take the place of the present one, too."""
+        """Give the checkpoints and observations to the folder that will take the place of the present one, too."""
         there = folder / UNFINISHED
         there.mkdir()
         for path in self._place.glob("[!.]*.*"):
-            if path.suffix not in (".h5", ".json"):
+            if path.suffix not in _KEPT:
                 continue
             try:
                 os.link(path, there / path.name)

@@ -9,6 +9,7 @@ import sys
 import pytest
 
 from tests.paths import ROOT
+from tests.pipelines.scenes import small_geology
 
 PAGES = ("README.md", "docs/howto/first-run.md", "docs/howto/survey.md")
 SCENE = "data/samples/window/window.toml"
@@ -41,6 +42,7 @@ def place(tmp_path):
         "[materials", 'where = ["course <= 3"]\n\n[materials', 1
     )
     (sample / "window.toml").write_text(quick, encoding="utf-8")
+    small_geology(tmp_path / "data/samples/geology")
     return tmp_path
 
 

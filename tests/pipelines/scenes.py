@@ -1,6 +1,7 @@
 """Scenes in tests: surveys of a few stones, assembly from a database, and the line of the error in a wrong scene."""
 
 from collections.abc import Callable, Mapping
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,8 +11,9 @@ from moma.errors import SceneError
 from pipelines.arrays import Array
 from pipelines.run.assemble import Assembly, assemble
 from pipelines.scene.file import parse_scene
+from tests.paths import ROOT
 
-__all__ = ["TWO_COURSES", "TWO_COURSES_MIXED", "assembled", "fails_at_line", "survey_text"]
+__all__ = ["TWO_COURSES", "TWO_COURSES_MIXED", "assembled", "fails_at_line", "small_geology", "survey_text"]
 
 # the two lowest courses of the sample, the first fixed
 TWO_COURSES = """
@@ -63,3 +65,18 @@ def survey_text(stones: Mapping[str, tuple[int, Array, Array]], shift: Array) ->
             lines += [f"{word} {' '.join(map(repr, place))}" for place in (places + shift).tolist()]
         lines.append("end")
     return "\n".join(lines) + "\n"
+
+
+def small_geology(folder: Path) -> None:
+    """Write the shipped geological scenes into a folder, a tenth as large, without cells, for a few steps."""
+    folder.mkdir(parents=True)
+    small = {"length": 0.1, "thickness": 0.5, "deep": 0.5, "deep_length": 0.1, "slope_end": 0.1, "tip": 0.1}
+    for path in (ROOT / "data/samples/geology").glob("*.toml"):
+        lines = path.read_text(encoding="utf-8").partition("\n[[cells]]")[0].splitlines()
+        for number, line in enumerate(lines):
+            name, _, value = line.partition(" = ")
+            if name in small:
+                lines[number] = f"{name} = {float(value) * small[name]:.4g}"
+            elif name == "steps":
+                lines[number] = "steps = 4"
+        (folder / path.name).write_text("\n".join(lines) + "\n", encoding="utf-8")

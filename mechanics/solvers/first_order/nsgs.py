@@ -36,6 +36,7 @@ class NSGS:
     tolerance : natural map η at which the problem counts as solved [-]
     velocity_tolerance : largest velocity by which a contact may break its law, over that of u_free [-]
     max_iterations : limit of the sweeps
+    min_iterations : sweeps that are made even where fewer solve the problem
     check_every : sweeps between two looks at η
     depth : past iterates from which Anderson's method extrapolates at each look; an extrapolation is kept unless its
         η is ten times that of the sweeps alone: one that looks worse at first mostly leads on. 0: plain sweeps
@@ -46,6 +47,7 @@ class NSGS:
     max_iterations: int = 2000
     check_every: int = 5
     depth: int = 20
+    min_iterations: int = 0
 
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from the impulses of `start`; return the best of all looks."""
@@ -53,11 +55,11 @@ class NSGS:
         left = residual(problem, impulse)
         best, sweeps = (impulse, left), 0
         limits = self.tolerance, self.velocity_tolerance
-        if not left.within(*limits):
+        if self.min_iterations or not left.within(*limits):
             shift = problem.biased
             sweep = problem.delassus.gauss_seidel(shift, problem.friction, problem.cohesion)
             look = _Look(problem, sweep, self.depth, limits)
-            while not left.within(*limits) and sweeps < self.max_iterations:
+            while sweeps < self.min_iterations or (not left.within(*limits) and sweeps < self.max_iterations):
                 count = min(self.check_every, self.max_iterations - sweeps)
                 impulse, left = look(impulse, count)
                 sweeps += count

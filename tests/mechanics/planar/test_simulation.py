@@ -18,7 +18,7 @@ from mechanics.scene.loads.gravity import GravityRamp, TiltingTable
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import ImposedMotion
 from mechanics.scene.loads.time_series import History
-from mechanics.scene.scene import LawRule, Method
+from mechanics.scene.scene import LawRule, Method, SolverSettings
 from moma.errors import SceneError, SolverError
 from tests.mechanics.planar.shapes import ACCURATE, G, box, grid_of_disks
 
@@ -351,3 +351,11 @@ def test_progress_is_told_and_frames_are_kept():
     assert result.outcome is Outcome.MOVING
     assert len(result.history.time) == 10
     assert set(result.wall_time) == {"advance", "detect", "assemble", "solve", "observe"}
+
+
+def test_each_step_makes_the_sweeps_that_are_asked_for_at_least():
+    solver = SolverSettings(Method.NSGS, max_iterations=200)
+    scene = PlanarScene("rest", (disk(),), (FLOOR,), solver=solver, min_sweeps=60)
+    assert (simulate_planar(scene).history.iterations == 60).all()
+    with pytest.raises(SceneError, match="min_sweeps = 60"):
+        replace(scene, solver=SolverSettings())

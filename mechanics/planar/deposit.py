@@ -1,0 +1,135 @@
+"""Samples of disks: laid out loosely, let fall into a box, cut to a profile, and left to come to rest."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from mechanics.arrays import Array, Bools
+from mechanics.dynamics.progress import Listener, Progress, silent
+from mechanics.planar.run import PlanarRun
+from mechanics.planar.scene import Disk, PlanarScene, PlanarTime, Wall
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.scene import Method, SolverSettings
+from moma.errors import SceneError
+
+__all__ = ["Deposit", "deposit"]
+
+_LOOSE = 1.1  # width of the place of each disk at first, over the largest disk's
+_ROOM = 1.25  # height of the box that is filled at first, over what its disks need at rest
+_SOLID = 0.82  # share that settled disks fill, at most
+_FALL = 0.05  # step in which a disk falls by this share of the smallest radius from rest
+_SLOW = 2e-3  # mean speed of the disks over √(g r) at which they have come to rest
+_FEWEST, _MOST = 100, 1000  # steps of each of the two stages
+_SWEEPS = 100  # of each step
+
+
+@dataclass(frozen=True)
+class Deposit:
+    """Sample to make.
+
+    Attributes
+    ----------
+    length : of the box, x from 0 [m]
+    top : height of the surface at places along x, to which the sample is cut [m]
+    highest : largest value of `top` [m]
+    smallest, largest : radii, evenly distributed between them [m]
+    density : [kg/m³]
+    friction : between disks, and with the box
+    falling_friction : the same while they fall; less makes the sample denser (0.05: 0.845 of the area, 0.4: 0.83)
+    seed : of the radii and places
+    """
+
+    length: float
+    top: Callable[[Array], Array]
+    highest: float
+    smallest: float
+    largest: float
+    density: float
+    friction: float
+    falling_friction: float
+    seed: int = 1
+
+    def __post_init__(self) -> None:
+        for quantity, value, ok, remedy in (
+            (
+                "smallest radius",
+                self.smallest,
+                0 < self.smallest <= self.largest,
+                "give 0 < smallest ≤ largest",
+            ),
+            ("length", self.length, self.length > 4 * self.largest, "give more than two disks' width"),
+            ("highest", self.highest, self.highest > 4 * self.largest, "give more than two disks' width"),
+        ):
+            if not ok:
+                raise SceneError(f"{quantity} = {value!r}", where="sample", remedy=remedy)
+
+
+def deposit(asked: Deposit, gravity: float = 9.81, progress: Listener = silent) -> tuple[Array, Array]:
+    """Return centres (nd, 2) and radii (nd,) of a sample at rest [m].
+
+    Disks of random sizes fall into a box; once they rest, those that reach above the profile are taken away, and the
+    others come to rest again.
+    """
+    centre, radius = _loose(asked)
+    centre = _settled(asked, centre, radius, asked.falling_friction, gravity, progress)
+    keep = _below(asked, centre, radius)
+    if keep.all():
+        raise SceneError(
+            "the deposit does not reach the profile",
+            where="sample",
+            remedy="tell the developers the settings",
+        )
+    centre, radius = centre[keep], radius[keep]
+    return _settled(asked, centre, radius, asked.friction, gravity, progress), radius
+
+
+def _below(asked: Deposit, centre: Array, radius: Array) -> Bools:
+    return np.asarray(centre[:, 1] + radius <= asked.top(centre[:, 0]))
+
+
+def _loose(asked: Deposit) -> tuple[Array, Array]:
+    """Lay disks out without contact, in rows shifted by half a place, each anywhere in its place."""
+    rng = np.random.default_rng(asked.seed)
+    wide = 2.0 * _LOOSE * asked.largest
+    columns = int((asked.length - 0.5 * wide) / wide)
+    mean = np.pi * (asked.smallest**2 + asked.smallest * asked.largest + asked.largest**2) / 3.0
+    rows = int(np.ceil(_ROOM * _SOLID * asked.length * asked.highest / mean / columns))
+    row, column = np.indices((rows, columns)).reshape(2, -1)
+    radius = rng.uniform(asked.smallest, asked.largest, len(row))
+    free = (0.5 * wide - radius)[:, None]
+    pitch = (asked.length - 0.5 * wide) / columns
+    place = np.column_stack([pitch * column + 0.5 * wide * (row % 2), wide * row]) + 0.5 * wide
+    return place + rng.uniform(-1.0, 1.0, place.shape) * free, radius
+
+
+def _settled(
+    asked: Deposit, centre: Array, radius: Array, friction: float, gravity: float, progress: Listener
+) -> Array:
+    """Return the centres once disks that start from rest have come to rest again."""
+    top = float(centre[:, 1].max()) + 2.0 * asked.largest
+    step = float(np.sqrt(2.0 * _FALL * asked.smallest / gravity))
+    scene = PlanarScene(
+        "deposit",
+        tuple(
+            Disk(str(number), (float(x), float(y)), float(r), asked.density)
+            for number, ((x, y), r) in enumerate(zip(centre, radius, strict=True))
+        ),
+        (
+            Wall("floor", (-asked.length, 0.0), (2.0 * asked.length, 0.0)),
+            Wall("left", (0.0, -asked.largest), (0.0, top)),
+            Wall("right", (asked.length, -asked.largest), (asked.length, top)),
+        ),
+        gravity=(0.0, -gravity),
+        law=DryJoint(friction=friction),
+        time=PlanarTime(step, 1.0, _MOST * step, stop_at_equilibrium=True),
+        solver=SolverSettings(Method.NSGS, max_iterations=_SWEEPS),
+    )
+    run, slow = PlanarRun(scene), _SLOW * np.sqrt(gravity * asked.smallest)
+    while not run.done:
+        last = run.step()
+        speed = float(np.hypot(*last.after.velocity[: len(radius), :2].T).mean())
+        progress(Progress("step", run.steps, _MOST, f"mean speed {speed:.1e} m/s"))
+        if run.steps >= _FEWEST and speed < slow:
+            break
+    return last.after.centre[: len(radius)]

@@ -1,0 +1,101 @@
+"""Cells: groups of disks that are chosen by place at the start, and followed through the motion."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mechanics.arrays import Array, Ints
+from moma.errors import SceneError
+
+__all__ = ["Cell", "Shape", "members", "shape_of"]
+
+_FEWEST = 5  # disks of a cell: fewer have no mean deformation
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A circle at the start; its disks stay its disks, as W(x, y, r) of Renouf, Dubois & Alart (2006).
+
+    Attributes
+    ----------
+    name : its name, unique in a run
+    centre : (x, y) [m]
+    radius : [m]
+    """
+
+    name: str
+    centre: tuple[float, float]
+    radius: float
+
+    def __post_init__(self) -> None:
+        where = f"cell {self.name!r}"
+        if not self.radius > 0:
+            raise SceneError(f"radius = {self.radius!r}", where=where, remedy="give metres greater than 0")
+        if not np.isfinite([*self.centre, self.radius]).all():
+            raise SceneError("has a value that is not finite", where=where, remedy="give numbers")
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A cell's shape now over that at the start.
+
+    Attributes
+    ----------
+    extent : λx and λy, standard deviations of x and y of its disks over those at the start [-]
+    gradient : F (2, 2), the linear map that comes nearest to the motion of its disks [-]
+    turned : angle of the rotation in F = R U, counter-clockwise [rad]
+    volume : det F - 1 [-]
+    shear : ln of the ratio of the principal stretches of F [-]
+    centre : (2,) mean place [m]
+    """
+
+    extent: Array
+    gradient: Array
+    turned: float
+    volume: float
+    shear: float
+    centre: Array
+
+
+def members(cell: Cell, centre: Array) -> Ints:
+    """Return the disks of a cell, by their centres (nd, 2) at the start.
+
+    Raises
+    ------
+    SceneError : the cell has too few disks, as one outside the sample has
+    """
+    away = np.linalg.norm(centre - np.array(cell.centre), axis=1)
+    found = np.flatnonzero(away <= cell.radius)
+    if len(found) < _FEWEST:
+        raise SceneError(
+            f"holds {len(found)} disks",
+            where=f"cell {cell.name!r}",
+            remedy=f"place it within the sample, with a radius that holds {_FEWEST} or more",
+        )
+    return found
+
+
+def shape_of(start: Array, now: Array) -> Shape:
+    """Compare a cell's places (n, 2) now with those at the start.
+
+    Examples
+    --------
+    Simple shear by 1 keeps the area and the height, and lengthens a square by √2:
+
+    >>> square = np.array([(x, y) for x in range(3) for y in range(3)], dtype=float)
+    >>> sheared = shape_of(square, square @ np.array([[1.0, 0.0], [1.0, 1.0]]))
+    >>> sheared.extent.round(6).tolist(), round(abs(sheared.volume), 6)
+    ([1.414214, 1.0], 0.0)
+    """
+    before, after = start - start.mean(axis=0), now - now.mean(axis=0)
+    gradient = np.linalg.lstsq(before, after, rcond=None)[0].T
+    (left, stretch, right) = np.linalg.svd(gradient)
+    rotation = left @ right
+    return Shape(
+        extent=after.std(axis=0) / before.std(axis=0),
+        gradient=gradient,
+        turned=float(np.arctan2(rotation[1, 0], rotation[0, 0])),
+        volume=float(np.linalg.det(gradient)) - 1.0,
+        shear=float(np.log(stretch[0] / stretch[1])) if stretch[1] > 0 else np.inf,
+        centre=now.mean(axis=0),
+    )

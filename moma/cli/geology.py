@@ -1,0 +1,65 @@
+"""Command that runs geological scenes."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from moma.cli.console import reporting, say
+from moma.cli.options import Json, SceneArgument
+from moma.cli.progress import Interruption, progress_bars
+
+__all__ = ["Experiment", "geology"]
+
+
+class Experiment(StrEnum):
+    """Experiments with disks."""
+
+    DEPOSIT = "deposit"
+    FOLD = "fold"
+    FAULT = "fault"
+
+
+@reporting
+def geology(
+    experiment: Annotated[Experiment, typer.Argument(help="Experiment; the scene has a table of its name.")],
+    scene: SceneArgument,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results; default: out/SCENE.")
+    ] = None,
+    samples: Annotated[
+        Path | None,
+        typer.Option(
+            "--samples", metavar="DIR", help="Folder of prepared samples; default: .samples beside DIR."
+        ),
+    ] = None,
+    resume: Annotated[
+        bool | None,
+        typer.Option(
+            "--resume/--restart",
+            help="Go on with the unfinished run in the folder, or give it up; without either, it is left alone.",
+            show_default=False,
+        ),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Deform a sample of disks; write rows of its cells, fields, figures and a summary."""
+    from moma.cli.text.formats import as_json
+    from pipelines.geology.run import run_geology
+
+    folder, stop = out or Path("out") / scene.stem, Interruption()
+    with progress_bars() as listener, stop.handled():
+        done = run_geology(scene, experiment.value, folder, samples, stop.listening(listener), stop, resume)
+    for warning in done.warnings:
+        say(f"warning: {warning}")
+    summary = done.summary
+    lines = [
+        f"{summary['scene']}: {summary['disks']} disks, {summary['steps']} steps",
+        f"  {summary['headline']}",
+        f"  results in {done.folder}",
+    ]
+    print(as_json(summary) if json else "\n".join(lines))
+    if summary["outcome"] == "interrupted":
+        say(f"the same command with --resume goes on after step {summary['steps']}")
+        raise typer.Exit(1)

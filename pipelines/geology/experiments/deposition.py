@@ -1,0 +1,51 @@
+"""Deposition alone: a sample at rest in its box."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from mechanics.arrays import Array
+from mechanics.planar.scene import Wall
+from mechanics.scene.loads.load import Loads
+from mechanics.stones.settings import Setting, check_settings
+from pipelines.geology.experiments.experiment import Setup
+
+__all__ = ["Deposition"]
+
+
+@dataclass(frozen=True)
+class Deposition:
+    """`[deposit]`: a level sample, which rests."""
+
+    length: Annotated[float, Setting("Length of the sample.", "m", above=0)]
+    height: Annotated[float, Setting("Height of the sample.", "m", above=0)]
+
+    def __post_init__(self) -> None:
+        check_settings("deposit", self)
+
+    @property
+    def highest(self) -> float:
+        """Height of the sample [m]."""
+        return self.height
+
+    def top(self, x: Array) -> Array:
+        """Return the height of the sample at places along x [m]."""
+        return np.full(len(x), self.height)
+
+    def setup(self, step: float, duration: float) -> Setup:
+        """Return the box."""
+        roof = 2.0 * self.height
+        return Setup(
+            (
+                Wall("floor", (-0.1 * self.length, 0.0), (1.1 * self.length, 0.0)),
+                Wall("left", (0.0, -0.1 * self.height), (0.0, roof)),
+                Wall("right", (self.length, -0.1 * self.height), (self.length, roof)),
+            ),
+            Loads(),
+        )
+
+    def phases(self, duration: float) -> Mapping[str, tuple[float, float]]:
+        """Return the one phase of the run."""
+        return {"rest": (0.0, duration)}

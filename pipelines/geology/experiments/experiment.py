@@ -1,0 +1,48 @@
+"""Protocol of the experiments: a sample of a certain shape, and walls and loads that deform it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+from mechanics.arrays import Array
+from mechanics.planar.scene import Wall
+from mechanics.scene.loads.load import Loads
+
+__all__ = ["Experiment", "Setup"]
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Walls and loads of an experiment on a sample.
+
+    Attributes
+    ----------
+    walls : in the order in which results name them
+    loads : motions and forces of walls
+    smooth : codes of walls without friction
+    """
+
+    walls: tuple[Wall, ...]
+    loads: Loads
+    smooth: frozenset[str] = frozenset()
+
+
+class Experiment(Protocol):
+    """An experiment, made of its table in the scene file."""
+
+    @property
+    def length(self) -> float:
+        """Length of the box in which the sample is deposited [m]."""
+
+    @property
+    def highest(self) -> float:
+        """Largest height of the sample [m]."""
+
+    def top(self, x: Array) -> Array:
+        """Return the height of the sample at places along x, to which it is cut [m]."""
+
+    def setup(self, step: float, duration: float) -> Setup:
+        """Return the walls and loads of a run with this time step and duration [s]."""
+
+    def phases(self, duration: float) -> Mapping[str, tuple[float, float]]:
+        """Return the beginning and end of each phase of the run by its name [s]."""

@@ -1,0 +1,124 @@
+"""Geological scene files: TOML text → a GeologyScene in which every key has been checked."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+from mechanics.planar.measures.cells import Cell
+from moma.errors import SceneError
+from pipelines.geology.experiments.deposition import Deposition
+from pipelines.geology.experiments.experiment import Experiment
+from pipelines.geology.experiments.fault import Fault
+from pipelines.geology.experiments.fold import Fold
+from pipelines.geology.settings import Material, Recording, Sample, Stepping, Sweeping
+from pipelines.scene.keys import build, keys_of
+from pipelines.toml.lines import key_lines, parse_toml, read_text
+from pipelines.toml.schema import REQUIRED, Document, Key, Kind, check_table, nearest
+
+__all__ = ["EXPERIMENTS", "GeologyScene", "parse_geology", "read_geology"]
+
+EXPERIMENTS: Mapping[str, type[Any]] = {"deposit": Deposition, "fault": Fault, "fold": Fold}
+"""Experiments by the name of their table, which is that of their command."""
+
+_TABLES: Mapping[str, type[Any]] = {
+    "sample": Sample,
+    "contact": Material,
+    "time": Stepping,
+    "solver": Sweeping,
+    "output": Recording,
+}
+_TITLE = (Key("name", Kind.TEXT, "Title; by default the name of the file.", "", None),)
+_CELL = (
+    Key("name", Kind.TEXT, "Name of the cell.", "", REQUIRED),
+    Key("centre", Kind.NUMBERS, "x and y at the start.", "m", REQUIRED),
+    Key("radius", Kind.NUMBER, "Radius at the start.", "m", REQUIRED, above=0),
+)
+_START = "see docs/howto/geology.md for a scene to start from"
+
+
+@dataclass(frozen=True)
+class GeologyScene:
+    """A geological scene as its author wrote it, checked, with all defaults filled in.
+
+    Attributes
+    ----------
+    document : file and lines, for error messages
+    text : the file, as it is kept with the run
+    name : title
+    kind : of `EXPERIMENTS`
+    cells : followed through the run
+    """
+
+    document: Document
+    text: str
+    name: str
+    kind: str
+    sample: Sample
+    contact: Material
+    time: Stepping
+    solver: Sweeping
+    output: Recording
+    experiment: Experiment
+    cells: tuple[Cell, ...]
+
+
+def read_geology(path: str | Path, kind: str) -> GeologyScene:
+    """Read and check the scene file of an experiment.
+
+    Raises
+    ------
+    SceneError : with file and line, at the first mistake
+    """
+    return parse_geology(read_text(path, SceneError, missing="no such scene file"), str(path), kind)
+
+
+def parse_geology(text: str, path: str, kind: str) -> GeologyScene:
+    """Check the text of the scene file of an experiment; `path` is for the messages."""
+    given = parse_toml(text, path, SceneError, _START)
+    document = Document(path, key_lines(text))
+    known = ["scene", *_TABLES, kind, "cells"]
+    for name in given:
+        if name not in known:
+            other = (
+                f"this is a scene of `moma geology {name}`" if name in EXPERIMENTS else nearest(name, known)
+            )
+            document.fail(f"unknown table [{name}]", name, remedy=other)
+    if kind not in given:
+        document.fail(f"no table [{kind}]", remedy=_START)
+    title = check_table(document, ("scene",), given.get("scene", {}), _TITLE)["name"]
+    tables = {name: _built(document, given, name, owner) for name, owner in _TABLES.items()}
+    return GeologyScene(
+        document=document,
+        text=text,
+        name=str(title or Path(path).stem),
+        kind=kind,
+        experiment=cast(Experiment, _built(document, given, kind, EXPERIMENTS[kind])),
+        cells=_cells(document, given.get("cells", [])),
+        **tables,
+    )
+
+
+def _built(document: Document, given: Mapping[str, Any], name: str, owner: type[Any]) -> Any:
+    content = given.get(name, {})
+    if not isinstance(content, dict):
+        document.fail(f"{name!r} is not a table", name, remedy=f"write [{name}] on a line of its own")
+    values = check_table(document, (name,), content, keys_of(owner))
+    with document.at(name):
+        return build(owner, values)
+
+
+def _cells(document: Document, given: Any) -> tuple[Cell, ...]:
+    if not isinstance(given, list):
+        document.fail("'cells' is not an array of tables", "cells", remedy="write [[cells]] before each cell")
+    cells: dict[str, Cell] = {}
+    for number, content in enumerate(given):
+        place = ("cells", str(number))
+        values = cast(dict[str, Any], check_table(document, place, content, _CELL, f"[[cells]] {number + 1}"))
+        if len(values["centre"]) != 2:
+            document.fail(f"centre = {list(values['centre'])}", *place, "centre", remedy="give x and y")
+        if values["name"] in cells:
+            document.fail(f"cell {values['name']!r} is given twice", *place, "name")
+        with document.at(*place):
+            cells[values["name"]] = Cell(values["name"], values["centre"], values["radius"])
+    return tuple(cells.values())

@@ -1,0 +1,217 @@
+"""Observation of a run of disks: rows of the cells and of the whole sample, and instants of all disks."""
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mechanics.arrays import Array, Ints
+from mechanics.planar.measures.cells import Cell, members, shape_of
+from mechanics.planar.measures.fabric import fabric_of
+from mechanics.planar.measures.strain import deformation
+from mechanics.planar.measures.stress import mean_stress, moments
+from mechanics.planar.measures.tessellation import Tessellation, tessellation
+from mechanics.planar.result import PlanarInstant
+
+__all__ = ["CELL_COLUMNS", "WHOLE", "Fields", "Observation", "read_rows"]
+
+WHOLE = "whole sample"
+"""Name of the rows of all disks."""
+
+CELL_COLUMNS: Mapping[str, str] = {
+    "step": "number of the step",
+    "time": "[s]",
+    "x": "mean place of the disks [m]",
+    "y": "mean place of the disks [m]",
+    "lambda_x": "standard deviation of x over that at the start [-]",
+    "lambda_y": "standard deviation of y over that at the start [-]",
+    "volume": "change of the area by the linear map nearest to the motion [-]",
+    "shear": "ln of the ratio of its principal stretches [-]",
+    "turned": "its rotation, counter-clockwise [°]",
+    "sigma_xx": "mean stress, compression positive [Pa]",
+    "sigma_yy": "mean stress, compression positive [Pa]",
+    "sigma_xy": "mean stress [Pa]",
+    "p": "(σ1 + σ2)/2 [Pa]",
+    "q": "(σ1 - σ2)/2 [Pa]",
+    "direction": "angle of σ1 from the x axis [°]",
+    "anisotropy": "2 (φ1 - φ2) of the fabric [-]",
+    "fabric_direction": "angle of φ1 from the x axis [°]",
+    "coordination": "contacts that bear a force per disk [-]",
+    "porosity": "share of the area that no disk fills [-]",
+}
+"""Columns of the rows of a cell, and their meaning."""
+
+
+@dataclass(frozen=True)
+class Fields:
+    """All disks at one instant.
+
+    Attributes
+    ----------
+    step, time : number of the step, [s]
+    position, velocity : (nb, 3) of disks, then walls
+    pressure : (nd,) mean pressure in the share of each disk, 0 where it has none [Pa]
+    volume, shear : (nd,) local deformation since the start (`Deformation`) [-]
+    force_chains : (n, 5) of contacts that bear: the centres of the two disks, or the disk and the point [m], and the
+        normal force [N]
+    """
+
+    step: int
+    time: float
+    position: Array
+    velocity: Array
+    pressure: Array
+    volume: Array
+    shear: Array
+    force_chains: Array
+
+
+class Observation:
+    """Rows and instants of a run, written as it goes on; a resumed run writes those after its checkpoint again.
+
+    Parameters
+    ----------
+    folder : for the files, which exists
+    cells : followed by the disks that they hold at the start
+    start : (nd, 2) centres at the start [m]
+    radius : (nd,) [m]
+    thickness : of the slice [m]
+
+    Raises
+    ------
+    SceneError : a cell has too few disks
+    """
+
+    def __init__(
+        self, folder: Path, cells: Sequence[Cell], start: Array, radius: Array, thickness: float
+    ) -> None:
+        self._folder, self._start, self._radius, self._thickness = folder, start, radius, thickness
+        groups: dict[str, Ints] = {cell.name: members(cell, start) for cell in cells}
+        self._groups = groups | {WHOLE: np.arange(len(radius))}
+        self._reference = tessellation(start, radius)
+
+    def row(self, instant: PlanarInstant) -> None:
+        """Add a row to the file of each cell, and of the whole sample."""
+        count = len(self._radius)
+        place = instant.position[:count, :2]
+        shares = tessellation(place, self._radius)
+        moment = self._moments(instant)
+        for number, (name, group) in enumerate(self._groups.items()):
+            values = self._values(instant, name, group, place, shares, moment)
+            path = self._folder / f"cell-{number:03d}.csv"
+            new = not path.exists()
+            with path.open("a", encoding="utf-8", newline="") as file:
+                writer = csv.writer(file)
+                if new:
+                    writer.writerow(CELL_COLUMNS)
+                writer.writerow([repr(values[column]) for column in CELL_COLUMNS])
+
+    def _moments(self, instant: PlanarInstant) -> Array:
+        contacts = instant.contacts
+        return moments(
+            len(self._radius), instant.position[:, :2], contacts.bodies, contacts.point, contacts.force
+        )
+
+    def _values(
+        self,
+        instant: PlanarInstant,
+        name: str,
+        group: Ints,
+        place: Array,
+        shares: Tessellation,
+        moment: Array,
+    ) -> dict[str, float]:
+        chosen = np.zeros(len(self._radius), dtype=bool)
+        chosen[group] = True
+        contacts = instant.contacts
+        shape = shape_of(self._start[group], place[group])
+        # disks at the rim have a part of their area only
+        inner = chosen & shares.inside
+        stress = mean_stress(moment[inner], max(float(shares.share[inner].sum()), 1e-300), self._thickness)
+        fabric = fabric_of(chosen, contacts.bodies, contacts.normal, contacts.force, self._radius, shares)
+        return {
+            "step": instant.step,
+            "time": instant.time,
+            "x": float(shape.centre[0]),
+            "y": float(shape.centre[1]),
+            "lambda_x": float(shape.extent[0]),
+            "lambda_y": float(shape.extent[1]),
+            "volume": shape.volume,
+            "shear": shape.shear,
+            "turned": float(np.degrees(shape.turned)),
+            "sigma_xx": float(stress.tensor[0, 0]),
+            "sigma_yy": float(stress.tensor[1, 1]),
+            "sigma_xy": float(stress.tensor[0, 1]),
+            "p": stress.pressure,
+            "q": stress.deviator,
+            "direction": float(np.degrees(stress.direction)),
+            "anisotropy": fabric.anisotropy,
+            "fabric_direction": float(np.degrees(fabric.direction)),
+            "coordination": fabric.coordination,
+            "porosity": fabric.porosity,
+        }
+
+    def fields(self, instant: PlanarInstant) -> None:
+        """Keep all disks at this instant."""
+        count, contacts = len(self._radius), instant.contacts
+        place = instant.position[:count, :2]
+        shares = tessellation(place, self._radius)
+        moment = self._moments(instant)
+        area = np.where(shares.share > 0, shares.share, np.inf) * self._thickness
+        strain = deformation(self._start, place, self._reference)
+        normal = np.einsum("ci,ci->c", contacts.normal, contacts.force)
+        bears = normal > 0
+        first, second = contacts.bodies[bears].T
+        far = np.where((second < count)[:, None], place[np.minimum(second, count - 1)], contacts.point[bears])
+        arrays: dict[str, Any] = {
+            "step": instant.step,
+            "time": instant.time,
+            "position": instant.position,
+            "velocity": instant.velocity,
+            "pressure": 0.5 * np.trace(moment, axis1=1, axis2=2) / area,
+            "volume": strain.volume,
+            "shear": strain.shear,
+            "force_chains": np.column_stack([place[first], far, normal[bears]]),
+        }
+        path = self._folder / f"fields-{instant.step:08d}.npz"
+        fresh = path.with_suffix(".new")
+        with fresh.open("wb") as file:
+            np.savez(file, **arrays)
+        fresh.replace(path)
+
+    def rows(self, every: int) -> dict[str, dict[str, Array]]:
+        """Return the columns of the rows of each `every`-th step and the last, by cell, in the order of steps."""
+        return {
+            name: read_rows(self._folder / f"cell-{number:03d}.csv", every)
+            for number, name in enumerate(self._groups)
+        }
+
+    def instants(self, every: int) -> list[Fields]:
+        """Return the instants of each `every`-th step and the last, in the order of steps."""
+        found, paths = [], sorted(self._folder.glob("fields-*.npz"))
+        for path in paths:
+            if int(path.stem.partition("-")[2]) % every and path != paths[-1]:
+                continue
+            with np.load(path) as data:
+                arrays = {name: data[name] for name in data.files}
+            found.append(Fields(**arrays | {"step": int(arrays["step"]), "time": float(arrays["time"])}))
+        return found
+
+
+def read_rows(path: Path, every: int = 1) -> dict[str, Array]:
+    """Return the columns of a file of rows; of rows of one step the last, and none that a kill cut short.
+
+    A run that was stopped leaves a row of the instant at which it was; it is left out if there is a later one, and its
+    step is no multiple of `every`.
+    """
+    rows: dict[int, list[float]] = {}
+    with path.open(encoding="utf-8", newline="") as file:
+        for values in list(csv.reader(file))[1:]:
+            if len(values) == len(CELL_COLUMNS):
+                rows[int(values[0])] = [float(value) for value in values[1:]]
+    steps = sorted(step for step in rows if step % every == 0 or step == max(rows))
+    table = np.array([rows[step] for step in steps]).reshape(-1, len(CELL_COLUMNS) - 1)
+    return dict(zip(CELL_COLUMNS, [np.array(steps), *table.T], strict=True))

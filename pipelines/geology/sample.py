@@ -1,0 +1,85 @@
+"""Samples of geological scenes: deposited once for each set of settings, and kept."""
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mechanics.arrays import Array, Ints
+from mechanics.dynamics.progress import Listener, silent
+from mechanics.planar.deposit import Deposit, deposit
+from pipelines.geology.file import GeologyScene
+
+__all__ = ["PreparedSample", "prepare"]
+
+_VERSION = 1  # of the preparation: a change of its outcome raises it
+_DIGITS = 16  # of the digest that names a sample
+
+
+@dataclass(frozen=True)
+class PreparedSample:
+    """Disks at rest.
+
+    Attributes
+    ----------
+    centre : (nd, 2) [m]
+    radius : (nd,) [m]
+    layer : (nd,) marker layer, 0 at the base
+    digest : of the settings that made it
+    """
+
+    centre: Array
+    radius: Array
+    layer: Ints
+    digest: str
+
+
+def prepare(scene: GeologyScene, cache: Path, progress: Listener = silent) -> PreparedSample:
+    """Take the sample of a scene out of the cache, or deposit it and keep it there."""
+    asked, own = scene.sample, scene.experiment
+    x = np.linspace(0.0, own.length, 1001)
+    settings = {
+        "version": _VERSION,
+        "sample": {name: value for name, value in asdict(asked).items() if name != "layers"},
+        "friction": scene.contact.friction,
+        "gravity": scene.time.gravity,
+        "profile": hashlib.sha256(np.append(x, own.top(x)).tobytes()).hexdigest(),
+    }
+    digest = hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()[:_DIGITS]
+    path = cache / f"{digest}.npz"
+    found = _stored(path)
+    if found is None:
+        found = deposit(
+            Deposit(
+                own.length,
+                own.top,
+                own.highest,
+                asked.smallest,
+                asked.largest,
+                asked.density,
+                scene.contact.friction,
+                asked.falling_friction,
+                asked.seed,
+            ),
+            scene.time.gravity,
+            progress,
+        )
+        cache.mkdir(parents=True, exist_ok=True)
+        fresh = path.with_suffix(".new.npz")
+        np.savez(fresh, centre=found[0], radius=found[1])
+        fresh.replace(path)
+    centre, radius = found
+    part = centre[:, 1] / own.highest
+    layer = np.clip((part * asked.layers).astype(np.int64), 0, asked.layers - 1)
+    return PreparedSample(centre, radius, layer, digest)
+
+
+def _stored(path: Path) -> tuple[Array, Array] | None:
+    try:
+        with np.load(path) as data:
+            return data["centre"], data["radius"]
+    except (OSError, ValueError, KeyError):
+        # not there, or cut short: it is made again
+        return None

@@ -1,0 +1,103 @@
+"""Settings of a geological scene, table by table."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from mechanics.stones.settings import Setting, check_settings
+from moma.errors import SceneError
+
+__all__ = ["Material", "Recording", "Sample", "Stepping", "Sweeping"]
+
+
+@dataclass(frozen=True)
+class Sample:
+    """`[sample]`: the disks, and how they are prepared."""
+
+    smallest: Annotated[float, Setting("Smallest radius.", "m", above=0)]
+    largest: Annotated[float, Setting("Largest radius.", "m", above=0)]
+    density: Annotated[float, Setting("Of the disks.", "kg/m³", above=0)] = 2800.0
+    falling_friction: Annotated[
+        float,
+        Setting(
+            "Friction while disks are deposited; less makes the sample denser.", "-", at_least=0, at_most=2
+        ),
+    ] = 0.4
+    seed: Annotated[int, Setting("Of sizes and places; another seed is another sample.", at_least=0)] = 1
+    layers: Annotated[int, Setting("Marker layers of pictures and measures.", at_least=1, at_most=50)] = 6
+
+    def __post_init__(self) -> None:
+        check_settings("sample", self)
+        if self.largest < self.smallest:
+            raise SceneError(
+                f"largest = {self.largest:g} is less than smallest = {self.smallest:g}",
+                where="sample",
+                remedy="exchange them",
+            )
+
+
+@dataclass(frozen=True)
+class Material:
+    """`[contact]`: the laws of the contacts."""
+
+    friction: Annotated[float, Setting("Between disks.", "-", at_least=0, at_most=2)] = 0.4
+    wall_friction: Annotated[
+        float | None,
+        Setting("Between disks and walls; without it, that between disks.", "-", at_least=0, at_most=2),
+    ] = None
+    cohesion: Annotated[float, Setting("Pull γ of each contact between disks; 0: none.", "N", at_least=0)] = (
+        0.0
+    )
+    cohesion_range: Annotated[
+        float, Setting("Gap within which it acts, over the smallest radius.", "-", above=0, at_most=1)
+    ] = 0.05
+
+    def __post_init__(self) -> None:
+        check_settings("contact", self)
+
+
+@dataclass(frozen=True)
+class Stepping:
+    """`[time]`: steps of the run."""
+
+    step: Annotated[float, Setting("Time step h.", "s", above=0)]
+    steps: Annotated[int, Setting("Number of steps.", at_least=1)]
+    theta: Annotated[float, Setting("Integration parameter θ.", "-", at_least=0.5, at_most=1)] = 1.0
+    gravity: Annotated[float, Setting("Downwards.", "m/s²", at_least=0)] = 9.81
+
+    def __post_init__(self) -> None:
+        check_settings("time", self)
+
+
+@dataclass(frozen=True)
+class Sweeping:
+    """`[solver]`: sweeps of each step."""
+
+    min_iterations: Annotated[int, Setting("Sweeps of each step, at least.", at_least=0)] = 100
+    max_iterations: Annotated[int, Setting("Sweeps of each step, at most.", at_least=1)] = 100
+    tolerance: Annotated[float, Setting("η at which a step counts as solved.", "-", above=0, below=1)] = 1e-4
+    largest_overlap: Annotated[
+        float, Setting("Overlap over the smallest radius that no step leaves.", "-", above=0, infinite=True)
+    ] = 0.01
+    threads: Annotated[int, Setting("Threads that sweep; the results have the same bits.", at_least=1)] = 1
+
+    def __post_init__(self) -> None:
+        check_settings("solver", self)
+        if self.max_iterations < self.min_iterations:
+            raise SceneError(
+                f"max_iterations = {self.max_iterations} is less than min_iterations = {self.min_iterations}",
+                where="solver",
+                remedy="give as many or more",
+            )
+
+
+@dataclass(frozen=True)
+class Recording:
+    """`[output]`: what is kept, and how often."""
+
+    every: Annotated[int, Setting("Steps between two rows of the measures.", at_least=1)] = 20
+    fields_every: Annotated[int, Setting("Steps between two instants of all disks.", at_least=1)] = 500
+    checkpoint: Annotated[int, Setting("Steps between two checkpoints; 0: none.", at_least=0)] = 200
+    figures: Annotated[bool, Setting("Draw the figures.")] = True
+
+    def __post_init__(self) -> None:
+        check_settings("output", self)

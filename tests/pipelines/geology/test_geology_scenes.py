@@ -1,0 +1,162 @@
+"""Geological scenes: keys are checked with their lines, the shipped ones are the paper's, runs leave their measures."""
+
+import json
+
+import numpy as np
+import pytest
+
+from moma.cli.geology import Experiment
+from moma.errors import SceneError
+from pipelines.geology.file import EXPERIMENTS, parse_geology, read_geology
+from pipelines.geology.observe import CELL_COLUMNS, read_rows
+from pipelines.geology.run import run_geology
+from pipelines.geology.sample import prepare
+from tests.docs.test_docs import commands
+from tests.moma.commands import answer, fails, prints
+from tests.paths import ROOT
+from tests.pipelines.scenes import small_geology
+
+SAMPLES = ROOT / "data/samples/geology"
+SMALL = """
+[scene]
+name = "Small fault"
+[sample]
+smallest = 0.2
+largest = 0.3
+layers = 3
+[time]
+step = 0.01
+steps = 30
+[solver]
+min_iterations = 20
+max_iterations = 40
+[fault]
+length = 12.0
+thickness = 3.0
+tip = 6.0
+dip = 30.0
+speed = 0.5
+[output]
+every = 10
+fields_every = 15
+checkpoint = 10
+figures = false
+[[cells]]
+name = "W1"
+centre = [7.0, 1.5]
+radius = 1.0
+"""
+
+
+@pytest.mark.parametrize(("name", "kind"), [("fold", "fold"), ("fault", "fault")])
+def test_shipped_scenes_are_those_of_the_paper_and_a_tenth_has_its_lengths_over_the_root_of_ten(name, kind):
+    whole, tenth = (read_geology(SAMPLES / f"{name}{part}.toml", kind) for part in ("", "-tenth"))
+    assert whole.sample == tenth.sample
+    assert whole.time == tenth.time
+    assert tenth.experiment.length == pytest.approx(whole.experiment.length / np.sqrt(10), rel=1e-3)
+    assert [cell.name for cell in whole.cells] == [cell.name for cell in tenth.cells]
+    for one, other in zip(whole.cells, tenth.cells, strict=True):
+        assert np.array(other.centre) == pytest.approx(np.array(one.centre) / np.sqrt(10), rel=1e-3)
+
+
+def test_the_fold_has_the_area_of_its_disks():
+    """43,000 disks of 0.42 to 0.56 m fill the profile at 0.82 to 0.83 of its area (Renouf et al. 2006)."""
+    fold = read_geology(SAMPLES / "fold.toml", "fold").experiment
+    x = np.linspace(0.0, fold.length, 100_001)
+    area = float(np.mean(fold.top(x)) * fold.length)
+    mean = np.pi * (0.42**2 + 0.42 * 0.56 + 0.56**2) / 3.0
+    assert 43_000 * mean / area == pytest.approx(0.825, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("written", "instead", "line", "said"),
+    [
+        ("smallest = 0.2", "smalest = 0.2", 5, "unknown key 'smalest' in [sample]; did you mean 'smallest'?"),
+        ("dip = 30.0", "dip = 95.0", 18, "dip = 95"),
+        ("largest = 0.3", "largest = 0.1", 4, "largest = 0.1 is less than smallest = 0.2"),
+        ("min_iterations = 20", "min_iterations = 50", 11, "max_iterations = 40 is less than"),
+        ("tip = 6.0", "tip = 16.0", 14, "tip = 16 is not within the length"),
+        ("radius = 1.0", "radius = -1.0", 28, "radius = -1"),
+        ("[fault]", "[fold]", 14, "this is a scene of `moma geology fold`"),
+        ("centre = [7.0, 1.5]", "centre = [7.0]", 27, "give x and y"),
+        ("step = 0.01", "step = 0", 9, "step = 0 is out of range"),
+    ],
+)
+def test_what_is_wrong_is_refused_at_its_line(written, instead, line, said):
+    assert written in SMALL
+    with pytest.raises(SceneError) as caught:
+        parse_geology(SMALL.replace(written, instead, 1), "fault.toml", "fault")
+    assert str(caught.value).startswith(f"fault.toml:{line}: ")
+    assert said in str(caught.value)
+
+
+def test_negative_cohesion_is_refused():
+    text = SMALL.replace("[time]", "[contact]\ncohesion = -1.0\n[time]")
+    with pytest.raises(SceneError, match="cohesion = -1"):
+        parse_geology(text, "fault.toml", "fault")
+
+
+def test_a_sample_is_made_once(tmp_path):
+    scene = parse_geology(SMALL, "fault.toml", "fault")
+    first = prepare(scene, tmp_path)
+    (path,) = tmp_path.glob("*.npz")
+    made = path.stat().st_mtime_ns
+    again = prepare(scene, tmp_path)
+    assert path.stat().st_mtime_ns == made
+    assert np.array_equal(first.centre, again.centre)
+    assert sorted(set(first.layer.tolist())) == [0, 1, 2]
+    path.write_bytes(b"cut short")
+    assert np.array_equal(prepare(scene, tmp_path).centre, first.centre)
+
+
+def test_a_run_leaves_rows_of_its_cells_fields_and_a_summary(tmp_path):
+    (tmp_path / "fault.toml").write_text(SMALL, encoding="utf-8")
+    summary = answer("geology", "fault", tmp_path / "fault.toml", "--out", tmp_path / "out")
+    assert summary == json.loads((tmp_path / "out/summary.json").read_text(encoding="utf-8"))
+    assert summary["steps"] == 30
+    assert summary["overlap"]["max"] <= 0.01
+    assert set(summary["cells"]) == {"W1", "whole sample"}
+    rows = read_rows(tmp_path / "out" / summary["cells"]["W1"])
+    assert list(rows) == list(CELL_COLUMNS)
+    assert rows["step"].tolist() == [10.0, 20.0, 30.0]
+    assert (rows["p"] > 0).all()
+    assert sorted(path.name for path in (tmp_path / "out/fields").iterdir()) == [
+        "00000015.vtu",
+        "00000030.vtu",
+    ]
+
+
+def test_a_run_that_was_stopped_goes_on_with_the_same_bits(tmp_path):
+    (tmp_path / "fault.toml").write_text(SMALL, encoding="utf-8")
+    whole = run_geology(tmp_path / "fault.toml", "fault", tmp_path / "whole")
+    steps = iter([False] * 16)
+    stopped = run_geology(
+        tmp_path / "fault.toml", "fault", tmp_path / "parts", stop=lambda: next(steps, True)
+    )
+    assert stopped.summary["outcome"] == "interrupted"
+    done = run_geology(tmp_path / "fault.toml", "fault", tmp_path / "parts", resume=True)
+    assert done.summary["steps"] == 30
+    for name in whole.summary["cells"].values():
+        assert (tmp_path / "parts" / name).read_text() == (tmp_path / "whole" / name).read_text()
+
+
+def test_a_cell_outside_the_sample_is_refused_at_its_line(tmp_path):
+    text = SMALL.replace("centre = [7.0, 1.5]", "centre = [7.0, 50.0]")
+    (tmp_path / "fault.toml").write_text(text, encoding="utf-8")
+    said = fails(2, "geology", "fault", tmp_path / "fault.toml", "--out", tmp_path / "out")
+    assert "cell 'W1': holds 0 disks" in said
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_command_knows_all_experiments():
+    assert {one.value for one in Experiment} == set(EXPERIMENTS)
+
+
+def test_the_commands_of_the_how_to_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    small_geology(tmp_path / "data/samples/geology")
+    asked = commands("docs/howto/geology.md")
+    assert {command[2] for command in asked} == set(EXPERIMENTS)
+    for command in asked:
+        assert "results in" in prints(*command[1:])
+    assert (tmp_path / "out/geology/fault/cells.png").stat().st_size > 10_000
