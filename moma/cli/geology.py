@@ -19,6 +19,9 @@ class Experiment(StrEnum):
     DEPOSIT = "deposit"
     FOLD = "fold"
     FAULT = "fault"
+    BIAXIAL = "biaxial"
+    WEDGE = "wedge"
+    REPOSE = "repose"
 
 
 @reporting
@@ -57,6 +60,7 @@ def geology(
     lines = [
         f"{summary['scene']}: {summary['disks']} disks, {summary['steps']} steps",
         f"  {summary['headline']}",
+        *(f"  {name}: {value:.4g}" for name, value in summary["measures"].items()),
         f"  results in {done.folder}",
     ]
     print(as_json(summary) if json else "\n".join(lines))

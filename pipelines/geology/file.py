@@ -7,10 +7,13 @@ from typing import Any, cast
 
 from mechanics.planar.measures.cells import Cell
 from moma.errors import SceneError
+from pipelines.geology.experiments.biaxial import Biaxial
 from pipelines.geology.experiments.deposition import Deposition
 from pipelines.geology.experiments.experiment import Experiment
 from pipelines.geology.experiments.fault import Fault
 from pipelines.geology.experiments.fold import Fold
+from pipelines.geology.experiments.repose import Repose
+from pipelines.geology.experiments.wedge import Wedge
 from pipelines.geology.settings import Material, Recording, Sample, Stepping, Sweeping
 from pipelines.scene.keys import build, keys_of
 from pipelines.toml.lines import key_lines, parse_toml, read_text
@@ -18,7 +21,14 @@ from pipelines.toml.schema import REQUIRED, Document, Key, Kind, check_table, ne
 
 __all__ = ["EXPERIMENTS", "GeologyScene", "parse_geology", "read_geology"]
 
-EXPERIMENTS: Mapping[str, type[Any]] = {"deposit": Deposition, "fault": Fault, "fold": Fold}
+EXPERIMENTS: Mapping[str, type[Any]] = {
+    "deposit": Deposition,
+    "fold": Fold,
+    "fault": Fault,
+    "biaxial": Biaxial,
+    "wedge": Wedge,
+    "repose": Repose,
+}
 """Experiments by the name of their table, which is that of their command."""
 
 _TABLES: Mapping[str, type[Any]] = {

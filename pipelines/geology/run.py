@@ -24,7 +24,7 @@ from mechanics.scene.scene import LawRule, Method, SolverSettings
 from moma.errors import SceneError
 from pipelines.geology.figures import draw_curves, draw_instant
 from pipelines.geology.file import GeologyScene, read_geology
-from pipelines.geology.observe import CELL_COLUMNS, Fields, Observation
+from pipelines.geology.observe import CELL_COLUMNS, WHOLE, Fields, Observation
 from pipelines.geology.sample import PreparedSample, prepare
 from pipelines.results.folder import RUN_INDEX, UNFINISHED, check_replaceable, replacing
 from pipelines.results.vtu import VERTEX, Grid, cells_of, write_pvd, write_vtu
@@ -36,7 +36,6 @@ from pipelines.scene.settings import Output, ParaView
 __all__ = ["GeologyReport", "planar_scene", "run_geology"]
 
 _SAMPLES = ".samples"  # folder of prepared samples, beside that of the results
-_BETWEEN = "walls"  # friction with walls, where it differs
 
 
 @dataclass(frozen=True)
@@ -79,7 +78,7 @@ def planar_scene(scene: GeologyScene, sample: PreparedSample) -> PlanarScene:
             for code, (x, y), radius in zip(codes, sample.centre, sample.radius, strict=True)
         ),
         setup.walls,
-        (0.0, -time.gravity),
+        (0.0, 0.0 if setup.weightless else -time.gravity),
         law,
         rules,
         largest_overlap=solver.largest_overlap,
@@ -214,7 +213,7 @@ def _write(
         **quality,
         "energy": result.errors.energy,
         "cells": cells,
-        "measures": {},
+        "measures": dict(scene.experiment.measures(sample.centre, sample.radius, instants, rows[WHOLE])),
         "versions": dict(versions()),
         "version": version("moma-masonry"),
         "resumed": archive.resumed,

@@ -1,4 +1,5 @@
 """Experiments: folds, faults, compression, wedges and heaps.
 
-Public: `Experiment`, `Setup` (experiment); `Fold` (fold); `Fault` (fault); `Deposition` (deposition).
+Public: `Experiment`, `Setup` (experiment); `Deposition` (deposition); `Fold` (fold); `Fault` (fault); `Biaxial` (biaxial);
+`Wedge` (wedge); `Repose` (repose).
 """

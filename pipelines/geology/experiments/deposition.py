@@ -1,6 +1,6 @@
 """Deposition alone: a sample at rest in its box."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -11,6 +11,7 @@ from mechanics.planar.scene import Wall
 from mechanics.scene.loads.load import Loads
 from mechanics.stones.settings import Setting, check_settings
 from pipelines.geology.experiments.experiment import Setup
+from pipelines.geology.observe import Fields
 
 __all__ = ["Deposition"]
 
@@ -49,3 +50,9 @@ class Deposition:
     def phases(self, duration: float) -> Mapping[str, tuple[float, float]]:
         """Return the one phase of the run."""
         return {"rest": (0.0, duration)}
+
+    def measures(
+        self, start: Array, radius: Array, instants: Sequence[Fields], whole: Mapping[str, Array]
+    ) -> Mapping[str, float]:
+        """Return nothing beyond the rows of the whole sample."""
+        return {}

@@ -1,12 +1,13 @@
 """Protocol of the experiments: a sample of a certain shape, and walls and loads that deform it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from mechanics.arrays import Array
 from mechanics.planar.scene import Wall
 from mechanics.scene.loads.load import Loads
+from pipelines.geology.observe import Fields
 
 __all__ = ["Experiment", "Setup"]
 
@@ -20,11 +21,13 @@ class Setup:
     walls : in the order in which results name them
     loads : motions and forces of walls
     smooth : codes of walls without friction
+    weightless : nothing weighs any more once the sample is deposited
     """
 
     walls: tuple[Wall, ...]
     loads: Loads
     smooth: frozenset[str] = frozenset()
+    weightless: bool = False
 
 
 class Experiment(Protocol):
@@ -46,3 +49,16 @@ class Experiment(Protocol):
 
     def phases(self, duration: float) -> Mapping[str, tuple[float, float]]:
         """Return the beginning and end of each phase of the run by its name [s]."""
+
+    def measures(
+        self, start: Array, radius: Array, instants: Sequence[Fields], whole: Mapping[str, Array]
+    ) -> Mapping[str, float]:
+        """Return what the experiment is made for, by name with the unit.
+
+        Parameters
+        ----------
+        start : (nd, 2) centres at the start [m]
+        radius : (nd,) [m]
+        instants : those that were kept
+        whole : columns of the rows of the whole sample
+        """

@@ -1,12 +1,13 @@
 """Reverse fault in the basement, whose propagation folds the cover (Renouf, Dubois & Alart 2006)."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 
 from mechanics.arrays import Array
+from mechanics.planar.measures.trishear import trishear_fit
 from mechanics.planar.scene import Wall
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import ImposedMotion
@@ -14,6 +15,7 @@ from mechanics.scene.loads.time_series import History
 from mechanics.stones.settings import Setting, check_settings
 from moma.errors import SceneError
 from pipelines.geology.experiments.experiment import Setup
+from pipelines.geology.observe import Fields
 
 __all__ = ["Fault"]
 
@@ -82,3 +84,20 @@ class Fault:
         """Return the paper's two phases, as parts of the run [s]."""
         middle = _FIRST_PHASE * duration
         return {"first": (0.0, middle), "second": (middle, duration)}
+
+    def measures(
+        self, start: Array, radius: Array, instants: Sequence[Fields], whole: Mapping[str, Array]
+    ) -> Mapping[str, float]:
+        """Return the trishear that comes nearest to the motion of the disks, and how near."""
+        last = instants[-1]
+        slip = self.speed * last.time
+        fit = trishear_fit(
+            start, last.position[: len(start), :2], (self.tip, 0.0), float(np.radians(self.dip)), slip
+        )
+        return {
+            "slip [m]": slip,
+            "trishear: apical angle [°]": 2.0 * float(np.degrees(fit.model.half_angle)),
+            "trishear: propagation to slip [-]": fit.model.ratio,
+            "trishear: residual over slip [-]": fit.relative,
+            "trishear: share of the motion explained [-]": fit.explained,
+        }

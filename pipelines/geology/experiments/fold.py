@@ -1,12 +1,13 @@
 """Forced fold: a wall pushes a basin that thins away from it (Renouf, Dubois & Alart 2006)."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 
 from mechanics.arrays import Array
+from mechanics.planar.measures.surface import profile
 from mechanics.planar.scene import Wall
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import ImposedMotion
@@ -14,6 +15,7 @@ from mechanics.scene.loads.time_series import History
 from mechanics.stones.settings import Setting, check_settings
 from moma.errors import SceneError
 from pipelines.geology.experiments.experiment import Setup
+from pipelines.geology.observe import Fields
 
 __all__ = ["Fold"]
 
@@ -71,3 +73,21 @@ class Fold:
     def phases(self, duration: float) -> Mapping[str, tuple[float, float]]:
         """Return the one phase of the run."""
         return {"shortening": (0.0, duration)}
+
+    def measures(
+        self, start: Array, radius: Array, instants: Sequence[Fields], whole: Mapping[str, Array]
+    ) -> Mapping[str, float]:
+        """Return how far the wall went, how high the sample rose, and how far its front has come.
+
+        The front is the farthest place at which the surface stands higher than at the start by two mean radii.
+        """
+        last = instants[-1]
+        places = np.linspace(0.0, self.length, 1 + int(self.length / (2.0 * radius.mean())))
+        before = profile(start, radius, places)
+        now = profile(last.position[: len(start), :2], radius, places)
+        risen = places[np.nan_to_num(now - before, nan=0.0) > 2.0 * radius.mean()]
+        return {
+            "shortening [m]": self.speed * last.time,
+            "highest [m]": float(np.nanmax(now)),
+            "front [m]": float(risen.max(initial=0.0)),
+        }

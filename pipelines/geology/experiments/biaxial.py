@@ -1,0 +1,89 @@
+"""Biaxial compression between smooth platens: the friction angle of the sample."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from mechanics.arrays import Array
+from mechanics.planar.scene import Wall
+from mechanics.scene.loads.forces import StoneForce
+from mechanics.scene.loads.load import Loads
+from mechanics.scene.loads.motions import ImposedMotion
+from mechanics.scene.loads.time_series import History
+from mechanics.stones.settings import Setting, check_settings
+from pipelines.geology.experiments.experiment import Setup
+from pipelines.geology.observe import Fields
+
+__all__ = ["Biaxial"]
+
+_LATE = 0.5  # of the run, whose mean is that of large strain [-]
+_MASS = 0.1  # of a side platen, over that of the sample if it were water [-]
+
+
+@dataclass(frozen=True)
+class Biaxial:
+    """`[biaxial]`: the top sinks at a constant speed, the sides press with a constant pressure; nothing weighs."""
+
+    width: Annotated[float, Setting("Width of the sample.", "m", above=0)]
+    height: Annotated[float, Setting("Height of the sample.", "m", above=0)]
+    pressure: Annotated[float, Setting("Of the sides.", "Pa", above=0)]
+    strain: Annotated[float, Setting("Vertical strain at the end.", "-", above=0, below=0.9)] = 0.2
+
+    def __post_init__(self) -> None:
+        check_settings("biaxial", self)
+
+    @property
+    def length(self) -> float:
+        """Width of the box in which the sample is deposited [m]."""
+        return self.width
+
+    @property
+    def highest(self) -> float:
+        """Height of the sample [m]."""
+        return self.height
+
+    def top(self, x: Array) -> Array:
+        """Return the height of the sample at places along x [m]."""
+        return np.full(len(x), self.height)
+
+    def setup(self, step: float, duration: float) -> Setup:
+        """Return the platens; those at the sides have a mass, and press with their force whatever their place."""
+        out, mass = 0.5 * self.width, _MASS * 1000.0 * self.width * self.height
+        walls = (
+            Wall("floor", (-out, 0.0), (self.width + out, 0.0)),
+            Wall("top", (-out, self.height), (self.width + out, self.height)),
+            Wall("left", (0.0, -out), (0.0, self.height + out), mass),
+            Wall("right", (self.width, -out), (self.width, self.height + out), mass),
+        )
+        force = self.pressure * self.height
+        loads = Loads(
+            forces=tuple(
+                StoneForce(frozenset({code}), History.constant([sign * force, 0.0, 0.0]))
+                for code, sign in (("left", 1.0), ("right", -1.0))
+            ),
+            motions=(
+                ImposedMotion(
+                    frozenset({"top"}), History.constant([0.0, -self.strain * self.height / duration, 0.0])
+                ),
+            ),
+        )
+        return Setup(walls, loads, smooth=frozenset(wall.code for wall in walls), weightless=True)
+
+    def phases(self, duration: float) -> Mapping[str, tuple[float, float]]:
+        """Return the one phase of the run."""
+        return {"compression": (0.0, duration)}
+
+    def measures(
+        self, start: Array, radius: Array, instants: Sequence[Fields], whole: Mapping[str, Array]
+    ) -> Mapping[str, float]:
+        """Return the friction angle at large strain, of the mean stress of the sample."""
+        late = whole["time"] >= _LATE * whole["time"][-1]
+        ratio = np.clip(whole["q"][late] / whole["p"][late], 0.0, 1.0)
+        angle = np.degrees(np.arcsin(ratio))
+        return {
+            "friction angle [°]": float(angle.mean()),
+            "its standard deviation [°]": float(angle.std()),
+            "sin φ [-]": float(ratio.mean()),
+        }

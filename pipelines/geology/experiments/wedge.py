@@ -1,0 +1,98 @@
+"""Wedge pushed by a wall over its base, as sandboxes are (Buiter et al. 2016)."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from mechanics.arrays import Array
+from mechanics.planar.measures.surface import profile
+from mechanics.planar.measures.surface import slope as slope_of
+from mechanics.planar.scene import Wall
+from mechanics.scene.loads.load import Loads
+from mechanics.scene.loads.motions import ImposedMotion
+from mechanics.scene.loads.time_series import History
+from mechanics.stones.settings import Setting, check_settings
+from moma.errors import SceneError
+from pipelines.geology.experiments.experiment import Setup
+from pipelines.geology.observe import Fields
+
+__all__ = ["Wedge"]
+
+_MIDDLE = (0.15, 0.85)  # part of the wedge, along its base, over which its slope is measured [-]
+_ROOM = 1.5  # length of the base over that of the wedge and the push [-]
+
+
+@dataclass(frozen=True)
+class Wedge:
+    """`[wedge]`: a surface that sinks away from the wall that pushes, with a level layer before it, or none."""
+
+    height: Annotated[float, Setting("Height beside the wall.", "m", above=0)]
+    slope: Annotated[float, Setting("Slope of the surface.", "°", at_least=0, below=90)]
+    push: Annotated[float, Setting("Way of the wall.", "m", above=0)]
+    layer: Annotated[float, Setting("Thickness of the layer before the wedge; 0: none.", "m", at_least=0)] = (
+        0.0
+    )
+    layer_length: Annotated[float, Setting("Length of that layer.", "m", at_least=0)] = 0.0
+
+    def __post_init__(self) -> None:
+        check_settings("wedge", self)
+        if self.layer >= self.height and self.slope > 0:
+            raise SceneError(
+                f"layer = {self.layer:g} m is not lower than the wedge, {self.height:g} m", where="wedge"
+            )
+        if self.slope == 0 and self.layer_length == 0:
+            raise SceneError("slope = 0 needs a layer", where="wedge", remedy="give layer and layer_length")
+
+    @property
+    def _foot(self) -> float:
+        """Length of the part with a slope [m]."""
+        return (self.height - self.layer) / np.tan(np.radians(self.slope)) if self.slope else 0.0
+
+    @property
+    def length(self) -> float:
+        """Length of the box in which the sample is deposited [m]."""
+        return float(self._foot + self.layer_length)
+
+    @property
+    def highest(self) -> float:
+        """Height beside the wall [m]."""
+        return self.height
+
+    def top(self, x: Array) -> Array:
+        """Return the height of the sample at places along x [m]."""
+        height: Array = np.maximum(self.height - np.tan(np.radians(self.slope)) * x, self.layer)
+        return height
+
+    def setup(self, step: float, duration: float) -> Setup:
+        """Return the base and the wall, which goes its way within the run."""
+        walls = (
+            Wall("base", (-0.1 * self.length, 0.0), (_ROOM * (self.length + self.push), 0.0)),
+            Wall("left", (0.0, -0.1 * self.height), (0.0, 3.0 * self.height)),
+        )
+        speed = History.constant([self.push / duration, 0.0, 0.0])
+        return Setup(walls, Loads(motions=(ImposedMotion(frozenset({"left"}), speed),)))
+
+    def phases(self, duration: float) -> Mapping[str, tuple[float, float]]:
+        """Return the one phase of the run."""
+        return {"push": (0.0, duration)}
+
+    def measures(
+        self, start: Array, radius: Array, instants: Sequence[Fields], whole: Mapping[str, Array]
+    ) -> Mapping[str, float]:
+        """Return the slope of the surface before and after, and the local shear of the disks."""
+        last = instants[-1]
+        inner = np.isfinite(last.shear)
+        return {
+            "slope at the start [°]": self._slope(start, radius, 0.0),
+            "slope [°]": self._slope(last.position[: len(start), :2], radius, self.push),
+            "local shear, median [-]": float(np.median(last.shear[inner])),
+            "local shear, 95 % [-]": float(np.quantile(last.shear[inner], 0.95)),
+        }
+
+    def _slope(self, place: Array, radius: Array, shift: float) -> float:
+        low, high = _MIDDLE
+        length = self._foot or self.length
+        places = np.arange(shift + low * length, shift + high * length, radius.mean())
+        return -float(np.degrees(slope_of(places, profile(place, radius, places))))
