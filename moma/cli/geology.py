@@ -60,7 +60,10 @@ def geology(
     lines = [
         f"{summary['scene']}: {summary['disks']} disks, {summary['steps']} steps",
         f"  {summary['headline']}",
-        *(f"  {name}: {value:.4g}" for name, value in summary["measures"].items()),
+        *(
+            f"  {name}: {'unknown' if value is None else f'{value:.4g}'}"
+            for name, value in summary["measures"].items()
+        ),
         f"  results in {done.folder}",
     ]
     print(as_json(summary) if json else "\n".join(lines))

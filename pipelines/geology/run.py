@@ -200,6 +200,7 @@ def _write(
         draw_curves(folder / "cells.png", rows, phases, line)
         for fields in instants[-1:]:
             draw_instant(folder, fields, sample.radius, sample.layer, _ends(model, fields), line)
+    measures = scene.experiment.measures(sample.centre, sample.radius, instants, rows[WHOLE])
     summary: dict[str, Any] = {
         "scene": scene.name,
         "kind": scene.kind,
@@ -213,7 +214,7 @@ def _write(
         **quality,
         "energy": result.errors.energy,
         "cells": cells,
-        "measures": dict(scene.experiment.measures(sample.centre, sample.radius, instants, rows[WHOLE])),
+        "measures": {name: value if np.isfinite(value) else None for name, value in measures.items()},
         "versions": dict(versions()),
         "version": version("moma-masonry"),
         "resumed": archive.resumed,

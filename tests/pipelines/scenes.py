@@ -70,7 +70,8 @@ def survey_text(stones: Mapping[str, tuple[int, Array, Array]], shift: Array) ->
 def small_geology(folder: Path) -> None:
     """Write the shipped geological scenes into a folder, a tenth as large, without cells, for a few steps."""
     folder.mkdir(parents=True)
-    small = {"length": 0.1, "thickness": 0.5, "deep": 0.5, "deep_length": 0.1, "slope_end": 0.1, "tip": 0.1}
+    small = {"length": 0.1, "deep_length": 0.1, "slope_end": 0.1, "tip": 0.1}
+    small |= {"thickness": 0.5, "deep": 0.5, "width": 0.3, "height": 0.3}
     for path in (ROOT / "data/samples/geology").glob("*.toml"):
         lines = path.read_text(encoding="utf-8").partition("\n[[cells]]")[0].splitlines()
         for number, line in enumerate(lines):
