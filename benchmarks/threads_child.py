@@ -63,7 +63,7 @@ def main() -> None:
     parser.add_argument("repeats", type=int)
     options = parser.parse_args()
     make = STAGES[options.stage]
-    with ThreadpoolController().limit(limits=options.threads, user_api="blas"):
+    with ThreadpoolController().limit(limits=1, user_api="blas"):
         stage = make(options.size, options.threads)
         arrays = stage.prepare()()  # compiles
         wall, cpu = [], []
