@@ -1,10 +1,11 @@
-"""Strategy for scenes with deformable stones: ADMM, and where that is slow the interior-point method."""
+"""Strategy for scenes with deformable stones: ADMM, where that is slow the interior point, at last cone programmes."""
 
 from dataclasses import dataclass, replace
 
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.problem.residual import residual
 from mechanics.solvers.first_order.admm import ADMM
+from mechanics.solvers.second_order.cone_program import ConeProgram
 from mechanics.solvers.second_order.interior_point import InteriorPoint
 
 __all__ = ["Elastic"]
@@ -15,6 +16,8 @@ _ADMM = 400
 _NEARLY_ADMM = 60
 # η of such a start [-]
 _NEARLY = 1e-4
+# most contacts of a step that cone programmes may solve: they take 2 to 5 s of 300 contacts
+_FEW = 1000
 
 
 @dataclass(frozen=True)
@@ -24,7 +27,8 @@ class Elastic:
     ADMM factorises once for as long as contacts persist, so where little changes from step to step a few of its cheap
     iterations suffice, and where they do not, Newton's method, with which the interior point begins, ends it. The
     interior point factorises in each of some 30 iterations, whatever the state (docs/decisions/010-interior-point.md
-    and 035-elastic-factors.md have the measurements).
+    and 035-elastic-factors.md have the measurements). Warped stones that settle ask for more now and then: cone
+    programmes, slow and sure, solve what neither did.
 
     Attributes
     ----------
@@ -50,4 +54,11 @@ class Elastic:
         second = other(problem, ContactStart(first.impulse, first.velocity))
         second = replace(second, why=f"interior point: admm stood at η {first.natural_map:.0e}")
         best = second if second.natural_map < first.natural_map or second.converged else first
-        return replace(best, iterations=first.iterations + second.iterations)
+        count = first.iterations + second.iterations
+        left = self.max_iterations - count
+        if not best.converged and left > 0 and len(start.impulse) <= _FEW:
+            third = ConeProgram(*limits, left)(problem, ContactStart(best.impulse, best.velocity))
+            third = replace(third, why=f"cone programmes: interior point stood at η {second.natural_map:.0e}")
+            best = third if third.natural_map < best.natural_map or third.converged else best
+            count += third.iterations
+        return replace(best, iterations=count)

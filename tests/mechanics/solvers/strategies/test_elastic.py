@@ -1,4 +1,4 @@
-"""ADMM first, the interior-point method where that does not get there; the better of both counts."""
+"""ADMM first, the interior point where that does not get there, cone programmes at last; the best of all counts."""
 
 from dataclasses import replace
 from functools import cache
@@ -107,22 +107,36 @@ class Fake:
 
 
 @pytest.mark.parametrize(
-    ("first", "second", "expected"),
-    [(1e-3, 1e-5, 1e-5), (1e-5, 1e-3, 1e-5), (1e-7, 1e-3, 1e-7)],
+    ("first", "second", "third", "expected"),
+    [(1e-3, 1e-5, 1e-4, 1e-5), (1e-5, 1e-3, 1e-4, 1e-5), (1e-7, 1e-3, 1e-4, 1e-7), (1e-4, 1e-5, 1e-6, 1e-6)],
 )
-def test_of_two_failures_the_better_counts(monkeypatch, first, second, expected):
-    one, other = Fake(first), Fake(second, iterations=4)
+def test_of_three_failures_the_best_counts(monkeypatch, first, second, third, expected):
+    one, other, last = Fake(first), Fake(second, iterations=4), Fake(third, iterations=5)
     monkeypatch.setattr(elastic, "ADMM", one)
     monkeypatch.setattr(elastic, "InteriorPoint", other)
+    monkeypatch.setattr(elastic, "ConeProgram", last)
     problem = sliding()
     answer = Elastic(1e-9, 1e-8, 90)(problem, cold(problem))
     assert answer.natural_map == expected
     assert not answer.converged
-    assert answer.iterations == 7
+    assert answer.iterations == 12
     # it goes on from where ADMM ended, with what is left of the iterations
     np.testing.assert_array_equal(other.starts[0].impulse, first)
     assert one.settings == (1e-9, 1e-8, 90)
     assert other.settings == (1e-9, 1e-8, 87)
+    assert last.settings == (1e-9, 1e-8, 83)
+
+
+def test_cone_programmes_are_for_few_contacts(monkeypatch):
+    last = Fake(1e-12, converged=True)
+    monkeypatch.setattr(elastic, "ADMM", Fake(1e-3))
+    monkeypatch.setattr(elastic, "InteriorPoint", Fake(1e-4))
+    monkeypatch.setattr(elastic, "ConeProgram", last)
+    problem = sliding()
+    assert Elastic(1e-9, 1e-8)(problem, cold(problem)).converged
+    monkeypatch.setattr(elastic, "_FEW", len(problem.u_free) - 1)
+    assert not Elastic(1e-9, 1e-8)(problem, cold(problem)).converged
+    assert len(last.starts) == 1
 
 
 def test_what_converged_goes_before_what_has_the_smaller_natural_map(monkeypatch):
