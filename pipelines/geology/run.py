@@ -123,8 +123,6 @@ def run_geology(
     """
     folder, scene = Path(folder), read_geology(path, kind)
     check_replaceable(folder)
-    with scene.document.at(kind):
-        scene.experiment.setup(scene.time.step, scene.time.step * scene.time.steps)
     sample = prepare(scene, Path(samples) if samples is not None else folder.parent / _SAMPLES, progress)
     planar = planar_scene(scene, sample)
     observation = _observation(scene, sample, planar, folder / UNFINISHED)
@@ -138,7 +136,8 @@ def run_geology(
         progress(Progress("write", 0, 1, "results"))
         summary.update(_write(fresh, scene, sample, result, observation, archive))
 
-    run_planar(planar, folder, resume, scene.output.checkpoint, progress, stop, observers, write)
+    with scene.document.at(kind):
+        run_planar(planar, folder, resume, scene.output.checkpoint, progress, stop, observers, write)
     return GeologyReport(folder, summary, tuple(summary["warnings"]))
 
 

@@ -58,7 +58,7 @@ class Stepping:
     step: Annotated[float, Setting("Time step h.", "s", above=0)]
     steps: Annotated[int, Setting("Number of steps.", at_least=1)]
     theta: Annotated[float, Setting("Integration parameter θ.", "-", at_least=0.5, at_most=1)] = 1.0
-    gravity: Annotated[float, Setting("Downwards.", "m/s²", at_least=0)] = 9.81
+    gravity: Annotated[float, Setting("Downwards; the sample settles under it.", "m/s²", above=0)] = 9.81
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Sweeping:
     max_iterations: Annotated[int, Setting("Sweeps of each step, at most.", at_least=1)] = 100
     tolerance: Annotated[float, Setting("η at which a step counts as solved.", "-", above=0, below=1)] = 1e-4
     largest_overlap: Annotated[
-        float, Setting("Overlap over the smallest radius that no step leaves.", "-", above=0, infinite=True)
+        float, Setting("Overlap over the smallest radius that no step leaves.", "-", above=0)
     ] = 0.01
     threads: Annotated[int, Setting("Threads that sweep; the results have the same bits.", at_least=1)] = 1
 
