@@ -7,6 +7,7 @@ import numpy as np
 
 from mechanics.arrays import Array, Bools
 from mechanics.dynamics.progress import Listener, Progress, silent
+from mechanics.planar.measures.surface import profile
 from mechanics.planar.run import PlanarRun
 from mechanics.planar.scene import Disk, PlanarScene, PlanarTime, Wall
 from mechanics.scene.laws.dry_joint import DryJoint
@@ -15,6 +16,10 @@ from moma.errors import SceneError
 
 __all__ = ["Deposit", "deposit"]
 
+_NARROWEST = 4.0  # length and height of a sample over the largest radius, at least [-]
+_MOST_DISKS = 2_000_000  # of a sample: more do not fit into the memory of most machines
+_LOW = 2.0  # of the surface below the profile over the width of the largest disk, at most [-]
+_PLACES = 200  # along the profile, at which the surface is looked at
 _LOOSE = 1.1  # width of the place of each disk at first, over the largest disk's
 _ROOM = 1.25  # height of the box that is filled at first, over what its disks need at rest
 _SOLID = 0.82  # share that settled disks fill, at most
@@ -38,6 +43,7 @@ class Deposit:
     friction : between disks, and with the box
     falling_friction : the same while they fall; less makes the sample denser (0.05: 0.845 of the area, 0.4: 0.83)
     seed : of the radii and places
+    gravity : downwards [m/s²]
     """
 
     length: float
@@ -49,6 +55,7 @@ class Deposit:
     friction: float
     falling_friction: float
     seed: int = 1
+    gravity: float = 9.81
 
     def __post_init__(self) -> None:
         for quantity, value, ok, remedy in (
@@ -58,30 +65,53 @@ class Deposit:
                 0 < self.smallest <= self.largest,
                 "give 0 < smallest ≤ largest",
             ),
-            ("length", self.length, self.length > 4 * self.largest, "give more than two disks' width"),
-            ("highest", self.highest, self.highest > 4 * self.largest, "give more than two disks' width"),
+            (
+                "length",
+                self.length,
+                self.length > _NARROWEST * self.largest,
+                f"give more than two of the widest disks, {_NARROWEST * self.largest:g} m, or smaller disks",
+            ),
+            (
+                "highest",
+                self.highest,
+                self.highest > _NARROWEST * self.largest,
+                f"give more than two of the widest disks, {_NARROWEST * self.largest:g} m, or smaller disks",
+            ),
+            ("gravity", self.gravity, self.gravity > 0, "give m/s² greater than 0: the disks fall"),
         ):
             if not ok:
                 raise SceneError(f"{quantity} = {value!r}", where="sample", remedy=remedy)
 
 
-def deposit(asked: Deposit, gravity: float = 9.81, progress: Listener = silent) -> tuple[Array, Array]:
+def deposit(asked: Deposit, progress: Listener = silent) -> tuple[Array, Array]:
     """Return centres (nd, 2) and radii (nd,) of a sample at rest [m].
 
     Disks of random sizes fall into a box; once they rest, those that reach above the profile are taken away, and the
     others come to rest again.
+
+    Raises
+    ------
+    SceneError : the sample needs more disks than there may be, or what settles does not reach the profile
     """
     centre, radius = _loose(asked)
-    centre = _settled(asked, centre, radius, asked.falling_friction, gravity, progress)
+    centre = _settled(asked, centre, radius, asked.falling_friction, progress)
+    _refuse_low(asked, centre, radius)
     keep = _below(asked, centre, radius)
-    if keep.all():
-        raise SceneError(
-            "the deposit does not reach the profile",
-            where="sample",
-            remedy="tell the developers the settings",
-        )
     centre, radius = centre[keep], radius[keep]
-    return _settled(asked, centre, radius, asked.friction, gravity, progress), radius
+    return _settled(asked, centre, radius, asked.friction, progress), radius
+
+
+def _refuse_low(asked: Deposit, centre: Array, radius: Array) -> None:
+    places = np.linspace(asked.largest, asked.length - asked.largest, _PLACES)
+    reached, wanted = np.nan_to_num(profile(centre, radius, places)), asked.top(places)
+    worst = int(np.argmax(wanted - reached))
+    if wanted[worst] - reached[worst] > 2.0 * _LOW * asked.largest:
+        raise SceneError(
+            f"at x = {places[worst]:.4g} m the settled disks reach {reached[worst]:.4g} m, the profile is "
+            f"{wanted[worst]:.4g} m high",
+            where="sample",
+            remedy="take smaller disks, of more similar sizes, or a longer sample; these settled too densely",
+        )
 
 
 def _below(asked: Deposit, centre: Array, radius: Array) -> Bools:
@@ -94,7 +124,15 @@ def _loose(asked: Deposit) -> tuple[Array, Array]:
     wide = 2.0 * _LOOSE * asked.largest
     columns = int((asked.length - 0.5 * wide) / wide)
     mean = np.pi * (asked.smallest**2 + asked.smallest * asked.largest + asked.largest**2) / 3.0
-    rows = int(np.ceil(_ROOM * _SOLID * asked.length * asked.highest / mean / columns))
+    needed = _ROOM * _SOLID * asked.length * asked.highest / mean
+    if needed > _MOST_DISKS:
+        raise SceneError(
+            f"{needed:.3g} disks of {asked.smallest:g} to {asked.largest:g} m are needed to fill "
+            f"{asked.length:g} × {asked.highest:g} m; at most {_MOST_DISKS:,} are taken",
+            where="sample",
+            remedy="take larger disks, or a smaller sample",
+        )
+    rows = int(np.ceil(needed / columns))
     row, column = np.indices((rows, columns)).reshape(2, -1)
     radius = rng.uniform(asked.smallest, asked.largest, len(row))
     free = (0.5 * wide - radius)[:, None]
@@ -103,12 +141,10 @@ def _loose(asked: Deposit) -> tuple[Array, Array]:
     return place + rng.uniform(-1.0, 1.0, place.shape) * free, radius
 
 
-def _settled(
-    asked: Deposit, centre: Array, radius: Array, friction: float, gravity: float, progress: Listener
-) -> Array:
+def _settled(asked: Deposit, centre: Array, radius: Array, friction: float, progress: Listener) -> Array:
     """Return the centres once disks that start from rest have come to rest again."""
     top = float(centre[:, 1].max()) + 2.0 * asked.largest
-    step = float(np.sqrt(2.0 * _FALL * asked.smallest / gravity))
+    step = float(np.sqrt(2.0 * _FALL * asked.smallest / asked.gravity))
     scene = PlanarScene(
         "deposit",
         tuple(
@@ -120,12 +156,12 @@ def _settled(
             Wall("left", (0.0, -asked.largest), (0.0, top)),
             Wall("right", (asked.length, -asked.largest), (asked.length, top)),
         ),
-        gravity=(0.0, -gravity),
+        gravity=(0.0, -asked.gravity),
         law=DryJoint(friction=friction),
         time=PlanarTime(step, 1.0, _MOST * step, stop_at_equilibrium=True),
         solver=SolverSettings(Method.NSGS, max_iterations=_SWEEPS),
     )
-    run, slow = PlanarRun(scene), _SLOW * np.sqrt(gravity * asked.smallest)
+    run, slow = PlanarRun(scene), _SLOW * np.sqrt(asked.gravity * asked.smallest)
     while not run.done:
         last = run.step()
         speed = float(np.hypot(*last.after.velocity[: len(radius), :2].T).mean())

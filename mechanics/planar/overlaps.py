@@ -18,20 +18,48 @@ from mechanics.arrays import Array, Ints
 from mechanics.carried import Carrier
 from mechanics.planar.contacts import PlanarContacts
 from mechanics.planar.delassus import PlanarDelassus
-from mechanics.planar.model import PlanarState
+from mechanics.planar.model import PlanarModel, PlanarState
 from mechanics.scene.laws.law import Terms
+from moma.errors import SceneError
 
-__all__ = ["Apart", "Overlaps"]
+__all__ = ["Apart", "Overlaps", "refuse_deep"]
 
 
 # overlap over the largest allowed that a correction leaves, a in the equations: contacts stay closed [-]
 _LEFT = 0.5
 # overlap beyond that from which disks are moved apart, over the largest allowed; the rest is for what is not linear
 _BEYOND = 0.3
+# of overlaps at the start that are just as large as allowed [-]
+_ROUNDING = 1e-9
 # sweeps between two looks
 _LOOK = 10
 # sweeps of one correction at most; what is left then is left to the next step
 _SWEEPS = 1000
+
+
+def refuse_deep(model: PlanarModel, contacts: PlanarContacts) -> None:
+    """Refuse a start at which disks overlap by more than `PlanarScene.start_overlap`, or a wall runs through them.
+
+    Raises
+    ------
+    SceneError : naming the two bodies that overlap most, the place, and how many more there are
+    """
+    scene, radius = model.scene, 0.5 * contacts.size
+    part = -contacts.gap / radius
+    deep = np.flatnonzero(part > scene.start_overlap * (1.0 + _ROUNDING))
+    if not len(deep):
+        return
+    worst = deep[np.argmax(part[deep])]
+    codes, (first, second) = scene.codes, contacts.bodies[worst].tolist()
+    across = second >= len(model.radius)
+    x, y = contacts.point[worst]
+    more = f"; so do {len(deep) - 1} more pairs" if len(deep) > 1 else ""
+    raise SceneError(
+        f"at the start they overlap by {-contacts.gap[worst]:.4g} m at ({x:.6g}, {y:.6g}), {part[worst]:.0%} of the "
+        f"radius {radius[worst]:.4g} m; {scene.start_overlap:.0%} is allowed{more}",
+        where=f"disk {codes[first]!r} and {'wall' if across else 'disk'} {codes[second]!r}",
+        remedy="move the wall or the disk" if across else "move them apart, or leave one out",
+    )
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from mechanics.carried import Carried, Carrier, Rows
 from mechanics.dynamics.outcome import Outcome
 from mechanics.dynamics.progress import Clock
 from mechanics.dynamics.stopping import LASTING
+from mechanics.planar.contacts import PlanarDetector
 from mechanics.planar.model import PlanarModel, PlanarState, build_planar_model
 from mechanics.planar.observers import (
     PlanarEnergy,
@@ -18,6 +19,7 @@ from mechanics.planar.observers import (
     kinetic_energy,
     world_force,
 )
+from mechanics.planar.overlaps import refuse_deep
 from mechanics.planar.result import (
     PlanarContactResult,
     PlanarFrame,
@@ -44,6 +46,10 @@ class PlanarRun(Carrier):
     Parameters
     ----------
     scene : it
+
+    Raises
+    ------
+    SceneError : disks overlap too much at the start, or a wall runs through them
 
     Attributes
     ----------
@@ -72,6 +78,7 @@ class PlanarRun(Carrier):
     def __init__(self, scene: PlanarScene) -> None:
         self._clock = Clock()
         self.model, start = build_planar_model(scene)
+        refuse_deep(self.model, PlanarDetector(self.model)(start))
         self.simulation = PlanarSimulation(self.model, start, self._clock)
         self._log, self._watch = _Log(self.model, start), PlanarWatch(self.model)
         self.steps, self.total = 0, max(1, round(scene.time.duration / scene.time.step))

@@ -137,6 +137,7 @@ class PlanarScene:
     gravity : (gx, gy) [m/s²]
     law : contact law where no rule says otherwise
     rules : laws between two groups of bodies, by their codes; of two that name the same pair, the later holds
+    start_overlap : disks that overlap more at the start, or lie across a wall, are refused when the run begins
     largest_overlap : beyond it disks are moved apart after a step, at unchanged velocities; overlaps of the start stay
     alert_distance : gap below which a contact is watched, relative to the smaller radius [-]
     thickness : of the slice; masses and areas are for it [m]
@@ -154,6 +155,15 @@ class PlanarScene:
     law: Law = field(default_factory=DryJoint)
     rules: tuple[LawRule, ...] = ()
     alert_distance: float = 0.05
+    start_overlap: Annotated[
+        float,
+        Setting(
+            "Overlap at the start over the smaller radius beyond which the scene is refused; infinite: it never is.",
+            "-",
+            above=0,
+            infinite=True,
+        ),
+    ] = 0.3
     largest_overlap: Annotated[
         float,
         Setting(

@@ -48,7 +48,7 @@ def simulate_planar(
 
     Raises
     ------
-    SceneError : if a motion leaves the plane
+    SceneError : if disks overlap too much at the start, or a motion leaves the plane
     SolverError : if the motion is no longer finite
 
     Examples

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from moma.cli.console import reporting, say
-from moma.cli.options import Json, SceneArgument
+from moma.cli.options import Json, Out, Resume, SceneArgument
 from moma.cli.progress import Interruption, progress_bars
 
 __all__ = ["Experiment", "geology"]
@@ -28,23 +28,14 @@ class Experiment(StrEnum):
 def geology(
     experiment: Annotated[Experiment, typer.Argument(help="Experiment; the scene has a table of its name.")],
     scene: SceneArgument,
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results; default: out/SCENE.")
-    ] = None,
+    out: Out = None,
     samples: Annotated[
         Path | None,
         typer.Option(
             "--samples", metavar="DIR", help="Folder of prepared samples; default: .samples beside DIR."
         ),
     ] = None,
-    resume: Annotated[
-        bool | None,
-        typer.Option(
-            "--resume/--restart",
-            help="Go on with the unfinished run in the folder, or give it up; without either, it is left alone.",
-            show_default=False,
-        ),
-    ] = None,
+    resume: Resume = None,
     json: Json = False,
 ) -> None:
     """Deform a sample of disks; write rows of its cells, fields, figures and a summary."""

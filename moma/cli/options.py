@@ -16,9 +16,11 @@ __all__ = [
     "Kind",
     "KindWhere",
     "ListFormat",
+    "Out",
     "Planes",
     "Profile",
     "ProfileName",
+    "Resume",
     "SceneArgument",
     "Sigma",
     "Snap",
@@ -139,3 +141,14 @@ Planes = Annotated[
     ),
 ]
 SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="Scene file; see docs/scene.md.")]
+Out = Annotated[
+    Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results; default: out/SCENE.")
+]
+Resume = Annotated[
+    bool | None,
+    typer.Option(
+        "--resume/--restart",
+        help="Go on with the unfinished run in the folder, or give it up; without either, it is left alone.",
+        show_default=False,
+    ),
+]

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from moma.cli.console import reporting, say
-from moma.cli.options import DEFAULT_DB, Db, Json, Profile, SceneArgument, Verbose
+from moma.cli.options import DEFAULT_DB, Db, Json, Out, Profile, Resume, SceneArgument, Verbose
 from moma.cli.progress import Interruption, progress_bars
 
 __all__ = ["check", "run", "trade"]
@@ -62,9 +62,7 @@ def check(
 @reporting
 def run(
     scene: SceneArgument,
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results; default: out/SCENE.")
-    ] = None,
+    out: Out = None,
     meshes: Annotated[
         Path | None,
         typer.Option(
@@ -73,14 +71,7 @@ def run(
             help="Write the meshes of deformable stones for Gmsh, Code_Aster, Abaqus, …; see docs/runs.md.",
         ),
     ] = None,
-    resume: Annotated[
-        bool | None,
-        typer.Option(
-            "--resume/--restart",
-            help="Go on with the unfinished run in the folder, or give it up; without either, it is left alone.",
-            show_default=False,
-        ),
-    ] = None,
+    resume: Resume = None,
     accept_unsound: AcceptUnsound = False,
     profile: Profile = None,
     db: Db = DEFAULT_DB,

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
+
 from mechanics.planar.measures.cells import Cell
 from moma.errors import SceneError
 from pipelines.geology.experiments.biaxial import Biaxial
@@ -14,6 +16,7 @@ from pipelines.geology.experiments.fault import Fault
 from pipelines.geology.experiments.fold import Fold
 from pipelines.geology.experiments.repose import Repose
 from pipelines.geology.experiments.wedge import Wedge
+from pipelines.geology.observe import WHOLE
 from pipelines.geology.settings import Material, Recording, Sample, Stepping, Sweeping
 from pipelines.scene.keys import build, keys_of
 from pipelines.toml.lines import key_lines, parse_toml, read_text
@@ -44,6 +47,7 @@ _CELL = (
     Key("centre", Kind.NUMBERS, "x and y at the start.", "m", REQUIRED),
     Key("radius", Kind.NUMBER, "Radius at the start.", "m", REQUIRED, above=0),
 )
+_CORNERS = 73  # of the polygon that stands for a cell
 _START = "see docs/howto/geology.md for a scene to start from"
 
 
@@ -96,9 +100,9 @@ def parse_geology(text: str, path: str, kind: str) -> GeologyScene:
             document.fail(f"unknown table [{name}]", name, remedy=other)
     if kind not in given:
         document.fail(f"no table [{kind}]", remedy=_START)
-    title = check_table(document, ("scene",), given.get("scene", {}), _TITLE)["name"]
+    title = check_table(document, ("scene",), _table(document, given, "scene"), _TITLE)["name"]
     tables = {name: _built(document, given, name, owner) for name, owner in _TABLES.items()}
-    return GeologyScene(
+    scene = GeologyScene(
         document=document,
         text=text,
         name=str(title or Path(path).stem),
@@ -107,19 +111,62 @@ def parse_geology(text: str, path: str, kind: str) -> GeologyScene:
         cells=_cells(document, given.get("cells", [])),
         **tables,
     )
+    _check_cells(scene)
+    _check_motion(scene)
+    return scene
 
 
-def _built(document: Document, given: Mapping[str, Any], name: str, owner: type[Any]) -> Any:
+def _check_cells(scene: GeologyScene) -> None:
+    """Refuse a cell that reaches out of the sample by more than a disk."""
+    own, slack, turn = scene.experiment, scene.sample.largest, np.linspace(0.0, 2.0 * np.pi, _CORNERS)
+    for number, cell in enumerate(scene.cells):
+        x = cell.centre[0] + cell.radius * np.cos(turn)
+        y = cell.centre[1] + cell.radius * np.sin(turn)
+        top = own.top(np.clip(x, 0.0, own.length))
+        out = np.max([-x, x - own.length, -y, y - top], axis=0)
+        worst = int(np.argmax(out))
+        if out[worst] > slack:
+            scene.document.fail(
+                f"cell {cell.name!r} reaches out of the sample by {out[worst]:.4g} m at "
+                f"({x[worst]:.4g}, {y[worst]:.4g}); it is {own.length:g} m long, and {top[worst]:.4g} m high there",
+                "cells",
+                str(number),
+                remedy="place it within the sample, or make it smaller",
+            )
+
+
+def _check_motion(scene: GeologyScene) -> None:
+    """Refuse walls that the experiment moves by more than a disk's radius in a step: they would pass through disks."""
+    time, smallest = scene.time, scene.sample.smallest
+    with scene.document.at(scene.kind):
+        setup = scene.experiment.setup(time.step, time.step * time.steps)
+    for motion in setup.loads.motions:
+        way = time.step * float(np.linalg.norm(np.atleast_2d(motion.velocity.value), axis=1).max())
+        if way > smallest:
+            scene.document.fail(
+                f"in a step of {time.step:g} s the wall {min(motion.stones)!r} goes {way:.4g} m, more than the "
+                f"smallest radius, {smallest:g} m: it would pass through disks",
+                "time",
+                "step",
+                remedy=f"take a step of {time.step * smallest / way:.2g} s or less",
+            )
+
+
+def _table(document: Document, given: Mapping[str, Any], name: str) -> Mapping[str, Any]:
     content = given.get(name, {})
     if not isinstance(content, dict):
         document.fail(f"{name!r} is not a table", name, remedy=f"write [{name}] on a line of its own")
-    values = check_table(document, (name,), content, keys_of(owner))
+    return content
+
+
+def _built(document: Document, given: Mapping[str, Any], name: str, owner: type[Any]) -> Any:
+    values = check_table(document, (name,), _table(document, given, name), keys_of(owner))
     with document.at(name):
         return build(owner, values)
 
 
 def _cells(document: Document, given: Any) -> tuple[Cell, ...]:
-    if not isinstance(given, list):
+    if not isinstance(given, list) or not all(isinstance(one, dict) for one in given):
         document.fail("'cells' is not an array of tables", "cells", remedy="write [[cells]] before each cell")
     cells: dict[str, Cell] = {}
     for number, content in enumerate(given):
@@ -127,6 +174,8 @@ def _cells(document: Document, given: Any) -> tuple[Cell, ...]:
         values = cast(dict[str, Any], check_table(document, place, content, _CELL, f"[[cells]] {number + 1}"))
         if len(values["centre"]) != 2:
             document.fail(f"centre = {list(values['centre'])}", *place, "centre", remedy="give x and y")
+        if values["name"] == WHOLE:
+            document.fail(f"{WHOLE!r} is the name of all disks", *place, "name", remedy="give another name")
         if values["name"] in cells:
             document.fail(f"cell {values['name']!r} is given twice", *place, "name")
         with document.at(*place):

@@ -4,7 +4,7 @@ import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from mechanics.planar.measures.stress import mean_stress, moments
 from mechanics.planar.measures.tessellation import Tessellation, tessellation
 from mechanics.planar.result import PlanarInstant
 
-__all__ = ["CELL_COLUMNS", "WHOLE", "Fields", "Observation", "read_rows"]
+__all__ = ["CELL_COLUMNS", "WHOLE", "Fields", "Instants", "Observation", "read_rows"]
 
 WHOLE = "whole sample"
 """Name of the rows of all disks."""
@@ -92,13 +92,12 @@ class Observation:
         groups: dict[str, Ints] = {cell.name: members(cell, start) for cell in cells}
         self._groups = groups | {WHOLE: np.arange(len(radius))}
         self._reference = tessellation(start, radius)
+        self._last: tuple[PlanarInstant, Tessellation, Array] | None = None
 
     def row(self, instant: PlanarInstant) -> None:
         """Add a row to the file of each cell, and of the whole sample."""
-        count = len(self._radius)
-        place = instant.position[:count, :2]
-        shares = tessellation(place, self._radius)
-        moment = self._moments(instant)
+        place = instant.position[: len(self._radius), :2]
+        shares, moment = self._measured(instant)
         for number, (name, group) in enumerate(self._groups.items()):
             values = self._values(instant, name, group, place, shares, moment)
             path = self._folder / f"cell-{number:03d}.csv"
@@ -109,11 +108,14 @@ class Observation:
                     writer.writerow(CELL_COLUMNS)
                 writer.writerow([repr(values[column]) for column in CELL_COLUMNS])
 
-    def _moments(self, instant: PlanarInstant) -> Array:
-        contacts = instant.contacts
-        return moments(
-            len(self._radius), instant.position[:, :2], contacts.bodies, contacts.point, contacts.force
-        )
+    def _measured(self, instant: PlanarInstant) -> tuple[Tessellation, Array]:
+        """Return the tessellation and the moments of the disks, made once for rows and fields of the same instant."""
+        if self._last is None or self._last[0] is not instant:
+            count, contacts, centre = len(self._radius), instant.contacts, instant.position[:, :2]
+            shares = tessellation(centre[:count], self._radius)
+            moment = moments(count, centre, contacts.bodies, contacts.point, contacts.force)
+            self._last = instant, shares, moment
+        return self._last[1:]
 
     def _values(
         self,
@@ -158,8 +160,7 @@ class Observation:
         """Keep all disks at this instant."""
         count, contacts = len(self._radius), instant.contacts
         place = instant.position[:count, :2]
-        shares = tessellation(place, self._radius)
-        moment = self._moments(instant)
+        shares, moment = self._measured(instant)
         area = np.where(shares.share > 0, shares.share, np.inf) * self._thickness
         strain = deformation(self._start, place, self._reference)
         normal = np.einsum("ci,ci->c", contacts.normal, contacts.force)
@@ -189,16 +190,35 @@ class Observation:
             for number, name in enumerate(self._groups)
         }
 
-    def instants(self, every: int) -> list[Fields]:
+    def instants(self, every: int) -> "Instants":
         """Return the instants of each `every`-th step and the last, in the order of steps."""
-        found, paths = [], sorted(self._folder.glob("fields-*.npz"))
-        for path in paths:
-            if int(path.stem.partition("-")[2]) % every and path != paths[-1]:
-                continue
-            with np.load(path) as data:
-                arrays = {name: data[name] for name in data.files}
-            found.append(Fields(**arrays | {"step": int(arrays["step"]), "time": float(arrays["time"])}))
-        return found
+        paths = sorted(self._folder.glob("fields-*.npz"))
+        chosen = [
+            path for path in paths if int(path.stem.partition("-")[2]) % every == 0 or path == paths[-1]
+        ]
+        return Instants(tuple(chosen))
+
+
+@dataclass(frozen=True)
+class Instants(Sequence[Fields]):
+    """Instants in files, read as they are asked for: those of a long run do not fit into memory."""
+
+    paths: tuple[Path, ...]
+
+    def __len__(self) -> int:
+        return len(self.paths)
+
+    @overload
+    def __getitem__(self, index: int) -> Fields: ...
+    @overload
+    def __getitem__(self, index: slice) -> "Instants": ...
+    def __getitem__(self, index: int | slice) -> "Fields | Instants":
+        """Read an instant, or choose some."""
+        if isinstance(index, slice):
+            return Instants(self.paths[index])
+        with np.load(self.paths[index]) as data:
+            arrays = {name: data[name] for name in data.files}
+        return Fields(**arrays | {"step": int(arrays["step"]), "time": float(arrays["time"])})
 
 
 def read_rows(path: Path, every: int = 1) -> dict[str, Array]:

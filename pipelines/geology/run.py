@@ -2,7 +2,7 @@
 
 import csv
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -11,12 +11,11 @@ from typing import Any
 import numpy as np
 
 from mechanics.arrays import Array
-from mechanics.dynamics.outcome import Outcome
 from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.planar.model import build_planar_model
 from mechanics.planar.result import PlanarResult
 from mechanics.planar.scene import Disk, PlanarScene, PlanarTime
-from mechanics.planar.simulate import PlanarObserver, simulate_planar
+from mechanics.planar.simulate import PlanarObserver
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.law import Law
 from mechanics.scene.laws.lennard_jones import LennardJones
@@ -26,12 +25,12 @@ from pipelines.geology.figures import draw_curves, draw_instant
 from pipelines.geology.file import GeologyScene, read_geology
 from pipelines.geology.observe import CELL_COLUMNS, WHOLE, Fields, Observation
 from pipelines.geology.sample import PreparedSample, prepare
-from pipelines.results.folder import RUN_INDEX, UNFINISHED, check_replaceable, replacing
+from pipelines.results.folder import RUN_INDEX, UNFINISHED, check_replaceable
+from pipelines.results.summary import as_json
 from pipelines.results.vtu import VERTEX, Grid, cells_of, write_pvd, write_vtu
+from pipelines.run.planar import run_planar
 from pipelines.run.record import versions
-from pipelines.run.unfinished import UnfinishedRun, unfinished_run
-from pipelines.scene.fingerprint import planar_fingerprint
-from pipelines.scene.settings import Output, ParaView
+from pipelines.run.unfinished import UnfinishedRun
 
 __all__ = ["GeologyReport", "planar_scene", "run_geology"]
 
@@ -124,26 +123,22 @@ def run_geology(
     """
     folder, scene = Path(folder), read_geology(path, kind)
     check_replaceable(folder)
-    with scene.document.at(kind):
-        scene.experiment.setup(scene.time.step, scene.time.step * scene.time.steps)
     sample = prepare(scene, Path(samples) if samples is not None else folder.parent / _SAMPLES, progress)
     planar = planar_scene(scene, sample)
-    output = Output(checkpoint=scene.output.checkpoint, paraview=ParaView.PVD)
-    with unfinished_run(folder, output, resume, progress) as archive:
-        archive.open((), planar_fingerprint(planar), versions(), scene.time.steps, bool(resume))
-        observation = _observation(scene, sample, planar, folder / UNFINISHED)
-        observers = (
-            PlanarObserver(scene.output.every, observation.row),
-            PlanarObserver(scene.output.fields_every, observation.fields),
-        )
-        result = simulate_planar(planar, progress, stop, archive, observers)
-        with replacing(folder) as fresh:
-            progress(Progress("write", 0, 1, "results"))
-            summary, warnings = _write(fresh, scene, sample, result, observation, archive)
-            archive.hand_over(fresh)
-        if result.outcome is not Outcome.INTERRUPTED:
-            archive.remove()
-    return GeologyReport(folder, summary, warnings)
+    observation = _observation(scene, sample, planar, folder / UNFINISHED)
+    observers = (
+        PlanarObserver(scene.output.every, observation.row),
+        PlanarObserver(scene.output.fields_every, observation.fields),
+    )
+    summary: dict[str, Any] = {}
+
+    def write(fresh: Path, result: PlanarResult, archive: UnfinishedRun) -> None:
+        progress(Progress("write", 0, 1, "results"))
+        summary.update(_write(fresh, scene, sample, result, observation, archive))
+
+    with scene.document.at(kind):
+        run_planar(planar, folder, resume, scene.output.checkpoint, progress, stop, observers, write)
+    return GeologyReport(folder, summary, tuple(summary["warnings"]))
 
 
 def _observation(
@@ -162,10 +157,8 @@ def _write(
     result: PlanarResult,
     observation: Observation,
     archive: UnfinishedRun,
-) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Write all files of a run into an empty folder; return the summary and the warnings."""
-    from pipelines.results.summary import as_json
-
+) -> dict[str, Any]:
+    """Write all files of a run into an empty folder; return the summary."""
     warnings = list(archive.warnings)
     history, smallest = result.history, float(sample.radius.min())
     overlap = history.penetration
@@ -223,7 +216,7 @@ def _write(
     (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
     summary["files"] = sorted([RUN_INDEX, *(entry.name for entry in folder.iterdir())])
     (folder / RUN_INDEX).write_text(as_json(summary), encoding="utf-8")
-    return summary, tuple(warnings)
+    return summary
 
 
 def _ends(model: Any, fields: Fields) -> Array:
@@ -233,7 +226,7 @@ def _ends(model: Any, fields: Fields) -> Array:
     return np.asarray(model.ends(PlanarState(fields.time, position[:, :2], position[:, 2], fields.velocity)))
 
 
-def _write_fields(folder: Path, instants: list[Fields], sample: PreparedSample) -> None:
+def _write_fields(folder: Path, instants: Sequence[Fields], sample: PreparedSample) -> None:
     """Write the instants for ParaView: a point for each disk."""
     place = folder / "fields"
     os.makedirs(place)

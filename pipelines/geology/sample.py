@@ -51,21 +51,22 @@ def prepare(scene: GeologyScene, cache: Path, progress: Listener = silent) -> Pr
     path = cache / f"{digest}.npz"
     found = _stored(path)
     if found is None:
-        found = deposit(
-            Deposit(
-                own.length,
-                own.top,
-                own.highest,
-                asked.smallest,
-                asked.largest,
-                asked.density,
-                scene.contact.friction,
-                asked.falling_friction,
-                asked.seed,
-            ),
-            scene.time.gravity,
-            progress,
-        )
+        with scene.document.at("sample"):
+            found = deposit(
+                Deposit(
+                    own.length,
+                    own.top,
+                    own.highest,
+                    asked.smallest,
+                    asked.largest,
+                    asked.density,
+                    scene.contact.friction,
+                    asked.falling_friction,
+                    asked.seed,
+                    scene.time.gravity,
+                ),
+                progress,
+            )
         cache.mkdir(parents=True, exist_ok=True)
         fresh = path.with_suffix(".new.npz")
         np.savez(fresh, centre=found[0], radius=found[1])

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from mechanics.stones.settings import Setting, check_settings
+from mechanics.stones.settings import Setting
 from moma.errors import SceneError
 
 __all__ = ["Material", "Recording", "Sample", "Stepping", "Sweeping"]
@@ -26,7 +26,6 @@ class Sample:
     layers: Annotated[int, Setting("Marker layers of pictures and measures.", at_least=1, at_most=50)] = 6
 
     def __post_init__(self) -> None:
-        check_settings("sample", self)
         if self.largest < self.smallest:
             raise SceneError(
                 f"largest = {self.largest:g} is less than smallest = {self.smallest:g}",
@@ -51,9 +50,6 @@ class Material:
         float, Setting("Gap within which it acts, over the smallest radius.", "-", above=0, at_most=1)
     ] = 0.05
 
-    def __post_init__(self) -> None:
-        check_settings("contact", self)
-
 
 @dataclass(frozen=True)
 class Stepping:
@@ -62,10 +58,7 @@ class Stepping:
     step: Annotated[float, Setting("Time step h.", "s", above=0)]
     steps: Annotated[int, Setting("Number of steps.", at_least=1)]
     theta: Annotated[float, Setting("Integration parameter θ.", "-", at_least=0.5, at_most=1)] = 1.0
-    gravity: Annotated[float, Setting("Downwards.", "m/s²", at_least=0)] = 9.81
-
-    def __post_init__(self) -> None:
-        check_settings("time", self)
+    gravity: Annotated[float, Setting("Downwards; the sample settles under it.", "m/s²", above=0)] = 9.81
 
 
 @dataclass(frozen=True)
@@ -76,12 +69,11 @@ class Sweeping:
     max_iterations: Annotated[int, Setting("Sweeps of each step, at most.", at_least=1)] = 100
     tolerance: Annotated[float, Setting("η at which a step counts as solved.", "-", above=0, below=1)] = 1e-4
     largest_overlap: Annotated[
-        float, Setting("Overlap over the smallest radius that no step leaves.", "-", above=0, infinite=True)
+        float, Setting("Overlap over the smallest radius that no step leaves.", "-", above=0)
     ] = 0.01
     threads: Annotated[int, Setting("Threads that sweep; the results have the same bits.", at_least=1)] = 1
 
     def __post_init__(self) -> None:
-        check_settings("solver", self)
         if self.max_iterations < self.min_iterations:
             raise SceneError(
                 f"max_iterations = {self.max_iterations} is less than min_iterations = {self.min_iterations}",
@@ -98,6 +90,3 @@ class Recording:
     fields_every: Annotated[int, Setting("Steps between two instants of all disks.", at_least=1)] = 500
     checkpoint: Annotated[int, Setting("Steps between two checkpoints; 0: none.", at_least=0)] = 200
     figures: Annotated[bool, Setting("Draw the figures.")] = True
-
-    def __post_init__(self) -> None:
-        check_settings("output", self)

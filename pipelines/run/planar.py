@@ -8,12 +8,16 @@ from mechanics.dynamics.progress import Listener, silent
 from mechanics.planar.result import PlanarResult
 from mechanics.planar.scene import PlanarScene
 from mechanics.planar.simulate import PlanarObserver, simulate_planar
+from pipelines.results.folder import replacing
 from pipelines.run.record import versions
-from pipelines.run.unfinished import unfinished_run
+from pipelines.run.unfinished import UnfinishedRun, unfinished_run
 from pipelines.scene.fingerprint import planar_fingerprint
 from pipelines.scene.settings import Output, ParaView
 
-__all__ = ["run_planar"]
+__all__ = ["Write", "run_planar"]
+
+Write = Callable[[Path, PlanarResult, UnfinishedRun], None]
+"""Writes results into an empty folder, given the archive of the run."""
 
 
 def run_planar(
@@ -24,6 +28,7 @@ def run_planar(
     progress: Listener = silent,
     stop: Callable[[], bool] = lambda: False,
     observers: Sequence[PlanarObserver] = (),
+    write: Write | None = None,
 ) -> tuple[PlanarResult, tuple[str, ...]]:
     """Run a scene of the plane with checkpoints; return its result, and warnings of checkpoints.
 
@@ -37,6 +42,7 @@ def run_planar(
     resume : go on with the unfinished run there, if there is one; False: give it up; None: refuse to give it up
     every : number of steps between two checkpoints; those that would take more than 4 % of the time are left out
     progress, stop, observers : as in `simulate_planar`
+    write : called at the end, even of an interrupted run, with a new folder that then takes the place of `folder`
 
     Raises
     ------
@@ -49,6 +55,10 @@ def run_planar(
     with unfinished_run(folder, output, resume, progress) as archive:
         archive.open((), planar_fingerprint(scene), versions(), steps, bool(resume))
         result = simulate_planar(scene, progress, stop, archive, observers)
+        if write is not None:
+            with replacing(folder) as fresh:
+                write(fresh, result, archive)
+                archive.hand_over(fresh)
         if result.outcome is not Outcome.INTERRUPTED:
             archive.remove()
         return result, tuple(archive.warnings)

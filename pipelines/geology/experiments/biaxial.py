@@ -12,7 +12,7 @@ from mechanics.scene.loads.forces import StoneForce
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import ImposedMotion
 from mechanics.scene.loads.time_series import History
-from mechanics.stones.settings import Setting, check_settings
+from mechanics.stones.settings import Setting
 from pipelines.geology.experiments.experiment import Setup
 from pipelines.geology.observe import Fields
 
@@ -30,9 +30,6 @@ class Biaxial:
     height: Annotated[float, Setting("Height of the sample.", "m", above=0)]
     pressure: Annotated[float, Setting("Of the sides.", "Pa", above=0)]
     strain: Annotated[float, Setting("Vertical strain at the end.", "-", above=0, below=0.9)] = 0.2
-
-    def __post_init__(self) -> None:
-        check_settings("biaxial", self)
 
     @property
     def length(self) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 from mechanics.arrays import Array
 from mechanics.planar.scene import Wall
 from mechanics.scene.loads.load import Loads
-from mechanics.stones.settings import Setting, check_settings
+from mechanics.stones.settings import Setting
 from pipelines.geology.experiments.experiment import Setup
 from pipelines.geology.observe import Fields
 
@@ -22,9 +22,6 @@ class Deposition:
 
     length: Annotated[float, Setting("Length of the sample.", "m", above=0)]
     height: Annotated[float, Setting("Height of the sample.", "m", above=0)]
-
-    def __post_init__(self) -> None:
-        check_settings("deposit", self)
 
     @property
     def highest(self) -> float:

@@ -12,7 +12,7 @@ from mechanics.planar.scene import Wall
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import ImposedMotion
 from mechanics.scene.loads.time_series import History
-from mechanics.stones.settings import Setting, check_settings
+from mechanics.stones.settings import Setting
 from moma.errors import SceneError
 from pipelines.geology.experiments.experiment import Setup
 from pipelines.geology.observe import Fields
@@ -37,7 +37,6 @@ class Fault:
     speed: Annotated[float, Setting("Of the moving basement, along the fault.", "m/s", above=0)]
 
     def __post_init__(self) -> None:
-        check_settings("fault", self)
         if self.tip >= self.length:
             raise SceneError(
                 f"tip = {self.tip:g} is not within the length of {self.length:g} m", where="fault"

@@ -12,7 +12,7 @@ from mechanics.planar.scene import Wall
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import ImposedMotion
 from mechanics.scene.loads.time_series import History
-from mechanics.stones.settings import Setting, check_settings
+from mechanics.stones.settings import Setting
 from moma.errors import SceneError
 from pipelines.geology.experiments.experiment import Setup
 from pipelines.geology.observe import Fields
@@ -36,7 +36,6 @@ class Fold:
     speed: Annotated[float, Setting("Of the wall at the left.", "m/s", above=0)]
 
     def __post_init__(self) -> None:
-        check_settings("fold", self)
         if not self.deep_length < self.slope_end < self.length:
             raise SceneError(
                 f"deep_length = {self.deep_length:g}, slope_end = {self.slope_end:g}, length = {self.length:g}",

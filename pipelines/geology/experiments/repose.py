@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated
 
 import numpy as np
 
@@ -10,7 +9,7 @@ from mechanics.arrays import Array
 from mechanics.planar.measures.surface import profile, slope
 from mechanics.planar.scene import Wall
 from mechanics.scene.loads.load import Loads
-from mechanics.stones.settings import Setting, check_settings
+from pipelines.geology.experiments.deposition import Deposition
 from pipelines.geology.experiments.experiment import Setup
 from pipelines.geology.observe import Fields
 
@@ -21,23 +20,8 @@ _FLOOR = 20.0  # length of the floor over that of the deposit [-]
 
 
 @dataclass(frozen=True)
-class Repose:
+class Repose(Deposition):
     """`[repose]`: a deposit between two walls, of which the right one is gone as the run begins."""
-
-    length: Annotated[float, Setting("Length of the deposit.", "m", above=0)]
-    height: Annotated[float, Setting("Height of the deposit.", "m", above=0)]
-
-    def __post_init__(self) -> None:
-        check_settings("repose", self)
-
-    @property
-    def highest(self) -> float:
-        """Height of the sample [m]."""
-        return self.height
-
-    def top(self, x: Array) -> Array:
-        """Return the height of the sample at places along x [m]."""
-        return np.full(len(x), self.height)
 
     def setup(self, step: float, duration: float) -> Setup:
         """Return the floor and the wall that stays."""

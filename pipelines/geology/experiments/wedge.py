@@ -13,7 +13,7 @@ from mechanics.planar.scene import Wall
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import ImposedMotion
 from mechanics.scene.loads.time_series import History
-from mechanics.stones.settings import Setting, check_settings
+from mechanics.stones.settings import Setting
 from moma.errors import SceneError
 from pipelines.geology.experiments.experiment import Setup
 from pipelines.geology.observe import Fields
@@ -37,7 +37,6 @@ class Wedge:
     layer_length: Annotated[float, Setting("Length of that layer.", "m", at_least=0)] = 0.0
 
     def __post_init__(self) -> None:
-        check_settings("wedge", self)
         if self.layer >= self.height and self.slope > 0:
             raise SceneError(
                 f"layer = {self.layer:g} m is not lower than the wedge, {self.height:g} m", where="wedge"

@@ -15,6 +15,7 @@ from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import ImposedMotion
 from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import Method, SolverSettings
+from moma.errors import SceneError
 from tests.mechanics.planar.shapes import G, grid_of_disks
 
 
@@ -108,6 +109,31 @@ def test_what_rebounds_is_not_moved(restitution):
     assert other.history.penetration.max() > 0.01
     np.testing.assert_array_equal(one.position, other.position)
     assert not one.history.lifted.any()
+
+
+@pytest.mark.parametrize(
+    ("disks", "walls", "said"),
+    [
+        (
+            [Disk("a", (0.0, 0.0), 0.1), Disk("b", (0.15, 0.0), 0.2), Disk("c", (0.5, 0.0), 0.2)],
+            [],
+            "disk 'a' and disk 'b': at the start they overlap by 0.15 m at (0.025, 0), 150% of the radius 0.1 m; "
+            "30% is allowed; move them apart",
+        ),
+        (
+            [Disk("a", (0.0, 0.05), 0.1), Disk("b", (1.0, 0.02), 0.1)],
+            [Wall("floor", (-1.0, 0.0), (2.0, 0.0))],
+            "disk 'b' and wall 'floor': at the start they overlap by 0.08 m at (1, -0.04), 80% of the radius 0.1 m; "
+            "30% is allowed; so do 1 more pairs; move the wall or the disk",
+        ),
+    ],
+)
+def test_disks_that_overlap_too_far_at_the_start_are_refused_with_their_place(disks, walls, said):
+    scene = PlanarScene("bad", tuple(disks), tuple(walls))
+    with pytest.raises(SceneError) as caught:
+        simulate_planar(scene)
+    assert said in str(caught.value)
+    simulate_planar(replace(scene, start_overlap=np.inf, time=PlanarTime(1e-3, 1.0, 1e-3)))
 
 
 def test_overlaps_of_the_start_stay_and_those_of_the_motion_do_not():

@@ -28,7 +28,7 @@ def pushed():
     wedged = replace(
         bed.disks[0], code="wedged", centre=(bed.disks[0].centre[0] + 0.9, bed.disks[0].centre[1])
     )
-    return replace(bed, disks=(*bed.disks, wedged), frame_every=7)
+    return replace(bed, disks=(*bed.disks, wedged), frame_every=7, start_overlap=np.inf)
 
 
 def bonded():

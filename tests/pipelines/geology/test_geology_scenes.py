@@ -80,6 +80,20 @@ def test_the_fold_has_the_area_of_its_disks():
         ("[fault]", "[fold]", 14, "this is a scene of `moma geology fold`"),
         ("centre = [7.0, 1.5]", "centre = [7.0]", 27, "give x and y"),
         ("step = 0.01", "step = 0", 9, "step = 0 is out of range"),
+        ("steps = 30", "steps = 30\ngravity = 0", 11, "gravity = 0 is out of range"),
+        ("speed = 0.5", "speed = 20.1", 9, "the wall 'fault' goes 0.201 m"),
+        ("speed = 0.5", "speed = nan", 19, "speed = nan is out of range"),
+        ("steps = 30", "steps = 3000", 14, "the tip goes 12.9904 m of the 6 m ahead of it"),
+        (
+            "centre = [7.0, 1.5]",
+            "centre = [7.0, 3.0]",
+            25,
+            "cell 'W1' reaches out of the sample by 1 m at (7, 4)",
+        ),
+        ("centre = [7.0, 1.5]", "centre = [50.0, 1.5]", 25, "cell 'W1' reaches out of the sample by 39 m"),
+        ('name = "W1"', 'name = "whole sample"', 26, "is the name of all disks"),
+        ("[[cells]]", "[cells]", 25, "'cells' is not an array of tables"),
+        ('[scene]\nname = "Small fault"', "scene = 3", 2, "'scene' is not a table"),
     ],
 )
 def test_what_is_wrong_is_refused_at_its_line(written, instead, line, said):
@@ -94,6 +108,31 @@ def test_negative_cohesion_is_refused():
     text = SMALL.replace("[time]", "[contact]\ncohesion = -1.0\n[time]")
     with pytest.raises(SceneError, match="cohesion = -1"):
         parse_geology(text, "fault.toml", "fault")
+
+
+@pytest.mark.parametrize(
+    ("written", "instead", "said"),
+    [
+        (
+            "smallest = 0.2\nlargest = 0.3",
+            "smallest = 3\nlargest = 4",
+            "length = 12.0; give more than two of",
+        ),
+        ("thickness = 3.0", "thickness = 1.1", "highest = 1.1; give more than two of the widest"),
+        (
+            "smallest = 0.2\nlargest = 0.3",
+            "smallest = 0.001\nlargest = 0.001",
+            "1.17e+07 disks of 0.001 to 0.001 m",
+        ),
+    ],
+)
+def test_a_sample_that_cannot_be_made_is_refused_at_its_line(tmp_path, written, instead, said):
+    assert written in SMALL
+    text = SMALL.replace(written, instead).partition("[[cells]]")[0].replace("speed = 0.5", "speed = 0.01")
+    with pytest.raises(SceneError) as caught:
+        prepare(parse_geology(text, "fault.toml", "fault"), tmp_path)
+    assert str(caught.value).startswith("fault.toml:4: ")
+    assert said in str(caught.value)
 
 
 def test_a_sample_is_made_once(tmp_path):
@@ -144,7 +183,7 @@ def test_a_cell_outside_the_sample_is_refused_at_its_line(tmp_path):
     text = SMALL.replace("centre = [7.0, 1.5]", "centre = [7.0, 50.0]")
     (tmp_path / "fault.toml").write_text(text, encoding="utf-8")
     said = fails(2, "geology", "fault", tmp_path / "fault.toml", "--out", tmp_path / "out")
-    assert "cell 'W1': holds 0 disks" in said
+    assert "cell 'W1' reaches out of the sample by 48" in said
     assert not (tmp_path / "out").exists()
 
 
