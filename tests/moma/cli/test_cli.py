@@ -54,6 +54,18 @@ def test_the_command_line_loads_no_heavy_package():
     assert heavy.isdisjoint(done.stdout.split())
 
 
+def test_a_command_ends_without_a_last_search_for_garbage():
+    code = "import gc, atexit, moma.cli; atexit.register(lambda: print(gc.get_count()[0], gc.get_freeze_count()))"
+    done = subprocess.run(
+        [sys.executable, "-c", f"{code}; moma.cli.main()", "--version"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    left, kept = map(int, done.stdout.splitlines()[-1].split())
+    assert left < 1000 < kept  # nearly all objects of a loaded program are beyond it
+
+
 def test_a_query_loads_no_package_that_it_does_not_ask(tmp_path):
     url = f"sqlite:///{tmp_path / 'wall.db'}"
     made = (
