@@ -7,6 +7,7 @@
 PYTHON ?= python3
 VENV := .venv
 MOMA := $(VENV)/bin/moma
+PIP := $(VENV)/bin/python -m pip install --quiet --disable-pip-version-check
 SAMPLE := data/samples/window
 OUT := out
 KERNELS := $(shell find survey mechanics benchmarks -path "*/_kernels*" -name "*.py")
@@ -17,7 +18,7 @@ KERNELS := $(shell find survey mechanics benchmarks -path "*/_kernels*" -name "*
 help:
 	@sed -n 's/^# \{0,1\}//p' Makefile | head -5
 
-demo: $(VENV)/.installed $(VENV)/.kernels
+demo: $(VENV)/.kernels $(VENV)/.installed
 	@mkdir -p $(OUT)
 	@rm -f $(OUT)/window.db $(OUT)/window.db-wal $(OUT)/window.db-shm
 	$(MOMA) ingest $(SAMPLE)/window.moma --db sqlite:///$(OUT)/window.db
@@ -30,15 +31,18 @@ demo: $(VENV)/.installed $(VENV)/.kernels
 test: $(VENV)/.tests $(VENV)/.kernels
 	$(VENV)/bin/python -m pytest
 
-# A mark is newer than pyproject.toml as long as what it stands for is installed.
-$(VENV)/.installed: pyproject.toml | $(VENV)/bin/python
-	@echo "Installing into $(VENV); the first time this takes some minutes."
-	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --editable .
+# A mark is newer than pyproject.toml as long as what it stands for is installed. What compiles kernels comes first, so
+# that the rest is installed while a second process compiles.
+$(VENV)/.installed: pyproject.toml | $(VENV)/.kernels
+	@echo "Installing into $(VENV); the first time this takes a minute or two."
+	@$(PIP) numba scipy
+	@$(VENV)/bin/python -m moma.kernels & compiler=$$!; trap "kill $$compiler; exit 130" INT TERM; \
+	  $(PIP) --editable .; failed=$$?; kill $$compiler 2>/dev/null; wait $$compiler 2>/dev/null; exit $$failed
 	@touch $@
 
 $(VENV)/.tests: pyproject.toml | $(VENV)/bin/python
 	@echo "Installing into $(VENV) with what the tests need; the first time this takes some minutes."
-	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
+	@$(PIP) --editable '.[test]'
 	@touch $@ $(VENV)/.installed
 
 # numba keeps compiled kernels, and does not see that one in another file which they call has changed.

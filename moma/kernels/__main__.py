@@ -1,0 +1,19 @@
+"""Compilation of the usual kernels by ``python -m moma.kernels``, beside an installation.
+
+It needs nothing but numba and SciPy, and may be ended at any moment: what it has compiled stays in the cache.
+The kernels of the first command come first; those of the next one from the far end, since that command begins at the near one.
+"""
+
+import gc
+from contextlib import suppress
+
+from moma.kernels.uses import COMMANDS, kernels_of
+
+__all__: list[str] = []
+
+if __name__ == "__main__":
+    gc.disable()  # a compiler makes millions of small objects that live
+    first, *later = COMMANDS
+    for use in (*kernels_of(first), *(use for command in later for use in reversed(kernels_of(command)))):
+        with suppress(Exception):  # a list of an older program; the command itself reports what is wrong
+            use.compile()
