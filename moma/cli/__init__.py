@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from moma.cli.assess import assess
 from moma.cli.database import export, import_, migrate
 from moma.cli.entities import query, schema, show
 from moma.cli.geology import geology
@@ -65,6 +66,7 @@ _COMMANDS = (
     load_path,
     check,
     run,
+    assess,
     trade,
     geology,
     runs,

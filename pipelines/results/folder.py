@@ -31,7 +31,12 @@ RUN_INDEX = "summary.json"
 UNFINISHED = "unfinished"
 """Folder within that of the results, of a run that goes on or has been stopped."""
 
-_INDEXES = (RUN_INDEX, "check.json", "survey.json")  # their "files" list the files that MOMA wrote
+_INDEXES = (
+    RUN_INDEX,
+    "check.json",
+    "survey.json",
+    "assessment.json",
+)  # their "files" list the files that MOMA wrote
 _MARK = ".moma-"  # in the names of hidden folders
 _EARLIER = f"{_MARK}earlier"
 _RANDOM = "?" * 8  # characters that tempfile adds to a name

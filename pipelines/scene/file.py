@@ -18,7 +18,7 @@ from pipelines.draw.catalogue import PICTURES
 from pipelines.scene.array_tables import Entry, read_entries
 from pipelines.scene.keys import build, typed_values
 from pipelines.scene.laws import BONDS, JointLaw, read_laws
-from pipelines.scene.loads import read_loads, read_throws
+from pipelines.scene.loads import ASSESS_TYPES, read_loads, read_throws
 from pipelines.scene.settings import Fidelities, MaterialRule, MeshSettings, Output, Selection
 from pipelines.scene.tables import ARRAYS, AUTO, MATERIAL_KEYS, MESH_KEYS, ORTHOTROPY_KEYS, TABLES
 from pipelines.toml.lines import key_lines, parse_toml, read_text
@@ -42,6 +42,7 @@ class SceneFile:
     meshes : finite elements of particular groups of stones
     laws : of particular joints; the general law is in `contact`
     loads, throws : actions besides gravity, and initial motions
+    assess : live loads whose limits are sought
     """
 
     document: Document
@@ -61,6 +62,7 @@ class SceneFile:
     laws: tuple[JointLaw, ...]
     loads: tuple[Entry, ...]
     throws: tuple[Entry, ...]
+    assess: tuple[Entry, ...]
 
 
 def read_scene(path: str | Path) -> SceneFile:
@@ -111,6 +113,7 @@ def parse_scene(text: str, path: str) -> SceneFile:
         laws=laws,
         loads=read_loads(document, given),
         throws=read_throws(document, given),
+        assess=read_entries(document, given, "assess", ASSESS_TYPES),
     )
 
 

@@ -20,7 +20,16 @@ from pipelines.scene.array_tables import Entry, file_beside, read_entries
 from pipelines.scene.keys import keys_of
 from pipelines.toml.schema import Document, Key, Kind
 
-__all__ = ["FORCES", "LOAD_TYPES", "THROW_KEYS", "build_loads", "read_loads", "read_throws", "thrown"]
+__all__ = [
+    "ASSESS_TYPES",
+    "FORCES",
+    "LOAD_TYPES",
+    "THROW_KEYS",
+    "build_loads",
+    "read_loads",
+    "read_throws",
+    "thrown",
+]
 
 Codes = frozenset[str]
 Groups = Mapping[tuple[str, ...], Sequence[Codes]]
@@ -108,6 +117,20 @@ LOAD_TYPES: Mapping[str, tuple[Key, ...]] = {
             at_least=0,
             at_most=12,
         ),
+    ),
+}
+
+ASSESS_TYPES: Mapping[str, tuple[Key, ...]] = {
+    "horizontal": (
+        Key("direction", Kind.VECTOR, "Direction of the push, λ times the weight of each stone.", "-"),
+    ),
+    "tilt": (
+        Key("axis", Kind.VECTOR, "Axis about which the table turns, right-handed; its tangent is λ.", "-"),
+    ),
+    "force": (
+        Key("stone", Kind.TEXT, "Code of the stone on which it acts."),
+        Key("force", Kind.VECTOR, "Force at λ = 1.", "N"),
+        Key("point", Kind.VECTOR, "Where it acts; if not given, at the centre of mass.", "m", None),
     ),
 }
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from pipelines.scene.laws import LAW_KEYS, LAW_TYPES
-from pipelines.scene.loads import LOAD_TYPES, THROW_KEYS
+from pipelines.scene.loads import ASSESS_TYPES, LOAD_TYPES, THROW_KEYS
 from pipelines.scene.tables import MATERIAL_KEYS, MESH_KEYS, ORTHOTROPY_KEYS, TABLES
 from pipelines.toml.schema import REQUIRED, Key
 
@@ -24,6 +24,7 @@ SECTIONS: Mapping[str, tuple[Key, ...]] = {
     **{f"[[laws]] {name}": keys for name, keys in LAW_TYPES.items()},
     **{f"[[loads]] {name}": keys for name, keys in LOAD_TYPES.items()},
     "[[throw]]": THROW_KEYS,
+    **{f"[[assess]] {name}": keys for name, keys in ASSESS_TYPES.items()},
 }
 """Keys by heading of the page; those of a type follow the heading of its array."""
 

@@ -13,7 +13,7 @@ from survey.joints.settings import JointSettings
 
 __all__ = ["ARRAYS", "AUTO", "MATERIAL_KEYS", "MESH_KEYS", "ORTHOTROPY_KEYS", "TABLES"]
 
-ARRAYS = ("meshes", "laws", "loads", "throw")
+ARRAYS = ("meshes", "laws", "loads", "throw", "assess")
 """Tables of which a scene may have many."""
 
 AUTO = "auto"

@@ -1,0 +1,162 @@
+"""Equilibrium of rigid stones on the contact points that the detection finds.
+
+Every joint acts in its contact points, the corners of the common face, with a force f = (f_N, f_T1, f_T2) on the
+candidate of each. All stones that are free to move are in balance under a load p if
+
+    H f + p = 0,     ‖f_T‖ ≤ μ (f_N + s) + k,   f_N + s ≥ 0
+
+with friction μ, cohesion k and tensile strength s of each point (mechanics.scene.laws, docs/theory.md §2).
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from mechanics.arrays import Array, Ints
+from mechanics.contact.contacts import Contacts, gaps, material_points, take
+from mechanics.dynamics.contact_search import detector
+from mechanics.model.model import Model, build_model
+from mechanics.scene.laws.law import STATE, Approach
+from mechanics.scene.scene import Fidelity, Scene
+from mechanics.scene.state import State
+from moma.errors import SceneError
+
+__all__ = ["Assembly", "assembly"]
+
+
+# gap up to which a joint counts as closed, over the width of the smaller stone: a thousandth is a survey's error [-]
+_CLOSED = 1e-3
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """Rigid stones and the joints that are closed.
+
+    Attributes
+    ----------
+    model, state : the stones, all rigid or fixed
+    contacts : the contact points (nc) of closed joints
+    point : (nc, 3) their places [m]
+    free : (n,) bodies that may move
+    lift : (6 n, 3 nc) H, forces at contacts → force [N] and moment about its centre [N m] of each free stone
+    dead : (6 n,) weight, and the forces of the scene at its start [N, N m]
+    friction : (nc,) μ [-]
+    cohesion, tension : (nc,) k and s [N]
+    widest : largest gap that counts as closed [m]
+    """
+
+    model: Model
+    state: State
+    contacts: Contacts
+    point: Array
+    free: Ints
+    lift: "csr_array[np.float64]"
+    dead: Array
+    friction: Array
+    cohesion: Array
+    tension: Array
+    widest: float
+
+    @property
+    def weight(self) -> float:
+        """Weight of all stones that may move [N]."""
+        gravity = float(np.linalg.norm(self.model.gravity(0.0)))
+        return float(self.model.mass[self.free].sum()) * gravity
+
+
+def assembly(scene: Scene) -> Assembly:
+    """Return the equilibrium of a scene as it stands at its start; deformable stones count as rigid.
+
+    Raises
+    ------
+    SceneError : no stone may move, or no joint is closed
+    """
+    blocks = tuple(
+        replace(block, fidelity=Fidelity.RIGID) if block.fidelity is Fidelity.DEFORMABLE else block
+        for block in scene.blocks
+    )
+    model, state = build_model(replace(scene, blocks=blocks))
+    free = np.flatnonzero(~model.fixed)
+    if not len(free):
+        raise SceneError("no stone may move", where=scene.name, remedy="fix the supports only")
+    contacts = detector(model)(state, np.zeros(len(model.mass)))
+    gap = gaps(contacts, state)
+    size = np.minimum(*model.surfaces.size[contacts.bodies.T])
+    closed = np.flatnonzero(gap <= _CLOSED * size)
+    if not len(closed):
+        raise SceneError(
+            "no joint is closed",
+            where=scene.name,
+            remedy=f"close the joints: gaps up to {_CLOSED:g} of a stone's width count as closed",
+        )
+    contacts, gap, size = take(contacts, closed), gap[closed], size[closed]
+    friction, cohesion, tension = _strength(model, contacts, size)
+    sides = material_points(contacts, state)
+    point = 0.5 * (sides[:, 0] + sides[:, 1])
+    return Assembly(
+        model=model,
+        state=state,
+        contacts=contacts,
+        point=point,
+        free=free,
+        lift=_lift(model, state, contacts, point, free),
+        dead=_dead(model, state, free),
+        friction=friction,
+        cohesion=cohesion,
+        tension=tension,
+        widest=float(gap.max()),
+    )
+
+
+def _strength(model: Model, contacts: Contacts, size: Array) -> tuple[Array, Array, Array]:
+    """Return μ, k and s of closed joints, as their laws state them for a step of one second: N for N s."""
+    none = np.zeros(len(contacts))
+    approach = Approach(
+        gap=none,
+        speed=none,
+        area=contacts.area,
+        size=size,
+        compliance=none + 1.0,
+        step=1.0,
+        theta=1.0,
+        push_out=False,
+        first=True,
+        state=np.zeros((len(contacts), STATE)),
+    )
+    terms = model.laws.terms(model.laws.of(contacts.bodies), approach)
+    return terms.friction, terms.cohesion, terms.adhesion
+
+
+def _lift(
+    model: Model, state: State, contacts: Contacts, point: Array, free: Ints
+) -> "csr_array[np.float64]":
+    count = len(contacts)
+    place = np.full(len(model.mass), -1)
+    place[free] = np.arange(len(free))
+    values, rows, columns = [], [], []
+    for side, sign in ((0, 1.0), (1, -1.0)):
+        body = contacts.bodies[:, side]
+        arm = point - state.centre[body]
+        # columns of a contact: its three directions, world axes
+        force = np.swapaxes(contacts.frame, 1, 2)
+        moment = np.swapaxes(np.cross(arm[:, None], contacts.frame), 1, 2)
+        wrench = sign * np.concatenate([force, moment], axis=1)
+        moves = place[body] >= 0
+        row = 6 * place[body][:, None, None] + np.arange(6)[None, :, None]
+        column = 3 * np.arange(count)[:, None, None] + np.arange(3)[None, None]
+        values.append(wrench[moves].ravel())
+        rows.append(np.broadcast_to(row, wrench.shape)[moves].ravel())
+        columns.append(np.broadcast_to(column, wrench.shape)[moves].ravel())
+    entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
+    return csr_array(entries, shape=(6 * len(free), 3 * count))
+
+
+def _dead(model: Model, state: State, free: Ints) -> Array:
+    load = np.zeros((len(model.mass), 6))
+    load[:, :3] = model.mass[:, None] * model.gravity(0.0)
+    for force, bodies in model.forces:
+        push, moment = force(0.0, state.centre[bodies], state.rotation[bodies])
+        load[bodies, :3] += push
+        load[bodies, 3:] += moment
+    return load[free].ravel()

@@ -1,0 +1,42 @@
+"""Command that finds limit loads."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from moma.cli.console import reporting, say
+from moma.cli.options import DEFAULT_DB, Db, Json, Out, SceneArgument, Verbose
+from moma.cli.progress import progress_bars
+
+__all__ = ["assess"]
+
+
+@reporting
+def assess(
+    scene: SceneArgument,
+    load: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--load",
+            metavar="LOAD",
+            help='"horizontal x", "horizontal 30" (degrees from x), "tilt y" or "force CODE FX FY FZ"; also several. '
+            "Default: [[assess]] of the scene, or horizontal along x, -x, y and -y.",
+        ),
+    ] = None,
+    out: Out = None,
+    db: Db = DEFAULT_DB,
+    json: Json = False,
+    verbose: Verbose = False,
+) -> None:
+    """Find how far a scene is from falling: limit load, bound and candidate, and mechanism of each load."""
+    from moma.cli.text.assessments import assessment_lines
+    from moma.cli.text.formats import as_json
+    from pipelines.assess.assess import assess_scene
+
+    folder = out or Path("out") / f"{scene.stem}-assess"
+    with progress_bars() as listener:
+        done = assess_scene(scene, db, folder, load or (), listener)
+    for warning in done.warnings:
+        say(f"warning: {warning}")
+    print(as_json(done.summary) if json else "\n".join(assessment_lines(done, verbose)))

@@ -1,0 +1,64 @@
+"""Pictures of mechanisms, drawn off screen by PyVista (``python -m`` this module ``JOB.json``)."""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipelines.arrays import Array, Ints
+from pipelines.draw.offscreen.jobs import run_job
+from pipelines.draw.offscreen.parts import (
+    Colouring,
+    add_coloured,
+    add_edges,
+    add_glass,
+    mesh_of,
+    new_plotter,
+    place_camera,
+    save_picture,
+)
+
+__all__ = ["MechanismSurface", "draw"]
+
+_PALETTE = ("YlOrRd", 0.85)  # colour map, and the part of it that is used
+_NOTE = "As the stones begin to move, exaggerated; glass: where they stand"
+
+
+@dataclass(frozen=True)
+class MechanismSurface:
+    """Stones where they stand and where the mechanism takes them.
+
+    Attributes
+    ----------
+    points, moved : (n, 3) corners, before and after [m]
+    triangles : (nt, 3)
+    edges : (ne, 2)
+    """
+
+    points: Array
+    moved: Array
+    triangles: Ints
+    edges: Ints
+
+
+def draw(surface: MechanismSurface, path: Path, job: dict[str, Any]) -> None:
+    """Draw one picture as PNG; `job` has title, towards (to the viewer) and up."""
+    import pyvista
+
+    plotter = new_plotter(pyvista)
+    way = np.linalg.norm(surface.moved - surface.points, axis=1)
+    share = way / max(float(way.max()), 1e-300)
+    mesh = mesh_of(pyvista, surface.moved, surface.triangles)
+    mesh.point_data["value"] = share
+    add_coloured(plotter, mesh, Colouring(share, "Way over the longest [-]", 1.0, 5, False, _PALETTE))
+    add_glass(pyvista, plotter, surface.points, surface.triangles)
+    both = np.concatenate([surface.points, surface.moved])
+    place_camera(pyvista, plotter, both, np.array(job["towards"]), np.array(job["up"]))
+    add_edges(pyvista, plotter, surface.moved, surface.edges)
+    save_picture(plotter, path, f"{job['title']}\n{_NOTE}", "")
+
+
+if __name__ == "__main__":
+    sys.exit(run_job(sys.argv, MechanismSurface, draw))

@@ -1,0 +1,150 @@
+"""Limit loads by cone programmes: published walls, closed forms, and a linear programme of another hand."""
+
+import numpy as np
+import pytest
+
+from mechanics.limit.assembly import assembly
+from mechanics.limit.limit_load import Flow, limit_load
+from mechanics.limit.live_loads import Acceleration, PointForce
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.laws.mortar import MortarJoint
+from mechanics.scene.scene import ContactSettings, Scene
+from mechanics.scene.shapes import bond
+from tests.validation.masonry import cuboid, running_bond, semicircular_arch
+from tests.validation.scenes import ground
+from tests.validation.statics.limit_analysis import multiplier
+
+ALONG = Acceleration((1.0, 0.0, 0.0))
+STONE = (0.4, 0.175)
+FRICTION = 0.65
+
+
+def _courses(names, order):
+    return [names[name] for name in order.split()]
+
+
+_WINDOW = "Wu We Wu We Wu"
+_W03 = {"Fe": [1] * 4, "Fu": [0.5, 1, 1, 1, 0.5], "We": [1, 0.5, -1, 0.5, 1], "Wu": [0.5, 1, -1, 1, 0.5]}
+_W04 = {
+    "Fe": [0.5, 1, 1, 1, 1, 0.5],
+    "Fu": [1] * 5,
+    "Wu": [1, -1, 1, -1, 1],
+    "We": [0.5, 0.5, -1, 0.5, 0.5, -1, 0.5, 0.5],
+}
+_W05 = {"Fe": [0.5, 1, 1, 0.5], "Fu": [1] * 3, "Wu": [1, -1, 1], "We": [0.5, 0.5, -1, 0.5, 0.5]}
+_W06 = {
+    "Fe": [0.5, *[1] * 6, 0.5],
+    "Fu": [1] * 7,
+    "Wu": [0.5, 1, -1, 1, 1, -1, 1, 0.5],
+    "We": [1, 0.5, -1, 0.5, 1, 0.5, -1, 0.5, 1],
+}
+# courses, stones, associative and non-associative λ (Ferris & Tin-Loi 2001, Gilbert et al. 2006, via HybriDFEM)
+WALLS = {
+    "W01": (bond(5, 6, halves_first=True), 33, 0.64286, 0.64),
+    "W02": (bond(5, 10, halves_first=True), 55, 0.58, 0.563),
+    "W03": (_courses(_W03, f"Fe Fu Fe {_WINDOW} Fe Fu Fe"), 46, 0.40369, 0.356),
+    "W04": (_courses(_W04, f"Fe Fu Fe {_WINDOW} Fe Fu Fe"), 55, 0.33195, 0.264),
+    "W05": (_courses(_W05, f"Fe Fu Fe {_WINDOW} Fe Fu Fe {_WINDOW} Fe Fu Fe"), 61, 0.23964, 0.215),
+    "W06": (_courses(_W06, f"Fe Fu Fe Fu {_WINDOW} Fu Fe Fu {_WINDOW} Fu Fe Fu Fe"), 146, 0.34782, 0.297),
+}
+
+
+def standing(blocks, law=None):
+    return assembly(Scene("limit", tuple(blocks), contact=ContactSettings(law or DryJoint(FRICTION))))
+
+
+@pytest.mark.parametrize("name", WALLS)
+def test_walls_have_their_published_loads(name):
+    courses, stones, associative, published = WALLS[name]
+    on = standing(running_bond(courses, *STONE))
+    assert len(on.free) == stones
+    bound = limit_load(on, ALONG)
+    assert bound.multiplier == pytest.approx(associative, rel=3e-5)
+    candidate = limit_load(on, ALONG, Flow.COULOMB)
+    assert candidate.converged
+    assert candidate.multiplier == pytest.approx(published, rel=1e-2)
+    assert candidate.multiplier < bound.multiplier
+
+
+@pytest.mark.parametrize(
+    ("count", "thickness", "friction"), [(7, 0.2, 0.7), (15, 0.15, 0.7), (12, 0.25, 0.5)]
+)
+def test_arches_agree_with_a_linear_programme(count, thickness, friction):
+    arch = semicircular_arch(count, thickness)
+    found = limit_load(standing(arch, DryJoint(friction)), ALONG)
+    assert found.multiplier == pytest.approx(multiplier(arch, friction), rel=1e-5)
+
+
+@pytest.mark.parametrize(("width", "height", "friction"), [(0.3, 3.0, 0.6), (0.5, 6.0, 0.6), (2.0, 1.0, 0.4)])
+def test_a_stone_topples_at_its_slenderness_or_slides_at_its_friction(width, height, friction):
+    on = standing([ground(), cuboid("S", (0, 0, 0), (width, 0.8, height))], DryJoint(friction))
+    for flow in Flow:
+        found = limit_load(on, ALONG, flow)
+        assert found.multiplier == pytest.approx(min(width / height, friction), rel=1e-6)
+
+
+def test_bonded_stones_bear_what_their_mortar_does():
+    """Four corners with a quarter of the bed each: two of them crack, W b/2 + s A b = λ W h/2 about the edge."""
+    width, depth, height, tension = 0.4, 0.5, 2.0, 2e4
+    on = standing(
+        [ground(), cuboid("S", (0, 0, 0), (width, depth, height))],
+        MortarJoint(friction=5.0, tension=tension, shear=1e6),
+    )
+    bed = 0.5 * tension * width * depth
+    found = limit_load(on, ALONG)
+    assert found.multiplier == pytest.approx(
+        (on.weight * width / 2 + bed * width) / (on.weight * height / 2), rel=1e-6
+    )
+
+
+def test_the_mechanism_balances_the_power_of_all_loads():
+    """Dry joints dissipate nothing where flow is associative: dead and live load do no work together."""
+    courses, *_ = WALLS["W03"]
+    on = standing(running_bond(courses, *STONE))
+    found = limit_load(on, ALONG)
+    power = found.velocity.ravel() @ (on.dead + found.multiplier * ALONG(on))
+    assert abs(power) < 1e-6 * (found.velocity.ravel() @ ALONG(on))
+    u = (on.lift.T @ found.velocity.ravel()).reshape(-1, 3)
+    assert (u[:, 0] >= FRICTION * np.linalg.norm(u[:, 1:], axis=1) - 1e-6).all()
+
+
+def test_a_candidate_slides_without_opening():
+    courses, *_ = WALLS["W01"]
+    on = standing(running_bond(courses, *STONE))
+    found = limit_load(on, ALONG, Flow.COULOMB)
+    u = (on.lift.T @ found.velocity.ravel()).reshape(-1, 3)
+    bears = found.force[:, 0] > 1e-3 * on.weight / len(on.free)
+    assert np.abs(u[bears, 0]).max() < 0.02
+    assert np.linalg.norm(u[:, 1:], axis=1).max() > 0.1
+    left = on.lift @ found.force.ravel() + on.dead + found.multiplier * ALONG(on)
+    assert np.abs(left).max() < 1e-5 * on.weight
+
+
+def test_forces_and_weight_turn_into_one_another():
+    """A force of the stone's weight at its centre is the same push as an acceleration of gravity."""
+    on = standing([ground(), cuboid("S", (0, 0, 0), (0.5, 0.8, 2.0))])
+    push = limit_load(on, PointForce("S", (on.weight, 0.0, 0.0)))
+    assert push.multiplier == pytest.approx(limit_load(on, ALONG).multiplier, rel=1e-9)
+    low = limit_load(on, PointForce("S", (on.weight, 0.0, 0.0), (0.0, 0.4, 0.4)))
+    assert low.multiplier == pytest.approx(0.25 / 0.4, rel=1e-6)
+
+
+def test_what_falls_by_itself_is_told_from_what_nothing_limits():
+    leaning = cuboid("S", (4.0, 0, 0), (6.5, 0.8, 1.0))
+    falls = limit_load(standing([ground(half=5.0), leaning]), ALONG)
+    assert np.isnan(falls.multiplier)
+    assert "own weight" in falls.headline
+    assert falls.velocity.any()
+    pressed = standing([ground(), cuboid("S", (0, 0, 0), (0.5, 0.8, 2.0))])
+    endless = limit_load(pressed, Acceleration((0.0, 0.0, -1.0)))
+    assert np.isinf(endless.multiplier)
+    assert "nothing limits it" in endless.headline
+
+
+@pytest.mark.slow
+def test_forty_courses_of_forty_bricks():
+    """L7: within a minute; its own stones fall at least at their slenderness."""
+    on = standing(running_bond(bond(40, 40, halves_first=True), 0.2, 0.1))
+    found = limit_load(on, ALONG)
+    assert found.converged
+    assert 0.5 < found.multiplier <= FRICTION
