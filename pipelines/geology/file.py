@@ -8,6 +8,7 @@ from typing import Any, cast
 import numpy as np
 
 from mechanics.planar.measures.cells import Cell
+from mechanics.scene.loads.motions import ImposedMotion
 from moma.errors import SceneError
 from pipelines.geology.experiments.biaxial import Biaxial
 from pipelines.geology.experiments.deposition import Deposition
@@ -140,7 +141,7 @@ def _check_motion(scene: GeologyScene) -> None:
     time, smallest = scene.time, scene.sample.smallest
     with scene.document.at(scene.kind):
         setup = scene.experiment.setup(time.step, time.step * time.steps)
-    for motion in setup.loads.motions:
+    for motion in (one for one in setup.loads.motions if isinstance(one, ImposedMotion)):
         way = time.step * float(np.linalg.norm(np.atleast_2d(motion.velocity.value), axis=1).max())
         if way > smallest:
             scene.document.fail(
