@@ -40,7 +40,11 @@ def geology_record(
         summary=summary,
         versions=versions(),
         results=(),
-        settings={"kind": scene.kind, **{name: asdict(table) for name, table in tables.items()}},
+        settings={
+            "kind": scene.kind,
+            **{name: asdict(table) for name, table in tables.items()},
+            "layers": [asdict(layer) for layer in scene.layers],
+        },
         steps=result.steps,
         simulated=result.time,
         wall=summary["time"]["wall"],

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass
+from itertools import combinations_with_replacement
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 from archmodel.database.session import Database, open_database
 from archmodel.store.run_record import RunRecord
 from archmodel.store.runs import store_run
+from mechanics.arrays import Ints
 from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.planar.result import PlanarResult
 from mechanics.planar.scene import Disk, PlanarScene, PlanarTime
@@ -25,6 +27,7 @@ from pipelines.geology.observe import Observation, read_rows
 from pipelines.geology.record import geology_record
 from pipelines.geology.results import write_results
 from pipelines.geology.sample import PreparedSample, prepare
+from pipelines.geology.settings import Layer
 from pipelines.results.folder import UNFINISHED, check_replaceable
 from pipelines.run.planar import run_planar
 from pipelines.run.unfinished import UnfinishedRun
@@ -56,9 +59,6 @@ def planar_scene(scene: GeologyScene, sample: PreparedSample) -> PlanarScene:
     """Put the sample between the walls of the experiment."""
     contact, solver, time = scene.contact, scene.solver, scene.time
     setup = scene.experiment.setup(time.step, time.step * time.steps)
-    law: Law = DryJoint(contact.friction)
-    if contact.cohesion > 0:
-        law = LennardJones(contact.friction, contact.cohesion, contact.cohesion_range * scene.sample.smallest)
     codes = tuple(str(number) for number in range(1, len(sample.radius) + 1))
     wall_friction = contact.friction if contact.wall_friction is None else contact.wall_friction
     rules = tuple(
@@ -69,15 +69,19 @@ def planar_scene(scene: GeologyScene, sample: PreparedSample) -> PlanarScene:
         )
         if walls
     )
+    material, layers = _materials(scene, sample)
+    rules = (*_between_layers(scene, layers, material, codes), *rules)
     return PlanarScene(
         scene.name,
         tuple(
-            Disk(code, (float(x), float(y)), float(radius), scene.sample.density)
-            for code, (x, y), radius in zip(codes, sample.centre, sample.radius, strict=True)
+            Disk(code, (float(x), float(y)), float(radius), layers[number].density or scene.sample.density)
+            for code, (x, y), radius, number in zip(
+                codes, sample.centre, sample.radius, material.tolist(), strict=True
+            )
         ),
         setup.walls,
         (0.0, 0.0 if setup.weightless else -time.gravity),
-        law,
+        _law(scene, contact.friction, contact.cohesion),
         rules,
         largest_overlap=solver.largest_overlap,
         time=PlanarTime(time.step, time.theta, time.step * time.steps, stop_at_equilibrium=False),
@@ -91,6 +95,37 @@ def planar_scene(scene: GeologyScene, sample: PreparedSample) -> PlanarScene:
         min_sweeps=solver.min_iterations,
         loads=setup.loads,
     )
+
+
+def _law(scene: GeologyScene, friction: float, cohesion: float) -> Law:
+    if cohesion > 0:
+        return LennardJones(friction, cohesion, scene.contact.cohesion_range * scene.sample.smallest)
+    return DryJoint(friction)
+
+
+def _materials(scene: GeologyScene, sample: PreparedSample) -> tuple[Ints, tuple[Layer, ...]]:
+    """Return the number of the layer (nd,) of each disk, and the layers; what lies above the last is of the last."""
+    layers = scene.layers or (Layer(np.inf),)
+    number = np.searchsorted([layer.top for layer in layers[:-1]], sample.centre[:, 1])
+    return number.astype(np.int64), layers
+
+
+def _between_layers(
+    scene: GeologyScene, layers: tuple[Layer, ...], material: Ints, codes: tuple[str, ...]
+) -> list[LawRule]:
+    """Return a rule for each pair of layers: the smaller friction, and the smaller cohesion."""
+    if not scene.layers:
+        return []
+    contact, names = scene.contact, np.array(codes)
+    groups = [frozenset(names[material == number].tolist()) for number in range(len(layers))]
+    friction = [contact.friction if one.friction is None else one.friction for one in layers]
+    cohesion = [contact.cohesion if one.cohesion is None else one.cohesion for one in layers]
+    rules = []
+    for one, other in combinations_with_replacement(range(len(layers)), 2):
+        if groups[one] and groups[other]:
+            law = _law(scene, min(friction[one], friction[other]), min(cohesion[one], cohesion[other]))
+            rules.append(LawRule(groups[one], groups[other], law))
+    return rules
 
 
 def run_geology(

@@ -9,6 +9,7 @@ from sqlalchemy import select
 
 from archmodel.database.session import open_database
 from archmodel.tables.runs import CellResult
+from mechanics.planar.model import build_planar_model
 from mechanics.planar.scene import Disk, PlanarScene, PlanarTime
 from mechanics.planar.simulate import simulate_planar
 from moma.cli.geology import Experiment
@@ -16,7 +17,7 @@ from moma.errors import SceneError
 from pipelines.geology.file import EXPERIMENTS, parse_geology, read_geology
 from pipelines.geology.observe import CELL_COLUMNS, Fields, read_rows
 from pipelines.geology.results import quality_of
-from pipelines.geology.run import run_geology
+from pipelines.geology.run import planar_scene, run_geology
 from pipelines.geology.sample import PreparedSample, prepare
 from tests.docs.test_docs import commands
 from tests.moma.commands import answer, fails, prints
@@ -140,6 +141,64 @@ def test_a_sample_that_cannot_be_made_is_refused_at_its_line(tmp_path, written, 
         prepare(parse_geology(text, "fault.toml", "fault"), tmp_path)
     assert str(caught.value).startswith("fault.toml:4: ")
     assert said in str(caught.value)
+
+
+LAYERED = """
+[[layers]]
+top = 1.0
+density = 3000.0
+friction = 0.1
+cohesion = 50.0
+[[layers]]
+top = 2.0
+[[layers]]
+top = 9.0
+friction = 0.3
+cohesion = 20.0
+"""
+
+
+def test_layers_have_their_density_and_the_contacts_between_two_the_smaller_friction_and_cohesion(tmp_path):
+    scene = parse_geology(SMALL + LAYERED, "fault.toml", "fault")
+    sample = prepare(scene, tmp_path)
+    planar = planar_scene(scene, sample)
+    height = sample.centre[:, 1]
+    assert [disk.density for disk in planar.disks] == np.where(height < 1.0, 3000.0, 2800.0).tolist()
+    layer = np.digitize(height, [1.0, 2.0])
+    model, _ = build_planar_model(planar)
+    some = [int(np.flatnonzero(layer == number)[0]) for number in range(3)]
+    others = [int(np.flatnonzero(layer == number)[1]) for number in range(3)]
+    pairs = np.array([(some[one], others[two]) for one in range(3) for two in range(3)])
+    laws = [model.laws.laws[number] for number in model.laws.of(pairs)]
+    assert [law.friction for law in laws] == [0.1, 0.1, 0.1, 0.1, 0.4, 0.3, 0.1, 0.3, 0.3]
+    assert [getattr(law, "force", 0.0) for law in laws] == [
+        50.0,
+        0.0,
+        20.0,
+        0.0,
+        0.0,
+        0.0,
+        20.0,
+        0.0,
+        20.0,
+    ]
+
+
+def test_layers_that_do_not_follow_each_other_are_refused_at_their_line():
+    text = SMALL + LAYERED.replace("top = 2.0", "top = 0.5")
+    line = text.splitlines().index("top = 0.5") + 1
+    with pytest.raises(
+        SceneError, match=f"^fault.toml:{line}: top = 0.5 is not above that of the layer before, 1"
+    ):
+        parse_geology(text, "fault.toml", "fault")
+
+
+def test_two_sizes_have_their_share(tmp_path):
+    text = SMALL.replace("layers = 3", "layers = 3\nlarge_share = 0.25")
+    radius = prepare(parse_geology(text, "fault.toml", "fault"), tmp_path).radius
+    assert set(radius.tolist()) == {0.2, 0.3}
+    # binomial: 3 standard deviations of some 200 disks
+    assert (radius == 0.3).mean() == pytest.approx(0.25, abs=0.1)
 
 
 def test_a_sample_is_made_once(tmp_path):
